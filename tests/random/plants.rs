@@ -9,6 +9,8 @@ use glam::DVec3;
 pub struct Plant {
     pub name: &'static str,
     pub relation: Relation,
+    /// Seed of a scene in which the fault can be seen.
+    pub seed: u64,
     /// Spoils the scene or what it is compared with; false where there is nothing to spoil.
     pub spoil: fn(&mut World, &mut Other) -> bool,
 }
@@ -111,25 +113,25 @@ fn turn_lights_off(world: &mut World, other: &mut Other) -> bool {
 
 /// Every relation with a fault that breaks it.
 pub fn plants() -> Vec<Plant> {
-    let plant = |name, relation, spoil| Plant { name, relation, spoil };
-    let hiding = |relation| plant("lights hide themselves", relation, hide);
+    let plant = |name, relation, seed, spoil| Plant { name, relation, seed, spoil };
+    let hiding = |relation| plant("lights hide themselves", relation, 0, hide);
     vec![
         hiding(Relation::Moved),
         hiding(Relation::Turned),
         hiding(Relation::Subdivided),
         hiding(Relation::FarThing),
         hiding(Relation::Method(caustique::render::Method::Bdpt)),
-        plant("lamps do not grow with the scene", Relation::Scaled, keep_intensity),
-        plant("the largest copy is lost", Relation::Copied, lose_a_thing),
-        plant("the first light is lost", Relation::Reordered, turn_lights_off),
-        plant("lights hide each other", Relation::LightsSplit, hide),
-        plant("a light is lost", Relation::SumOfLights, lose_a_light),
-        plant("light does not double", Relation::Doubled, double_less),
-        plant("channels stay", Relation::Permuted, forget_channels),
-        plant("glass is glued to the floor", Relation::Lifted, glue),
-        plant("the window shows more", Relation::Cropped, widen),
-        plant("lamps are a tenth too bright", Relation::Usd, brighten),
-        plant("a mirror is forgotten", Relation::MirroredTwice, forget_a_mirror),
+        plant("lamps do not grow with the scene", Relation::Scaled, 2, keep_intensity),
+        plant("the largest copy is lost", Relation::Copied, 0, lose_a_thing),
+        plant("the first light is lost", Relation::Reordered, 1, turn_lights_off),
+        plant("lights hide each other", Relation::LightsSplit, 0, hide),
+        plant("a light is lost", Relation::SumOfLights, 4, lose_a_light),
+        plant("light does not double", Relation::Doubled, 0, double_less),
+        plant("channels stay", Relation::Permuted, 0, forget_channels),
+        plant("glass is glued to the floor", Relation::Lifted, 57, glue),
+        plant("the window shows more", Relation::Cropped, 0, widen),
+        plant("lamps are a tenth too bright", Relation::Usd, 0, brighten),
+        plant("a mirror is forgotten", Relation::MirroredTwice, 0, forget_a_mirror),
     ]
 }
 
