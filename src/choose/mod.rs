@@ -20,7 +20,7 @@ pub use weights::Weight;
 use crate::camera::Camera;
 use crate::finish::Finish;
 use crate::render::{Candidate, Clock, Cost, Session, Settings, Spent, Stage, cpu_seconds};
-use crate::scene::Scene;
+use crate::scene::{Scene, View};
 use pilot::Pilot;
 use weights::Weighed;
 
@@ -52,7 +52,7 @@ impl Choice {
 /// Tries the candidates and takes one by what `finish` makes of them. `make` gives the settings of a way, `None` where
 /// other wishes rule it out. Once `stop` holds, what is tried ends as soon as it can, and the choice is worth nothing.
 pub fn choose(
-    (scene, camera): (&Scene, &Camera),
+    View { scene, camera }: View<'_>,
     finish: &mut Finish,
     make: impl Fn(Candidate) -> Option<Settings>,
     stop: impl Fn() -> bool,

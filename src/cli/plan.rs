@@ -8,6 +8,7 @@ use caustique::options::number::threads;
 use caustique::options::{RenderOptions, SceneOptions};
 use caustique::pipeline::{Loaded, Outlook, check, outlook, plan, sized};
 use caustique::plan::{EffectPlan, Plan};
+use caustique::scene::View;
 use serde_json::json;
 
 /// Say which effects a scene calls for, which will be simulated, and why.
@@ -46,18 +47,19 @@ fn report(args: &PlanArgs) -> Result<()> {
     // Options that contradict each other are errors here, too.
     let settings = job.settings()?;
     let Loaded { scene, removed } = scene::read(&job.scene, Form::beside(args.json), rayon::current_num_threads())?;
-    let camera = scene.camera(&job.view()?)?;
+    let camera = scene.camera(&job.camera_request()?)?;
+    let view = View::new(&scene, &camera);
     check::media(&job.scene.path, &settings, &scene)?;
     let make = |candidate| job.allowed(candidate, camera.size());
     let choice = if job.method.0.is_none() {
         let mut finish = job.pilot_finish();
-        let tried = || choose((&scene, &camera), &mut finish, make, || false);
+        let tried = || choose(view, &mut finish, make, || false);
         Form::beside(args.json).during("choosing a method", tried)
     } else {
         None
     };
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: job.max_depth, switches: job.scene.switches() };
-    let mut plan = plan::plan(&asked, settings.method, (&scene, &camera), &removed);
+    let mut plan = plan::plan(&asked, settings.method, view, &removed);
     let of_scene = &scene.warnings;
     plan.warnings.splice(0..0, of_scene.iter().cloned());
     let outlook = match job.target_error {
@@ -65,7 +67,7 @@ fn report(args: &PlanArgs) -> Result<()> {
             let settings = choice.as_ref().map_or(&settings, |choice| &choice.settings);
             let settings = sized(settings.clone(), job.photons, camera.size());
             let mut finish = job.outlook_finish()?;
-            let tried = || outlook((&scene, &camera), &settings, &mut finish, error);
+            let tried = || outlook(view, &settings, &mut finish, error);
             Some((error, Form::beside(args.json).during("trying how the error falls", tried)?))
         }
         None => None,
@@ -182,15 +184,15 @@ mod tests {
     use caustique::plan::switch::Removed;
     use caustique::plan::{Effect, Switches};
     use caustique::render;
-    use caustique::scene::{Description, Scene, View};
+    use caustique::scene::{CameraRequest, Description, Scene};
 
     /// Columns of figures are there when something has measured them, with a dash where it has not.
     #[test]
     fn figures_have_columns() {
         let scene = Scene::build(Description::default(), 1).unwrap();
-        let camera = scene.camera(&View::default()).unwrap();
+        let camera = scene.camera(&CameraRequest::default()).unwrap();
         let asked = plan::Asked { choice: None, max_depth: None, switches: Switches::default() };
-        let mut plan = plan::plan(&asked, render::Method::Vcm, (&scene, &camera), &Removed::default());
+        let mut plan = plan::plan(&asked, render::Method::Vcm, View::new(&scene, &camera), &Removed::default());
         assert_eq!(columns(&plan).len(), 2);
         let caustic = &mut plan.effects[Effect::Caustic as usize];
         (caustic.energy, caustic.seconds_per_iteration, caustic.error_if_off) = (Some(0.123), Some(0.25), Some(0.4));

@@ -21,7 +21,7 @@ use crate::render::{
     BandwidthRule, Candidate, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, Method,
     PHOTON_BYTES, RadiusRule, Settings, Shard,
 };
-use crate::scene::{MAX_SIZE, View};
+use crate::scene::{CameraRequest, MAX_SIZE};
 use crate::stat::sum::MOST_TERMS;
 use crate::stop::Stop;
 use crate::transport::{Indirect, MAX_LEVELS};
@@ -169,10 +169,10 @@ impl RenderOptions {
     ///
     /// # Errors
     /// A filter that there is not.
-    pub fn view(&self) -> Result<View> {
+    pub fn camera_request(&self) -> Result<CameraRequest> {
         let crop = self.crop.as_ref().map(|choice| choice.crop);
         let filter = self.filter.as_deref().map_or(Ok(Filter::default()), filter)?;
-        Ok(View { camera: self.camera.clone(), width: self.width, height: self.height, crop, filter })
+        Ok(CameraRequest { camera: self.camera.clone(), width: self.width, height: self.height, crop, filter })
     }
 
     /// The render asked for; with `auto` settings by which effects are weighed.

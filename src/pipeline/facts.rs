@@ -7,7 +7,7 @@ use crate::light::MAX_GROUPS;
 use crate::render::output::shape;
 use crate::render::{Part, Settings};
 use crate::scene::description::PictureDefaults;
-use crate::scene::{MAX_SIZE, Scene, View};
+use crate::scene::{CameraRequest, MAX_SIZE, Scene};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
@@ -31,11 +31,11 @@ impl Facts {
     /// Those of a render of a scene with these settings.
     ///
     /// # Errors
-    /// There is no such view.
-    pub(super) fn new(scene: &Scene, view: &View, settings: &Settings) -> Result<Facts> {
-        let whole = scene.whole_camera(view)?;
+    /// The scene has no such camera.
+    pub(super) fn new(scene: &Scene, request: &CameraRequest, settings: &Settings) -> Result<Facts> {
+        let whole = scene.whole_camera(request)?;
         let (width, height) = whole.size();
-        let [x, y, ..] = scene.window(view, (width, height))?.unwrap_or_default();
+        let [x, y, ..] = scene.window(request, (width, height))?.unwrap_or_default();
         let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
         Ok(Facts {
             shape: shape(settings, scene),

@@ -4,7 +4,7 @@
 use crate::camera::Camera;
 use crate::choose::{small, window_factor};
 use crate::render::{Session, Settings, Stage};
-use crate::scene::Scene;
+use crate::scene::View;
 
 /// Pixels of the smaller picture, at most.
 const PIXELS: f64 = 64.0 * 64.0;
@@ -15,9 +15,9 @@ const FACTOR: f64 = 1.25;
 const LEAST_SECONDS: f64 = 1.0;
 
 /// The warning, if an iteration takes more time than there is.
-pub(super) fn warn((scene, camera): (&Scene, &Camera), settings: &Settings) -> Option<String> {
+pub(super) fn warn(view: View<'_>, settings: &Settings) -> Option<String> {
     let time = settings.time?;
-    let seconds = seconds((scene, camera), settings)?;
+    let seconds = seconds(view, settings)?;
     let remedy = match settings.method.counts_photons() {
         true => "fewer --photons, a smaller --width or more --time",
         false => "a smaller --width or more --time",
@@ -28,7 +28,7 @@ pub(super) fn warn((scene, camera): (&Scene, &Camera), settings: &Settings) -> O
 }
 
 /// About how long an iteration takes. The smaller picture is no window: the light paths around one are counted.
-fn seconds((scene, camera): (&Scene, &Camera), settings: &Settings) -> Option<f64> {
+fn seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Option<f64> {
     let count = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
     let pixels = |camera: &Camera| count(camera.size());
     let walked = camera.sizes().map(count)[usize::from(settings.method.walks_whole_picture())];

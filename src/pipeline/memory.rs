@@ -1,6 +1,5 @@
 //! Whether a render fits into memory, asked before it begins.
 
-use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::estimator::Pixel;
 use crate::estimator::rule::{adaptive, chi_squared, local};
@@ -13,7 +12,7 @@ use crate::render::{
     BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, WHOLE_TILE, bytes_of_measures, bytes_per_whole_tile,
     photons_per_path,
 };
-use crate::scene::Scene;
+use crate::scene::View;
 use crate::transport::{MergePhoton, Splat};
 use std::fmt::Display;
 use std::mem::size_of;
@@ -105,7 +104,7 @@ impl Cap {
     /// Not even the least fits.
     pub fn plan(
         self,
-        (scene, camera): (&Scene, &Camera),
+        View { scene, camera }: View<'_>,
         settings: Settings,
         channels: usize,
     ) -> Result<(Settings, Option<String>)> {
@@ -161,10 +160,11 @@ impl Cap {
 ///
 /// # Errors
 /// They need more memory than there is.
-pub fn check(stage: (&Scene, &Camera), settings: &Settings, channels: usize, finishes: bool) -> Result<()> {
-    let size = stage.1.size();
-    let groups = stage.0.lights.groups().names.len();
-    let needed = needed(stage.1.sizes(), (channels, groups), settings, photons_per_path(stage.0, stage.1, settings));
+pub fn check(view: View<'_>, settings: &Settings, channels: usize, finishes: bool) -> Result<()> {
+    let View { scene, camera } = view;
+    let size = camera.size();
+    let groups = scene.lights.groups().names.len();
+    let needed = needed(camera.sizes(), (channels, groups), settings, photons_per_path(scene, camera, settings));
     let needed = needed + if finishes { finish_bytes(size, groups) } else { 0 };
     let paths = if settings.method.counts_photons() {
         let each = if settings.method.has_one_map() { "" } else { " an iteration" };
@@ -188,8 +188,8 @@ const COMBINED_CHANNELS: usize = 37;
 ///
 /// # Errors
 /// They need more memory than there is.
-pub fn check_all<'a>(stage: (&Scene, &Camera), all: impl Iterator<Item = &'a Settings>) -> Result<()> {
-    let (scene, camera) = stage;
+pub fn check_all<'a>(view: View<'_>, all: impl Iterator<Item = &'a Settings>) -> Result<()> {
+    let View { scene, camera } = view;
     let [(width, height), whole] = camera.sizes();
     let each = |settings| {
         needed([(width, height), whole], (COMBINED_CHANNELS, 0), settings, photons_per_path(scene, camera, settings))

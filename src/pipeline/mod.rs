@@ -35,7 +35,6 @@ use deliver::{Writing, deliver};
 use saver::Saver;
 use shard::Tail;
 
-use crate::camera::Camera;
 use crate::choose::{self, Choice};
 use crate::error::{Error, Kind, Result};
 use crate::film::{LayerSet, Naming, Selection, finished_part, output as film};
@@ -45,7 +44,7 @@ use crate::image::exr;
 use crate::plan::{Plan, Switches};
 use crate::render::output::shape;
 use crate::render::{Candidate, Control, Progress, Rendered, Session, Settings, Spent, Stage, StopReason, drive};
-use crate::scene::{Scene, View};
+use crate::scene::{CameraRequest, Scene, View};
 use crate::stop::Stop;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
@@ -66,7 +65,7 @@ pub struct Order<'a> {
     /// The scene, and how it is read.
     pub scene: load::Order,
     /// Camera and size.
-    pub view: View,
+    pub camera: CameraRequest,
     /// How light is found, and when to stop. With `auto` what its options come to for [`Candidate::GATHERING`].
     pub settings: Settings,
     /// Light paths of an iteration; `None`: what is usual.
@@ -178,9 +177,9 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     let Loaded { scene, removed } = loaded;
     let auto = order.auto.take();
     watch.loaded(scene)?;
-    let camera = scene.camera(&order.view)?;
-    let stage = (scene, &camera);
-    let (settings, selection) = checked(&order, stage)?;
+    let camera = scene.camera(&order.camera)?;
+    let view = View::new(scene, &camera);
+    let (settings, selection) = checked(&order, view)?;
     let kept = order.saving.is_some() || order.resume.is_some() || settings.is_shard();
     let identity = if kept { order.hash(scene)? } else { None };
     let saved = order.resume.as_deref().map(checkpoint::read).transpose()?;
@@ -194,20 +193,20 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
             (None, settings_of_candidate(&auto, candidate, camera.size()).unwrap_or(settings), candidate)
         }
         None => {
-            let choice = choose(&order, auto, stage, &settings, watch)?;
+            let choice = choose(&order, auto, view, &settings, watch)?;
             let settings = choice.as_ref().map_or(settings, |choice| choice.settings.clone());
             let candidate = choice.as_ref().map(|choice| choice.candidate);
             (choice, settings, candidate)
         }
     };
-    let (settings, less) = fitted(&order, stage, settings)?;
+    let (settings, less) = fitted(&order, view, settings)?;
     let asked = plan::Asked { choice: choice.as_ref(), max_depth: order.max_depth, switches: order.switches };
-    let mut plan = plan::plan(&asked, settings.method, stage, removed);
+    let mut plan = plan::plan(&asked, settings.method, view, removed);
     plan.warnings.extend(less);
     plan.warnings.extend(ungrouped(scene, &settings));
     let dark = layers::dark(&selection, &shape(&settings, scene), order.finish.is_some());
     plan.warnings.extend(dark.iter().map(|name| format!("layer \"{name}\" is black: the render has no such light")));
-    let (mut ready, settings) = readied(&order, stage, settings, &selection, watch)?;
+    let (mut ready, settings) = readied(&order, view, settings, &selection, watch)?;
     // The error that is asked for is that of the picture that is delivered.
     let (target, settings) = match (&ready, settings.target_error) {
         (Some(_), Some(target)) => (Some(target), Settings { target_error: None, ..settings }),
@@ -216,12 +215,12 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     let settings = Settings { stop: watch.stop(), ..settings };
     // ErrorCoverage, but not kept in the header: a clock says so.
     let kept = plan.warnings.len();
-    plan.warnings.extend(hurry::warn(stage, &settings));
+    plan.warnings.extend(hurry::warn(view, &settings));
     watch.begins(&plan, &settings);
     plan.warnings.truncate(kept);
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
-    let facts = Facts::new(scene, &order.view, &settings)?;
+    let facts = Facts::new(scene, &order.camera, &settings)?;
     let stage = Stage::new(scene, &camera, &settings);
     let (mut session, told) = match saved {
         None => {
@@ -340,7 +339,8 @@ fn preview(session: &mut Session<'_>, ready: Option<&mut Ready>, frame: &exr::Fr
 }
 
 /// The settings for the picture's size, and the layers that are wanted, once both are known to fit the scene.
-fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Settings, Selection)> {
+fn checked(order: &Order<'_>, view: View<'_>) -> Result<(Settings, Selection)> {
+    let View { scene, camera } = view;
     check::media(&order.scene.path, &order.settings, scene)?;
     check::bandwidth(&order.scene.path, &order.settings, scene)?;
     let settings = sized(order.settings.clone(), order.photons, camera.size());
@@ -348,18 +348,18 @@ fn checked(order: &Order<'_>, (scene, camera): (&Scene, &Camera)) -> Result<(Set
     let selection = layers::selection(&order.layers, &shape, finishes)?;
     layers::check_names(&selection, &shape, finishes, order.naming)?;
     // Before anything is tried, which takes time.
-    fitted(order, (scene, camera), settings.clone())?;
+    fitted(order, view, settings.clone())?;
     Ok((settings, selection))
 }
 
 /// Settings that fit into memory, and what the cap that was asked for takes from them.
-fn fitted(order: &Order<'_>, stage: (&Scene, &Camera), settings: Settings) -> Result<(Settings, Option<String>)> {
-    let channels = layers::channels(&shape(&settings, stage.0));
+fn fitted(order: &Order<'_>, view: View<'_>, settings: Settings) -> Result<(Settings, Option<String>)> {
+    let channels = layers::channels(&shape(&settings, view.scene));
     let (settings, less) = match order.memory {
-        Some(cap) => cap.plan(stage, settings, channels)?,
+        Some(cap) => cap.plan(view, settings, channels)?,
         None => (settings, None),
     };
-    memory::check(stage, &settings, channels, order.finish.is_some())?;
+    memory::check(view, &settings, channels, order.finish.is_some())?;
     Ok((settings, less))
 }
 
@@ -372,7 +372,7 @@ pub fn sized(settings: Settings, photons: Option<u32>, size: (u32, u32)) -> Sett
 fn choose(
     order: &Order<'_>,
     auto: Option<Auto<'_>>,
-    (scene, camera): (&Scene, &Camera),
+    View { scene, camera }: View<'_>,
     settings: &Settings,
     watch: &mut dyn Watch,
 ) -> Result<Option<Choice>> {
@@ -388,7 +388,7 @@ fn choose(
                 Some(Settings { techniques, ..settings })
             };
             watch.waits(Some(Wait::Choosing));
-            let chosen = choose::choose((scene, camera), &mut auto.finish, make, || watch.stops());
+            let chosen = choose::choose(View { scene, camera }, &mut auto.finish, make, || watch.stops());
             watch.waits(None);
             chosen
         }
@@ -401,7 +401,7 @@ fn choose(
 /// joined.
 fn readied(
     order: &Order<'_>,
-    (scene, camera): (&Scene, &Camera),
+    View { scene, camera }: View<'_>,
     settings: Settings,
     selection: &Selection,
     watch: &mut dyn Watch,

@@ -6,7 +6,7 @@ use crate::choose::small;
 use crate::error::Result;
 use crate::finish::{Finish, reads_for_error};
 use crate::render::{Accuracy, LEAST, Session, Settings, Spent, Stage};
-use crate::scene::Scene;
+use crate::scene::View;
 use serde::Serialize;
 
 /// Pixels of the pilot's picture.
@@ -36,7 +36,7 @@ pub struct Outlook {
 /// # Errors
 /// The denoiser fails.
 pub fn outlook(
-    (scene, camera): (&Scene, &Camera),
+    View { scene, camera }: View<'_>,
     settings: &Settings,
     finish: &mut Finish,
     error: f64,

@@ -1,11 +1,10 @@
 //! The plan of a render, with what a pilot has measured.
 
-use crate::camera::Camera;
 use crate::choose::{Choice, Trial};
 use crate::plan::switch::Removed;
 use crate::plan::{self, Plan, Switches};
 use crate::render::Method;
-use crate::scene::Scene;
+use crate::scene::View;
 
 /// What decides what a plan says.
 #[derive(Clone, Copy)]
@@ -19,7 +18,7 @@ pub struct Asked<'a> {
 }
 
 /// The plan of a render by a method, of a scene that was built without what is `removed`.
-pub fn plan(asked: &Asked<'_>, method: Method, (scene, camera): (&Scene, &Camera), removed: &Removed) -> Plan {
+pub fn plan(asked: &Asked<'_>, method: Method, View { scene, camera }: View<'_>, removed: &Removed) -> Plan {
     let Asked { choice, max_depth, switches } = *asked;
     let method = choice.map_or(method, |choice| choice.candidate.method);
     let because = choice.map_or("asked for".into(), why);

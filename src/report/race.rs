@@ -11,10 +11,9 @@ use super::outcome::Look;
 use super::point::Point;
 use super::reference::Reference;
 use super::spool::Spool;
-use crate::camera::Camera;
 use crate::error::Result;
 use crate::render::{Control, Session, Settings, Stage};
-use crate::scene::Scene;
+use crate::scene::View;
 use std::collections::VecDeque;
 use std::path::Path;
 
@@ -43,7 +42,7 @@ pub struct Step<'a> {
 /// # Errors
 /// The file system, before anything is rendered.
 pub fn race(
-    (scene, camera): (&Scene, &Camera),
+    View { scene, camera }: View<'_>,
     mut field: Field<'_>,
     rules: &Rules,
     reference: &Reference,

@@ -1,6 +1,7 @@
 //! The scene: read from a file into a plain [`Description`], then validated and committed into a [`Scene`].
 
 mod build;
+mod camera_request;
 pub mod contact;
 mod contacts;
 mod dense;
@@ -13,11 +14,12 @@ mod survey;
 pub mod usd;
 mod view;
 
+pub use camera_request::{CameraRequest, Crop, MAX_SIZE};
 pub use contacts::Contacts;
 pub use description::Description;
 pub use nesting::{EMPTY_STACK, SolidStack, SolidStacks};
 pub use survey::Survey;
-pub use view::{Crop, MAX_SIZE, View};
+pub use view::View;
 
 use crate::error::Result;
 use crate::geometry::{Shapes, Surface};

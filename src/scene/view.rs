@@ -1,185 +1,20 @@
-//! The camera of a picture: chosen by name, sized, or made when the scene has none.
+//! A scene as one camera sees it.
 
 use super::Scene;
-use super::description::{CameraDescription, Projection};
-use crate::camera::{self, Camera, Filter};
-use crate::error::{Error, Kind, Result};
-use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2};
+use crate::camera::Camera;
 
-/// Width of a picture when nothing is asked for.
-const DEFAULT_WIDTH: u32 = 1280;
-/// Aspect ratio of a picture when neither the camera nor the user gives one.
-const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
-/// Largest width or height.
-pub const MAX_SIZE: u32 = 32_768;
-
-/// What the user asks of the picture.
-#[derive(Clone, Debug, Default)]
-pub struct View {
-    /// Name of the camera; the first one otherwise.
-    pub camera: Option<String>,
-    /// Width in pixels.
-    pub width: Option<u32>,
-    /// Height in pixels.
-    pub height: Option<u32>,
-    /// The window that is rendered; the scene's own, or all, otherwise.
-    pub crop: Option<Crop>,
-    /// Pixel filter.
-    pub filter: Filter,
+/// A scene and the camera that a render, a plan or a pilot looks through.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The camera, sized for the picture.
+    pub camera: &'a Camera,
 }
 
-/// A window of a picture: left edge, top edge, width and height.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Crop {
-    /// In pixels.
-    Pixels([u32; 4]),
-    /// In shares of the picture's width and height.
-    Shares([f64; 4]),
-}
-
-impl Crop {
-    /// The window in a picture of that size, in pixels: at least one, where shares are small. `None` where it is not
-    /// within the picture or empty.
-    pub fn window(self, (width, height): (u32, u32)) -> Option<[u32; 4]> {
-        let [x, y, w, h] = match self {
-            Crop::Pixels(window) => window,
-            Crop::Shares([x, y, w, h]) => {
-                let along = |start: f64, length: f64, side: u32| {
-                    let side_f = f64::from(side);
-                    let first = ((start * side_f).round() as u32).min(side.saturating_sub(1));
-                    let last = (((start + length) * side_f).round() as u32).min(side);
-                    (first, last.saturating_sub(first).max(1))
-                };
-                let ((x, w), (y, h)) = (along(x, w, width), along(y, h, height));
-                [x, y, w, h]
-            }
-        };
-        let fits =
-            |start: u32, length: u32, side: u32| length > 0 && start.checked_add(length).is_some_and(|end| end <= side);
-        (fits(x, w, width) && fits(y, h, height)).then_some([x, y, w, h])
+impl<'a> View<'a> {
+    /// The view of `scene` through `camera`.
+    pub fn new(scene: &'a Scene, camera: &'a Camera) -> View<'a> {
+        View { scene, camera }
     }
-}
-
-impl Scene {
-    /// The camera for `view`, of its window of the picture. One of width and height given keeps the camera's aspect
-    /// ratio.
-    ///
-    /// # Errors
-    /// No camera has the name, the size is zero or too large, or the window is not within the picture.
-    pub fn camera(&self, view: &View) -> Result<Camera> {
-        let whole = self.whole_camera(view)?;
-        Ok(self.window(view, whole.size())?.map_or(whole, |window| whole.window(window)))
-    }
-
-    /// The window that is rendered of a picture of that size, in pixels, if not all of it.
-    ///
-    /// # Errors
-    /// It is not within the picture.
-    pub fn window(&self, view: &View, size: (u32, u32)) -> Result<Option<[u32; 4]>> {
-        let Some(crop) = view.crop.or(self.picture.crop.map(Crop::Shares)) else { return Ok(None) };
-        let window = crop.window(size).ok_or_else(|| {
-            let (width, height) = size;
-            let cause = format!("--crop: the window is not within the picture of {width} x {height} pixels");
-            Error::usage(cause).hint(
-                "it is X,Y,W,H: left edge, top edge, width and height, in pixels or in shares such as 0.25,0,0.5,1",
-            )
-        })?;
-        Ok(Some(window).filter(|window| *window != [0, 0, size.0, size.1]))
-    }
-
-    /// The camera for `view`, of the whole picture.
-    ///
-    /// # Errors
-    /// No camera has the name, or the size is zero or too large.
-    pub fn whole_camera(&self, view: &View) -> Result<Camera> {
-        let default;
-        let described = match &view.camera {
-            Some(name) => self.cameras.iter().find(|c| &c.name == name).ok_or_else(|| {
-                let names: Vec<String> = self.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
-                let error =
-                    Error::new(Kind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
-                error.hint(if names.is_empty() {
-                    "the scene has no camera".into()
-                } else {
-                    format!("it has {}", names.join(", "))
-                })
-            })?,
-            None => match self.cameras.first() {
-                Some(camera) => camera,
-                None => {
-                    default = self.default_camera();
-                    &default
-                }
-            },
-        };
-        let aspect = match (self.picture.resolution, described.projection) {
-            (Some([width, height]), _) => width as f32 / height as f32,
-            (None, Projection::Perspective { aspect, .. }) => aspect.unwrap_or(DEFAULT_ASPECT),
-            (None, Projection::Orthographic { xmag, ymag }) => (xmag / ymag).abs(),
-        };
-        let scaled = |x: u32, factor: f32| ((x as f32 * factor).round() as u32).max(1);
-        let (width, height) = match (view.width, view.height) {
-            (Some(w), Some(h)) => (w, h),
-            (Some(w), None) => (w, scaled(w, 1.0 / aspect)),
-            (None, Some(h)) => (scaled(h, aspect), h),
-            (None, None) => match self.picture.resolution {
-                Some([width, height]) => (width, height),
-                None => (DEFAULT_WIDTH, scaled(DEFAULT_WIDTH, 1.0 / aspect)),
-            },
-        };
-        if width == 0 || height == 0 || width > MAX_SIZE || height > MAX_SIZE {
-            let cause = format!("a picture of {width} x {height} pixels cannot be made");
-            return Err(
-                Error::new(Kind::Usage, "", cause).hint(format!("--width and --height are from 1 to {MAX_SIZE}"))
-            );
-        }
-        let film_aspect = width as f32 / height as f32;
-        let projection = match described.projection {
-            Projection::Perspective { yfov, .. } => {
-                let half = (0.5 * yfov).tan();
-                camera::Projection::Perspective(Vec2::new(half * film_aspect, half))
-            }
-            Projection::Orthographic { xmag, ymag } => {
-                // A picture of another aspect shows all of the camera's view.
-                let ymag = ymag.abs().max(xmag.abs() / film_aspect);
-                camera::Projection::Orthographic(Vec2::new(ymag * film_aspect, ymag))
-            }
-        };
-        let lens = if described.aperture_radius > 0.0 && described.focus_distance > 0.0 {
-            (described.aperture_radius, described.focus_distance)
-        } else {
-            (0.0, 1.0)
-        };
-        let position = described.to_world.translation - self.origin;
-        let camera = Camera::new(position, rotation(&described.to_world), projection, lens, (width, height));
-        Ok(camera.shifted(described.shift.into()).filtered(view.filter))
-    }
-
-    /// A view of the whole scene from the front, a little from above.
-    fn default_camera(&self) -> CameraDescription {
-        let yfov = 40f32.to_radians();
-        let sky = self.lights.sky();
-        let distance = f64::from(sky.radius) / f64::from(0.5 * yfov).sin();
-        let back = DVec3::new(0.0, 0.35, 1.0).normalize();
-        let right = DVec3::Y.cross(back).normalize();
-        let matrix = DMat3::from_cols(right, back.cross(right), back);
-        let position = sky.center.as_dvec3() + self.origin + back * distance;
-        CameraDescription {
-            name: "default".into(),
-            to_world: DAffine3 { matrix3: matrix, translation: position },
-            projection: Projection::Perspective { yfov, aspect: None },
-            aperture_radius: 0.0,
-            focus_distance: 1.0,
-            shift: [0.0; 2],
-        }
-    }
-}
-
-/// Orthonormal axes of a node's transform; left-handed where that mirrors, so that +X stays to the right.
-fn rotation(to_world: &DAffine3) -> Mat3 {
-    let back = to_world.matrix3.z_axis.normalize_or(DVec3::Z);
-    let up = to_world.matrix3.y_axis;
-    let right = up.cross(back).normalize_or(DVec3::X);
-    let hand = if to_world.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
-    DMat3::from_cols(hand * right, back.cross(right), back).as_mat3()
 }

@@ -7,7 +7,7 @@ use caustique::choose::counted_cost;
 use caustique::render::Candidate;
 use caustique::render::{Levels, Method, Session, Settings, Stage, cpu_seconds};
 use caustique::scene::gltf::{ReadOptions, read};
-use caustique::scene::{Scene, View};
+use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::Indirect;
 
 /// What counts is the median of so many.
@@ -32,7 +32,9 @@ fn main() {
     for path in arguments.iter().filter(|a| !a.contains('=')) {
         let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-        let camera = scene.camera(&View { width: Some(width), ..View::default() }).unwrap_or_else(|e| panic!("{e}"));
+        let camera = scene
+            .camera(&CameraRequest { width: Some(width), ..CameraRequest::default() })
+            .unwrap_or_else(|e| panic!("{e}"));
         for way in ways {
             let settings = Settings::of(way);
             let settings = Settings { levels: levels.unwrap_or(settings.levels), ..settings };

@@ -12,7 +12,7 @@ use caustique::photon::ThinningKey;
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Levels, Method, Session, Settings, Stage};
 use caustique::scene::gltf::{ReadOptions, read};
-use caustique::scene::{Scene, View};
+use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::Found;
 use serde_json::{Value, json};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
@@ -126,7 +126,7 @@ fn looks() -> Value {
 fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
     let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-    let view = View { width: Some(width), ..View::default() };
+    let view = CameraRequest { width: Some(width), ..CameraRequest::default() };
     let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
     let mut rows = Vec::new();
     for levels in [1, 5] {

@@ -9,7 +9,7 @@ use caustique::estimator::InitialBandwidth;
 use caustique::render::output::shape;
 use caustique::render::{Control, Levels, Settings, cpu_seconds, peak_memory, render};
 use caustique::scene::gltf::{ReadOptions, read};
-use caustique::scene::{Scene, View};
+use caustique::scene::{CameraRequest, Scene};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -18,7 +18,7 @@ fn main() {
     let (width, rounds) = (number(1, 1280), number(2, 3));
     let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-    let view = View { width: Some(width), ..View::default() };
+    let view = CameraRequest { width: Some(width), ..CameraRequest::default() };
     let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
     let variants = [
         ("five levels, two eye paths", Levels { count: 5, two_paths: true }, 20),

@@ -10,7 +10,7 @@ use caustique::geometry::Mesh;
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
-use caustique::scene::{Description, Scene, View};
+use caustique::scene::{CameraRequest, Description, Scene};
 use caustique::transport::{LightVertex, MergePhoton};
 use support::scenes::{add, build, cuboid, look_at, matte, mirror, quad, sphere};
 
@@ -80,7 +80,9 @@ struct Cost {
 
 /// Processor seconds of an iteration, the first left out (it merges nothing, and it is cold); least of some runs.
 fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
-    let camera = scene.camera(&View { width: Some(512), height: Some(512), ..View::default() }).expect("a camera");
+    let camera = scene
+        .camera(&CameraRequest { width: Some(512), height: Some(512), ..CameraRequest::default() })
+        .expect("a camera");
     let settings = Settings {
         method,
         initial: InitialBandwidth::Footprint,

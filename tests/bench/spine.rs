@@ -10,7 +10,7 @@ use caustique::math::{Rgb, Vec2, Vec3, warp};
 use caustique::photon::{Photon, PhotonFlags, PhotonMap, ThinningKey};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::gltf::{ReadOptions, read};
-use caustique::scene::{Scene, View};
+use caustique::scene::{CameraRequest, Scene};
 use caustique::spectrum::Band;
 use caustique::trace::Ray;
 use caustique_embree as embree;
@@ -32,7 +32,7 @@ fn race(mut a: impl FnMut(), mut b: impl FnMut()) -> (f64, f64) {
 
 /// Rays of eye paths: from the camera, and from what those hit in a random direction.
 fn rays(scene: &Scene) -> Vec<Ray> {
-    let view = View { width: Some(640), ..View::default() };
+    let view = CameraRequest { width: Some(640), ..CameraRequest::default() };
     let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
     let (width, height) = camera.size();
     let mut rays = Vec::new();

@@ -9,12 +9,12 @@ use caustique::camera::Filter;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::description::Projection;
-use caustique::scene::{Crop, Description, Scene, View};
+use caustique::scene::{CameraRequest, Crop, Description, Scene};
 use support::channels::{SIZE, agree, seeds};
 use support::scenes::{add, build, glass, lit_room, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{Check, mean_and_error};
 
-fn rendered(scene: &Scene, view: &View, (method, iterations): (Method, u64), seed: u64) -> Rendered {
+fn rendered(scene: &Scene, view: &CameraRequest, (method, iterations): (Method, u64), seed: u64) -> Rendered {
     let camera = scene.camera(view).expect("a camera");
     let levels = Levels::new(1);
     let settings = Settings { method, levels, iterations: Some(iterations), seed, ..Settings::default() };
@@ -96,11 +96,11 @@ fn windows_are_the_whole_picture_there() {
     description.cameras[0].aperture_radius = 0.02;
     let scene = build(description);
     for filter in [Filter::Box(1.0), Filter::Gaussian(2.0)] {
-        let whole = View { width: Some(37), height: Some(29), filter, ..View::default() };
+        let whole = CameraRequest { width: Some(37), height: Some(29), filter, ..CameraRequest::default() };
         for method in [Method::Path, Method::Bdpt, Method::Light] {
             let all = rendered(&scene, &whole, (method, 3), 5);
             for [x, y, width, height] in [[16, 16, 16, 13], [5, 3, 23, 19], [36, 0, 1, 29]] {
-                let view = View { crop: Some(Crop::Pixels([x, y, width, height])), ..whole.clone() };
+                let view = CameraRequest { crop: Some(Crop::Pixels([x, y, width, height])), ..whole.clone() };
                 let window = rendered(&scene, &view, (method, 3), 5);
                 let bits = |pixel: &caustique::estimator::Pixel| {
                     let values = [pixel.mean(0), pixel.variance_of_mean(0), pixel.albedo(), pixel.parts().indirect];

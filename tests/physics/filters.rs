@@ -10,7 +10,7 @@ use caustique::camera::Filter;
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{PunctualKind, PunctualLight};
-use caustique::scene::{Description, Scene, View};
+use caustique::scene::{CameraRequest, Description, Scene};
 use glam::DQuat;
 use std::f64::consts::PI;
 use support::scenes::{add, build, look_at, matte, quad, square};
@@ -45,7 +45,7 @@ fn strip() -> Scene {
 
 /// Means of the columns by seed.
 fn columns(scene: &Scene, method: Method, filter: Filter) -> Vec<Vec<f64>> {
-    let camera = scene.camera(&View { filter, ..square(SIDE) }).expect("a camera");
+    let camera = scene.camera(&CameraRequest { filter, ..square(SIDE) }).expect("a camera");
     (0..SEEDS)
         .map(|seed| {
             let settings =

@@ -19,7 +19,7 @@ use caustique::render::Candidate;
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::Survey;
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
-use caustique::scene::{Description, Scene};
+use caustique::scene::{Description, Scene, View};
 use caustique::stat::floor;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 use caustique::transport::{Indirect, InitialMedia, LightPass};
@@ -313,7 +313,7 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(C
     let make = |candidate| allowed(candidate).then(|| settings(candidate));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let mut finish = Finish::new(Denoiser::Own, None);
-    pool.install(|| choose((scene, &camera), &mut finish, make, || false)).expect("a choice")
+    pool.install(|| choose(View::new(scene, &camera), &mut finish, make, || false)).expect("a choice")
 }
 
 /// The same arguments, the same choice and the same expectations to the last bit, on any number of threads.
@@ -379,7 +379,9 @@ fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
     let chosen = |scene: &Scene| {
         let camera = scene.camera(&square(16)).expect("a camera");
         let make = |candidate| Some(Settings { iterations: Some(4), ..Settings::of(candidate) });
-        choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").candidate
+        choose(View::new(scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false)
+            .expect("a choice")
+            .candidate
     };
     assert_eq!(chosen(&cloudy(false, 1.2)), Candidate::FOCUSED_GATHERING);
     assert_eq!(chosen(&cloudy(true, 1.2)), Candidate::FOCUSED);
@@ -400,7 +402,9 @@ fn what_is_left_out_is_weighed_too() {
             let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(candidate) };
             (candidate == Candidate::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
         };
-        choose((scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false).expect("a choice").weights
+        choose(View::new(scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false)
+            .expect("a choice")
+            .weights
     };
     // Where there is glass its light needs photons as well, and to leave this one out saves nothing.
     for (scene, saves) in [(glass_room(), false), (matte_room(), true)] {
@@ -483,7 +487,7 @@ fn a_pilot_can_be_stopped() {
             times.set(times.get() + 1);
             answer
         };
-        let choice = choose((&scene, &camera), &mut Finish::new(Denoiser::Own, None), make, stop);
+        let choice = choose(View::new(&scene, &camera), &mut Finish::new(Denoiser::Own, None), make, stop);
         assert!(choice.is_some_and(|choice| choice.trials.len() == 3));
         times.get()
     };

@@ -10,7 +10,7 @@ use caustique::plan::{ClassSet, Switches};
 use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, Projection};
-use caustique::scene::{Description, Scene};
+use caustique::scene::{Description, Scene, View};
 use caustique::transport::{Eye, Indirect, InitialMedia, Interior, LightPass};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
@@ -224,7 +224,7 @@ fn overlaps_do_not_depend_on_the_direction() {
         assert_eq!([in_turn([0, 2]), in_turn([2, 0])], [Some(2); 2]);
         let camera = scene.camera(&square(8)).expect("a camera");
         let asked = Asked { choice: None, max_depth: None, switches: Switches::default() };
-        let plan = plan(&asked, Method::Path, (&scene, &camera), &Default::default());
+        let plan = plan(&asked, Method::Path, View::new(&scene, &camera), &Default::default());
         let named = |warning: &&String| warning.starts_with("objects \"water\" and \"jar\" overlap");
         assert_eq!(plan.warnings.iter().filter(named).count(), usize::from(higher == 0), "{:?}", plan.warnings);
         assert!(!plan.warnings.iter().any(|warning| warning.contains("pebble") && warning.contains("overlap")));

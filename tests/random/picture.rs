@@ -8,7 +8,7 @@ use caustique::plan::switch::Removed;
 use caustique::plan::{Effect, EffectPlan, Plan, PlanRequest, Switches};
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{Crop, Description, Scene, View};
+use caustique::scene::{CameraRequest, Crop, Description, Scene};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::path::Path;
 
@@ -76,14 +76,14 @@ impl Shot {
         }
     }
 
-    fn view(&self) -> View {
+    fn view(&self) -> CameraRequest {
         let tile = SIZE / TILES;
-        View {
+        CameraRequest {
             camera: Some(if self.usd { usd::camera(&self.camera) } else { self.camera.clone() }),
             width: Some(SIZE),
             height: Some(SIZE),
             crop: self.window.map(|window| Crop::Pixels(window.map(|side| side * tile))),
-            ..View::default()
+            ..CameraRequest::default()
         }
     }
 }

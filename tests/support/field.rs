@@ -9,7 +9,7 @@ use caustique::estimator::{InitialBandwidth, Pixel};
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Levels, Settings};
 use caustique::scene::description::Projection;
-use caustique::scene::{Description, Scene, View};
+use caustique::scene::{CameraRequest, Description, Scene};
 use std::f64::consts::PI;
 
 /// Pixels of the coarsest picture across and down, each of side [`PIXEL`], from [`CORNER`] on.
@@ -139,8 +139,8 @@ impl Field {
 }
 
 /// The picture, with so many pixels for every one of [`SIZE`] across and down.
-pub fn view(finer: u32) -> View {
-    View { width: Some(SIZE.0 * finer), height: Some(SIZE.1 * finer), ..View::default() }
+pub fn view(finer: u32) -> CameraRequest {
+    CameraRequest { width: Some(SIZE.0 * finer), height: Some(SIZE.1 * finer), ..CameraRequest::default() }
 }
 
 /// What photons bring to a pixel, on average over its iterations.

@@ -12,7 +12,7 @@ use caustique::pipeline::{checkpoint, records, shard};
 use caustique::render::{Candidate, Control, Method, Session, Settings, Stage, StopReason, render};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{Scene, View, environment_file, usd};
+use caustique::scene::{CameraRequest, Scene, environment_file, usd};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -74,8 +74,8 @@ fn scene(bytes: &[u8], _: &Path) {
 const METHODS: [Method; 3] = [Method::Path, Method::Sppm, Method::Vcm];
 
 /// A picture of four pixels.
-fn small() -> View {
-    View { width: Some(2), height: Some(2), ..View::default() }
+fn small() -> CameraRequest {
+    CameraRequest { width: Some(2), height: Some(2), ..CameraRequest::default() }
 }
 
 /// Renders of [`METHODS`] that saved states are gone on with: of a triangle in light from all around.

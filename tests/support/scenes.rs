@@ -8,7 +8,7 @@ use caustique::plan::ClassSet;
 use caustique::scene::description::{
     CameraDescription, Description, PlacedMesh, Projection, PunctualKind, PunctualLight,
 };
-use caustique::scene::{Scene, View};
+use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::{Eye, Indirect, InitialMedia};
 
 /// A diffuse material of some reflectance that gives some radiance, without any Fresnel layer.
@@ -151,8 +151,8 @@ pub fn build(description: Description) -> Scene {
 }
 
 /// A view of `size x size` pixels.
-pub fn square(size: u32) -> View {
-    View { width: Some(size), height: Some(size), ..View::default() }
+pub fn square(size: u32) -> CameraRequest {
+    CameraRequest { width: Some(size), height: Some(size), ..CameraRequest::default() }
 }
 
 /// A room with a lamp below the ceiling.

@@ -20,7 +20,7 @@ use caustique::report::entry::{Entry, Metric};
 use caustique::report::race::{Field, Rules, race};
 use caustique::report::reference::{Halves, Reference};
 use caustique::report::summary::{Subject, Wishes, summarize};
-use caustique::scene::Scene as Built;
+use caustique::scene::View;
 use caustique::stat::sum::MOST_TERMS;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
@@ -97,7 +97,7 @@ pub fn converge<'py>(
     let threads = keywords.take("threads")?.unwrap_or(0);
     let progress = keywords.take::<Py<PyAny>>("progress")?.map(Arc::new);
     keywords.finish()?;
-    let camera = scene.loaded.scene.camera(&comparison.common.view().map_err(raised)?).map_err(raised)?;
+    let camera = scene.loaded.scene.camera(&comparison.common.camera_request().map_err(raised)?).map_err(raised)?;
     let reference = given.map(|given| reference(&given, camera.size())).transpose()?;
     let settled = comparison.settle()?;
     let done = work(py, threads, |caller| {
@@ -199,8 +199,8 @@ impl Comparison {
             check::bandwidth(scene.path, of, built)?;
         }
         let (entries, mut finishes) = self.entries((scene, camera), settings, told)?;
-        memory::check_all((built, camera), entries.iter().map(|entry| &entry.settings))?;
-        let reference = reference.unwrap_or_else(|| self.make(own, (built, camera), told));
+        memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings))?;
+        let reference = reference.unwrap_or_else(|| self.make(own, View::new(built, camera), told));
         let RenderOptions { seed, iterations, .. } = self.common;
         let rules = Rules {
             time: self.time(),
@@ -211,9 +211,9 @@ impl Comparison {
         };
         // Where pictures of the race are kept meanwhile.
         let folder = caustique::temporary::folder("caustique-")?;
-        let stage = (built, camera);
+        let view = View::new(built, camera);
         let field = Field { entries: &entries, finishes: &mut finishes, guests: None };
-        let mut outcome = race(stage, field, &rules, &reference, folder.path(), |step| {
+        let mut outcome = race(view, field, &rules, &reference, folder.path(), |step| {
             told.tell(json!({
                 "run": step.name,
                 "iterations": step.iterations,
@@ -259,14 +259,14 @@ impl Comparison {
             if options.method.0.is_none() {
                 let limited = RenderOptions { time: self.time(), ..options.clone() };
                 let make = |candidate| limited.allowed(candidate, camera.size());
-                choice = choose((built, camera), &mut options.pilot_finish(), make, || told.caller.stops());
+                choice = choose(View::new(built, camera), &mut options.pilot_finish(), make, || told.caller.stops());
             }
             if let Some(choice) = &choice {
                 (settings, decided) = (choice.settings.clone(), choice.spent);
             }
             let (max_depth, switches) = (self.common.max_depth, scene.asked.switches());
             let asked = plan::Asked { choice: choice.as_ref(), max_depth, switches };
-            let plan = plan::plan(&asked, settings.method, (built, camera), &scene.loaded.removed);
+            let plan = plan::plan(&asked, settings.method, View::new(built, camera), &scene.loaded.removed);
             warnings
                 .extend(plan.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
             let order = (!options.no_combine).then(|| options.finish.order());
@@ -283,7 +283,7 @@ impl Comparison {
     }
 
     /// Makes a reference: two halves.
-    fn make(&self, settings: Settings, (scene, camera): (&Built, &Camera), told: &ErrorCoverage<'_>) -> Reference {
+    fn make(&self, settings: Settings, View { scene, camera }: View<'_>, told: &ErrorCoverage<'_>) -> Reference {
         let seen_through_glass = Presence::of(scene, camera).has(Effect::Sds);
         let plain = self.own.method.is_none() && !seen_through_glass;
         let method = if plain { Method::Bdpt } else { settings.method };

@@ -18,7 +18,7 @@ use caustique::pipeline::{self, Auto, Delivery, Loaded, Order, Saving, Wait, Wat
 use caustique::plan::Plan;
 use caustique::render::{Rendered, Settings};
 use caustique::scene::description::EnvironmentSource;
-use caustique::scene::{Scene as Built, gltf};
+use caustique::scene::{Scene as Built, View, gltf};
 use caustique::stop::Stop;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -124,7 +124,7 @@ impl Scene {
             ));
         }
         let settings = asked.settings().map_err(raised)?;
-        let view = asked.view().map_err(raised)?;
+        let request = asked.camera_request().map_err(raised)?;
         let arguments = self.arguments(py, options)?;
         let progress = progress.map(Arc::new);
         let done = work(py, threads, |caller| {
@@ -132,7 +132,7 @@ impl Scene {
             let auto = asked.method.0.is_none().then(|| Auto { allowed: &allowed, finish: asked.pilot_finish() });
             let order = Order {
                 scene: self.order(),
-                view,
+                camera: request,
                 settings,
                 photons: asked.photons,
                 max_depth: asked.max_depth,
@@ -171,21 +171,21 @@ impl Scene {
         let (asked, _) = job::take(&mut keywords, &job::of_plan(), &self.asked)?;
         keywords.finish()?;
         let settings = asked.settings().map_err(raised)?;
-        let view = asked.view().map_err(raised)?;
+        let request = asked.camera_request().map_err(raised)?;
         let Loaded { scene, removed } = &self.loaded;
         let done = work(py, threads, |caller| {
-            let camera = scene.camera(&view)?;
+            let camera = scene.camera(&request)?;
             check::media(&self.path, &settings, scene)?;
             let choice = match asked.method.0 {
                 Some(_) => None,
                 None => {
                     let make = |candidate| asked.allowed(candidate, camera.size());
-                    choose((scene, &camera), &mut asked.pilot_finish(), make, || caller.stops())
+                    choose(View::new(scene, &camera), &mut asked.pilot_finish(), make, || caller.stops())
                 }
             };
             let (max_depth, switches) = (asked.max_depth, self.asked.switches());
             let asked = pipeline::plan::Asked { choice: choice.as_ref(), max_depth, switches };
-            let mut plan = pipeline::plan::plan(&asked, settings.method, (scene, &camera), removed);
+            let mut plan = pipeline::plan::plan(&asked, settings.method, View::new(scene, &camera), removed);
             plan.warnings.splice(0..0, scene.warnings.iter().cloned());
             Ok(json!(plan))
         })?;

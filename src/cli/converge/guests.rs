@@ -3,14 +3,13 @@
 use super::options::ConvergeArgs;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
-use caustique::camera::Camera;
 use caustique::error::{Error, Result};
 use caustique::finish::{Denoiser, DenoiserChoice};
 use caustique::options::SceneOptions;
 use caustique::peers::{Drivers, Renderer};
 use caustique::report::guests::{Denoising, Driving, Guests};
 use caustique::scene::gltf::{Glass, LightUnits};
-use caustique::scene::{Scene, usd};
+use caustique::scene::{View, usd};
 
 /// The guests that are asked for; `None` where there are none.
 ///
@@ -18,7 +17,7 @@ use caustique::scene::{Scene, usd};
 /// A renderer is not installed; no `--time` says how long they render.
 pub fn all(
     args: &ConvergeArgs,
-    (scene, camera): (&Scene, &Camera),
+    View { scene, camera }: View<'_>,
     threads: usize,
     interrupt: &Interrupt,
     notes: &mut Vec<String>,

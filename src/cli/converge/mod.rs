@@ -23,7 +23,7 @@ use caustique::report::crop::{Look, Window};
 use caustique::report::entry::Entry;
 use caustique::report::race::{Field, Rules, race};
 use caustique::report::summary::{Subject, Wishes, find, summarize};
-use caustique::scene::{Scene, View};
+use caustique::scene::View;
 use progress::Reporter;
 use runs::Run;
 use std::collections::HashSet;
@@ -48,8 +48,8 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let threads = rayon::current_num_threads();
     let Loaded { scene, removed } = scene::read(&args.scene, args.progress, threads)?;
     scene::tell(&args.scene, &scene.warnings)?;
-    let view = View { camera: args.camera.clone(), width: args.width, height: args.height, ..View::default() };
-    let camera = scene.camera(&view)?;
+    let camera = scene.camera(&args.camera_request())?;
+    let view = View::new(&scene, &camera);
     let windows = windows(args, &camera)?;
     for run in &runs {
         let (path, settings) = (&run.args.scene.path, &run.entry.settings);
@@ -60,22 +60,22 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         })?;
     }
     let interrupt = Interrupt::listen()?;
-    let (runs, choices) = choose_all(args, runs, (&scene, &camera), &interrupt)?;
+    let (runs, choices) = choose_all(args, runs, view, &interrupt)?;
     interrupt.before_the_first_iteration(&args.output)?;
-    memory::check_all((&scene, &camera), runs.iter().map(|run| &run.entry.settings))?;
+    memory::check_all(view, runs.iter().map(|run| &run.entry.settings))?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
-    let source = reference::source(args, (&scene, &camera), &runs, &seeds, &mut notes)?;
-    let (entries, mut finishes) = open(args, runs, &choices, (&scene, &camera), &removed)?;
-    let guests = guests::all(args, (&scene, &camera), threads, &interrupt, &mut notes)?;
+    let source = reference::source(args, view, &runs, &seeds, &mut notes)?;
+    let (entries, mut finishes) = open(args, runs, &choices, view, &removed)?;
+    let guests = guests::all(args, view, threads, &interrupt, &mut notes)?;
     let peers = guests.as_ref().map_or_else(Vec::new, |guests| guests.peers.clone());
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
-    let reference = reference::get(args, source, (&scene, &camera), &interrupt, &mut notes, entries.len())?;
+    let reference = reference::get(args, source, view, &interrupt, &mut notes, entries.len())?;
     let rules = Rules { time: time(args), iterations: args.iterations, ratio: args.moments, more: more.clone(), seeds };
     let mut reporter = Reporter::new(args.progress);
     let field = Field { entries: &entries, finishes: &mut finishes, guests };
-    let mut outcome = race((&scene, &camera), field, &rules, &reference, &args.output, |step| {
+    let mut outcome = race(view, field, &rules, &reference, &args.output, |step| {
         reporter.step(step);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
     })?;
@@ -142,19 +142,19 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
 fn choose_all(
     args: &ConvergeArgs,
     mut runs: Vec<Run>,
-    (scene, camera): (&Scene, &Camera),
+    view: View<'_>,
     interrupt: &Interrupt,
 ) -> Result<(Vec<Run>, Vec<Option<Choice>>)> {
     let choose_one = |run: &mut Run| {
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
-        run.entry.settings = sized(run.entry.settings.clone(), run.args.photons, camera.size());
-        let make = |candidate| run.args.allowed(candidate, camera.size()).map(limits);
+        run.entry.settings = sized(run.entry.settings.clone(), run.args.photons, view.camera.size());
+        let make = |candidate| run.args.allowed(candidate, view.camera.size()).map(limits);
         if run.args.method.0.is_some() {
             return Ok(None);
         }
         let mut finish = run.args.pilot_finish();
-        let tried = || choose((scene, camera), &mut finish, make, || interrupt.asked());
+        let tried = || choose(view, &mut finish, make, || interrupt.asked());
         let Some(chosen) = args.progress.during("choosing a method", tried) else { return Ok(None) };
         say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));
         run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
@@ -170,7 +170,7 @@ fn open(
     args: &ConvergeArgs,
     runs: Vec<Run>,
     choices: &[Option<Choice>],
-    (scene, camera): (&Scene, &Camera),
+    view: View<'_>,
     removed: &Removed,
 ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
     let mut told = HashSet::new();
@@ -178,7 +178,7 @@ fn open(
     let mut finishes = Vec::new();
     for (Run { mut entry, args: options }, choice) in runs.into_iter().zip(choices) {
         let asked = plan::Asked { choice: choice.as_ref(), max_depth: args.max_depth, switches: args.scene.switches() };
-        let plan = plan::plan(&asked, entry.settings.method, (scene, camera), removed);
+        let plan = plan::plan(&asked, entry.settings.method, view, removed);
         let new: Vec<String> = plan.warnings.into_iter().filter(|warning| told.insert(warning.clone())).collect();
         tell_plan(&args.scene.path, &new);
         let place = format!("--run \"{}\"", entry.name);

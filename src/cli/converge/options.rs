@@ -7,7 +7,7 @@ use caustique::options::{MethodChoice, SceneOptions};
 use caustique::peers::Renderer;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
-use caustique::scene::MAX_SIZE;
+use caustique::scene::{CameraRequest, MAX_SIZE};
 use caustique::stat::sum::MOST_TERMS;
 use std::ops::Bound::{Excluded, Included};
 use std::path::PathBuf;
@@ -118,6 +118,18 @@ pub struct ConvergeArgs {
     /// Reports on stderr
     #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
     pub progress: Form,
+}
+
+impl ConvergeArgs {
+    /// The camera and the size of the compared pictures.
+    pub fn camera_request(&self) -> CameraRequest {
+        CameraRequest {
+            camera: self.camera.clone(),
+            width: self.width,
+            height: self.height,
+            ..CameraRequest::default()
+        }
+    }
 }
 
 /// `--target-of RUN@N`.

@@ -6,13 +6,12 @@ use super::runs::{self, Run};
 use crate::cli::progress::duration;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
-use caustique::camera::Camera;
 use caustique::error::{Error, Kind, Result};
 use caustique::options::MethodChoice;
 use caustique::plan::{Effect, Presence};
 use caustique::render::{Control, Method, Settings};
 use caustique::report::reference::{Halves, OwnError, Reference};
-use caustique::scene::Scene;
+use caustique::scene::View;
 
 /// Where the reference comes from.
 pub enum Source {
@@ -28,14 +27,14 @@ pub enum Source {
 /// A file that will not do; options.
 pub fn source(
     args: &ConvergeArgs,
-    (scene, camera): (&Scene, &Camera),
+    view: View<'_>,
     runs: &[Run],
     seeds: &[u64],
     notes: &mut Vec<String>,
 ) -> Result<Source> {
     let metric = args.error_metric;
-    let Some(path) = &args.reference else { return own(args, scene, camera).map(Source::Own) };
-    let (mut reference, header) = Reference::read(path, camera.size())?;
+    let Some(path) = &args.reference else { return own(args, view).map(Source::Own) };
+    let (mut reference, header) = Reference::read(path, view.camera.size())?;
     if let Some(error) = args.reference_error {
         reference.error = OwnError::in_metric(metric, error);
     }
@@ -62,7 +61,7 @@ pub fn source(
 }
 
 /// Settings of a reference to be made.
-fn own(args: &ConvergeArgs, scene: &Scene, camera: &Camera) -> Result<Box<Settings>> {
+fn own(args: &ConvergeArgs, View { scene, camera }: View<'_>) -> Result<Box<Settings>> {
     let method = match args.reference_method {
         Some(method) => method,
         None if Presence::of(scene, camera).has(Effect::Sds) => MethodChoice(Some(Method::Vcm)),
@@ -109,7 +108,7 @@ fn announce(args: &ConvergeArgs, settings: &Settings, runs: usize) {
 pub fn get(
     args: &ConvergeArgs,
     source: Source,
-    (scene, camera): (&Scene, &Camera),
+    View { scene, camera }: View<'_>,
     interrupt: &Interrupt,
     notes: &mut Vec<String>,
     runs: usize,

@@ -68,7 +68,7 @@ fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<(
     let auto = args.job.method.0.is_none().then(|| Auto { allowed: &allowed, finish: args.job.pilot_finish() });
     let order = Order {
         scene: args.job.scene.order(),
-        view: args.job.view()?,
+        camera: args.job.camera_request()?,
         settings,
         photons: args.job.photons,
         max_depth: args.job.max_depth,

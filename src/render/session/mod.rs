@@ -397,7 +397,7 @@ mod tests {
     use super::*;
     use crate::math::DAffine3;
     use crate::scene::description::{CameraDescription, Projection};
-    use crate::scene::{Description, View};
+    use crate::scene::{CameraRequest, Description};
 
     /// Pixels count iterations in 32 bits, and their sums are exact for 2^23: no render goes on beyond, however many
     /// are asked for, nor does the last of many shards.
@@ -414,7 +414,8 @@ mod tests {
             shift: [0.0; 2],
         });
         let scene = Scene::build(description, 1).unwrap();
-        let camera = scene.camera(&View { width: Some(2), height: Some(1), ..View::default() }).unwrap();
+        let camera =
+            scene.camera(&CameraRequest { width: Some(2), height: Some(1), ..CameraRequest::default() }).unwrap();
         for (iterations, last) in [(None, MOST_TERMS), (Some(1 << 40), MOST_TERMS), (Some(100), 100)] {
             let stage = Stage::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
             let mut session = Session::new(&stage);

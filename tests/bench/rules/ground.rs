@@ -8,7 +8,7 @@ use caustique::image::tonemap::ToneMap;
 use caustique::math::DVec3;
 use caustique::render::{Levels, Method, Session, Settings, Stage};
 use caustique::scene::gltf::{ReadOptions, read};
-use caustique::scene::{Scene, View};
+use caustique::scene::{CameraRequest, Scene};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -36,7 +36,7 @@ impl Ground {
         let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.glb"));
         let description = read(&path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
-        let view = View { width: Some(width), ..View::default() };
+        let view = CameraRequest { width: Some(width), ..CameraRequest::default() };
         let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
         Ground { name: name.into(), scene, camera }
     }

@@ -4,7 +4,7 @@ use super::glb::Glb;
 use super::{message, read, try_read};
 use caustique::light::SpotEdge;
 use caustique::scene::description::{PictureDefaults, PunctualKind, ToneMap};
-use caustique::scene::{Crop, View};
+use caustique::scene::{CameraRequest, Crop};
 use serde_json::{Value, json};
 
 fn caustique(keys: Value) -> Value {
@@ -33,8 +33,12 @@ fn what_the_picture_was_made_for() {
     let scene = caustique::scene::Scene::build(description, 1).expect("a scene");
     let whole = Some(Crop::Shares([0.0, 0.0, 1.0, 1.0]));
     let size = |width, height| {
-        let halved = scene.camera(&View { width, height, ..View::default() }).expect("a camera").size();
-        let whole = scene.camera(&View { width, height, crop: whole, ..View::default() }).expect("a camera").size();
+        let halved =
+            scene.camera(&CameraRequest { width, height, ..CameraRequest::default() }).expect("a camera").size();
+        let whole = scene
+            .camera(&CameraRequest { width, height, crop: whole, ..CameraRequest::default() })
+            .expect("a camera")
+            .size();
         assert_eq!(halved, (whole.0 / 2, whole.1));
         whole
     };
@@ -114,7 +118,9 @@ fn lens_shift() {
     file.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 1, "aspectRatio": 2, "znear": 0.1}}]);
     file.node(json!({"camera": 0, "extras": {"caustique": {"shift": [0.5, -0.25]}}}));
     let scene = caustique::scene::Scene::build(read(&file), 1).expect("a scene");
-    let camera = scene.camera(&View { width: Some(200), height: Some(100), ..View::default() }).expect("a camera");
+    let camera = scene
+        .camera(&CameraRequest { width: Some(200), height: Some(100), ..CameraRequest::default() })
+        .expect("a camera");
     let ray = camera.ray([0.0, 25.0].into(), [0.5; 2].into());
     assert!((ray.direction - camera.forward()).length() < 1e-5, "{:?}", ray.direction);
 }
