@@ -11,7 +11,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 /// What sort of thing went wrong; decides the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ErrorKind {
     /// The command line asks for something that cannot be (exit code 2).
     Usage,
     /// A scene file is malformed, or asks for what we cannot do.
@@ -32,7 +32,7 @@ pub enum Kind {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
     /// What sort of thing went wrong.
-    pub kind: Kind,
+    pub kind: ErrorKind,
     /// File and place in it, such as `pool.glb: mesh "water", primitive 0`; empty when there is none.
     pub place: String,
     /// The fault, in one clause without a full stop.
@@ -43,13 +43,13 @@ pub struct Error {
 
 impl Error {
     /// An error with a place and a cause.
-    pub fn new(kind: Kind, place: impl fmt::Display, cause: impl fmt::Display) -> Self {
+    pub fn new(kind: ErrorKind, place: impl fmt::Display, cause: impl fmt::Display) -> Self {
         Error { kind, place: place.to_string(), cause: cause.to_string(), hint: None }
     }
 
     /// An error of the options of a call: `cause` names them as on the command line, `--max-depth`.
     pub fn usage(cause: impl fmt::Display) -> Self {
-        Error::new(Kind::Usage, "command line", cause)
+        Error::new(ErrorKind::Usage, "command line", cause)
     }
 
     /// The same error with advice.
@@ -61,7 +61,7 @@ impl Error {
 
     /// An operating-system error at a path.
     pub fn io(path: &Path, cause: &std::io::Error) -> Self {
-        Error::new(Kind::Io, path.display(), cause)
+        Error::new(ErrorKind::Io, path.display(), cause)
     }
 
     /// The same error, its place preceded by `outer` (a file's name, say).
@@ -74,8 +74,8 @@ impl Error {
     /// Exit code of a process that fails with this error.
     pub fn exit_code(&self) -> u8 {
         match self.kind {
-            Kind::Usage => 2,
-            Kind::Interrupted => 130,
+            ErrorKind::Usage => 2,
+            ErrorKind::Interrupted => 130,
             _ => 1,
         }
     }

@@ -5,7 +5,7 @@
 //! it where one is given but not there. The least of three counts: what the machine has left, `ulimit -v`, and the
 //! `memory.max` of the control groups (containers, batch systems, systemd).
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use rustix::process::{Resource, getrlimit};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ pub fn check(bytes: u64, what: impl Display) -> Result<()> {
         Some(Available { bytes: left, by }) if bytes > left => {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
             let cause = format!("{what} need about {:.1} GiB of memory, {:.1} GiB are {by}", gib(bytes), gib(left));
-            Err(Error::new(Kind::Scene, "", cause))
+            Err(Error::new(ErrorKind::Scene, "", cause))
         }
         _ => Ok(()),
     }
@@ -68,7 +68,7 @@ pub fn room<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
         Ok(()) => Ok(items),
         Err(_) => {
             let mib = (count as u128 * size_of::<T>() as u128) >> 20;
-            Err(Error::new(Kind::Scene, "", format!("there is no memory for {count} {what} ({mib} MiB)")))
+            Err(Error::new(ErrorKind::Scene, "", format!("there is no memory for {count} {what} ({mib} MiB)")))
         }
     }
 }

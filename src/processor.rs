@@ -3,7 +3,7 @@
 //! `.cargo/config.toml` builds for x86-64-v3. `is_x86_feature_detected!` is no help: where a feature is enabled at
 //! build time it is simply `true`. So the kernel is asked, which lists the features as `flags` in `/proc/cpuinfo`.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// Features of x86-64-v3 by the kernel's names.
 const NEEDED: [&str; 5] = ["avx2", "bmi2", "f16c", "fma", "movbe"];
@@ -31,7 +31,7 @@ pub fn check() -> Result<()> {
         return Ok(());
     }
     let cause = format!("it lacks instructions that this build needs ({})", lacking.join(", "));
-    Err(Error::new(Kind::Library, "processor", cause)
+    Err(Error::new(ErrorKind::Library, "processor", cause)
         .hint("use a processor made since 2013, or build from source without the flags in .cargo/config.toml"))
 }
 

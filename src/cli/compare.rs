@@ -2,7 +2,7 @@
 
 use super::progress::Form;
 use super::{output, print, print_json};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{Layer, LayerSet};
 use caustique::image::{Comparison, Floor, atomic, compare_above, exr, heat, png};
 use caustique::report::errors;
@@ -73,7 +73,7 @@ fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
         let names: Vec<String> = set.layers.iter().map(shown).collect();
         set.layers.retain(|layer| layer.name == name);
         let Some(layer) = set.layers.first_mut() else {
-            let error = Error::new(Kind::Usage, path.display(), format!("there is no layer \"{name}\""));
+            let error = Error::new(ErrorKind::Usage, path.display(), format!("there is no layer \"{name}\""));
             return Err(error.hint(format!("it has {}", names.join(", "))));
         };
         layer.name.clear();

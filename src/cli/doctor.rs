@@ -2,7 +2,7 @@
 
 use super::{print, print_json};
 use caustique::combine::Runtime;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::finish::denoiser;
 use caustique::installed;
 use caustique::scene::usd::Interpreter;
@@ -50,7 +50,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
         None => Ok(()),
         Some(first) => {
             let names: Vec<&str> = missing.iter().map(|f| f.name).collect();
-            let mut error = Error::new(Kind::Library, "doctor", format!("cannot use {}", names.join(" and ")));
+            let mut error = Error::new(ErrorKind::Library, "doctor", format!("cannot use {}", names.join(" and ")));
             error.hint = first.found.as_ref().err().and_then(|(_, hint)| hint.clone());
             Err(error)
         }

@@ -3,7 +3,7 @@
 use super::progress::{Form, duration, percent};
 use super::render::place;
 use super::{plot, print, print_json, printable, scene};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
 use caustique::light::Emitter;
@@ -69,7 +69,7 @@ fn is_exr(path: &Path) -> Result<bool> {
     let read = File::open(path).and_then(|file| file.take(4).read_to_end(&mut start));
     read.map_err(|cause| Error::io(path, &cause))?;
     if start.is_empty() {
-        return Err(Error::new(Kind::Io, path.display(), "the file is empty"));
+        return Err(Error::new(ErrorKind::Io, path.display(), "the file is empty"));
     }
     Ok(start == EXR_MAGIC)
 }

@@ -19,7 +19,7 @@ mod signals;
 mod stage;
 mod usage;
 
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::processor;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fs::File;
@@ -141,7 +141,7 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
         ));
     }
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads);
-    builder.build().map_err(|error| Error::new(Kind::Io, "threads", error).hint("ask for fewer with --threads"))
+    builder.build().map_err(|error| Error::new(ErrorKind::Io, "threads", error).hint("ask for fewer with --threads"))
 }
 
 /// Prints a line to stderr. Nobody may be listening any more (a closed pipe, a terminal that is gone): a render goes
@@ -167,7 +167,7 @@ fn commands(c: char) -> bool {
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Error::new(Kind::Io, "standard output", error))
+            Err(Error::new(ErrorKind::Io, "standard output", error))
         }
         _ => Ok(()),
     }

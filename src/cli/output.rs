@@ -1,6 +1,6 @@
 //! Options and checks that every command with output files shares.
 
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, Compression};
 use caustique::image::tonemap::ToneMap;
@@ -68,7 +68,7 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
     // A device, such as /dev/null, is called what it is called; of a folder another error tells.
     let is_no_file = path.exists() && !path.is_file();
     if !named && !is_no_file {
-        let error = Error::new(Kind::Usage, path.display(), format!("the name does not end in .{extension}"));
+        let error = Error::new(ErrorKind::Usage, path.display(), format!("the name does not end in .{extension}"));
         return Err(match extension {
             "exr" => error.hint("the output is an EXR; --png writes a picture to look at beside it"),
             _ => error.hint(format!("name it .{extension}")),
@@ -89,7 +89,7 @@ pub fn check_inputs<'a>(output: &Path, mut inputs: impl Iterator<Item = &'a Path
         None => Ok(()),
         Some(input) => {
             let cause = format!("{} is an input, which is not overwritten", input.display());
-            Err(Error::new(Kind::Usage, output.display(), cause).hint("name another output"))
+            Err(Error::new(ErrorKind::Usage, output.display(), cause).hint("name another output"))
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::progress::{Form, Waiting};
 use super::say;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::SceneOptions;
 use caustique::pipeline::Loaded;
 use caustique::pipeline::load::load;
@@ -42,5 +42,6 @@ pub fn tell(args: &SceneOptions, warnings: &[String]) -> Result<()> {
 pub fn forbidden(args: &SceneOptions, warnings: usize) -> Error {
     let things = if warnings == 1 { "1 thing is" } else { &format!("{warnings} things are") };
     let cause = format!("{things} ignored or approximated, and --strict forbids it");
-    Error::new(Kind::Scene, args.path.display(), cause).hint("mend what the warnings above name, or leave --strict out")
+    Error::new(ErrorKind::Scene, args.path.display(), cause)
+        .hint("mend what the warnings above name, or leave --strict out")
 }

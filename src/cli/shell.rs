@@ -2,7 +2,7 @@
 //! take from the command line itself.
 
 use super::{print, print_json};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::catalogue::describe;
 use clap::Command;
 use clap_complete::Shell;
@@ -52,6 +52,6 @@ pub fn man(args: &ManArgs, mut whole: Command) -> Result<()> {
     };
     let mut text = Vec::new();
     let rendered = clap_mangen::Man::new(page.clone()).render(&mut text);
-    rendered.map_err(|error| Error::new(Kind::Io, "manual", error))?;
+    rendered.map_err(|error| Error::new(ErrorKind::Io, "manual", error))?;
     print(&String::from_utf8_lossy(&text))
 }

@@ -2,7 +2,7 @@
 //! ends the program at once. Ctrl-C is answered, by a thread of its own: a handler may not print.
 
 use super::say;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::stop::Stop;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::iterator::Signals;
@@ -23,7 +23,7 @@ impl Interrupt {
         if let Some(interrupt) = LISTENING.get() {
             return Ok(interrupt.clone());
         }
-        let failed = |error| Error::new(Kind::Io, "signals", error);
+        let failed = |error| Error::new(ErrorKind::Io, "signals", error);
         let asked = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             // In this order: a signal ends the program if one came before it, and only then is noted itself.
@@ -55,7 +55,7 @@ impl Interrupt {
             return Ok(());
         }
         let cause = "interrupted before the first iteration; nothing is written";
-        Err(Error::new(Kind::Interrupted, output.display(), cause))
+        Err(Error::new(ErrorKind::Interrupted, output.display(), cause))
     }
 
     /// What tells a render to end, once somebody listens.
@@ -75,5 +75,5 @@ impl Interrupt {
 /// The system takes no handler.
 pub fn survive_large_files() -> Result<()> {
     let noted = Arc::new(AtomicBool::new(false));
-    signal_hook::flag::register(SIGXFSZ, noted).map(drop).map_err(|error| Error::new(Kind::Io, "signals", error))
+    signal_hook::flag::register(SIGXFSZ, noted).map(drop).map_err(|error| Error::new(ErrorKind::Io, "signals", error))
 }

@@ -1,7 +1,7 @@
 //! What a stage of USD says about its own render: options that hold where the command line does not give them.
 
 use super::{Cli, Command, usage};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::SceneOptions;
 use caustique::scene::usd;
 use clap::FromArgMatches;
@@ -63,7 +63,7 @@ fn output(scene: &SceneOptions, mut products: Vec<String>) -> Result<Option<Stri
     let names: Vec<&str> = products.iter().map(|word| word.trim_start_matches(OUTPUT)).collect();
     let cause = format!("RenderSettings has several products, and a render writes one: {}", names.join(", "));
     let hint = "-o OUT.exr renders the first; for each of the others make RenderSettings with that product alone";
-    Err(Error::new(Kind::Usage, scene.path.display(), cause).hint(hint))
+    Err(Error::new(ErrorKind::Usage, scene.path.display(), cause).hint(hint))
 }
 
 /// The scene, or its first frame's file where its name is a pattern.

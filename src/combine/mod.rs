@@ -48,7 +48,7 @@ impl Combiner {
     /// Loads `model` into `runtime`, with as many threads as the current rayon pool has.
     ///
     /// # Errors
-    /// [`Kind::Model`](crate::error::Kind::Model) when the file is no network, or not one of ours.
+    /// [`ErrorKind::Model`](crate::error::ErrorKind::Model) when the file is no network, or not one of ours.
     pub fn new(model: &Model, runtime: &Runtime) -> Result<Self> {
         Ok(Combiner { network: Network::load(model, runtime, rayon::current_num_threads())? })
     }
@@ -64,8 +64,8 @@ impl Combiner {
     /// level, else the mean of its finite neighbours in the window, else black.
     ///
     /// # Errors
-    /// [`Kind::Image`](crate::error::Kind::Image) when planes differ in size or the number of levels is not the
-    /// network's; [`Kind::Model`](crate::error::Kind::Model) when the network fails.
+    /// [`ErrorKind::Image`](crate::error::ErrorKind::Image) when planes differ in size or the number of levels is not the
+    /// network's; [`ErrorKind::Model`](crate::error::ErrorKind::Model) when the network fails.
     pub fn run(&mut self, stack: &LevelStack) -> Result<Vec<[f32; 3]>> {
         let pixels = self.network.facts().tile_pixels();
         self.run_tiled(stack, pixels)

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::tensor;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// An ONNX file in memory, with a name for messages.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ impl Model {
     /// A network made by `scripts/lab/train/export_network.py`.
     ///
     /// # Errors
-    /// [`Kind::Io`] when the file cannot be read. What it holds is checked by [`Combiner::new`](super::Combiner::new).
+    /// [`ErrorKind::Io`] when the file cannot be read. What it holds is checked by [`Combiner::new`](super::Combiner::new).
     pub fn from_file(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|cause| {
             Error::io(path, &cause)
@@ -40,7 +40,7 @@ impl Model {
             "compact" => Ok(Model::compact()),
             "paper" if !Path::new(name).exists() => {
                 let cause = "the paper's network is not part of the program";
-                Err(Error::new(Kind::Model, "paper", cause)
+                Err(Error::new(ErrorKind::Model, "paper", cause)
                     .hint("train it with scripts/lab/train/train.py --arch paper and give the exported file"))
             }
             path => Model::from_file(Path::new(path)),

@@ -9,7 +9,7 @@ use super::model::{Contract, Facts, Model};
 use super::rect::Rect;
 use super::runtime::{Quiet, Runtime};
 use super::tensor;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// The weights of equation (6), in either form.
 #[derive(Debug)]
@@ -31,10 +31,10 @@ impl Network {
     /// Loads and checks `model`; inference uses `threads` threads.
     ///
     /// # Errors
-    /// [`Kind::Model`] naming what is wrong with the file.
+    /// [`ErrorKind::Model`] naming what is wrong with the file.
     pub fn load(model: &Model, runtime: &Runtime, threads: usize) -> Result<Self> {
         let refuse = |cause: &dyn std::fmt::Display| {
-            Error::new(Kind::Model, format!("model {}", model.name), one_line(cause))
+            Error::new(ErrorKind::Model, format!("model {}", model.name), one_line(cause))
                 .hint("make network files with scripts/lab/train/export_network.py")
         };
         let session = open(model, runtime, threads).map_err(|cause| refuse(&cause))?;
@@ -54,10 +54,11 @@ impl Network {
     /// Runs the network on `input`, the tensor of `rect` from [`tensor::fill`].
     ///
     /// # Errors
-    /// [`Kind::Model`] when ONNX Runtime fails or the output has the wrong shape.
+    /// [`ErrorKind::Model`] when ONNX Runtime fails or the output has the wrong shape.
     pub fn run(&mut self, input: &[f32], rect: Rect) -> Result<Weights> {
         let Network { session, facts, name } = self;
-        let fail = |cause: &dyn std::fmt::Display| Error::new(Kind::Model, format!("model {name}"), one_line(cause));
+        let fail =
+            |cause: &dyn std::fmt::Display| Error::new(ErrorKind::Model, format!("model {name}"), one_line(cause));
         let shape = [1, tensor::channels(facts.levels), rect.height(), rect.width()];
         let tensor = TensorRef::from_array_view((shape, input)).map_err(|cause| fail(&cause))?;
         let outputs = session.run(ort::inputs!["input" => tensor]).map_err(|cause| fail(&cause))?;

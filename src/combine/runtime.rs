@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use caustique_library::{below, file_name};
 use ort::environment::Environment;
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
 
 /// Environment variable that names the library's file.
@@ -44,7 +44,7 @@ impl Runtime {
     /// The library: loaded by the first call, the same for all later ones.
     ///
     /// # Errors
-    /// [`Kind::Library`] when no candidate can be loaded; the hint says what to install.
+    /// [`ErrorKind::Library`] when no candidate can be loaded; the hint says what to install.
     pub fn find() -> Result<Self> {
         let mut loaded = LOADED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(runtime) = &*loaded {
@@ -82,7 +82,7 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
         let absolute = std::path::absolute(&path).map_err(|cause| Error::io(&path, &cause))?;
         if !absolute.is_file() {
             let place = format!("{VARIABLE}={}", path.display());
-            return Err(Error::new(Kind::Library, place, "no such file").hint(HINT));
+            return Err(Error::new(ErrorKind::Library, place, "no such file").hint(HINT));
         }
         return Ok(vec![absolute]);
     }
@@ -102,7 +102,7 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
             Ok(builder) => {
                 let path = located(candidate);
                 let environment = builder.with_name("caustique").with_telemetry(false).build();
-                let environment = environment.map_err(|cause| Error::new(Kind::Library, path.display(), cause))?;
+                let environment = environment.map_err(|cause| Error::new(ErrorKind::Library, path.display(), cause))?;
                 return Ok(Runtime { environment, path });
             }
             // A name unknown to the loader is no news; a file that refuses, or a library too old, is.
@@ -114,7 +114,7 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
         None => "the shared library was not found".to_string(),
         Some(first) => format!("the shared library cannot be used: {first}"),
     };
-    Err(Error::new(Kind::Library, "ONNX Runtime", cause).hint(HINT))
+    Err(Error::new(ErrorKind::Library, "ONNX Runtime", cause).hint(HINT))
 }
 
 /// While it lives, what is written to stderr is lost. Debian 13's ONNX Runtime is linked to a libonnx that has
@@ -167,7 +167,7 @@ mod tests {
     fn nothing_found_is_an_error_with_advice() {
         let error = load(&[]).unwrap_err();
         assert_eq!(error.to_string(), "ONNX Runtime: the shared library was not found");
-        assert_eq!(error.kind, Kind::Library);
+        assert_eq!(error.kind, ErrorKind::Library);
         assert!(error.hint.unwrap().contains("scripts/setup.sh"));
     }
 }

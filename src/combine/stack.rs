@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Role};
 
 /// The layers of one render that the combiner reads; every plane holds `width * height` pixels, rows from the top.
@@ -37,7 +37,7 @@ impl LevelStack {
         let of_role = |role| set.find(role).map(Layer::triples).unwrap_or_default();
         let levels = numbered("Level");
         if levels.is_empty() {
-            let error = Error::new(Kind::Image, "", "the file has no bandwidth levels (Level1, Level2, ...)");
+            let error = Error::new(ErrorKind::Image, "", "the file has no bandwidth levels (Level1, Level2, ...)");
             return Err(error.hint("render with --layers all"));
         }
         let depth = set.find(Role::Depth).and_then(|layer| layer.planes.first());
@@ -56,12 +56,16 @@ impl LevelStack {
     pub(crate) fn check(&self, expected: usize) -> Result<()> {
         let pixels = self.width.checked_mul(self.height).unwrap_or(0);
         if pixels == 0 {
-            return Err(Error::new(Kind::Image, "", format!("an image of {} x {} pixels", self.width, self.height)));
+            return Err(Error::new(
+                ErrorKind::Image,
+                "",
+                format!("an image of {} x {} pixels", self.width, self.height),
+            ));
         }
         let count = self.levels.len();
         if count != expected {
             let cause = format!("the image has {count} levels, the network takes {expected}");
-            return Err(Error::new(Kind::Image, "", cause)
+            return Err(Error::new(ErrorKind::Image, "", cause)
                 .hint(format!("render with --levels {expected}, or give a network trained for {count} with --model")));
         }
         let plane = |name: String, size: usize| {
@@ -69,7 +73,7 @@ impl LevelStack {
                 return Ok(());
             }
             let cause = format!("the layer holds {size} pixels, the image {pixels}");
-            Err(Error::new(Kind::Image, format!("layer {name}"), cause).hint("render with --layers all"))
+            Err(Error::new(ErrorKind::Image, format!("layer {name}"), cause).hint("render with --layers all"))
         };
         for index in 0..count {
             plane(format!("Level{}", index + 1), self.levels[index].len())?;

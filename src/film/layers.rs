@@ -3,7 +3,7 @@
 //! A layer is a few planes, one per component, and `Level1.R` is the plane `R` of the layer `Level1`. The beauty is the
 //! layer with the empty name. A plane that stands alone in a file, such as `Z`, is the only plane `Z` of a layer `Z`.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// How a plane's values are stored in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,7 +119,7 @@ impl LayerSet {
     pub fn push(&mut self, layer: Layer) -> Result<()> {
         if let Some(plane) = layer.planes.iter().find(|plane| plane.values.len() != self.pixels()) {
             let cause = format!("{} values for {} x {} pixels", plane.values.len(), self.width, self.height);
-            return Err(Error::new(Kind::Image, format!("layer \"{}\"", layer.name), cause));
+            return Err(Error::new(ErrorKind::Image, format!("layer \"{}\"", layer.name), cause));
         }
         match self.layers.iter_mut().find(|old| old.name == layer.name) {
             Some(old) => *old = layer,
@@ -163,7 +163,7 @@ impl LayerSet {
     pub fn beauty(&self) -> Result<Vec<[f32; 3]>> {
         let layer = self.find(Role::Beauty).filter(|layer| !layer.planes.is_empty()).ok_or_else(|| {
             let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).take(8).collect();
-            Error::new(Kind::Image, "", format!("no picture among the layers ({})", names.join(", ")))
+            Error::new(ErrorKind::Image, "", format!("no picture among the layers ({})", names.join(", ")))
                 .hint("a picture has the channels R, G, B, or a layer named Combined, beauty or rgba")
         })?;
         Ok(layer.triples())

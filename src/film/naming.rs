@@ -7,7 +7,7 @@
 
 use super::kind::{CAUSTIC, LAYERS, LIGHT_GROUP, LayerKind, Suffix, Use, finished_part, kind_of, part_names, stem};
 use super::layers::{Layer, LayerSet, Sample};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
 /// How channels are called in an EXR.
@@ -119,7 +119,7 @@ impl Selection {
         }
         let names: Vec<String> = text.split(',').map(|s| s.trim().to_owned()).filter(|s| !s.is_empty()).collect();
         if names.is_empty() {
-            return Err(Error::new(Kind::Usage, "--layers", "no layer is named")
+            return Err(Error::new(ErrorKind::Usage, "--layers", "no layer is named")
                 .hint("give all, comp, beauty, or names such as beauty,Noisy,albedo"));
         }
         match names.iter().find(|name| *name != "beauty" && describe(name).is_none()) {
@@ -191,7 +191,7 @@ fn suggestions() -> Vec<String> {
 
 fn unknown_layer<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Error {
     let known: Vec<&str> = known.collect();
-    let error = Error::new(Kind::Usage, "--layers", format!("no layer \"{name}\""));
+    let error = Error::new(ErrorKind::Usage, "--layers", format!("no layer \"{name}\""));
     let distance = |known: &str| strsim::levenshtein(&name.to_lowercase(), &known.to_lowercase());
     let nearest = known.iter().map(|k| (distance(k), k)).min_by_key(|(d, _)| *d);
     match nearest {
@@ -211,12 +211,12 @@ pub fn check(set: &LayerSet, naming: Naming) -> Result<()> {
             let fault = fault(layer, &plane.component, naming, name.len())
                 .or_else(|| (!seen.insert(name.clone())).then_some("two channels have this name"));
             if let Some(cause) = fault {
-                return Err(Error::new(Kind::Image, format!("channel \"{name}\""), cause));
+                return Err(Error::new(ErrorKind::Image, format!("channel \"{name}\""), cause));
             }
         }
     }
     if seen.len() > 1023 {
-        return Err(Error::new(Kind::Image, "", "more than the 1023 channels that Nuke can hold"));
+        return Err(Error::new(ErrorKind::Image, "", "more than the 1023 channels that Nuke can hold"));
     }
     Ok(())
 }

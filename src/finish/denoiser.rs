@@ -4,7 +4,7 @@
 use super::Estimate;
 use super::bound::spread;
 use super::statistical;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
 use caustique_oidn as oidn;
 use serde::{Deserialize, Serialize};
@@ -58,7 +58,7 @@ impl Denoiser {
     /// is not Open Image Denoise.
     ///
     /// # Errors
-    /// [`Kind::Library`] where [`DenoiserChoice::Oidn`] cannot be had.
+    /// [`ErrorKind::Library`] where [`DenoiserChoice::Oidn`] cannot be had.
     pub fn open(choice: DenoiserChoice) -> Result<(Denoiser, Option<Error>)> {
         match choice {
             DenoiserChoice::None => Ok((Denoiser::None, None)),
@@ -80,7 +80,7 @@ impl Denoiser {
     /// The denoised picture of an estimate, row by row.
     ///
     /// # Errors
-    /// [`Kind::Library`] when Open Image Denoise fails.
+    /// [`ErrorKind::Library`] when Open Image Denoise fails.
     pub fn run(&mut self, estimate: &Estimate, quality: Quality) -> Result<Vec<[f32; 3]>> {
         let Estimate { size, mean, albedo, normal, .. } = estimate;
         let (albedo, normal) = (albedo.as_deref(), normal.as_deref());
@@ -102,7 +102,7 @@ impl Denoiser {
                 input.normal = normal.filter(|_| albedo.is_some());
                 (input.hdr, input.clean_aux) = (true, albedo.is_some());
                 (input.quality, input.max_memory_mib) = (quality, Some(MEMORY_MIB));
-                filter.denoise(&input).map_err(|error| Error::new(Kind::Library, "Open Image Denoise", error))
+                filter.denoise(&input).map_err(|error| Error::new(ErrorKind::Library, "Open Image Denoise", error))
             }
         }
     }
@@ -126,7 +126,7 @@ pub fn origin(library: &oidn::Library) -> &'static str {
 
 fn oidn() -> Result<Denoiser> {
     let refuse = |error: oidn::Error| {
-        let refusal = Error::new(Kind::Library, "Open Image Denoise", &error);
+        let refusal = Error::new(ErrorKind::Library, "Open Image Denoise", &error);
         error.hint().into_iter().fold(refusal, Error::hint)
     };
     let library = library().map_err(refuse)?;

@@ -25,7 +25,7 @@ pub use verdict::{Errors, USUAL, Verdict};
 pub use window::{Size, Windows, window};
 
 use crate::combine::{Combiner, LevelStack};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::QUARTERS;
 use crate::film::kind::Use;
 use crate::film::{CAUSTIC, LIGHT_GROUP, Layer, LayerSet, Role, finished_part, kind_of, part_names};
@@ -107,7 +107,7 @@ impl Estimate {
             }
             (None, None) => {
                 let error = Error::new(
-                    Kind::Image,
+                    ErrorKind::Image,
                     "",
                     "nothing tells how noisy the picture is: there is no layer Variance1, Variance, or Half1 and Half2",
                 );

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 
 /// Writes a file through `fill` so that nobody ever sees half of it: to a temporary file beside it, flushed to disk,
 /// then renamed. If anything fails the temporary file is removed and an older file at `path` stays as it was.
@@ -39,7 +39,8 @@ pub fn check_writable(path: &Path) -> Result<()> {
     match fs::symlink_metadata(&target) {
         Err(cause) if cause.kind() != io::ErrorKind::NotFound => return Err(failure(path, &cause)),
         Ok(file) if is_kept(&target, &file) => {
-            let error = Error::new(Kind::Io, path.display(), "belongs to another user, whose files are kept there");
+            let error =
+                Error::new(ErrorKind::Io, path.display(), "belongs to another user, whose files are kept there");
             return Err(error.hint("choose another name, or another folder"));
         }
         _ => {}
@@ -94,7 +95,7 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
 
 /// Where the bytes go: links followed, so that a link stays a link, also one to a file that is not there yet.
 fn resolve(path: &Path) -> Result<PathBuf> {
-    let error = |cause: &str| Error::new(Kind::Io, path.display(), cause);
+    let error = |cause: &str| Error::new(ErrorKind::Io, path.display(), cause);
     if path.file_name().is_none() || path.is_dir() {
         return Err(error("is a folder").hint("name a file in it"));
     }

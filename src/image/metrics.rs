@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::flip;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::LayerSet;
 use crate::math::Rgb;
 use crate::memory;
@@ -167,7 +167,7 @@ pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
 pub fn compare_above(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Comparison> {
     if (a.width, a.height) != (b.width, b.height) {
         let cause = format!("pictures of {} x {} and {} x {} pixels", a.width, a.height, b.width, b.height);
-        return Err(Error::new(Kind::Image, "", cause).hint("render both with the same --width and --height"));
+        return Err(Error::new(ErrorKind::Image, "", cause).hint("render both with the same --width and --height"));
     }
     let bytes = (a.width as u64).saturating_mul(a.height as u64).saturating_mul(COMPARED_PIXEL_BYTES);
     if bytes >= memory::SMALL {
@@ -189,7 +189,7 @@ pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usiz
 fn compare_values(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize), floor: Floor) -> Result<Comparison> {
     if a.len() != width * height || b.len() != width * height {
         let cause = format!("{} and {} values for {width} x {height} pixels", a.len(), b.len());
-        return Err(Error::new(Kind::Image, "", cause));
+        return Err(Error::new(ErrorKind::Image, "", cause));
     }
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
@@ -197,7 +197,7 @@ fn compare_values(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize
     let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
         (errors_above(a, b, floor), grain_above(a, b, (width, height), floor))
     else {
-        return Err(Error::new(Kind::Image, "", "the pictures have no pixel with finite values in common"));
+        return Err(Error::new(ErrorKind::Image, "", "the pictures have no pixel with finite values in common"));
     };
 
     // FLIP filters over neighbours, so that a hole needs a value; black in both looks equal.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::image::atomic;
 use crate::image::tonemap::ToneMap;
 use crate::math::Rgb;
@@ -24,9 +24,9 @@ pub fn encode(width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>
     let picture = size.and_then(|(w, h)| image::RgbImage::from_raw(w, h, bytes));
     let picture = picture
         .filter(|picture| picture.as_raw().len() == 3 * width * height)
-        .ok_or_else(|| Error::new(Kind::Image, "", format!("no picture of {width} x {height} pixels")))?;
+        .ok_or_else(|| Error::new(ErrorKind::Image, "", format!("no picture of {width} x {height} pixels")))?;
     let mut encoded = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut encoded, image::ImageFormat::Png).map_err(|cause| Error::new(Kind::Image, "", cause))?;
+    picture.write_to(&mut encoded, image::ImageFormat::Png).map_err(|cause| Error::new(ErrorKind::Image, "", cause))?;
     Ok(encoded.into_inner())
 }
 

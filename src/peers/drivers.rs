@@ -3,7 +3,7 @@
 use super::process::{self, End, Stop};
 use super::python::Interpreter;
 use super::{Peer, Renderer};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::image::exr;
 use crate::temporary;
 use serde::Deserialize;
@@ -126,7 +126,7 @@ impl Drivers {
     /// The driver fails, takes far too long, or does not answer.
     pub fn render(&self, peer: &Peer, task: Task, stop: Stop<'_>) -> Result<Answer> {
         let failed = |cause: &dyn std::fmt::Display| {
-            Error::new(Kind::Library, peer.name, cause)
+            Error::new(ErrorKind::Library, peer.name, cause)
                 .hint(format!("its driver is scripts/compare/peers/{}", peer.renderer.driver()))
         };
         let Some((_, python)) = self.interpreters.iter().find(|(of, _)| *of == peer.renderer) else {
@@ -187,7 +187,7 @@ impl Drivers {
         let (width, height) = (self.size.0 as usize, self.size.1 as usize);
         if (set.width, set.height) != (width, height) {
             let cause = format!("a picture of {} x {} pixels, not {width} x {height}", set.width, set.height);
-            return Err(Error::new(Kind::Image, "", cause));
+            return Err(Error::new(ErrorKind::Image, "", cause));
         }
         set.beauty()
     }

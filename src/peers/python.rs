@@ -1,7 +1,7 @@
 //! Finding the Pythons that have the renderers.
 
 use super::Renderer;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
 use std::path::PathBuf;
 use std::process::Command;
@@ -31,7 +31,7 @@ impl Interpreter {
     /// `scripts/compare/setup.sh peers` makes (see [`installed`]).
     ///
     /// # Errors
-    /// [`Kind::Library`]: there is none, it does not run, or it lacks the renderer.
+    /// [`ErrorKind::Library`]: there is none, it does not run, or it lacks the renderer.
     pub(super) fn find(renderer: Renderer) -> Result<Interpreter> {
         let (variable, environment, module) = match renderer {
             Renderer::Mitsuba => ("CAUSTIQUE_PEERS_PYTHON", ".venv-peers", "mitsuba"),
@@ -42,11 +42,11 @@ impl Interpreter {
         let path = match installed::set(variable) {
             Some(path) if path.is_file() => path,
             Some(path) => {
-                let error = Error::new(Kind::Library, format!("{variable}={}", path.display()), "no such file");
+                let error = Error::new(ErrorKind::Library, format!("{variable}={}", path.display()), "no such file");
                 return Err(error.hint(format!("name a Python that has {module}, or unset it and {HINT}")));
             }
             None => installed::find(&format!("{environment}/bin/python")).ok_or_else(|| {
-                Error::new(Kind::Library, format!("--with: {environment}"), "there is no such environment")
+                Error::new(ErrorKind::Library, format!("--with: {environment}"), "there is no such environment")
                     .hint(format!("{HINT}, or set {variable} to a Python that has {module}"))
             })?,
         };
@@ -66,7 +66,7 @@ impl Interpreter {
     }
 
     fn check(&self, module: &str) -> Result<()> {
-        let error = |cause: String| Error::new(Kind::Library, self.path.display(), cause).hint(HINT);
+        let error = |cause: String| Error::new(ErrorKind::Library, self.path.display(), cause).hint(HINT);
         let probe = self.command().args(["-c", PROBE, module, "numpy", "OpenEXR"]).output();
         let output = probe.map_err(|cause| error(cause.to_string()))?;
         if output.status.success() {

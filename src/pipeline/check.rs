@@ -1,6 +1,6 @@
 //! What a method cannot do in a scene, found before anything is rendered.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::LEAST_ASKED;
 use crate::plan::Search;
@@ -24,7 +24,7 @@ pub fn media(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
         _ => return Ok(()),
     };
     let cause = format!("{option} does not render media that scatter light");
-    Err(Error::new(Kind::Usage, path.display(), cause).hint(hint))
+    Err(Error::new(ErrorKind::Usage, path.display(), cause).hint(hint))
 }
 
 /// Whether photons within the bandwidth that was asked for tell of the light there.
@@ -40,12 +40,12 @@ pub fn bandwidth(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> 
             let cause = format!(
                 "--initial-bandwidth {asked}: in a scene of radius {radius:.3} single precision does not tell such lengths apart"
             );
-            let error = Error::new(Kind::Usage, path.display(), cause);
+            let error = Error::new(ErrorKind::Usage, path.display(), cause);
             Err(error.hint(format!("ask for {least:.1e} at least, or leave --initial-bandwidth out")))
         }
         InitialBandwidth::Fixed(asked) if asked > radius => {
             let cause = format!("--initial-bandwidth {asked}: the scene has a radius of {radius:.3}");
-            let error = Error::new(Kind::Usage, path.display(), cause);
+            let error = Error::new(ErrorKind::Usage, path.display(), cause);
             Err(error.hint(format!("ask for {radius:.3} at most, or leave --initial-bandwidth out")))
         }
         _ => Ok(()),

@@ -4,7 +4,7 @@
 //! both as postcard packs them.
 
 use super::records::{self, Record};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::Pixel;
 use crate::image::atomic;
 use crate::render::{Candidate, State};
@@ -58,9 +58,9 @@ pub struct Head {
 /// # Errors
 /// The file system.
 pub fn write(path: &Path, head: &Head, state: State<&[Pixel]>) -> Result<()> {
-    let head = serde_json::to_vec(head).map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
+    let head = serde_json::to_vec(head).map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
     let (state, pixels) = state.exchange(());
-    let state = postcard::to_allocvec(&state).map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
+    let state = postcard::to_allocvec(&state).map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
     atomic::write(path, |file| {
         let written = file
             .write_all(MAGIC)
@@ -86,7 +86,7 @@ pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<(
     let mut magic = [0; MAGIC.len()];
     let length = file.by_ref().take(MAGIC.len() as u64).read(&mut magic).map_err(|cause| Error::io(path, &cause))?;
     if length > 0 && !magic.starts_with(KIND) {
-        let error = Error::new(Kind::Usage, path.display(), "is no checkpoint, so it is not replaced by one");
+        let error = Error::new(ErrorKind::Usage, path.display(), "is no checkpoint, so it is not replaced by one");
         return Err(error.hint("name another file with --checkpoint, or move this one"));
     }
     let head = Record::read(&mut file).ok().flatten().and_then(|record| record.unpack().ok());
@@ -94,7 +94,7 @@ pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<(
     if length == 0 || overwrite || head.is_some_and(|head| head.finished) {
         return Ok(());
     }
-    let error = Error::new(Kind::Usage, path.display(), "is the checkpoint of a render that was not finished");
+    let error = Error::new(ErrorKind::Usage, path.display(), "is the checkpoint of a render that was not finished");
     Err(error.hint(remedy))
 }
 
@@ -103,7 +103,7 @@ pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<(
 /// # Errors
 /// There is no file, it is none of ours, of another version of the program, or damaged.
 pub fn read(path: &Path) -> Result<(Head, State)> {
-    let error = |cause: &str| Error::new(Kind::Io, path.display(), cause);
+    let error = |cause: &str| Error::new(ErrorKind::Io, path.display(), cause);
     let missing =
         |cause| Error::io(path, &cause).hint("name a file that --checkpoint wrote, or start anew without --resume");
     let mut file = BufReader::new(File::open(path).map_err(missing)?);
@@ -135,7 +135,7 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
 /// # Errors
 /// Its scene or an option is another.
 pub fn check(path: &Path, head: &Head, scene: Option<&str>, arguments: &Value) -> Result<()> {
-    let error = |cause: String| Error::new(Kind::Usage, path.display(), cause);
+    let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
     if Some(head.scene.as_str()) != scene {
         let cause = "is of another scene, or the scene's files have changed since";
         return Err(error(cause.into()).hint("give the same scene, or start anew without --resume"));

@@ -1,6 +1,6 @@
 //! From a scene file and wishes about it to a scene.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::math::Rgb;
 use crate::memory;
 use crate::plan::EffectSet;
@@ -107,7 +107,7 @@ fn environment(description: &mut Description, order: &Order) -> Result<()> {
         return Ok(());
     }
     let cause = format!("its environment is brighter than {MAX_RADIANCE:e} W/(sr m^2)");
-    Err(Error::new(Kind::Scene, order.path.display(), cause).hint("lower --env or --env-strength"))
+    Err(Error::new(ErrorKind::Scene, order.path.display(), cause).hint("lower --env or --env-strength"))
 }
 
 /// A turn and a strength also act on the scene's own environment.
@@ -115,7 +115,8 @@ fn set_turn_and_strength(description: &mut Description, order: &Order) -> Result
     let given = [("--env-rotation", order.rotation), ("--env-strength", order.strength)];
     let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
     let Some(environment) = &mut description.environment else {
-        let error = Error::new(Kind::Usage, order.path.display(), format!("{option}: the scene has no environment"));
+        let error =
+            Error::new(ErrorKind::Usage, order.path.display(), format!("{option}: the scene has no environment"));
         return Err(error.hint("give one with --env"));
     };
     if let Some(degrees) = order.rotation {

@@ -6,7 +6,7 @@ use super::facts::Facts;
 use super::finish;
 use super::layers;
 use super::shard::Open;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::Pixel;
 use crate::film::Naming;
 use crate::render::{Part, Rendered, Settings};
@@ -61,7 +61,7 @@ impl Shards {
         let mut files: Vec<(PathBuf, Open)> = Vec::new();
         for path in paths {
             let Some(open) = Open::of(path)? else {
-                let error = Error::new(Kind::Usage, path.display(), "is no shard of a render");
+                let error = Error::new(ErrorKind::Usage, path.display(), "is no shard of a render");
                 return Err(error.hint("merge files that --shard I/N made, or whole renders of other seeds alone"));
             };
             if let Some((first, whole)) = files.first() {
@@ -73,7 +73,7 @@ impl Shards {
         let index = |open: &Open| open.part.settings.shard.index;
         if let Some([(a, open), (b, _)]) = files.windows(2).find(|pair| index(&pair[0].1) == index(&pair[1].1)) {
             let cause = format!("is shard {} as {} is", index(open), a.display());
-            return Err(Error::new(Kind::Usage, b.display(), cause).hint("name each shard once"));
+            return Err(Error::new(ErrorKind::Usage, b.display(), cause).hint("name each shard once"));
         }
         let count = files.first().map_or(0, |(_, open)| open.part.settings.shard.count);
         let missing: Vec<u64> =
@@ -172,7 +172,7 @@ fn join(path: &Path, open: &mut Open, pixels: &mut Vec<Pixel>) -> Result<()> {
 
 /// Whether two shards are of one render.
 fn check((first, whole): (&Path, &Open), (path, open): (&Path, &Open)) -> Result<()> {
-    let error = |cause: String| Error::new(Kind::Usage, path.display(), cause);
+    let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
     let first = first.display();
     if open.head.scene != whole.head.scene {
         return Err(error(format!("is of another scene than {first}")).hint("merge shards of one render"));

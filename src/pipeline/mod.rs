@@ -36,7 +36,7 @@ use saver::Saver;
 use shard::Tail;
 
 use crate::choose::{self, Choice};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LayerSet, Naming, Selection, finished_part, output as film};
 use crate::finish::{Finish, reads_for_picture};
 use crate::image::atomic::is_same_file;
@@ -230,7 +230,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         Some((head, state)) => {
             watch.resumed(state.iterations());
             let path = order.resume.clone().unwrap_or_default();
-            let other = || Error::new(Kind::Usage, path.display(), "is of a picture of another size or method");
+            let other = || Error::new(ErrorKind::Usage, path.display(), "is of a picture of another size or method");
             let session = Session::resume(&stage, state).ok_or_else(other)?;
             (session, head.plan)
         }

@@ -2,7 +2,7 @@
 
 use super::Watch;
 use super::checkpoint::{self, Head, Saving};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::render::{Clock, Session, Spent, StopReason};
 use std::path::PathBuf;
 
@@ -58,7 +58,7 @@ impl<'a> Saver<'a> {
 
     fn write(&self, session: &Session<'_>) -> Result<()> {
         let path = &self.saving.path;
-        let state = session.state().map_err(|cause| Error::new(Kind::Io, path.display(), cause))?;
+        let state = session.state().map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
         checkpoint::write(path, &self.head, state)
     }
 }

@@ -3,7 +3,7 @@
 
 use super::checkpoint::difference;
 use super::deliver::FINISHED_PICTURE;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
 use crate::film::kind::Merge;
 use crate::film::{CRYPTOMATTES, Layer, LayerSet, kind_of};
@@ -105,7 +105,7 @@ impl Seeds {
     }
 
     fn source(&self, path: &Path, set: &LayerSet, attributes: &Attributes) -> Result<Source> {
-        let error = |cause: String| Error::new(Kind::Usage, path.display(), cause);
+        let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
         let header = attributes.object().filter(|header| header["iterations"].as_f64().is_some_and(|n| n > 0.0));
         let Some(header) = header else {
             return Err(error("is no render of caustique".into()).hint("merge renders of other seeds, or shards"));

@@ -8,7 +8,7 @@
 use super::checkpoint::{BLOCK, Head};
 use super::facts::Facts;
 use super::records::{self, Record};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::Pixel;
 use crate::render::Part;
 use std::fs::File;
@@ -76,7 +76,9 @@ impl Open {
         let head: Head = serde_json::from_slice(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
         if head.version != env!("CARGO_PKG_VERSION") {
             let cause = format!("is of version {} of caustique; this is {}", head.version, env!("CARGO_PKG_VERSION"));
-            return Err(Error::new(Kind::Usage, path.display(), cause).hint("merge it with the version that made it"));
+            return Err(
+                Error::new(ErrorKind::Usage, path.display(), cause).hint("merge it with the version that made it")
+            );
         }
         let (facts, part): (Facts, Part) =
             postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
@@ -108,7 +110,7 @@ impl Open {
 }
 
 fn damaged(path: &Path) -> Error {
-    Error::new(Kind::Io, path.display(), "the sums behind its picture are damaged").hint("render this shard again")
+    Error::new(ErrorKind::Io, path.display(), "the sums behind its picture are damaged").hint("render this shard again")
 }
 
 /// Where the tail begins, if there is one.

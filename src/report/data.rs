@@ -6,7 +6,7 @@ use super::outcome::Outcome;
 use super::point::Point;
 use super::summary::{Subject, Summary, finite};
 use super::target::Reached;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -67,7 +67,7 @@ fn method(subject: &Subject, of: Of) -> &'static str {
 /// # Errors
 /// None that memory would not have.
 pub fn csv(subject: &Subject, outcome: &Outcome) -> Result<Vec<u8>> {
-    let failed = |cause: &dyn std::fmt::Display| Error::new(Kind::Io, "points.csv", cause);
+    let failed = |cause: &dyn std::fmt::Display| Error::new(ErrorKind::Io, "points.csv", cause);
     let mut writer = csv::Writer::from_writer(Vec::new());
     for point in &outcome.points {
         writer.serialize(Row::of(subject, point)).map_err(|cause| failed(&cause))?;

@@ -4,7 +4,7 @@ use super::curve::{Axis, Curve, Spot};
 use super::entry::{Metric, Of};
 use super::number::{minus, plain};
 use super::summary::{Subject, Summary};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -75,7 +75,7 @@ pub fn svg(
     let Some((across, up)) = ranges(&curves, axis) else { return Ok(None) };
     let mut text = String::new();
     let drawn = draw(&mut text, &Picture { subject, summary, metric, axis, curves }, (across, up));
-    drawn.map_err(|cause| Error::new(Kind::Image, "plot", cause))?;
+    drawn.map_err(|cause| Error::new(ErrorKind::Image, "plot", cause))?;
     Ok(Some(text))
 }
 

@@ -7,7 +7,7 @@
 
 use super::entry::Metric;
 use crate::camera::Camera;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet};
 use crate::image::exr::{self, Attributes};
 use crate::image::{Errors, errors};
@@ -95,12 +95,12 @@ impl Reference {
         let (width, height) = (size.0 as usize, size.1 as usize);
         if (set.width, set.height) != (width, height) {
             let cause = format!("the reference has {} x {} pixels, not {width} x {height}", set.width, set.height);
-            let error = Error::new(Kind::Usage, about, cause);
+            let error = Error::new(ErrorKind::Usage, about, cause);
             return Err(error.hint(format!("use --width {} --height {}", set.width, set.height)));
         }
         let picture = set.beauty().map_err(|error| error.within(&about))?;
         if !picture.iter().flatten().any(|v| v.is_finite()) {
-            return Err(Error::new(Kind::Image, about, "the reference has no finite value"));
+            return Err(Error::new(ErrorKind::Image, about, "the reference has no finite value"));
         }
         Ok(Reference { width, height, picture, error: told(header), about })
     }

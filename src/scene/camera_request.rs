@@ -3,7 +3,7 @@
 use super::Scene;
 use super::description::{CameraDescription, Projection};
 use crate::camera::{self, Camera, Filter};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2};
 
 /// Width of a picture when nothing is asked for.
@@ -97,7 +97,7 @@ impl Scene {
             Some(name) => self.cameras.iter().find(|c| &c.name == name).ok_or_else(|| {
                 let names: Vec<String> = self.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
                 let error =
-                    Error::new(Kind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
+                    Error::new(ErrorKind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
                 error.hint(if names.is_empty() {
                     "the scene has no camera".into()
                 } else {
@@ -130,7 +130,7 @@ impl Scene {
         if width == 0 || height == 0 || width > MAX_SIZE || height > MAX_SIZE {
             let cause = format!("a picture of {width} x {height} pixels cannot be made");
             return Err(
-                Error::new(Kind::Usage, "", cause).hint(format!("--width and --height are from 1 to {MAX_SIZE}"))
+                Error::new(ErrorKind::Usage, "", cause).hint(format!("--width and --height are from 1 to {MAX_SIZE}"))
             );
         }
         let film_aspect = width as f32 / height as f32;

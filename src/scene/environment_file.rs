@@ -1,7 +1,7 @@
 //! Environment images: OpenEXR and Radiance HDR files, latitude and longitude.
 
 use super::description::EnvironmentSource;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::memory;
 use exr::prelude::{ReadChannels, ReadLayers};
 use image::ImageDecoder;
@@ -34,7 +34,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<EnvironmentSource
     let mut start = Vec::new();
     std::io::Read::read_to_end(&mut std::io::Read::take(File::open(path).map_err(io)?, 10), &mut start).map_err(io)?;
     let failed = |cause: String| {
-        Error::new(Kind::Image, path.display(), cause)
+        Error::new(ErrorKind::Image, path.display(), cause)
             .hint("save the environment as a latitude-longitude OpenEXR or Radiance HDR image")
     };
     let decode: fn(&Path) -> std::result::Result<Pixels, String> = match start.as_slice() {

@@ -3,7 +3,7 @@
 //! A scene comes from anywhere, and its bytes end in a picture or in a message: one that names `../../.ssh/id_rsa` must
 //! not have it opened, not even to learn whether it is there.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use std::path::{Component, Path, PathBuf};
 
 /// The folder of a scene file.
@@ -30,7 +30,7 @@ impl<'a> Folder<'a> {
             return Ok(file);
         }
         let cause = format!("the file {} is outside the scene's folder", name.display());
-        Err(Error::new(Kind::Scene, "", cause)
+        Err(Error::new(ErrorKind::Scene, "", cause)
             .hint("put it beside the scene file and name it so, or allow such files with --allow-outside"))
     }
 }

@@ -1,6 +1,6 @@
 //! The scene's triangles in Embree, addressed by our own indices.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::Shapes;
 use crate::math::{Affine3A, Vec3};
 use caustique_embree as embree;
@@ -65,7 +65,7 @@ pub struct Tracer {
 
 fn convert(error: embree::Error) -> Error {
     let hint = error.hint();
-    let mut error = Error::new(Kind::Library, "Embree", error);
+    let mut error = Error::new(ErrorKind::Library, "Embree", error);
     error.hint = hint;
     error
 }

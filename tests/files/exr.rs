@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use caustique::error::Kind;
+use caustique::error::ErrorKind;
 use caustique::film::{Layer, LayerSet, Naming, Role, Sample, Selection};
 use caustique::image::exr::{self, Attributes, Compression, Options};
 use caustique::image::{atomic, png, tonemap::ToneMap};
@@ -255,7 +255,7 @@ fn names_that_break_other_programs_are_refused() {
 fn planes_must_fit_and_names_are_unique() {
     let mut set = LayerSet::new(2, 2);
     let error = set.push(Layer::interleaved("Noisy", "RGB", [[0.0; 3]; 3])).unwrap_err();
-    assert_eq!((error.kind, error.cause.as_str()), (Kind::Image, "3 values for 2 x 2 pixels"));
+    assert_eq!((error.kind, error.cause.as_str()), (ErrorKind::Image, "3 values for 2 x 2 pixels"));
     set.push(Layer::interleaved("Noisy", "RGB", [[0.0; 3]; 4])).unwrap();
     set.push(Layer::interleaved("Noisy", "RGB", [[1.0; 3]; 4])).unwrap();
     assert_eq!(set.layers.len(), 1);
@@ -273,9 +273,9 @@ fn selections() {
     assert_eq!(names("beauty"), [""]);
     assert_eq!(names("beauty,albedo, Level"), ["", "Level1", "albedo"]);
     let error = Selection::parse("beauty,albeod").unwrap_err();
-    assert_eq!((error.kind, error.cause.as_str()), (Kind::Usage, "no layer \"albeod\""));
+    assert_eq!((error.kind, error.cause.as_str()), (ErrorKind::Usage, "no layer \"albeod\""));
     assert_eq!(error.hint.as_deref(), Some("did you mean \"albedo\"?"));
-    assert_eq!(Selection::parse("").unwrap_err().kind, Kind::Usage);
+    assert_eq!(Selection::parse("").unwrap_err().kind, ErrorKind::Usage);
     // A name of ours that this picture lacks.
     let error = Selection::parse("beauty,Level9").unwrap().apply(set.clone()).unwrap_err();
     assert_eq!(error.hint.as_deref(), Some("did you mean \"Level1\"?"));
@@ -360,11 +360,11 @@ fn malformed_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let missing = exr::read(&path).unwrap_err();
-    assert_eq!(missing.kind, Kind::Io);
+    assert_eq!(missing.kind, ErrorKind::Io);
     fs::write(&path, b"").unwrap();
     assert!(exr::read(&path).unwrap_err().cause.contains("empty"));
     fs::write(&path, b"\x89PNG\r\n\x1a\n and so on").unwrap();
-    assert_eq!(exr::read(&path).unwrap_err().kind, Kind::Image);
+    assert_eq!(exr::read(&path).unwrap_err().kind, ErrorKind::Image);
     assert!(exr::read(folder.path()).is_err());
 
     let mut random = 0x9e37_79b9_7f4a_7c15u64;
@@ -454,7 +454,7 @@ fn a_failed_write_leaves_nothing_and_an_older_file_alone() {
     let error = atomic::write(&path, |file| {
         use std::io::Write;
         file.write_all(b"half of it").unwrap();
-        Err(caustique::error::Error::new(Kind::Io, "", "the disk is full"))
+        Err(caustique::error::Error::new(ErrorKind::Io, "", "the disk is full"))
     });
     assert!(error.is_err());
     assert_eq!(fs::read(&path).unwrap(), b"older");
@@ -470,7 +470,7 @@ fn writability_is_known_beforehand() {
     atomic::check_writable(&folder.path().join("new.exr")).unwrap();
     assert!(entries(folder.path()).is_empty());
     let error = atomic::check_writable(&folder.path().join("no/such/a.exr")).unwrap_err();
-    assert_eq!((error.kind, error.cause.as_str()), (Kind::Io, "its folder does not exist"));
+    assert_eq!((error.kind, error.cause.as_str()), (ErrorKind::Io, "its folder does not exist"));
     assert!(error.hint.unwrap().starts_with("mkdir -p "));
     let error = atomic::check_writable(folder.path()).unwrap_err();
     assert_eq!(error.cause, "is a folder");
@@ -484,7 +484,7 @@ fn a_full_disk_is_an_error_with_advice() {
     // The device takes the place of a full disk: every write to it fails with ENOSPC.
     let error =
         exr::write(Path::new("/dev/full"), &fixture(8, 8), &Attributes::default(), Options::default()).unwrap_err();
-    assert_eq!((error.kind, error.place.as_str()), (Kind::Io, "/dev/full"));
+    assert_eq!((error.kind, error.place.as_str()), (ErrorKind::Io, "/dev/full"));
     assert!(error.hint.unwrap().contains("make room"));
 }
 

@@ -1,6 +1,6 @@
 //! The library's errors as Python's.
 
-use caustique::error::{Error as Fault, Kind};
+use caustique::error::{Error as Fault, ErrorKind};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
@@ -86,18 +86,18 @@ pub fn in_python(text: &str) -> String {
 
 /// An error of a call's arguments.
 pub fn usage(cause: impl std::fmt::Display, hint: impl std::fmt::Display) -> PyErr {
-    raised(Fault::new(Kind::Usage, "", cause).hint(hint))
+    raised(Fault::new(ErrorKind::Usage, "", cause).hint(hint))
 }
 
-fn name(kind: Kind) -> &'static str {
+fn name(kind: ErrorKind) -> &'static str {
     match kind {
-        Kind::Usage => "usage",
-        Kind::Scene => "scene",
-        Kind::Image => "image",
-        Kind::Io => "io",
-        Kind::Library => "library",
-        Kind::Model => "model",
-        Kind::Interrupted => "interrupted",
+        ErrorKind::Usage => "usage",
+        ErrorKind::Scene => "scene",
+        ErrorKind::Image => "image",
+        ErrorKind::Io => "io",
+        ErrorKind::Library => "library",
+        ErrorKind::Model => "model",
+        ErrorKind::Interrupted => "interrupted",
     }
 }
 

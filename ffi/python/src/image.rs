@@ -3,7 +3,7 @@
 use crate::error::{raised, usage};
 use crate::keywords::choice;
 use crate::value::{to_json, to_python};
-use caustique::error::{Error, Kind};
+use caustique::error::{Error, ErrorKind};
 use caustique::film::{Layer, LayerSet, Plane, Sample};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
@@ -181,7 +181,7 @@ impl Image {
                 })
             }
             () if is("png") => png::write_tonemapped(&path, set.width, set.height, &set.beauty()?, exposure, curve),
-            () => Err(Error::new(Kind::Usage, path.display(), "the name ends neither in .exr nor in .png")
+            () => Err(Error::new(ErrorKind::Usage, path.display(), "the name ends neither in .exr nor in .png")
                 .hint("an EXR holds all layers, a PNG is a picture to look at")),
         });
         written.map_err(raised)
@@ -271,7 +271,7 @@ pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyR
 
 /// An array whose shape and values come from one place.
 fn shaped<T, E: std::fmt::Display>(array: Result<T, E>) -> PyResult<T> {
-    array.map_err(|cause| raised(Error::new(Kind::Image, "", cause)))
+    array.map_err(|cause| raised(Error::new(ErrorKind::Image, "", cause)))
 }
 
 /// Triples per pixel of an array (H, W, 3) of finite, not negative radiance, and its width and height.

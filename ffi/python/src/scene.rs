@@ -327,7 +327,9 @@ impl Watch for Watcher<'_> {
 
     fn chosen(&mut self, _: Option<&Choice>) -> Result<()> {
         match self.caller.stops() {
-            true => Err(Error::new(caustique::error::Kind::Interrupted, "", "interrupted before the first iteration")),
+            true => {
+                Err(Error::new(caustique::error::ErrorKind::Interrupted, "", "interrupted before the first iteration"))
+            }
             false => Ok(()),
         }
     }

@@ -5,7 +5,7 @@
 //! the thread that its author expects.
 
 use crate::error::{SceneWarning, in_python, raised, usage};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::stop::Stop;
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuilder;
@@ -107,7 +107,7 @@ pub fn work<T: Send>(
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
-        .map_err(|cause| raised(Error::new(Kind::Io, "threads", cause).hint("ask for fewer threads")))?;
+        .map_err(|cause| raised(Error::new(ErrorKind::Io, "threads", cause).hint("ask for fewer threads")))?;
     let stopped = Arc::new(AtomicBool::new(false));
     Ok(py.detach(|| {
         thread::scope(|scope| {

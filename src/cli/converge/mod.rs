@@ -14,7 +14,7 @@ use super::signals::Interrupt;
 use super::{finish, say, scene};
 use caustique::camera::Camera;
 use caustique::choose::{Choice, choose};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::finish::Finish;
 use caustique::pipeline::{Loaded, Ready, check, memory, plan, sized};
 use caustique::plan::switch::Removed;
@@ -102,7 +102,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     }
     if outcome.interrupted {
         let cause = "interrupted; the report on what was done is written";
-        return Err(Error::new(Kind::Interrupted, args.output.display(), cause));
+        return Err(Error::new(ErrorKind::Interrupted, args.output.display(), cause));
     }
     Ok(())
 }
@@ -111,7 +111,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
 fn targets_of(args: &ConvergeArgs, runs: &[Run]) -> Result<Vec<(usize, u64)>> {
     let entries: Vec<Entry> = runs.iter().map(|run| run.entry.clone()).collect();
     let place = |target: &options::TargetOf| {
-        let usage = |cause: String| Error::new(Kind::Usage, "--target-of", cause);
+        let usage = |cause: String| Error::new(ErrorKind::Usage, "--target-of", cause);
         let names: Vec<String> = entries.iter().map(|entry| format!("\"{}\"", entry.name)).collect();
         let run = find(&entries, &target.run).ok_or_else(|| {
             usage(format!("there is no run \"{}\"", target.run)).hint(format!("there are {}", names.join(", ")))
@@ -131,7 +131,7 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     let windows: Vec<Window> = args.crop.iter().map(|crop| crop.0).collect();
     if let Some(w) = windows.iter().find(|w| !w.fits(width as usize, height as usize)) {
         let shown = format!("{},{},{},{}", w.x, w.y, w.width, w.height);
-        let error = Error::new(Kind::Usage, "--crop", format!("{shown} is not within the picture"));
+        let error = Error::new(ErrorKind::Usage, "--crop", format!("{shown} is not within the picture"));
         return Err(error.hint(format!("it has {width} x {height} pixels")));
     }
     Ok(windows)
@@ -185,7 +185,7 @@ fn open(
         let levels = entry.settings.levels.count;
         let ready = (!options.no_combine).then(|| finish::open(&options.finish, Some(levels))).transpose();
         let ready = ready.map_err(|mut error| {
-            if error.kind == Kind::Usage {
+            if error.kind == ErrorKind::Usage {
                 error.place = place;
             }
             error

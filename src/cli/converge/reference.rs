@@ -6,7 +6,7 @@ use super::runs::{self, Run};
 use crate::cli::progress::duration;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::MethodChoice;
 use caustique::plan::{Effect, Presence};
 use caustique::render::{Control, Method, Settings};
@@ -134,7 +134,7 @@ pub fn get(
     if interrupt.asked() {
         let cause =
             format!("interrupted, the reference after {} iterations of each half is written", halves.iterations);
-        return Err(Error::new(Kind::Interrupted, path.display(), cause));
+        return Err(Error::new(ErrorKind::Interrupted, path.display(), cause));
     }
     if settings.method.has_bandwidths() {
         notes.push(format!(

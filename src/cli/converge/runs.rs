@@ -4,7 +4,7 @@ use super::options::ConvergeArgs;
 use crate::cli::layout;
 use crate::cli::render::RenderArgs;
 use crate::cli::usage;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{MethodChoice, RenderOptions};
 use caustique::render::{Method, Settings, Spent};
 use caustique::report::entry::Entry;
@@ -40,9 +40,9 @@ pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
         };
         let place = format!("--run \"{name}\"");
         let words = shell_words::split(options)
-            .map_err(|cause| Error::new(Kind::Usage, &place, cause).hint("close the quotes"))?;
+            .map_err(|cause| Error::new(ErrorKind::Usage, &place, cause).hint("close the quotes"))?;
         if name.is_empty() {
-            return Err(Error::new(Kind::Usage, "--run", "a run needs a name or options")
+            return Err(Error::new(ErrorKind::Usage, "--run", "a run needs a name or options")
                 .hint("such as --run 'five levels: --method sppm --levels 5'"));
         }
         runs.push(parse(args, name, options, words).map_err(|mut error| {
@@ -75,7 +75,7 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
     // What a render needs besides.
     line.extend(["-o".into(), "run.exr".into(), args.scene.path.clone().into()]);
     let explain = |error: clap::Error| {
-        usage::explain(&error, Some(&command)).unwrap_or_else(|| Error::new(Kind::Usage, "", error))
+        usage::explain(&error, Some(&command)).unwrap_or_else(|| Error::new(ErrorKind::Usage, "", error))
     };
     let matches = command.clone().try_get_matches_from(line).map_err(explain)?;
     refuse_common(&command, &matches)?;

@@ -4,7 +4,7 @@
 use super::options::RenderArgs;
 use super::preview::Target;
 use crate::cli::{output, print_file};
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
 use caustique::image::exr::{self, Attributes};
 use caustique::image::{atomic, usd_layer};
@@ -29,7 +29,7 @@ pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: O
     if output::is_stdout(&args.output) {
         // The header of a file is written last.
         let kept = Kept::write("render.exr".as_ref(), into)?;
-        let failed = |cause| Error::new(Kind::Io, "standard output", cause);
+        let failed = |cause| Error::new(ErrorKind::Io, "standard output", cause);
         return print_file(&kept.path).map_err(|cause| kept.told(failed(cause)));
     }
     let Err(error) = into(&args.output) else { return Ok(()) };

@@ -2,7 +2,7 @@
 
 use crate::cli::output::{self, PictureArgs};
 use crate::cli::say;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, Naming};
 use caustique::image::exr::{self, Attributes, Compression, Frame};
 use caustique::image::png;
@@ -64,7 +64,7 @@ impl Target {
         match self {
             Target::Png(path) => output::check(path, "png"),
             Target::Exr(path) if path == output => {
-                let error = Error::new(Kind::Usage, path.display(), "--preview and -o name the same file");
+                let error = Error::new(ErrorKind::Usage, path.display(), "--preview and -o name the same file");
                 Err(error.hint("give the preview a name of its own"))
             }
             Target::Exr(path) => output::check(path, "exr"),
@@ -125,7 +125,7 @@ impl<'a> Preview<'a> {
                 exr::write(path, set, &Attributes { frame, ..Attributes::default() }, options)
             }
             Target::Tev => self.stream(set).map_err(|cause| {
-                Error::new(Kind::Io, format!("tev at {TEV}"), cause).hint("start tev on this machine first")
+                Error::new(ErrorKind::Io, format!("tev at {TEV}"), cause).hint("start tev on this machine first")
             }),
         }
     }

@@ -5,7 +5,7 @@ use super::options::RenderArgs;
 use crate::cli::progress::Turn;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{Frames, is_pattern, numbered};
 
 /// Renders the frames in order, and ends at the first that fails, as Blender does; those before are written.
@@ -48,7 +48,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         let left = left();
         if Interrupt::came() {
             let cause = format!("interrupted before frame {frame}; the frames before it are written");
-            return Err(Error::new(Kind::Interrupted, args.output.display(), cause)
+            return Err(Error::new(ErrorKind::Interrupted, args.output.display(), cause)
                 .hint("the same command with --skip-existing goes on"));
         }
         if args.progress.for_people() {

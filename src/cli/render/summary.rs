@@ -4,7 +4,7 @@ use super::options::RenderArgs;
 use crate::cli::output::is_stdout;
 use crate::cli::progress::{count, duration, percent};
 use crate::cli::say;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
 use caustique::pipeline::{Delivery, Place, Reached};
 use caustique::render::{ErrorCoverage, Rejections, Rendered, StopReason, peak_memory};
@@ -113,7 +113,7 @@ impl Summary {
             return Ok(());
         }
         let cause = format!("interrupted after {} iterations, which are written", self.iterations);
-        let error = Error::new(Kind::Interrupted, args.output.display(), cause);
+        let error = Error::new(ErrorKind::Interrupted, args.output.display(), cause);
         let of_frames = args.job.scene.frames.is_some();
         Err(match args.saving().filter(|saving| saving.path.exists()) {
             Some(_) if of_frames => error.hint("the same command with --skip-existing goes on"),

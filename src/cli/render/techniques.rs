@@ -1,7 +1,7 @@
 //! `--debug-techniques`: pictures per sampling technique, as files.
 
 use super::options::RenderArgs;
-use caustique::error::{Error, Kind, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{Layer, LayerSet};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
@@ -16,7 +16,8 @@ use std::path::Path;
 pub fn prepare(args: &RenderArgs) -> Result<()> {
     let Some(folder) = &args.debug_techniques else { return Ok(()) };
     std::fs::create_dir_all(folder).map_err(|cause| {
-        Error::new(Kind::Io, folder.display(), cause).hint("--debug-techniques wants a folder that can be written to")
+        Error::new(ErrorKind::Io, folder.display(), cause)
+            .hint("--debug-techniques wants a folder that can be written to")
     })
 }
 

@@ -119,12 +119,12 @@ fn files_that_are_no_networks_are_errors_with_advice() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("wrong.onnx");
     let error = Model::from_file(&path).unwrap_err();
-    assert_eq!(error.kind, Kind::Io);
+    assert_eq!(error.kind, ErrorKind::Io);
     let compact = Model::compact().bytes;
     for bytes in [&b""[..], b"not a network", &compact[..compact.len() / 2]] {
         std::fs::write(&path, bytes).unwrap();
         let error = Combiner::new(&Model::from_file(&path).unwrap(), &runtime).err().unwrap();
-        assert_eq!(error.kind, Kind::Model);
+        assert_eq!(error.kind, ErrorKind::Model);
         assert!(error.to_string().starts_with(&format!("model {}: ", path.display())), "{error}");
         assert!(error.hint.unwrap().contains("export_network.py"));
     }

@@ -135,7 +135,7 @@ fn input_of_the_wrong_shape_is_an_error_that_says_so() {
         let mut stack = Random(11).stack(4, 3, 5);
         change(&mut stack);
         let error = combiner.run(&stack).unwrap_err();
-        assert_eq!(error.kind, Kind::Image);
+        assert_eq!(error.kind, ErrorKind::Image);
         error.to_string()
     };
     assert_eq!(message(&mut combiner, &|s| s.levels.truncate(3)), "the image has 3 levels, the network takes 5");

@@ -6,7 +6,7 @@ mod hull;
 mod image;
 
 use super::*;
-use crate::error::Kind;
+use crate::error::ErrorKind;
 
 /// Uniform numbers in [0, 1), repeatable (splitmix64).
 struct Random(u64);

@@ -17,7 +17,7 @@ pub use write::{Compression, Options, write, write_followed};
 /// Name and version of the program, for headers.
 const SOFTWARE: &str = concat!("caustique ", env!("CARGO_PKG_VERSION"));
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::ascii_json;
 use serde::{Deserialize, Serialize};
 
@@ -85,7 +85,7 @@ impl Attributes {
     /// Adds an attribute that holds `object` as JSON, non-ASCII characters escaped.
     pub fn insert(&mut self, name: &str, object: &impl serde::Serialize) -> Result<()> {
         let json = serde_json::to_string(object)
-            .map_err(|cause| Error::new(Kind::Image, format!("attribute \"{name}\""), cause))?;
+            .map_err(|cause| Error::new(ErrorKind::Image, format!("attribute \"{name}\""), cause))?;
         self.texts.insert(name.to_owned(), ascii_json(&json));
         Ok(())
     }

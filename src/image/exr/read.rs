@@ -14,7 +14,7 @@ use exr::prelude::f16;
 use rayon::prelude::*;
 
 use super::Attributes;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Plane, Sample};
 use crate::memory;
 
@@ -31,19 +31,19 @@ pub fn read(path: &Path) -> Result<(LayerSet, Attributes)> {
     let file = File::open(path).map_err(|cause| Error::io(path, &cause))?;
     let length = file.metadata().map_err(|cause| Error::io(path, &cause))?.len();
     if length == 0 {
-        return Err(Error::new(Kind::Image, path.display(), "the file is empty"));
+        return Err(Error::new(ErrorKind::Image, path.display(), "the file is empty"));
     }
     // The decoder asserts what it believes to be true of any file; some files know better.
     let outcome = catch_unwind(AssertUnwindSafe(|| decode(BufReader::new(file), length)));
     let outcome = outcome.unwrap_or_else(|_| Err(invalid("the file contradicts itself")));
     outcome.map_err(|cause| match cause {
         exr::error::Error::Io(cause) if cause.kind() != std::io::ErrorKind::UnexpectedEof => Error::io(path, &cause),
-        exr::error::Error::Io(_) => Error::new(Kind::Image, path.display(), "the file ends too early")
+        exr::error::Error::Io(_) => Error::new(ErrorKind::Image, path.display(), "the file ends too early")
             .hint("copy or render it again; it is not whole"),
         exr::error::Error::NotSupported(cause) => {
-            Error::new(Kind::Image, path.display(), cause).hint("save it as a flat EXR with ZIP compression")
+            Error::new(ErrorKind::Image, path.display(), cause).hint("save it as a flat EXR with ZIP compression")
         }
-        other => Error::new(Kind::Image, path.display(), format!("not a valid EXR: {other}")),
+        other => Error::new(ErrorKind::Image, path.display(), format!("not a valid EXR: {other}")),
     })
 }
 

@@ -18,7 +18,7 @@ use exr::prelude::{SmallVec, f16};
 use rayon::prelude::*;
 
 use super::{Attributes, Frame, SOFTWARE, header, zip};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LayerSet, Naming, Plane, Sample, check};
 use crate::image::atomic;
 use serde::Serialize;
@@ -79,7 +79,7 @@ pub fn write_followed(
     }
     if planes.is_empty() || set.pixels() == 0 {
         let cause = format!("{} channels of {} x {} pixels are no picture", planes.len(), set.width, set.height);
-        return Err(Error::new(Kind::Image, path.display(), cause));
+        return Err(Error::new(ErrorKind::Image, path.display(), cause));
     }
     planes.sort_by(|(a, _), (b, _)| a.cmp(b));
     let header = header(set, &planes, attributes, options).map_err(|error| error.within(path.display()))?;
@@ -107,7 +107,7 @@ fn sort(file: &mut BufWriter<&mut File>) -> std::io::Result<()> {
 fn failure(path: &Path, error: exr::error::Error) -> Error {
     match error {
         exr::error::Error::Io(cause) => atomic::failure(path, &cause),
-        other => Error::new(Kind::Image, path.display(), other),
+        other => Error::new(ErrorKind::Image, path.display(), other),
     }
 }
 
@@ -133,7 +133,7 @@ fn header(
     };
     let mut other = HashMap::new();
     for (name, value) in &attributes.texts {
-        let error = |cause| Error::new(Kind::Image, format!("attribute \"{name}\""), cause);
+        let error = |cause| Error::new(ErrorKind::Image, format!("attribute \"{name}\""), cause);
         let key = Text::new_or_none(name).ok_or_else(|| error("its name is not ASCII"))?;
         let text =
             Text::new_or_none(value).filter(|_| value.is_ascii()).ok_or_else(|| error("its text is not ASCII"))?;

@@ -34,7 +34,7 @@ mod uri;
 pub use files::{files, hash};
 
 use super::Description;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use serde::Serialize;
 use std::fmt::Display;
 use std::path::Path;
@@ -122,5 +122,5 @@ fn counted(n: usize, one: &str, many: &str) -> String {
 
 /// A fault of the scene file at a place in it.
 fn fault(place: impl Display, cause: impl Display) -> Error {
-    Error::new(Kind::Scene, place, cause)
+    Error::new(ErrorKind::Scene, place, cause)
 }

@@ -2,7 +2,7 @@
 
 use super::document::{Document, get, named};
 use super::fault;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::texture::{Encoding, Integers, Texels, Texture, TextureRef, Wrap};
 use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
@@ -185,7 +185,7 @@ impl Textures {
 /// Decodes an image; one that is cut off has the texels that are there, and a warning.
 fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<String>) -> Result<Decoded> {
     const HINT: &str = "save the image again as PNG or JPEG";
-    let broken = |cause: String| Error::new(Kind::Image, "", cause).hint(HINT);
+    let broken = |cause: String| Error::new(ErrorKind::Image, "", cause).hint(HINT);
     let format = image::guess_format(bytes);
     let Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = format else {
         return Err(broken("it is neither PNG nor JPEG".into()));
@@ -239,7 +239,7 @@ fn check_room(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<
         let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
         if (bytes.len() as u64).saturating_mul(16) < blocks {
             let cause = format!("it is cut off: {} bytes do not hold {width} x {height} texels", bytes.len());
-            return Err(Error::new(Kind::Image, "", cause).hint("copy or save the image again"));
+            return Err(Error::new(ErrorKind::Image, "", cause).hint("copy or save the image again"));
         }
         if jpeg.progressive {
             // 16 bits a coefficient, of all blocks at a time.

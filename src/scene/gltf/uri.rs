@@ -1,7 +1,7 @@
 //! Where the bytes of buffers and images are: data URIs and files beside the scene (RFC 2397, RFC 3986).
 
 use super::fault;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::scene::folder::Folder;
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub(super) fn load(uri: &str, folder: Folder, room: impl FnOnce(u64) -> Result<(
     let path = path_of(uri, folder)?;
     let cause = |e: std::io::Error| {
         let (path, cause) = (path.display(), e);
-        Error::new(Kind::Io, "", format!("the file {path} cannot be read: {cause}"))
+        Error::new(ErrorKind::Io, "", format!("the file {path} cannot be read: {cause}"))
             .hint("put the file there, or export as .glb, which holds buffers and textures itself")
     };
     // A device or a pipe might never end.

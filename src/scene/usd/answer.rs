@@ -1,6 +1,6 @@
 //! What the converter answers besides its .glb: options, or a fault.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -18,7 +18,7 @@ struct Fault {
 /// It prints something else.
 pub fn options(printed: &[u8], stage: &Path) -> Result<Vec<String>> {
     serde_json::from_slice(printed).map_err(|cause| {
-        Error::new(Kind::Scene, stage.display(), format!("the converter does not say options: {cause}"))
+        Error::new(ErrorKind::Scene, stage.display(), format!("the converter does not say options: {cause}"))
     })
 }
 
@@ -29,7 +29,7 @@ pub fn failure(told: &[u8], stage: &Path) -> Error {
     let Some(Fault { prim, fault, hint }) = fault else {
         let last = told.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
         let cause = format!("the converter (scripts/usd) failed: {}", last.trim());
-        return Error::new(Kind::Scene, stage.display(), cause).hint("'caustique doctor' says what is found");
+        return Error::new(ErrorKind::Scene, stage.display(), cause).hint("'caustique doctor' says what is found");
     };
-    Error { hint, ..Error::new(Kind::Scene, prim, fault).within(stage.display()) }
+    Error { hint, ..Error::new(ErrorKind::Scene, prim, fault).within(stage.display()) }
 }

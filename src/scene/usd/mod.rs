@@ -9,7 +9,7 @@ pub use python::Interpreter;
 
 use super::description::Description;
 use super::gltf::{self, FrameTime, ReadOptions};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::memory;
 use crate::stop::Stop;
 use crate::temporary;
@@ -101,7 +101,8 @@ fn seconds() -> Result<u32> {
     // poll(2) counts milliseconds in 31 bits.
     let seconds = said.to_str().and_then(|said| said.parse().ok()).filter(|seconds| (1..=2_000_000).contains(seconds));
     seconds.ok_or_else(|| {
-        let error = Error::new(Kind::Usage, SECONDS_VARIABLE, format!("{} is no number of seconds", said.display()));
+        let error =
+            Error::new(ErrorKind::Usage, SECONDS_VARIABLE, format!("{} is no number of seconds", said.display()));
         error.hint("give a whole number from 1 to 2000000, or none")
     })
 }
@@ -138,15 +139,18 @@ impl<'p> Converter<'p> {
         command.arg("--guard").arg(seconds()?.to_string()).arg(bytes.to_string());
         // A group of its own: Ctrl-C is for this program, and the pipe that closes then ends the converter.
         command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let output = command
-            .spawn()
-            .and_then(|child| output_unless(child, stop))
-            .map_err(|cause| Error::new(Kind::Library, self.interpreter.path().display(), cause).hint(python::HINT))?;
+        let output = command.spawn().and_then(|child| output_unless(child, stop)).map_err(|cause| {
+            Error::new(ErrorKind::Library, self.interpreter.path().display(), cause).hint(python::HINT)
+        })?;
         if output.status.success() {
             return Ok(output);
         }
         if stop.asked() {
-            return Err(Error::new(Kind::Interrupted, self.stage.display(), "interrupted while the stage was read"));
+            return Err(Error::new(
+                ErrorKind::Interrupted,
+                self.stage.display(),
+                "interrupted while the stage was read",
+            ));
         }
         Err(answer::failure(&output.stderr, self.stage))
     }

@@ -1,6 +1,6 @@
 //! Finding a Python that has `usd-core`.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -31,13 +31,13 @@ impl Interpreter {
     /// has installed it (see [`installed`]); `python3`.
     ///
     /// # Errors
-    /// [`Kind::Library`] where the variable names no file.
+    /// [`ErrorKind::Library`] where the variable names no file.
     pub fn find() -> Result<Interpreter> {
         if let Some(path) = installed::set(VARIABLE) {
             return if path.is_file() {
                 Ok(Interpreter { path })
             } else {
-                Err(Error::new(Kind::Library, format!("{VARIABLE}={}", path.display()), "no such file").hint(HINT))
+                Err(Error::new(ErrorKind::Library, format!("{VARIABLE}={}", path.display()), "no such file").hint(HINT))
             };
         }
         Ok(Interpreter { path: installed::find(ENVIRONMENT).unwrap_or_else(|| "python3".into()) })
@@ -63,9 +63,9 @@ impl Interpreter {
     /// The version of USD, once all that the converter needs is there.
     ///
     /// # Errors
-    /// [`Kind::Library`]: it does not run, or lacks a module.
+    /// [`ErrorKind::Library`]: it does not run, or lacks a module.
     pub fn version(&self) -> Result<String> {
-        let error = |cause: String| Error::new(Kind::Library, self.path.display(), cause).hint(HINT);
+        let error = |cause: String| Error::new(ErrorKind::Library, self.path.display(), cause).hint(HINT);
         let output = self.command().args(["-c", PROBE]).output().map_err(|cause| error(cause.to_string()))?;
         if output.status.success() {
             return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
