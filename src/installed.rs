@@ -1,36 +1,36 @@
 //! What `scripts/setup.sh` has installed for the program: libraries below `.deps`, Pythons in `.venv-*`.
 //!
-//! Both lie in the folder that [`VARIABLE`] names, else in a folder above the program or, in Python, above the package.
+//! Both lie in the folder that [`HOME_VARIABLE`] names, else in a folder above the program or, in Python, above the package.
 //! The current folder is never searched, because what is found there would run, and it may hold anybody's files.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-pub use caustique_library::variable as set;
+pub use caustique_library::path_from_env;
 
 /// Environment variable that names the folder in which `scripts/setup.sh` lies in `scripts`, and then no other.
-pub const VARIABLE: &str = "CAUSTIQUE_HOME";
+pub const HOME_VARIABLE: &str = "CAUSTIQUE_HOME";
 
 /// Folders where everybody may create files, such as `/tmp`, have this bit in their mode.
 const STICKY: u32 = 0o1000;
 
 /// The places where something installed may lie, the nearest first. `relative` is its path in the project's folder.
-pub fn places(relative: &str) -> Vec<PathBuf> {
-    homes().iter().map(|home| home.join(relative)).collect()
+pub fn candidates(relative: &str) -> Vec<PathBuf> {
+    project_folders().iter().map(|home| home.join(relative)).collect()
 }
 
-/// The nearest of [`places`] where there is a file or a folder.
+/// The nearest of [`candidates`] where there is a file or a folder.
 pub fn find(relative: &str) -> Option<PathBuf> {
-    places(relative).into_iter().find(|path| path.exists())
+    candidates(relative).into_iter().find(|path| path.exists())
 }
 
 /// Where the library or Python at `path` comes from: the environment variable that names it, `scripts/setup.sh`, which
 /// installs it below `relative` in the project's folder, or the system.
 pub fn origin(variable: &'static str, relative: &str, path: &Path) -> &'static str {
     let below = |place: &PathBuf| path.starts_with(place) || place.canonicalize().is_ok_and(|it| path.starts_with(it));
-    if set(variable).is_some() {
+    if path_from_env(variable).is_some() {
         variable
-    } else if places(relative).iter().any(below) {
+    } else if candidates(relative).iter().any(below) {
         "scripts/setup.sh"
     } else {
         "system"
@@ -38,8 +38,8 @@ pub fn origin(variable: &'static str, relative: &str, path: &Path) -> &'static s
 }
 
 /// The folders that may be the project's, the nearest first.
-fn homes() -> Vec<PathBuf> {
-    match set(VARIABLE) {
+fn project_folders() -> Vec<PathBuf> {
+    match path_from_env(HOME_VARIABLE) {
         Some(home) => std::path::absolute(home).into_iter().collect(),
         None => own_file().map(|own| above(&own)).unwrap_or_default(),
     }
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn an_origin_is_a_variable_the_folder_or_the_system() {
-        let library = places(".deps/oidn").remove(0).join("lib/libOpenImageDenoise.so");
+        let library = candidates(".deps/oidn").remove(0).join("lib/libOpenImageDenoise.so");
         assert_eq!(origin("CAUSTIQUE_UNSET", ".deps/oidn", &library), "scripts/setup.sh");
         assert_eq!(origin("CAUSTIQUE_UNSET", ".deps/oidn", Path::new("/usr/lib/libfoo.so")), "system");
         assert_eq!(origin("PATH", ".deps/oidn", &library), "PATH");

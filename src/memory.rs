@@ -11,11 +11,11 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// Smaller amounts than this are not asked about.
-pub const SMALL: u64 = 16 << 20;
+pub const MIN_CHECKED_BYTES: u64 = 16 << 20;
 
 /// Bytes of samples that a byte of an EXR stands for at most: no compression packs better than deflate (1032 to 1) over
 /// run lengths of blocks of 64 samples.
-pub const EXR_PACKED: u64 = 1032 * 64;
+pub const MAX_EXR_RATIO: u64 = 1032 * 64;
 
 /// Bytes that may still be taken, and who says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub struct Available {
     /// How many.
     pub bytes: u64,
     /// Whose limit it is: `available`, `left by 'ulimit -v'`.
-    pub by: &'static str,
+    pub source: &'static str,
 }
 
 /// The least of what the machine and the limits of the process leave; `None` where none of them tells.
@@ -39,7 +39,7 @@ pub fn available() -> Option<Available> {
         (address_space(), "left by 'ulimit -v'"),
         (groups(), "left by the control group (a container's or a job's limit)"),
     ];
-    let limits = limits.into_iter().filter_map(|(bytes, by)| Some(Available { bytes: bytes?, by }));
+    let limits = limits.into_iter().filter_map(|(bytes, source)| Some(Available { bytes: bytes?, source }));
     limits.min_by_key(|limit| limit.bytes)
 }
 
@@ -47,11 +47,11 @@ pub fn available() -> Option<Available> {
 ///
 /// # Errors
 /// There is less: with both numbers, without a place, to which the caller adds the remedy.
-pub fn check(bytes: u64, what: impl Display) -> Result<()> {
+pub fn require(bytes: u64, what: impl Display) -> Result<()> {
     match available() {
-        Some(Available { bytes: left, by }) if bytes > left => {
+        Some(Available { bytes: left, source }) if bytes > left => {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
-            let cause = format!("{what} need about {:.1} GiB of memory, {:.1} GiB are {by}", gib(bytes), gib(left));
+            let cause = format!("{what} need about {:.1} GiB of memory, {:.1} GiB are {source}", gib(bytes), gib(left));
             Err(Error::new(ErrorKind::Scene, "", cause))
         }
         _ => Ok(()),
@@ -62,7 +62,7 @@ pub fn check(bytes: u64, what: impl Display) -> Result<()> {
 ///
 /// # Errors
 /// The allocator has no room for them.
-pub fn room<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
+pub fn reserve<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
     let mut items = Vec::new();
     match items.try_reserve_exact(count) {
         Ok(()) => Ok(items),
@@ -144,11 +144,11 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_an_error_with_its_number() {
         assert!(available().expect("Linux tells").bytes > 0);
-        assert!(check(1 << 20, "few").is_ok());
-        let error = check(1 << 60, "9 copies").expect_err("no machine has that");
+        assert!(require(1 << 20, "few").is_ok());
+        let error = require(1 << 60, "9 copies").expect_err("no machine has that");
         assert!(error.cause.starts_with("9 copies need about 1073741824.0 GiB of memory, "), "{error}");
-        assert_eq!(room::<u64>(3, "numbers").map(|items| items.capacity() >= 3), Ok(true));
-        let error = room::<u64>(1 << 59, "numbers").expect_err("no machine has that");
+        assert_eq!(reserve::<u64>(3, "numbers").map(|items| items.capacity() >= 3), Ok(true));
+        let error = reserve::<u64>(1 << 59, "numbers").expect_err("no machine has that");
         assert_eq!(error.cause, format!("there is no memory for {} numbers ({} MiB)", 1u64 << 59, 1u64 << 42));
     }
 }

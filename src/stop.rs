@@ -11,7 +11,7 @@ const NEVER: u64 = u64::MAX;
 /// Tells units of work to end. Clones share what they know.
 #[derive(Clone, Debug)]
 pub struct Stop {
-    asked: Arc<AtomicBool>,
+    requested: Arc<AtomicBool>,
     state: Arc<State>,
 }
 
@@ -20,29 +20,29 @@ struct State {
     begun: Instant,
     /// Nanoseconds after that.
     deadline: AtomicU64,
-    given_up: AtomicBool,
+    aborted: AtomicBool,
 }
 
 impl Default for Stop {
     /// Nobody asks for an end.
     fn default() -> Stop {
-        Stop::by(Arc::default())
+        Stop::from_flag(Arc::default())
     }
 }
 
 impl Stop {
     /// One that tells to end as soon as `asked` is set.
     #[allow(clippy::disallowed_methods, reason = "a deadline decides when a render stops, and nothing else")]
-    pub fn by(asked: Arc<AtomicBool>) -> Stop {
-        let (deadline, given_up) = (AtomicU64::new(NEVER), AtomicBool::new(false));
-        Stop { asked, state: Arc::new(State { begun: Instant::now(), deadline, given_up }) }
+    pub fn from_flag(requested: Arc<AtomicBool>) -> Stop {
+        let (deadline, aborted) = (AtomicU64::new(NEVER), AtomicBool::new(false));
+        Stop { requested, state: Arc::new(State { begun: Instant::now(), deadline, aborted }) }
     }
 
     /// Begins an iteration, which must end within so many seconds if there is a number.
-    pub fn begin(&self, seconds: Option<f64>) {
+    pub fn start_iteration(&self, seconds: Option<f64>) {
         let end = |seconds: f64| (self.nanoseconds() as f64 + 1e9 * seconds.max(0.0)) as u64;
         self.state.deadline.store(seconds.map_or(NEVER, end), Ordering::Relaxed);
-        self.state.given_up.store(false, Ordering::Relaxed);
+        self.state.aborted.store(false, Ordering::Relaxed);
     }
 
     fn nanoseconds(&self) -> u64 {
@@ -50,26 +50,26 @@ impl Stop {
     }
 
     /// Whether an end was asked for, by whatever but the clock.
-    pub fn asked(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
+    pub fn requested(&self) -> bool {
+        self.requested.load(Ordering::Relaxed)
     }
 
     /// Asks whether a unit of work is to end. If so, its iteration is given up.
-    pub fn gives_up(&self) -> bool {
+    pub fn should_abort(&self) -> bool {
         let late = || {
             let deadline = self.state.deadline.load(Ordering::Relaxed);
             deadline != NEVER && self.nanoseconds() >= deadline
         };
-        let ends = self.gave_up() || self.asked() || late();
+        let ends = self.aborted() || self.requested() || late();
         if ends {
-            self.state.given_up.store(true, Ordering::Relaxed);
+            self.state.aborted.store(true, Ordering::Relaxed);
         }
         ends
     }
 
     /// Whether the iteration that was begun last is given up.
-    pub fn gave_up(&self) -> bool {
-        self.state.given_up.load(Ordering::Relaxed)
+    pub fn aborted(&self) -> bool {
+        self.state.aborted.load(Ordering::Relaxed)
     }
 }
 
@@ -81,17 +81,17 @@ mod tests {
     #[test]
     fn an_iteration_is_given_up_once_and_for_all() {
         let asked = Arc::new(AtomicBool::new(false));
-        let stop = Stop::by(Arc::clone(&asked));
-        stop.begin(None);
-        assert!(!stop.gives_up() && !stop.gave_up());
+        let stop = Stop::from_flag(Arc::clone(&asked));
+        stop.start_iteration(None);
+        assert!(!stop.should_abort() && !stop.aborted());
         asked.store(true, Ordering::Relaxed);
-        assert!(!stop.gave_up(), "all units were done before");
-        assert!(stop.clone().gives_up() && stop.gave_up());
+        assert!(!stop.aborted(), "all units were done before");
+        assert!(stop.clone().should_abort() && stop.aborted());
         asked.store(false, Ordering::Relaxed);
-        assert!(stop.gives_up());
-        stop.begin(Some(3600.0));
-        assert!(!stop.gives_up());
-        stop.begin(Some(-1.0));
-        assert!(stop.gives_up() && !stop.asked());
+        assert!(stop.should_abort());
+        stop.start_iteration(Some(3600.0));
+        assert!(!stop.should_abort());
+        stop.start_iteration(Some(-1.0));
+        assert!(stop.should_abort() && !stop.requested());
     }
 }

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 ///
 /// # Errors
 /// The file system.
-pub fn folder(prefix: &str) -> Result<TempDir> {
+pub fn create_folder(prefix: &str) -> Result<TempDir> {
     let folder = tempfile::Builder::new().prefix(prefix).permissions(Permissions::from_mode(0o700)).tempdir();
     folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))
 }
@@ -21,7 +21,7 @@ mod tests {
 
     #[test]
     fn nobody_else_looks_into_a_temporary_folder() {
-        let folder = folder("caustique-test-").expect("a folder");
+        let folder = create_folder("caustique-test-").expect("a folder");
         let mode = std::fs::metadata(folder.path()).expect("it is there").permissions().mode();
         assert_eq!(mode & 0o777, 0o700);
     }

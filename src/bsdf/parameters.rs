@@ -64,7 +64,7 @@ impl Parameters {
 
     /// Where the indices match, light goes straight through it, tinted by the base colour, and does nothing else.
     #[inline]
-    pub fn is_pure_transmission(&self) -> bool {
+    pub fn is_clear_if_matched(&self) -> bool {
         self.metallic == 0.0 && self.transmission == 1.0 && !self.is_covered()
     }
 }

@@ -19,7 +19,7 @@ pub enum Filter {
 }
 
 /// Widest filter, in pixels.
-pub const WIDEST: f32 = 8.0;
+pub const MAX_FILTER_WIDTH: f32 = 8.0;
 
 /// Coefficients of the window of Blackman and Harris \[Harris 1978\], 4 terms, over their sum at the middle.
 const TERMS: [f64; 4] = [0.35875, 0.48829, 0.14128, 0.01168];

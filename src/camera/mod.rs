@@ -3,8 +3,8 @@
 mod filter;
 mod tiles;
 
-pub use filter::{Filter, WIDEST};
-pub use tiles::{GROUP, Place, band, par_pixels};
+pub use filter::{Filter, MAX_FILTER_WIDTH};
+pub use tiles::{GROUP_SIZE, TilePixel, par_pixels, pixels_per_band};
 
 use crate::math::{DMat3, DMat4, DVec3, DVec4, Mat3, Vec2, Vec3, warp};
 use std::f32::consts::PI;
@@ -101,19 +101,19 @@ impl Camera {
     }
 
     /// The same with its film moved by `shift`, in widths to the right and heights up.
-    pub fn shifted(&self, shift: Vec2) -> Camera {
+    pub fn with_shift(&self, shift: Vec2) -> Camera {
         let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
         Camera { offset: 2.0 * shift * half, ..*self }
     }
 
     /// The same with another pixel filter.
-    pub fn filtered(&self, filter: Filter) -> Camera {
+    pub fn with_filter(&self, filter: Filter) -> Camera {
         Camera { filter, ..*self }
     }
 
     /// A window of the picture: left edge, top edge, width and height in pixels. All but its size is as in the whole
     /// picture, to the bit.
-    pub fn window(&self, [x, y, width, height]: [u32; 4]) -> Camera {
+    pub fn crop(&self, [x, y, width, height]: [u32; 4]) -> Camera {
         let Whole { corner, at, .. } = self.whole;
         let (corner, at) = (corner + Vec2::new(x as f32, y as f32), (at.0 + x, at.1 + y));
         Camera { width, height, whole: Whole { corner, at, ..self.whole }, ..*self }
@@ -122,7 +122,7 @@ impl Camera {
     /// A sample of this camera's pixels, `factor` times as many a side, at least one, and spread evenly over the film:
     /// each sees as much as a pixel does here. What light paths send to the film is taken from all around it: as much
     /// noise as if there were all pixels and as many light paths.
-    pub fn sparse(&self, factor: f64) -> Camera {
+    pub fn subsample(&self, factor: f64) -> Camera {
         let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
         let (width, height, covered) = (scaled(self.width), scaled(self.height), self.covered * factor.min(1.0) as f32);
         // Its pixels are none of those of the picture, and it is a window of no other.
@@ -136,12 +136,12 @@ impl Camera {
     }
 
     /// The whole view in a smaller picture, `factor` times as many pixels a side, at least one: each sees as much more.
-    pub fn smaller(&self, factor: f64) -> Camera {
-        Camera { covered: self.covered, ..self.sparse(factor) }
+    pub fn downscale(&self, factor: f64) -> Camera {
+        Camera { covered: self.covered, ..self.subsample(factor) }
     }
 
     /// The same without its lens: all is sharp.
-    pub fn pinhole(&self) -> Camera {
+    pub fn without_lens(&self) -> Camera {
         Camera { lens_radius: 0.0, focus_distance: 1.0, ..*self }
     }
 
@@ -394,7 +394,7 @@ mod tests {
         for (projection, (lens_radius, shift)) in all.into_iter().flat_map(|p| lenses.map(|lens| (p, lens))) {
             let rotation = Mat3::from_rotation_y(0.4) * Mat3::from_rotation_x(-0.2);
             let camera = Camera::new(DVec3::new(1.0, 2.0, 3.0), rotation, projection, (lens_radius, 4.0), (160, 90));
-            let camera = camera.shifted(shift);
+            let camera = camera.with_shift(shift);
             for i in 0..1000 {
                 let draws = Stream::new(0, 0, Domain::Test, i).vertex(0);
                 let film = draws.two(Purpose::Pixel) * Vec2::new(160.0, 90.0);
@@ -414,7 +414,7 @@ mod tests {
     fn some(projection: Projection) -> Camera {
         let rotation = Mat3::from_rotation_y(0.4) * Mat3::from_rotation_x(-0.2);
         Camera::new(DVec3::new(1.0, 2.0, 3.0), rotation, projection, (0.2, 4.0), (160, 90))
-            .shifted(Vec2::new(0.1, -0.3))
+            .with_shift(Vec2::new(0.1, -0.3))
     }
 
     /// A window sees what the whole picture sees there, and light paths bring its pixels as much.
@@ -425,8 +425,8 @@ mod tests {
         {
             let whole = some(projection);
             let corner = Vec2::new(40.0, 30.0);
-            let window = whole.window([40, 30, 60, 20]);
-            let deeper = window.window([10, 5, 20, 10]);
+            let window = whole.crop([40, 30, 60, 20]);
+            let deeper = window.crop([10, 5, 20, 10]);
             assert_eq!((window.size(), deeper.size()), ((60, 20), (20, 10)));
             for camera in [window, deeper] {
                 let (a, b) = (whole.span(), camera.span());
@@ -461,7 +461,7 @@ mod tests {
         for projection in
             [Projection::Perspective(Vec2::new(0.8, 0.45)), Projection::Orthographic(Vec2::new(0.8, 0.45))]
         {
-            let camera = some(projection).pinhole();
+            let camera = some(projection).without_lens();
             let origin = DVec3::new(100.0, -20.0, 5.0);
             let [to_camera, to_ndc] = camera.matrices(origin);
             let by = |m: &[f32; 16], p: DVec3| {

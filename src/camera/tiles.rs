@@ -6,11 +6,11 @@ use rayon::prelude::*;
 const TILE: usize = 16;
 
 /// Pixels visited together.
-pub const GROUP: usize = 8;
+pub const GROUP_SIZE: usize = 8;
 
 /// A pixel of a group.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct TilePixel {
     /// Column and row.
     pub pixel: (u32, u32),
     /// Index, row by row.
@@ -20,31 +20,31 @@ pub struct Place {
 }
 
 /// Pixels of a band, the unit of work of [`par_pixels`], in a picture so wide.
-pub fn band(width: u32) -> usize {
+pub fn pixels_per_band(width: u32) -> usize {
     width as usize * TILE
 }
 
-/// Calls `f(scratch, band, places)` for all pixels of a picture stored row by row and cut into `bands` of [`band`]
-/// pixels, [`GROUP`] of them at a time (fewer at edges), in tiles and within them along a Z-order curve: neighbours in
+/// Calls `f(scratch, band, places)` for all pixels of a picture stored row by row and cut into `bands` of [`pixels_per_band`]
+/// pixels, [`GROUP_SIZE`] of them at a time (fewer at edges), in tiles and within them along a Z-order curve: neighbours in
 /// time are neighbours in the picture, in both directions. Groups depend on the picture's size alone. `scratch` is made
 /// once per unit of work or less often, so nothing may depend on what is in it.
 pub fn par_pixels<B: Send, S>(
     bands: impl IndexedParallelIterator<Item = B>,
     (width, height): (u32, u32),
     scratch: impl Fn() -> S + Send + Sync,
-    f: impl Fn(&mut S, &mut B, &[Option<Place>; GROUP]) + Send + Sync,
+    f: impl Fn(&mut S, &mut B, &[Option<TilePixel>; GROUP_SIZE]) + Send + Sync,
 ) {
     let (width, height) = (width as usize, height as usize);
     let even_bits = |i: usize| (i & 1) | (i >> 1 & 2) | (i >> 2 & 4) | (i >> 3 & 8);
     bands.enumerate().for_each_init(scratch, |scratch, (band, mut pixels)| {
         let height = (height - band * TILE).min(TILE);
         for x0 in (0..width).step_by(TILE) {
-            for first in (0..TILE * TILE).step_by(GROUP) {
+            for first in (0..TILE * TILE).step_by(GROUP_SIZE) {
                 let places = std::array::from_fn(|k| {
                     let (x, dy) = (x0 + even_bits(first + k), even_bits((first + k) >> 1));
                     let y = band * TILE + dy;
                     let place =
-                        Place { pixel: (x as u32, y as u32), index: (y * width + x) as u64, at: dy * width + x };
+                        TilePixel { pixel: (x as u32, y as u32), index: (y * width + x) as u64, at: dy * width + x };
                     (x < width && dy < height).then_some(place)
                 });
                 if places.iter().any(Option::is_some) {
@@ -64,7 +64,7 @@ mod tests {
         for (width, height) in [(1, 1), (16, 16), (37, 5), (100, 33), (3, 70)] {
             let mut pixels = vec![0u32; (width * height) as usize];
             par_pixels(
-                pixels.par_chunks_mut(band(width)),
+                pixels.par_chunks_mut(pixels_per_band(width)),
                 (width, height),
                 || (),
                 |(), pixels, places| {

@@ -98,7 +98,7 @@ impl<'a> CandidateRun<'a> {
 /// Relative squared difference of two pictures, without the worst pixels.
 fn variance(a: &[[f32; 3]], b: &[[f32; 3]], values: &[[f32; 3]]) -> f64 {
     let value = |index: usize| values[index].iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
-    let floor = floor::relative((0..a.len()).map(value));
+    let floor = floor::relative_to_mean((0..a.len()).map(value));
     let square = |index: usize| -> f64 {
         let apart: f64 = (0..3).map(|c| f64::from(a[index][c] - b[index][c]).powi(2)).sum();
         apart / 3.0 * super::pilot_settings::scale(value(index), floor)

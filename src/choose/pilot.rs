@@ -106,7 +106,7 @@ impl<'a> Pilot<'a> {
             taken += if affordable { more } else { 0.0 };
             affordable
         });
-        let small = self.camera.sparse((self.least() / self.pixels).sqrt().min(1.0));
+        let small = self.camera.subsample((self.least() / self.pixels).sqrt().min(1.0));
         let count = |scene: &Scene, camera: &Camera| Cost::count(scene, camera, self.gathering, None);
         (weights::weigh(self.scene, &small, &settings, &presence, &properties, count), taken)
     }
@@ -173,6 +173,6 @@ impl<'a> Pilot<'a> {
         let needed = |pixels: f64| count * compare::ITERATIONS.0 as f64 * dearest(pixels);
         let pixels = if needed(pixels) > allowed { least } else { pixels };
         (needed(pixels) <= most)
-            .then(|| (self.camera.smaller((pixels / self.pixels).sqrt()), allowed.max(needed(pixels))))
+            .then(|| (self.camera.downscale((pixels / self.pixels).sqrt()), allowed.max(needed(pixels))))
     }
 }

@@ -152,7 +152,7 @@ pub(super) fn weigh(
     let (pixels, whole) = picture(scene, camera, settings);
     let values = values(&pixels, camera.size(), settings.levels);
     let total = 0.5 * light(&whole, None).iter().flatten().map(|light| mean(*light)).sum::<f64>();
-    let floor = floor::relative(values.iter().copied());
+    let floor = floor::relative_to_mean(values.iter().copied());
     let scale = Scale { values: &values, floor, total: total.max(f64::MIN_POSITIVE) };
     // Light is never negative: noise hides none of it.
     let of_light = |effect: Effect, light: &[Vec<DVec3>; 2]| {
@@ -183,7 +183,7 @@ pub(super) fn weigh(
         // A lens is the camera's.
         let made = (effect != Effect::DepthOfField).then(|| switch::without(scene, effect));
         let (scene, camera) = match &made {
-            None => (scene, camera.pinhole()),
+            None => (scene, camera.without_lens()),
             Some(Ok(made)) => (made, *camera),
             Some(Err(_)) => continue,
         };

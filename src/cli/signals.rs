@@ -60,7 +60,7 @@ impl Interrupt {
 
     /// What tells a render to end, once somebody listens.
     pub fn stop() -> Stop {
-        LISTENING.get().map(|interrupt| Stop::by(Arc::clone(&interrupt.0))).unwrap_or_default()
+        LISTENING.get().map(|interrupt| Stop::from_flag(Arc::clone(&interrupt.0))).unwrap_or_default()
     }
 
     /// Whether a signal came.

@@ -8,7 +8,7 @@ use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use caustique_library::{below, file_name};
+use caustique_library::{file_name, find_below};
 use ort::environment::Environment;
 
 use crate::error::{Error, ErrorKind, Result};
@@ -50,7 +50,7 @@ impl Runtime {
         if let Some(runtime) = &*loaded {
             return Ok(runtime.clone());
         }
-        let runtime = load(&candidates(installed::set(VARIABLE))?)?;
+        let runtime = load(&candidates(installed::path_from_env(VARIABLE))?)?;
         Ok(loaded.insert(runtime).clone())
     }
 
@@ -89,7 +89,7 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
     let versioned = MINOR_VERSIONS.rev().map(|minor| format!("{NAME}.1.{minor}"));
     let mut all: Vec<PathBuf> =
         [NAME.into(), format!("{NAME}.1")].into_iter().chain(versioned).map(PathBuf::from).collect();
-    all.extend(below(&installed::places(FOLDER), NAME));
+    all.extend(find_below(&installed::candidates(FOLDER), NAME));
     Ok(all)
 }
 

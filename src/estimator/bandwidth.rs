@@ -9,7 +9,7 @@
 //! photons usually lie. A pixel whose pilot path gathers nowhere gets the median of the others (or, with no others,
 //! the cap at the scene's size).
 
-use crate::camera::{Camera, band, par_pixels};
+use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::photon::{Located, Nearest, PhotonMap, VolumePhoton};
 use crate::random::{Domain, Stream, Streams};
 use crate::stat::median;
@@ -162,7 +162,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
     let mut found: Vec<Option<[f32; MAPS]>> = vec![None; pixels];
     let streams = Streams::new(seed, 0, Domain::PilotEye);
     par_pixels(
-        found.par_chunks_mut(band(width)),
+        found.par_chunks_mut(pixels_per_band(width)),
         (width, height),
         || (Bump::new(), std::array::from_fn::<_, MAPS, _>(|_| Nearest::default())),
         |(arena, nearest), found, places| {

@@ -295,7 +295,7 @@ impl Pixel {
         }
         self.iterations += 1;
         let most = all().fold(Rgb::ZERO, |most, value| most.max(value.abs()));
-        self.make_room(self.grids.holding(f64::from(most.max_element())));
+        self.make_room(self.grids.with_room_for(f64::from(most.max_element())));
         let rounding = self.grids.rounding();
         let quarter = &mut self.quarters[random::quarter(pass) as usize];
         let light = values[own].as_dvec3();

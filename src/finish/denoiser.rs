@@ -116,7 +116,7 @@ const FOLDER: &str = ".deps/oidn";
 /// # Errors
 /// That of [`oidn::Library::load`].
 pub fn library() -> std::result::Result<oidn::Library, oidn::Error> {
-    oidn::Library::load(&installed::places(FOLDER))
+    oidn::Library::load(&installed::candidates(FOLDER))
 }
 
 /// Where that library comes from.

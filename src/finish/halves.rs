@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Share of the pixels left out, those where the judging quarters differ most. Which pixels these are does not depend
 /// on `F`.
-pub use crate::stat::WORST;
+pub use crate::stat::TRIMMED_SHARE;
 
 /// What two judges tell of a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +30,7 @@ pub struct Judged {
 /// from each by `pulls`.
 pub fn judge(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]) -> Vec<Judged> {
     let mean = |index: usize| values[index].iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0;
-    let floor = floor::relative((0..picture.len()).map(mean));
+    let floor = floor::relative_to_mean((0..picture.len()).map(mean));
     let of_pixel = |index: usize| {
         let (f, [a, b]) = (picture[index], judges.map(|judge| judge[index].map(f64::from)));
         let (f, mean) = (f.map(f64::from), mean(index));
@@ -43,7 +43,7 @@ pub fn judge(picture: &[[f32; 3]], judges: [&[[f32; 3]]; 2], values: &[[f32; 3]]
     };
     let pixels: Vec<(f64, Judged)> = (0..picture.len()).into_par_iter().map(of_pixel).collect();
     let mut apart: Vec<f64> = pixels.iter().map(|(apart, _)| *apart).collect();
-    let kept = apart.len() - (apart.len() as f64 * WORST) as usize;
+    let kept = apart.len() - (apart.len() as f64 * TRIMMED_SHARE) as usize;
     if kept == 0 {
         return Vec::new();
     }

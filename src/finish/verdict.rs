@@ -17,7 +17,7 @@
 //! smooth, and noise that both levels share drops out, so that a mean over a window shows it. In media, where squared
 //! bandwidths are a factor 2^(2/3) apart, the difference is 0.59 of it.
 
-use super::halves::WORST;
+use super::halves::TRIMMED_SHARE;
 use super::window::{Size, Windows};
 use crate::stat::floor;
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ pub const USUAL: f64 = 0.35;
 /// The error of a picture finished from half of the iterations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Squared relative error, trimmed of the pixels that the estimate is least sure of ([`WORST`]); noise around a small one may
+    /// Squared relative error, trimmed of the pixels that the estimate is least sure of ([`TRIMMED_SHARE`]); noise around a small one may
     /// make it negative.
     pub noise: f64,
     /// Standard error of that.
@@ -196,7 +196,7 @@ impl Evidence {
         let pixels = trial.size.pixels();
         let (f, q) = (trial.half, trial.quarters);
         let value = |i: usize| mean(&f[i]);
-        let floor = floor::relative((0..pixels).map(value));
+        let floor = floor::relative_to_mean((0..pixels).map(value));
         let weight: Vec<f64> = (0..pixels).into_par_iter().map(|i| 1.0 / (value(i).powi(2) + floor)).collect();
         let plane = |of: &(dyn Fn([f64; 4], usize, usize) -> f64 + Sync)| -> Vec<[f32; 3]> {
             let at = |i: usize, c: usize| std::array::from_fn(|k| f64::from(q[k][i][c]));
@@ -224,7 +224,7 @@ fn mean(rgb: &[f32; 3]) -> f64 {
 
 /// Which pixels are not among the worst by some value, and what share of the sum the worst have.
 fn usual(values: &[f64]) -> (Vec<bool>, f64) {
-    let count = values.len() - (values.len() as f64 * WORST) as usize;
+    let count = values.len() - (values.len() as f64 * TRIMMED_SHARE) as usize;
     if count == 0 {
         return (Vec::new(), 0.0);
     }

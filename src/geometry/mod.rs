@@ -6,6 +6,6 @@ mod shapes;
 mod surface;
 
 pub use mesh::{Instance, Mesh, Placement};
-pub use precision::{Extent, coordinate_error, error, shadow_end, spawn};
+pub use precision::{Extent, coordinate_error, offset_origin, shadow_end, triangle_error};
 pub use shapes::Shapes;
 pub use surface::Surface;

@@ -60,14 +60,14 @@ pub fn coordinate_error(p: Vec3) -> f32 {
 
 /// How far off the plane of a triangle with these corners a position on it may be (scene units).
 #[inline]
-pub fn error(corners: [Vec3; 3]) -> f32 {
+pub fn triangle_error(corners: [Vec3; 3]) -> f32 {
     let extent = Extent::of(corners);
     extent.plane_error() + coordinate_error(extent.largest)
 }
 
-/// [`Surface::spawn`](super::Surface::spawn) for a point of a triangle with unit normal `ng` that may be off by `error`.
+/// [`Surface::ray_origin`](super::Surface::ray_origin) for a point of a triangle with unit normal `ng` that may be off by `error`.
 #[inline]
-pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
+pub fn offset_origin(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
     p + ng * error.copysign(direction.dot(ng))
 }
 
@@ -76,5 +76,5 @@ pub fn spawn(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
 /// does not block the ray that ends on it.
 #[inline]
 pub fn shadow_end(p: Vec3, ng: Vec3, direction: Vec3, error: f32, distance: f32) -> Vec3 {
-    spawn(p, ng, direction, error + RAY_ERROR * distance)
+    offset_origin(p, ng, direction, error + RAY_ERROR * distance)
 }

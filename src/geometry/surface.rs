@@ -1,7 +1,7 @@
 //! The point of a surface that a ray has hit, with everything shading needs.
 
 use super::mesh::Corner;
-use super::precision::{Extent, shadow_end, spawn};
+use super::precision::{Extent, offset_origin, shadow_end};
 use super::{Instance, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -92,8 +92,8 @@ impl Surface {
     /// Where a ray towards `direction` starts: moved off the surface, to the side the direction points to, by the
     /// error bound of the position, so that the ray does not hit the surface it leaves.
     #[inline]
-    pub fn spawn(&self, direction: Vec3) -> Vec3 {
-        spawn(self.p, self.ng, direction, self.error)
+    pub fn ray_origin(&self, direction: Vec3) -> Vec3 {
+        offset_origin(self.p, self.ng, direction, self.error)
     }
 
     /// Where a shadow ray of length `distance` ends that comes against `direction`.

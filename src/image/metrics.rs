@@ -7,7 +7,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::film::LayerSet;
 use crate::math::Rgb;
 use crate::memory;
-use crate::stat::{WORST, floor};
+use crate::stat::{TRIMMED_SHARE, floor};
 
 /// The error of a picture A against a reference B of the same size, over all pixels that are finite in both.
 ///
@@ -16,7 +16,7 @@ use crate::stat::{WORST, floor};
 pub struct Comparison {
     /// Mean over pixels of [`relative_squared_error`], the papers' relMSE.
     pub relmse: f64,
-    /// The same without the worst 0.5 % of pixels (rounded down), [`WORST`].
+    /// The same without the worst 0.5 % of pixels (rounded down), [`TRIMMED_SHARE`].
     pub relmse_trimmed: f64,
     /// Mean over pixels and channels of the squared difference.
     pub mse: f64,
@@ -42,7 +42,7 @@ pub enum Floor {
     /// 0.01, as the papers define relMSE.
     #[default]
     Papers,
-    /// 0.01 times the squared mean radiance of the reference ([`floor::relative`]), so that errors do not depend on the
+    /// 0.01 times the squared mean radiance of the reference ([`floor::relative_to_mean`]), so that errors do not depend on the
     /// unit of radiance.
     Relative,
 }
@@ -50,8 +50,8 @@ pub enum Floor {
 impl Floor {
     fn of(self, reference: &[[f32; 3]]) -> f64 {
         match self {
-            Floor::Papers => floor::PAPERS,
-            Floor::Relative => floor::relative(reference.iter().map(|r| mean(*r))),
+            Floor::Papers => floor::ABSOLUTE,
+            Floor::Relative => floor::relative_to_mean(reference.iter().map(|r| mean(*r))),
         }
     }
 }
@@ -75,7 +75,7 @@ pub struct Errors {
 
 /// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is none.
 pub fn errors(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<Errors> {
-    errors_above(a, b, floor::PAPERS)
+    errors_above(a, b, floor::ABSOLUTE)
 }
 
 fn errors_above(a: &[[f32; 3]], b: &[[f32; 3]], floor: f64) -> Option<Errors> {
@@ -88,7 +88,7 @@ fn errors_above(a: &[[f32; 3]], b: &[[f32; 3]], floor: f64) -> Option<Errors> {
     let mut relative: Vec<f64> = pixels.iter().map(|&i| squared_error(a[i], b[i]) / weight(b[i], floor)).collect();
     let relmse = relative.iter().sum::<f64>() / n;
     relative.sort_unstable_by(f64::total_cmp);
-    relative.truncate(pixels.len() - (n * WORST) as usize);
+    relative.truncate(pixels.len() - (n * TRIMMED_SHARE) as usize);
     let relmse_trimmed = relative.iter().sum::<f64>() / relative.len() as f64;
     let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
     let total = |image: &[[f32; 3]]| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
@@ -98,7 +98,7 @@ fn errors_above(a: &[[f32; 3]], b: &[[f32; 3]], floor: f64) -> Option<Errors> {
 
 /// Mean over RGB of (x - r)^2, over (mean of r over RGB)^2 + 0.01.
 pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
-    squared_error(x, r) / weight(r, floor::PAPERS)
+    squared_error(x, r) / weight(r, floor::ABSOLUTE)
 }
 
 /// (mean of r over RGB)^2 + the floor.
@@ -119,7 +119,7 @@ pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 /// Pixels that are not finite in both pictures are left out, as neighbours too; `None` if there is no other, or if the
 /// sizes are not `width * height`.
 pub fn grain(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Option<f64> {
-    grain_above(a, b, (width, height), floor::PAPERS)
+    grain_above(a, b, (width, height), floor::ABSOLUTE)
 }
 
 fn grain_above(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize), floor: f64) -> Option<f64> {
@@ -170,8 +170,8 @@ pub fn compare_above(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Compari
         return Err(Error::new(ErrorKind::Image, "", cause).hint("render both with the same --width and --height"));
     }
     let bytes = (a.width as u64).saturating_mul(a.height as u64).saturating_mul(COMPARED_PIXEL_BYTES);
-    if bytes >= memory::SMALL {
-        let needed = memory::check(bytes, format_args!("comparing {} x {} pixels", a.width, a.height));
+    if bytes >= memory::MIN_CHECKED_BYTES {
+        let needed = memory::require(bytes, format_args!("comparing {} x {} pixels", a.width, a.height));
         needed.map_err(|e| e.hint("compare smaller pictures, or with more memory"))?;
     }
     compare_values(&a.beauty()?, &b.beauty()?, (a.width, a.height), floor)

@@ -1,14 +1,14 @@
 //! One light source and the densities that belong to it.
 
 use super::{Environment, Spread};
-use crate::geometry::{Shapes, error};
+use crate::geometry::{Shapes, triangle_error};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
 use std::f32::consts::{PI, TAU};
 
 /// How far the points of a triangle, given by a corner and the edges to the others, may be off (scene units).
 #[inline]
 pub(super) fn position_error(&[corner, a, b]: &[Vec3; 3]) -> f32 {
-    error([corner, corner + a, corner + b])
+    triangle_error([corner, corner + a, corner + b])
 }
 
 /// A light source. The set is closed: a scene's lights are one flat list.
@@ -192,7 +192,7 @@ impl Emitter {
     pub fn anywhere(&self, shapes: &Shapes) -> Option<Vec3> {
         match self {
             Emitter::Triangle { instance, primitive, .. } => {
-                shapes.surface(*instance, *primitive, [1.0 / 3.0, 1.0 / 3.0]).map(|s| s.spawn(s.ng))
+                shapes.surface(*instance, *primitive, [1.0 / 3.0, 1.0 / 3.0]).map(|s| s.ray_origin(s.ng))
             }
             Emitter::Point { p, .. } | Emitter::Spot { p, .. } => Some(*p),
             Emitter::Sun { .. } | Emitter::Environment => None,

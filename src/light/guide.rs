@@ -15,7 +15,7 @@ use super::emission::{EmissionSample, EntryDisc};
 use super::emitter::position_error;
 use super::lights::Lights;
 use super::{Cdf, Emitter, Region};
-use crate::geometry::{Shapes, spawn};
+use crate::geometry::{Shapes, offset_origin};
 use crate::material::Materials;
 use crate::math::{DVec2, Frame, Vec2, Vec3, one_minus_cos, warp};
 use std::f32::consts::PI;
@@ -248,7 +248,7 @@ impl Guide {
         if let Emitter::Triangle { plane, corners, .. } = &lights.emitters()[emission.light as usize] {
             let b = warp::triangle_uniform(point);
             let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
-            emission.origin = spawn(at, plane.truncate(), d, position_error(corners));
+            emission.origin = offset_origin(at, plane.truncate(), d, position_error(corners));
         }
         emission.direction = d;
         (emission.density.onward, emission.density.cos) = lights.onward(emission.light as usize, d)?;

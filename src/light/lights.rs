@@ -10,7 +10,7 @@ use super::group::{Group, Groups};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::spread::Spread;
-use crate::geometry::{Shapes, Surface, shadow_end, spawn};
+use crate::geometry::{Shapes, Surface, offset_origin, shadow_end};
 use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
 use std::f32::consts::{PI, TAU};
@@ -504,7 +504,7 @@ impl Lights {
                 }
                 let flux = radiance * (PI * area * along * if *two_sided { 2.0 } else { 1.0 });
                 (
-                    spawn(at, ng, d, position_error(corners)),
+                    offset_origin(at, ng, d, position_error(corners)),
                     d,
                     flux,
                     [1.0 / area, Self::onto(cos, *two_sided, spread), cos],

@@ -8,7 +8,7 @@ use crate::texture::{Texture, TextureRef};
 use std::sync::Arc;
 
 /// Wider lobes focus no light and show no reflections.
-pub const WIDEST_ROUGHNESS: f32 = 0.45;
+pub const MAX_FOCUSING_ROUGHNESS: f32 = 0.45;
 
 /// The scene's materials, and the textures they refer to.
 #[derive(Clone, Debug, Default)]
@@ -70,7 +70,7 @@ impl Material {
     /// Whether its base (coatings aside) reflects or bends light into narrow lobes somewhere.
     fn has_narrow_base(&self) -> bool {
         let width = if self.is_solid_glass() { refraction_width(self.ior) } else { 1.0 };
-        self.roughness * width.sqrt() < WIDEST_ROUGHNESS || self.metallic_roughness_texture.is_some()
+        self.roughness * width.sqrt() < MAX_FOCUSING_ROUGHNESS || self.metallic_roughness_texture.is_some()
     }
 
     /// Whether it shows reflections: its base, or a coating, has a narrow lobe.
@@ -85,7 +85,7 @@ impl Material {
         let lobes = [Some(base), (self.clearcoat > 0.0).then_some(coat)];
         let any =
             |of: &dyn Fn(f32) -> bool| lobes.iter().flatten().any(|&(roughness, textured)| textured || of(roughness));
-        let sharp = any(&|roughness| !is_perfect(roughness) && roughness < WIDEST_ROUGHNESS);
+        let sharp = any(&|roughness| !is_perfect(roughness) && roughness < MAX_FOCUSING_ROUGHNESS);
         (any(&is_perfect), sharp || (self.has_narrow_base() && !is_perfect(self.roughness)))
     }
 

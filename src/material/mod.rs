@@ -5,7 +5,7 @@ mod library;
 mod scattering;
 
 pub use crate::medium::MediumParameters;
-pub use library::{Materials, WIDEST_ROUGHNESS};
+pub use library::{MAX_FOCUSING_ROUGHNESS, Materials};
 pub use scattering::Scattering;
 
 use crate::math::Rgb;

@@ -91,7 +91,7 @@ impl Scattering {
 
     /// For the scene with other materials, which have no indices of refraction that the first ones lack: the tables are
     /// shared.
-    pub fn again(&self, materials: &[Material]) -> Scattering {
+    pub fn for_materials(&self, materials: &[Material]) -> Scattering {
         Scattering::with(Arc::clone(&self.tables), materials)
     }
 

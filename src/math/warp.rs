@@ -4,7 +4,7 @@
 //! `_a` area.
 
 use glam::{Vec2, Vec3};
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, TAU};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 /// Uniform point of the unit disc, area-preserving and continuous
 /// \[Shirley and Chiu 1997, "A Low Distortion Map Between Disk and Square"\]. Density 1/pi.
@@ -24,12 +24,6 @@ pub fn disc_concentric(u: Vec2) -> Vec2 {
 pub fn hemisphere_cosine(u: Vec2) -> Vec3 {
     let d = disc_concentric(u);
     Vec3::new(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
-}
-
-/// Density of [`hemisphere_cosine`]: zero below the horizon.
-#[inline]
-pub fn hemisphere_cosine_pdf_w(cos_theta: f32) -> f32 {
-    cos_theta.max(0.0) * FRAC_1_PI
 }
 
 /// Uniform direction of the sphere; density 1 / (4 pi).

@@ -7,7 +7,7 @@
 //! for a sample's density is at least the channel's own.
 //!
 //! MIS between whole paths must know the densities of paths it has not walked, and cannot ask for the throughput they
-//! would have had. It takes the even mixture of the channels in its place ([`Flight`]): the weights still sum to one,
+//! would have had. It takes the even mixture of the channels in its place ([`FlightDensity`]): the weights still sum to one,
 //! which is all that they must.
 
 use super::{Equiangular, MediumParameters};
@@ -24,7 +24,7 @@ pub struct Collision {
 
 /// How a ray fares in a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fate {
+pub enum FlightOutcome {
     /// It gets to the end, and what it carries is multiplied by this: transmittance over the probability of getting
     /// there.
     Passed(Rgb),
@@ -39,37 +39,37 @@ impl MediumParameters {
     /// Draws how a ray of `throughput` fares on the next `distance` (maybe infinite). `u` is uniform on the unit
     /// square.
     #[inline]
-    pub fn fly(&self, throughput: Rgb, distance: f32, u: Vec2) -> Fate {
+    pub fn sample_flight(&self, throughput: Rgb, distance: f32, u: Vec2) -> FlightOutcome {
         let sigma = self.sigma_t();
         let share = shares(throughput);
         let drawn = pick(sigma, share, u.x);
         let t = if drawn > 0.0 { -(1.0 - (u.y + HALF_STEP)).ln() / drawn } else { f32::INFINITY };
         if t < distance {
             let left = self.transmittance(t);
-            Fate::Collided(Collision { distance: t, weight: left / (share * sigma * left).element_sum() })
+            FlightOutcome::Collided(Collision { distance: t, weight: left / (share * sigma * left).element_sum() })
         } else {
             let left = self.transmittance(distance);
-            Fate::Passed(left / (share * left).element_sum())
+            FlightOutcome::Passed(left / (share * left).element_sum())
         }
     }
 
     /// The points of the next `distance` (maybe infinite) at which a ray of `throughput` is scattered, as if it had to
     /// be. `None` where nothing is scattered.
     #[inline]
-    pub fn collisions(&self, throughput: Rgb, distance: f32) -> Option<Collisions<'_>> {
+    pub fn collision_distribution(&self, throughput: Rgb, distance: f32) -> Option<CollisionDistribution<'_>> {
         let sigma = self.sigma_t();
         // Share of each channel that is scattered on the way; -expm1 keeps thin media exact.
         let lost = -(-sigma * distance).map(exp_m1);
         let lost = Rgb::select(sigma.cmpgt(Rgb::ZERO), lost, Rgb::ZERO);
         let albedo = Rgb::select(sigma.cmpgt(Rgb::ZERO), self.sigma_s / sigma, Rgb::ZERO);
         let scattered = throughput * albedo * lost;
-        is_lit(scattered).then(|| Collisions { medium: self, distance, lost, share: shares(scattered) })
+        is_lit(scattered).then(|| CollisionDistribution { medium: self, distance, lost, share: shares(scattered) })
     }
 }
 
 /// Points of a ray at which a medium scatters it, distributed as the light is that is scattered there.
 #[derive(Clone, Copy, Debug)]
-pub struct Collisions<'m> {
+pub struct CollisionDistribution<'m> {
     medium: &'m MediumParameters,
     /// Length of the way.
     distance: f32,
@@ -79,10 +79,10 @@ pub struct Collisions<'m> {
     share: Rgb,
 }
 
-impl Collisions<'_> {
+impl CollisionDistribution<'_> {
     /// Draws one.
     #[inline]
-    pub fn draw(&self, u: Vec2) -> Option<Collision> {
+    pub fn sample(&self, u: Vec2) -> Option<Collision> {
         let drawn = pick(self.medium.sigma_t(), self.share, u.x);
         let within = pick(self.lost, self.share, u.x);
         let t = -(-(u.y + HALF_STEP) * within).ln_1p() / drawn;
@@ -92,7 +92,7 @@ impl Collisions<'_> {
 
     /// Draws one by the angle as seen from a lamp.
     #[inline]
-    pub fn draw_by_angle(&self, lamp: &Equiangular, u: f32) -> Option<Collision> {
+    pub fn sample_equiangular(&self, lamp: &Equiangular, u: f32) -> Option<Collision> {
         let t = lamp.sample(u + HALF_STEP).min(self.distance);
         self.at(t, lamp.pdf(t))
     }
@@ -103,7 +103,7 @@ impl Collisions<'_> {
         (distance.is_finite() && weight.is_finite()).then_some(Collision { distance, weight })
     }
 
-    /// Density per length with which [`Collisions::draw`] draws `distance`.
+    /// Density per length with which [`CollisionDistribution::sample`] draws `distance`.
     #[inline]
     pub fn pdf(&self, distance: f32) -> f32 {
         // Densities of the channels, each cut off at the end of the ray.
@@ -141,29 +141,29 @@ fn pick(of: Rgb, share: Rgb, u: f32) -> f32 {
 /// Densities of flight along one segment, both ways, with the even mixture of the channels: per length where the end it
 /// flies to lies in a scattering medium, else the probability of getting there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Flight {
+pub struct FlightDensity {
     /// From the start to the end.
     pub forward: f32,
     /// From the end to the start.
     pub reverse: f32,
 }
 
-impl Flight {
+impl FlightDensity {
     /// Nothing on the way scatters.
-    pub const FREE: Flight = Flight { forward: 1.0, reverse: 1.0 };
+    pub const ONE: FlightDensity = FlightDensity { forward: 1.0, reverse: 1.0 };
 
     /// Goes on through `distance` of `medium`. `starts`, `ends`: the segment starts or ends in here, at a vertex of the
     /// medium.
     #[must_use]
     #[inline]
-    pub fn through(self, medium: &MediumParameters, distance: f32, starts: bool, ends: bool) -> Flight {
+    pub fn through(self, medium: &MediumParameters, distance: f32, starts: bool, ends: bool) -> FlightDensity {
         if !medium.scatters() {
             return self;
         }
         let left = medium.transmittance(distance);
         let pass = left.element_sum() / 3.0;
         let stop = (medium.sigma_t() * left).element_sum() / 3.0;
-        Flight {
+        FlightDensity {
             forward: self.forward * if ends { stop } else { pass },
             reverse: self.reverse * if starts { stop } else { pass },
         }
@@ -202,25 +202,27 @@ mod tests {
                 for i in 0..DRAWS {
                     let draws = Stream::new(31, at as u64, Domain::Test, i).vertex(0);
                     let mut values = [Rgb::ZERO; 6];
-                    match medium.fly(throughput, distance, draws.two(Purpose::Flight)) {
-                        Fate::Passed(weight) => values[0] = weight,
-                        Fate::Collided(hit) => {
+                    match medium.sample_flight(throughput, distance, draws.two(Purpose::Flight)) {
+                        FlightOutcome::Passed(weight) => values[0] = weight,
+                        FlightOutcome::Collided(hit) => {
                             assert!(hit.distance > 0.0 && hit.distance < distance);
                             values[1] = bug(hit, medium.sigma_t()) * hit.distance;
                         }
                     }
-                    let Some(collisions) = medium.collisions(throughput, distance) else { panic!("it scatters") };
+                    let Some(collisions) = medium.collision_distribution(throughput, distance) else {
+                        panic!("it scatters")
+                    };
                     let seen = |part| Equiangular::new(Vec3::ZERO, Vec3::X, part, lamp).expect("an angle");
                     let ways = [seen([0.0, distance]), seen([0.3 * distance, 0.5 * distance])];
                     let share = |lamp: &Equiangular, pdf: f32, at: f32| pdf / (collisions.pdf(at) + lamp.pdf(at));
-                    if let Some(hit) = collisions.draw(draws.two(Purpose::Phase)) {
+                    if let Some(hit) = collisions.sample(draws.two(Purpose::Phase)) {
                         values[2] = bug(hit, medium.sigma_t()) * hit.distance;
                         for (lamp, shared) in ways.iter().zip([4, 5]) {
                             values[shared] += values[2] * share(lamp, collisions.pdf(hit.distance), hit.distance);
                         }
                     }
                     for (lamp, shared) in ways.iter().zip([4, 5]) {
-                        if let Some(hit) = collisions.draw_by_angle(lamp, draws.one(Purpose::Equiangular)) {
+                        if let Some(hit) = collisions.sample_equiangular(lamp, draws.one(Purpose::Equiangular)) {
                             let value = bug(hit, medium.sigma_t()) * hit.distance;
                             values[shared] += value * share(lamp, lamp.pdf(hit.distance), hit.distance);
                             if shared == 4 {
@@ -276,9 +278,9 @@ mod tests {
             let mut throughput = Rgb::ONE;
             for vertex in 0..50 {
                 let u = Stream::new(2, 0, Domain::Test, i).vertex(vertex).two(Purpose::Flight);
-                throughput *= match medium.fly(throughput, 0.3, u) {
-                    Fate::Passed(weight) => weight,
-                    Fate::Collided(hit) => hit.weight * medium.sigma_s,
+                throughput *= match medium.sample_flight(throughput, 0.3, u) {
+                    FlightOutcome::Passed(weight) => weight,
+                    FlightOutcome::Collided(hit) => hit.weight * medium.sigma_s,
                 };
                 assert!(throughput.element_sum() < 3.001, "path {i}, vertex {vertex}: {throughput}");
             }
@@ -288,12 +290,12 @@ mod tests {
     #[test]
     fn densities_of_flight_compose() {
         let medium = media()[0];
-        let whole = Flight::FREE.through(&medium, 1.5, false, true);
-        let parts = Flight::FREE.through(&medium, 0.5, false, false).through(&medium, 1.0, false, true);
+        let whole = FlightDensity::ONE.through(&medium, 1.5, false, true);
+        let parts = FlightDensity::ONE.through(&medium, 0.5, false, false).through(&medium, 1.0, false, true);
         assert!((whole.forward / parts.forward - 1.0).abs() < 1e-5);
         // Grey: T to a surface, sigma T to a vertex of the medium.
         assert!((whole.reverse - (-1.5f32).exp()).abs() < 1e-6 && (whole.forward - whole.reverse).abs() < 1e-6);
         let clear = MediumParameters { sigma_a: Rgb::ONE, ..MediumParameters::default() };
-        assert_eq!(Flight::FREE.through(&clear, 2.0, false, false), Flight::FREE);
+        assert_eq!(FlightDensity::ONE.through(&clear, 2.0, false, false), FlightDensity::ONE);
     }
 }

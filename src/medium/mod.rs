@@ -5,7 +5,7 @@ mod flight;
 mod phase;
 
 pub use equiangular::Equiangular;
-pub use flight::{Collision, Collisions, Fate, Flight};
+pub use flight::{Collision, CollisionDistribution, FlightDensity, FlightOutcome};
 pub use phase::HenyeyGreenstein;
 
 use crate::math::Rgb;

@@ -22,7 +22,7 @@ use crate::render::{
     PHOTON_BYTES, RadiusRule, Settings, Shard,
 };
 use crate::scene::{CameraRequest, MAX_SIZE};
-use crate::stat::sum::MOST_TERMS;
+use crate::stat::sum::MAX_TERMS;
 use crate::stop::Stop;
 use crate::transport::{Indirect, MAX_LEVELS};
 use serde::Serialize;
@@ -119,7 +119,7 @@ pub struct RenderOptions {
     #[arg(long, value_name = "SECONDS", between = (Excluded(0.0), Unbounded), help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop after so many iterations [default: 64, if nothing else says when to stop]
-    #[arg(long, value_name = "N", whole = 1_u64..=MOST_TERMS, help_heading = "When to stop")]
+    #[arg(long, value_name = "N", whole = 1_u64..=MAX_TERMS, help_heading = "When to stop")]
     pub iterations: Option<u64>,
     /// Stop when the estimated relative error (the root of relMSE) is this small; 0.05 is 5 %
     #[arg(long, value_name = "E", between = (Excluded(0.0), Excluded(1.0)), help_heading = "When to stop")]

@@ -1,6 +1,6 @@
 //! Values of options that are neither numbers nor types of the modules that they concern.
 
-use crate::camera::{Filter, WIDEST};
+use crate::camera::{Filter, MAX_FILTER_WIDTH};
 use crate::error::{Error, Result};
 use crate::render::{MAX_SHARDS, Method, Shard};
 use crate::scene::{Crop, MAX_SIZE};
@@ -164,14 +164,14 @@ pub fn filter(words: &[String]) -> Result<Filter> {
     let fault = |cause: String| {
         let filters = "box, gaussian or blackman-harris";
         Error::usage(cause).hint(format!(
-            "give --filter {filters} and perhaps a width from 0.1 to {WIDEST} pixels, and the scene before it"
+            "give --filter {filters} and perhaps a width from 0.1 to {MAX_FILTER_WIDTH} pixels, and the scene before it"
         ))
     };
     let width = match words.get(1) {
         None => None,
-        Some(text) => match text.parse::<f32>().ok().filter(|width| (0.1..=WIDEST).contains(width)) {
+        Some(text) => match text.parse::<f32>().ok().filter(|width| (0.1..=MAX_FILTER_WIDTH).contains(width)) {
             Some(width) => Some(width),
-            None => return Err(fault(format!("--filter: '{text}' is no width from 0.1 to {WIDEST} pixels"))),
+            None => return Err(fault(format!("--filter: '{text}' is no width from 0.1 to {MAX_FILTER_WIDTH} pixels"))),
         },
     };
     match words.first().map(String::as_str) {

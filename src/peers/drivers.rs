@@ -112,7 +112,7 @@ impl Drivers {
         threads: usize,
     ) -> Result<Drivers> {
         let interpreters = renderers.iter().map(|&of| Ok((of, Interpreter::find(of)?))).collect::<Result<Vec<_>>>()?;
-        let folder = temporary::folder("caustique-peers-")?;
+        let folder = temporary::create_folder("caustique-peers-")?;
         for (name, source) in SOURCES {
             let path = folder.path().join(name);
             std::fs::write(&path, source).map_err(|cause| Error::io(&path, &cause))?;

@@ -39,7 +39,7 @@ impl Interpreter {
             Renderer::Cycles => ("CAUSTIQUE_PEERS_BPY_PYTHON", ".venv-bpy", "bpy"),
         };
         let packages = installed::find(".venv-peers/bpy").filter(|_| renderer == Renderer::Cycles);
-        let path = match installed::set(variable) {
+        let path = match installed::path_from_env(variable) {
             Some(path) if path.is_file() => path,
             Some(path) => {
                 let error = Error::new(ErrorKind::Library, format!("{variable}={}", path.display()), "no such file");

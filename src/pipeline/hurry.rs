@@ -32,7 +32,7 @@ fn seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Option<f64>
     let count = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
     let pixels = |camera: &Camera| count(camera.size());
     let walked = camera.sizes().map(count)[usize::from(settings.method.walks_whole_picture())];
-    let pilot = camera.smaller((PIXELS.min(SHARE * walked) / pixels(camera)).sqrt());
+    let pilot = camera.downscale((PIXELS.min(SHARE * walked) / pixels(camera)).sqrt());
     let share = pixels(&pilot) / pixels(camera);
     let factor = window_factor(scene, camera, settings);
     let settings = Settings { guided: false, ..small(settings, share) };

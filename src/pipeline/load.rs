@@ -75,7 +75,7 @@ pub fn load_bytes(bytes: &[u8], order: &Order, threads: usize) -> Result<Loaded>
 }
 
 fn check_memory(order: &Order, threads: usize) -> Result<()> {
-    memory::check(START_BYTES + threads as u64 * THREAD_BYTES, "Embree and its threads")
+    memory::require(START_BYTES + threads as u64 * THREAD_BYTES, "Embree and its threads")
         .map_err(|e| e.within(order.path.display()).hint("give the program more memory, or fewer --threads"))
 }
 

@@ -199,7 +199,7 @@ pub fn check_all<'a>(view: View<'_>, all: impl Iterator<Item = &'a Settings>) ->
 
 /// The error where `what` need more memory than there is.
 fn refuse(needed: u64, what: impl Display, fewer: &str) -> Result<()> {
-    memory::check(needed, what).map_err(|error| error.hint(format!("use a smaller --width and --height, or {fewer}")))
+    memory::require(needed, what).map_err(|error| error.hint(format!("use a smaller --width and --height, or {fewer}")))
 }
 
 #[cfg(test)]

@@ -118,7 +118,7 @@ pub trait Watch {
     fn stop(&self) -> Stop;
     /// An end is asked for.
     fn stops(&self) -> bool {
-        self.stop().asked()
+        self.stop().requested()
     }
     /// It is decided how to render. An error ends the render before its first iteration.
     ///

@@ -42,7 +42,7 @@ pub fn outlook(
     error: f64,
 ) -> Result<Option<Outlook>> {
     let pixels = |camera: &Camera| f64::from(camera.size().0) * f64::from(camera.size().1);
-    let pilot = camera.smaller((PIXELS / pixels(camera)).sqrt().min(1.0));
+    let pilot = camera.downscale((PIXELS / pixels(camera)).sqrt().min(1.0));
     let share = pixels(&pilot) / pixels(camera);
     let stage = Stage::new(scene, &pilot, &small(settings, share));
     let mut session = Session::new(&stage);

@@ -13,7 +13,7 @@ mod chain;
 mod sobol;
 
 pub use chain::Chain;
-pub use sobol::{SobolPair, owen_sobol};
+pub use sobol::SobolPair;
 
 use glam::Vec2;
 
@@ -68,7 +68,7 @@ pub enum Purpose {
     /// Alpha cut-outs along the segment that leaves this vertex.
     Alpha = 11,
     /// Whether the second direct-light strategy is tried.
-    SecondStrategy = 12,
+    SecondTechnique = 12,
     /// Lobe of that second strategy.
     SecondLobe = 13,
     /// Direction of that second strategy (2D).

@@ -107,12 +107,6 @@ impl SobolPair {
     }
 }
 
-/// Point `index` of the pair keyed by `seed`.
-#[inline]
-pub fn owen_sobol(index: u32, seed: u64) -> Vec2 {
-    SobolPair::new(seed).point(index)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

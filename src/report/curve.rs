@@ -4,7 +4,7 @@ use super::entry::Metric;
 use super::point::Point;
 use super::reference::Reference;
 use crate::image::Errors;
-use crate::stat::{PowerLaw, WORST};
+use crate::stat::{PowerLaw, TRIMMED_SHARE};
 use std::fmt;
 
 /// A mean over seeds and its standard error, which one seed does not tell.
@@ -49,7 +49,7 @@ pub struct Spot {
 /// Whether a few bright samples rule a picture's error: the worst 0.5 % of its pixels hold more than half of its
 /// relMSE. Of Gaussian noise as large everywhere they hold 2 to 5 %.
 pub fn fireflies(errors: &Errors) -> bool {
-    (1.0 - WORST) * errors.relmse_trimmed < 0.5 * errors.relmse
+    (1.0 - TRIMMED_SHARE) * errors.relmse_trimmed < 0.5 * errors.relmse
 }
 
 /// A run's error against iterations and seconds.

@@ -22,7 +22,7 @@ const SHOWN: f64 = 0.95;
 pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison: &Comparison) -> Result<String> {
     let (pixels, truth) = (image.beauty()?, reference.beauty()?);
     let value = |rgb: &[f32; 3]| rgb.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
-    let floor = floor::relative(truth.iter().map(value));
+    let floor = floor::relative_to_mean(truth.iter().map(value));
     // Of a pixel, whose squared error is given by channel.
     let relative = |square: f64, worth: &[f32; 3]| (square / 3.0 / (value(worth).powi(2) + floor)).sqrt() as f32;
     let distance =

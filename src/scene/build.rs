@@ -9,7 +9,7 @@ use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
 use crate::texture::Texture;
-use crate::trace::{CAMERA, MeetsTest, Tracer};
+use crate::trace::{CAMERA_RAY_BIT, HitFilter, Tracer};
 use std::sync::Arc;
 
 /// Farther from the origin than this many scene radii, coordinates are moved to the scene's centre: f32 would lose the
@@ -226,7 +226,7 @@ pub(super) fn rebuild_with_materials(
         cameras: scene.cameras.clone(),
         picture: scene.picture,
         medium,
-        scattering: scene.scattering.again(&materials.list),
+        scattering: scene.scattering.for_materials(&materials.list),
         survey: Survey::new(&shapes, &materials, &lights, medium),
         contacts,
         ranks: Arc::clone(&scene.ranks),
@@ -328,11 +328,11 @@ pub(super) fn random_cutoff(token: u32, instance: u32, key: u32) -> f32 {
     (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
 }
 
-fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> MeetsTest {
+fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
     Arc::new(move |instance, primitive, barycentric, token| {
         let placed = &shapes.instances[instance as usize];
-        if placed.hidden_from_camera && token & CAMERA != 0 {
+        if placed.hidden_from_camera && token & CAMERA_RAY_BIT != 0 {
             return false;
         }
         let material = &materials.list[placed.material as usize];

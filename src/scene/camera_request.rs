@@ -68,7 +68,7 @@ impl Scene {
     /// No camera has the name, the size is zero or too large, or the window is not within the picture.
     pub fn camera(&self, request: &CameraRequest) -> Result<Camera> {
         let whole = self.whole_camera(request)?;
-        Ok(self.window(request, whole.size())?.map_or(whole, |window| whole.window(window)))
+        Ok(self.window(request, whole.size())?.map_or(whole, |window| whole.crop(window)))
     }
 
     /// The window that is rendered of a picture of that size, in pixels, if not all of it.
@@ -152,7 +152,7 @@ impl Scene {
         };
         let position = described.to_world.translation - self.origin;
         let camera = Camera::new(position, rotation(&described.to_world), projection, lens, (width, height));
-        Ok(camera.shifted(described.shift.into()).filtered(request.filter))
+        Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
     }
 
     /// A view of the whole scene from the front, a little from above.

@@ -24,7 +24,7 @@
 
 use super::Scene;
 use super::contacts::face_each_other;
-use crate::geometry::{Surface, error};
+use crate::geometry::{Surface, triangle_error};
 use crate::light::Emitter;
 use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
@@ -75,7 +75,7 @@ impl ContactPoint {
         };
         let ng = plane.truncate();
         let p = near - ng * (ng.dot(near) - plane.w);
-        let error = scene.contacts.reach(instance, primitive, error([corner, corner + a, corner + b]))?;
+        let error = scene.contacts.reach(instance, primitive, triangle_error([corner, corner + a, corner + b]))?;
         let material = scene.shapes.instances[instance as usize].material;
         Some(ContactPoint { p, ng, instance, primitive, material, error })
     }
@@ -243,7 +243,7 @@ impl RaySurfaces {
     /// Goes on behind a surface.
     #[inline(always)]
     pub fn pass(&mut self, surface: &Surface) {
-        let next = surface.spawn(self.ray.direction);
+        let next = surface.ray_origin(self.ray.direction);
         self.ray.tmax -= (next - self.ray.origin).dot(self.ray.direction);
         self.ray.origin = next;
         self.here = ContactPoint::touching(surface);

@@ -1,11 +1,11 @@
-//! Media that scatter within the way by which rays start off a surface ([`position_error`]): what happens in there would
+//! Media that scatter within the way by which rays start off a surface ([`triangle_error`]): what happens in there would
 //! not be seen, and all that comes from so near to the surface would be missing.
 //!
 //! A medium so dense looks as one without end, and what that sends back depends on albedo and phase function alone, not
 //! on the density \[Chandrasekhar 1950, section 13: everything is told in optical depths\]. So it is taken to be as dense
 //! as positions resolve, channel by channel, with the albedo that it has.
 
-use crate::geometry::{Shapes, error as position_error};
+use crate::geometry::{Shapes, triangle_error};
 use crate::material::{Materials, MediumParameters};
 use crate::math::Rgb;
 
@@ -23,7 +23,7 @@ pub(super) fn thin(
         let instance = &shapes.instances[instance];
         let mesh = &shapes.meshes[instance.mesh as usize];
         let primitives = 0..mesh.triangles.len() as u32;
-        primitives.map(|primitive| position_error(instance.corners(mesh, primitive))).fold(0.0, f32::max)
+        primitives.map(|primitive| triangle_error(instance.corners(mesh, primitive))).fold(0.0, f32::max)
     };
     let mut farthest = vec![0f32; materials.list.len()];
     for (i, instance) in shapes.instances.iter().enumerate() {

@@ -66,7 +66,7 @@ fn clamp(texels: &mut [[f32; 3]]) -> usize {
 
 fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
     match width.checked_mul(height) {
-        Some(texels @ 1..=MOST_TEXELS) => memory::check(TEXEL_BYTES * texels, "its texels").map_err(|e| e.cause),
+        Some(texels @ 1..=MOST_TEXELS) => memory::require(TEXEL_BYTES * texels, "its texels").map_err(|e| e.cause),
         _ => Err(format!("{width} x {height} texels are none or too many")),
     }
 }
@@ -77,7 +77,7 @@ fn read_exr(path: &Path) -> std::result::Result<Pixels, String> {
     let length = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
     for header in &meta.headers {
         let texels = (header.layer_size.width() as u64).saturating_mul(header.layer_size.height() as u64);
-        if texels > length.saturating_mul(memory::EXR_PACKED) {
+        if texels > length.saturating_mul(memory::MAX_EXR_RATIO) {
             return Err("it has more texels than the file can hold".into());
         }
         check_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;

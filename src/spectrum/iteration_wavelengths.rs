@@ -20,7 +20,7 @@ impl IterationWavelengths {
     /// For passes whose paths meet photons of the pass before: places move to and fro with the square root of the
     /// number of passes. Over a render they are everywhere, and their steps shrink as bandwidths do, and with them the
     /// difference of wavelengths that meet.
-    pub fn slow(seed: u64, pass: u64) -> IterationWavelengths {
+    pub fn drifting(seed: u64, pass: u64) -> IterationWavelengths {
         let at = ((pass as f64).sqrt() + 2.0 * start(seed)) % 2.0;
         IterationWavelengths { offset: (if at < 1.0 { at } else { 2.0 - at }) as f32 }
     }
@@ -51,7 +51,7 @@ mod tests {
             let n = offsets.len() as f32;
             offsets.iter().enumerate().map(|(i, x)| (x - i as f32 / n).abs()).fold(0.0, f32::max)
         };
-        for wavelengths in [IterationWavelengths::new, IterationWavelengths::slow] {
+        for wavelengths in [IterationWavelengths::new, IterationWavelengths::drifting] {
             for pass in [0, 1, 7] {
                 assert!(
                     distance((0..4000).map(|seed| wavelengths(seed, pass).offset).collect()) < 0.035,
@@ -62,8 +62,9 @@ mod tests {
         }
         assert!(distance((1..40).map(|pass| IterationWavelengths::new(3, pass).offset).collect()) < 0.08);
         for pass in 1..4000u64 {
-            let step =
-                (IterationWavelengths::slow(3, pass).offset - IterationWavelengths::slow(3, pass + 1).offset).abs();
+            let step = (IterationWavelengths::drifting(3, pass).offset
+                - IterationWavelengths::drifting(3, pass + 1).offset)
+                .abs();
             assert!(f64::from(step) < 0.51 / (pass as f64).sqrt(), "{pass}: {step}");
         }
     }

@@ -50,7 +50,7 @@ impl WavelengthSample {
     /// The wavelength here.
     #[inline]
     pub fn wavelength(self) -> Wavelength {
-        let (nm, weight) = observer::at(self.0);
+        let (nm, weight) = observer::sample(self.0);
         Wavelength { nm, weight, band: Band(self.band().0 + 1) }
     }
 
@@ -58,10 +58,10 @@ impl WavelengthSample {
     /// what they weigh in this channel: so all such paths weigh the same. Its weight is that of the channel, in all
     /// channels; 1 on average.
     #[inline]
-    pub fn wavelength_of(self, channel: usize, u: f32) -> Wavelength {
+    pub fn sample_in_channel(self, channel: usize, u: f32) -> Wavelength {
         let offset = self.band().1;
         let weights: [f32; BANDS as usize] =
-            std::array::from_fn(|band| observer::at(WavelengthSample::within(band as u8, offset).0).1[channel]);
+            std::array::from_fn(|band| observer::sample(WavelengthSample::within(band as u8, offset).0).1[channel]);
         let sum: f32 = weights.iter().sum();
         let mut left = u * sum;
         let mut band = 0;
@@ -103,14 +103,18 @@ impl Band {
 impl Wavelength {
     /// One over the weight: what a path is multiplied with that would count it twice.
     #[inline]
-    pub fn once(&self) -> Rgb {
+    pub fn inverse_weight(&self) -> Rgb {
         Rgb::select(self.weight.cmpgt(Rgb::splat(LEAST_WEIGHT)), self.weight.recip(), Rgb::ZERO)
     }
 
     /// What light of a path of some band is multiplied with where this path meets it, both drawn independently; `None`:
     /// they do not meet.
     #[inline]
-    pub fn meets(&self, band: Band) -> Option<Rgb> {
-        if band == Band::WHITE { Some(Rgb::ONE) } else { (band == self.band).then(|| self.once() * f32::from(BANDS)) }
+    pub fn connection_factor(&self, band: Band) -> Option<Rgb> {
+        if band == Band::WHITE {
+            Some(Rgb::ONE)
+        } else {
+            (band == self.band).then(|| self.inverse_weight() * f32::from(BANDS))
+        }
     }
 }

@@ -84,7 +84,7 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
 
 /// The wavelength (nm) at `u` in `[0, 1]`, uniform, and what it weighs: on average exactly white.
 #[inline]
-pub fn at(u: f32) -> (f32, Rgb) {
+pub fn sample(u: f32) -> (f32, Rgb) {
     let table = &*TABLE;
     let x = u * STEPS as f32;
     let k = (x as usize).min(STEPS - 1);

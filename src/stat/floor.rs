@@ -6,18 +6,18 @@
 //! like theirs.
 
 /// The papers' own constant.
-pub const PAPERS: f64 = 0.01;
+pub const ABSOLUTE: f64 = 0.01;
 
 /// Share of the pixels that the mean leaves out, the brightest: lamps that are seen, and fireflies.
 const BRIGHTEST: f64 = 0.01;
 
 /// 0.01 times the squared mean of the values of a picture's pixels without the brightest; with them where the others
 /// are black; the papers' constant where all are. Scaling the values by a power of two scales it exactly.
-pub fn relative(values: impl IntoIterator<Item = f64>) -> f64 {
+pub fn relative_to_mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
     let kept = values.len() - (values.len() as f64 * BRIGHTEST) as usize;
     if kept == 0 {
-        return PAPERS;
+        return ABSOLUTE;
     }
     let mut sorted = values.clone();
     let most = *sorted.select_nth_unstable_by(kept - 1, f64::total_cmp).1;
@@ -25,8 +25,8 @@ pub fn relative(values: impl IntoIterator<Item = f64>) -> f64 {
         let (sum, count) = values.iter().filter(|value| **value <= most).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
         sum / count
     };
-    let floor = |mean: f64| PAPERS * mean * mean;
-    [mean(most), mean(f64::INFINITY)].map(floor).into_iter().find(|floor| *floor > 0.0).unwrap_or(PAPERS)
+    let floor = |mean: f64| ABSOLUTE * mean * mean;
+    [mean(most), mean(f64::INFINITY)].map(floor).into_iter().find(|floor| *floor > 0.0).unwrap_or(ABSOLUTE)
 }
 
 #[cfg(test)]
@@ -39,16 +39,16 @@ mod tests {
         // Two fireflies are the brightest hundredth.
         values[17] = 1e9;
         values[90] = 1e12;
-        let floor = relative(values.iter().copied());
+        let floor = relative_to_mean(values.iter().copied());
         assert!((floor / (0.01 * 0.9975f64.powi(2)) - 1.0).abs() < 0.01, "{floor}");
         for power in [-10, 10] {
             let scale = 2f64.powi(power);
-            assert_eq!(relative(values.iter().map(|value| scale * value)), scale * scale * floor);
+            assert_eq!(relative_to_mean(values.iter().map(|value| scale * value)), scale * scale * floor);
         }
-        assert_eq!(relative([0.0; 300]), PAPERS);
-        assert_eq!(relative([]), PAPERS);
+        assert_eq!(relative_to_mean([0.0; 300]), ABSOLUTE);
+        assert_eq!(relative_to_mean([]), ABSOLUTE);
         // Light in one pixel alone.
-        let lit = relative((0..300).map(|i| if i == 7 { 3.0 } else { 0.0 }));
+        let lit = relative_to_mean((0..300).map(|i| if i == 7 { 3.0 } else { 0.0 }));
         assert!((lit - 1e-6).abs() < 1e-12, "{lit}");
     }
 }

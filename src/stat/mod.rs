@@ -8,7 +8,7 @@ pub mod sum;
 
 /// Share of the pixels that trimmed errors leave out, the worst ones: a few bright samples (fireflies) would rule the
 /// mean.
-pub const WORST: f64 = 0.005;
+pub const TRIMMED_SHARE: f64 = 0.005;
 
 pub use median::median;
 pub use moments::{Grids, Moments, variance_of_mean};

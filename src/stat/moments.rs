@@ -23,8 +23,8 @@ impl Grids {
     /// With room for values of this size.
     #[inline]
     #[must_use]
-    pub fn holding(self, most: f64) -> Grids {
-        Grids { values: self.values.holding(most), squares: self.squares.holding(most * most) }
+    pub fn with_room_for(self, most: f64) -> Grids {
+        Grids { values: self.values.with_room_for(most), squares: self.squares.with_room_for(most * most) }
     }
 
     /// The coarser of either.
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn agrees_with_two_passes_far_from_zero() {
         let values: Vec<f64> = (0..1000).map(|i| 1e3 + f64::from((i * 7919) % 101)).collect();
-        let grids = Grids::default().holding(2e3);
+        let grids = Grids::default().with_room_for(2e3);
         let mut moments = Moments::default();
         values.iter().for_each(|&v| moments.add(Rgb::splat(v as f32), grids.rounding()));
         let mean = values.iter().sum::<f64>() / 1000.0;
@@ -129,7 +129,7 @@ mod tests {
     fn equal_values_have_next_to_no_variance() {
         let mut worst = 0.0f64;
         for value in (0..200).map(|i| 1.1f32.powi(i - 100)) {
-            let grids = Grids::default().holding(f64::from(value));
+            let grids = Grids::default().with_room_for(f64::from(value));
             let mut moments = Moments::default();
             (0..100).for_each(|_| moments.add(Rgb::splat(value), grids.rounding()));
             worst = worst.max(99.0 * moments.variance_of_mean(100.0).x / f64::from(value).powi(2));

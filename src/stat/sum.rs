@@ -16,7 +16,7 @@ const STEP: i16 = 30;
 /// The finest coarse grid: below the squares of all that f32 can hold.
 const LOWEST: i16 = -330;
 /// Terms that can be added before a sum may lose a digit: a term has at most 30 digits of a grid, an f64 has 53.
-pub const MOST_TERMS: u64 = 1 << (53 - STEP as u64);
+pub const MAX_TERMS: u64 = 1 << (53 - STEP as u64);
 
 /// What can be summed.
 pub trait Term: Copy + Default + Add<Output = Self> + AddAssign + Sub<Output = Self> {
@@ -71,7 +71,7 @@ impl Grid {
     /// This or the next coarser one that has room for `most`, which is finite: the largest size of a term.
     #[inline]
     #[must_use]
-    pub fn holding(self, most: f64) -> Grid {
+    pub fn with_room_for(self, most: f64) -> Grid {
         let mut grid = self;
         // Half of the next grid's step, which would round to it.
         while most >= two_to(grid.0 + STEP - 1) {
@@ -144,7 +144,7 @@ impl Total {
     /// Adds a finite term.
     #[inline]
     pub fn add(&mut self, term: f64) {
-        self.reach(self.grid.holding(term.abs()));
+        self.reach(self.grid.with_room_for(term.abs()));
         self.sum.add(term, self.grid.rounding());
     }
 

@@ -17,12 +17,12 @@ pub struct Ray {
     /// Largest t; may be infinite.
     pub tmax: f32,
     /// Random bits that decide about alpha cut-outs along this ray, and in scenes that hide something from cameras
-    /// whether this is a camera's ([`CAMERA`]).
+    /// whether this is a camera's ([`CAMERA_RAY_BIT`]).
     pub token: u32,
 }
 
 /// The bit of a token by which a camera's own rays, and rays to its lens, pass what is hidden from cameras.
-pub const CAMERA: u32 = 1;
+pub const CAMERA_RAY_BIT: u32 = 1;
 
 /// The nearest triangle along a ray.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +51,7 @@ impl From<embree::Hit> for Hit {
 
 /// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs, and
 /// what is hidden from cameras. A pure function.
-pub type MeetsTest = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
+pub type HitFilter = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
 /// Up to so many triangles of all the instances of a mesh together stand in the one tree of the scene, copied: rays are
 /// faster there than through an instance's own tree, whose box overlaps its neighbours'.
@@ -81,7 +81,7 @@ impl Tracer {
     ///
     /// # Errors
     /// Embree is missing or out of memory, or a coordinate is too large for it.
-    pub fn build(shapes: &Shapes, asked: &[Option<bool>], meets: &MeetsTest, threads: usize) -> Result<Tracer> {
+    pub fn build(shapes: &Shapes, asked: &[Option<bool>], meets: &HitFilter, threads: usize) -> Result<Tracer> {
         let library = embree::Library::load().map_err(convert)?;
         let device = embree::Device::new(&library, threads).map_err(convert)?;
         // A mesh is filtered if any instance of it is: the test itself then accepts the opaque ones.

@@ -18,7 +18,7 @@ use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{EmissionDensity, Group, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 use crate::photon::PhotonMap;
 use crate::plan::{LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream, mix};
@@ -182,7 +182,7 @@ impl<R: Record> EyeWalk<'_, R> {
         }
         let mut value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
         if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
-            value *= wavelength.once();
+            value *= wavelength.inverse_weight();
         }
         if !self.finds(technique, value) {
             return;
@@ -244,7 +244,7 @@ impl<R: Record> EyeWalk<'_, R> {
     /// Whether the work of a path that has grown long is in vain.
     #[inline]
     fn is_given_up(&self, depth: u32) -> bool {
-        depth.is_multiple_of(LOOK) && self.shared.eye.stop.is_some_and(Stop::gives_up)
+        depth.is_multiple_of(LOOK) && self.shared.eye.stop.is_some_and(Stop::should_abort)
     }
 }
 
@@ -350,7 +350,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
     }
 
     #[inline]
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: Flight) {
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: FlightDensity) {
         if let Some(scattered) = scattered {
             self.trail.scattered(scattered.lobe);
         }

@@ -15,7 +15,7 @@ use super::walk::walk;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{Group, Receiver};
 use crate::math::{Rgb, is_lit};
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 use crate::plan::{Event, EyeSuffix, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 
@@ -104,7 +104,7 @@ struct LightWalk<'a, 's, R> {
 
 impl<R: Record> LightWalk<'_, '_, R> {
     #[inline(always)]
-    fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: Flight, scattered: Option<Scattered>) {
+    fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: FlightDensity, scattered: Option<Scattered>) {
         if let Some(scattered) = scattered {
             self.beam = self.beam.then(Event::by(scattered.lobe, self.lobes));
         }

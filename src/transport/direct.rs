@@ -41,7 +41,7 @@ pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, 
         return Rgb::ZERO;
     }
     let mut light = next_event(scene, vertex, [(gather, SECOND_STRATEGY), (onward, survival)]);
-    if !gather.is_empty() && vertex.draws().one(Purpose::SecondStrategy) < SECOND_STRATEGY {
+    if !gather.is_empty() && vertex.draws().one(Purpose::SecondTechnique) < SECOND_STRATEGY {
         light += second_strategy(scene, vertex, gather);
     }
     light
@@ -88,7 +88,7 @@ fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> 
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
     let Some(sample) = vertex.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
     let interior = *vertex.interiors()[usize::from(sample.transmitted)];
-    let (origin, token) = (vertex.spawn(sample.wi), token(scene, draws, Purpose::SecondAlpha));
+    let (origin, token) = (vertex.ray_origin(sample.wi), token(scene, draws, Purpose::SecondAlpha));
     let start = Start { origin, direction: sample.wi, interior, leaving: vertex.touching(), token };
     let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
     let (mut light, mut reach) = (Rgb::ZERO, f32::INFINITY);

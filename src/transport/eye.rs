@@ -32,10 +32,10 @@ use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::volume::Volume;
 use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
-use crate::camera::{Camera, GROUP, Place};
+use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec2, Vec3};
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 use crate::photon::{ByKind, Kernel, Kind, Near, Photon, PhotonMap, PhotonMaps, VolumePhoton};
 use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream, Streams};
@@ -367,7 +367,7 @@ fn gather_dispersed(
     mut push: impl FnMut(&Photon, f32),
 ) {
     photons.gather(near, vertex.surface.p, vertex.surface.ng, reach2, |photon, distance2| {
-        if let Some(weight) = wavelength.meets(photon.band) {
+        if let Some(weight) = wavelength.connection_factor(photon.band) {
             push(&Photon { flux: photon.flux * weight, ..*photon }, distance2);
         }
     });
@@ -492,7 +492,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     }
 
     #[inline]
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {
         let scene = self.scene;
         self.sight = self.arrived(scattered);
         let last = self.last;
@@ -537,7 +537,7 @@ impl Eye<'_> {
     /// Whether the iteration under way is given up.
     #[inline]
     pub fn is_given_up(&self) -> bool {
-        self.stop.is_some_and(Stop::gives_up)
+        self.stop.is_some_and(Stop::should_abort)
     }
 
     /// Camera depth and position of what a measure has seen first, if anything (scene units; of the scene as it was
@@ -574,18 +574,22 @@ impl Eye<'_> {
 
     /// The starts of the eye paths of neighbouring pixels, first rays traced together.
     #[inline]
-    pub fn starts(&self, places: &[Option<Place>; GROUP], streams: Streams) -> [Option<(PathStart, Stream)>; GROUP] {
+    pub fn starts(
+        &self,
+        places: &[Option<TilePixel>; GROUP_SIZE],
+        streams: Streams,
+    ) -> [Option<(PathStart, Stream)>; GROUP_SIZE] {
         self.starts_through(places, streams, streams)
     }
 
     /// The same, through points of pixels and lens that are drawn from `film`.
     pub fn starts_through(
         &self,
-        places: &[Option<Place>; GROUP],
+        places: &[Option<TilePixel>; GROUP_SIZE],
         film: Streams,
         streams: Streams,
-    ) -> [Option<(PathStart, Stream)>; GROUP] {
-        let mut starts = [const { None }; GROUP];
+    ) -> [Option<(PathStart, Stream)>; GROUP_SIZE] {
+        let mut starts = [const { None }; GROUP_SIZE];
         for (start, place) in starts.iter_mut().zip(places) {
             if let Some(place) = place {
                 let key = self.camera.key(place.pixel);
@@ -595,7 +599,7 @@ impl Eye<'_> {
                 *start = Some((PathStart { first, ..self.start(place.pixel, film) }, stream));
             }
         }
-        let mut hits = [const { None }; GROUP];
+        let mut hits = [const { None }; GROUP_SIZE];
         let ray = |k: usize| {
             starts[k].as_ref().map(|(start, stream): &(PathStart, Stream)| Ray {
                 origin: start.origin,

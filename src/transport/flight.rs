@@ -15,7 +15,7 @@ use super::direct::balance;
 use super::segment::{MediumArrival, Passage, Span, Through};
 use super::vertex::{MediumVertex, Scattered, Visitor};
 use crate::math::{Rgb, Vec3};
-use crate::medium::{Collision, Equiangular, Fate, Flight};
+use crate::medium::{Collision, Equiangular, FlightDensity, FlightOutcome};
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::spectrum::Wavelength;
@@ -43,7 +43,7 @@ pub(super) struct Fly<'a> {
     /// It has come from infinity already when it starts.
     pub from_infinity: bool,
     /// Densities up to where it is.
-    pub flight: Flight,
+    pub flight: FlightDensity,
 }
 
 impl Through for Fly<'_> {
@@ -57,12 +57,12 @@ impl Through for Fly<'_> {
         let starts = first && self.from_medium;
         let far = |distance| if first && self.from_infinity { f32::INFINITY } else { distance };
         let u = self.draws.nth(span.crossed).two(Purpose::Flight);
-        match medium.fly(self.throughput * span.left, span.distance, u) {
-            Fate::Passed(weight) => {
+        match medium.sample_flight(self.throughput * span.left, span.distance, u) {
+            FlightOutcome::Passed(weight) => {
                 self.flight = self.flight.through(medium, far(span.distance), starts, false);
                 Passage::Left(weight)
             }
-            Fate::Collided(collision) => {
+            FlightOutcome::Collided(collision) => {
                 self.flight = self.flight.through(medium, far(collision.distance), starts, true);
                 Passage::Ended(arrival(self.scene, span, collision))
             }
@@ -112,7 +112,7 @@ impl<V> Split<'_, V> {
             depth: self.depth,
             from: self.from,
             draws,
-            flight: Flight::FREE,
+            flight: FlightDensity::ONE,
             opacity,
             next_event,
             wavelength: self.wavelength,
@@ -131,17 +131,17 @@ impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
         }
         // One for the points, the others for what is measured there; the surface behind has draws of its own.
         let draws = self.draws.nth(span.crossed);
-        if let Some(collisions) = span.medium.collisions(self.throughput * span.left, span.distance) {
+        if let Some(collisions) = span.medium.collision_distribution(self.throughput * span.left, span.distance) {
             let lamp = self.lamp(span, &draws);
             let opacity = 1.0 - left.element_sum() / 3.0;
-            if let Some(at) = collisions.draw(draws.two(Purpose::Flight)) {
+            if let Some(at) = collisions.sample(draws.two(Purpose::Flight)) {
                 let by_angle = lamp.map_or(0.0, |lamp| lamp.pdf(at.distance));
                 let share = balance(collisions.pdf(at.distance), by_angle);
                 let vertex = self.vertex(span, at, draws, opacity, share);
                 self.visitor.medium(&vertex, self.scattered);
             }
             if let Some(lamp) = lamp
-                && let Some(at) = collisions.draw_by_angle(&lamp, draws.one(Purpose::Equiangular))
+                && let Some(at) = collisions.sample_equiangular(&lamp, draws.one(Purpose::Equiangular))
             {
                 let share = balance(lamp.pdf(at.distance), collisions.pdf(at.distance));
                 let vertex = self.vertex(span, at, draws, opacity, share);

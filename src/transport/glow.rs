@@ -7,7 +7,7 @@
 use super::segment::{Between, Start, shadow_ray};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
@@ -24,7 +24,7 @@ pub struct Glow {
     /// Length of the segment up to here.
     pub distance: f32,
     /// Densities of the flight up to here.
-    pub flight: Flight,
+    pub flight: FlightDensity,
 }
 
 /// Calls `each` with every lamp without a body that a ray meets within `reach`, how far it is, what is left of its
@@ -35,7 +35,7 @@ pub(super) fn glows(
     start: &Start,
     reach: f32,
     from_medium: bool,
-    mut each: impl FnMut(&Surface, f32, Rgb, Flight),
+    mut each: impl FnMut(&Surface, f32, Rgb, FlightDensity),
 ) {
     if let Some(pass_through_lights) = &scene.pass_through_lights {
         let Start { origin, direction, token, .. } = *start;

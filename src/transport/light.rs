@@ -119,7 +119,7 @@ impl<'a> LightPass<'a> {
     /// Whether path `index` and all others of its iteration are given up.
     #[inline]
     pub fn is_given_up(&self, index: u32) -> bool {
-        index.is_multiple_of(LOOK) && self.stop.is_some_and(Stop::gives_up)
+        index.is_multiple_of(LOOK) && self.stop.is_some_and(Stop::should_abort)
     }
 
     /// The wavelength of path `index`.

@@ -30,7 +30,7 @@
 
 use crate::light::EmissionDensity;
 use crate::math::DVec2;
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 
 /// Directions nearer to a surface (cosine) than this count as if they were this far from it: so near that f32 hardly
 /// tells them from along it.
@@ -164,7 +164,7 @@ impl MisState {
     /// ends \[Georgiev (2), with the flight's factor as in Lafortune and Willems 1996\].
     #[must_use]
     #[inline]
-    pub fn fly(self, flight: Flight) -> MisState {
+    pub fn fly(self, flight: FlightDensity) -> MisState {
         let (forward, reverse) = (f64::from(flight.forward), f64::from(flight.reverse));
         let ratio = reverse / forward;
         MisState {

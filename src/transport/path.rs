@@ -17,7 +17,7 @@ use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::{Group, Receiver};
 use crate::math::{Rgb, Vec3, is_lit};
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 use crate::plan::{ClassSet, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
@@ -153,7 +153,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         self.next()
     }
 
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: Flight) {
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {
         if let Some(scattered) = scattered {
             self.trail.scattered(scattered.lobe);
         }

@@ -110,7 +110,8 @@ pub(super) fn merge_photons<R: Record>(
         if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
             return;
         }
-        let meets = vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.meets(photon.band));
+        let meets =
+            vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.connection_factor(photon.band));
         let Some(weight) = meets else { return };
         let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, LobeSet::ALL);
         // Photons measure irradiance on the geometric surface where they are, see `Shading::gather`: the cosine in f

@@ -39,7 +39,7 @@ pub trait ScatterPoint {
     /// Geometric cosine of a direction.
     fn cos(&self, w: Vec3) -> f32;
     /// Where a ray towards `w` starts.
-    fn spawn(&self, w: Vec3) -> Vec3;
+    fn ray_origin(&self, w: Vec3) -> Vec3;
     /// The solids on the side of `wo`, and behind.
     fn interiors(&self) -> [&Interior; 2];
     /// Whether `w` is on the other side than `wo`.
@@ -88,7 +88,7 @@ pub trait ScatterPoint {
         to_medium: bool,
         reaching: Option<ContactPoint>,
     ) -> ShadowRay {
-        let origin = self.spawn(wi);
+        let origin = self.ray_origin(wi);
         let (direction, tmax) = match target {
             None => (wi, f32::INFINITY),
             Some(target) => {
@@ -181,8 +181,8 @@ impl ScatterPoint for Vertex<'_, '_> {
     }
 
     #[inline]
-    fn spawn(&self, w: Vec3) -> Vec3 {
-        self.surface.spawn(w)
+    fn ray_origin(&self, w: Vec3) -> Vec3 {
+        self.surface.ray_origin(w)
     }
 
     #[inline]
@@ -276,7 +276,7 @@ impl ScatterPoint for MediumVertex {
     }
 
     #[inline]
-    fn spawn(&self, _: Vec3) -> Vec3 {
+    fn ray_origin(&self, _: Vec3) -> Vec3 {
         self.met.p
     }
 

@@ -5,11 +5,11 @@ use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
 use crate::material::MediumParameters;
 use crate::math::{Rgb, Vec3};
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 use crate::random::{Draws, Purpose};
 use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint, RaySurfaces};
-use crate::trace::{CAMERA, Hit, Ray};
+use crate::trace::{CAMERA_RAY_BIT, Hit, Ray};
 
 /// Boundaries without scattering that a segment may cross, as those of heaped drops of one liquid; more are taken for a
 /// numerical trap and end the path.
@@ -194,7 +194,7 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     // Of two glasses with one index some wavelengths are refracted all the same.
     if eta == 1.0 && !material.emits() && !(scene.survey.dispersion && crossing.disperses(scene)) {
         let parameters = material.parameters(surface, &scene.materials.textures, eta);
-        if parameters.is_pure_transmission() {
+        if parameters.is_clear_if_matched() {
             return Boundary::None(parameters.base_color, crossing.interior);
         }
     }
@@ -218,7 +218,7 @@ pub(super) fn camera_token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32
 #[inline(always)]
 pub(super) fn told(scene: &Scene, bits: u32, camera: bool) -> u32 {
     let matters = scene.survey.hidden_from_camera || scene.survey.culled;
-    if matters { bits & !CAMERA | if camera { CAMERA } else { 0 } } else { bits }
+    if matters { bits & !CAMERA_RAY_BIT | if camera { CAMERA_RAY_BIT } else { 0 } } else { bits }
 }
 
 /// A ray from inside `interior`, about to be followed.
@@ -279,7 +279,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
             }
         }
         distance += t;
-        if token & CAMERA != 0 && scene.culls(&surface, direction) {
+        if token & CAMERA_RAY_BIT != 0 && scene.culls(&surface, direction) {
             let Some(other) = contact::visible_on_culled(scene, &surface, direction, token) else {
                 along.pass(&surface);
                 continue;
@@ -306,11 +306,11 @@ pub struct ShadowRay {
     /// What is left of the light.
     pub left: Rgb,
     /// Densities of flying it both ways.
-    pub flight: Flight,
+    pub flight: FlightDensity,
 }
 
 impl ShadowRay {
-    const BLOCKED: ShadowRay = ShadowRay { left: Rgb::ZERO, flight: Flight::FREE };
+    const BLOCKED: ShadowRay = ShadowRay { left: Rgb::ZERO, flight: FlightDensity::ONE };
 
     /// Goes on through `distance` of what fills the space.
     #[inline]
@@ -350,14 +350,14 @@ pub struct Between {
 pub fn shadow_ray(scene: &Scene, between: &Between) -> ShadowRay {
     let Between { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
     let [starts, ends] = between.in_medium;
-    let culls = scene.survey.culled && token & CAMERA != 0;
+    let culls = scene.survey.culled && token & CAMERA_RAY_BIT != 0;
     if scene.survey.null_boundaries || culls || leaving.is_some() || reaching.is_some() {
         return way_through(scene, between);
     }
     if scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
         return ShadowRay::BLOCKED;
     }
-    let mut way = ShadowRay { left: Rgb::ONE, flight: Flight::FREE };
+    let mut way = ShadowRay { left: Rgb::ONE, flight: FlightDensity::ONE };
     way.pass(scene, interior, tmax, starts, ends);
     way
 }
@@ -366,7 +366,7 @@ pub fn shadow_ray(scene: &Scene, between: &Between) -> ShadowRay {
 fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
     let Between { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);
-    let mut way = ShadowRay { left: Rgb::ONE, flight: Flight::FREE };
+    let mut way = ShadowRay { left: Rgb::ONE, flight: FlightDensity::ONE };
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some((mut surface, t)) = along.next(scene, !interior.is_open()) else {
@@ -385,7 +385,7 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
             starts = false;
         }
         // Towards the lens, so that the lens sees its other side.
-        if token & CAMERA != 0 && scene.culls(&surface, -direction) {
+        if token & CAMERA_RAY_BIT != 0 && scene.culls(&surface, -direction) {
             let Some(other) = contact::visible_on_culled(scene, &surface, -direction, token) else {
                 along.pass(&surface);
                 continue;

@@ -7,7 +7,7 @@ use super::segment::MediumArrival;
 use crate::bsdf::{BsdfSample, LobeSet, Shading};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
-use crate::medium::{Flight, HenyeyGreenstein};
+use crate::medium::{FlightDensity, HenyeyGreenstein};
 use crate::random::Draws;
 use crate::scene::Scene;
 use crate::spectrum::Wavelength;
@@ -35,7 +35,7 @@ pub struct Vertex<'v, 'a> {
     /// Random numbers of this vertex.
     pub draws: Draws,
     /// Densities of the last segment's flight through media.
-    pub flight: Flight,
+    pub flight: FlightDensity,
     /// The wavelength the path has taken, here at the latest; its weight is in the throughput.
     pub wavelength: Option<Wavelength>,
     pub(super) survival_scale: f32,
@@ -75,7 +75,7 @@ pub struct MediumVertex {
     /// Random numbers of this vertex.
     pub draws: Draws,
     /// Densities of the last segment's flight.
-    pub flight: Flight,
+    pub flight: FlightDensity,
     /// Share of the light that the medium takes from rays through all of it; 1 where chance has brought the path here.
     pub opacity: f32,
     /// Share of next-event estimation that is this vertex's, where another is drawn for it (`flight.rs`).
@@ -165,7 +165,7 @@ pub trait Visitor<'a> {
     fn lost(&mut self) {}
     /// The path leaves the scene along `direction` with weight `throughput`; `flight`: densities of its way to
     /// infinity.
-    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: Flight) {
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: FlightDensity) {
         let _ = (direction, throughput, scattered, flight);
     }
 }

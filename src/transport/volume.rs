@@ -57,7 +57,10 @@ impl<'a> Volume<'a> {
             if photon.medium != medium || u32::from(photon.depth) > longest {
                 return;
             }
-            let meets = vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.meets(photon.band));
+            let meets = vertex
+                .wavelength
+                .as_ref()
+                .map_or(Some(Rgb::ONE), |wavelength| wavelength.connection_factor(photon.band));
             let Some(weight) = meets else { return };
             let light = photon.flux * weight * phase.pdf_w(vertex.wo, photon.wi);
             for (sum, &radius2) in sums.iter_mut().zip(radius2) {
@@ -77,7 +80,7 @@ impl<'a> Volume<'a> {
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::medium::{Flight, MediumParameters};
+    use crate::medium::{FlightDensity, MediumParameters};
     use crate::photon::kernel;
     use crate::random::{Domain, Purpose, Stream};
     use crate::spectrum::Band;
@@ -111,7 +114,7 @@ mod tests {
             depth: 1,
             from: Vec3::ZERO,
             draws: Stream::new(0, 0, Domain::Test, 0).vertex(0),
-            flight: Flight::FREE,
+            flight: FlightDensity::ONE,
             opacity: 1.0,
             next_event: 1.0,
             wavelength: None,

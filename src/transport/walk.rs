@@ -12,7 +12,7 @@ use super::segment::{
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3, is_lit};
-use crate::medium::Flight;
+use crate::medium::FlightDensity;
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use crate::scene::contact::ContactPoint;
@@ -187,14 +187,18 @@ struct Path<'a> {
 impl<'a> Path<'a> {
     /// Goes to the next vertex: where the segment ends, and what media on the way mean for the densities of distances.
     #[inline(always)]
-    fn travel<V: Visitor<'a>, const BESIDES: u8>(&mut self, met: &PrecomputedHit, visitor: &mut V) -> (End, Flight) {
+    fn travel<V: Visitor<'a>, const BESIDES: u8>(
+        &mut self,
+        met: &PrecomputedHit,
+        visitor: &mut V,
+    ) -> (End, FlightDensity) {
         let Path { scene, throughput, depth, scattered, wavelength, survival_scale, origin, .. } = *self;
         let draws = self.stream.vertex(depth - 1);
         let camera = depth == 1 && self.transport == Transport::Radiance;
         let token =
             if camera { camera_token(scene, draws, Purpose::Alpha) } else { token(scene, draws, Purpose::Alpha) };
         let start = Start { origin, direction: self.direction, interior: self.interior, leaving: self.leaving, token };
-        let mut flight = Flight::FREE;
+        let mut flight = FlightDensity::ONE;
         let end = if BESIDES < ABSORPTION {
             next_vertex(scene, start, met, &mut Clear)
         } else if BESIDES < SCATTERING {
@@ -224,7 +228,7 @@ impl<'a> Path<'a> {
 
     /// Scatters it in a medium; `None` ends it.
     #[inline(always)]
-    fn medium<V: Visitor<'a>>(&mut self, met: MediumArrival, flight: Flight, visitor: &mut V) -> Option<()> {
+    fn medium<V: Visitor<'a>>(&mut self, met: MediumArrival, flight: FlightDensity, visitor: &mut V) -> Option<()> {
         let Path { scene, depth, wavelength, survival_scale, reach, .. } = *self;
         let arriving = self.throughput * met.weight;
         // What light at a distance still brings to the scene, or takes from it, falls with the distance squared.
@@ -273,7 +277,7 @@ impl<'a> Path<'a> {
     fn surface<V: Visitor<'a>, const BESIDES: u8>(
         &mut self,
         arrival: Arrival,
-        flight: Flight,
+        flight: FlightDensity,
         visitor: &mut V,
     ) -> Option<()> {
         let Arrival { ref surface, eta, ref crossing, interior: here, transmittance, distance } = arrival;
@@ -337,7 +341,7 @@ impl<'a> Path<'a> {
             self.survival_scale *= eta * eta;
         }
         self.direction = sample.wi;
-        self.origin = surface.spawn(sample.wi);
+        self.origin = surface.ray_origin(sample.wi);
         (self.in_medium, self.leaving) = (false, ContactPoint::touching(surface));
         self.interior = if sample.transmitted { behind } else { here };
         Some(())
@@ -353,9 +357,9 @@ impl<'a> Path<'a> {
         }
         let taken = match self.channel {
             None => self.wavelength_sample.wavelength(),
-            Some((channel, _)) => {
-                self.wavelength_sample.wavelength_of(channel, self.stream.vertex(self.depth).one(Purpose::Wavelength))
-            }
+            Some((channel, _)) => self
+                .wavelength_sample
+                .sample_in_channel(channel, self.stream.vertex(self.depth).one(Purpose::Wavelength)),
         };
         self.throughput *= taken.weight;
         self.wavelength = Some(taken);

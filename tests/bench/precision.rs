@@ -56,7 +56,7 @@ fn pixel_sums() {
     let (ns_single, single) = timed(MILLION, || values.iter().fold(0f32, |sum, value| sum + value));
     let (ns_double, double) = timed(MILLION, || values.iter().fold(0f64, |sum, value| sum + f64::from(*value)));
     row("a pixel's sum, plain", [error(f64::from(single)), error(double)], [ns_single, ns_double]);
-    let rounding = Grid::default().holding(2000.0).rounding();
+    let rounding = Grid::default().with_room_for(2000.0).rounding();
     let (ns, sum) = timed(MILLION, || {
         let mut sum = Sum::<f64>::default();
         values.iter().for_each(|value| sum.add(f64::from(*value), rounding));

@@ -46,7 +46,7 @@ fn rays(scene: &Scene) -> Vec<Ray> {
             && let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)
         {
             let direction = warp::sphere_uniform(draws.two(Purpose::Direction));
-            rays.push(Ray { origin: surface.spawn(direction), direction, tmax: f32::INFINITY, token: 0 });
+            rays.push(Ray { origin: surface.ray_origin(direction), direction, tmax: f32::INFINITY, token: 0 });
         }
     }
     rays

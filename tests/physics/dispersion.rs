@@ -74,12 +74,12 @@ fn over_hues(f: impl Fn(f32) -> Rgb) -> [f64; 3] {
 /// The mean over all wavelengths is white, nothing is negative or above 3, and colours are in their order.
 #[test]
 fn weights_are_white_on_average() {
-    for mean in over_hues(|u| observer::at(u).1) {
+    for mean in over_hues(|u| observer::sample(u).1) {
         assert!((mean - 1.0).abs() < 1e-6, "{mean}");
     }
     let mut last = 0.0;
     for i in 0..=10_000 {
-        let (nm, weight) = observer::at(i as f32 / 10_000.0);
+        let (nm, weight) = observer::sample(i as f32 / 10_000.0);
         assert!(nm >= last && (390.0..=720.0).contains(&nm), "{nm}");
         assert!(weight.min_element() >= 0.0 && weight.max_element() < 3.05, "{nm}: {weight}");
         assert!((weight.element_sum() - 3.0).abs() < 0.02, "{nm}: {weight}");
@@ -128,7 +128,7 @@ fn paths_of_one_channel_carry_the_same() {
         for i in 0..n {
             let draws = Stream::new(5, 0, Domain::Test, i).vertex(channel as u32);
             // Whatever band it starts from.
-            let taken = wavelength((i % 8) as u8).wavelength_of(channel, draws.one(Purpose::Wavelength));
+            let taken = wavelength((i % 8) as u8).sample_in_channel(channel, draws.one(Purpose::Wavelength));
             let band = (0..BANDS).find(|&band| wavelength(band).wavelength().band == taken.band).expect("a band");
             counts[usize::from(band)] += 1.0;
             assert!((f64::from(taken.weight[channel]) - total / f64::from(BANDS)).abs() < 1e-5);
@@ -140,7 +140,7 @@ fn paths_of_one_channel_carry_the_same() {
     }
     // Over all offsets they carry what white light has.
     let mean =
-        over_hues(|u| Rgb::from_array([0, 1, 2].map(|c| WavelengthSample::new(u).wavelength_of(c, 0.5).weight.x)));
+        over_hues(|u| Rgb::from_array([0, 1, 2].map(|c| WavelengthSample::new(u).sample_in_channel(c, 0.5).weight.x)));
     assert!(mean.iter().all(|m| (m - 1.0).abs() < 1e-4), "{mean:?}");
 }
 
@@ -169,11 +169,11 @@ fn put_together(carried: impl Fn(f32) -> bool, weight: impl Fn(&Wavelength, &Wav
 fn two_paths_put_together_have_one_wavelength() {
     let carried = |nm: f32| nm > 530.0 && nm < 610.0;
     let expected = over_hues(|u| {
-        let (nm, weight) = observer::at(u);
+        let (nm, weight) = observer::sample(u);
         if carried(nm) { weight } else { Rgb::ZERO }
     });
     let off = |found: [f64; 3]| (0..2).map(|c| (found[c] / expected[c] - 1.0).abs()).fold(0.0, f64::max);
-    let meeting = |eye: &Wavelength, light: &Wavelength| eye.meets(light.band).unwrap_or(Rgb::ZERO);
+    let meeting = |eye: &Wavelength, light: &Wavelength| eye.connection_factor(light.band).unwrap_or(Rgb::ZERO);
     let found = put_together(carried, meeting);
     assert!(off(found) < 0.02, "{found:?} {expected:?}");
     // The bugs: colours multiplied as if wavelengths were independent; bands that meet, but with a colour that counts
@@ -185,7 +185,7 @@ fn two_paths_put_together_have_one_wavelength() {
     assert!(off(put_together(carried, twice)) > 0.2, "a colour counted twice goes unnoticed");
     // White light meets all.
     let eye = WavelengthSample::new(0.3).wavelength();
-    assert_eq!(eye.meets(Band::WHITE), Some(Rgb::ONE));
+    assert_eq!(eye.connection_factor(Band::WHITE), Some(Rgb::ONE));
     assert_eq!(Band::of(None), Band::WHITE);
 }
 
@@ -251,7 +251,7 @@ impl<'a> Visitor<'a> for Straight {
         self.transmitted += u32::from(sample.transmitted);
     }
 
-    fn escape(&mut self, direction: Vec3, _: Rgb, _: Option<Scattered>, _: caustique::medium::Flight) {
+    fn escape(&mut self, direction: Vec3, _: Rgb, _: Option<Scattered>, _: caustique::medium::FlightDensity) {
         self.escaped = Some(direction);
     }
 }
@@ -379,7 +379,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
     let n = 4000;
     let (mut flux, mut moment) = ([0.0f64; 3], [0.0f64; 3]);
     for i in 0..n {
-        let (nm, weight) = observer::at((i as f32 + 0.5) / n as f32);
+        let (nm, weight) = observer::sample((i as f32 + 0.5) / n as f32);
         let index = cauchy(f64::from(IOR), f64::from(ABBE), f64::from(nm));
         let Some(angle) = through_prism(index, arriving) else { continue };
         for (c, (flux, moment)) in flux.iter_mut().zip(&mut moment).enumerate() {
@@ -408,9 +408,9 @@ fn color_of(nm: f64) -> Rgb {
     let (mut low, mut high) = (0.0f32, 1.0f32);
     for _ in 0..30 {
         let middle = 0.5 * (low + high);
-        if f64::from(observer::at(middle).0) < nm { low = middle } else { high = middle }
+        if f64::from(observer::sample(middle).0) < nm { low = middle } else { high = middle }
     }
-    observer::at(low).1
+    observer::sample(low).1
 }
 
 // ---------------------------------------------------------------- pictures

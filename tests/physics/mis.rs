@@ -16,7 +16,7 @@ use caustique::camera::Camera;
 use caustique::light::{EmissionDensity, Emitter, Receiver};
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
-use caustique::medium::{Flight, HenyeyGreenstein};
+use caustique::medium::{FlightDensity, HenyeyGreenstein};
 use caustique::photon::PhotonMap;
 use caustique::plan::ClassSet;
 use caustique::random::{Domain, Purpose, Stream};
@@ -126,7 +126,7 @@ impl<'a> Visitor<'a> for Notes<'a> {
         }
     }
 
-    fn escape(&mut self, direction: Vec3, _: Rgb, _: Option<Scattered>, _: Flight) {
+    fn escape(&mut self, direction: Vec3, _: Rgb, _: Option<Scattered>, _: FlightDensity) {
         self.escaped = Some(direction);
     }
 }
@@ -209,9 +209,9 @@ impl<'s> Whole<'s> {
     }
 
     /// Flight along segment `j`, from the light to the eye.
-    fn flight(&self, j: usize) -> Flight {
+    fn flight(&self, j: usize) -> FlightDensity {
         let starts = j > 0 && self.in_medium(j - 1);
-        Flight { forward: self.flies(j, self.in_medium(j)) as f32, reverse: self.flies(j, starts) as f32 }
+        FlightDensity { forward: self.flies(j, self.in_medium(j)) as f32, reverse: self.flies(j, starts) as f32 }
     }
 
     fn strategies(&self) -> Vec<Candidate> {
@@ -307,8 +307,13 @@ impl<'s> Whole<'s> {
         let by_eye = |j: usize| one(which.eye_merges((k - j) as u32) && !self.in_medium(j), self.is_clear(j));
         let cosine = |c: f64| if bug == Some(Bug::Cosine) { 1.0 } else { c as f32 };
         let flight = |j: usize, eye_side: bool| {
-            let Flight { forward, reverse } = if bug == Some(Bug::Flight) { Flight::FREE } else { self.flight(j) };
-            if eye_side { Flight { forward: reverse, reverse: forward } } else { Flight { forward, reverse } }
+            let FlightDensity { forward, reverse } =
+                if bug == Some(Bug::FlightDensity) { FlightDensity::ONE } else { self.flight(j) };
+            if eye_side {
+                FlightDensity { forward: reverse, reverse: forward }
+            } else {
+                FlightDensity { forward, reverse }
+            }
         };
         let go = |mis: MisState, j: usize, to_light: bool, merges: Merges| {
             let cos = self.nodes[j].cos[usize::from(!to_light)] as f32;
@@ -360,7 +365,7 @@ impl<'s> Whole<'s> {
                     let d2 = self.distance2[0] as f32;
                     let solid = if self.light.infinite || self.light.delta { 1.0 } else { d2 / self.light.cos };
                     let reach = if self.light.infinite { 1.0 } else { 1.0 / d2 };
-                    let Flight { forward, reverse: back } = self.flight(0);
+                    let FlightDensity { forward, reverse: back } = self.flight(0);
                     let chosen = self.light.start / self.light.direct;
                     let arrival = self.light.onward * reach * self.nodes[0].cos[0] as f32 * forward * chosen;
                     let pdfs = (reverse(0, true) * back, reverse(0, false));
@@ -403,14 +408,15 @@ enum Bug {
     /// Merges counted where none are made.
     DirectMerged,
     /// Flight through media forgotten.
-    Flight,
+    FlightDensity,
     /// Lights chosen for a point as they are for emission.
     Chosen,
     /// Merges at the vertices of light paths taken for independent, those of eye paths not.
     NothingShared,
 }
 
-const BUGS: [Bug; 6] = [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::Flight, Bug::Chosen, Bug::NothingShared];
+const BUGS: [Bug; 6] =
+    [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::FlightDensity, Bug::Chosen, Bug::NothingShared];
 
 /// What the library has said.
 #[derive(Default)]
@@ -702,7 +708,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     for (bug, worst) in BUGS.into_iter().zip(tally.bugs) {
         // Some need a scene that has what they forget.
         let possible = match bug {
-            Bug::Flight => media,
+            Bug::FlightDensity => media,
             // The triangles of a lamp are chosen alike for emission and for a point.
             Bug::Chosen => {
                 let emitters = scene.lights.emitters();

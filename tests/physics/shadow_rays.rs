@@ -2,7 +2,7 @@
 
 use crate::support;
 
-use caustique::geometry::{Mesh, shadow_end, spawn};
+use caustique::geometry::{Mesh, offset_origin, shadow_end};
 use caustique::light::Receiver;
 use caustique::math::{DAffine3, DVec3, Vec2, Vec3};
 use caustique::random::mix;
@@ -65,7 +65,7 @@ fn blocked(scenes: u64, receivers: u64) -> ([u64; 3], u64) {
             let ends = [
                 sample.target.expect("a triangle has a place"),
                 shadow_end(middle.p, middle.ng, back, middle.error, distance),
-                spawn(middle.p, middle.ng, back, middle.error),
+                offset_origin(middle.p, middle.ng, back, middle.error),
             ];
             all += 1;
             for (count, end) in blocked.iter_mut().zip(ends) {

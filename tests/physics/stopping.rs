@@ -118,7 +118,7 @@ fn comparisons_above_a_relative_floor() {
 fn iterations_are_given_up_as_a_whole() {
     let scene = lit(1.0);
     let camera = scene.camera(&square(48)).expect("a camera");
-    let mut given_up = 0;
+    let mut aborted = 0;
     for &method in Method::ALL {
         let levels = if method.has_levels() { Levels::decorrelated(3) } else { Levels::new(1) };
         let photons = 3000;
@@ -128,7 +128,7 @@ fn iterations_are_given_up_as_a_whole() {
         let disturbed = rendered_by(&stage, |session| {
             let mut seconds = 2e-4;
             while !session.step_within(Some(seconds)) {
-                (given_up, seconds) = (given_up + 1, 2.0 * seconds);
+                (aborted, seconds) = (aborted + 1, 2.0 * seconds);
                 assert_eq!(session.iterations(), 1, "{method:?}");
             }
         });
@@ -137,7 +137,7 @@ fn iterations_are_given_up_as_a_whole() {
             assert_eq!(format!("{a:?}"), format!("{b:?}"), "{method:?}");
         }
     }
-    assert!(given_up > 11, "hardly an iteration was given up: {given_up}");
+    assert!(aborted > 11, "hardly an iteration was given up: {aborted}");
 }
 
 /// Three iterations, with something done after the first.
@@ -157,8 +157,12 @@ fn the_first_iteration_ends_by_request_alone() {
     let scene = lit(1.0);
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let asked = Arc::new(AtomicBool::new(false));
-    let settings =
-        Settings { method: Method::Bdpt, time: Some(1e-9), stop: Stop::by(asked.clone()), ..Settings::default() };
+    let settings = Settings {
+        method: Method::Bdpt,
+        time: Some(1e-9),
+        stop: Stop::from_flag(asked.clone()),
+        ..Settings::default()
+    };
     let ends = |expected: (u64, StopReason)| {
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         assert_eq!((rendered.iterations, rendered.stop), expected);

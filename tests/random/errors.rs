@@ -39,7 +39,7 @@ fn of(rendered: &[Rendered]) -> Errors {
     let mean: Vec<glam::DVec3> =
         (0..pixels).map(|at| values.iter().map(|picture| picture[at]).sum::<glam::DVec3>() / n).collect();
     let gray = |value: &glam::DVec3| value.element_sum() / 3.0;
-    let floor = floor::relative(mean.iter().map(gray));
+    let floor = floor::relative_to_mean(mean.iter().map(gray));
     let squared: f64 = values
         .iter()
         .flat_map(|picture| picture.iter().zip(&mean))

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use caustique_library::{Refusal, file_of, first_of, open, variable};
+use caustique_library::{Refusal, file_containing, load_first_of, open, path_from_env};
 
 use crate::api::{Common, Trace, Trace3, Trace4};
 use crate::error::Error;
@@ -33,7 +33,7 @@ impl Library {
     ///
     /// [`Error::NotFound`] with what was tried; [`Error::Unusable`] as for [`Library::load_from`].
     pub fn load() -> Result<Library, Error> {
-        match variable(LIBRARY_VARIABLE) {
+        match path_from_env(LIBRARY_VARIABLE) {
             Some(path) => Library::load_from(path),
             None => load_first(NAMES),
         }
@@ -54,7 +54,7 @@ impl Library {
 
 fn load_first(names: &[&str]) -> Result<Library, Error> {
     let names: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
-    first_of(&names, load).map_err(|tried| Error::NotFound { tried })
+    load_first_of(&names, load).map_err(|tried| Error::NotFound { tried })
 }
 
 fn load(path: &Path) -> Result<Library, Refusal> {
@@ -65,7 +65,7 @@ fn load(path: &Path) -> Result<Library, Refusal> {
         let missing = Refusal::by_loader(path, &error).reason;
         Refusal::new(path, format!("not Embree 3 or 4 ({missing})"))
     })?;
-    let path = file_of(common.new_device as usize).unwrap_or_else(|| path.to_owned());
+    let path = file_containing(common.new_device as usize).unwrap_or_else(|| path.to_owned());
 
     let version = probe::version(&common).map_err(|reason| Refusal::new(&path, reason))?;
     let trace = match version.major {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 pub use libloading::Library;
 
-/// Levels of folders that [`below`] searches under a folder.
+/// Levels of folders that [`find_below`] searches under a folder.
 const DEPTH: usize = 3;
 
 /// The version number of a library.
@@ -51,7 +51,7 @@ impl Refusal {
 }
 
 /// The path in an environment variable that is set and not empty.
-pub fn variable(name: &str) -> Option<PathBuf> {
+pub fn path_from_env(name: &str) -> Option<PathBuf> {
     std::env::var_os(name).filter(|path| !path.is_empty()).map(PathBuf::from)
 }
 
@@ -71,7 +71,7 @@ pub unsafe fn open(path: &Path) -> Result<Library, Refusal> {
 ///
 /// # Errors
 /// Every candidate with the reason of its refusal, in order.
-pub fn first_of<T>(
+pub fn load_first_of<T>(
     candidates: &[PathBuf],
     load: impl Fn(&Path) -> Result<T, Refusal>,
 ) -> Result<T, Vec<(PathBuf, String)>> {
@@ -87,22 +87,22 @@ pub fn first_of<T>(
 
 /// The files below `folders` whose names begin with `stem`. In each folder the longest name, which holds the fullest
 /// version number, comes first.
-pub fn below(folders: &[PathBuf], stem: &str) -> Vec<PathBuf> {
+pub fn find_below(folders: &[PathBuf], stem: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for folder in folders {
-        add_below(folder, stem, DEPTH, &mut found);
+        add_files_below(folder, stem, DEPTH, &mut found);
     }
     found
 }
 
-fn add_below(folder: &Path, stem: &str, depth: usize, found: &mut Vec<PathBuf>) {
+fn add_files_below(folder: &Path, stem: &str, depth: usize, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     paths.sort_by(|a, b| b.cmp(a));
     for path in paths {
         if path.is_dir() {
             if depth > 0 {
-                add_below(&path, stem, depth - 1, found);
+                add_files_below(&path, stem, depth - 1, found);
             }
         } else if file_name(&path).starts_with(stem) && !found.contains(&path) {
             found.push(path);
@@ -117,7 +117,7 @@ pub fn file_name(path: &Path) -> &str {
 
 /// The file that holds the code or data at `address`, by the name that the loader was given.
 #[cfg(unix)]
-pub fn file_of(address: usize) -> Option<PathBuf> {
+pub fn file_containing(address: usize) -> Option<PathBuf> {
     use std::ffi::{CStr, c_char, c_int, c_void};
     use std::os::unix::ffi::OsStrExt;
 
@@ -145,7 +145,7 @@ pub fn file_of(address: usize) -> Option<PathBuf> {
 
 /// The file that holds the code or data at `address`: this system cannot tell.
 #[cfg(not(unix))]
-pub fn file_of(_address: usize) -> Option<PathBuf> {
+pub fn file_containing(_address: usize) -> Option<PathBuf> {
     None
 }
 
@@ -162,7 +162,7 @@ mod tests {
             std::fs::write(lib.join(format!("libOpenImageDenoise{suffix}")), "").unwrap();
         }
         std::fs::write(lib.join("libonnxruntime.so"), "").unwrap();
-        let found = below(&[folder.path().to_owned(), lib.clone()], "libOpenImageDenoise.so");
+        let found = find_below(&[folder.path().to_owned(), lib.clone()], "libOpenImageDenoise.so");
         let names: Vec<_> = found.iter().map(|path| file_name(path)).collect();
         assert_eq!(names, ["libOpenImageDenoise.so.2.5.1", "libOpenImageDenoise.so.2", "libOpenImageDenoise.so"]);
     }
@@ -176,8 +176,8 @@ mod tests {
                 path => Err(Refusal::new(path, "broken")),
             }
         };
-        assert_eq!(first_of(&candidates, load("b")), Ok("b"));
-        let tried = first_of(&candidates, load("d")).unwrap_err();
+        assert_eq!(load_first_of(&candidates, load("b")), Ok("b"));
+        let tried = load_first_of(&candidates, load("d")).unwrap_err();
         assert_eq!(tried, ["a", "b", "c"].map(|name| (PathBuf::from(name), "broken".to_owned())));
     }
 
@@ -191,8 +191,8 @@ mod tests {
 
     #[test]
     fn the_file_of_this_function_is_the_test_program() {
-        let address = file_of as fn(usize) -> Option<PathBuf>;
-        let found = file_of(address as usize).and_then(|path| path.canonicalize().ok());
+        let address = file_containing as fn(usize) -> Option<PathBuf>;
+        let found = file_containing(address as usize).and_then(|path| path.canonicalize().ok());
         assert_eq!(found, std::env::current_exe().ok());
     }
 }

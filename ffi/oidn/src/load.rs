@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use caustique_library::{Refusal, below, file_of, first_of, open, variable};
+use caustique_library::{Refusal, file_containing, find_below, load_first_of, open, path_from_env};
 
 use crate::api::Functions;
 use crate::device;
@@ -36,7 +36,7 @@ impl Library {
         if let Some(library) = &*loaded {
             return Ok(library.clone());
         }
-        let library = match variable(LIBRARY_VARIABLE) {
+        let library = match path_from_env(LIBRARY_VARIABLE) {
             Some(path) => load_named(&path),
             None => load_first(&candidates(folders)),
         }?;
@@ -66,12 +66,12 @@ fn load_named(path: &Path) -> Result<Library, Error> {
 }
 
 fn load_first(candidates: &[PathBuf]) -> Result<Library, Error> {
-    first_of(candidates, load).map_err(|tried| Error::NotFound { tried })
+    load_first_of(candidates, load).map_err(|tried| Error::NotFound { tried })
 }
 
 /// The names and files to try when no file is named, in order.
 fn candidates(folders: &[PathBuf]) -> Vec<PathBuf> {
-    NAMES.iter().map(PathBuf::from).chain(below(folders, STEM)).collect()
+    NAMES.iter().map(PathBuf::from).chain(find_below(folders, STEM)).collect()
 }
 
 fn load(path: &Path) -> Result<Library, Refusal> {
@@ -82,7 +82,7 @@ fn load(path: &Path) -> Result<Library, Refusal> {
         let missing = Refusal::by_loader(path, &error).reason;
         Refusal::new(path, format!("not Open Image Denoise 2 ({missing})"))
     })?;
-    let path = file_of(functions.new_device as usize).unwrap_or_else(|| path.to_owned());
+    let path = file_containing(functions.new_device as usize).unwrap_or_else(|| path.to_owned());
     let path = path.canonicalize().unwrap_or(path);
     // Its worker threads may still be on their way out when the last device is released, so its code must stay
     // mapped. Nothing of it has run before this line but initialisers.

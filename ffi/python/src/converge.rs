@@ -21,7 +21,7 @@ use caustique::report::race::{Field, Rules, race};
 use caustique::report::reference::{Halves, Reference};
 use caustique::report::summary::{Subject, Wishes, summarize};
 use caustique::scene::View;
-use caustique::stat::sum::MOST_TERMS;
+use caustique::stat::sum::MAX_TERMS;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 use serde_json::{Value, json};
@@ -81,7 +81,7 @@ pub fn converge<'py>(
     let (common, _) = job::take(&mut keywords, &job::named(&COMMON), scene.asked)?;
     let own = Own {
         method: keywords.choice::<MethodChoice>("reference_method")?.and_then(|method| method.0),
-        iterations: keywords.number("reference_iterations", 1..=MOST_TERMS, "a whole number above 0")?,
+        iterations: keywords.number("reference_iterations", 1..=MAX_TERMS, "a whole number above 0")?,
         time: keywords.number("reference_time", (Excluded(0.0), Unbounded), "a number of seconds above 0")?,
     };
     let comparison = Comparison {
@@ -210,7 +210,7 @@ impl Comparison {
             seeds: (0..self.seeds).map(|i| seed.wrapping_add(i)).collect(),
         };
         // Where pictures of the race are kept meanwhile.
-        let folder = caustique::temporary::folder("caustique-")?;
+        let folder = caustique::temporary::create_folder("caustique-")?;
         let view = View::new(built, camera);
         let field = Field { entries: &entries, finishes: &mut finishes, guests: None };
         let mut outcome = race(view, field, &rules, &reference, folder.path(), |step| {

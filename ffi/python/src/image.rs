@@ -212,7 +212,7 @@ fn view<'py>(this: &Bound<'py, Image>, plane: &Plane) -> PyResult<Bound<'py, PyA
 /// MemoryError.
 fn check_memory(count: usize) -> PyResult<()> {
     let bytes = (count as u64).saturating_mul(4);
-    let checked = if bytes < memory::SMALL { Ok(()) } else { memory::check(bytes, "the arrays") };
+    let checked = if bytes < memory::MIN_CHECKED_BYTES { Ok(()) } else { memory::require(bytes, "the arrays") };
     checked.map_err(|error| PyMemoryError::new_err(error.to_string()))
 }
 

@@ -41,7 +41,7 @@ impl Caller {
 
     /// What tells the work to end.
     pub fn stop(&self) -> Stop {
-        Stop::by(Arc::clone(&self.stopped))
+        Stop::from_flag(Arc::clone(&self.stopped))
     }
 
     /// Whether an end was asked for: by a signal, by a callback that said False, or by one that raised.

@@ -8,7 +8,7 @@ use caustique::peers::Renderer;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
 use caustique::scene::{CameraRequest, MAX_SIZE};
-use caustique::stat::sum::MOST_TERMS;
+use caustique::stat::sum::MAX_TERMS;
 use std::ops::Bound::{Excluded, Included};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -48,7 +48,7 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
     /// Stop each run after so many iterations
-    #[arg(long, value_name = "N", whole = 1_u64..=MOST_TERMS, help_heading = "When to stop")]
+    #[arg(long, value_name = "N", whole = 1_u64..=MAX_TERMS, help_heading = "When to stop")]
     pub iterations: Option<u64>,
     /// Measure at iterations that grow by this factor, in (1, 10]
     #[arg(long, value_name = "RATIO", default_value_t = std::f64::consts::SQRT_2, between = (Excluded(1.0), Included(10.0)), help_heading = "Runs")]
@@ -83,7 +83,7 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "reference", help_heading = "Error")]
     pub reference_time: Option<f64>,
     /// Iterations of each of the two halves of a reference made here [default: 16 times --iterations, without --time]
-    #[arg(long, value_name = "N", whole = 2_u64..=MOST_TERMS, conflicts_with = "reference", help_heading = "Error")]
+    #[arg(long, value_name = "N", whole = 2_u64..=MAX_TERMS, conflicts_with = "reference", help_heading = "Error")]
     pub reference_iterations: Option<u64>,
 
     /// Width in pixels; without a height the camera's aspect is kept [default: the scene's, else 1280]

@@ -127,7 +127,7 @@ struct Kept {
 
 impl Kept {
     fn write(name: &OsStr, into: impl Fn(&Path) -> Result<()>) -> Result<Kept> {
-        let folder = temporary::folder("caustique-")?;
+        let folder = temporary::create_folder("caustique-")?;
         let path = folder.path().join(name);
         into(&path)?;
         Ok(Kept { folder, path })

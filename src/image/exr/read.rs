@@ -100,8 +100,8 @@ fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
     }
     // A window of a large picture may be small.
     match u64::try_from(taken) {
-        Ok(taken) if taken <= WHOLE.max(length.saturating_mul(memory::EXR_PACKED)) => {
-            memory::check(taken, "its pixels").map_err(|error| exr::error::Error::NotSupported(error.cause.into()))
+        Ok(taken) if taken <= WHOLE.max(length.saturating_mul(memory::MAX_EXR_RATIO)) => {
+            memory::require(taken, "its pixels").map_err(|error| exr::error::Error::NotSupported(error.cause.into()))
         }
         _ => Err(invalid("the display window is too large for its file")),
     }
@@ -126,7 +126,7 @@ fn ratio(header: &Header) -> u128 {
         // Two codes of a bit at least and eight bits repeat a sample of two bytes 255 times; a bitmap says which values
         // there are.
         Compression::PIZ => DEFLATE,
-        _ => u128::from(memory::EXR_PACKED),
+        _ => u128::from(memory::MAX_EXR_RATIO),
     }
 }
 

@@ -4,7 +4,7 @@ use super::super::names::{Worn, cut, worn, worn_in};
 use super::rays;
 use crate::geometry::{Instance, Mesh};
 use crate::light::Receiver;
-use crate::material::{Alpha, Material, WIDEST_ROUGHNESS};
+use crate::material::{Alpha, MAX_FOCUSING_ROUGHNESS, Material};
 use crate::math::{Vec2, Vec3};
 use crate::scene::Scene;
 use crate::stat::median;
@@ -72,7 +72,7 @@ fn is_flat(mesh: &Mesh) -> bool {
 pub(super) fn wide(scene: &Scene) -> Vec<String> {
     let tell = |material: &Material, label: String| {
         format!(
-            "{label}: its roughness of {} spreads light too wide for a caustic to show; {WIDEST_ROUGHNESS} and more is frosted",
+            "{label}: its roughness of {} spreads light too wide for a caustic to show; {MAX_FOCUSING_ROUGHNESS} and more is frosted",
             material.roughness
         )
     };
@@ -88,7 +88,7 @@ pub(super) fn faded(scene: &Scene) -> Vec<String> {
     let mut named = Vec::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
         let material = &materials[instance.material as usize];
-        let smooth = material.metallic < 0.5 && material.roughness < WIDEST_ROUGHNESS && !material.unlit;
+        let smooth = material.metallic < 0.5 && material.roughness < MAX_FOCUSING_ROUGHNESS && !material.unlit;
         if material.alpha != Alpha::Blend || !smooth || material.transmission >= 0.5 {
             continue;
         }
@@ -188,7 +188,7 @@ fn shade(scene: &Scene, instances: &[u32]) -> Shade {
             let Some(point) = scene.shapes.surface(index, primitive as u32, [1.0 / 3.0; 2]) else { continue };
             for k in 0..SAMPLES {
                 let Some((direction, distance)) = towards_light(scene, point.p, k) else { continue };
-                match rays::first_opaque(scene, point.spawn(direction), direction, distance, k) {
+                match rays::first_opaque(scene, point.ray_origin(direction), direction, distance, k) {
                     None => {
                         shade.lit = true;
                         return shade;

@@ -112,7 +112,7 @@ fn sources(scene: &Scene) -> Vec<Source> {
             };
             let Some(place) = scene.shapes.surface(instance, *primitive, [1.0 / 3.0; 2]) else { continue };
             let shines = |d: &Vec3| *two_sided || place.ng.dot(*d) > 0.0;
-            rays.extend(rays::directions(PLACES.1).filter(shines).map(|d| (place.spawn(d), d)));
+            rays.extend(rays::directions(PLACES.1).filter(shines).map(|d| (place.ray_origin(d), d)));
         }
         let object = Some(scene.shapes.instances[instance as usize].object);
         sources.push(Source { name: scene.light_name(triangles[0]), object, rays });
@@ -165,7 +165,7 @@ fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>
             let front = if direction.dot(surface.ng) < 0.0 { surface.ng } else { -surface.ng };
             let next = onward[(97 * index + 41 * bounce) % onward.len()];
             let next = if next.dot(front) < 0.0 { -next } else { next };
-            *ray = (surface.spawn(next), next);
+            *ray = (surface.ray_origin(next), next);
         }
     }
     (!rays.is_empty()).then_some(met)

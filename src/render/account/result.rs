@@ -103,7 +103,7 @@ pub(in crate::render) fn error_estimate(pixels: &[Pixel], settings: &Settings) -
     let (mut variance, mut squared_bias) = (0.0, 0.0);
     let (mut lit, mut unknown) = (false, 0.0);
     let value = |pixel: &Pixel| pixel.mean(own).element_sum() / 3.0;
-    let floor = floor::relative(pixels.iter().map(value));
+    let floor = floor::relative_to_mean(pixels.iter().map(value));
     for pixel in pixels {
         let Some(error) = SquaredError::of(pixel, own, compared) else {
             unknown += 1.0;

@@ -78,7 +78,7 @@ impl PhotonRecord {
             return Unseen::default();
         }
         // Without the brightest pixels: a light in sight does not hide what is missing elsewhere.
-        let (count, mean) = (pixels.len() as f64, (floor::relative(values) / floor::PAPERS).sqrt());
+        let (count, mean) = (pixels.len() as f64, (floor::relative_to_mean(values) / floor::ABSOLUTE).sqrt());
         let per_path = self.flux / light_paths as f64;
         let of_kind = |kind: Kind| {
             let radius2 = |i: usize| {

@@ -16,7 +16,7 @@ use super::measures::{self, Measures};
 use super::photon_counts::PhotonCounts;
 use super::techniques::{TechniquePicture, Watch, Watched};
 use super::tiles::{Group, TILE_PIXELS, Tiles, WholeTile};
-use crate::camera::{Camera, GROUP};
+use crate::camera::{Camera, GROUP_SIZE};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
 use crate::light::Guide;
@@ -130,7 +130,7 @@ impl<'a> Passes<'a> {
         // Others put paths together of one wavelength alone, whichever it is. There each light path is its pixel's own, and
         // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
         if self.shared.strategies.merge {
-            pass.with(IterationWavelengths::slow(seed, i))
+            pass.with(IterationWavelengths::drifting(seed, i))
         } else {
             pass.drawing(Streams::in_sequence(seed, i, pair.light))
         }
@@ -167,7 +167,7 @@ impl<'a> Passes<'a> {
         if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // Before the first pass of all, too: without photons it would lack the light that only they bring.
             let photons = self.photons_of(i - 1);
-            if self.settings.stop.gave_up() {
+            if self.settings.stop.aborted() {
                 return None;
             }
             self.photons = Some((i - 1, photons));
@@ -209,7 +209,7 @@ impl<'a> Passes<'a> {
                         return;
                     }
                     let mut starts = film.as_ref().map(|_| shared.eye.starts(&places, streams)).unwrap_or_default();
-                    for k in 0..GROUP {
+                    for k in 0..GROUP_SIZE {
                         let of_film = places[k].map(|place| place.index);
                         let Some(index) = (if shared.strategies.merge { of_film } else { keys[k] }) else { continue };
                         let index = index as u32;
@@ -231,7 +231,7 @@ impl<'a> Passes<'a> {
                     }
                 }
             });
-            if self.settings.stop.gave_up() {
+            if self.settings.stop.aborted() {
                 return None;
             }
             let splats = SplatsByTile::new(&self.left, &tiles);

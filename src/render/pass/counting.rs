@@ -9,7 +9,7 @@ use super::iterate::{Iterate, Work};
 use super::measures::Measures;
 use super::sppm::Sppm;
 use super::volume::Maps;
-use crate::camera::{band, par_pixels};
+use crate::camera::{par_pixels, pixels_per_band};
 use crate::estimator::rule::CountingRule;
 use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
 use crate::math::{Frame, Vec3};
@@ -205,10 +205,10 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         let states = layout.count() * maps.len();
         let line = (64 / size_of::<R::Count>().max(1)).max(1);
         let bands = pixels
-            .par_chunks(band(size.0))
-            .zip(Measures::par_of_paths(sppm.measures(), band(size.0)))
-            .zip(bandwidths.par_chunks_mut(band(size.0) * states))
-            .zip(counts.par_chunks_mut(band(size.0) * states * each));
+            .par_chunks(pixels_per_band(size.0))
+            .zip(Measures::par_of_paths(sppm.measures(), pixels_per_band(size.0)))
+            .zip(bandwidths.par_chunks_mut(pixels_per_band(size.0) * states))
+            .zip(counts.par_chunks_mut(pixels_per_band(size.0) * states * each));
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
         par_pixels(bands, size, scratches, |scratches, (((pixels, measures), bandwidths), counts), places| {
             if eye.is_given_up() {

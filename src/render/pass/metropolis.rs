@@ -353,7 +353,7 @@ impl Iterate for Metropolis<'_> {
             .enumerate()
             .map_init(Bump::new, |arena, (number, candidate)| walks.chain(arena, number as u64, candidate, steps))
             .collect();
-        if self.settings.stop.gave_up() {
+        if self.settings.stop.aborted() {
             return None;
         }
         // A step stands for as many paths as there are pixels over steps, and light divided by its importance for `b`.

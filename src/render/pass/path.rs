@@ -50,7 +50,7 @@ impl<'a> Paths<'a> {
                 }
             }
         });
-        if self.settings.stop.gave_up() {
+        if self.settings.stop.aborted() {
             return false;
         }
         let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);

@@ -15,7 +15,7 @@
 use super::iterate::{Iterate, Work};
 use super::measures::{self, Measures};
 use super::sppm::trace_some;
-use crate::camera::{Camera, band, par_pixels};
+use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::math::Vec3;
@@ -155,7 +155,7 @@ impl Iterate for Pm<'_> {
             Some(maps) => (maps, 0, 0),
             None => self.build(phases),
         };
-        if self.settings.stop.gave_up() {
+        if self.settings.stop.aborted() {
             return None;
         }
         let start = cpu_seconds();
@@ -168,7 +168,7 @@ impl Iterate for Pm<'_> {
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(
-            self.measures[0].par_parts(band(camera.size().0)),
+            self.measures[0].par_parts(pixels_per_band(camera.size().0)),
             camera.size(),
             scratch,
             |(scratch, nearest), measures, places| {
@@ -182,13 +182,13 @@ impl Iterate for Pm<'_> {
                 }
             },
         );
-        if !self.settings.stop.gave_up() {
+        if !self.settings.stop.aborted() {
             measures::add(&self.measures, (eye, i), pixels, |index| index, |_| &[]);
         }
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();
         self.maps = Some(maps);
-        if self.settings.stop.gave_up() {
+        if self.settings.stop.aborted() {
             return None;
         }
         // After a pause the maps are made again, of the same paths.

@@ -1,7 +1,7 @@
 //! The region that a picture shows, for light from infinity: of a lamp as wide as the scene few paths would come where
 //! anybody looks.
 
-use crate::camera::{band, par_pixels};
+use crate::camera::{par_pixels, pixels_per_band};
 use crate::light::Region;
 use crate::math::Vec3;
 use crate::random::{Domain, Streams};
@@ -25,12 +25,12 @@ pub(super) fn region(eye: &Eye<'_>, seed: u64) -> Option<Region> {
         return None;
     }
     let (width, height) = eye.camera.size();
-    let camera = eye.camera.sparse((PATHS / (f64::from(width) * f64::from(height))).sqrt().min(1.0));
+    let camera = eye.camera.subsample((PATHS / (f64::from(width) * f64::from(height))).sqrt().min(1.0));
     let eye = Eye { camera: &camera, ..*eye };
     let (width, height) = camera.size();
     let mut seen: Vec<Option<Vec3>> = vec![None; width as usize * height as usize];
     let streams = Streams::new(seed, 0, Domain::PilotEye);
-    par_pixels(seen.par_chunks_mut(band(width)), (width, height), Bump::new, |arena, seen, places| {
+    par_pixels(seen.par_chunks_mut(pixels_per_band(width)), (width, height), Bump::new, |arena, seen, places| {
         let starts = eye.starts(places, streams);
         for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
             seen[place.at] = eye.gather_point(arena, start).map(|point| point.p);

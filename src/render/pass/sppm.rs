@@ -9,7 +9,7 @@ use super::iterate::{Iterate, Work};
 use super::measures::{self, Measures};
 use super::region::region;
 use super::volume::{Maps, VolumeMap};
-use crate::camera::{Camera, band, par_pixels};
+use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths, usual_radius2};
 use crate::estimator::{InitialBandwidth, Pixel};
 use crate::light::{Guide, Region};
@@ -76,7 +76,7 @@ fn eye_pass(
     let schedule = settings.schedule(i);
     let [independent, correlated] =
         [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| Streams::in_sequence(settings.seed, i, domain));
-    let band = band(size.0);
+    let band = pixels_per_band(size.0);
     let bands = pixels.par_chunks(band).zip(Measures::par_of_paths(measures, band));
     par_pixels(bands, size, Scratch::default, |scratch, (pixels, (measures, others)), places| {
         if eye.is_given_up() {
@@ -156,7 +156,7 @@ impl<'a> Sppm<'a> {
     /// Adds iteration `i`, as it is measured, to the pixels, and the photons they have met to `work`; `None` where it was
     /// given up.
     pub fn add(&self, i: u64, pixels: &mut [Pixel], mut work: Work) -> Option<Work> {
-        let done = !self.settings.stop.gave_up();
+        let done = !self.settings.stop.aborted();
         done.then(|| {
             work.counts.gathered = measures::add(&self.measures, (&self.eye, i), pixels, |index| index, |_| &[]);
             work

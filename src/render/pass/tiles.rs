@@ -1,6 +1,6 @@
 //! Tiles of constant size: the unit of work of the methods that add to a film.
 
-use crate::camera::{Camera, GROUP, Place};
+use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 
 /// Width and height of a tile in pixels.
 pub const TILE: u32 = 16;
@@ -31,9 +31,9 @@ pub(super) struct WholeTile {
 /// Pixels of a tile of the whole picture, neighbours together.
 pub(super) struct Group {
     /// Their indices in the whole picture, row by row.
-    pub keys: [Option<u64>; GROUP],
+    pub keys: [Option<u64>; GROUP_SIZE],
     /// Those of them that are on the film.
-    pub places: [Option<Place>; GROUP],
+    pub places: [Option<TilePixel>; GROUP_SIZE],
 }
 
 impl Tiles {
@@ -89,14 +89,14 @@ impl Tiles {
         tile * TILE_PIXELS + slot
     }
 
-    /// All pixels of a tile of the whole picture: a group is a block of two rows. [`Place::at`] is the slot in the tile.
+    /// All pixels of a tile of the whole picture: a group is a block of two rows. [`TilePixel::at`] is the slot in the tile.
     pub fn all_groups(self, tile: WholeTile) -> impl Iterator<Item = Group> {
         let [size, at] = self.whole;
-        let columns = GROUP as u32 / 2;
+        let columns = GROUP_SIZE as u32 / 2;
         let per_row = TILE / columns;
-        (0..TILE * TILE / GROUP as u32).map(move |group| {
+        (0..TILE * TILE / GROUP_SIZE as u32).map(move |group| {
             let (dx, dy) = (group % per_row * columns, group / per_row * 2);
-            let slots: [(u32, u32); GROUP] =
+            let slots: [(u32, u32); GROUP_SIZE] =
                 std::array::from_fn(|k| (dx + k as u32 % columns, dy + k as u32 / columns));
             let pixels = slots.map(|(dx, dy)| (tile.corner.0 + dx, tile.corner.1 + dy));
             let key = |(x, y): (u32, u32)| {
@@ -105,7 +105,7 @@ impl Tiles {
             let place = |k: usize| {
                 let ((dx, dy), (x, y)) = (slots[k], pixels[k]);
                 let (x, y) = (x.checked_sub(at.0)?, y.checked_sub(at.1)?);
-                (x < self.width && y < self.height).then_some(Place {
+                (x < self.width && y < self.height).then_some(TilePixel {
                     pixel: (x, y),
                     index: u64::from(self.index(x, y)),
                     at: (dy * TILE + dx) as usize,
@@ -116,7 +116,7 @@ impl Tiles {
     }
 
     /// The film's pixels of one of its tiles, in the order of [`Tiles::all_groups`].
-    pub fn groups(self, tile: usize) -> impl Iterator<Item = [Option<Place>; GROUP]> {
+    pub fn groups(self, tile: usize) -> impl Iterator<Item = [Option<TilePixel>; GROUP_SIZE]> {
         let at = self.whole[1];
         let (i, j) = (tile as u32 % self.across + at.0 / TILE, tile as u32 / self.across + at.1 / TILE);
         self.all_groups(WholeTile { tile: Some(tile), corner: (i * TILE, j * TILE) })
@@ -125,7 +125,7 @@ impl Tiles {
     }
 
     /// The same, one after the other.
-    pub fn pixels(self, tile: usize) -> impl Iterator<Item = Place> {
+    pub fn pixels(self, tile: usize) -> impl Iterator<Item = TilePixel> {
         self.groups(tile).flat_map(|places| places.into_iter().flatten())
     }
 }
@@ -142,7 +142,7 @@ mod tests {
         let projection = Projection::Perspective(Vec2::ONE);
         let whole = Camera::new(DVec3::ZERO, Mat3::IDENTITY, projection, (0.0, 1.0), (70, 50));
         for [x, y, width, height] in [[0, 0, 70, 50], [16, 32, 16, 16], [13, 7, 40, 43], [69, 49, 1, 1]] {
-            let camera = whole.window([x, y, width, height]);
+            let camera = whole.crop([x, y, width, height]);
             let tiles = Tiles::new(&camera);
             let (mut on_film, mut keys, mut numbers) = (Vec::new(), Vec::<u64>::new(), Vec::<usize>::new());
             for tile in tiles.of_whole() {

@@ -1,7 +1,7 @@
 //! The photons of a pass, and what media add to them: photons of their own, and bandwidths of their own.
 
 use super::photon_counts::PhotonCounts;
-use crate::camera::GROUP;
+use crate::camera::GROUP_SIZE;
 use crate::estimator::{Pixel, Schedule};
 use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
 use crate::random::Stream;
@@ -42,7 +42,10 @@ impl Maps {
 
     /// The starts of eye paths that take no other wavelengths.
     #[inline]
-    pub fn tune(&self, mut starts: [Option<(PathStart, Stream)>; GROUP]) -> [Option<(PathStart, Stream)>; GROUP] {
+    pub fn tune(
+        &self,
+        mut starts: [Option<(PathStart, Stream)>; GROUP_SIZE],
+    ) -> [Option<(PathStart, Stream)>; GROUP_SIZE] {
         for (start, _) in starts.iter_mut().flatten() {
             start.wavelength_sample = self.wavelengths.nearest(start.wavelength_sample);
         }

@@ -45,7 +45,7 @@ pub fn drive<'a>(
         // A picture is the least that is wanted: the first iteration may take longer.
         let left = settings.time.filter(|_| session.iterations() > 0).map(|time| time - session.spent().seconds);
         if !session.step_within(left) {
-            return if settings.stop.asked() { StopReason::Interrupted } else { StopReason::Time };
+            return if settings.stop.requested() { StopReason::Interrupted } else { StopReason::Time };
         }
         let progress = session.progress();
         match observe(&progress, session) {

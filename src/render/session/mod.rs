@@ -26,7 +26,7 @@ use crate::render::pass::Iterate;
 use crate::render::pass::passes;
 use crate::render::settings::{Levels, Settings};
 use crate::scene::Scene;
-use crate::stat::sum::MOST_TERMS;
+use crate::stat::sum::MAX_TERMS;
 use crate::transport::InitialMedia;
 use state::Rest;
 
@@ -172,7 +172,7 @@ impl<'a> Session<'a> {
 
     /// Whether all iterations that were asked for are done, or as many as can be summed.
     pub fn finished(&self) -> bool {
-        self.next >= self.stage.settings.iterations.unwrap_or(u64::MAX).min(MOST_TERMS)
+        self.next >= self.stage.settings.iterations.unwrap_or(u64::MAX).min(MAX_TERMS)
     }
 
     /// Adds one iteration; none where an end was asked for in its midst ([`Settings::stop`]).
@@ -184,7 +184,7 @@ impl<'a> Session<'a> {
     /// The same, which is given up after so many seconds, too; false where it was.
     pub fn step_within(&mut self, seconds: Option<f64>) -> bool {
         let mut spent = self.spent;
-        self.stage.settings.stop.begin(seconds);
+        self.stage.settings.stop.start_iteration(seconds);
         let done = spent.during(|| self.iterate());
         self.spent = spent;
         if let Some((true, error)) = done {
@@ -416,7 +416,7 @@ mod tests {
         let scene = Scene::build(description, 1).unwrap();
         let camera =
             scene.camera(&CameraRequest { width: Some(2), height: Some(1), ..CameraRequest::default() }).unwrap();
-        for (iterations, last) in [(None, MOST_TERMS), (Some(1 << 40), MOST_TERMS), (Some(100), 100)] {
+        for (iterations, last) in [(None, MAX_TERMS), (Some(1 << 40), MAX_TERMS), (Some(100), 100)] {
             let stage = Stage::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
             let mut session = Session::new(&stage);
             session.next = last - 1;

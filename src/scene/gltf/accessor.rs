@@ -137,7 +137,7 @@ impl Document<'_> {
             let bytes = count as u64 * size_of::<T>() as u64;
             let error = self.take(bytes, "its elements");
             error.map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))?;
-            memory::room(count, "elements")
+            memory::reserve(count, "elements")
         };
         let mut values = match accessor.buffer_view {
             Some(view) => {

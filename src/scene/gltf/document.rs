@@ -85,11 +85,11 @@ impl<'a> Document<'a> {
     pub(super) fn take(&self, bytes: u64, what: impl Display) -> Result<()> {
         let unasked = self.unasked.get().saturating_add(bytes);
         self.unasked.set(unasked);
-        if unasked < memory::SMALL {
+        if unasked < memory::MIN_CHECKED_BYTES {
             return Ok(());
         }
         self.unasked.set(0);
-        memory::check(unasked, what)
+        memory::require(unasked, what)
     }
 
     fn load_buffers(&self, list: &[json::Buffer], binary: &'a [u8]) -> Result<Vec<Cow<'a, [u8]>>> {

@@ -451,7 +451,7 @@ impl Reader<'_> {
             let copy = compose(three(&moves), turn, three(&scales)).filter(finite);
             copy.ok_or_else(|| within(fault("", format!("the transform of copy {i} is not finite"))))
         };
-        let mut copies = memory::room(n, "copies").map_err(within)?;
+        let mut copies = memory::reserve(n, "copies").map_err(within)?;
         for i in 0..n {
             copies.push(copy(i)?);
         }
@@ -462,10 +462,10 @@ impl Reader<'_> {
     fn check_room(&self, copies: usize, parts: usize) -> Result<()> {
         let placed = (copies as u64).saturating_mul(parts as u64).saturating_add(self.out.instances.len() as u64);
         let bytes = placed.saturating_mul(PLACED_BYTES);
-        if bytes < memory::SMALL {
+        if bytes < memory::MIN_CHECKED_BYTES {
             return Ok(());
         }
-        memory::check(bytes, format_args!("{placed} placed meshes"))
+        memory::require(bytes, format_args!("{placed} placed meshes"))
             .map_err(|e| e.hint("place fewer copies, join them into one mesh, or render with more memory"))
     }
 }

@@ -119,7 +119,7 @@ impl<'p> Converter<'p> {
         std::fs::File::open(stage)
             .map_err(|e| Error::io(stage, &e).hint("check the path of the scene file and your right to read it"))?;
         let interpreter = Interpreter::find()?;
-        let folder = temporary::folder("caustique-usd-")?;
+        let folder = temporary::create_folder("caustique-usd-")?;
         for (name, source) in SOURCES {
             let path = folder.path().join(name);
             std::fs::write(&path, source).map_err(|cause| Error::io(&path, &cause))?;
@@ -145,7 +145,7 @@ impl<'p> Converter<'p> {
         if output.status.success() {
             return Ok(output);
         }
-        if stop.asked() {
+        if stop.requested() {
             return Err(Error::new(
                 ErrorKind::Interrupted,
                 self.stage.display(),
@@ -162,7 +162,7 @@ fn output_unless(mut child: Child, stop: &Stop) -> std::io::Result<Output> {
     let (over, ended) = channel::<()>();
     std::thread::scope(|scope| {
         std::thread::Builder::new().spawn_scoped(scope, move || {
-            while !stop.asked() && ended.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {}
+            while !stop.requested() && ended.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {}
             drop(open);
         })?;
         let output = child.wait_with_output();

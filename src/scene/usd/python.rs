@@ -33,7 +33,7 @@ impl Interpreter {
     /// # Errors
     /// [`ErrorKind::Library`] where the variable names no file.
     pub fn find() -> Result<Interpreter> {
-        if let Some(path) = installed::set(VARIABLE) {
+        if let Some(path) = installed::path_from_env(VARIABLE) {
             return if path.is_file() {
                 Ok(Interpreter { path })
             } else {

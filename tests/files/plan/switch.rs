@@ -49,7 +49,7 @@ fn check(effect: Effect, mut with: Description, without: Description, because: &
     let scene = build(with.clone());
     let camera = scene.camera(&square(12)).expect("there is a camera");
     let left = match effect {
-        Effect::DepthOfField => picture_of(&scene, &camera.pinhole()),
+        Effect::DepthOfField => picture_of(&scene, &camera.without_lens()),
         _ => picture_of(&switch::without(&scene, effect).expect("it is built"), &camera),
     };
     assert!(left == plain, "{effect:?} left out of the scene");

@@ -97,7 +97,7 @@ fn glass_that_hardly_bends_and_glass_that_bends_much() {
 fn a_thick_medium_with_a_sharp_peak() {
     let mut description = lit(0.8);
     description.medium = Some(MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::new(20.0, 5.0, 1.0), g: 0.95 });
-    checked("thick", description, 0.1, Bug::Flight);
+    checked("thick", description, 0.1, Bug::FlightDensity);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::exact::Exact;
 use caustique::estimator::Pixel;
 use caustique::math::{DVec3, Rgb};
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::stat::sum::{Grid, MOST_TERMS, Sum};
+use caustique::stat::sum::{Grid, MAX_TERMS, Sum};
 use caustique::stat::{Grids, Moments};
 use caustique::transport::EyeMeasure;
 
@@ -23,7 +23,7 @@ fn sample(index: u32) -> f32 {
 fn a_million_values_keep_their_digits() {
     let values: Vec<f32> = (0..MILLION).map(sample).collect();
     let largest = values.iter().fold(0.0f32, |most, value| most.max(*value));
-    let grids = Grids::default().holding(f64::from(largest));
+    let grids = Grids::default().with_room_for(f64::from(largest));
     let (mut moments, mut plain) = (Moments::default(), 0.0f32);
     let (mut sum, mut squares) = (Exact::default(), Exact::default());
     for &value in &values {
@@ -53,19 +53,19 @@ fn a_million_values_keep_their_digits() {
 #[test]
 fn as_many_terms_as_are_allowed_lose_no_digit() {
     // Of a grid of whole numbers, and of the finer one of multiples of 2^-30.
-    let rounding = Grid::default().holding(1.0).rounding();
+    let rounding = Grid::default().with_room_for(1.0).rounding();
     for unit in [1.0, 2f64.powi(-30)] {
         let term = (2f64.powi(29) - 1.0) * unit;
         let (mut sum, mut plain) = (Sum::<f64>::default(), 0.0f32);
-        for _ in 0..MOST_TERMS {
+        for _ in 0..MAX_TERMS {
             sum.add(term, rounding);
             plain += term as f32;
         }
-        let expected = MOST_TERMS as f64 * term;
+        let expected = MAX_TERMS as f64 * term;
         assert!(sum.value() == expected && f64::from(plain) != expected, "{} {plain} {expected}", sum.value());
     }
     // Two eye paths an iteration.
-    assert!(u32::try_from(2 * MOST_TERMS).is_ok(), "pixels count in 32 bits");
+    assert!(u32::try_from(2 * MAX_TERMS).is_ok(), "pixels count in 32 bits");
 }
 
 /// A pixel that sees nothing at all for a million iterations, one that sees light once, and one whose every sample is
