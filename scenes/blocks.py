@@ -17,11 +17,11 @@ for name, material, at, turn in (
         ("floor", white, (0, 0, 0), (0, 0, 0)), ("ceiling", white, (0, 0, SIDE), (180, 0, 0)),
         ("back wall", white, (0, half, half), (90, 0, 0)), ("left wall", red, (-half, 0, half), (0, 90, 0)),
         ("right wall", green, (half, 0, half), (0, -90, 0))):
-    b.thing(name, b.plane(name, SIDE, SIDE), material, at, turn)
+    b.add_object(name, b.plane(name, SIDE, SIDE), material, at, turn)
 
-b.thing("lamp", b.plane("lamp", 0.5, 0.5), b.emission("lamp", (28, 23, 17)), (0.0, 0.0, SIDE - 0.001), (180, 0, 0))
-b.thing("tall block", b.box("tall block", (0.6, 0.6, 1.2), 0.004), white, (-0.34, 0.34, 0.6), (0, 0, 18))
-b.thing("short block", b.box("short block", (0.6, 0.6, 0.6), 0.004), white, (0.36, -0.3, 0.3), (0, 0, -16))
+b.add_object("lamp", b.plane("lamp", 0.5, 0.5), b.emission("lamp", (28, 23, 17)), (0.0, 0.0, SIDE - 0.001), (180, 0, 0))
+b.add_object("tall block", b.box("tall block", (0.6, 0.6, 1.2), 0.004), white, (-0.34, 0.34, 0.6), (0, 0, 18))
+b.add_object("short block", b.box("short block", (0.6, 0.6, 0.6), 0.004), white, (0.36, -0.3, 0.3), (0, 0, -16))
 
 b.camera((0, -3.95, 1.0), (0, 0, 1.0), lens=54)
 b.finish(__file__)

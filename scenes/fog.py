@@ -28,19 +28,19 @@ def flags(size=512):
 wall = b.principled("brick", roughness=0.9, texture=b.image("brick", bricks()), Specular_IOR_Level=0.2)
 floor = b.principled("flagstone", roughness=0.5, texture=b.image("flagstone", flags()))
 WIDE, DEEP, HIGH = 4.4, 4.6, 2.6
-b.thing("floor", b.plane("floor", WIDE, DEEP, uv=1.6), floor)
-b.thing("ceiling", b.plane("ceiling", WIDE, DEEP), b.principled("ceiling", (0.5, 0.47, 0.43), 0.9), (0, 0, HIGH), (180, 0, 0))
+b.add_object("floor", b.plane("floor", WIDE, DEEP, uv=1.6), floor)
+b.add_object("ceiling", b.plane("ceiling", WIDE, DEEP), b.principled("ceiling", (0.5, 0.47, 0.43), 0.9), (0, 0, HIGH), (180, 0, 0))
 for name, span, at, turn in (("back wall", WIDE, (0, DEEP / 2), 0), ("front wall", WIDE, (0, -DEEP / 2), 180),
                              ("left wall", DEEP, (-WIDE / 2, 0), 90), ("right wall", DEEP, (WIDE / 2, 0), -90)):
-    b.thing(name, b.plane(name, span, HIGH, uv=1.9), wall, (*at, HIGH / 2), (90, 0, turn))
+    b.add_object(name, b.plane(name, span, HIGH, uv=1.9), wall, (*at, HIGH / 2), (90, 0, turn))
 
 column = b.lathe("pedestal", b.rounded([(0, 0), (0.23, 0), (0.23, 0.07), (0.15, 0.12), (0.13, 0.66), (0.19, 0.72), (0.19, 0.78), (0, 0.78)], 0.03, 8), 128)
-b.thing("pedestal", column, b.principled("pedestal", (0.62, 0.60, 0.56), 0.6), (-0.25, 0.5, 0))
-b.thing("ring foot", b.torus("ring foot", 0.075, 0.014, 96, 24), b.metal("bronze", (0.72, 0.50, 0.30), 0.25), (-0.25, 0.5, 0.794))
-b.thing("ball", b.sphere("ball", 0.19, 7), b.glass("glass", 1.5), (-0.25, 0.5, 0.978))
+b.add_object("pedestal", column, b.principled("pedestal", (0.62, 0.60, 0.56), 0.6), (-0.25, 0.5, 0))
+b.add_object("ring foot", b.torus("ring foot", 0.075, 0.014, 96, 24), b.metal("bronze", (0.72, 0.50, 0.30), 0.25), (-0.25, 0.5, 0.794))
+b.add_object("ball", b.sphere("ball", 0.19, 7), b.glass("glass", 1.5), (-0.25, 0.5, 0.978))
 crate = b.principled("crate", (0.30, 0.19, 0.10), 0.75)
-b.thing("crate", b.box("crate", (0.55, 0.45, 0.40), 0.012), crate, (1.25, 1.35, 0.20), (0, 0, 22))
-b.thing("crate", b.box("small crate", (0.36, 0.32, 0.27), 0.010), crate, (1.22, 1.38, 0.535), (0, 0, -12))
+b.add_object("crate", b.box("crate", (0.55, 0.45, 0.40), 0.012), crate, (1.25, 1.35, 0.20), (0, 0, 22))
+b.add_object("crate", b.box("small crate", (0.36, 0.32, 0.27), 0.010), crate, (1.22, 1.38, 0.535), (0, 0, -12))
 
 b.spot("beam", (-2.05, 0.9, 2.42), (-0.25, 0.5, 0.978), 1500, 15.5, (1.0, 0.93, 0.80), 0.15, 0.02)
 b.point("lantern", (1.9, -0.2, 2.2), 160, (0.45, 0.62, 1.0), 0.06)

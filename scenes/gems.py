@@ -75,7 +75,7 @@ def linen(size=1024):
 
 
 cloth = b.principled("linen", roughness=1.0, texture=b.image("linen", linen(), quality=75), Specular_IOR_Level=0.0)
-b.thing("table", b.plane("table", 0.9, 0.9, uv=0.06), cloth)
+b.add_object("table", b.plane("table", 0.9, 0.9, uv=0.06), cloth)
 
 diamond = b.glass("diamond", 2.417, abbe=55.3)
 ruby = b.glass("ruby", 1.765, absorption=(8, 330, 240), abbe=72)
@@ -92,7 +92,7 @@ def lay(name, mesh, material, size, at, tilt, turn, stretch=1.0):
     """Set a gem down: tilted, so that it rests on the table with its lowest point."""
     mesh = mesh.copy()
     mesh.materials.clear()
-    body = b.thing(name, mesh, material, (0, 0, 0), (tilt, 0, turn), (size * stretch, size, size))
+    body = b.add_object(name, mesh, material, (0, 0, 0), (tilt, 0, turn), (size * stretch, size, size))
     b.bpy.context.view_layer.update()
     lowest = min((body.matrix_world @ v.co).z for v in mesh.vertices)
     body.location = (*at, 2e-5 - lowest)
@@ -112,21 +112,21 @@ for k, (x, y) in enumerate(((-0.0015, -0.0235), (0.0065, -0.0165), (0.030, 0.010
 
 # A gold ring with a stone in a six-prong setting, lying on its band.
 gold = b.metal("gold", (1.0, 0.77, 0.34), 0.08)
-band = b.thing("ring band", b.torus("ring band", 9.2 * MM, 1.15 * MM, 128, 48), gold)
+band = b.add_object("ring band", b.torus("ring band", 9.2 * MM, 1.15 * MM, 128, 48), gold)
 band.matrix_world = b.Matrix.Translation((0.0245, -0.0185, 0.0012))
 head = b.Matrix.Translation((0.0245, -0.0185, 0.0)) @ b.Matrix.Rotation(math.radians(210), 4, "Z") @ b.Matrix.Translation((12.2 * MM, 0, 2.9 * MM)) @ b.Matrix.Rotation(math.radians(72), 4, "Y")
-stone = b.thing("ring stone", round_cut.copy(), None, scale=(5.6 * MM,) * 3)
+stone = b.add_object("ring stone", round_cut.copy(), None, scale=(5.6 * MM,) * 3)
 stone.data.materials.clear()
 stone.data.materials.append(diamond)
 stone.matrix_world = head @ b.Matrix.Diagonal((5.6 * MM, 5.6 * MM, 5.6 * MM, 1))
 prong = b.tube("prong", b.arc([(0.4 * MM, 0, -2.4 * MM), (1.3 * MM, 0, -2.2 * MM), (2.95 * MM, 0, 0), (2.93 * MM, 0, 0.5 * MM), (2.3 * MM, 0, 0.75 * MM)], 0.5 * MM, 6), 0.24 * MM, 16)
 for k in range(6):
-    claw = b.thing("prong", prong, gold)
+    claw = b.add_object("prong", prong, gold)
     claw.matrix_world = head @ b.Matrix.Rotation(math.radians(60 * k + 11), 4, "Z")
 
 b.spot("key", (-0.20, 0.34, 0.36), (0.0, 0.0, 0.0), 15.0, 30, (1.0, 0.94, 0.86), 0.4, 0.004)
 b.spot("rim", (0.34, 0.20, 0.24), (0.004, 0.0, 0.0), 7.0, 30, (0.86, 0.93, 1.0), 0.4, 0.004)
-panel = b.thing("softbox", b.plane("softbox", 0.26, 0.16), b.emission("softbox", (2.2, 2.2, 2.3)))
+panel = b.add_object("softbox", b.plane("softbox", 0.26, 0.16), b.emission("softbox", (2.2, 2.2, 2.3)))
 panel.matrix_world = b.Matrix.Translation((-0.10, -0.12, 0.42)) @ Vector((-0.10, -0.12, 0.42)).to_track_quat("-Z", "Y").to_matrix().to_4x4()
 b.sky((0.045, 0.05, 0.06))
 b.camera((-0.012, -0.150, 0.098), (0.0012, -0.0008, 0.002), lens=76, fstop=20, focus=(0.0, -0.002, 0.004))

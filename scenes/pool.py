@@ -39,22 +39,22 @@ coping = b.principled("coping", (0.70, 0.67, 0.61), 0.6)
 lane = 0.25
 for name, material, x, width in (("floor left", aqua, -WIDE / 4 - lane / 4, WIDE / 2 - lane / 2),
                                  ("lane", navy, 0, lane), ("floor right", aqua, WIDE / 4 + lane / 4, WIDE / 2 - lane / 2)):
-    b.thing(name, b.plane(name, width, LONG, uv=2.0 if material is aqua else 1.0), material, (x, 0, -DEEP))
+    b.add_object(name, b.plane(name, width, LONG, uv=2.0 if material is aqua else 1.0), material, (x, 0, -DEEP))
 for name, width, at, turn in (("wall left", LONG, (-WIDE / 2, 0), 90), ("wall right", LONG, (WIDE / 2, 0), -90),
                               ("wall far", WIDE, (0, LONG / 2), 0), ("wall near", WIDE, (0, -LONG / 2), 180)):
-    b.thing(name, b.plane(name, width, DEEP, uv=2.0), aqua, (*at, -DEEP / 2), (90, 0, turn))
+    b.add_object(name, b.plane(name, width, DEEP, uv=2.0), aqua, (*at, -DEEP / 2), (90, 0, turn))
 
 # The terrace around it, and the rounded stones of its rim.
 stone = b.box("coping stone", (0.494, 0.34, 0.06), 0.014)
 for k in range(int(WIDE / 0.5) + 2):
     for side in (-1, 1):
-        b.thing("coping", stone, coping, ((k + 0.5) * 0.5 - (int(WIDE / 0.5) + 2) * 0.25, side * (LONG / 2 + 0.14), 0.0))
+        b.add_object("coping", stone, coping, ((k + 0.5) * 0.5 - (int(WIDE / 0.5) + 2) * 0.25, side * (LONG / 2 + 0.14), 0.0))
 for k in range(int(LONG / 0.5) + 1):
     for side in (-1, 1):
-        b.thing("coping", stone, coping, (side * (WIDE / 2 + 0.14), (k + 0.5) * 0.5 - (int(LONG / 0.5) + 1) * 0.25, 0.001), (0, 0, 90))
+        b.add_object("coping", stone, coping, (side * (WIDE / 2 + 0.14), (k + 0.5) * 0.5 - (int(LONG / 0.5) + 1) * 0.25, 0.001), (0, 0, 90))
 for name, size, at in (("terrace left", (6, 20), (-WIDE / 2 - 3.25, 0)), ("terrace right", (6, 20), (WIDE / 2 + 3.25, 0)),
                        ("terrace far", (WIDE + 0.5, 6), (0, LONG / 2 + 3.25)), ("terrace near", (WIDE + 0.5, 6), (0, -LONG / 2 - 3.25))):
-    b.thing(name, b.plane(name, *size, uv=2.4), paving, (*at, 0.0))
+    b.add_object(name, b.plane(name, *size, uv=2.4), paving, (*at, 0.0))
 
 # Water: ripples of many wavelengths, the closed body reaching a centimetre into the walls.
 lengths = np.exp(random.uniform(math.log(0.22), math.log(1.5), 40))
@@ -69,7 +69,7 @@ def surface(u, v):
     return x, y, LEVEL + float(np.sum(heights * np.sin(waves @ (x, y) + phases)))
 
 
-b.thing("water", b.sheet("water", 184, 256, surface, bottom=-DEEP - 0.01), b.glass("water", 1.333, absorption=(0.42, 0.075, 0.035)))
+b.add_object("water", b.sheet("water", 184, 256, surface, bottom=-DEEP - 0.01), b.glass("water", 1.333, absorption=(0.42, 0.075, 0.035)))
 
 # A swim ring, a ball and a ladder.
 ring = b.torus("swim ring", 0.36, 0.115, 96, 48)
@@ -79,22 +79,22 @@ ring.materials.append(cream)
 for face in ring.polygons:
     turn = math.atan2(face.center.y, face.center.x) / (2 * math.pi) * 8
     face.material_index = int(math.floor(turn)) % 2
-b.thing("swim ring", ring, None, (-0.95, -0.35, LEVEL + 0.035), (4, -3, 20))
-b.thing("ball", b.sphere("ball", 0.17, 6), b.principled("yellow", (0.90, 0.62, 0.07), 0.3), (1.15, 1.55, LEVEL + 0.11))
+b.add_object("swim ring", ring, None, (-0.95, -0.35, LEVEL + 0.035), (4, -3, 20))
+b.add_object("ball", b.sphere("ball", 0.17, 6), b.principled("yellow", (0.90, 0.62, 0.07), 0.3), (1.15, 1.55, LEVEL + 0.11))
 
 chrome = b.metal("chrome", (0.78, 0.79, 0.81), 0.06)
 for x in (-0.25, 0.25):
     path = b.arc([(x, 0.62, 0.0), (x, 0.62, 0.62), (x, -0.08, 0.62), (x, -0.08, -1.05)], 0.28, 14)
-    b.thing("ladder rail", b.tube("ladder rail", path, 0.021), chrome, (WIDE / 2 - 0.02, 1.35, 0), (0, 0, -90))
+    b.add_object("ladder rail", b.tube("ladder rail", path, 0.021), chrome, (WIDE / 2 - 0.02, 1.35, 0), (0, 0, -90))
 step = b.box("ladder step", (0.5, 0.08, 0.03), 0.01)
 for z in (-0.32, -0.62, -0.92):
-    b.thing("ladder step", step, chrome, (WIDE / 2 - 0.10, 1.35, z), (0, 0, -90))
+    b.add_object("ladder step", step, chrome, (WIDE / 2 - 0.10, 1.35, z), (0, 0, -90))
 
 # A towel and a tumbler of lemonade on the terrace.
 cloth = b.principled("towel", (0.90, 0.88, 0.84), 0.95, Specular_IOR_Level=0.1)
 stripe = b.principled("towel stripe", (0.10, 0.30, 0.55), 0.95, Specular_IOR_Level=0.1)
 for k in range(3):
-    b.thing("towel", b.box("towel", (0.62 - 0.01 * k, 0.42 - 0.008 * k, 0.034), 0.015), (cloth, stripe, cloth)[k],
+    b.add_object("towel", b.box("towel", (0.62 - 0.01 * k, 0.42 - 0.008 * k, 0.034), 0.015), (cloth, stripe, cloth)[k],
             (-WIDE / 2 - 0.85, 0.9, 0.018 + 0.036 * k), (0, 0, 12 + 2 * k))
 
 b.sun("sun", (-0.42, 0.38, -0.82), 3.9, (1.0, 0.95, 0.87))

@@ -19,7 +19,7 @@ def heading(degrees):
 
 
 paper = b.principled("paper", (0.72, 0.71, 0.69), 1.0, Specular_IOR_Level=0.0)
-b.thing("table", b.plane("table", 2.4, 2.4), paper)
+b.add_object("table", b.plane("table", 2.4, 2.4), paper)
 
 # The prism stands at the origin, turned to the angle of minimum deviation: inside it light flies along its base.
 side, high = 0.055, 0.075
@@ -27,7 +27,7 @@ bend = 2 * math.degrees(math.asin(FLINT / 2)) - 60
 along = ARRIVING + bend / 2
 planes = [((0, 0, 1), high), ((0, 0, -1), -1e-4)]
 planes += [(heading(along + turn), side / math.sqrt(12)) for turn in (90, 210, 330)]
-b.thing("prism", b.polyhedron("prism", planes), b.glass("flint", FLINT, abbe=ABBE))
+b.add_object("prism", b.polyhedron("prism", planes), b.glass("flint", FLINT, abbe=ABBE))
 
 # The shutter: a slit before the prism, a window before the brilliant.
 travel, wide = heading(ARRIVING), heading(ARRIVING + 90)
@@ -38,7 +38,7 @@ wood = b.principled("shutter", (0.05, 0.045, 0.04), 0.9, Specular_IOR_Level=0.1)
 
 def panel(name, left, right, low, high):
     size = (0.012, right - left, high - low)
-    b.thing(name, b.box(name, size), wood, middle + wide * ((left + right) / 2) + Vector((0, 0, (low + high) / 2)), (0, 0, ARRIVING))
+    b.add_object(name, b.box(name, size), wood, middle + wide * ((left + right) / 2) + Vector((0, 0, (low + high) / 2)), (0, 0, ARRIVING))
 
 
 panel("shutter left", -1.1, window[0] - window[1], 0, top)
@@ -78,7 +78,7 @@ def brilliant(name):
 
 
 # It lies on its side, on culet and girdle.
-stone = b.thing("brilliant", brilliant("brilliant"), b.glass("diamond", 2.417, abbe=55.3), scale=(0.03,) * 3, turn=(41, 0, 205))
+stone = b.add_object("brilliant", brilliant("brilliant"), b.glass("diamond", 2.417, abbe=55.3), scale=(0.03,) * 3, turn=(41, 0, 205))
 b.bpy.context.view_layer.update()
 lowest = min((stone.matrix_world @ v.co).z for v in stone.data.vertices)
 place = middle + wide * window[0] + travel * 0.36
@@ -86,7 +86,7 @@ stone.location = (place.x, place.y, 2e-5 - lowest)
 
 # A card stops the rainbow.
 end = heading(ARRIVING + bend + 1)
-b.thing("card", b.box("card", (0.004, 0.17, 0.11), 0.001), paper, end * 0.42 + Vector((0, 0, 0.0551)), (0, 0, ARRIVING + bend + 1))
+b.add_object("card", b.box("card", (0.004, 0.17, 0.11), 0.001), paper, end * 0.42 + Vector((0, 0, 0.0551)), (0, 0, ARRIVING + bend + 1))
 
 b.sun("sun", travel - Vector((0, 0, math.tan(math.radians(DESCENT)))), 90.0)
 b.sky((0.11, 0.125, 0.15))

@@ -26,11 +26,11 @@ def painting(size=256):
 
 
 plaster = b.principled("plaster", (0.75, 0.75, 0.75), 1.0, Specular_IOR_Level=0.0)
-b.thing("wall", b.plane("wall", 4, 4), plaster, (0, 1.6, 0), (90, 0, 0))
-b.thing("floor", b.plane("floor", 6, 6), plaster, (0, 0, -0.8))
+b.add_object("wall", b.plane("wall", 4, 4), plaster, (0, 1.6, 0), (90, 0, 0))
+b.add_object("floor", b.plane("floor", 6, 6), plaster, (0, 0, -0.8))
 slide = b.principled("slide", (1, 1, 1), 0.0, texture=b.image("painting", painting(), quality=95), IOR=1.5, Transmission_Weight=1.0)
-b.thing("slide", b.plane("slide", 0.1, 0.1, uv=0.1), slide, (0, 0.1, 0), (90, 0, 0))
-b.thing("ball", b.sphere("ball", 0.22, 6), b.principled("chalk", (0.7, 0.7, 0.7), 1.0, Specular_IOR_Level=0.0), (0.62, 1.25, -0.58))
+b.add_object("slide", b.plane("slide", 0.1, 0.1, uv=0.1), slide, (0, 0.1, 0), (90, 0, 0))
+b.add_object("ball", b.sphere("ball", 0.22, 6), b.principled("chalk", (0.7, 0.7, 0.7), 1.0, Specular_IOR_Level=0.0), (0.62, 1.25, -0.58))
 b.spot("lantern", (0, 0, 0), (0, 1, 0), 300, 42, blend=0.05, radius=0.0)
 b.sky((0.01, 0.012, 0.016))
 b.camera((0.55, -1.0, 0.12), (0.0, 1.6, -0.12), lens=35)

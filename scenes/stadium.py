@@ -49,15 +49,15 @@ steel = b.metal("steel", (0.56, 0.57, 0.58), 0.3)
 # Pitch: mown bands, lines of chalk, and the plinth on the centre spot.
 for k in range(-11, 11):
     band = grass if k % 2 else dark
-    b.thing("band", b.plane("band", 6, 80, uv=1.5), band, (k * 6 + 3, 0, 0))
-b.thing("ground", b.plane("ground", 260, 220), dark, (0, 0, -0.02))
+    b.add_object("band", b.plane("band", 6, 80, uv=1.5), band, (k * 6 + 3, 0, 0))
+b.add_object("ground", b.plane("ground", 260, 220), dark, (0, 0, -0.02))
 line = 0.12
 for name, w, d, x, y in (("halfway line", line, 68, 0, 0), ("touchline", 105, line, 0, 34), ("touchline", 105, line, 0, -34),
                          ("goal line", line, 68, 52.5, 0), ("goal line", line, 68, -52.5, 0)):
-    b.thing(name, b.plane(name, w, d), chalk, (x, y, 0.004))
-b.thing("centre circle", b.lathe("centre circle", [(9.09, 0), (9.21, 0)], 256, sharp=0), chalk, (0, 0, 0.004))
-b.thing("plinth", b.box("plinth", (0.62, 0.62, 0.20), 0.012, 4), stone, (0, 0, 0.10), (0, 0, 28))
-b.thing("ball", b.sphere("ball", 0.05, 7), b.glass("glass", 1.52), (0, 0, 0.25005))
+    b.add_object(name, b.plane(name, w, d), chalk, (x, y, 0.004))
+b.add_object("centre circle", b.lathe("centre circle", [(9.09, 0), (9.21, 0)], 256, sharp=0), chalk, (0, 0, 0.004))
+b.add_object("plinth", b.box("plinth", (0.62, 0.62, 0.20), 0.012, 4), stone, (0, 0, 0.10), (0, 0, 28))
+b.add_object("ball", b.sphere("ball", 0.05, 7), b.glass("glass", 1.52), (0, 0, 0.25005))
 
 # Stands in two tiers, stepped; seats in blocks of colour; a roof.
 lower = [(4.0, 0.0)]
@@ -66,10 +66,10 @@ for k in range(22):
 upper = [(20.0, 13.5)]
 for k in range(22):
     upper += [(20.0 + 0.8 * k, 14.5 + 0.55 * k), (20.8 + 0.8 * k, 14.5 + 0.55 * k)]
-b.thing("lower tier", ring("lower tier", lower), concrete)
-b.thing("upper tier", ring("upper tier", upper), concrete)
-b.thing("outer wall", ring("outer wall", [(38, 0), (38, 32)]), concrete)
-b.thing("roof", ring("roof", [(12, 34.0), (12, 34.5), (40, 32.5), (40, 32.0), (12, 34.0)]), steel)
+b.add_object("lower tier", ring("lower tier", lower), concrete)
+b.add_object("upper tier", ring("upper tier", upper), concrete)
+b.add_object("outer wall", ring("outer wall", [(38, 0), (38, 32)]), concrete)
+b.add_object("roof", ring("roof", [(12, 34.0), (12, 34.5), (40, 32.5), (40, 32.0), (12, 34.0)]), steel)
 paints = [b.principled(f"seats {k}", c, 0.5) for k, c in enumerate(((0.10, 0.17, 0.36), (0.55, 0.09, 0.07), (0.66, 0.64, 0.60)))]
 seat = [b.box("seats", (1, 0.5, 0.55), 0.05, 1) for _ in paints]
 for mesh, paint in zip(seat, paints):
@@ -84,7 +84,7 @@ for tier, count, first, run, rise in (("lower", 22, 4.45, 0.85, 0.42), ("upper",
             x2, y2 = oval(turn + 0.05, first + run * k)
             length = math.hypot(x2 - x1, y2 - y1)
             pick = 2 if i % 5 == 0 else (0 if (i // 5 + k // 11) % 2 else 1)
-            b.thing("seats", seat[pick], None, (x, y, base + rise * k + 0.28), (0, 0, math.degrees(math.atan2(y2 - y1, x2 - x1))), (length * 0.88, 1, 1))
+            b.add_object("seats", seat[pick], None, (x, y, base + rise * k + 0.28), (0, 0, math.degrees(math.atan2(y2 - y1, x2 - x1))), (length * 0.88, 1, 1))
 
 # Fifty floodlights under the rim of the roof, all aimed at the pitch.
 housing = b.box("floodlight", (1.3, 0.5, 1.0), 0.05, 2)
@@ -96,8 +96,8 @@ for k in range(50):
     b.spot(f"floodlight {k}", (x * 0.992, y * 0.992, 33.2), aim, 9000, 80, (1.0, 0.97, 0.91), 0.5, 0.25)
     turned = (b.Vector(aim) - b.Vector((x, y, 33.2))).to_track_quat("-Z", "Y").to_matrix().to_4x4()
     there = b.Matrix.Translation((x, y, 33.2)) @ turned
-    b.thing("floodlight", housing, steel).matrix_world = there @ b.Matrix.Translation((0, 0, 0.85)) @ b.Matrix.Rotation(math.pi / 2, 4, "X")
-    b.thing("floodlight face", face, None).matrix_world = there @ b.Matrix.Translation((0, 0, 0.55)) @ b.Matrix.Rotation(math.pi, 4, "X")
+    b.add_object("floodlight", housing, steel).matrix_world = there @ b.Matrix.Translation((0, 0, 0.85)) @ b.Matrix.Rotation(math.pi / 2, 4, "X")
+    b.add_object("floodlight face", face, None).matrix_world = there @ b.Matrix.Translation((0, 0, 0.55)) @ b.Matrix.Rotation(math.pi, 4, "X")
 
 b.sky((0.012, 0.018, 0.036))
 b.camera((-0.44, -0.215, 0.372), (0.5, 0.255, 0.408), lens=20)

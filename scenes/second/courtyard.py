@@ -38,13 +38,13 @@ greens = [b.principled(f"leaf {k}", c, 0.45) for k, c in enumerate(((0.06, 0.14,
 dark = b.principled("door", (0.10, 0.17, 0.16), 0.5)
 
 # The ground, and the walks' outer walls on three sides.
-b.thing("ground", b.plane("ground", 30, 30, uv=2.4), paving, (0, 0, 0))
+b.add_object("ground", b.plane("ground", 30, 30, uv=2.4), paving, (0, 0, 0))
 edge = COURT / 2 + WALK
 for name, at, turn in (("back wall", (0, edge), 0), ("left wall", (-edge, 0), 90), ("right wall", (edge, 0), -90)):
-    b.thing(name, b.plane(name, 2 * edge + 6, 5.6, uv=2.0), wall, (*at, 2.8), (90, 0, turn))
+    b.add_object(name, b.plane(name, 2 * edge + 6, 5.6, uv=2.0), wall, (*at, 2.8), (90, 0, turn))
 for x, y, turn in ((-1.8, edge - 0.02, 0), (3.0, edge - 0.02, 0), (-edge + 0.02, 0.9, 90)):
-    b.thing("door", b.box("door", (1.1, 0.08, 2.3), 0.02, 1), dark, (x, y, 1.15), (0, 0, turn))
-    b.thing("jamb", b.box("jamb", (1.4, 0.05, 2.46), 0.02, 1), stone, (x, y, 1.23), (0, 0, turn))
+    b.add_object("door", b.box("door", (1.1, 0.08, 2.3), 0.02, 1), dark, (x, y, 1.15), (0, 0, turn))
+    b.add_object("jamb", b.box("jamb", (1.4, 0.05, 2.46), 0.02, 1), stone, (x, y, 1.23), (0, 0, turn))
 
 # Arcades: bays of a round arch cut from a wall 30 cm thick, on columns; a cornice, and a roof that slopes to the court.
 outline = [(BAY / 2, SPRING)] + [(0.72 * math.cos(t), SPRING + 0.72 * math.sin(t)) for t in np.linspace(0, math.pi, 21)] + [(-BAY / 2, SPRING), (-BAY / 2, CORNICE), (BAY / 2, CORNICE)]
@@ -62,24 +62,24 @@ plinth, abacus = b.box("plinth", (0.42, 0.42, 0.12), 0.012, 1), b.box("abacus", 
 for place, turn in (((0, COURT / 2), 0), ((-COURT / 2, 0), 90), ((COURT / 2, 0), -90)):
     side = b.Matrix.Translation((*place, 0)) @ b.Matrix.Rotation(math.radians(turn), 4, "Z")
     for k in range(5):
-        b.thing("arch", arch, wall).matrix_world = side @ b.Matrix.Translation(((k - 2) * BAY, 0, 0))
+        b.add_object("arch", arch, wall).matrix_world = side @ b.Matrix.Translation(((k - 2) * BAY, 0, 0))
     for k in range(6):
         for name, mesh, z in (("plinth", plinth, 0.06), ("column", column, 0), ("abacus", abacus, 2.29)):
-            b.thing(name, mesh, stone).matrix_world = side @ b.Matrix.Translation(((k - 2.5) * BAY, 0, z))
-    b.thing("cornice", b.box("cornice", (COURT + 0.5, 0.46, 0.14), 0.03, 2), stone).matrix_world = side @ b.Matrix.Translation((0, 0, CORNICE + 0.07))
-    b.thing("roof", b.box("roof", (COURT + 2 * WALK, WALK + 0.75, 0.10)), tile).matrix_world = side @ b.Matrix.Translation((0, 1.0, 4.3)) @ b.Matrix.Rotation(math.radians(16), 4, "X")
+            b.add_object(name, mesh, stone).matrix_world = side @ b.Matrix.Translation(((k - 2.5) * BAY, 0, z))
+    b.add_object("cornice", b.box("cornice", (COURT + 0.5, 0.46, 0.14), 0.03, 2), stone).matrix_world = side @ b.Matrix.Translation((0, 0, CORNICE + 0.07))
+    b.add_object("roof", b.box("roof", (COURT + 2 * WALK, WALK + 0.75, 0.10)), tile).matrix_world = side @ b.Matrix.Translation((0, 1.0, 4.3)) @ b.Matrix.Rotation(math.radians(16), 4, "X")
     half = b.lathe("ridge", [(0.075, 0), (0.075, 3.45)], 10)
     for k in range(44):
-        b.thing("ridge", half, tile).matrix_world = side @ b.Matrix.Translation(((k - 21.5) * 0.22, -0.68, 3.87)) @ b.Matrix.Rotation(math.radians(-74), 4, "X")
+        b.add_object("ridge", half, tile).matrix_world = side @ b.Matrix.Translation(((k - 21.5) * 0.22, -0.68, 3.87)) @ b.Matrix.Rotation(math.radians(-74), 4, "X")
 
 # The basin: a low rim of limestone, a glazed floor, water 20 cm deep that reaches a centimetre into the stone.
 SIDE, LEVEL = 2.6, 0.30
 for turn in range(4):
     spin = b.Matrix.Rotation(math.pi / 2 * turn, 4, "Z")
-    b.thing("rim", b.box("rim", (SIDE + 0.52, 0.26, 0.42), 0.02, 2), stone).matrix_world = spin @ b.Matrix.Translation((0, SIDE / 2 + 0.13, 0.211 - 0.001 * (turn % 2)))
-b.thing("basin floor", b.plane("basin floor", SIDE, SIDE), azulejo, (0, 0, 0.10))
-b.thing("foot", b.lathe("foot", b.rounded([(0, 0.10), (0.20, 0.10), (0.10, 0.25), (0.075, 0.70), (0.14, 0.80), (0, 0.80)], 0.04, 4), 40), stone)
-b.thing("bowl", b.lathe("bowl", b.rounded([(0, 0.78), (0.12, 0.78), (0.46, 0.96), (0.47, 1.00), (0.43, 1.00), (0.11, 0.83), (0, 0.82)], 0.04, 5), 64), stone)
+    b.add_object("rim", b.box("rim", (SIDE + 0.52, 0.26, 0.42), 0.02, 2), stone).matrix_world = spin @ b.Matrix.Translation((0, SIDE / 2 + 0.13, 0.211 - 0.001 * (turn % 2)))
+b.add_object("basin floor", b.plane("basin floor", SIDE, SIDE), azulejo, (0, 0, 0.10))
+b.add_object("foot", b.lathe("foot", b.rounded([(0, 0.10), (0.20, 0.10), (0.10, 0.25), (0.075, 0.70), (0.14, 0.80), (0, 0.80)], 0.04, 4), 40), stone)
+b.add_object("bowl", b.lathe("bowl", b.rounded([(0, 0.78), (0.12, 0.78), (0.46, 0.96), (0.47, 1.00), (0.43, 1.00), (0.11, 0.83), (0, 0.82)], 0.04, 5), 64), stone)
 drops = [(0.52 * math.cos(t), 0.52 * math.sin(t), p) for t, p in zip(random.uniform(0, 2 * math.pi, 7), random.uniform(0, 6.3, 7))]
 
 
@@ -93,9 +93,9 @@ def ripple(u, v):
 
 
 water = b.glass("water", 1.333, absorption=(0.42, 0.075, 0.035))
-b.thing("water", b.sheet("water", 100, 100, ripple, bottom=0.09), water)
+b.add_object("water", b.sheet("water", 100, 100, ripple, bottom=0.09), water)
 still = b.lathe("bowl water", b.rounded([(0, 0.8205), (0.108, 0.8305), (0.415, 0.985), (0, 0.985)], 0.0005, 1), 64)
-b.thing("bowl water", still, water)
+b.add_object("bowl water", still, water)
 
 # Greenery: one tuft of leaves, many times: hedges of box round the court, an orange tree in each front corner, pots.
 def tuft(name, count, size, spread):
@@ -112,26 +112,26 @@ for mesh, green in zip(box_leaf + tree_leaf, greens * 2):
     mesh.materials.append(green)
 core = b.box("hedge core", (1, 1, 1), 0.1, 1)
 for x, y, long, turn in ((-2.9, 1.35, 2.3, 90), (2.9, 1.35, 2.3, 90), (-2.1, 2.75, 1.9, 0), (2.1, 2.75, 1.9, 0)):
-    b.thing("hedge core", core, greens[0], (x, y, 0.26), (0, 0, turn), (long, 0.30, 0.5))
+    b.add_object("hedge core", core, greens[0], (x, y, 0.26), (0, 0, turn), (long, 0.30, 0.5))
     for k in range(int(long / 0.16)):
         for out, up in ((-0.12, 0.18), (0.12, 0.18), (-0.1, 0.44), (0.1, 0.44)):
             along = (k + 0.5) * 0.16 - long / 2
             at = (x + along, y + out, up) if turn == 0 else (x + out, y + along, up)
-            b.thing("box", box_leaf[(k + (up > 0.3)) % 2], None, at, tuple(random.uniform(0, 360, 3)), (0.72,) * 3)
+            b.add_object("box", box_leaf[(k + (up > 0.3)) % 2], None, at, tuple(random.uniform(0, 360, 3)), (0.72,) * 3)
 fruit = b.sphere("orange", 0.042, 3)
 for x, y in ((-2.9, 2.75), (2.9, 2.75)):
-    b.thing("trunk", b.tube("trunk", [(0, 0, 0), (0.02, 0.01, 0.8), (-0.02, 0.02, 1.35), (0.03, 0, 1.9)], 0.05, 10), bark, (x, y, 0))
+    b.add_object("trunk", b.tube("trunk", [(0, 0, 0), (0.02, 0.01, 0.8), (-0.02, 0.02, 1.35), (0.03, 0, 1.9)], 0.05, 10), bark, (x, y, 0))
     for k in range(36):
         away = b.Vector(random.normal(0, 1, 3)).normalized() * 0.72 * random.random() ** 0.33
-        b.thing("orange leaf", tree_leaf[k % 2], None, (x + away.x, y + away.y, 2.05 + 0.85 * away.z), tuple(random.uniform(0, 360, 3)))
+        b.add_object("orange leaf", tree_leaf[k % 2], None, (x + away.x, y + away.y, 2.05 + 0.85 * away.z), tuple(random.uniform(0, 360, 3)))
     for k in range(14):
         away = b.Vector(random.normal(0, 1, 3)).normalized() * 0.90
-        b.thing("orange", fruit, orange, (x + away.x, y + away.y, 2.0 + 0.85 * away.z))
+        b.add_object("orange", fruit, orange, (x + away.x, y + away.y, 2.0 + 0.85 * away.z))
 pot = b.lathe("pot", b.rounded([(0, 0), (0.15, 0), (0.22, 0.34), (0.24, 0.34), (0.24, 0.39), (0.205, 0.39), (0.19, 0.33), (0, 0.33)], 0.012, 3), 40)
 for x, y in ((-1.78, -1.72), (1.78, -1.72)):
-    b.thing("pot", pot, terracotta, (x, y, 0))
+    b.add_object("pot", pot, terracotta, (x, y, 0))
     for k in range(9):
-        b.thing("box", box_leaf[k % 2], None, (x + random.normal(0, 0.08), y + random.normal(0, 0.08), 0.50 + 0.028 * k), tuple(random.uniform(0, 360, 3)), (0.85 - 0.03 * k,) * 3)
+        b.add_object("box", box_leaf[k % 2], None, (x + random.normal(0, 0.08), y + random.normal(0, 0.08), 0.50 + 0.028 * k), tuple(random.uniform(0, 360, 3)), (0.85 - 0.03 * k,) * 3)
 
 b.sun("sun", (0.50, 0.34, -0.80), 5.4, (1.0, 0.93, 0.83))
 b.dome(lambda x, y, z: b.blend((0.80, 0.94, 1.12), (0.19, 0.36, 0.76), np.clip(z, 0, 1) ** 0.5) * (1 + 3 * np.clip(-0.5 * x - 0.34 * y + 0.8 * z, 0, 1) ** 16)[..., None])

@@ -36,18 +36,18 @@ for name, radiance in colors.items():
 
 
 def bulb(name, at, radius=0.035):
-    b.thing("bulb", bulbs[name], None, at, scale=(radius,) * 3)
+    b.add_object("bulb", bulbs[name], None, at, scale=(radius,) * 3)
 
 
-b.thing("ground", b.plane("ground", 90, 90, uv=2.2), asphalt, (0, 20, 0))
+b.add_object("ground", b.plane("ground", 90, 90, uv=2.2), asphalt, (0, 20, 0))
 
 # The wheel, 14 m across: two rims, twelve spokes with bulbs, gondolas.
 R, HUB = 7.0, (4.2, 17.0, 8.2)
 for y in (-0.7, 0.7):
-    b.thing("rim", b.torus("rim", R, 0.07, 96, 10), steel, (HUB[0], HUB[1] + y, HUB[2]), (90, 0, 0))
+    b.add_object("rim", b.torus("rim", R, 0.07, 96, 10), steel, (HUB[0], HUB[1] + y, HUB[2]), (90, 0, 0))
     for x in (-3.4, 3.4):
-        b.thing("strut", b.tube("strut", [(HUB[0] + x, HUB[1] + 1.9 * y, 0), (HUB[0], HUB[1] + 1.5 * y, HUB[2])], 0.14, 12), navy)
-b.thing("axle", b.lathe("axle", b.rounded([(0, -1.3), (0.45, -1.3), (0.45, 1.3), (0, 1.3)], 0.05, 2), 32), red, HUB, (90, 0, 0))
+        b.add_object("strut", b.tube("strut", [(HUB[0] + x, HUB[1] + 1.9 * y, 0), (HUB[0], HUB[1] + 1.5 * y, HUB[2])], 0.14, 12), navy)
+b.add_object("axle", b.lathe("axle", b.rounded([(0, -1.3), (0.45, -1.3), (0.45, 1.3), (0, 1.3)], 0.05, 2), 32), red, HUB, (90, 0, 0))
 gondola = b.lathe("gondola", b.rounded([(0, -1.15), (0.55, -1.1), (0.72, -0.55), (0.68, -0.55), (0.5, -1.02), (0, -1.05)], 0.05, 3), 32)
 canopy = b.lathe("canopy", b.rounded([(0.75, 0.0), (0.45, 0.22), (0, 0.34)], 0.05, 3), 32)
 for k in range(12):
@@ -56,16 +56,16 @@ for k in range(12):
     centre = b.Vector(HUB)
     for y in (-0.7, 0.7):
         shift = b.Vector((0, y, 0))
-        b.thing("spoke", b.tube("spoke", [shift + out * 0.3, shift + out * R], 0.035, 8), steel, HUB)
+        b.add_object("spoke", b.tube("spoke", [shift + out * 0.3, shift + out * R], 0.035, 8), steel, HUB)
     for m in range(8):
         bulb(("amber", "warm")[m % 2], centre + out * (1.2 + 0.72 * m) + b.Vector((0, -0.79, 0)), 0.05)
     for m in range(6):
         s = t + 2 * math.pi / 12 * m / 6
         bulb(("rose", "blue", "green")[k % 3], centre + b.Vector((math.cos(s), 0, math.sin(s))) * (R + 0.02) + b.Vector((0, -0.82, 0)), 0.06)
     seat = centre + out * R
-    b.thing("gondola", gondola.copy(), (red, cream, teal)[k % 3], seat)
-    b.thing("canopy", canopy.copy(), (cream, red, cream)[k % 3], seat)
-    b.thing("pole", b.tube("pole", [(0, 0, -1.1), (0, 0, 0.3)], 0.03, 8), steel, seat)
+    b.add_object("gondola", gondola.copy(), (red, cream, teal)[k % 3], seat)
+    b.add_object("canopy", canopy.copy(), (cream, red, cream)[k % 3], seat)
+    b.add_object("pole", b.tube("pole", [(0, 0, -1.1), (0, 0, 0.3)], 0.03, 8), steel, seat)
 
 
 def stall(x, y, turn, wide, first, second, lights):
@@ -73,7 +73,7 @@ def stall(x, y, turn, wide, first, second, lights):
     here = b.Matrix.Translation((x, y, 0)) @ b.Matrix.Rotation(math.radians(turn), 4, "Z")
 
     def put(name, mesh, paint, at, lean=0):
-        b.thing(name, mesh, paint).matrix_world = here @ b.Matrix.Translation(at) @ b.Matrix.Rotation(math.radians(lean), 4, "X")
+        b.add_object(name, mesh, paint).matrix_world = here @ b.Matrix.Translation(at) @ b.Matrix.Rotation(math.radians(lean), 4, "X")
 
     put("counter", b.box("counter", (wide, 0.5, 0.95), 0.02, 1), wood, (0, -0.9, 0.475))
     put("front", b.box("front", (wide - 0.1, 0.03, 0.75)), first, (0, -1.17, 0.5))
@@ -98,7 +98,7 @@ def stall(x, y, turn, wide, first, second, lights):
             across, pick = (k + 0.7) * 0.32 - wide / 2, random.integers(3)
             for size, up in ((0.11, 0.12), (0.075, 0.27), (0.03, 0.34)):
                 at = here @ b.Vector((across + (0.05 if up > 0.3 else 0), 0.66, shelf + up))
-                b.thing("toy", toys[pick], plush[pick], at, scale=(size,) * 3)
+                b.add_object("toy", toys[pick], plush[pick], at, scale=(size,) * 3)
 
 
 stall(-5.4, 9.0, 34, 4.2, red, navy, ("warm", "rose"))
@@ -108,23 +108,23 @@ stall(7.4, 9.0, -48, 3.9, navy, teal, ("blue", "amber"))
 # Strings of bulbs between poles, and a row of dark houses behind.
 poles = [(-3.3, 5.2), (-1.9, 12.0), (1.4, 15.0), (3.9, 6.3), (6.6, 12.5)]
 for x, y in poles:
-    b.thing("pole", b.lathe("pole", b.rounded([(0, 0), (0.12, 0), (0.12, 0.3), (0.05, 0.35), (0.04, 4.6), (0, 4.62)], 0.01, 2), 16), navy, (x, y, 0))
+    b.add_object("pole", b.lathe("pole", b.rounded([(0, 0), (0.12, 0), (0.12, 0.3), (0.05, 0.35), (0.04, 4.6), (0, 4.62)], 0.01, 2), 16), navy, (x, y, 0))
 for n, (i, j) in enumerate(((0, 1), (1, 2), (0, 3), (1, 3), (2, 4), (3, 4))):
     start, end = b.Vector((*poles[i], 4.55)), b.Vector((*poles[j], 4.55))
     length = (end - start).length
     path = [start.lerp(end, s) - b.Vector((0, 0, 0.34 * length / 4 * 4 * s * (1 - s) * 0.8)) for s in np.linspace(0, 1, 25)]
-    b.thing("cable", b.tube("cable", path, 0.009, 6), cable)
+    b.add_object("cable", b.tube("cable", path, 0.009, 6), cable)
     for k in range(1, 25):
         here = start.lerp(end, k / 25) - b.Vector((0, 0, 0.34 * length / 4 * 4 * k / 25 * (1 - k / 25) * 0.8))
         bulb(("warm", "rose", "warm", "amber", "warm", "green", "white", "blue")[(k + n) % 8], here - b.Vector((0, 0, 0.06)))
 window = b.emission("window", (2.6, 1.7, 0.8))
 for k in range(9):
     high = 7 + 4 * random.random()
-    b.thing("house", b.box("house", (6.2, 5, high)), brick, (-24 + 6.3 * k, 36 + random.random(), high / 2))
+    b.add_object("house", b.box("house", (6.2, 5, high)), brick, (-24 + 6.3 * k, 36 + random.random(), high / 2))
     for row in range(2):
         for column in range(3):
             if random.random() < 0.35:
-                b.thing("window", b.plane("window", 0.9, 1.3), window, (-26 + 6.3 * k + 1.9 * column, 33.2, 2.6 + 2.7 * row), (90, 0, 0))
+                b.add_object("window", b.plane("window", 0.9, 1.3), window, (-26 + 6.3 * k + 1.9 * column, 33.2, 2.6 + 2.7 * row), (90, 0, 0))
 
 b.sky((0.010, 0.013, 0.026))
 b.camera((-0.2, -1.6, 1.55), (0.75, 12.0, 3.25), lens=24)

@@ -61,21 +61,21 @@ nosing = b.box("nosing", (WALL - WELL, 0.035, 0.044), 0.006, 2)
 baluster = b.lathe("baluster", b.rounded([(0, 0), (0.018, 0), (0.008, 0.05), (0.008, 0.42), (0.017, 0.46), (0.008, 0.50), (0.008, 0.97), (0, 0.97)], 0.01, 3), 10)
 for k in range(STEPS * TURNS):
     height, turn = (k + 1) * RISE, math.degrees(STEP * k)
-    b.thing("step", step, plaster, (0, 0, height - 0.04), (0, 0, turn))
-    b.thing("tread", slab, tread, (0, 0, height), (0, 0, turn))
-    b.thing("nosing", nosing, dado, ((WALL + WELL) / 2 * math.cos(STEP * k), (WALL + WELL) / 2 * math.sin(STEP * k), height - 0.021), (0, 0, turn))
+    b.add_object("step", step, plaster, (0, 0, height - 0.04), (0, 0, turn))
+    b.add_object("tread", slab, tread, (0, 0, height), (0, 0, turn))
+    b.add_object("nosing", nosing, dado, ((WALL + WELL) / 2 * math.cos(STEP * k), (WALL + WELL) / 2 * math.sin(STEP * k), height - 0.021), (0, 0, turn))
     for part in (0.25, 0.75):
         t = STEP * (k + part)
-        b.thing("baluster", baluster, iron, ((WELL + 0.05) * math.cos(t), (WELL + 0.05) * math.sin(t), height), (0, 0, turn))
-b.thing("handrail", b.tube("handrail", helix(WELL + 0.05, 1.05), 0.032, 14), oak)
-b.thing("wall rail", b.tube("wall rail", helix(WALL - 0.06, 1.05), 0.022, 10), oak)
-b.thing("dado line", b.tube("dado line", helix(WALL - 0.004, 1.35), 0.014, 6), dado)
+        b.add_object("baluster", baluster, iron, ((WELL + 0.05) * math.cos(t), (WELL + 0.05) * math.sin(t), height), (0, 0, turn))
+b.add_object("handrail", b.tube("handrail", helix(WELL + 0.05, 1.05), 0.032, 14), oak)
+b.add_object("wall rail", b.tube("wall rail", helix(WALL - 0.06, 1.05), 0.022, 10), oak)
+b.add_object("dado line", b.tube("dado line", helix(WALL - 0.004, 1.35), 0.014, 6), dado)
 skirt = b.sheet("skirt", TURNS * 48, 1, lambda u, v: (*helix(WALL - 0.006, 0, u * TURNS, u * TURNS + 1)[0][:2], u * TURNS * LIFT + 0.05 + 1.3 * v))
-b.thing("skirt", skirt, dado)
+b.add_object("skirt", skirt, dado)
 TOP = TURNS * LIFT + 3.0
-b.thing("wall", b.lathe("wall", [(WALL, -0.01), (WALL, TOP)], 96), plaster)
-b.thing("ceiling", b.lathe("ceiling", [(0, TOP), (WALL, TOP)], 96), plaster)
-b.thing("floor", b.plane("floor", 2 * WALL + 0.1, 2 * WALL + 0.1, uv=2.2), b.principled("star", roughness=0.2, texture=b.image("star", star())))
+b.add_object("wall", b.lathe("wall", [(WALL, -0.01), (WALL, TOP)], 96), plaster)
+b.add_object("ceiling", b.lathe("ceiling", [(0, TOP), (WALL, TOP)], 96), plaster)
+b.add_object("floor", b.plane("floor", 2 * WALL + 0.1, 2 * WALL + 0.1, uv=2.2), b.principled("star", roughness=0.2, texture=b.image("star", star())))
 
 # Four globes a turn on the wall, and a chain of seven down the middle of the well.
 ball, arm = b.sphere("globe", 0.10, 4), b.tube("arm", b.arc([(0.24, 0, -0.16), (0.0, 0, -0.20), (0, 0, -0.09)], 0.06, 6), 0.011, 10)
@@ -83,13 +83,13 @@ collar = b.lathe("collar", b.rounded([(0, -0.115), (0.045, -0.105), (0.05, -0.08
 for k in range(4 * TURNS):
     turn = k / 4 + 0.11
     at = helix(WALL - 0.22, 2.1, turn, turn + 1)[0]
-    b.thing("globe", ball, globe, at)
-    b.thing("arm", arm, brass, at, (0, 0, 360 * turn))
-    b.thing("collar", collar, brass, at)
-b.thing("cable", b.tube("cable", [(0, 0, 2.6), (0, 0, TOP)], 0.006, 8), iron)
+    b.add_object("globe", ball, globe, at)
+    b.add_object("arm", arm, brass, at, (0, 0, 360 * turn))
+    b.add_object("collar", collar, brass, at)
+b.add_object("cable", b.tube("cable", [(0, 0, 2.6), (0, 0, TOP)], 0.006, 8), iron)
 for k in range(7):
     at = (0, 0, 2.5 + 2.1 * k)
-    b.thing("globe", ball, globe, at, (0, 0, 0), (1.2,) * 3)
-    b.thing("cap", collar, brass, at, (180, 0, 0), (1.2,) * 3)
+    b.add_object("globe", ball, globe, at, (0, 0, 0), (1.2,) * 3)
+    b.add_object("cap", collar, brass, at, (180, 0, 0), (1.2,) * 3)
 b.camera((0.42, -0.50, TURNS * LIFT + 1.3), (-0.42, 0.36, 6.5), lens=18)
 b.finish(__file__)

@@ -8,7 +8,7 @@ import contextlib
 import bpy
 import numpy
 
-import bakecache
+import bake_cache
 import standin
 from graph import is_constant
 from shading import output_of
@@ -84,7 +84,7 @@ class Baker:
         `wanted`: {slot: (graph, {pass: value})}, the value of the pass "normal" a bent normal.
         """
         found = {}
-        shape = bakecache.of_mesh(body.data)
+        shape = bake_cache.mesh_digest(body.data)
         place = (body.name, [tuple(row) for row in body.matrix_world], tuple(body.color), body.pass_index)
         names = sorted({name for _, values in wanted.values() for name in values})
         for name in names:
@@ -93,9 +93,9 @@ class Baker:
                 if name not in values:
                     continue
                 shaders.append((graph, (_bend if name == "normal" else _shine)(graph, values[name])))
-                keys[slot] = bakecache.digest(shape, slot, bakecache.of_tree(graph.tree), self.size, name,
+                keys[slot] = bake_cache.digest(shape, slot, bake_cache.tree_digest(graph.tree), self.size, name,
                                               place if of_object else None)
-                texels = bakecache.kept(keys[slot])
+                texels = bake_cache.load(keys[slot])
                 if texels is None:
                     now[slot] = graph
                 else:
@@ -103,7 +103,7 @@ class Baker:
             if now:
                 made = self._texels(body, now, "NORMAL" if name == "normal" else "EMIT", self.size)
                 for slot, texels in made.items():
-                    bakecache.keep(keys[slot], texels)
+                    bake_cache.store(keys[slot], texels)
                     found[slot, name] = texels
             for graph, shader in shaders:
                 graph.tree.nodes.remove(shader)
@@ -161,7 +161,7 @@ def _surface(graph):
 def _shine(graph, value):
     """Let the material shine with a value; the shader's node."""
     node = graph.tree.nodes.new("ShaderNodeEmission")
-    graph.put(value, node.inputs["Color"])
+    graph.connect(value, node.inputs["Color"])
     graph.tree.links.new(node.outputs[0], _surface(graph))
     return node
 
@@ -170,6 +170,6 @@ def _bend(graph, normal):
     """Let the material be a matt white one with this normal, or with the one that its displacement makes; its node."""
     node = graph.tree.nodes.new("ShaderNodeBsdfDiffuse")
     if normal is not None:
-        graph.put(normal, node.inputs["Normal"])
+        graph.connect(normal, node.inputs["Normal"])
     graph.tree.links.new(node.outputs[0], _surface(graph))
     return node

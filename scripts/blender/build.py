@@ -133,7 +133,7 @@ def blend(a, b, amount):
 # Shapes
 
 
-def thing(name, mesh, material, at=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1)):
+def add_object(name, mesh, material, at=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1)):
     """Put a mesh into the scene; the same mesh may stand in several places."""
     body = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(body)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from graph import feed, is_constant, upstream
+from graph import is_constant, source_socket, upstream
 
 _DEPENDS_ON_VIEW = {
     "FRESNEL": {"Fac"}, "LAYER_WEIGHT": {"Fresnel", "Facing"}, "NEW_GEOMETRY": {"Incoming", "Backfacing"},
@@ -41,7 +41,7 @@ class Sum:
 
 def read(socket, path=()):
     """The shader tree under a shader socket: Leaf, Mix, Sum, or None for a black one."""
-    output, path = feed(socket, path)
+    output, path = source_socket(socket, path)
     if output is None or not output.is_output:
         return None
     node = output.node
@@ -55,7 +55,7 @@ def read(socket, path=()):
 
 def _faceted(mix):
     """The same mix, or one leaf where Fresnel's equations mix a Glossy shader over another: that is a dielectric."""
-    output, path = feed(mix.factor, mix.path)
+    output, path = source_socket(mix.factor, mix.path)
     below, coat = mix.first, mix.second
     leaves = isinstance(below, Leaf) and isinstance(coat, Leaf) and below.coat is None
     if output is None or not leaves or coat.node.type not in _GLOSSY or not output.is_output:
@@ -78,9 +78,9 @@ def weigh(tree, graph, weight=1.0):
         return [(tree, weight)]
     if isinstance(tree, Sum):
         return weigh(tree.first, graph, weight) + weigh(tree.second, graph, weight)
-    share = graph.unit(graph.grey(graph.value(tree.factor, tree.path)))
-    first = weigh(tree.first, graph, graph.times(weight, graph.minus(1.0, share)))
-    return first + weigh(tree.second, graph, graph.times(weight, share))
+    share = graph.clamp(graph.grey(graph.value(tree.factor, tree.path)))
+    first = weigh(tree.first, graph, graph.multiply(weight, graph.subtract(1.0, share)))
+    return first + weigh(tree.second, graph, graph.multiply(weight, share))
 
 
 def adds_up(tree):
@@ -97,7 +97,7 @@ def facets(tree):
     return facets(tree.first) + facets(tree.second) if tree is not None else []
 
 
-def settle(graph, surface, tree, say):
+def fix_view_dependence(graph, surface, tree, say):
     """Put a constant in the place of what depends on the view or the kind of ray; `say` names each.
 
     `surface` is the shader socket of which `tree` was read.
@@ -138,7 +138,7 @@ def _typical(node, output):
 
 
 def _held(socket):
-    output, _ = feed(socket)
+    output, _ = source_socket(socket)
     return output.default_value if output is not None and not output.is_output else socket.default_value
 
 

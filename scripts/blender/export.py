@@ -69,20 +69,20 @@ def write(path, scene=None, bake_size=bake.SIZE):
         _look_at(scene, undo)
         said, sun = world.extras(scene, path, warn)
         said.update(camera_export.picture(scene, warn))
-        flat = objects.Flat(scene, undo, warn)
+        flat = objects.FlatScene(scene, undo, warn)
         _look_at(flat.scene, undo)
         bpy.context.view_layer.update()
         for thing in flat.things:
             if thing.type == "CAMERA":
-                flat.say(thing, **camera_export.extras(thing, flat, warn))
+                flat.add_extras(thing, **camera_export.extras(thing, flat, warn))
         if flat.scene.camera is not None:
             camera_export.warn_of_clipping(flat.scene.camera, flat, warn)
         worn = surfaces.Surfaces(flat.things, _worn(flat.things), undo, warn, bake_size)
         lighting.warn_of_soft_falloff(flat, warn)
-        lighting.hang(flat, warn)
+        lighting.add_lamps(flat, warn)
         if sun is not None:
             environment = said["environment"]
-            sky.hang(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
+            sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
         bodies = _bodies(flat.things)
         bpy.context.view_layer.update()
         _run_exporter(path)

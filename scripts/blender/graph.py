@@ -21,7 +21,7 @@ def named(sockets, identifier):
     return next((s for s in sockets if s.identifier == identifier), None)
 
 
-def feed(socket, path=()):
+def source_socket(socket, path=()):
     """What gives an input socket its value, past reroutes, muted nodes and the borders of groups, and the path there.
 
     An output socket; or the input socket that holds the value itself; or None where a muted node cuts the line.
@@ -58,7 +58,7 @@ def end_of(tree):
 def upstream(socket, path=(), seen=None):
     """All nodes that an input socket's value comes from, with the output that is used of each."""
     seen = {} if seen is None else seen
-    output, path = feed(socket, path)
+    output, path = source_socket(socket, path)
     if output is None or not output.is_output:
         return seen
     key = (output.node.as_pointer(), output.identifier, tuple(n.as_pointer() for n in path))
@@ -109,7 +109,7 @@ class Graph:
 
     def value(self, socket, path=()):
         """The value of an input socket of any depth."""
-        output, path = feed(socket, path)
+        output, path = source_socket(socket, path)
         if output is None:
             return (0.0,) * 3 if socket.type in {"RGBA", "VECTOR"} else 0.0
         if not output.is_output or output.node.type in {"VALUE", "RGB"}:
@@ -121,7 +121,7 @@ class Graph:
                 value = 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]
             return value
         top = self._top(output, path)
-        return top if socket.type in {"RGBA", "VECTOR"} or top.type == "VALUE" else self.times(self.grey(top), 1.0)
+        return top if socket.type in {"RGBA", "VECTOR"} or top.type == "VALUE" else self.multiply(self.grey(top), 1.0)
 
     def grey(self, value):
         """A value as one number, colours by their luminance as Cycles does."""
@@ -157,10 +157,10 @@ class Graph:
         node = self.tree.nodes.new(kind)
         node.operation = operation
         for socket, value in zip(node.inputs, values):
-            self.put(value, socket)
+            self.connect(value, socket)
         return node.outputs[output]
 
-    def put(self, value, socket):
+    def connect(self, value, socket):
         """Give an input socket at the top level a value."""
         if not is_constant(value):
             self.tree.links.new(value, socket)
@@ -179,7 +179,7 @@ class Graph:
         kind = "ShaderNodeVectorMath" if is_colour(a) or is_colour(b) else "ShaderNodeMath"
         return self.node(kind, operation, a, b)
 
-    def times(self, a, b):
+    def multiply(self, a, b):
         """The product of two values."""
         for one, other in ((a, b), (b, a)):
             if is_constant(one) and one in (1.0, (1.0,) * 3) and (is_colour(other) or not is_colour(one)):
@@ -188,28 +188,28 @@ class Graph:
                 return (0.0,) * 3 if is_colour(one) or is_colour(other) else 0.0
         return self._binary("MULTIPLY", lambda x, y: x * y, a, b)
 
-    def plus(self, a, b):
+    def add(self, a, b):
         """The sum of two values."""
         for one, other in ((a, b), (b, a)):
             if is_constant(one) and one in (0.0, (0.0,) * 3) and (is_colour(other) or not is_colour(one)):
                 return other
         return self._binary("ADD", lambda x, y: x + y, a, b)
 
-    def minus(self, a, b):
+    def subtract(self, a, b):
         """The difference of two values."""
-        return self.plus(a, self.times(b, -1.0))
+        return self.add(a, self.multiply(b, -1.0))
 
-    def over(self, a, b):
+    def divide(self, a, b):
         """The quotient of two values, 0 where the divisor is 0 as Blender's nodes have it."""
         if is_constant(b) and b in (1.0, (1.0,) * 3):
             return a
         return self._binary("DIVIDE", lambda x, y: x / y if y else 0.0, a, b)
 
-    def least(self, a, b):
+    def minimum(self, a, b):
         """The smaller of two values, for each component."""
         return self._binary("MINIMUM", min, a, b)
 
-    def most(self, a, b):
+    def maximum(self, a, b):
         """The larger of two values, for each component."""
         return self._binary("MAXIMUM", max, a, b)
 
@@ -217,27 +217,27 @@ class Graph:
         """A value to a power; what is negative counts as 0."""
         return self._binary("POWER", lambda x, y: max(x, 0.0) ** y, a, exponent)
 
-    def unit(self, a):
+    def clamp(self, a):
         """A value held within [0, 1]."""
-        return self.least(self.most(a, 0.0), 1.0)
+        return self.minimum(self.maximum(a, 0.0), 1.0)
 
-    def largest(self, colour):
+    def max_component(self, colour):
         """The largest component of a colour."""
         if is_constant(colour):
             return max(colour) if isinstance(colour, tuple) else colour
         if not is_colour(colour):
             return colour
         split = self.tree.nodes.new("ShaderNodeSeparateXYZ")
-        self.put(colour, split.inputs[0])
-        return self.most(self.most(*split.outputs[:2]), split.outputs[2])
+        self.connect(colour, split.inputs[0])
+        return self.maximum(self.maximum(*split.outputs[:2]), split.outputs[2])
 
-    def joined(self, values):
+    def combine_channels(self, values):
         """Three numbers as one colour."""
         if all(map(is_constant, values)):
             return tuple(map(float, values))
         node = self.tree.nodes.new("ShaderNodeCombineXYZ")
         for value, socket in zip(values, node.inputs):
-            self.put(value, socket)
+            self.connect(value, socket)
         return node.outputs[0]
 
     def varies(self, value):

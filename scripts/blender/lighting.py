@@ -70,7 +70,7 @@ def _size(light):
     return light.size, light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
 
 
-def hang(flat, warn):
+def add_lamps(flat, warn):
     """Make the lamps of a flat scene ready for the glTF exporter: area lamps become meshes."""
     for thing in [t for t in flat.things if t.type == "LIGHT"]:
         light, where = thing.data, flat.where(thing)
@@ -83,11 +83,11 @@ def hang(flat, warn):
             _area_mesh(thing, flat)
             flat.remove(thing)
         elif light.type == "SUN":
-            flat.say(thing, angle_deg=math.degrees(light.angle))
+            flat.add_extras(thing, angle_deg=math.degrees(light.angle))
         else:
-            flat.say(thing, radius=light.shadow_soft_size)
+            flat.add_extras(thing, radius=light.shadow_soft_size)
             if light.type == "SPOT":
-                flat.say(thing, blend=light.spot_blend)
+                flat.add_extras(thing, blend=light.spot_blend)
 
 
 def _area_mesh(thing, flat):
@@ -100,11 +100,11 @@ def _area_mesh(thing, flat):
     else:
         corners = [(x * size_x / 2, y * size_y / 2, 0) for x, y in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
     name = flat.names[thing.name] + " (area light)"
-    mesh = flat.own(bpy.data.meshes.new(name))
+    mesh = flat.remove_later(bpy.data.meshes.new(name))
     mesh.from_pydata(corners, [], [range(len(corners))])  # clockwise: the face looks down -Z, as the light does
     radiance = area_radiance(light, [abs(s) for s in scale[:2]])
     strength = max(max(radiance), 1e-30)
-    material = flat.own(bpy.data.materials.new(name))
+    material = flat.remove_later(bpy.data.materials.new(name))
     if bpy.app.version < (5, 0, 0):
         material.use_nodes = True
     material.use_backface_culling = True

@@ -87,7 +87,7 @@ class Reader:
         colour = self.get(leaf, "Color")
         if is_constant(colour) and max(colour) - min(colour) > 0.1:
             self.say("the reflectance of its tinted Glossy shader rises towards the rim")
-        colour = self.graph.most(self.graph.times(self.graph.minus(colour, 1 / 21), 21 / 20), 0.0)
+        colour = self.graph.maximum(self.graph.multiply(self.graph.subtract(colour, 1 / 21), 21 / 20), 0.0)
         return self._facets(leaf, Lobe(base=colour, metallic=1.0, specular=0.0))
 
     def _metal(self, leaf):
@@ -103,9 +103,9 @@ class Reader:
 
     def _conductor(self, n, k):
         g = self.graph
-        k2 = g.times(k, k)
-        below, above = g.minus(n, 1.0), g.plus(n, 1.0)
-        return g.over(g.plus(g.times(below, below), k2), g.plus(g.times(above, above), k2))
+        k2 = g.multiply(k, k)
+        below, above = g.subtract(n, 1.0), g.add(n, 1.0)
+        return g.divide(g.add(g.multiply(below, below), k2), g.add(g.multiply(above, above), k2))
 
     def _glass(self, leaf):
         self._named(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
@@ -113,8 +113,8 @@ class Reader:
         lobe = Lobe(base=colour, roughness=self.get(leaf, "Roughness"), transmission=1.0, ior=self.get(leaf, "IOR"),
                     normal=self.normal(leaf))
         if leaf.node.type == "BSDF_GLASS":  # its reflection is tinted, too
-            lobe.specular = self.graph.least(self.graph.largest(colour), 1.0)
-            lobe.specular_colour = self.graph.over(colour, self.graph.most(lobe.specular, 1e-6))
+            lobe.specular = self.graph.minimum(self.graph.max_component(colour), 1.0)
+            lobe.specular_colour = self.graph.divide(colour, self.graph.maximum(lobe.specular, 1e-6))
             if is_constant(colour) and max(colour) - min(colour) > 0.25:
                 self.say("the tint of its Glass shader's reflections is carried at steep angles only")
         self._distribution(leaf, lobe)
@@ -125,7 +125,7 @@ class Reader:
         socket, path = leaf.ior
         ior = self.graph.value(socket, path)
         if socket.node.type == "LAYER_WEIGHT":
-            ior = self.graph.over(1.0, self.graph.most(self.graph.minus(1.0, ior), 1e-5))
+            ior = self.graph.divide(1.0, self.graph.maximum(self.graph.subtract(1.0, ior), 1e-5))
         coat = leaf.coat
         lobe = Lobe(base=self.get(leaf, "Color"), ior=ior, specular=1.0, normal=self.normal(leaf),
                     specular_colour=self.get(coat, "Color"))
@@ -151,18 +151,18 @@ class Reader:
         a = 1 - s. glTF keeps alpha across, and moves the share of its squared strength of the way to 1 along.
         """
         g, turn = self.graph, self.get(leaf, "Anisotropic Rotation")
-        alpha = g.times(lobe.roughness, lobe.roughness)
+        alpha = g.multiply(lobe.roughness, lobe.roughness)
         if leaf.node.type == "BSDF_PRINCIPLED":
-            aspect = g.power(g.minus(1.0, g.times(0.9, stretch)), 0.5)
+            aspect = g.power(g.subtract(1.0, g.multiply(0.9, stretch)), 0.5)
         else:
             # The other shaders are smoother along the tangent where their anisotropy is positive.
             turn, negative = self.get(leaf, "Rotation"), is_constant(stretch) and stretch < 0
-            turn = turn if negative else g.plus(turn, 0.25)
-            aspect = g.minus(1.0, g.times(stretch, -1.0 if negative else 1.0))
-        along, across = g.over(alpha, aspect), g.times(alpha, aspect)
-        along = g.least(along, 1.0)
-        rest = g.most(g.minus(1.0, across), 1e-6)
-        lobe.anisotropy = g.power(g.most(g.over(g.minus(along, across), rest), 0.0), 0.5)
+            turn = turn if negative else g.add(turn, 0.25)
+            aspect = g.subtract(1.0, g.multiply(stretch, -1.0 if negative else 1.0))
+        along, across = g.divide(alpha, aspect), g.multiply(alpha, aspect)
+        along = g.minimum(along, 1.0)
+        rest = g.maximum(g.subtract(1.0, across), 1e-6)
+        lobe.anisotropy = g.power(g.maximum(g.divide(g.subtract(along, across), rest), 0.0), 0.5)
         lobe.roughness = g.power(across, 0.5)
         lobe.tangent = self._tangent(leaf, turn)
         self.say("its stretched highlights keep the few per cent of light that Cycles loses between facets")
@@ -178,9 +178,9 @@ class Reader:
             return tangent
         node = g.tree.nodes.new("ShaderNodeVectorRotate")
         node.rotation_type = "AXIS_ANGLE"
-        g.put(tangent, node.inputs["Vector"])
-        g.put(geometry.outputs["Normal"], node.inputs["Axis"])
-        g.put(g.times(turns, 6.283185307179586), node.inputs["Angle"])
+        g.connect(tangent, node.inputs["Vector"])
+        g.connect(geometry.outputs["Normal"], node.inputs["Axis"])
+        g.connect(g.multiply(turns, 6.283185307179586), node.inputs["Angle"])
         return node.outputs[0]
 
     def _sheen(self, leaf):
@@ -191,19 +191,19 @@ class Reader:
     def _sheen_roughness(self, roughness):
         """The roughness at which glTF's sheen reflects about as much as Cycles' fibres do at this one."""
         g = self.graph
-        return g.least(g.plus(g.times(roughness, 0.88), g.times(g.most(g.minus(roughness, 0.5), 0.0), 1.0)), 1.0)
+        return g.minimum(g.add(g.multiply(roughness, 0.88), g.multiply(g.maximum(g.subtract(roughness, 0.5), 0.0), 1.0)), 1.0)
 
     def _principled(self, leaf):
         g = self.graph
         lobe = Lobe(
-            base=self.get(leaf, "Base Color"), metallic=g.unit(self.get(leaf, "Metallic")),
-            transmission=g.unit(self.get(leaf, "Transmission Weight")), ior=self.get(leaf, "IOR"), specular=1.0,
-            specular_colour=self.get(leaf, "Specular Tint"), coat=g.unit(self.get(leaf, "Coat Weight")),
+            base=self.get(leaf, "Base Color"), metallic=g.clamp(self.get(leaf, "Metallic")),
+            transmission=g.clamp(self.get(leaf, "Transmission Weight")), ior=self.get(leaf, "IOR"), specular=1.0,
+            specular_colour=self.get(leaf, "Specular Tint"), coat=g.clamp(self.get(leaf, "Coat Weight")),
             coat_roughness=self.get(leaf, "Coat Roughness"), emission=self.get(leaf, "Emission Color"),
             strength=self.get(leaf, "Emission Strength"))
         # Principled glass takes the root of the colour at each of a body's two surfaces.
-        clear = g.times(lobe.transmission, g.minus(1.0, lobe.metallic))
-        lobe.base = g.plus(g.times(lobe.base, g.minus(1.0, clear)), g.times(g.power(lobe.base, 0.5), clear))
+        clear = g.multiply(lobe.transmission, g.subtract(1.0, lobe.metallic))
+        lobe.base = g.add(g.multiply(lobe.base, g.subtract(1.0, clear)), g.multiply(g.power(lobe.base, 0.5), clear))
         both = is_constant(clear) and 0 < clear < 1
         if both and is_constant(lobe.base) and max(lobe.base) - min(lobe.base) > 0.1:
             self.say("the colour of its diffuse and of its transmitted light is one: their mean is taken")
@@ -229,7 +229,7 @@ class Reader:
                 f0 = min(((lobe.ior - 1) / (lobe.ior + 1)) ** 2 * 2 * level, 0.99)
                 lobe.ior = (1 + f0 ** 0.5) / (1 - f0 ** 0.5)
         elif level != 0.5:
-            lobe.specular = g.least(g.times(level, 2.0), 1.0)
+            lobe.specular = g.minimum(g.multiply(level, 2.0), 1.0)
 
     def _coverings(self, leaf, lobe):
         g = self.graph
@@ -241,13 +241,13 @@ class Reader:
                 self.say("Coat Tint is approximated by a tint of what lies below the coat")
                 # Light is seen through 1 / cos of the coat's thickness: 1.146 on average at an index of 1.5.
                 tint = g.power(tint, 1.146)
-                lobe.base = g.times(lobe.base, g.plus(g.times(tint, lobe.coat), g.minus(1.0, lobe.coat)))
+                lobe.base = g.multiply(lobe.base, g.add(g.multiply(tint, lobe.coat), g.subtract(1.0, lobe.coat)))
             if self.normal(leaf, "Coat Normal") is not None:
                 self.say("Coat Normal is not carried: the coat follows the surface")
         weight = self.get(leaf, "Sheen Weight")
         if weight != 0.0:
             self.say("sheen is approximated by glTF's")
-            lobe.sheen = g.times(self.get(leaf, "Sheen Tint"), weight)
+            lobe.sheen = g.multiply(self.get(leaf, "Sheen Tint"), weight)
             lobe.sheen_roughness = self._sheen_roughness(self.get(leaf, "Sheen Roughness"))
 
 

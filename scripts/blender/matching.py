@@ -28,7 +28,7 @@ def match(material, output, undo, say):
     if tree is None:
         inside = output.inputs["Volume"].is_linked
         return graph, replace(_film(WHITE), thin=False) if inside else Matched()
-    closures.settle(graph, socket, tree, say)
+    closures.fix_view_dependence(graph, socket, tree, say)
     weighed = closures.weigh(tree, graph)
     return graph, _Match(graph, say, closures.adds_up(tree)).surface(weighed, output.inputs["Volume"].is_linked)
 
@@ -57,10 +57,10 @@ class _Match:
             else:
                 lobe, part = self.reader.lobe(leaf), weight
                 if leaf.node.type == "BSDF_PRINCIPLED":
-                    alpha = g.unit(self.reader.get(leaf, "Alpha"))
+                    alpha = g.clamp(self.reader.get(leaf, "Alpha"))
                     if alpha != 1.0:
-                        part = g.times(weight, alpha)
-                        clear.append((g.times(weight, g.minus(1.0, alpha)), WHITE))
+                        part = g.multiply(weight, alpha)
+                        clear.append((g.multiply(weight, g.subtract(1.0, alpha)), WHITE))
                     if lobe.strength != 0.0 and lobe.emission != BLACK:
                         shining.append((part, lobe.emission, lobe.strength))
                 lobes.append((lobe, part))
@@ -81,7 +81,7 @@ class _Match:
         g = self.graph
         tint = BLACK
         for weight, colour in clear:
-            tint = g.plus(tint, g.times(weight, colour))
+            tint = g.add(tint, g.multiply(weight, colour))
         emission, strength = self._emission(shining)
         if tint == BLACK:
             return Matched(emission=emission, strength=strength)
@@ -97,19 +97,19 @@ class _Match:
         if self.adds_up and all(tint == WHITE for _, tint in clear):
             alpha = 0.0
             for _, part in lobes:
-                alpha = g.plus(alpha, part)
+                alpha = g.add(alpha, part)
         else:
             passed = BLACK
             for weight, tint in clear:
-                passed = g.plus(passed, g.times(weight, tint))
+                passed = g.add(passed, g.multiply(weight, tint))
             if not (is_constant(passed) and len(set(passed)) == 1):
                 self.say("the colour of its Transparent shader is not carried beside other shaders: its mean is taken")
-            alpha = g.unit(g.minus(1.0, g.mean(passed)))
+            alpha = g.clamp(g.subtract(1.0, g.mean(passed)))
 
         def within(part):
             if part is alpha or part == alpha:
                 return 1.0
-            return g.over(part, alpha if is_constant(alpha) else g.most(alpha, 1e-4))
+            return g.divide(part, alpha if is_constant(alpha) else g.maximum(alpha, 1e-4))
         return alpha, within
 
     def _emission(self, shining):
@@ -118,7 +118,7 @@ class _Match:
             return shining[0][1:]
         total = BLACK
         for weight, colour, strength in shining:
-            total = g.plus(total, g.times(g.times(weight, strength), colour))
+            total = g.add(total, g.multiply(g.multiply(weight, strength), colour))
         return total, (1.0 if shining else 0.0)
 
     def _joined(self, lobes, kinds):
@@ -128,21 +128,21 @@ class _Match:
             return lobes[0][0]
         whole = 0.0
         for _, part in lobes:
-            whole = g.plus(whole, part)
+            whole = g.add(whole, part)
         if is_constant(whole) and whole > 1 + 1e-5:
             self.say(f"its shaders add up to {whole:.3g} times the light they receive: colours are held within 1")
         if self.adds_up or (is_constant(whole) and abs(whole - 1) < 1e-6):
             whole = 1.0
-        parts = [g.over(part, whole) for _, part in lobes]
+        parts = [g.divide(part, whole) for _, part in lobes]
         lobes = [lobe for lobe, _ in lobes]
         diffuse = [kind in _DIFFUSE for kind in kinds]
         if all(kind in _DIFFUSE | _GLOSSY for kind in kinds) and not all(diffuse):
             found = self._under_constant_gloss(lobes, parts, diffuse)
         else:
             found = self._mean(lobes, parts)
-        found.base = g.times(found.base, whole)
+        found.base = g.multiply(found.base, whole)
         if found.specular != 0.0 and whole != 1.0:
-            found.specular = g.times(found.specular, g.least(whole, 1.0))
+            found.specular = g.multiply(found.specular, g.minimum(whole, 1.0))
         found.normal = self._normal(lobes, parts)
         return found
 
@@ -163,10 +163,10 @@ class _Match:
             return counted[0][0]
         top, below = 0.0, 0.0
         for value, weight in counted:
-            top, below = g.plus(top, g.times(value, weight)), g.plus(below, weight)
+            top, below = g.add(top, g.multiply(value, weight)), g.add(below, weight)
         if is_constant(below) and abs(below - 1) < 1e-6:
             return top
-        return g.over(top, below if is_constant(below) else g.most(below, 1e-5))
+        return g.divide(top, below if is_constant(below) else g.maximum(below, 1e-5))
 
     def _under_constant_gloss(self, lobes, parts, diffuse):
         """Glossy shaders reflect the same at every angle: facets of that reflectance over what is diffuse.
@@ -178,18 +178,18 @@ class _Match:
         shiny = [(lobe, part) for lobe, part, matt in zip(lobes, parts, diffuse) if not matt]
         for lobe, part, matt in zip(lobes, parts, diffuse):
             # Undo the metal's rise towards the rim.
-            colour = lobe.base if matt else g.plus(g.times(lobe.base, 20 / 21), 1 / 21)
-            colour = g.times(colour, part)
-            under, gloss = (g.plus(under, colour), gloss) if matt else (under, g.plus(gloss, colour))
+            colour = lobe.base if matt else g.add(g.multiply(lobe.base, 20 / 21), 1 / 21)
+            colour = g.multiply(colour, part)
+            under, gloss = (g.add(under, colour), gloss) if matt else (under, g.add(gloss, colour))
         if self._differ([lobe.roughness for lobe, _ in shiny]):
             self.say("its mixed shaders differ in roughness: the mean is taken")
-        strongest = g.largest(gloss)
-        rest = g.minus(1.0, strongest)
+        strongest = g.max_component(gloss)
+        rest = g.subtract(1.0, strongest)
         first = shiny[0][0]
         return Lobe(
-            base=g.unit(g.over(under, rest if is_constant(rest) else g.most(rest, 1e-3))),
+            base=g.clamp(g.divide(under, rest if is_constant(rest) else g.maximum(rest, 1e-3))),
             roughness=self._sum([lobe.roughness for lobe, _ in shiny], [part for _, part in shiny]),
-            ior=0.0, specular=strongest, specular_colour=g.over(gloss, g.most(strongest, 1e-6)),
+            ior=0.0, specular=strongest, specular_colour=g.divide(gloss, g.maximum(strongest, 1e-6)),
             anisotropy=first.anisotropy, tangent=first.tangent)
 
     @staticmethod
@@ -199,13 +199,13 @@ class _Match:
     def _mean(self, lobes, parts):
         """Every quantity averaged, each over the lobes in which it means something."""
         g = self.graph
-        dull = [g.times(p, g.minus(1.0, lobe.metallic)) for lobe, p in zip(lobes, parts)]
+        dull = [g.multiply(p, g.subtract(1.0, lobe.metallic)) for lobe, p in zip(lobes, parts)]
         shiny = [p if lobe.faceted else 0.0 for lobe, p in zip(lobes, parts)]
-        coated = [g.times(d, lobe.specular) if lobe.faceted else 0.0 for lobe, d in zip(lobes, dull)]
+        coated = [g.multiply(d, lobe.specular) if lobe.faceted else 0.0 for lobe, d in zip(lobes, dull)]
         over = {"metallic": parts, "base": parts, "transmission": dull, "specular": dull, "roughness": shiny,
                 "ior": coated, "specular_colour": coated, "coat": parts, "sheen": parts, "anisotropy": shiny,
-                "coat_roughness": [g.times(p, lobe.coat) for lobe, p in zip(lobes, parts)],
-                "sheen_roughness": [g.times(p, g.largest(lobe.sheen)) for lobe, p in zip(lobes, parts)]}
+                "coat_roughness": [g.multiply(p, lobe.coat) for lobe, p in zip(lobes, parts)],
+                "sheen_roughness": [g.multiply(p, g.max_component(lobe.sheen)) for lobe, p in zip(lobes, parts)]}
         found = Lobe(**{name: self._sum([getattr(lobe, name) for lobe in lobes], weights)
                         for name, weights in over.items()})
         found.thin = any(lobe.thin for lobe in lobes)

@@ -1,6 +1,6 @@
 """The scene as a render would evaluate it, flat: every visible thing once, in the world, without modifiers or parents.
 
-`Flat` is a scene of its own that holds them while the exporter runs: meshes after all modifiers, shape keys, armatures
+`FlatScene` is a scene of its own that holds them while the exporter runs: meshes after all modifiers, shape keys, armatures
 and geometry nodes, shared by the instances of the same; lamps and cameras with their evaluated transforms.
 """
 
@@ -20,7 +20,7 @@ _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes 
          "GPENCIL": "grease pencil is not carried: " + _PATHS}
 
 
-class Flat:
+class FlatScene:
     """The evaluated scene until `undo` (a contextlib.ExitStack) closes.
 
     `things` are its objects, `names` the names of the objects and meshes that they stand for, `hidden` the kinds of rays
@@ -63,7 +63,7 @@ class Flat:
         for thing in sorted(concerned, key=lambda thing: thing.name):
             self._warn_of(thing)
 
-    def say(self, thing, **keys):
+    def add_extras(self, thing, **keys):
         """Lets keys of `extras.caustique` stand on the node of one of `things`."""
         before = thing["caustique"].to_dict() if "caustique" in thing else {}
         thing["caustique"] = {**before, **keys}
@@ -73,7 +73,7 @@ class Flat:
         kind = {"LIGHT": "light", "CAMERA": "camera"}.get(thing.type, "object")
         return f'{kind} "{self.names[thing.name]}"'
 
-    def own(self, block):
+    def remove_later(self, block):
         """Removes a block of Blender's data with the flat scene; the block."""
         self._made.append(block)
         return block
@@ -113,7 +113,7 @@ class Flat:
         else:
             mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
             self._shapes.append((mesh, thing.original))
-        self.names[self.own(mesh).name] = name
+        self.names[self.remove_later(mesh).name] = name
         for index, slot in enumerate(thing.material_slots):
             if slot.link == "OBJECT" and index < len(mesh.materials):
                 mesh.materials[index] = slot.material and slot.material.original
@@ -124,7 +124,7 @@ class Flat:
         if isinstance(data, bpy.types.Mesh) and not _is_plain(matrix):
             # A sheared object has no place that location, rotation and scale could tell: its mesh gets it instead.
             sheared = data.copy()
-            self.names[self.own(sheared).name] = self.names[data.name]
+            self.names[self.remove_later(sheared).name] = self.names[data.name]
             sheared.transform(matrix)
             if matrix.determinant() < 0:
                 sheared.flip_normals()
@@ -132,7 +132,7 @@ class Flat:
         body = self.add(original.name, data, matrix, hidden, group)
         body.color, body.pass_index = original.color, original.pass_index
         if "caustique" in original:
-            self.say(body, **original["caustique"].to_dict())
+            self.add_extras(body, **original["caustique"].to_dict())
         if original == bpy.context.scene.camera and self.scene.camera is None:
             self.scene.camera = body
         rest = [ray for ray in hidden if ray != "camera"]
@@ -141,17 +141,17 @@ class Flat:
 
     def add(self, name, data, matrix, hidden=(), group=None):
         """A thing of this name, data, place (world matrix), kinds of rays that do not see it, and group of lights."""
-        body = self.own(bpy.data.objects.new(name, data))
+        body = self.remove_later(bpy.data.objects.new(name, data))
         self.names[body.name] = name
         self.scene.collection.objects.link(body)
         body.matrix_world = matrix
         self.things.append(body)
         self.hidden[body.name] = hidden
         if "camera" in hidden:
-            self.say(body, visible={"camera": False})
+            self.add_extras(body, visible={"camera": False})
         self.groups[body.name] = group
         if group:
-            self.say(body, light_group=group)
+            self.add_extras(body, light_group=group)
         return body
 
     def remove(self, thing):

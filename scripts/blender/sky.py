@@ -42,16 +42,16 @@ def sun(scene, undo, where, warn):
     return Sun(toward, [max(float(x), 0.0) for x in irradiance], node.sun_size)
 
 
-def hang(found, flat, hidden, group):
+def add_sun(found, flat, hidden, group):
     """Puts a `Sun` into the flat scene as a lamp, `hidden` from kinds of rays, in a group of lights or none."""
     strongest = max(found.irradiance)
     if strongest <= 0:
         return
-    light = flat.own(bpy.data.lights.new("sky's sun", "SUN"))
+    light = flat.remove_later(bpy.data.lights.new("sky's sun", "SUN"))
     light.energy, light.color = strongest, [x / strongest for x in found.irradiance]
     light.angle = found.angle
     body = flat.add(light.name, light, found.toward.to_track_quat("Z", "Y").to_matrix().to_4x4(), hidden, group)
-    flat.say(body, angle_deg=math.degrees(found.angle))
+    flat.add_extras(body, angle_deg=math.degrees(found.angle))
 
 
 def _light_from(scene, toward, angle):

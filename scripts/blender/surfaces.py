@@ -9,7 +9,7 @@ import bake
 import gltfmaterial
 import shading
 import standin
-from plans import Plan, matt
+from material_plan import Plan, matt
 
 
 def materials_of(thing):

@@ -55,16 +55,16 @@ task = ray.remote(retry_exceptions=[Failed])
 
 
 @task
-def shard(order, picture, index):
+def shard(request, picture, index):
     """Renders a shard."""
-    words = [HERE / "shard.sh", order.scene, order.output, f"{index}/{order.shards}", *picture.frame_words]
-    run([*words, "--threads", order.cores, *order.render], picture.folder / f"{index}.log")
+    words = [HERE / "shard.sh", request.scene, request.output, f"{index}/{request.shards}", *picture.frame_words]
+    run([*words, "--threads", request.cores, *request.render], picture.folder / f"{index}.log")
 
 
 @task
-def merge(order, picture):
+def merge(request, picture):
     """Merges the shards of a picture, which then are gone."""
-    words = [HERE / "merge.sh", order.output, *picture.frame_words, "--threads", order.cores, *order.merge]
+    words = [HERE / "merge.sh", request.output, *picture.frame_words, "--threads", request.cores, *request.merge]
     run(words, picture.output.with_suffix(".log"))
 
 
@@ -122,11 +122,11 @@ def frames_of(text):
     return range(int(match[1]), int(match[2] or match[1]) + 1, int(match[3] or 1))
 
 
-def pictures(order):
+def pictures(request):
     """Renders; gives each picture when it is merged, and tells of its shards on the way."""
-    frames = [None] if order.frames is None else order.frames
-    tasks = shards_in_order(order, frames)
-    room = math.ceil(2 * ray.cluster_resources().get("CPU", 1) / order.cores)
+    frames = [None] if request.frames is None else request.frames
+    tasks = shards_in_order(request, frames)
+    room = math.ceil(2 * ray.cluster_resources().get("CPU", 1) / request.cores)
     running, told = {}, time.monotonic()
     more = True
     while more or running:
@@ -145,29 +145,29 @@ def pictures(order):
             picture.left -= 1
             picture.done += 1
             if picture.left == 0:
-                running[merged(order, picture)] = picture
-        if order.partial and time.monotonic() - told > order.partial:
+                running[merged(request, picture)] = picture
+        if request.partial and time.monotonic() - told > request.partial:
             told = time.monotonic()
             for picture in {id(of): of for of in running.values()}.values():
                 show(picture)
 
 
-def shards_in_order(order, frames):
+def shards_in_order(request, frames):
     """Submits shards, one each time that it is asked; gives what stands for them, and their picture."""
     for frame in frames:
-        output = order.output if frame is None else numbered(order.output, frame)
-        picture = Picture(output, frame, order.shards)
-        for index in range(order.shards):
-            options = {"num_cpus": order.cores, "max_retries": order.retries, "scheduling_strategy": "SPREAD"}
-            yield shard.options(**options).remote(order, picture, index), picture
+        output = request.output if frame is None else numbered(request.output, frame)
+        picture = Picture(output, frame, request.shards)
+        for index in range(request.shards):
+            options = {"num_cpus": request.cores, "max_retries": request.retries, "scheduling_strategy": "SPREAD"}
+            yield shard.options(**options).remote(request, picture, index), picture
 
 
-def merged(order, picture):
+def merged(request, picture):
     """Has a picture merged, once nobody reads its shards any more."""
     if picture.showing is not None:
         ray.wait([picture.showing])
         picture.showing = None
-    return merge.options(num_cpus=order.cores, max_retries=order.retries).remote(order, picture)
+    return merge.options(num_cpus=request.cores, max_retries=request.retries).remote(request, picture)
 
 
 def show(picture):
@@ -180,7 +180,7 @@ def show(picture):
 
 
 @dataclass
-class Order:
+class Request:
     """What is asked for."""
 
     scene: Path
@@ -202,7 +202,7 @@ def count(text):
     return int(text)
 
 
-def order_of(words):
+def parse_request(words):
     """The command line, read."""
     mine, merges = (words[: words.index("--")], words[words.index("--") + 1 :]) if "--" in words else (words, [])
     parser = argparse.ArgumentParser(description="Renders on a Ray cluster.", allow_abbrev=False)
@@ -229,17 +229,17 @@ def order_of(words):
     places = {"scene": known.scene.resolve(), "output": known.output.resolve()}
     # A shard alone is the picture.
     render += merges if known.shards == 1 else []
-    return Order(**{**vars(known), **places}, render=render, merge=merges)
+    return Request(**{**vars(known), **places}, render=render, merge=merges)
 
 
 def main():
-    order = order_of(sys.argv[1:])
+    request = parse_request(sys.argv[1:])
     os.environ["CAUSTIQUE_BIN"] = str(Path(program()).resolve()) if "/" in program() else program()
     variables = {"CAUSTIQUE_BIN": os.environ["CAUSTIQUE_BIN"]}
-    ray.init(order.address, log_to_driver=False, include_dashboard=False, runtime_env={"env_vars": variables})
-    order.output.parent.mkdir(parents=True, exist_ok=True)
+    ray.init(request.address, log_to_driver=False, include_dashboard=False, runtime_env={"env_vars": variables})
+    request.output.parent.mkdir(parents=True, exist_ok=True)
     try:
-        for picture in pictures(order):
+        for picture in pictures(request):
             for name in (picture.partial, picture.partial.with_suffix(".png"), picture.output.with_suffix(".log")):
                 name.unlink(missing_ok=True)
             print(picture.output, flush=True)

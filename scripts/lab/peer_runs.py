@@ -57,7 +57,7 @@ class Peers:
         text, _, spent = timed(command, 600 + 10 * float(words["budget"]), caller.environment(driver))
         try:
             answer = caller.answer(text)
-        except caller.Cannot as cannot:
+        except caller.CannotTranslate as cannot:
             return {"cannot": str(cannot), "process_core_seconds": round(spent, 2)}
         if answer is None:
             raise Failed("the driver says nothing of what it did")

@@ -5,7 +5,7 @@ import math
 from pxr import UsdGeom
 
 from faults import Fault
-from stage import said
+from stage import custom_keys
 
 # Attributes that are read, and the schema's defaults, which one that is blocked (`= None`) does not have.
 _DEFAULTS = (("horizontalAperture", 20.955), ("verticalAperture", 15.2908), ("focalLength", 50.0))
@@ -40,15 +40,15 @@ def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True)
     if stop > 0 and focus > 0 and lens:
         keys.update(aperture_radius=focal * unit / (2 * stop), focus_distance=focus * stage.metres)
     elif stop > 0 and lens:
-        stage.losses.name(where, "it has an fStop and no focusDistance: everything is sharp")
+        stage.losses.add(where, "it has an fStop and no focusDistance: everything is sharp")
     if get(camera.GetClippingPlanesAttr()):
-        stage.losses.name(where, "clippingPlanes are not carried: nothing is cut away")
+        stage.losses.add(where, "clippingPlanes are not carried: nothing is cut away")
     if get(camera.GetShutterCloseAttr(), 0.0) > get(camera.GetShutterOpenAttr(), 0.0):
-        stage.losses.name(where, "motion blur is not carried: everything stands still")
+        stage.losses.add(where, "motion blur is not carried: everything stands still")
     role = get(camera.GetStereoRoleAttr())
     if role in ("left", "right"):
-        stage.losses.name(where, f"it is the {role} one of a pair, of which each is rendered by itself")
-    keys.update(said(prim, stage))
+        stage.losses.add(where, f"it is the {role} one of a pair, of which each is rendered by itself")
+    keys.update(custom_keys(prim, stage))
     if keys:
         entry["extras"] = {"caustique": keys}
     return {"camera": document.add("cameras", {"name": str(where), **entry})}

@@ -18,7 +18,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 from faults import Fault, text_of  # from this folder
-from guard import guarded
+from guard import run_guarded
 
 
 @contextlib.contextmanager
@@ -68,9 +68,9 @@ def main(given):
         return _convert(given)
     folder = os.path.dirname(os.path.abspath(__file__))
     try:
-        return guarded(lambda: _convert(given), folder, *given.guard)
+        return run_guarded(lambda: _convert(given), folder, *given.guard)
     except Fault as fault:
-        return _tell(fault.where, fault.fault, fault.hint)
+        return _print_error(fault.where, fault.fault, fault.hint)
 
 
 def _convert(given):
@@ -91,10 +91,10 @@ def _convert(given):
         where, what, hint = "", "the stage takes more memory than there is", "use a simpler stage or smaller textures"
     except Exception as error:  # whatever USD raises about stages that come from anywhere
         where, what, hint = "", f"USD says: {text_of(error)}", None
-    return _tell(where, what, hint)
+    return _print_error(where, what, hint)
 
 
-def _tell(where, what, hint):
+def _print_error(where, what, hint):
     print(json.dumps({"prim": where, "fault": what, "hint": hint}), file=sys.stderr)
     return 1
 

@@ -10,7 +10,7 @@ from pxr import Gf
 import textures
 from faults import Fault
 from lights import Light
-from stage import kind_of, said
+from stage import custom_keys, kind_of
 
 
 class Dome:
@@ -24,24 +24,24 @@ class Dome:
         """Takes a dome light that stands at `matrix` (in glTF's axes)."""
         light = Light(prim, self._stage)
         if light.cone() is not None:
-            light.lose("shaping of a dome light is not carried: it shines from everywhere")
+            light.add_loss("shaping of a dome light is not carried: it shines from everywhere")
         asset = light.get("texture:file", None)
         plain = asset is None or not asset.path
         if self.keys is not None:
             if plain and "color" in self.keys and kind_of(self.keys["color"]) == "list":
                 self.keys["color"] = [a + b for a, b in zip(self.keys["color"], light.emitted())]
             else:
-                light.lose("a second dome light is not carried: it gives no light")
+                light.add_loss("a second dome light is not carried: it gives no light")
             return
         if light.normalized:
-            light.lose("inputs:normalize says nothing of a dome light")
+            light.add_loss("inputs:normalize says nothing of a dome light")
         self.keys = {"color": list(light.emitted())} if plain else self._image(light, asset, matrix)
-        self.keys.update(said(prim, self._stage))
+        self.keys.update(custom_keys(prim, self._stage))
 
     def _image(self, light, asset, matrix):
         format_ = light.get("texture:format", "automatic")
         if format_ not in ("automatic", "latlong"):
-            light.lose(f"a texture of format {format_} is read as latlong")
+            light.add_loss(f"a texture of format {format_} is read as latlong")
         data, name = self._stage.asset(light.prim, asset)
         emitted = light.emitted()
         pole = light.prim.GetAttribute("poleAxis")
@@ -53,7 +53,7 @@ class Dome:
         grey = max(emitted) - min(emitted) <= 1e-6 * max(emitted)
         suffix = os.path.splitext(name)[1].lower()
         if suffix == ".hdr" and not (upright and grey):
-            light.lose("a tilted or coloured dome with a Radiance HDR is not carried so: save its image as OpenEXR")
+            light.add_loss("a tilted or coloured dome with a Radiance HDR is not carried so: save its image as OpenEXR")
             upright, grey = True, True
         if suffix in (".hdr", ".exr") and upright and grey:
             # In USD the image's middle is at +Z, and turning about +Y takes +Z to +X.

@@ -23,7 +23,7 @@ class Losses:
     def __init__(self):
         self.lines = []
 
-    def name(self, where, what):
+    def add(self, where, what):
         """`what` is lost of the prim at `where`."""
         line = f"{where}: {what}"
         if line not in self.lines:

@@ -10,7 +10,7 @@ import sys
 from faults import Fault
 
 
-def guarded(work, folder, seconds, memory):
+def run_guarded(work, folder, seconds, memory):
     """Exit code of `work`, which a child does in at most so many seconds and bytes of memory.
 
     The program that asked for it keeps the other end of standard input open. When that end closes, the program is gone:

@@ -13,7 +13,7 @@ from pxr import Gf, UsdLux
 import shapes
 from faults import Fault
 from materials import glow
-from stage import said
+from stage import custom_keys
 
 _SIDES = 64
 
@@ -26,23 +26,23 @@ class Light:
         self.where = prim.GetPath()
         for name, what in (("diffuse", 1.0), ("specular", 1.0)):
             if self.get(name, 1.0) != what:
-                self.lose(f"inputs:{name} is not carried: it lights all lobes alike")
+                self.add_loss(f"inputs:{name} is not carried: it lights all lobes alike")
         shadow = stage.get(UsdLux.ShadowAPI(prim).GetShadowEnableAttr(), True)
         if not shadow:
-            self.lose("inputs:shadow:enable = false is not carried: it casts shadows")
+            self.add_loss("inputs:shadow:enable = false is not carried: it casts shadows")
         if self.api.GetFiltersRel().GetTargets():
-            self.lose("light filters are not carried")
+            self.add_loss("light filters are not carried")
         for collection in (self.api.GetLightLinkCollectionAPI(), self.api.GetShadowLinkCollectionAPI()):
             if collection.GetIncludesRel().GetTargets() or collection.GetExcludesRel().GetTargets():
-                self.lose(f"{collection.GetName()} is not carried: it shines on everything, and all casts shadows")
+                self.add_loss(f"{collection.GetName()} is not carried: it shines on everything, and all casts shadows")
 
     def get(self, name, default):
         """The value of an input of this name."""
         return self.stage.get(self.prim.GetAttribute("inputs:" + name), default)
 
-    def lose(self, what):
+    def add_loss(self, what):
         """Names a loss of this light."""
-        self.stage.losses.name(self.where, what)
+        self.stage.losses.add(self.where, what)
 
     @property
     def normalized(self):
@@ -74,10 +74,10 @@ class Light:
         if not self.prim.HasAPI(UsdLux.ShapingAPI):
             return None
         if self.get("shaping:focus", 0.0) > 0:
-            self.lose("shaping:focus is not carried: it shines alike within its cone")
+            self.add_loss("shaping:focus is not carried: it shines alike within its cone")
         ies = self.get("shaping:ies:file", None)
         if ies is not None and ies.path:
-            self.lose(f"its IES profile {ies.path} is not carried: it shines alike in all directions")
+            self.add_loss(f"its IES profile {ies.path} is not carried: it shines alike in all directions")
         angle = self.get("shaping:cone:angle", 90.0)
         softness = min(max(self.get("shaping:cone:softness", 0.0), 0.0), 1.0)
         if angle >= 180:
@@ -92,12 +92,12 @@ def node(prim, stage, document, matrix):
     makers = {"SphereLight": _sphere, "RectLight": _rect, "DiskLight": _disk, "CylinderLight": _cylinder,
               "DistantLight": _distant}
     if kind not in makers:
-        light.lose(f"a {kind} is not carried: it gives no light")
+        light.add_loss(f"a {kind} is not carried: it gives no light")
         return None
     made = makers[kind](light, document, matrix)
     if made is None:
         return None
-    keys = {**made.pop("caustique", {}), **said(prim, stage)}
+    keys = {**made.pop("caustique", {}), **custom_keys(prim, stage)}
     if keys:
         made["extras"] = {"caustique": keys}
     return made
@@ -117,9 +117,9 @@ def _sphere(light, document, matrix):
     if radius > 0 and max(a, b, c) > 1.001 * min(a, b, c):
         return _ellipsoid(light, document, radius, (a, b, c))
     if as_point and not light.normalized:
-        light.lose("treatAsPoint counts with normalize alone: it stays a sphere")
+        light.add_loss("treatAsPoint counts with normalize alone: it stays a sphere")
     if a == 0 and not light.normalized:
-        light.lose("a sphere of radius 0 has no light unless it is normalized: its intensity is taken as if it were")
+        light.add_loss("a sphere of radius 0 has no light unless it is normalized: its intensity is taken as if it were")
     emitted = light.emitted()
     # A sphere of radiance L shines with L pi r^2 in every direction, and has an area of 4 pi r^2.
     intensity = [e * (0.25 if light.normalized or a == 0 else math.pi * a * a) * light.stage.metres ** 2
@@ -130,15 +130,15 @@ def _sphere(light, document, matrix):
         entry["type"] = "spot"
         angle, softness = cone
         if angle > math.pi / 2:
-            light.lose(f"its cone of {math.degrees(angle):g} degrees is taken as 90: beyond there is no light")
+            light.add_loss(f"its cone of {math.degrees(angle):g} degrees is taken as 90: beyond there is no light")
             angle = math.pi / 2
         entry["spot"] = {"outerConeAngle": angle, "innerConeAngle": 0.0}
         whole = 1 - math.cos(angle)
         keys["blend"] = 1 - (1 - math.cos((1 - softness) * angle)) / whole if softness > 0 and whole > 0 else 0.0
         if softness > 0:
-            light.lose("the edge of its cone falls off by the cosine of the angle, not by the angle")
+            light.add_loss("the edge of its cone falls off by the cosine of the angle, not by the angle")
         if a > 0:
-            light.lose("its bulb shines as a disc across its axis, and cannot itself be seen")
+            light.add_loss("its bulb shines as a disc across its axis, and cannot itself be seen")
     return {"extensions": document.light(entry), "caustique": keys}
 
 
@@ -153,7 +153,7 @@ def _ellipsoid(light, document, radius, axes):
     a, b, c = axes
     mean = (((a * b) ** 1.6 + (a * c) ** 1.6 + (b * c) ** 1.6) / 3) ** (1 / 1.6)
     if light.cone() is not None:
-        light.lose("shaping of a stretched sphere is not carried: it shines in all directions")
+        light.add_loss("shaping of a stretched sphere is not carried: it shines in all directions")
     return _glowing(light, document, faces, light.radiance(4 * math.pi * mean), normals)
 
 
@@ -162,7 +162,7 @@ def _rect(light, document, matrix):
     u, v = (matrix.TransformDir(Gf.Vec3d(*axis)) for axis in ((2 * x, 0, 0), (0, 2 * y, 0)))
     image = light.get("texture:file", None)
     if image is not None and image.path:
-        light.lose(f"its texture {image.path} is not carried: it shines with its colour alone")
+        light.add_loss(f"its texture {image.path} is not carried: it shines with its colour alone")
     # Clockwise seen from +Z: it shines along -Z.
     return _flat(light, document, [(-x, -y), (-x, y), (x, y), (x, -y)], Gf.Cross(u, v).GetLength())
 
@@ -182,7 +182,7 @@ def _flat(light, document, corners, area):
     radiance, keys, cone = light.radiance(area), {}, light.cone()
     if cone is not None and (cone[0] < math.pi / 2 or cone[1] > 0):
         angle, softness = min(cone[0], math.pi / 2), cone[1]
-        light.lose("its cone is taken for a spread of the same flux, which falls off towards its edge")
+        light.add_loss("its cone is taken for a spread of the same flux, which falls off towards its edge")
         keys["spread_deg"] = math.degrees(2 * angle)
         share = _cone_flux(angle, softness)
         radiance = tuple(r * share for r in radiance)
@@ -201,9 +201,9 @@ def _cone_flux(angle, softness):
 def _cylinder(light, document, matrix):
     radius, half = light.get("radius", 0.5), light.get("length", 1.0) / 2
     if light.stage.get(light.prim.GetAttribute("treatAsLine"), False):
-        light.lose("treatAsLine is not carried: it stays a cylinder")
+        light.add_loss("treatAsLine is not carried: it stays a cylinder")
     if light.cone() is not None:
-        light.lose("shaping of a cylinder is not carried: it shines in all directions")
+        light.add_loss("shaping of a cylinder is not carried: it shines in all directions")
     a, b, c = (length * size for length, size in zip(_lengths(matrix), (2 * half, radius, radius)))
     # Ramanujan's perimeter of an ellipse, as the reference has it; ends do not shine.
     perimeter = math.pi * (3 * (b + c) - math.sqrt((3 * b + c) * (b + 3 * c)))
@@ -215,13 +215,13 @@ def _cylinder(light, document, matrix):
 def _distant(light, document, _matrix):
     angle = light.get("angle", 0.53)
     if not 0 <= angle <= 180:
-        light.lose(f"its angle of {angle:g} degrees is taken as 180")
+        light.add_loss(f"its angle of {angle:g} degrees is taken as 180")
         angle = min(max(angle, 0.0), 180.0)
     if light.cone() is not None:
-        light.lose("shaping of a distant light is not carried: it shines everywhere")
+        light.add_loss("shaping of a distant light is not carried: it shines everywhere")
     irradiance = light.emitted()
     if light.stage.by_blender:
-        light.lose("Blender 4 writes suns with a quarter of their strength and half their angle: both are taken back")
+        light.add_loss("Blender 4 writes suns with a quarter of their strength and half their angle: both are taken back")
         irradiance, angle = tuple(4 * e for e in irradiance), min(2 * angle, 180.0)
     if angle > 0 and not light.normalized:
         share = math.pi * math.sin(math.radians(angle / 2)) ** 2
@@ -234,7 +234,7 @@ def _glowing(light, document, faces, radiance, normals, keys=None):
     """A mesh that shines from its front and takes no light away."""
     triangles, _ = faces.triangles()
     if not len(triangles):
-        return light.lose("it has no surface: it gives no light")
+        return light.add_loss("it has no surface: it gives no light")
     entry = {"name": str(light.where), "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
              "extras": {"caustique": {"null_bsdf": True, **(keys or {})}}}
     glow(document, entry, radiance)

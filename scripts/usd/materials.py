@@ -7,7 +7,7 @@ import materialx
 import preview
 from network import Primvar, Reader, Texture
 from pxr import UsdShade
-from stage import finite, said
+from stage import custom_keys, finite
 from surface import Surface
 from faults import Fault
 from textures import Textures
@@ -39,7 +39,7 @@ class Materials:
         """The material that a prim or subset wears (UsdShade.Material), or None."""
         material, relationship = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(UsdShade.Tokens.full)
         if not material and relationship and relationship.GetTargets():
-            self._stage.losses.name(prim.GetPath(), f"the material {relationship.GetTargets()[0]} is not there")
+            self._stage.losses.add(prim.GetPath(), f"the material {relationship.GetTargets()[0]} is not there")
         return material if material else None
 
     def wear(self, material, closed, glow=None, fades=False):
@@ -66,7 +66,7 @@ class Materials:
         self._core(surface, entry, sets)
         self._normal(surface, entry, sets)
         self._emission(surface, entry, sets)
-        keys = said(material.GetPrim(), self._stage) if material else {}
+        keys = custom_keys(material.GetPrim(), self._stage) if material else {}
         self._extensions(surface, entry, sets, closed, keys, name)
         if keys:
             entry["extras"] = {"caustique": keys}
@@ -91,13 +91,13 @@ class Materials:
             return _READ[kind](mtlx, self._reader, losses)
         plain = material.ComputeSurfaceSource()[0]
         if kind and plain and plain.GetPath() != mtlx.GetPath():
-            losses.name(where, f"a surface {kind} is not read: its {identifier(plain)} takes its place")
+            losses.add(where, f"a surface {kind} is not read: its {identifier(plain)} takes its place")
         id_ = identifier(plain) if plain else None
         if id_ in _READ:
             return _READ[id_](plain, self._reader, losses)
         found = kind or id_
         what = f"a surface {found} is not read" if found else "it has no surface that is read"
-        losses.name(where, f"{what} (UsdPreviewSurface, OpenPBR, Standard Surface are): displayColor takes its place")
+        losses.add(where, f"{what} (UsdPreviewSurface, OpenPBR, Standard Surface are): displayColor takes its place")
         return Surface(base=Primvar("displayColor"), roughness=1.0, specular=0.0)
 
     def _core(self, surface, entry, sets):
@@ -191,7 +191,7 @@ class Materials:
         add("KHR_materials_transmission", self._textured(entry, sets, {"transmission": (surface.transmission, 0)}))
         thin = surface.thin or not closed
         if not closed and surface.thin is not True:
-            self._stage.losses.name(name, "it is worn by a mesh with holes, which has no inside: a thin pane there")
+            self._stage.losses.add(name, "it is worn by a mesh with holes, which has no inside: a thin pane there")
         volume = {"thicknessFactor": 0.0 if thin else 1.0}
         if surface.depth > 0 and not thin:
             volume.update(attenuationColor=list(surface.inside), attenuationDistance=surface.depth * self._stage.metres)
@@ -227,7 +227,7 @@ class Materials:
             raise Fault(entry["name"], f"its {what} is not finite", "give it numbers")
 
     def _lost(self, entry, what):
-        self._stage.losses.name(entry["name"], what)
+        self._stage.losses.add(entry["name"], what)
 
 
 def glow(document, entry, radiance):

@@ -65,14 +65,14 @@ def surface(shader, reader, losses):
         value = _read(reader, shader, name, default, key) if name else default
         if isinstance(value, (Texture, Primvar)) and (key not in _TEXTURED or (
                 isinstance(value, Primvar) and key != "base")):
-            losses.name(where, f"what feeds {name} is not carried: it has its default")
+            losses.add(where, f"what feeds {name} is not carried: it has its default")
             value = default
         given[key] = value
     for key, what in _LOST.items():
         if given[key]:
-            losses.name(where, what)
+            losses.add(where, what)
     if given["coat"] and given["coat_color"] != (1.0,) * 3:
-        losses.name(where, "the colour of its coat is not carried: the coat is clear")
+        losses.add(where, "the colour of its coat is not carried: the coat is clear")
     presence = given["presence"]
     if isinstance(presence, tuple):
         presence = sum(presence) / 3
@@ -83,7 +83,7 @@ def surface(shader, reader, losses):
                   coat_roughness=given["coat_roughness"], thin=bool(given["thin"]))
     out.emission = _scaled(given["emission_color"], given["emission"])
     if given["sheen"]:
-        losses.name(where, "its fuzz is taken for the sheen of glTF, whose lobe differs a little")
+        losses.add(where, "its fuzz is taken for the sheen of glTF, whose lobe differs a little")
         out.sheen = _scaled(given["sheen_color"], given["sheen"])
         out.sheen_roughness = given["sheen_roughness"]
     _transmit(out, given, where, losses)
@@ -110,11 +110,11 @@ def _transmit(out, given, where, losses):
         out.dispersion = 20 * given["dispersed"] / given["abbe"]
     if isinstance(out.transmission, Texture) or isinstance(out.base, (Texture, Primvar)) or out.transmission < 1:
         if out.depth == 0 and out.inside != out.base:
-            losses.name(where, "its transmission has the colour of its base")
+            losses.add(where, "its transmission has the colour of its base")
     else:
         out.base = out.inside if out.depth == 0 else (1.0,) * 3
     if any(out.scatter) and out.depth == 0:
-        losses.name(where, "transmission_scatter without a depth is not carried")
+        losses.add(where, "transmission_scatter without a depth is not carried")
         out.scatter = (0.0,) * 3
 
 

@@ -127,7 +127,7 @@ def of_prim(prim, stage):
     faces = Faces(where, points, get(mesh.GetFaceVertexCountsAttr(), ()), get(mesh.GetFaceVertexIndicesAttr(), ()),
                   mirrored)
     if (faces.counts < 3).any():
-        stage.losses.name(where, f"{(faces.counts < 3).sum()} faces with fewer than 3 corners are left out")
+        stage.losses.add(where, f"{(faces.counts < 3).sum()} faces with fewer than 3 corners are left out")
     holes = [h for h in get(mesh.GetHoleIndicesAttr(), ()) if 0 <= h < len(faces.counts)]
     return faces, holes
 
@@ -143,7 +143,7 @@ def primvar(prim, name, stage):
     except (TypeError, ValueError):
         return None
     if not values.size:
-        stage.losses.name(prim.GetPath(), f"its primvar {name} has no values and is ignored")
+        stage.losses.add(prim.GetPath(), f"its primvar {name} has no values and is ignored")
         return None
     return values.reshape(len(values), -1) if values.ndim else values.reshape(1, 1), found.GetInterpolation()
 
@@ -159,13 +159,13 @@ def authored_normals(prim, faces, stage):
             return None
         found = numpy.asarray(values, numpy.float64), mesh.GetNormalsInterpolation()
     if found[0].shape[1] != 3:
-        stage.losses.name(prim.GetPath(), f"normals has {found[0].shape[1]} numbers each: they are left out, and "
+        stage.losses.add(prim.GetPath(), f"normals has {found[0].shape[1]} numbers each: they are left out, and "
                           "its faces are flat")
         return None
     try:
         return faces.spread(*found, "normals")
     except Fault as fault:
-        stage.losses.name(prim.GetPath(), f"{fault.fault}: they are left out, and its faces are flat")
+        stage.losses.add(prim.GetPath(), f"{fault.fault}: they are left out, and its faces are flat")
         return None
 
 

@@ -69,7 +69,7 @@ class Reader:
         """What `read` gives where it is a constant; else `default`, and a loss."""
         found = self.read(shader, name, default)
         if isinstance(found, (Texture, Primvar)):
-            self.stage.losses.name(shader.GetPath(), f"what feeds {name} is not carried: it has its default")
+            self.stage.losses.add(shader.GetPath(), f"what feeds {name} is not carried: it has its default")
             return default
         return found
 
@@ -82,7 +82,7 @@ class Reader:
         path = shader_input.GetAttr().GetPath()
         if path in self._open or len(self._open) >= _DEEPEST:
             what = "feeds itself" if path in self._open else f"is more than {_DEEPEST} nodes deep"
-            self.stage.losses.name(path, f"its network {what}: it has its default")
+            self.stage.losses.add(path, f"its network {what}: it has its default")
             return False
         self._open.append(path)
         return True
@@ -100,7 +100,7 @@ class Reader:
             return found
         wanted = f"{len(default)} numbers" if isinstance(default, tuple) else f"a {kind_of(default)}"
         shown = f"{len(found)} numbers" if isinstance(found, tuple) else f"a {kind_of(found)}"
-        self.stage.losses.name(shader.GetPath(), f"what feeds {name} is {shown}, not {wanted}: it has its default")
+        self.stage.losses.add(shader.GetPath(), f"what feeds {name} is {shown}, not {wanted}: it has its default")
         return default
 
     def _node(self, shader, output):
@@ -119,7 +119,7 @@ class Reader:
             return self.read(shader, "value")
         if kind.startswith(_PASSING):
             return self._passed(shader, kind, output)
-        self.stage.losses.name(shader.GetPath(), f"a node {kind} is not carried: what it feeds has its default")
+        self.stage.losses.add(shader.GetPath(), f"a node {kind} is not carried: what it feeds has its default")
         return None
 
     def _passed(self, shader, kind, output):
@@ -133,7 +133,7 @@ class Reader:
             if channel in _CHANNELS:
                 found = dataclasses.replace(found, channel=channel)
             else:
-                self.stage.losses.name(shader.GetPath(), f"a channel {channel} is not carried: it hands on all of them")
+                self.stage.losses.add(shader.GetPath(), f"a channel {channel} is not carried: it hands on all of them")
         if isinstance(found, Texture) and kind.startswith("ND_normalmap"):
             strength = self.read(shader, "scale")
             if not isinstance(strength, (int, float)) and not (isinstance(strength, tuple) and len(strength) == 2):
@@ -147,7 +147,7 @@ class Reader:
         if asset is None:
             return self.read(shader, "fallback")
         if output not in _CHANNELS:
-            self.stage.losses.name(shader.GetPath(), f"it has no output {output}: what that feeds has its default")
+            self.stage.losses.add(shader.GetPath(), f"it has no output {output}: what that feeds has its default")
             return None
         constant = self.constant
         wraps = tuple(self._wrap(shader, constant(shader, name, "useMetadata")) for name in ("wrapS", "wrapT"))
@@ -181,7 +181,7 @@ class Reader:
 
     def _wrap(self, shader, mode):
         if mode not in _WRAPS:
-            self.stage.losses.name(shader.GetPath(), f"wrap mode {mode} is not carried: the image's edge goes on")
+            self.stage.losses.add(shader.GetPath(), f"wrap mode {mode} is not carried: the image's edge goes on")
         return _WRAPS.get(mode, 33071)
 
     def _coordinates(self, shader, name):
@@ -201,11 +201,11 @@ class Reader:
             if kind == "UsdTransform2d":
                 uv, before = self._coordinates(source, "in")
                 if before != still:
-                    self.stage.losses.name(source.GetPath(), "a UsdTransform2d before this one is not carried")
+                    self.stage.losses.add(source.GetPath(), "a UsdTransform2d before this one is not carried")
                 return uv, (self.constant(source, "scale", (1.0, 1.0)), self.constant(source, "rotation", 0.0),
                             self.constant(source, "translation", (0.0, 0.0)))
             if kind.startswith("ND_place2d"):
-                self.stage.losses.name(source.GetPath(), "a node ND_place2d is not carried: texture coordinates stay")
+                self.stage.losses.add(source.GetPath(), "a node ND_place2d is not carried: texture coordinates stay")
                 return self._coordinates(source, "texcoord")
             if kind.startswith("ND_texcoord"):
                 index = self.constant(source, "index", 0)

@@ -21,7 +21,7 @@ def surface(shader, reader, losses):
         _by_specular(out, read(shader, "specularColor", (0.0,) * 3), where, losses)
     displacement = read(shader, "displacement", 0.0)
     if displacement != 0:
-        losses.name(where, "displacement is not carried: displace the mesh before it is exported")
+        losses.add(where, "displacement is not carried: displace the mesh before it is exported")
     opacity = read(shader, "opacity", 1.0)
     if isinstance(opacity, Primvar):
         opacity = constant(shader, "opacity", 1.0)
@@ -29,15 +29,15 @@ def surface(shader, reader, losses):
     if isinstance(opacity, Texture) or out.threshold > 0 or present:
         out.presence = opacity
         if isinstance(opacity, Texture) and out.threshold == 0 and opacity.channel != "a":
-            losses.name(where, "its opacity texture is taken for presence: where it is 0 there is nothing, no glass")
+            losses.add(where, "its opacity texture is taken for presence: where it is 0 there is nothing, no glass")
     elif opacity != 1 and _is_metal(out.metallic):
-        losses.name(where, f"opacity {opacity:g} is not carried: metal is opaque (opacityMode \"presence\" makes holes in it)")
+        losses.add(where, f"opacity {opacity:g} is not carried: metal is opaque (opacityMode \"presence\" makes holes in it)")
     elif opacity != 1:
         out.transmission = 1 - opacity
         if opacity == 0:
             out.base = (1.0,) * 3
         else:
-            losses.name(where, f"opacity {opacity:g} is taken for glass that its diffuseColor tints")
+            losses.add(where, f"opacity {opacity:g} is taken for glass that its diffuseColor tints")
     return out
 
 
@@ -49,7 +49,7 @@ def _by_specular(out, color, where, losses):
     """The specular workflow: `color` is the reflectance at normal incidence, and there is no metal."""
     out.metallic = 0.0
     if isinstance(color, (Texture, Primvar)):
-        losses.name(where, "a texture of specularColor is not carried: use the metallic workflow")
+        losses.add(where, "a texture of specularColor is not carried: use the metallic workflow")
         return
     strongest = max(color)
     if strongest <= 0:

@@ -8,7 +8,7 @@ import pathlib
 from pxr import UsdGeom, UsdRender
 
 from faults import Fault
-from stage import said
+from stage import custom_keys
 
 # Keys of `extras.caustique` of a scene: what else stands in `caustique:` of the settings is an option of `render`.
 SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate"}
@@ -36,13 +36,13 @@ class Settings:
             return
         self.prim = found[0]
         if len(found) > 1:
-            stage.losses.name(self.prim.GetPath(), "the stage has several RenderSettings and names none as its own: "
+            stage.losses.add(self.prim.GetPath(), "the stage has several RenderSettings and names none as its own: "
                               "these are taken")
         products = [stage.stage.GetPrimAtPath(p) for p in UsdRender.Settings(self.prim).GetProductsRel().GetTargets()]
         self.products = [p for p in products if p and p.IsA(UsdRender.Product)]
         self.product = self.products[0] if self.products else None
         for other in self.products[1:]:
-            stage.losses.name(other.GetPath(), "only the first product is rendered: make RenderSettings with this product "
+            stage.losses.add(other.GetPath(), "only the first product is rendered: make RenderSettings with this product "
                               "alone")
         self._warn()
 
@@ -63,7 +63,7 @@ class Settings:
                 if found and found.IsA(UsdGeom.Camera):
                     return targets[0]
                 # Viewers leave settings behind with cameras of their own session.
-                self._stage.losses.name(prim.GetPath(), f"its camera {targets[0]} is not there: the first of the stage is "
+                self._stage.losses.add(prim.GetPath(), f"its camera {targets[0]} is not there: the first of the stage is "
                                         "taken")
         return None
 
@@ -117,7 +117,7 @@ class Settings:
         left, low, right, high = window
         inside = [min(max(x, 0.0), 1.0) for x in (left, low, right, high)]
         if inside != [left, low, right, high]:
-            self._stage.losses.name(self.prim.GetPath(), "its dataWindowNDC reaches beyond the picture: it is cut there")
+            self._stage.losses.add(self.prim.GetPath(), "its dataWindowNDC reaches beyond the picture: it is cut there")
         left, low, right, high = inside
         if right <= left or high <= low:
             raise Fault(self.prim.GetPath(), "its dataWindowNDC is empty", "it is xmin, ymin, xmax, ymax")
@@ -145,7 +145,7 @@ class Settings:
         return out
 
     def _said(self):
-        return said(self.prim, self._stage) if self.prim else {}
+        return custom_keys(self.prim, self._stage) if self.prim else {}
 
     def _layers(self):
         """Layers of the product's RenderVars, without what is not known, which is named."""
@@ -157,22 +157,22 @@ class Settings:
             ours = name in TABLE["layers"] or name.startswith(tuple(TABLE["groups"]))
             layer = LAYERS.get(name.lower(), name if ours else None)
             if layer is None:
-                self._stage.losses.name(target, f'there is no layer for the RenderVar\'s sourceName "{name}"')
+                self._stage.losses.add(target, f'there is no layer for the RenderVar\'s sourceName "{name}"')
             elif layer not in found:
                 found.append(layer)
         return found
 
     def _warn(self):
-        where, lose = self.prim.GetPath(), self._stage.losses.name
+        where, add_loss = self.prim.GetPath(), self._stage.losses.add
         if self.get("pixelAspectRatio", 1.0) != 1.0:
-            lose(where, "pixels that are not square are not carried")
+            add_loss(where, "pixels that are not square are not carried")
         space = self.get("renderingColorSpace")
         if space and space not in ("lin_rec709", "lin_rec709_scene"):
-            lose(where, f"renderingColorSpace {space} is not carried: colours are linear Rec. 709")
+            add_loss(where, f"renderingColorSpace {space} is not carried: colours are linear Rec. 709")
         if self.product and self.get("productType", "raster") != "raster":
-            lose(self.product.GetPath(), "a product that is no raster is rendered as one")
+            add_loss(self.product.GetPath(), "a product that is no raster is rendered as one")
         if self.product and UsdRender.Product(self.product).GetProductNameAttr().ValueMightBeTimeVarying():
-            lose(self.product.GetPath(), "its productName changes with time: the first is taken: write #### where the "
+            add_loss(self.product.GetPath(), "its productName changes with time: the first is taken: write #### where the "
                  "frame's number belongs, or give -o")
 
 

@@ -12,7 +12,7 @@ from dome import Dome, is_dome
 from faults import Fault
 from materials import Materials
 from render_settings import Settings
-from stage import PREDICATE, said
+from stage import PREDICATE, custom_keys
 
 _UNSEEN = {"BasisCurves": "curves are", "NurbsCurves": "curves are", "HermiteCurves": "curves are",
            "Points": "points are", "NurbsPatch": "a NURBS patch is", "TetMesh": "a tetrahedral mesh is",
@@ -97,11 +97,11 @@ class Scene:
         elif prim.IsA(UsdGeom.Mesh) or shapes.is_shape(prim) and kind not in _UNSEEN:
             mesh, size = self._mesh(prim)
             if mesh is not None:
-                keys = said(prim, self._stage)
+                keys = custom_keys(prim, self._stage)
                 extras = {"extras": {"caustique": keys}} if keys else {}
                 yield (lambda _: {"name": name, "mesh": mesh, **extras}), Gf.Matrix4d().SetScale(size) * matrix
         elif kind in _UNSEEN:
-            self._stage.losses.name(name, f"{_UNSEEN[kind]} not carried: convert to a mesh")
+            self._stage.losses.add(name, f"{_UNSEEN[kind]} not carried: convert to a mesh")
 
     def _instances(self, prim, matrix, purposes):
         """Copies of a PointInstancer's prototypes: meshes are shared, and each copy is a node."""
@@ -117,7 +117,7 @@ class Scene:
             raise Fault(where, f"it has {len(indices)} protoIndices, and positions for {len(places)}",
                         "export it again")
         if any(primvar.HasAuthoredValue() for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvars()):
-            stage.losses.name(where, "primvars of its copies are not carried: all look alike")
+            stage.losses.add(where, "primvars of its copies are not carried: all look alike")
         parts = {}
         for at, (index, place) in enumerate(zip(indices, places)):
             if mask and not mask[at]:
@@ -145,7 +145,7 @@ class Scene:
         parts = [(s, self._materials.bound(s.GetPrim()) or material) for s in subsets]
         form, size = (source.GetPath(), self._inherited(prim) if prim.IsInstanceProxy() else ()), 1.0
         if shapes.is_shape(prim) and not parts and not prim.HasAPI(UsdLux.LightAPI):
-            shape, size = shapes.form(prim, self._stage)
+            shape, size = shapes.shared_shape(prim, self._stage)
             form = shape, self._worn_values(prim)
         key = form, material and material.GetPath(), tuple(m and m.GetPath() for _, m in parts)
         if key not in self._meshes:
@@ -170,14 +170,14 @@ class Scene:
         if prim.IsA(UsdGeom.Mesh):
             found = meshes.of_prim(prim, stage)
             if found is None:
-                stage.losses.name(where, "it has no points")
+                stage.losses.add(where, "it has no points")
                 return None
             faces, holes = found
             normals = self._normals(prim, faces)
         else:
             found = shapes.of_prim(prim, stage, size)
             if found is None:
-                stage.losses.name(where, f"a {prim.GetTypeName()} is not carried")
+                stage.losses.add(where, f"a {prim.GetTypeName()} is not carried")
                 return None
             faces, normals = found
         triangles, of_face = faces.triangles(holes)
@@ -203,7 +203,7 @@ class Scene:
         """The faces of a GeomSubset."""
         where = subset.GetPrim().GetPath()
         if self._stage.get(subset.GetElementTypeAttr(), "face") != "face":
-            self._stage.losses.name(where, "a subset of anything but faces is not carried")
+            self._stage.losses.add(where, "a subset of anything but faces is not carried")
             return []
         chosen = numpy.asarray(self._stage.get(subset.GetIndicesAttr(), ()), numpy.int64)
         if len(chosen) and not 0 <= chosen.min() <= chosen.max() < count:
@@ -215,7 +215,7 @@ class Scene:
         scheme = self._stage.get(UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr(), "catmullClark")
         if scheme == "none":
             return meshes.authored_normals(prim, faces, self._stage)
-        self._stage.losses.name(prim.GetPath(), f"subdivision ({scheme}) is not carried: its control mesh is shown, "
+        self._stage.losses.add(prim.GetPath(), f"subdivision ({scheme}) is not carried: its control mesh is shown, "
                                 "shaded smoothly (subdivide it before it is exported)")
         return "smooth"
 
@@ -237,7 +237,7 @@ class Scene:
         for at, name in enumerate(worn.sets):
             found = meshes.primvar(prim, name, stage)
             if found is None:
-                stage.losses.name(prim.GetPath(), f"it has no primvar {name} for the textures of its material: they "
+                stage.losses.add(prim.GetPath(), f"it has no primvar {name} for the textures of its material: they "
                                   "are one colour on it")
                 found = numpy.zeros((1, 2)), UsdGeom.Tokens.constant
             values = faces.spread(*found, name)[:, :2] * (1, -1) + (0, 1)

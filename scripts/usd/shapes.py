@@ -17,7 +17,7 @@ _SIZES = {"Sphere": ("radius", 1.0), "Cube": ("size", 2.0)}
 _ATTRIBUTES = ("radius", "radiusTop", "radiusBottom", "height", "size", "width", "length", "axis")
 
 
-def form(prim, stage):
+def shared_shape(prim, stage):
     """What shapes that are copies of each other have in common, and the size of this one."""
     kind = prim.GetTypeName()
     if kind in _SIZES:

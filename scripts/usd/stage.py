@@ -34,7 +34,7 @@ class Stage:
             if layer.realPath:
                 self.check_place(layer.realPath, "the stage")
         for error in self.stage.GetCompositionErrors():
-            self.losses.name(getattr(error, "rootSite", None) and error.rootSite.path or "stage",
+            self.losses.add(getattr(error, "rootSite", None) and error.rootSite.path or "stage",
                              f"composition: {text_of(error)}")
         self.time = self._moment(frame)
         # USD's own function refuses a number that is no double.
@@ -45,7 +45,7 @@ class Stage:
         self.by_blender = (self.stage.GetRootLayer().documentation or "").startswith("Blender v4.")
         axis = UsdGeom.GetStageUpAxis(self.stage)
         if axis not in (UsdGeom.Tokens.y, UsdGeom.Tokens.z):
-            self.losses.name("/", f"upAxis is {axis}, which is neither Y nor Z: Y is up (turn the stage by a transform)")
+            self.losses.add("/", f"upAxis is {axis}, which is neither Y nor Z: Y is up (turn the stage by a transform)")
         self.z_up = axis == UsdGeom.Tokens.z
         self.to_world = self._axes() * Gf.Matrix4d().SetScale(self.metres)
         self._bake_skins()
@@ -80,9 +80,9 @@ class Stage:
                     attribute.Set(value, moment)
         for prim in roots:
             if prim.IsInstanceProxy():
-                self.losses.name(prim.GetPath(), "the skeleton of an instance is not carried: it stands as it is bound")
+                self.losses.add(prim.GetPath(), "the skeleton of an instance is not carried: it stands as it is bound")
             elif not UsdSkel.BakeSkinning(UsdSkel.Root(prim), Gf.Interval(moment, moment)):
-                self.losses.name(prim.GetPath(), "its skeleton could not be evaluated: it stands as it is bound")
+                self.losses.add(prim.GetPath(), "its skeleton could not be evaluated: it stands as it is bound")
 
     def check_place(self, path, what):
         """Raises where a file lies outside the stage's folder and may not."""
@@ -161,30 +161,30 @@ def _first_line(error):
     return ([line.strip() for line in lines if "Error" in line or "rror:" in line] or [str(error).strip()])[0]
 
 
-def said(prim, stage):
+def custom_keys(prim, stage):
     """Keys of `extras.caustique` that a prim's attributes `caustique:KEY` give; a colon stands for what is nested."""
     found = {}
     for attribute in prim.GetAuthoredPropertiesInNamespace("caustique"):
         value = stage.get(attribute) if isinstance(attribute, Usd.Attribute) else None
         if value is None:
-            stage.losses.name(prim.GetPath(), f"{attribute.GetName()} has no value and is ignored")
+            stage.losses.add(prim.GetPath(), f"{attribute.GetName()} has no value and is ignored")
             continue
         *above, key = attribute.GetName().split(":")[1:]
         if len(above) > _DEEPEST:
-            stage.losses.name(prim.GetPath(), f"an attribute caustique:* has more than {_DEEPEST} colons: it is "
+            stage.losses.add(prim.GetPath(), f"an attribute caustique:* has more than {_DEEPEST} colons: it is "
                               "ignored")
             continue
         at = found
         for part in above:
             at = at.setdefault(part, {}) if isinstance(at, dict) else None
         if not isinstance(at, dict):
-            stage.losses.name(prim.GetPath(), f"{attribute.GetName()} is ignored: what it is a part of has a value of "
+            stage.losses.add(prim.GetPath(), f"{attribute.GetName()} is ignored: what it is a part of has a value of "
                               "its own")
             continue
         try:
             at[key] = plain(value)
         except TypeError:
-            stage.losses.name(prim.GetPath(), f"{attribute.GetName()} is a {attribute.GetTypeName()} and is ignored")
+            stage.losses.add(prim.GetPath(), f"{attribute.GetName()} is a {attribute.GetTypeName()} and is ignored")
     return found
 
 

@@ -31,7 +31,7 @@ class Textures:
         entry = {"index": self._document.share("textures", {"source": image, "sampler": sampler})}
         if texture.uv not in sets:
             if len(sets) == 2:
-                self._stage.losses.name(texture.prim.GetPath(), f"more than two sets of texture coordinates: {sets[0]} "
+                self._stage.losses.add(texture.prim.GetPath(), f"more than two sets of texture coordinates: {sets[0]} "
                                         f"takes the place of {texture.uv}")
             else:
                 sets.append(texture.uv)
@@ -134,7 +134,7 @@ class Textures:
 
     def _clip(self, texture, values):
         if values.min() < -1e-4 or values.max() > 1 + 1e-4:
-            self._stage.losses.name(texture.prim.GetPath(), "texels outside 0 to 1 are clipped")
+            self._stage.losses.add(texture.prim.GetPath(), "texels outside 0 to 1 are clipped")
 
     def _file(self, texture):
         path = texture.asset.resolvedPath or texture.asset.path

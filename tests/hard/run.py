@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import families, judge, page, table
-from .guests import PEERS, Cannot, PeerStage
+from .peer_stage import PEERS, CannotTranslate, PeerStage
 from .stage import Broken, Stage, read
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,7 +35,7 @@ def play(stage):
     case, method = stage.case, stage.method
     try:
         verdict = case.answer.judge(stage)
-    except Cannot as cannot:
+    except CannotTranslate as cannot:
         return Result(case, method, "cannot", judge.Verdict(True, str(cannot)), 0.0, stage.commands, {})
     except Broken as broken:
         verdict = judge.Verdict(False, str(broken)[-400:], float("inf"))

@@ -12,7 +12,7 @@ import support
 from addon import ADDON, Installed, part_of_addon
 
 
-class Lives(Installed):
+class Package(Installed):
     def test_uninstalled_nothing_is_left(self):
         self.assertNotEqual(self.registered(), self.before)
         self.uninstall()

@@ -5,11 +5,11 @@ import math
 import os
 import unittest
 
-import beside  # first: it finds the scripts
+import cycles_comparison  # first: it finds the scripts
 import bpy
 import export
 import support
-from beside import eye, lamp, shared, square
+from cycles_comparison import eye, lamp, shared, square
 
 
 def matt(name, *color):
@@ -17,7 +17,7 @@ def matt(name, *color):
     return shared.node_material(name, "ShaderNodeBsdfPrincipled", Base_Color=(*color, 1), Roughness=1, Specular_IOR_Level=0)
 
 
-class Animation(beside.Beside):
+class Animation(cycles_comparison.CyclesComparison):
     """An object, a camera, a lamp, a shape key and an armature that move, rendered at frames 1, 7 and 12."""
 
     def keyed(self, thing, path, *values):

@@ -296,8 +296,8 @@ class Export(unittest.TestCase):
             bpy.context.view_layer.update()
             by_lamp = self.render().mean((0, 1))
             with ExitStack() as undo:
-                flat = objects.Flat(bpy.context.scene, undo, lambda *lost: self.fail(lost))
-                lighting.hang(flat, lambda *lost: self.fail(lost))
+                flat = objects.FlatScene(bpy.context.scene, undo, lambda *lost: self.fail(lost))
+                lighting.add_lamps(flat, lambda *lost: self.fail(lost))
                 lamp.hide_render = True
                 for body in flat.things:
                     if body.name.startswith(shape):

@@ -2,14 +2,14 @@
 
 import unittest
 
-import beside  # first: it finds the scripts
+import cycles_comparison  # first: it finds the scripts
 import bpy
 import export
 import glb
-from beside import eye, glow, lamp, square
+from cycles_comparison import eye, glow, lamp, square
 
 
-class Geometry(beside.Beside):
+class Geometry(cycles_comparison.CyclesComparison):
     def put(self, name, x, y, color, mesh=None, collection=None):
         body = bpy.data.objects.new(name, mesh or square(glow(name, color)))
         (collection or self.scene.collection).objects.link(body)

@@ -3,14 +3,14 @@
 import math
 import unittest
 
-import beside  # first: it finds the scripts
+import cycles_comparison  # first: it finds the scripts
 import bpy
 import export
 import glb
-from beside import eye, glow, lamp, shared, square
+from cycles_comparison import eye, glow, lamp, shared, square
 
 
-class Lamps(beside.Beside):
+class Lamps(cycles_comparison.CyclesComparison):
     def test_area_lamps_hide_and_let_light_through(self):
         """A camera above an area lamp sees the floor below, which a sky lights past the lamp; and so does one below."""
         self.floor()

@@ -5,16 +5,16 @@ import io
 import os
 import unittest
 
-import beside  # first: it finds the scripts
+import cycles_comparison  # first: it finds the scripts
 import bpy
 import export
 import glb
 import numpy
 import support
-from beside import eye, glow, lamp, shared, square
+from cycles_comparison import eye, glow, lamp, shared, square
 
 
-class Pictures(beside.Beside):
+class Pictures(cycles_comparison.CyclesComparison):
     def test_shift_and_size(self):
         """Lens shift of wide and tall, perspective and orthographic pictures, at the size of the scene."""
         for x in range(-3, 4):

@@ -5,10 +5,10 @@ import unittest
 
 import bpy
 import support
-from beside import Beside, eye, lamp, shared, square
+from cycles_comparison import CyclesComparison, eye, lamp, shared, square
 
 
-class Doors(Beside):
+class UsdAgainstGltf(CyclesComparison):
     """Pictures of one scene by both."""
 
     def through_usd(self, iterations, *options):

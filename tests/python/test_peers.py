@@ -56,7 +56,7 @@ class Shared(unittest.TestCase):
                 watch.time += watch.each
                 return 2
 
-            self.assertEqual(driver.passes(watch, render), 2 * expected, (each, budget))
+            self.assertEqual(driver.run_passes(watch, render), 2 * expected, (each, budget))
 
     def test_no_driver_is_left_out_of_the_program(self):
         source = (support.ROOT / "src" / "peers" / "drivers.rs").read_text()

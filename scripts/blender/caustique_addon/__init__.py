@@ -5,7 +5,7 @@ A render writes a copy of the scene, exports it in a Blender of its own (`handof
 and what it says of the scene is shown as it stands (`session`, `panels`).
 """
 
-from . import compatible, diagnosis, engine, panels, preferences, properties
+from . import blender_panels, diagnosis, engine, panels, preferences, properties
 
 # Blender before 4.2 reads this, newer ones blender_manifest.toml.
 bl_info = {
@@ -19,7 +19,7 @@ bl_info = {
 }
 
 # In this order: the engine and the panels read the properties.
-_PARTS = (preferences, properties, engine, diagnosis, panels, compatible)
+_PARTS = (preferences, properties, engine, diagnosis, panels, blender_panels)
 
 
 def register():

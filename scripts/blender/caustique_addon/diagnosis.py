@@ -7,8 +7,8 @@ from collections import namedtuple
 
 import bpy
 
-from . import asking, command, handoff, limits, preferences, program, session
-from .fault import Cancelled, Fault, of_error
+from . import command, handoff, ignored_settings, preferences, program, program_plan, session
+from .fault import Cancelled, Fault, fault_from_error
 
 #: What a plan says: a headline about caustics, the plan's own object (see `caustique plan --json`), all warnings, and
 #: the fault in whose place all this would stand, or None.
@@ -64,7 +64,7 @@ class Diagnose(bpy.types.Operator):
             path = program.find(chosen.program)
             frame = scene.frame_current + scene.frame_subframe
             job = handoff.Job(scene, context.view_layer.name, frame, self._folder, chosen.exporter)
-            warnings = limits.ignored(scene) + job.copy()
+            warnings = ignored_settings.warnings(scene) + job.copy()
             scale = scene.render.resolution_percentage
             size = (side * scale // 100 for side in (scene.render.resolution_x, scene.render.resolution_y))
             words = [path, "plan", handoff.GLB, "--json", *command.size(*size), *command.threads(scene.render),
@@ -78,12 +78,12 @@ class Diagnose(bpy.types.Operator):
             if fault is not None:
                 raise fault
             warnings = warnings + job.run(lambda: self._stopped)
-            said = asking.plan(words, self._folder, lambda: self._stopped)
-            self._plan = Plan(asking.headline(said), said, list(dict.fromkeys(warnings + said["warnings"])), None)
+            said = program_plan.read(words, self._folder, lambda: self._stopped)
+            self._plan = Plan(program_plan.headline(said), said, list(dict.fromkeys(warnings + said["warnings"])), None)
         except Cancelled:
             pass
         except Exception as error:  # in a thread, where it would be lost
-            self._plan = Plan("", None, [], of_error(error))
+            self._plan = Plan("", None, [], fault_from_error(error))
 
     def _end(self, context):
         shutil.rmtree(self._folder, ignore_errors=True)
@@ -94,7 +94,7 @@ class Diagnose(bpy.types.Operator):
             self.report({"ERROR"}, self._plan.fault.message())
             return {"CANCELLED"}
         if self.select:
-            _select(context, asking.named(context.scene, self._plan.warnings))
+            _select(context, program_plan.named_objects(context.scene, self._plan.warnings))
         self.report({"INFO"}, self._plan.headline)
         return {"FINISHED"}
 
@@ -110,7 +110,7 @@ class Select(bpy.types.Operator):
 
     def execute(self, context):
         """Select them, and nothing else."""
-        _select(context, asking.named(context.scene, [self.line]))
+        _select(context, program_plan.named_objects(context.scene, [self.line]))
         return {"FINISHED"}
 
 

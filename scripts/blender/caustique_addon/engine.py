@@ -12,8 +12,8 @@ import time
 import bpy
 import numpy
 
-from . import command, exr, handoff, limits, passes, preferences, program, run, session
-from .fault import Cancelled, of_error
+from . import command, exr, handoff, ignored_settings, passes, preferences, program, run, session
+from .fault import Cancelled, fault_from_error
 
 _PAUSE = 0.1  # seconds between two looks at the program
 _PREVIEW = "--preview"
@@ -42,7 +42,7 @@ class Engine(bpy.types.RenderEngine):
         except Cancelled:
             pass
         except Exception as error:
-            fault = of_error(error)
+            fault = fault_from_error(error)
             session.faults[depsgraph.scene.name] = fault
             self.report({"ERROR"}, fault.message())  # which ends an animation, too; `error_set` would not
         finally:
@@ -55,7 +55,7 @@ class Engine(bpy.types.RenderEngine):
             pass  # black: Blender crashes where it writes a picture that nobody has begun
         chosen = preferences.get(bpy.context)
         path = program.find(chosen.program)
-        self._warn(scene, limits.ignored(scene))
+        self._warn(scene, ignored_settings.warnings(scene))
         self.update_stats("", "Exporting")
         frame = scene.frame_current + scene.frame_subframe
         job = handoff.Job(depsgraph.scene, view_layer.name, frame, folder, chosen.exporter)

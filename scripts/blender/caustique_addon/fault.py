@@ -22,7 +22,7 @@ class Cancelled(Exception):
     """The user has stopped the work."""
 
 
-def of_error(error):
+def fault_from_error(error):
     """Any exception as a Fault. One that nobody foresaw is printed, too, for whoever mends it."""
     if isinstance(error, Fault):
         return error
@@ -31,7 +31,7 @@ def of_error(error):
                  "report it with the scene, and with what Blender has printed to its console")
 
 
-def of_program(lines, code):
+def fault_from_program(lines, code):
     """The Fault that the program tells of: its lines on stderr (what, then `hint: ` and the remedy), its exit code."""
     what, remedy = [], []
     for line in lines:

@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import asking, lines, properties, session
+from . import program_plan, properties, session, text_layout
 from .diagnosis import Diagnose, Select
 from .engine import Engine
 
@@ -52,7 +52,7 @@ class StopPanel(_Panel, bpy.types.Panel):
             value.active = getattr(settings, f"use_{name}")
             value.prop(settings, name, text="")
         if not any(getattr(settings, f"use_{name}") for name in _STOPS):
-            lines.draw(column, context, "Nothing is chosen: a render stops after 64 iterations", "INFO")
+            text_layout.draw(column, context, "Nothing is chosen: a render stops after 64 iterations", "INFO")
 
 
 class EffectsPanel(_Panel, bpy.types.Panel):
@@ -74,7 +74,7 @@ class EffectsPanel(_Panel, bpy.types.Panel):
             cells = _cells(effect) if effect else ()
             self._row(table, "prop", name, cells, settings, active=not effect or effect["present"])
         if plan and plan.said:
-            lines.draw(layout, context, plan.said["because"], "INFO")
+            text_layout.draw(layout, context, plan.said["because"], "INFO")
 
     @staticmethod
     def _row(table, kind, name, cells, settings=None, active=True):
@@ -122,11 +122,11 @@ class DiagnosisPanel(_Panel, bpy.types.Panel):
         if plan is None:
             return
         if plan.fault is not None:
-            lines.draw_fault(layout, context, plan.fault)
+            text_layout.draw_fault(layout, context, plan.fault)
             return
-        lines.draw(layout, context, plan.headline, "INFO")
-        for reason in asking.reasons(plan.said):
-            lines.draw(layout, context, reason, "DOT")
+        text_layout.draw(layout, context, plan.headline, "INFO")
+        for reason in program_plan.reasons(plan.said):
+            text_layout.draw(layout, context, reason, "DOT")
         _messages(layout, context, plan.warnings)
 
 
@@ -144,7 +144,7 @@ class MessagesPanel(_Panel, bpy.types.Panel):
     def draw(self, context):
         name = context.scene.name
         if name in session.faults:
-            lines.draw_fault(self.layout, context, session.faults[name])
+            text_layout.draw_fault(self.layout, context, session.faults[name])
         _messages(self.layout, context, session.warnings.get(name, []))
 
 
@@ -152,8 +152,8 @@ def _messages(layout, context, messages):
     """Lines, each with a button that selects the objects it names."""
     for line in messages:
         row = layout.box().row()
-        lines.draw(row, context, line, "ERROR")
-        if asking.named(context.scene, [line]):
+        text_layout.draw(row, context, line, "ERROR")
+        if program_plan.named_objects(context.scene, [line]):
             row.operator(Select.bl_idname, text="", icon="RESTRICT_SELECT_OFF").line = line
 
 

@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import lines, program
+from . import program, text_layout
 from .fault import Fault
 
 
@@ -27,9 +27,9 @@ class Preferences(bpy.types.AddonPreferences):
             path = program.find(self.program)
             layout.label(text=f"{path}, version {program.dotted(program.version(path))}", icon="CHECKMARK")
             for fault in program.missing_libraries(path):
-                lines.draw_fault(layout, context, fault)
+                text_layout.draw_fault(layout, context, fault)
         except Fault as fault:
-            lines.draw_fault(layout, context, fault)
+            text_layout.draw_fault(layout, context, fault)
         layout.prop(self, "exporter")
 
 

@@ -66,7 +66,7 @@ class Run:
         code = self._process.wait()
         self._listener.join()  # it may not have heard the last words yet
         if code not in (0, _INTERRUPTED):
-            raise fault.of_program(self._rest, code)
+            raise fault.fault_from_program(self._rest, code)
 
 
 def fraction(progress):

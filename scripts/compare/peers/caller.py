@@ -13,7 +13,7 @@ PACKAGES = ROOT / ".venv-peers" / "bpy"
 MARK = "PEER "
 
 
-class Cannot(Exception):
+class CannotTranslate(Exception):
     """The renderer cannot represent the scene; the message says why."""
 
 
@@ -31,11 +31,11 @@ def environment(driver):
 
 
 def answer(output):
-    """What a driver has answered, as a dict; None where it has not. A scene that it cannot translate is `Cannot`."""
+    """What a driver has answered, as a dict; None where it has not. A scene that it cannot translate is `CannotTranslate`."""
     lines = [line for line in output.splitlines() if line.startswith(MARK)]
     if not lines:
         return None
     facts = json.loads(lines[-1][len(MARK) :])
     if "cannot" in facts:
-        raise Cannot("; ".join(facts["cannot"]))
+        raise CannotTranslate("; ".join(facts["cannot"]))
     return facts

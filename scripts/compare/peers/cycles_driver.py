@@ -237,7 +237,7 @@ def main():
     options = driver.options(["path", "path_guiding"])
     of = plain_scene.Scene(options.scene, options.camera)
     if of.blockers:
-        driver.say(cannot=of.blockers)
+        driver.print_answer(cannot=of.blockers)
         return
     with tempfile.TemporaryDirectory(prefix="caustique-cycles-") as folder:
         scene = build(of, folder)
@@ -251,8 +251,8 @@ def main():
             total = total + samples * picture
             return samples
 
-        samples = one(0) if options.clock == "wall" else driver.passes(watch, one)
-        driver.done(watch, samples, bpy.app.version_string, approximations(of))
+        samples = one(0) if options.clock == "wall" else driver.run_passes(watch, one)
+        driver.report(watch, samples, bpy.app.version_string, approximations(of))
         pictures.write(options.output, total / samples)
 
 

@@ -70,12 +70,12 @@ def options(modes):
     return parser.parse_args()
 
 
-def say(**facts):
+def print_answer(**facts):
     """The line that the caller reads."""
     print("PEER " + json.dumps(facts), flush=True)
 
 
-def passes(watch, render):
+def run_passes(watch, render):
     """Calls `render(number)`, which returns samples a pixel, until another call would leave the budget by more than half
     of itself; returns all samples."""
     total = number = 0
@@ -87,9 +87,9 @@ def passes(watch, render):
             return total
 
 
-def done(watch, samples, version, approximations):
+def report(watch, samples, version, approximations):
     """Says what was rendered; called before the picture is written."""
-    say(
+    print_answer(
         seconds=round(watch.seconds(), 4),
         core_seconds=round(watch.core_seconds(), 4),
         startup_seconds=round(watch.startup, 4),

@@ -277,7 +277,7 @@ def main():
     options = driver.options(list(ENGINES))
     scene = plain_scene.Scene(options.scene, options.camera)
     if scene.blockers:
-        driver.say(cannot=scene.blockers)
+        driver.print_answer(cannot=scene.blockers)
         return
     lux.Init(lambda message: None)
     with tempfile.TemporaryDirectory(prefix="caustique-luxcore-") as folder:
@@ -292,7 +292,7 @@ def main():
             session.UpdateStats()
             samples = session.GetStats().Get("stats.renderengine.pass").GetFloat()
         session.Stop()
-        driver.done(watch, samples, lux.Version(), approximations(scene))
+        driver.report(watch, samples, lux.Version(), approximations(scene))
         picture = np.zeros(options.width * options.height * 3, np.float32)
         session.GetFilm().GetOutputFloat(lux.FilmOutputType.RGB, picture, 0)
         pictures.write(options.output, picture.reshape(options.height, options.width, 3)[::-1])

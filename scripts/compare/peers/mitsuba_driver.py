@@ -31,7 +31,7 @@ def main():
             scene.cameras = [camera for camera in scene.cameras if camera.name == options.camera]
         built = mitsuba_world.build(scene, options.width, options.height, correct=True)
     except gltf.Unsupported as unsupported:
-        driver.say(cannot=[str(unsupported)])
+        driver.print_answer(cannot=[str(unsupported)])
         return
     watch = driver.Stopwatch(options)
     total, each = np.zeros((options.height, options.width, 3)), 1
@@ -47,8 +47,8 @@ def main():
             each = min(2 * each, most)
         return samples
 
-    samples = driver.passes(watch, render)
-    driver.done(watch, samples, f"{mi.__version__} ({name})", [])
+    samples = driver.run_passes(watch, render)
+    driver.report(watch, samples, f"{mi.__version__} ({name})", [])
     pictures.write(options.output, total / samples)
 
 

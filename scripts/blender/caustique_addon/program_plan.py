@@ -10,7 +10,7 @@ _PATIENCE = 0.1  # seconds between two questions whether to give up
 _CAUSTICS = ("caustic", "sds")
 
 
-def plan(words, folder, stopped):
+def read(words, folder, stopped):
     """The object that a command line with --json prints in a folder. `stopped` is asked whether to give up."""
     process = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True, errors="replace")
@@ -25,7 +25,7 @@ def plan(words, folder, stopped):
                 raise fault.Cancelled() from None
     if process.returncode != 0:
         lines = [handoff.without_file(line) for line in told.splitlines() if not line.startswith("warning: ")]
-        raise fault.of_program(lines, process.returncode)
+        raise fault.fault_from_program(lines, process.returncode)
     try:
         return json.loads(said)
     except ValueError as error:
@@ -50,7 +50,7 @@ def reasons(said):
     return [reason for effect in said["effects"] if effect["name"] in _CAUSTICS for reason in effect["because"]]
 
 
-def named(scene, lines):
+def named_objects(scene, lines):
     """The objects of a scene that lines like `object "A": ..` or `material "B" on "C": ..` name, each once.
 
     A material stands for all that wear it, for lists of objects are cut where they are long.

@@ -23,7 +23,7 @@ def folder():
     return os.path.join(base, "caustique", "bake")
 
 
-def kept(key):
+def load(key):
     """The array that was stored under `key`, or None."""
     path = os.path.join(folder(), key + ".npy")
     try:
@@ -34,7 +34,7 @@ def kept(key):
     return texels.astype(numpy.float32)
 
 
-def keep(key, texels):
+def store(key, texels):
     """Store an array of halves under `key`, and drop what nobody has asked for in a month.
 
     A folder that cannot be written costs time at the next export and nothing else.
@@ -62,7 +62,7 @@ def digest(*parts):
     return total.hexdigest()[:40]
 
 
-def of_mesh(mesh):
+def mesh_digest(mesh):
     """A digest of shape, normals, materials by face, and every attribute of a mesh."""
     parts = [bpy.app.version_string]
     for attribute in mesh.attributes:
@@ -84,7 +84,7 @@ def of_mesh(mesh):
     return digest(*parts, corners, starts, tuple(mesh.texspace_location), tuple(mesh.texspace_size))
 
 
-def of_tree(tree):
+def tree_digest(tree):
     """A digest of what a node tree computes: nodes, values, links, images, groups."""
     parts = []
     for node in tree.nodes:
@@ -93,7 +93,7 @@ def of_tree(tree):
         if not node.inputs:
             parts += [_plain(s.default_value) for s in node.outputs if hasattr(s, "default_value")]
         if node.type == "GROUP" and node.node_tree is not None:
-            parts.append(of_tree(node.node_tree))
+            parts.append(tree_digest(node.node_tree))
     parts += sorted((k.from_node.name, k.from_socket.identifier, k.to_node.name, k.to_socket.identifier, k.is_muted)
                     for k in tree.links)
     return digest(*parts)

@@ -8,14 +8,14 @@ import tempfile
 import unittest
 from unittest import mock
 
+import bpy  # first: it brings bmesh
 import bmesh
-import bpy
 
 import support
 from addon import Installed, part_of_addon
 
 
-class Tells(Installed):
+class Messages(Installed):
     """What goes wrong, and what is left aside, is said where the user looks."""
 
     def fault(self):
@@ -191,12 +191,12 @@ class Tells(Installed):
         self.assertTrue([line for line in self.said() if "left out, though called for" in line], self.said())
 
     def test_settings_of_blender_that_are_left_aside(self):
-        limits, render = part_of_addon("limits"), self.scene.render
-        self.assertEqual(limits.ignored(self.scene), [])
+        ignored_settings, render = part_of_addon("ignored_settings"), self.scene.render
+        self.assertEqual(ignored_settings.warnings(self.scene), [])
         for name in ("use_motion_blur", "use_multiview", "use_freestyle"):
             setattr(render, name, True)
         render.pixel_aspect_x = 2
-        lines = limits.ignored(self.scene)
+        lines = ignored_settings.warnings(self.scene)
         self.assertEqual(len(lines), 4)
         self.assertTrue(all(": " in line for line in lines))
 
@@ -204,7 +204,7 @@ class Tells(Installed):
         self.stage()
         bpy.data.objects["plane"].modifiers.new("Flag", "CLOTH")
         bpy.data.objects["ball"].modifiers.new("Smooth", "SUBSURF")
-        said = part_of_addon("limits").ignored(self.scene)
+        said = part_of_addon("ignored_settings").warnings(self.scene)
         self.assertEqual(len(said), 1)
         self.assertIn('object "plane": its modifier Flag is not simulated for the render: apply it', said[0])
 
@@ -225,7 +225,7 @@ class Tells(Installed):
         self.assertTrue([line for line in self.said() if line.startswith('image "paint": ')], self.said())
 
 
-class Diagnoses(Installed):
+class Diagnosis(Installed):
     def ask(self):
         bpy.ops.caustique.diagnose()
         return part_of_addon("session").plans[self.scene.name]
@@ -277,12 +277,12 @@ class Diagnoses(Installed):
 
     def test_names_in_lines(self):
         self.stage()
-        named = part_of_addon("asking").named
+        named_objects = part_of_addon("program_plan").named_objects
         for line, names in (('object "ball": no light', ["ball"]),
                             ('material "ball glass" on "x" and 2 more', ["ball"]),
                             ('light "sun": all its light stays within "plane"', ["sun", "plane"]),
                             ('world "plane": its nodes', []), ("nothing", [])):
-            self.assertEqual([thing.name for thing in named(self.scene, [line])], names, line)
+            self.assertEqual([thing.name for thing in named_objects(self.scene, [line])], names, line)
 
 
 if __name__ == "__main__":

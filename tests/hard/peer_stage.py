@@ -7,7 +7,7 @@ each seed; a verdict that noise leaves open is said as such, and a longer budget
 import subprocess
 
 import caller
-from caller import Cannot
+from caller import CannotTranslate
 
 from .stage import Broken, Stage
 
@@ -22,7 +22,7 @@ PEERS = {
 DEPTH = 1000
 PATIENCE = 120
 
-__all__ = ["PEERS", "Cannot", "PeerStage"]
+__all__ = ["PEERS", "CannotTranslate", "PeerStage"]
 
 
 class PeerStage(Stage):

@@ -2,7 +2,7 @@
 
 import numpy
 
-from graph import feed
+from graph import source_socket
 
 _WRAPS = {"REPEAT", "EXTEND", "MIRROR"}
 _COARSE = 256  # texels
@@ -58,14 +58,14 @@ def normal_map(value):
     strength, colour = node.inputs["Strength"], node.inputs["Color"]
     if strength.is_linked or strength.default_value != 1 or not colour.is_linked:
         return None
-    output, path = feed(colour)
+    output, path = source_socket(colour)
     plain = output is not None and output.is_output and not path and image_of(output, data=True) is not None
     return node if plain else None
 
 
-def leans(node, cosine):
+def leaning_share(node, cosine):
     """The share of a Normal Map node's texels whose normal is farther from the surface's than this cosine."""
-    output, _ = feed(node.inputs["Color"])
+    output, _ = source_socket(node.inputs["Color"])
     return float(numpy.mean(_pixels(output.node.image)[:, 2] * 2 - 1 < cosine))
 
 
@@ -73,7 +73,7 @@ def _plain_coordinates(socket):
     """Whether an image's coordinates are the UV map that the mesh shows in renders, moved by one Mapping at most."""
     if not socket.is_linked:
         return True
-    output, path = feed(socket)
+    output, path = source_socket(socket)
     if output is None or not output.is_output or path:
         return False
     node = output.node
@@ -89,5 +89,5 @@ def _plain_coordinates(socket):
 
 
 def _moved(socket):
-    output, _ = feed(socket)
+    output, _ = source_socket(socket)
     return output is not None and output.is_output and output.node.type == "MAPPING"

@@ -7,11 +7,11 @@ import bpy
 import numpy
 
 import gltfmaterial
-import plain
+import direct_images
 import shading
 import standin
 from gltfmaterial import PLAIN
-from graph import feed, is_constant
+from graph import is_constant, source_socket
 from matching import Matched, match
 
 _PASSES = {
@@ -69,7 +69,7 @@ class Plan:
         self._displacement(output, values)
         self._name_plain(values)
         if not (is_constant(values["strength"]) and (is_constant(values["emission"]) or "emission" in self.links)):
-            values["emission"] = self.graph.times(values["emission"], values["strength"])
+            values["emission"] = self.graph.multiply(values["emission"], values["strength"])
             values["strength"] = 1.0
         varying = [n for n, v in values.items() if n not in self.links and not is_constant(v)]
         if self.bumped and "normal" not in varying:
@@ -119,17 +119,17 @@ class Plan:
         across = g.node("ShaderNodeVectorMath", "CROSS_PRODUCT", normal, along.outputs[0])
         x, y = (g.node("ShaderNodeVectorMath", "DOT_PRODUCT", tangent, axis, output="Value")
                 for axis in (along.outputs[0], across))
-        long = g.power(g.plus(g.times(x, x), g.times(y, y)), 0.5)
+        long = g.power(g.add(g.multiply(x, x), g.multiply(y, y)), 0.5)
         # As an image holds it, for a baked light is not negative.
-        return g.joined([g.plus(g.times(g.over(part, long), 0.5), 0.5) for part in (x, y)] + [0.0])
+        return g.combine_channels([g.add(g.multiply(g.divide(part, long), 0.5), 0.5) for part in (x, y)] + [0.0])
 
     def _name_plain(self, values):
         """Find what the exporter carries as it is: `self.links` by channel, the socket that it reads."""
         links, base, alpha = self.links, values["base"], values["alpha"]
-        image = plain.image_of(base, data=False) if not is_constant(base) else None
+        image = direct_images.image_of(base, data=False) if not is_constant(base) else None
         if image is not None:
             own = not is_constant(alpha) and alpha.node == image and alpha.name == "Alpha"
-            if own or (is_constant(alpha) and plain.is_opaque(image.image)):
+            if own or (is_constant(alpha) and direct_images.is_opaque(image.image)):
                 links["base"] = base
                 if own:
                     links["alpha"] = alpha
@@ -140,14 +140,14 @@ class Plan:
                 links.update({name: socket for name, (_, socket) in found.items()})
         emission = values["emission"]
         if not is_constant(emission) and is_constant(values["strength"]):
-            image = plain.image_of(emission, data=False)
-            if image is not None and plain.is_opaque(image.image):
+            image = direct_images.image_of(emission, data=False)
+            if image is not None and direct_images.is_opaque(image.image):
                 links["emission"] = emission
         normal = values["normal"]
         stretched = not is_constant(values["direction"])
-        if normal is not None and not self.bumped and not stretched and plain.normal_map(normal) is not None:
+        if normal is not None and not self.bumped and not stretched and direct_images.normal_map(normal) is not None:
             links["normal"] = normal
-            if plain.leans(normal.node, _STEEP) > 0.01:
+            if direct_images.leaning_share(normal.node, _STEEP) > 0.01:
                 self.say(_IS_STEEP)
 
     def _data(self, value, part):
@@ -156,11 +156,11 @@ class Plan:
         grey = node.type == "RGBTOBW"
         if not grey and (node.type != "SEPARATE_COLOR" or node.mode != "RGB" or value.name != part):
             return None
-        output, path = feed(node.inputs[0])
+        output, path = source_socket(node.inputs[0])
         if path or output is None or not output.is_output:
             return None
-        image = plain.image_of(output, data=True)
-        if image is None or (grey and not plain.is_grey(image.image)):
+        image = direct_images.image_of(output, data=True)
+        if image is None or (grey and not direct_images.is_grey(image.image)):
             return None
         return image, output if grey else value
 
@@ -180,11 +180,11 @@ class Plan:
             return values["normal"]
         if name == "stretch":
             split = self.graph.tree.nodes.new("ShaderNodeSeparateXYZ")
-            self.graph.put(values["direction"], split.inputs[0])
-            return self.graph.joined([*split.outputs[:2], values["anisotropy"]])
+            self.graph.connect(values["direction"], split.inputs[0])
+            return self.graph.combine_channels([*split.outputs[:2], values["anisotropy"]])
         if len(parts) == 1:
             return values[parts[0]]
-        return self.graph.joined([self.graph.grey(values[part]) for part in parts])
+        return self.graph.combine_channels([self.graph.grey(values[part]) for part in parts])
 
     def resolved(self, baked):
         """The channels, with texels in the place of what was baked: {pass: texels}."""
@@ -217,7 +217,7 @@ class Plan:
         sockets = {"base": "Base Color", "alpha": "Alpha", "roughness": "Roughness", "metallic": "Metallic",
                    "emission": "Emission Color", "normal": "Normal"}
         for name, value in self.links.items():
-            graph.put(value, node.inputs[sockets[name]])
+            graph.connect(value, node.inputs[sockets[name]])
         node.inputs["Emission Strength"].default_value = 1.0 if "emission" in self.links else 0.0
         transmission = self.channels["transmission"]
         node.inputs["Transmission Weight"].default_value = transmission if isinstance(transmission, float) else 1.0

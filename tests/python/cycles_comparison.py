@@ -43,7 +43,7 @@ def eye(at, to, **values):
     return body
 
 
-class Beside(unittest.TestCase):
+class CyclesComparison(unittest.TestCase):
     """An empty scene of small pictures."""
 
     def setUp(self):

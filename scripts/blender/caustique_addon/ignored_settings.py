@@ -3,7 +3,7 @@
 _SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT"}
 
 
-def ignored(scene):
+def warnings(scene):
     """A line for each such setting that is in use in `scene`."""
     render = scene.render
     found = [
