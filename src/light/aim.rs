@@ -1,9 +1,8 @@
-//! Aiming light from infinity: half of its paths start over the objects that can make caustics.
+//! Aimed emission of light from infinity: half of the light paths start towards objects that can make caustics.
 //!
-//! Light from infinity enters through a disc as large as the scene, and of a small glass on a wide floor it would
-//! hardly hit anything. Paths are drawn from a mixture of the whole disc and of the discs of the targets' bounding
-//! spheres; each carries the flux that its density in the mixture asks for, so the estimate is the same and no path is
-//! lost.
+//! Unaimed paths enter the scene through a disc as large as the scene, so few of them hit a small glass on a wide floor.
+//! Aimed starts are sampled from a mixture of the scene's disc and the discs of the targets' bounding spheres. The flux
+//! of a path is divided by its density in the mixture, so the estimate remains unbiased.
 
 use super::{Cdf, EmissionSample, EntryDisc, Region, Sky};
 use crate::geometry::Shapes;
@@ -11,32 +10,35 @@ use crate::material::Materials;
 use crate::math::{Frame, Vec2, Vec3, warp};
 use std::f32::consts::PI;
 
-/// Share of the paths that are aimed.
-const AIMED: f32 = 0.5;
-/// More targets than this are joined, those first whose joint sphere is smallest.
+/// Share of the paths that start on the disc of a target.
+const AIMED_SHARE: f32 = 0.5;
+/// Maximum number of targets; [`merged_spheres`] merges nearby ones.
 const MAX_TARGETS: usize = 32;
-/// More objects than this are joined by where they are, before that is looked at.
+/// Maximum number of spheres for [`merged_spheres`], whose cost is quadratic; [`spatially_merged`] merges others first.
 const MAX_SPHERES: usize = 512;
+/// Share of the paths that start on a disc of the region of interest, in a scene without targets.
+const REGION_SHARE: f32 = 0.5;
+/// Share of the paths that start on a disc of the region of interest, in a scene with targets.
+const REGION_SHARE_WITH_TARGETS: f32 = 1.0 / 3.0;
 
-/// Shares of the paths that go through a region of interest and its initial_media, without targets and with them.
-const LIT: (f32, f32) = (0.5, 1.0 / 3.0);
-/// Squared distance of a line from a point.
+/// Squared distance of `center` from the line through `p` along the unit `d`.
 #[inline]
-fn from_line(center: Vec3, p: Vec3, d: Vec3) -> f32 {
+fn distance_to_line2(center: Vec3, p: Vec3, d: Vec3) -> f32 {
     let v = p - center;
     (v - d * v.dot(d)).length_squared()
 }
 
-/// Bounding spheres of what can make caustics.
+/// Bounding spheres of the objects that can make caustics.
 pub struct CausticTargets {
+    /// Centres and radii (m).
     spheres: Vec<(Vec3, f32)>,
-    /// Choice in proportion to the discs' areas.
+    /// Selects a target in proportion to the area of its disc.
     choice: Option<Cdf>,
-    /// Sum of the areas.
+    /// Sum of the areas of the discs (m2).
     area: f32,
 }
 
-/// Bounding sphere of points: the centre of their box, the farthest of them.
+/// Bounding sphere of points, around the centre of their bounding box.
 fn bounding_sphere(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, f32)> {
     let (low, high) =
         points.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
@@ -58,8 +60,9 @@ fn join(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     (a.0 + (b.0 - a.0) * ((radius - a.1) / distance), radius)
 }
 
-/// At most `most` spheres: groups are halved along their widest axis until there are so many.
-fn halved(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
+/// Merges spheres until at most `most` remain: repeatedly halves the largest group along its widest axis, then merges
+/// each group.
+fn spatially_merged(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
     if spheres.len() <= most {
         return spheres;
     }
@@ -82,10 +85,10 @@ fn halved(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
     groups.into_iter().filter_map(|group| group.into_iter().reduce(join)).collect()
 }
 
-/// At most `most` spheres: the two whose joint sphere is smallest are joined until there are so many, so that what is
-/// small and alone stays so.
-fn gathered(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
-    // The best partner of each among those after it; only what has lost its own is looked at again.
+/// Merges spheres until at most `most` remain: repeatedly merges the pair with the smallest enclosing sphere, so that
+/// small isolated spheres stay small.
+fn merged_spheres(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
+    // For each sphere, the best partner among the later ones. It is searched again only if that partner was merged.
     let partner = |spheres: &[(Vec3, f32)], i: usize| {
         let joint = |j: usize| (join(spheres[i], spheres[j]).1, j);
         (i + 1..spheres.len()).map(joint).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f32::INFINITY, i))
@@ -115,7 +118,7 @@ fn gathered(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
 }
 
 impl CausticTargets {
-    /// The targets of a scene.
+    /// Finds the targets of a scene.
     pub fn new(shapes: &Shapes, materials: &Materials) -> CausticTargets {
         let spheres: Vec<(Vec3, f32)> = shapes
             .instances
@@ -126,74 +129,76 @@ impl CausticTargets {
                 bounding_sphere(mesh.positions.iter().map(|&p| instance.point(p)))
             })
             .collect();
-        let spheres = gathered(halved(spheres, MAX_SPHERES), MAX_TARGETS);
+        let spheres = merged_spheres(spatially_merged(spheres, MAX_SPHERES), MAX_TARGETS);
         let areas = spheres.iter().map(|s| PI * s.1 * s.1);
         let area = areas.clone().sum();
         CausticTargets { choice: Cdf::new(areas.map(f64::from)), spheres, area }
     }
 
-    /// Turns the start of a path from infinity, drawn uniformly over the scene's disc, into one drawn from the mixture.
-    /// `u` decides whether it is aimed, and at which target; `point` where on its disc.
+    /// Turns the start of a light path from infinity, sampled uniformly on the scene's disc, into a start sampled from
+    /// the mixture. `u` selects the scene's disc or a target, `point` a point of the target's disc.
     pub fn aim(&self, sky: &Sky, emission: &mut EmissionSample, u: f32, point: Vec2) {
         let Some(choice) = &self.choice else { return };
-        if u < AIMED {
-            let (target, ..) = choice.sample(f64::from(u / AIMED));
-            self.through(sky, emission, target, point);
+        if u < AIMED_SHARE {
+            let (target, ..) = choice.sample(f64::from(u / AIMED_SHARE));
+            self.aim_at(sky, emission, target, point);
         } else {
-            self.weigh(sky, emission);
+            self.apply_mixture(sky, emission);
         }
     }
 
-    /// The same, and part of the paths through the disc of a region. Flux and density are those without the region:
-    /// [`CausticTargets::lit`] has the mixture's.
+    /// [`CausticTargets::aim`], with part of the starts on a disc of the region. Flux and density do not account for the
+    /// region: [`CausticTargets::density_with_region`] returns the density of the whole mixture.
     pub fn aim_with_region(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
-        let lit = self.share_lit();
-        if u < lit {
-            let radius = region.sample(u / lit);
+        let share = self.region_share();
+        if u < share {
+            let radius = region.sample(u / share);
             emission.entry = EntryDisc::Region(radius);
-            emission.origin = Self::point(sky, emission.direction, (region.center, radius), point);
-            self.weigh(sky, emission);
+            emission.origin = Self::sample_origin(sky, emission.direction, (region.center, radius), point);
+            self.apply_mixture(sky, emission);
         } else {
-            self.aim(sky, emission, (u - lit) / (1.0 - lit), point);
+            self.aim(sky, emission, (u - share) / (1.0 - share), point);
         }
     }
 
-    fn share_lit(&self) -> f32 {
-        if self.choice.is_none() { LIT.0 } else { LIT.1 }
+    fn region_share(&self) -> f32 {
+        if self.choice.is_none() { REGION_SHARE } else { REGION_SHARE_WITH_TARGETS }
     }
 
-    /// Density of an aimed start in the mixture with a region, and the part of it that all light has: without the
-    /// targets.
+    /// Density per area of an aimed start in the mixture with the region, and the part of this density without the
+    /// discs of the targets.
     pub fn density_with_region(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
-        let lit = self.share_lit();
+        let share = self.region_share();
         let (p, d, aimed) = (emission.origin, emission.direction, emission.density.onward);
         let drawn = if let EntryDisc::Region(radius) = emission.entry { radius } else { 0.0 };
-        let through = lit * region.density(from_line(region.center, p, d), drawn);
-        ((1.0 - lit) * aimed + through, (1.0 - lit) * aimed * self.unaimed(sky, emission) + through)
+        let through = share * region.density(distance_to_line2(region.center, p, d), drawn);
+        ((1.0 - share) * aimed + through, (1.0 - share) * aimed * self.unaimed_share(sky, emission) + through)
     }
 
-    /// The same, drawn through the disc of one target.
-    pub fn through(&self, sky: &Sky, emission: &mut EmissionSample, target: usize, point: Vec2) {
+    /// Moves the start of a light path from infinity to a point of the disc of `target`, with the flux and density of
+    /// the mixture.
+    pub fn aim_at(&self, sky: &Sky, emission: &mut EmissionSample, target: usize, point: Vec2) {
         emission.entry = EntryDisc::Target(target);
-        emission.origin = Self::point(sky, emission.direction, self.spheres[target], point);
-        self.weigh(sky, emission);
+        emission.origin = Self::sample_origin(sky, emission.direction, self.spheres[target], point);
+        self.apply_mixture(sky, emission);
     }
 
-    /// A point of the line along `d` through a point of a sphere's disc, upstream of everything, as all starts are.
-    fn point(sky: &Sky, d: Vec3, (center, radius): (Vec3, f32), point: Vec2) -> Vec3 {
+    /// Samples a line along `d` through the disc of a sphere, and returns the origin on it outside the scene's bounding
+    /// sphere.
+    fn sample_origin(sky: &Sky, d: Vec3, (center, radius): (Vec3, f32), point: Vec2) -> Vec3 {
         let frame = Frame::from_normal(d);
         let q = warp::disc_concentric(point) * radius;
         let p = center + frame.t * q.x + frame.b * q.y;
         p - d * ((p - sky.center).dot(d) + sky.radius)
     }
 
-    /// Gives a start the flux and density of the mixture; it has those of the uniform density alone.
-    fn weigh(&self, sky: &Sky, emission: &mut EmissionSample) {
-        emission.density.onward = self.density_drawn(sky, emission.origin, emission.direction, Some(emission.entry));
+    /// Replaces flux and density of a start on the scene's disc by those of the mixture.
+    fn apply_mixture(&self, sky: &Sky, emission: &mut EmissionSample) {
+        emission.density.onward = self.mixture_density(sky, emission.origin, emission.direction, Some(emission.entry));
         emission.flux *= 1.0 / (PI * sky.radius * sky.radius * emission.density.onward);
     }
 
-    /// The bounding spheres: centres and radii.
+    /// Centres and radii of the bounding spheres.
     pub fn spheres(&self) -> &[(Vec3, f32)] {
         &self.spheres
     }
@@ -201,35 +206,35 @@ impl CausticTargets {
     /// Density per area, in the mixture, of the line through `p` along the unit `d`.
     #[inline]
     pub fn density(&self, sky: &Sky, p: Vec3, d: Vec3) -> f32 {
-        self.density_drawn(sky, p, d, None)
+        self.mixture_density(sky, p, d, None)
     }
 
-    /// The same of a line that was drawn through a disc, which it is within.
-    fn density_drawn(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
+    /// [`CausticTargets::density`] of a line that was sampled on the disc `drawn`, so it counts as a line through it.
+    fn mixture_density(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
         if self.choice.is_none() {
             return 1.0 / (PI * sky.radius * sky.radius);
         }
         let within = |&(target, &(center, radius)): &(usize, &(Vec3, f32))| {
-            drawn == Some(EntryDisc::Target(target)) || from_line(center, p, d) < radius * radius
+            drawn == Some(EntryDisc::Target(target)) || distance_to_line2(center, p, d) < radius * radius
         };
         let discs = self.spheres.iter().enumerate().filter(within).count();
-        self.uniform(sky, p, d, drawn) + AIMED * discs as f32 / self.area
+        self.scene_disc_density(sky, p, d, drawn) + AIMED_SHARE * discs as f32 / self.area
     }
 
-    /// The part of that density that paths of all light have.
-    fn uniform(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
-        // A target's disc may reach over the rim of the scene's.
-        let inside = drawn == Some(EntryDisc::Whole) || from_line(sky.center, p, d) <= sky.radius * sky.radius;
-        if inside { (1.0 - AIMED) / (PI * sky.radius * sky.radius) } else { 0.0 }
+    /// Density per area, in the mixture, of the scene's disc alone.
+    fn scene_disc_density(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
+        // A target's disc may extend beyond the scene's.
+        let inside = drawn == Some(EntryDisc::Whole) || distance_to_line2(sky.center, p, d) <= sky.radius * sky.radius;
+        if inside { (1.0 - AIMED_SHARE) / (PI * sky.radius * sky.radius) } else { 0.0 }
     }
 
-    /// Its share of the density that an aimed start has.
-    pub fn unaimed(&self, sky: &Sky, emission: &EmissionSample) -> f32 {
+    /// Share of the scene's disc in the density of an aimed start.
+    pub fn unaimed_share(&self, sky: &Sky, emission: &EmissionSample) -> f32 {
         match self.choice {
             None => 1.0,
             Some(_) => {
                 let EmissionSample { origin, direction, entry, density, .. } = emission;
-                self.uniform(sky, *origin, *direction, Some(*entry)) / density.onward
+                self.scene_disc_density(sky, *origin, *direction, Some(*entry)) / density.onward
             }
         }
     }
@@ -242,7 +247,7 @@ mod tests {
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// A start of light from infinity, drawn through the disc of the scene, whose area is `whole`, before it is aimed.
+    /// An unaimed start of light from infinity, sampled on the scene's disc of area `whole`.
     fn start(origin: Vec3, direction: Vec3, whole: f32) -> EmissionSample {
         let onward = 1.0 / whole;
         EmissionSample {
@@ -257,9 +262,8 @@ mod tests {
         }
     }
 
-    /// The flux that passes any place is the same with and without aiming and with a region of interest, and so is what
-    /// goes on of it after it is thinned to the share of paths that light everything: here through small discs that a
-    /// target or the region overlaps in part.
+    /// The flux through small discs does not depend on aiming or on a region of interest, also after Russian roulette
+    /// down to the share of unaimed paths. Targets and regions partly overlap the discs.
     #[test]
     fn aiming_keeps_the_flux() {
         let spheres = vec![(Vec3::new(0.3, 0.0, 0.1), 0.2), (Vec3::new(0.2, 0.1, -0.4), 0.25), (Vec3::X, 0.1)];
@@ -276,7 +280,7 @@ mod tests {
         assert_eq!((region.wider, small.wider), (0, 2));
         let regions = [None, Some(region), Some(small)];
         for ((center, radius), region) in places.into_iter().flat_map(|place| regions.map(|region| (place, region))) {
-            // All of it, and what goes on.
+            // The whole flux, and the flux after roulette.
             let (mut sum, mut squares) = ([0.0f64; 2], [0.0f64; 2]);
             for i in 0..n {
                 let draws = Stream::new(9, 0, Domain::Test, i).vertex(0);
@@ -292,7 +296,7 @@ mod tests {
                     }
                     None => {
                         targets.aim(&sky, &mut emission, u, point);
-                        targets.unaimed(&sky, &emission)
+                        targets.unaimed_share(&sky, &emission)
                     }
                 };
                 assert!((0.0..=1.0001).contains(&unaimed));
@@ -308,19 +312,19 @@ mod tests {
                 let mean = sum / n as f64;
                 let error = ((squares / n as f64 - mean * mean) / n as f64).sqrt();
                 let expected = f64::from(PI * radius * radius);
-                // Two-sided 4 sigma over eighteen fluxes: one false alarm in 870 seeds; an aimed path that forgot the
-                // uniform share is off by far more.
+                // Two-sided 4 sigma over eighteen fluxes: one false alarm in 870 seeds. Without the share of the scene's
+                // disc, the error would be far larger.
                 assert!((mean - expected).abs() < 4.0 * error, "{mean} +- {error}, expected {expected}, {region:?}");
                 assert!((mean * 1.5 - expected).abs() > 4.0 * error, "half as much again goes unnoticed");
             }
         }
     }
 
-    /// A target is as bright however much smaller than the scene it is: starts drawn through its disc carry twice its
-    /// area's flux, those at the rim as well. While rounding decided whether they lie in the disc, the mean was 160
-    /// instead of 6.28 at R/r = 700, of a few that carried (R/r)^2 times as much.
+    /// The flux of starts on the disc of a target is twice the disc's area for any size of the scene, also at the rim.
+    /// When a rounded position decided whether a start was in the disc, the mean was 160 instead of 6.28 at R/r = 700,
+    /// because a few starts carried (R/r)^2 times too much.
     #[test]
-    fn the_rim_of_a_small_target_carries_no_more() {
+    fn starts_at_the_rim_of_a_small_target_carry_no_excess_flux() {
         for ratio in [10.0f32, 700.0, 7_000.0, 100_000.0] {
             let area = PI;
             let spheres = vec![(Vec3::new(0.3, -0.2, 0.5) * ratio, 1.0)];
@@ -334,16 +338,14 @@ mod tests {
                 let draws = Stream::new(10, 0, Domain::Test, i).vertex(0);
                 let point = draws.two(Purpose::Lens);
                 let mut emission = start(Vec3::ZERO, warp::sphere_uniform(draws.two(Purpose::Direction)), whole);
-                let lit = EmissionSample { ..emission };
-                targets.through(&sky, &mut emission, 0, point);
+                let mut lit = EmissionSample { ..emission };
+                targets.aim_at(&sky, &mut emission, 0, point);
                 mean += f64::from(emission.flux.x) / n as f64;
-                // Through the region's own disc, where the density is a third of a half of one over its area at least.
-                let mut lit = lit;
+                // On the region's own disc, the density is at least 1/3 * 1/2 / area.
                 targets.aim_with_region(&sky, &mut lit, region, 0.0, point);
                 greatest = greatest.max(1.0 / targets.density_with_region(&sky, &lit, region).0);
             }
-            // 1 / (AIMED (1 / area + 1 / whole)).
-            let expected = f64::from(1.0 / (AIMED * (1.0 / area + 1.0 / whole)));
+            let expected = f64::from(1.0 / (AIMED_SHARE * (1.0 / area + 1.0 / whole)));
             assert!((mean / expected - 1.0).abs() < 1e-4, "{ratio}: {mean}, expected {expected}");
             assert!(greatest < 6.001 * PI, "{ratio}: {greatest}");
         }

@@ -1,26 +1,27 @@
-//! Choosing an index with given probabilities.
+//! Sampling an index with given probabilities.
 
-/// Steps that the unit interval is divided into, and probabilities are multiples of: as many as uniform numbers of 32
-/// bits can tell apart. Sums in f32 have an unequal 2^24, and the weaker of a million lamps none of them.
+/// Number of steps of the unit interval; probabilities are multiples of one step. Uniform numbers of 32 bits resolve
+/// 2^32 steps. Cumulative sums in f32 would resolve 2^24, too few for the weaker of a million lights.
 const STEPS: u64 = 1 << 32;
 
-/// A discrete distribution, inverted by a guide table \[Chen and Asau 1974\]: unlike an alias table it keeps the strata
-/// of its input.
+/// A discrete distribution, inverted with a guide table \[Chen and Asau 1974\]. Unlike an alias table, the inversion is
+/// monotonic, so it keeps the stratification of its input.
 #[derive(Clone, Debug)]
 pub struct Cdf {
-    /// The first step after an index, which are as many as go into its weight, and one at least where it has any; from
-    /// `last` on all of them, which is too great a number for this.
+    /// For each index, the first step after its interval. An index with a positive weight has at least one step. Entries
+    /// from `last` on are not used: their end is [`STEPS`], which does not fit.
     ends: Vec<u32>,
-    /// The last index that has a weight.
+    /// The last index with a positive weight.
     last: usize,
-    /// `guide[b]`: the first index that ends after bucket `b` of as many as there are indices begins, where a search
-    /// for a step in it starts.
+    /// The guide table, with one bucket of steps per index: `guide[b]` is the first index whose interval ends after
+    /// the start of bucket `b`. The search for a step in the bucket begins there.
     guide: Vec<u32>,
     total: f64,
 }
 
 impl Cdf {
-    /// From weights; negative and not finite ones count as zero. `None` if all are zero, or more than 2^32.
+    /// Builds the distribution from weights; negative and non-finite weights count as zero. `None` if all weights are
+    /// zero, or if 2^32 or more are positive.
     pub fn new(weights: impl Iterator<Item = f64>) -> Option<Cdf> {
         let weights: Vec<f64> = weights.map(|w| if w.is_finite() && w > 0.0 { w } else { 0.0 }).collect();
         let total: f64 = weights.iter().sum();
@@ -36,7 +37,7 @@ impl Cdf {
                 if weight > 0.0 {
                     sum += weight;
                     left -= 1;
-                    // A step for each that is still to come.
+                    // Leaves one step for each positive weight that follows.
                     end = ((sum / total * STEPS as f64) as u64).clamp(end + 1, STEPS - left);
                 }
                 end.min(u64::from(u32::MAX)) as u32
@@ -63,19 +64,20 @@ impl Cdf {
         if index == 0 { 0 } else { self.end(index - 1) }
     }
 
-    /// Probability of an index before `index`.
+    /// Probability of all indices before `index` together.
     #[inline]
     pub fn below(&self, index: usize) -> f64 {
         self.start(index) as f64 / STEPS as f64
     }
 
-    /// Probability of `index`: that of sampling it, in whole steps.
+    /// Probability with which [`Cdf::sample`] returns `index`.
     #[inline]
     pub fn pdf(&self, index: usize) -> f32 {
         (self.end(index) - self.start(index)) as f32 / STEPS as f32
     }
 
-    /// Index, its probability (above zero), and `u` (in `[0, 1)`) stretched over the chosen interval for reuse.
+    /// Samples an index by `u` in `[0, 1)`. Returns the index, its probability (above zero), and the position of `u` in
+    /// the interval of the index, which is a uniform number again.
     #[inline]
     pub fn sample(&self, u: f64) -> (usize, f32, f32) {
         let steps = u * STEPS as f64;
@@ -110,11 +112,11 @@ mod tests {
         assert!(Cdf::new([0.0, -1.0].into_iter()).is_none());
     }
 
-    /// The weaker of millions have a chance, too: equal ones, and those beside one that has all but a twentieth of it,
-    /// as lamps have the floor that `lights.rs` gives them. Sums in f32 left 11 % of such a million without any, and 53
-    /// % of four million.
+    /// Every one of millions of weights has a positive probability: equal weights, and weights beside one that has 95 %
+    /// of the total, which is the floor that `lights.rs` gives to lights. Cumulative sums in f32 left 11 % of a million
+    /// such weights without any probability, and 53 % of four million.
     #[test]
-    fn none_of_millions_is_impossible() {
+    fn each_of_millions_of_weights_can_be_sampled() {
         for n in [1_000_000usize, 4_000_000] {
             for strongest in [1.0, 19.0 * n as f64] {
                 let weight = |i: usize| if i == n / 3 { strongest } else { 1.0 };

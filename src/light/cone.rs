@@ -1,52 +1,53 @@
-//! The cone that a spot's light stays in, and the part of a ray within it.
+//! The cone of a spot's light, and the part of a ray in the cone.
 
 use crate::math::Vec3;
 
-/// A cone of at most half of all directions: it is convex, and holds one part of a ray or none.
+/// A cone with a half angle of at most 90 degrees. It is convex, so at most one part of a ray is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     apex: Vec3,
     /// Unit vector from the apex.
     axis: Vec3,
-    /// Squared sine and cosine of the angle between the axis and the side.
+    /// Squared sine of the half angle.
     sin2: f32,
+    /// Squared cosine of the half angle.
     cos2: f32,
 }
 
 impl Cone {
-    /// Of a half angle of which 1 - cos is told; `None` for wider ones.
+    /// A cone whose half angle is given as 1 - cos; `None` for half angles above 90 degrees.
     #[inline]
     pub fn new(apex: Vec3, axis: Vec3, one_minus_cos: f32) -> Option<Cone> {
         let (sin2, cos2) = (one_minus_cos * (2.0 - one_minus_cos), (1.0 - one_minus_cos) * (1.0 - one_minus_cos));
         (one_minus_cos < 1.0).then_some(Cone { apex, axis, sin2, cos2 })
     }
 
-    /// A vector along the axis, and what is left of it.
+    /// Splits a vector into its length along the axis and its component across the axis.
     #[inline]
     fn parts(&self, v: Vec3) -> (f32, Vec3) {
         let along = v.dot(self.axis);
         (along, v - self.axis * along)
     }
 
-    fn holds(&self, p: Vec3) -> bool {
+    fn contains(&self, p: Vec3) -> bool {
         let (height, off) = self.parts(p - self.apex);
         height >= 0.0 && self.cos2 * off.length_squared() <= self.sin2 * height * height
     }
 
-    /// Between which distances the ray from `origin` along the unit `direction` is within, no further than `distance`,
-    /// which may be infinite.
+    /// The range of distances at which a ray from `origin` along the unit `direction` is in the cone, clipped at
+    /// `distance`, which may be infinite. `None` if the ray misses the cone.
     #[inline]
     pub fn within(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<[f32; 2]> {
-        // Where the ray meets the double cone: sin^2 (f . axis)^2 = cos^2 |off|^2 for f = from + t direction, off what
-        // is left of it beside the axis. With sines, so that narrow cones keep their digits.
+        // The ray meets the double cone where sin^2 (f . axis)^2 = cos^2 |off|^2, with f = from + t direction and off
+        // the component of f across the axis. The form with sines is exact for narrow cones.
         let from = origin - self.apex;
         let ((along, aside), (height, off)) = (self.parts(direction), self.parts(from));
         let a = self.sin2 * along * along - self.cos2 * aside.length_squared();
         let b = self.sin2 * along * height - self.cos2 * aside.dot(off);
         let c = self.sin2 * height * height - self.cos2 * off.length_squared();
         let root = (b * b - a * c).max(0.0).sqrt();
-        // The form that cancels nothing; with a parallel to the side one of them is infinite or no number, and met
-        // nowhere.
+        // Roots without cancellation. For a ray parallel to the side, one root is infinite or NaN, and `meets`
+        // discards it.
         let q = -(b + root.copysign(b));
         let (s, t) = (q / a, c / q);
         let meets = |t: f32| if t > 0.0 && t < distance { t } else { 0.0 };
@@ -56,7 +57,7 @@ impl Cone {
         for k in 0..3 {
             let (start, end) = (borders[k], borders[k + 1]);
             let middle = if end.is_finite() { 0.5 * (start + end) } else { 2.0 * start + from.length() };
-            if end > start && self.holds(origin + direction * middle) {
+            if end > start && self.contains(origin + direction * middle) {
                 within = Some([within.map_or(start, |within| within[0]), end]);
             }
         }
@@ -70,10 +71,10 @@ mod tests {
     use crate::math::{Vec2, warp};
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Random cones and rays: points of the part, and no others, are in the cone but for those within a thousandth of
-    /// its side.
+    /// For random cones and rays, exactly the points of the returned part are in the cone. Points at the side, within
+    /// 0.001 in the cosine, are not tested.
     #[test]
-    fn parts_are_what_the_cone_holds() {
+    fn the_part_of_a_ray_is_in_the_cone() {
         let (mut inside, mut outside) = (0, 0);
         for i in 0..20_000 {
             let draws = |k| Stream::new(21, 0, Domain::Test, i).vertex(k);
@@ -98,9 +99,8 @@ mod tests {
         assert!(inside > 50_000 && outside > 50_000, "{inside}, {outside}");
     }
 
-    /// Along the axis, along the side and from the apex.
     #[test]
-    fn parts_of_special_rays() {
+    fn rays_along_the_axis_along_the_side_and_from_the_apex_have_exact_parts() {
         let cone = Cone::new(Vec3::ZERO, Vec3::Z, 1.0 - 0.5f32.sqrt()).expect("a cone");
         assert_eq!(cone.within(Vec3::Z * -1.0, Vec3::Z, 3.0), Some([1.0, 3.0]));
         assert_eq!(cone.within(Vec3::Z, -Vec3::Z, 3.0), Some([0.0, 1.0]));

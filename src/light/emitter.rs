@@ -1,40 +1,40 @@
-//! One light source and the densities that belong to it.
+//! One light source, its power, and the falloff of spots.
 
 use super::{Environment, Spread};
 use crate::geometry::{Shapes, triangle_error};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
 use std::f32::consts::{PI, TAU};
 
-/// How far the points of a triangle, given by a corner and the edges to the others, may be off (scene units).
+/// Bound on the rounding error of points on a triangle (scene units), given by a corner and the edges to the others.
 #[inline]
 pub(super) fn position_error(&[corner, a, b]: &[Vec3; 3]) -> f32 {
     triangle_error([corner, corner + a, corner + b])
 }
 
-/// A light source. The set is closed: a scene's lights are one flat list.
+/// A light source. The scene has one flat list of them.
 #[derive(Clone, Debug)]
 pub enum Emitter {
     /// A triangle of an emissive material.
     Triangle {
-        /// Instance it belongs to.
+        /// Index of the instance.
         instance: u32,
-        /// Triangle in the instance's mesh.
+        /// Index of the triangle in the instance's mesh.
         primitive: u32,
         /// Area (m2).
         area: f32,
-        /// Emits from both sides.
+        /// Whether both sides emit.
         two_sided: bool,
         /// Mean emitted radiance.
         radiance: Rgb,
-        /// How it falls off with the angle.
+        /// Angular distribution.
         spread: Spread,
-        /// Unit normal of its front and the plane's distance from the origin along it. This and the next are here so
-        /// that light sampling, which asks every time, finds all it needs in one place.
+        /// Unit normal of the front, and distance of the plane from the origin along it. `plane` and `corners` are
+        /// copies, so that light sampling finds all data in one place.
         plane: Vec4,
         /// A corner, and the edges to the others (m).
         corners: [Vec3; 3],
-        /// It looks the same all over: what it emits everywhere is `radiance`.
-        plain: bool,
+        /// Whether every point emits `radiance`.
+        uniform: bool,
     },
     /// A mathematical point.
     Point {
@@ -43,10 +43,10 @@ pub enum Emitter {
         /// Radiant intensity (W/sr).
         intensity: Rgb,
     },
-    /// What shines into a cone with an edge, from a point, or alike from every point of a disc across its axis that no
-    /// ray can hit.
+    /// A light that shines into a cone with a soft edge, from a point, or uniformly from a disc across the axis of the
+    /// cone. No ray can hit the disc.
     Spot {
-        /// Position; the middle of the disc.
+        /// Position; the centre of the disc.
         p: Vec3,
         /// Radius of the disc (m); 0 is a mathematical point.
         radius: f32,
@@ -54,48 +54,49 @@ pub enum Emitter {
         frame: Frame,
         /// Radiant intensity on the axis (W/sr).
         intensity: Rgb,
-        /// 1 - cos of the half angle of full intensity: a narrow one's cosine has no digits left.
+        /// 1 - cos of the half angle of the cone of full intensity. For narrow cones, the cosine itself would lose its
+        /// digits.
         inner: f32,
-        /// 1 - cos of the half angle of no intensity, which is greater.
+        /// 1 - cos of the half angle from which on the intensity is zero; greater than `inner`.
         outer: f32,
-        /// How it falls off between them.
+        /// Falloff between `inner` and `outer`.
         edge: SpotEdge,
     },
     /// Light from a small cone of directions at infinity.
     Sun {
         /// Frame whose normal points towards the sun.
         frame: Frame,
-        /// Irradiance on a surface that faces it (W/m2).
+        /// Irradiance on a surface that faces the sun (W/m2).
         irradiance: Rgb,
-        /// 1 - cos of the half angle; 0 is exactly parallel light.
+        /// 1 - cos of the half angle of the sun's disc; 0 is exactly parallel light.
         one_minus_cos: f32,
-        /// Cameras do not see its disc.
+        /// Whether cameras do not see the disc.
         hidden_from_camera: bool,
     },
     /// The environment.
     Environment,
 }
 
-/// The sphere that holds the scene, and what shines on it from infinity.
+/// The bounding sphere of the scene, and the environment around it.
 #[derive(Clone, Debug)]
 pub struct Sky {
     /// Centre of the scene's bounding sphere.
     pub center: Vec3,
-    /// Its radius.
+    /// Radius of the scene's bounding sphere (m).
     pub radius: f32,
     /// The environment, if any.
     pub environment: Option<Environment>,
-    /// Cameras do not see it.
+    /// Whether cameras do not see the environment.
     pub hidden_from_camera: bool,
 }
 
-/// How a spot's intensity falls across its edge, as a function of a ramp that is linear in the cosine.
+/// Falloff of a spot's intensity across its edge, as a function of a ramp that is linear in the cosine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SpotEdge {
-    /// The ramp's square: what KHR_lights_punctual recommends.
+    /// The square of the ramp, as KHR_lights_punctual recommends.
     #[default]
     Squared,
-    /// Its smoothstep, 3 t^2 - 2 t^3: Blender's.
+    /// The smoothstep of the ramp, 3 t^2 - 2 t^3, as in Blender.
     Smooth,
 }
 
@@ -108,7 +109,7 @@ impl SpotEdge {
         }
     }
 
-    /// Mean over the ramp.
+    /// Mean of the falloff over the ramp.
     #[inline]
     pub(super) fn mean(self) -> f32 {
         match self {
@@ -117,14 +118,14 @@ impl SpotEdge {
         }
     }
 
-    /// The ramp below which a share of the light in the edge lies.
+    /// Inverse of the falloff's integral: the ramp below which `share` of the light in the edge lies.
     #[inline]
     pub(super) fn ramp(self, share: f32) -> f32 {
         match self {
             SpotEdge::Squared => share.cbrt(),
             SpotEdge::Smooth => {
-                // Newton's iteration for 2 t^3 - t^4 = share, which is convex: after its first step it comes down to
-                // the root.
+                // Newton's iteration for 2 t^3 - t^4 = share. The function is convex, so the iteration decreases to
+                // the root after its first step.
                 let mut t = (0.5 * share).cbrt();
                 for _ in 0..5 {
                     let slope = t * t * (6.0 - 4.0 * t);
@@ -138,7 +139,7 @@ impl SpotEdge {
     }
 }
 
-/// A spot's intensity against that on its axis, at an angle to it; of it and of the borders 1 - cos is told.
+/// Intensity of a spot relative to its axis. The angle to the axis and both edges are given as 1 - cos.
 #[inline]
 pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32, edge: SpotEdge) -> f32 {
     if one_minus_cos <= inner {
@@ -150,13 +151,13 @@ pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32, edge: SpotEdge) 
     }
 }
 
-/// Solid angle that a spot fills, what its edge dims counted in part.
+/// Integral of [`spot_falloff`] over all directions (sr).
 #[inline]
 pub fn spot_solid_angle(inner: f32, outer: f32, edge: SpotEdge) -> f32 {
     TAU * (inner + (outer - inner) * edge.mean())
 }
 
-/// Where on its disc a spot at `p` shines from.
+/// Samples a point on the disc of a spot at `p`.
 #[inline]
 pub fn spot_point(p: Vec3, radius: f32, frame: &Frame, u: Vec2) -> Vec3 {
     if radius == 0.0 {
@@ -167,10 +168,10 @@ pub fn spot_point(p: Vec3, radius: f32, frame: &Frame, u: Vec2) -> Vec3 {
 }
 
 impl Emitter {
-    /// Emitted flux (W) as a luminance: what the choice of lights is proportional to. For light from infinity, the flux
-    /// through the scene's bounding sphere.
+    /// Luminance of the emitted flux (W), for the selection of lights. For light from infinity, the flux through the
+    /// scene's bounding sphere.
     pub fn power(&self, sky: &Sky) -> f64 {
-        // In f64, which no light overflows: what is infinitely strong would never be chosen.
+        // In f64, which does not overflow: a light of infinite power could not be selected.
         const PI: f64 = std::f64::consts::PI;
         let radius = f64::from(sky.radius);
         let (sphere, disc) = (4.0 * PI, PI * radius * radius);
@@ -188,8 +189,8 @@ impl Emitter {
         }
     }
 
-    /// A point of the light, just before its front; `None` for light from infinity.
-    pub fn anywhere(&self, shapes: &Shapes) -> Option<Vec3> {
+    /// A point of the light, offset from its front; `None` for light from infinity.
+    pub fn any_point(&self, shapes: &Shapes) -> Option<Vec3> {
         match self {
             Emitter::Triangle { instance, primitive, .. } => {
                 shapes.surface(*instance, *primitive, [1.0 / 3.0, 1.0 / 3.0]).map(|s| s.ray_origin(s.ng))
@@ -199,7 +200,7 @@ impl Emitter {
         }
     }
 
-    /// No ray that is not aimed at it can find it.
+    /// Whether no ray can hit the light.
     pub fn is_delta(&self) -> bool {
         match self {
             Emitter::Point { .. } | Emitter::Spot { .. } => true,
@@ -208,7 +209,7 @@ impl Emitter {
         }
     }
 
-    /// Its light comes from infinity.
+    /// Whether the light is at infinity.
     pub fn is_infinite(&self) -> bool {
         matches!(self, Emitter::Sun { .. } | Emitter::Environment)
     }

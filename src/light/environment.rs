@@ -1,4 +1,4 @@
-//! Light from infinity: a latitude-longitude image or one colour.
+//! Environment lights: a latitude-longitude image or a uniform colour.
 
 use super::cdf::Cdf;
 use crate::math::{Rgb, Vec2, Vec3, luminance, warp};
@@ -8,7 +8,7 @@ use std::sync::Arc;
 /// An environment light.
 #[derive(Clone, Debug)]
 pub enum Environment {
-    /// The same radiance from everywhere.
+    /// Equal radiance from all directions.
     Uniform(Rgb),
     /// An image.
     Image(Arc<ImageEnvironment>),
@@ -20,18 +20,18 @@ pub struct ImageEnvironment {
     width: usize,
     height: usize,
     radiance: Vec<[f32; 3]>,
-    /// Sine and cosine of the turn about +Y.
-    turn: (f32, f32),
+    /// Sine and cosine of the rotation about +Y.
+    rotation: (f32, f32),
     rows: Cdf,
     columns: Vec<Option<Cdf>>,
 }
 
 impl ImageEnvironment {
-    /// From texels (finite, not negative; `width * height` of them) already scaled by the strength. `None` if all are
-    /// black.
+    /// Builds the sampling distribution of `width * height` finite, non-negative texels, already scaled by the strength.
+    /// `rotation` is in radians. `None` if all texels are black.
     pub fn new(width: usize, height: usize, radiance: Vec<[f32; 3]>, rotation: f32) -> Option<ImageEnvironment> {
-        // Radiance is read bilinearly, so a texel sheds light over its neighbours' cells: the sampling weight of a cell
-        // is the mean over its 3x3 neighbourhood with the tent's weights, positive wherever radiance is.
+        // Bilinear interpolation spreads a texel over the neighbouring cells. So the weight of a cell is the
+        // tent-weighted mean over its 3x3 neighbourhood, which is positive wherever the radiance is.
         let value = |x: usize, y: usize| f64::from(luminance(Vec3::from_array(radiance[y * width + x])));
         let smooth = |x: usize, y: usize| {
             let mut sum = 0.0;
@@ -52,17 +52,17 @@ impl ImageEnvironment {
             let theta = std::f64::consts::PI * (y as f64 + 0.5) / height as f64;
             row.as_ref().map_or(0.0, |row| row.total() * theta.sin())
         }))?;
-        Some(ImageEnvironment { width, height, radiance, turn: rotation.sin_cos(), rows, columns })
+        Some(ImageEnvironment { width, height, radiance, rotation: rotation.sin_cos(), rows, columns })
     }
 
     fn to_image(&self, d: Vec3) -> Vec3 {
-        let (s, c) = self.turn;
-        // The image turns counter-clockwise (about +Y, seen from above): a look-up turns back.
+        let (s, c) = self.rotation;
+        // The image is rotated counter-clockwise about +Y, seen from above; a look-up rotates back.
         Vec3::new(c * d.x - s * d.z, d.y, s * d.x + c * d.z)
     }
 
     fn to_world(&self, d: Vec3) -> Vec3 {
-        let (s, c) = self.turn;
+        let (s, c) = self.rotation;
         Vec3::new(c * d.x + s * d.z, d.y, -s * d.x + c * d.z)
     }
 
@@ -86,7 +86,7 @@ impl ImageEnvironment {
         top.lerp(bottom, y - fy)
     }
 
-    /// Solid angle of a cell is 2 pi^2 sin(theta) / (width height) at theta inside it.
+    /// Density per solid angle of a cell: at theta, the cell has the solid angle 2 pi^2 sin(theta) / (width height).
     fn density(&self, cell: (usize, usize), probability: f32, sin_theta: f32) -> f32 {
         debug_assert!(cell.0 < self.width);
         probability * (self.width * self.height) as f32 / (TAU * PI * sin_theta.max(1e-6))
@@ -103,7 +103,7 @@ impl ImageEnvironment {
 
     fn sample(&self, u: Vec2) -> (Vec3, f32) {
         let (y, pdf_y, rest_y) = self.rows.sample(f64::from(u.x));
-        // A row that can be chosen has columns.
+        // Every row with a positive probability has columns.
         let Some(columns) = &self.columns[y] else { return (Vec3::Y, 0.0) };
         let (x, pdf_x, rest_x) = columns.sample(f64::from(u.y));
         let theta = PI * (y as f32 + rest_y) / self.height as f32;
@@ -138,7 +138,7 @@ impl Environment {
         }
     }
 
-    /// A direction towards the environment and its density per solid angle.
+    /// Samples a direction towards the environment. Returns the direction and its density per solid angle.
     #[inline]
     pub fn sample(&self, u: Vec2) -> (Vec3, f32) {
         match self {
@@ -147,7 +147,7 @@ impl Environment {
         }
     }
 
-    /// Density of [`Environment::sample`].
+    /// Density per solid angle of [`Environment::sample`].
     #[inline]
     pub fn pdf_w(&self, d: Vec3) -> f32 {
         match self {
@@ -180,20 +180,20 @@ mod tests {
         Environment::Image(Arc::new(ImageEnvironment::new(w, h, texels, rotation).unwrap()))
     }
 
-    /// The estimate of the total irradiation by importance sampling equals uniform sampling's, and the density of each
-    /// sample is the one `pdf_w` reports.
+    /// Importance sampling and uniform sampling estimate the same integral of radiance, and `pdf_w` returns the density
+    /// of each sample.
     #[test]
     fn samples_follow_their_density() {
         let environment = image(0.7);
         let n = 200_000u64;
         let (mut by_importance, mut squares, mut by_uniform, mut uniform_squares) = (0.0, 0.0, 0.0, 0.0);
-        let mut astray = 0;
+        let mut wrong = 0;
         for i in 0..n {
             let u = Stream::new(1, 0, Domain::Test, i).vertex(0).two(Purpose::LightPoint);
             let (d, pdf) = environment.sample(u);
             assert!((d.length() - 1.0).abs() < 1e-4);
             let again = environment.pdf_w(d);
-            astray += u32::from((pdf - again).abs() > 1e-2 * pdf);
+            wrong += u32::from((pdf - again).abs() > 1e-2 * pdf);
             let x = f64::from(luminance(environment.radiance(d)) / pdf);
             by_importance += x;
             squares += x * x;
@@ -202,8 +202,8 @@ mod tests {
             by_uniform += x;
             uniform_squares += x * x;
         }
-        // Rounding may carry a direction over the edge of its cell, but hardly ever.
-        assert!(astray < 200, "{astray} of {n} directions have another density than they were drawn with");
+        // Rounding rarely moves a direction into the next cell.
+        assert!(wrong < 200, "{wrong} of {n} directions have another density than they were sampled with");
         let n = n as f64;
         let (a, b) = (by_importance / n, by_uniform / n);
         let variance = (squares / n - a * a) / n + (uniform_squares / n - b * b) / n;

@@ -1,12 +1,12 @@
-//! Groups of lights, of which a picture tells the light apart.
+//! Light groups: the picture has a separate layer for the light of each group.
 
-/// Most groups of a scene: each takes memory in every pixel.
+/// Maximum number of groups in a scene; each group takes memory in every pixel.
 pub const MAX_GROUPS: usize = 64;
-/// Most letters of a group's name in the names of layers: `ViewLayer.CombinedLightGroup_NAME.R` has 63 then, the most
-/// that Blender holds.
+/// Maximum length of a group's name in letters. `ViewLayer.CombinedLightGroup_NAME.R` then has 63 letters, Blender's
+/// limit for a channel name.
 pub const MAX_GROUP_NAME: usize = 32;
 
-/// A group by its place among the scene's; or none.
+/// Index of a light group in its scene, or no group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Group(u8);
 
@@ -14,36 +14,36 @@ impl Group {
     /// No group.
     pub const NONE: Group = Group(0);
 
-    /// The group at this place, below [`MAX_GROUPS`].
+    /// The group with an index below [`MAX_GROUPS`].
     pub fn new(index: usize) -> Group {
         Group(u8::try_from(index + 1).unwrap_or(0))
     }
 
-    /// Its place among the scene's groups.
+    /// The index of the group; `None` for [`Group::NONE`].
     #[inline]
     pub fn index(self) -> Option<usize> {
         self.0.checked_sub(1).map(usize::from)
     }
 }
 
-/// What group each light of a scene is in.
+/// The light groups of a scene, and the group of each light.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Groups {
-    /// Names, which end the names of layers: all different, of ASCII letters, digits and `_`.
+    /// Names of the groups in the names of layers: unique, of ASCII letters, digits and `_`.
     pub names: Vec<String>,
-    /// Names in the scene.
+    /// Names of the groups in the scene file.
     labels: Vec<String>,
-    /// Of glowing instances.
+    /// Group of each emissive instance, by the index of the instance.
     pub instances: Vec<Group>,
-    /// Of lights that are no surfaces.
+    /// Groups of points, spots and suns, in the order of the emitters.
     pub others: Vec<Group>,
-    /// Of the environment.
+    /// Group of the environment.
     pub environment: Group,
 }
 
 impl Groups {
-    /// The group that the scene calls `label`, a new one where there is none; `None` where there are too many.
-    pub fn named(&mut self, label: &str) -> Option<Group> {
+    /// The group with the name `label` in the scene file, added if it is new. `None` if there are [`MAX_GROUPS`] others.
+    pub fn get_or_add(&mut self, label: &str) -> Option<Group> {
         let index = match self.labels.iter().position(|known| known == label) {
             Some(index) => index,
             None if self.labels.len() == MAX_GROUPS => return None,
@@ -56,14 +56,14 @@ impl Groups {
         Some(Group::new(index))
     }
 
-    /// Groups whose names are cut or numbered: what the scene calls them, and their names.
+    /// Groups whose names were truncated or numbered: the name in the scene file, and the name in layers.
     pub fn renamed(&self) -> impl Iterator<Item = (&str, &str)> {
         let pairs = self.labels.iter().zip(&self.names);
         pairs.filter(|(label, name)| legal(label) != **name).map(|(label, name)| (&**label, &**name))
     }
 
-    /// A name that no other group has: what a layer's name cannot have becomes `_`, what is too long is cut, and what
-    /// is taken by another label gets a number.
+    /// A unique layer name for a label: illegal letters become `_`, long names are truncated, and names that are taken
+    /// get a number.
     fn free_name(&self, label: &str) -> String {
         let letters = legal(label);
         let mut name = letters[..letters.len().min(MAX_GROUP_NAME)].to_owned();
@@ -78,7 +78,7 @@ impl Groups {
     }
 }
 
-/// A label with `_` for every letter that a layer's name cannot have.
+/// Replaces every letter that a layer's name cannot have by `_`.
 fn legal(label: &str) -> String {
     label.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
@@ -88,25 +88,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_become_names_of_layers_and_groups_are_no_more_than_there_is_room_for() {
+    fn labels_become_legal_names_and_the_number_of_groups_is_limited() {
         let mut groups = Groups::default();
-        let [key, rim, other, again] = ["Key light", "rim", "Key.light", "Key light"].map(|name| groups.named(name));
+        let [key, rim, other, again] =
+            ["Key light", "rim", "Key.light", "Key light"].map(|name| groups.get_or_add(name));
         assert_eq!((key, rim, again), (Some(Group::new(0)), Some(Group::new(1)), key));
         assert_eq!(other, Some(Group::new(2)));
         assert_eq!(groups.names, ["Key_light", "rim", "Key_light_2"]);
         assert_eq!(groups.renamed().collect::<Vec<_>>(), [("Key.light", "Key_light_2")]);
         assert_eq!((Group::NONE.index(), Group::new(63).index()), (None, Some(63)));
-        (3..MAX_GROUPS).for_each(|index| assert!(groups.named(&index.to_string()).is_some()));
-        assert_eq!(groups.named("one more"), None);
+        (3..MAX_GROUPS).for_each(|index| assert!(groups.get_or_add(&index.to_string()).is_some()));
+        assert_eq!(groups.get_or_add("one more"), None);
     }
 
-    /// Whatever the labels are, names are short, legal and different.
     #[test]
-    fn names_are_different_whatever_the_labels() {
+    fn names_are_short_legal_and_unique_for_any_labels() {
         let mut groups = Groups::default();
         let long = "a".repeat(40);
         let labels = ["\u{4e3b}\u{5149}", "\u{9006}\u{5149}", "__", "___2", &long, &long[1..], &long[..32], "a_2", ""];
-        let of: Vec<_> = labels.iter().map(|label| groups.named(label).and_then(Group::index)).collect();
+        let of: Vec<_> = labels.iter().map(|label| groups.get_or_add(label).and_then(Group::index)).collect();
         assert_eq!(of, (0..labels.len()).map(Some).collect::<Vec<_>>());
         let mut names = groups.names.clone();
         names.sort_unstable();

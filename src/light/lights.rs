@@ -1,4 +1,4 @@
-//! All lights of a scene: choosing one, sampling it from a point, sampling emission, and the densities for MIS.
+//! All lights of a scene: selecting one, sampling it from a point, sampling emission, and the densities for MIS.
 
 use super::Region;
 use super::aim::CausticTargets;
@@ -16,21 +16,22 @@ use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Share of the choices that all lights get alike; the rest goes by power.
+/// Share of the selection probability that all lights share equally; the rest is proportional to power.
 const EQUAL_SHARE: f64 = 0.05;
 
-/// Light paths that leave a surface at a smaller cosine carry nothing.
-const LEAST_COSINE: f32 = 1e-6;
+/// Smallest cosine at which light paths leave a surface. At smaller ones, densities over the cosine overflow.
+const MIN_COSINE: f32 = 1e-6;
 
-/// The lights of a scene.
+/// The lights of a scene, with the distributions that select them.
 pub struct Lights {
     emitters: Vec<Emitter>,
     choice: Option<LightSampler>,
-    /// Index of the first emitter of an instance, `u32::MAX` for instances that do not emit; and then the emitter of
-    /// each of its triangles, relative to it (`u32::MAX` for those without area).
+    /// For each instance, the index of its first emitter; `u32::MAX` if the instance does not emit.
     first: Vec<u32>,
+    /// For each instance and triangle, the index of the emitter relative to `first`; `u32::MAX` for triangles without
+    /// area.
     relative: Vec<Vec<u32>>,
-    /// Suns of finite size.
+    /// Indices of the suns of finite size.
     suns: Vec<u32>,
     environment: Option<u32>,
     sky: Sky,
@@ -38,73 +39,96 @@ pub struct Lights {
     groups: Groups,
 }
 
-/// What a triangle that does not look the same all over emits at a point; out of the way of lamps that do.
+/// Radiance that a textured or cut-out triangle emits at the barycentric coordinates `b`. Not inlined, so that the
+/// common case, uniform emission, stays small.
 #[cold]
 #[inline(never)]
-fn uneven(shapes: &Shapes, materials: &Materials, (instance, primitive): (u32, u32), b: Vec2) -> Option<Rgb> {
+fn textured_radiance(
+    shapes: &Shapes,
+    materials: &Materials,
+    (instance, primitive): (u32, u32),
+    b: Vec2,
+) -> Option<Rgb> {
     let light = shapes.surface(instance, primitive, [b.x, b.y])?;
     let material = &materials.list[light.material as usize];
-    // A cut-out part gives no light: rays pass it, so samples must, too.
+    // Rays pass through cut-outs, so light samples must do so, too.
     Some(material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures))
 }
 
+/// The emitter of a triangle of an emissive material; `None` for a triangle without area or emission.
+fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primitive: u32) -> Option<Emitter> {
+    let placed = &shapes.instances[instance as usize];
+    let material = &materials.list[placed.material as usize];
+    let mesh = &shapes.meshes[placed.mesh as usize];
+    let [a, b, c] = placed.corners(mesh, primitive);
+    let area = 0.5 * (b - a).cross(c - a).length();
+    // The mean over a few points suffices to select a light; a sample's radiance is looked up exactly.
+    let probes = [[1.0 / 3.0, 1.0 / 3.0], [0.6, 0.2], [0.2, 0.6], [0.2, 0.2]];
+    let (mut radiance, mut plane, mut coat) = (Rgb::ZERO, Vec4::ZERO, 0.0);
+    for barycentric in probes {
+        if let Some(surface) = shapes.surface(instance, primitive, barycentric) {
+            plane = surface.ng.extend(surface.ng.dot(surface.p));
+            radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
+            coat += material.coat(&surface, &materials.textures) / probes.len() as f32;
+        }
+    }
+    if material.unlit {
+        coat = 0.0;
+    }
+    let textured = material.unlit || material.emission_texture.is_some();
+    let uniform = !textured && matches!(material.alpha, Alpha::Opaque);
+    if uniform {
+        radiance = material.emission;
+    }
+    if textured || !mesh.colors.is_empty() {
+        // Every texel needs a selection probability: assume at least a tenth of the brightest.
+        radiance = radiance.max(material.brightest_emission() * 0.1);
+    }
+    if !(area > 0.0 && area.is_finite()) || radiance.max_element() <= 0.0 {
+        return None;
+    }
+    Some(Emitter::Triangle {
+        instance,
+        primitive,
+        area,
+        two_sided: material.double_sided,
+        radiance,
+        spread: Spread::new(material.spread).below_coat(coat),
+        plane,
+        corners: [a, b - a, c - a],
+        uniform,
+    })
+}
+
+/// A ray that leaves a light, sampled without the selection of the light.
+struct LightRay {
+    origin: Vec3,
+    direction: Vec3,
+    /// Emitted flux over density (W).
+    flux: Rgb,
+    /// Density of the point per area, or of the direction per solid angle for light from infinity; 1 for points.
+    start: f32,
+    /// Density of the direction per solid angle, or of the entry point per area for light from infinity.
+    onward: f32,
+    /// Cosine at the light; 1 at infinity and for points.
+    cos: f32,
+}
+
 impl Lights {
-    /// The emissive triangles of the shapes, then `others` (points, spots, suns), then the sky's environment.
+    /// Lists the emissive triangles of the shapes, then `others` (points, spots, suns), then the environment.
     pub fn new(shapes: &Shapes, materials: &Materials, others: Vec<Emitter>, sky: Sky) -> Lights {
         let mut emitters = Vec::new();
         let mut first = vec![u32::MAX; shapes.instances.len()];
         let mut relative = vec![Vec::new(); shapes.instances.len()];
         for (i, instance) in shapes.instances.iter().enumerate() {
-            let material = &materials.list[instance.material as usize];
-            if !material.emits() {
+            if !materials.list[instance.material as usize].emits() {
                 continue;
             }
-            let mesh = &shapes.meshes[instance.mesh as usize];
             first[i] = emitters.len() as u32;
-            for primitive in 0..mesh.triangles.len() as u32 {
-                let [a, b, c] = instance.corners(mesh, primitive);
-                let area = 0.5 * (b - a).cross(c - a).length();
-                // Mean emission from a few points, enough to choose by; the radiance of a sample is looked up exactly.
-                let probes = [[1.0 / 3.0, 1.0 / 3.0], [0.6, 0.2], [0.2, 0.6], [0.2, 0.2]];
-                let (mut radiance, mut plane, mut coat) = (Rgb::ZERO, Vec4::ZERO, 0.0);
-                for barycentric in probes {
-                    if let Some(surface) = shapes.surface(i as u32, primitive, barycentric) {
-                        plane = surface.ng.extend(surface.ng.dot(surface.p));
-                        radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
-                        coat += material.coat(&surface, &materials.textures) / probes.len() as f32;
-                    }
-                }
-                if material.unlit {
-                    coat = 0.0;
-                }
-                let textured = material.unlit || material.emission_texture.is_some();
-                let plain = !textured && matches!(material.alpha, Alpha::Opaque);
-                if plain {
-                    radiance = material.emission;
-                }
-                if textured || !mesh.colors.is_empty() {
-                    // No texel may be impossible to choose: keep a tenth of the brightest.
-                    radiance = radiance.max(material.brightest_emission() * 0.1);
-                }
-                if !(area > 0.0 && area.is_finite()) || radiance.max_element() <= 0.0 {
-                    relative[i].push(u32::MAX);
-                    continue;
-                }
-                relative[i].push(emitters.len() as u32 - first[i]);
-                let two_sided = material.double_sided;
-                let corners = [a, b - a, c - a];
-                let instance = i as u32;
-                emitters.push(Emitter::Triangle {
-                    instance,
-                    primitive,
-                    area,
-                    two_sided,
-                    radiance,
-                    spread: Spread::new(material.spread).below_coat(coat),
-                    plane,
-                    corners,
-                    plain,
-                });
+            for primitive in 0..shapes.meshes[instance.mesh as usize].triangles.len() as u32 {
+                let emitter = triangle_emitter(shapes, materials, i as u32, primitive);
+                relative[i].push(emitter.as_ref().map_or(u32::MAX, |_| emitters.len() as u32 - first[i]));
+                emitters.extend(emitter);
             }
         }
         emitters.extend(others);
@@ -117,9 +141,8 @@ impl Lights {
             .filter(|&i| matches!(emitters[i as usize], Emitter::Sun { one_minus_cos, .. } if one_minus_cos > 0.0))
             .collect();
         let powers: Vec<f64> = emitters.iter().map(|e| e.power(&sky)).collect();
-        // A lamp beside the sun is weak as seen from the whole scene, and the brightest thing on its own table: a share
-        // of the paths goes to all lights alike. It also keeps every probability above the resolution of the random
-        // numbers.
+        // Next to a sun, a desk lamp has almost no share of the total power, but it dominates its own table. So every
+        // light gets a minimum probability, which is also above the resolution of the random numbers.
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
         let choice = LightSampler::new(&emitters, &sky, floored);
@@ -127,13 +150,13 @@ impl Lights {
         Lights { emitters, choice, first, relative, suns, environment, sky, targets, groups }
     }
 
-    /// The same lights in groups.
+    /// Assigns the lights to groups.
     #[must_use]
-    pub fn grouped(self, groups: Groups) -> Lights {
+    pub fn with_groups(self, groups: Groups) -> Lights {
         Lights { groups, ..self }
     }
 
-    /// The groups that they are in.
+    /// The light groups of the scene.
     pub fn groups(&self) -> &Groups {
         &self.groups
     }
@@ -149,7 +172,7 @@ impl Lights {
             Emitter::Triangle { instance, .. } => instances.get(*instance as usize).copied().unwrap_or_default(),
             Emitter::Environment => *environment,
             _ => {
-                // Others stand between the triangles and the environment.
+                // `others` are the emitters between the triangles and the environment.
                 let last = self.emitters.len() - usize::from(self.environment.is_some());
                 (light as usize + others.len())
                     .checked_sub(last)
@@ -160,24 +183,24 @@ impl Lights {
         }
     }
 
-    /// The group of a surface that glows.
+    /// The light group of an emissive surface.
     #[inline]
     pub fn surface_group(&self, surface: &Surface) -> Group {
         self.groups.instances.get(surface.instance as usize).copied().unwrap_or_default()
     }
 
-    /// No light gives any light.
+    /// Whether no light has any power.
     pub fn is_empty(&self) -> bool {
         self.choice.is_none()
     }
 
-    /// The power of two of all light together; 0 if there is none.
+    /// Binary exponent of the total power of all lights; 0 without lights.
     pub fn power_exponent(&self) -> i32 {
         let power: f64 = self.emitters.iter().map(|emitter| emitter.power(&self.sky)).sum();
         if power.is_normal() { ((power.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
     }
 
-    /// The lights; indices are those of [`EmissionSample::light`].
+    /// The lights, indexed by [`EmissionSample::light`].
     pub fn emitters(&self) -> &[Emitter] {
         &self.emitters
     }
@@ -187,26 +210,26 @@ impl Lights {
         &self.sky
     }
 
-    /// What can make caustics.
+    /// Bounding spheres of the objects that can make caustics.
     pub fn targets(&self) -> &CausticTargets {
         &self.targets
     }
 
-    /// The choice of lights by power; `None` if there is none.
+    /// The distribution that selects lights by power; `None` if no light has any.
     pub(super) fn choice(&self) -> Option<&Cdf> {
         self.choice.as_ref().map(LightSampler::power)
     }
 
-    /// Probability of choosing a light for a receiver over that of choosing it for emission.
+    /// Probability of selecting a light for a receiver, over the probability of selecting it for emission.
     #[inline]
     pub fn choice_ratio(&self, receiver: &Receiver, light: u32) -> f32 {
         let Some(choice) = &self.choice else { return 1.0 };
         choice.pdf(receiver, light as usize) / choice.power().pdf(light as usize)
     }
 
-    /// The emitters of every lamp, the triangles of an instance or a light alone, and the probability of choosing one
-    /// of them.
-    pub(super) fn lamps(&self) -> impl Iterator<Item = (Range<usize>, f64)> {
+    /// Ranges of emitters that belong to one object (the triangles of an instance, or a single other light), each with
+    /// the probability of selecting an emitter in it.
+    pub(super) fn emitters_by_object(&self) -> impl Iterator<Item = (Range<usize>, f64)> {
         let same = |a: &Emitter, b: &Emitter| match (a, b) {
             (Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }) => a == b,
             _ => false,
@@ -223,14 +246,14 @@ impl Lights {
     }
 
     /// Density per solid angle of emission along `d` from any point of a light that is not at infinity, and the cosine
-    /// there; `None` where nothing leaves it.
+    /// at the light; `None` if the light emits nothing along `d`.
     #[inline]
-    pub(super) fn onward(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
+    pub(super) fn direction_density(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
         match &self.emitters[index] {
             Emitter::Triangle { two_sided, spread, plane, .. } => {
                 let cos = plane.truncate().dot(d);
                 let cos = if *two_sided { cos.abs() } else { cos };
-                let density = if cos >= LEAST_COSINE { Self::onto(cos, *two_sided, spread) } else { 0.0 };
+                let density = if cos >= MIN_COSINE { Self::cosine_density(cos, *two_sided, spread) } else { 0.0 };
                 (density > 0.0).then_some((density, cos))
             }
             Emitter::Point { .. } => Some((0.5 / TAU, 1.0)),
@@ -242,7 +265,8 @@ impl Lights {
         }
     }
 
-    /// A light chosen for a receiver, seen from there. `None` where the one chosen does not shine on it.
+    /// Selects a light for a receiver and samples a point of it (next-event estimation). `None` if the selected light
+    /// does not shine on the receiver.
     #[inline]
     pub fn sample_direct(
         &self,
@@ -253,14 +277,14 @@ impl Lights {
         u: Vec2,
     ) -> Option<DirectSample> {
         let (index, probability) = self.choice.as_ref()?.sample(receiver, choice)?;
-        let mut sample = self.seen_from(shapes, materials, receiver.p, (index, probability), u)?;
+        let mut sample = self.sample_light(shapes, materials, receiver.p, (index, probability), u)?;
         sample.arrival_pdf_a *= self.choice()?.pdf(index) / probability;
         Some(sample)
     }
 
-    /// The light of an index, chosen with a probability, seen from `p`.
+    /// Samples a point of the light `index`, which was selected with `probability`, as seen from `p`.
     #[inline]
-    fn seen_from(
+    fn sample_light(
         &self,
         shapes: &Shapes,
         materials: &Materials,
@@ -270,67 +294,27 @@ impl Lights {
     ) -> Option<DirectSample> {
         let light = index as u32;
         match &self.emitters[index] {
-            Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
-                // Most lamps have a back, and most points are behind some lamp: asked before more is looked up. Near
-                // the plane rounding decides.
-                let ng = plane.truncate();
-                if !*two_sided && ng.dot(p) <= plane.w {
-                    return None;
-                }
-                let b = warp::triangle_uniform(u);
-                let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
-                let to = at - p;
-                let distance2 = to.length_squared();
-                let wi = to.try_normalize()?;
-                let cos = -ng.dot(wi);
-                if cos == 0.0 || (cos < 0.0 && !two_sided) {
-                    return None;
-                }
-                let toward = spread.of(cos.abs());
-                if toward == 0.0 {
-                    return None;
-                }
-                let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
-                let radiance = radiance * toward;
-                let pdf_w = probability * distance2 / (area * cos.abs());
-                let arrival_pdf_a = Self::onto(cos.abs(), *two_sided, spread) / distance2;
-                let target = Some(shadow_end(at, ng, -wi, position_error(corners), distance2.sqrt()));
-                Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a, light })
+            triangle @ Emitter::Triangle { .. } => {
+                Self::sample_triangle(triangle, (shapes, materials), p, (light, probability), u)
             }
             Emitter::Point { p: at, intensity } => {
                 let to = *at - p;
-                let wi = to.try_normalize()?;
+                let (wi, target, pdf_w) = (to.try_normalize()?, Some(*at), probability);
                 let radiance = *intensity / to.length_squared();
                 let arrival_pdf_a = 0.5 / TAU / to.length_squared();
-                Some(DirectSample {
-                    wi,
-                    target: Some(*at),
-                    radiance,
-                    pdf_w: probability,
-                    delta: true,
-                    arrival_pdf_a,
-                    light,
-                })
+                Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_pdf_a, light })
             }
             Emitter::Spot { p: middle, radius, frame, intensity, inner, outer, edge } => {
                 let at = spot_point(*middle, *radius, frame, u);
                 let to = at - p;
-                let wi = to.try_normalize()?;
+                let (wi, target, pdf_w) = (to.try_normalize()?, Some(at), probability);
                 let falloff = spot_falloff(one_minus_cos(-wi, frame.n), *inner, *outer, *edge);
                 if falloff == 0.0 {
                     return None;
                 }
                 let radiance = *intensity * (falloff / to.length_squared());
                 let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer, *edge) * to.length_squared());
-                Some(DirectSample {
-                    wi,
-                    target: Some(at),
-                    radiance,
-                    pdf_w: probability,
-                    delta: true,
-                    arrival_pdf_a,
-                    light,
-                })
+                Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_pdf_a, light })
             }
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
@@ -348,21 +332,58 @@ impl Lights {
                 let environment = self.sky.environment.as_ref()?;
                 let (wi, pdf) = environment.sample(u);
                 let pdf_w = probability * pdf;
-                (pdf_w > 0.0).then(|| DirectSample {
-                    wi,
-                    target: None,
-                    radiance: environment.radiance(wi),
-                    pdf_w,
-                    delta: false,
-                    arrival_pdf_a: self.entry_pdf_a(p, wi),
-                    light,
+                (pdf_w > 0.0).then(|| {
+                    let (radiance, arrival_pdf_a) = (environment.radiance(wi), self.entry_pdf_a(p, wi));
+                    DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_pdf_a, light }
                 })
             }
         }
     }
 
-    /// The point of a light to which [`Lights::sample_direct`] goes from anywhere in a medium with these numbers, and
-    /// the cone that the light stays in. `None` for light from infinity.
+    /// [`Lights::sample_light`] for a triangle.
+    #[inline(always)]
+    fn sample_triangle(
+        triangle: &Emitter,
+        (shapes, materials): (&Shapes, &Materials),
+        p: Vec3,
+        (light, probability): (u32, f32),
+        u: Vec2,
+    ) -> Option<DirectSample> {
+        let Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, uniform } =
+            triangle
+        else {
+            return None;
+        };
+        // Most receivers are behind some one-sided light, so this cheap test comes first. Near the plane, rounding
+        // decides.
+        let ng = plane.truncate();
+        if !*two_sided && ng.dot(p) <= plane.w {
+            return None;
+        }
+        let b = warp::triangle_uniform(u);
+        let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
+        let to = at - p;
+        let distance2 = to.length_squared();
+        let wi = to.try_normalize()?;
+        let cos = -ng.dot(wi);
+        if cos == 0.0 || (cos < 0.0 && !two_sided) {
+            return None;
+        }
+        let relative = spread.relative_radiance(cos.abs());
+        if relative == 0.0 {
+            return None;
+        }
+        let radiance =
+            if *uniform { *radiance } else { textured_radiance(shapes, materials, (*instance, *primitive), b)? };
+        let radiance = radiance * relative;
+        let pdf_w = probability * distance2 / (area * cos.abs());
+        let arrival_pdf_a = Self::cosine_density(cos.abs(), *two_sided, spread) / distance2;
+        let target = Some(shadow_end(at, ng, -wi, position_error(corners), distance2.sqrt()));
+        Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a, light })
+    }
+
+    /// The point that [`Lights::sample_direct`] samples for any receiver in a medium with these random numbers, and the
+    /// cone of a spot's light. `None` for light from infinity.
     #[inline]
     pub fn sample_point(&self, choice: f64, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
         let (index, ..) = self.choice()?.sample(choice);
@@ -380,9 +401,9 @@ impl Lights {
         }
     }
 
-    /// Radiance that a surface hit by a ray sends back along it, which is `wo`, and the density per solid angle with which
-    /// [`Lights::sample_direct`] would have found that point from the ray's origin. A light that touches the surface that
-    /// the ray has left is at no distance.
+    /// Radiance that a surface hit by a ray emits along `wo`, back to the ray's origin `from`, and the density per solid
+    /// angle with which [`Lights::sample_direct`] samples that point from there. The density is 0 for a light that
+    /// touches the surface at the origin.
     #[inline]
     pub fn hit_radiance(
         &self,
@@ -395,20 +416,21 @@ impl Lights {
         Some((radiance, density.direct * surface.p.distance_squared(from.p) / density.cos))
     }
 
-    /// Density per solid angle of emission along cosine `cos` from a triangle.
+    /// Density per solid angle with which a triangle emits light paths at cosine `cos`.
     #[inline]
-    fn onto(cos: f32, two_sided: bool, spread: &Spread) -> f32 {
+    fn cosine_density(cos: f32, two_sided: bool, spread: &Spread) -> f32 {
         spread.pdf_w(cos) * if two_sided { 0.5 } else { 1.0 }
     }
 
-    /// Density per area with which light paths from infinity, once aimed, enter the scene along the line through `p`
-    /// towards the light, `wi`.
+    /// Density per area with which light paths from infinity, aimed at targets, enter the scene along the line through
+    /// `p` with direction `wi` towards the light.
     #[inline]
     pub fn entry_pdf_a(&self, p: Vec3, wi: Vec3) -> f32 {
         self.targets.density(&self.sky, p, wi)
     }
 
-    /// Radiance of a surface along `wo`, where `from` is, and the densities of starting a light path there that way.
+    /// Radiance that a surface emits along `wo` towards `from`, and the densities of starting a light path at that point
+    /// along `wo`.
     #[inline]
     pub fn emitted(
         &self,
@@ -433,16 +455,16 @@ impl Lights {
         }
         let radiance = materials.list[surface.material as usize].emitted(surface, &materials.textures);
         let cos = cos.abs();
-        let radiance = radiance * spread.of(cos);
+        let radiance = radiance * spread.relative_radiance(cos);
         let choice = self.choice.as_ref()?;
         let [direct, start] = [choice.pdf(from, index), choice.power().pdf(index)].map(|chosen| chosen / area);
-        let onward = Self::onto(cos, *two_sided, spread);
+        let onward = Self::cosine_density(cos, *two_sided, spread);
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 
-    /// Calls `each(radiance, direct, start, group)` for every light at infinity that a ray leaving the scene from a receiver
-    /// along `d` meets, with the densities of [`EmissionDensity`]; a camera's own ray does not meet those that are
-    /// hidden from cameras.
+    /// Calls `each(radiance, direct, start, group)` for every light at infinity that a ray from `from` along `d` reaches
+    /// when it leaves the scene, with the densities of [`EmissionDensity`]. Camera rays skip lights that are hidden from
+    /// cameras.
     #[inline]
     pub fn for_each_infinite(
         &self,
@@ -474,7 +496,7 @@ impl Lights {
         }
     }
 
-    /// The start of a light path, its light chosen by power.
+    /// Samples the start of a light path. Lights are selected by power.
     #[inline]
     pub fn sample_emission(
         &self,
@@ -486,36 +508,17 @@ impl Lights {
     ) -> Option<EmissionSample> {
         let (index, probability, rest) = self.choice()?.sample(choice);
         let emitter = &self.emitters[index];
-        // Densities: the point (the direction, at infinity) without the choice of the light, then the rest; the cosine
-        // at the light.
-        let (origin, d, flux, [direct, onward, cos]) = match emitter {
-            Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, plain } => {
-                let b = warp::triangle_uniform(point);
-                let (at, ng) = (corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate());
-                let back = *two_sided && rest < 0.5;
-                let frame = Frame::from_normal(if back { -ng } else { ng });
-                let (d, along) = spread.sample(direction);
-                let d = frame.to_world(d);
-                let radiance = if *plain { *radiance } else { uneven(shapes, materials, (*instance, *primitive), b)? };
-                let cos = ng.dot(d).abs();
-                // Along the surface nothing leaves it, and densities over the cosine would not be numbers.
-                if cos < LEAST_COSINE {
-                    return None;
-                }
-                let flux = radiance * (PI * area * along * if *two_sided { 2.0 } else { 1.0 });
-                (
-                    offset_origin(at, ng, d, position_error(corners)),
-                    d,
-                    flux,
-                    [1.0 / area, Self::onto(cos, *two_sided, spread), cos],
-                )
+        let ray = match emitter {
+            Emitter::Triangle { .. } => {
+                Self::emit_from_triangle(emitter, (shapes, materials), rest < 0.5, point, direction)?
             }
             Emitter::Point { p, intensity } => {
-                (*p, warp::sphere_uniform(direction), *intensity * (2.0 * TAU), [1.0, 0.5 / TAU, 1.0])
+                let (direction, flux) = (warp::sphere_uniform(direction), *intensity * (2.0 * TAU));
+                LightRay { origin: *p, direction, flux, start: 1.0, onward: 0.5 / TAU, cos: 1.0 }
             }
             Emitter::Spot { p, radius, frame, intensity, inner, outer, edge } => {
-                // Full cone and penumbra are chosen by their flux; inside the penumbra the falloff's integral is
-                // inverted, so every path carries the same flux.
+                // The full cone and the penumbra are selected by their flux. In the penumbra, the integral of the
+                // falloff is inverted, so every path carries the same flux.
                 let penumbra = (outer - inner) * edge.mean();
                 let x = direction.x * (inner + penumbra);
                 let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
@@ -523,48 +526,83 @@ impl Lights {
                 let (s, c) = (TAU * direction.y).sin_cos();
                 let filled = spot_solid_angle(*inner, *outer, *edge);
                 let falloff = spot_falloff(h, *inner, *outer, *edge);
-                let d = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
-                (spot_point(*p, *radius, frame, point), d, *intensity * filled, [1.0, falloff / filled, 1.0])
+                let direction = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
+                let (origin, flux) = (spot_point(*p, *radius, frame, point), *intensity * filled);
+                LightRay { origin, direction, flux, start: 1.0, onward: falloff / filled, cos: 1.0 }
             }
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
-                // Irradiance is what a facing surface gets from the whole cone; a path from direction d stands for
+                // A facing surface receives the irradiance E from the whole cone; a path from one direction carries
                 // L / pdf = E / mean cosine.
                 let flux = *irradiance * (2.0 / (2.0 - one_minus_cos));
-                let pdf_w = if *one_minus_cos == 0.0 { 1.0 } else { warp::cone_uniform_pdf_w(*one_minus_cos) };
-                let entry = 1.0 / (PI * self.sky.radius * self.sky.radius);
-                (self.disc(point, d), d, flux / entry, [pdf_w, entry, 1.0])
+                let start = if *one_minus_cos == 0.0 { 1.0 } else { warp::cone_uniform_pdf_w(*one_minus_cos) };
+                let onward = 1.0 / (PI * self.sky.radius * self.sky.radius);
+                let (origin, flux) = (self.sample_scene_disc(point, d), flux / onward);
+                LightRay { origin, direction: d, flux, start, onward, cos: 1.0 }
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
-                let (wi, pdf) = environment.sample(direction);
-                if pdf <= 0.0 {
+                let (wi, start) = environment.sample(direction);
+                if start <= 0.0 {
                     return None;
                 }
-                let entry = 1.0 / (PI * self.sky.radius * self.sky.radius);
-                (self.disc(point, -wi), -wi, environment.radiance(wi) / (pdf * entry), [pdf, entry, 1.0])
+                let onward = 1.0 / (PI * self.sky.radius * self.sky.radius);
+                let (origin, flux) = (self.sample_scene_disc(point, -wi), environment.radiance(wi) / (start * onward));
+                LightRay { origin, direction: -wi, flux, start, onward, cos: 1.0 }
             }
         };
+        let LightRay { origin, direction, flux, start, onward, cos } = ray;
         let flux = flux / probability;
-        let infinite = emitter.is_infinite();
-        let delta = emitter.is_delta();
-        let start = direct * probability;
+        let (infinite, delta) = (emitter.is_infinite(), emitter.is_delta());
+        let start = start * probability;
         let density = EmissionDensity { direct: start, start, onward, cos, infinite, delta };
-        // What is not finite sets out, for somebody to see that it was there.
+        let (light, entry) = (index as u32, EntryDisc::Whole);
+        // Non-finite flux is emitted too, so that the pixels it reaches report it.
         (flux.max_element() > 0.0 || !flux.is_finite()).then_some(EmissionSample {
             origin,
-            direction: d,
+            direction,
             flux,
-            light: index as u32,
+            light,
             delta,
             infinite,
-            entry: EntryDisc::Whole,
+            entry,
             density,
         })
     }
 
-    /// Aims the start of a path from infinity at what can make caustics (see [`CausticTargets::aim`]); others stay as they
-    /// are.
+    /// Samples a ray that leaves a triangle, on its `back` if it emits from both sides.
+    #[inline(always)]
+    fn emit_from_triangle(
+        triangle: &Emitter,
+        (shapes, materials): (&Shapes, &Materials),
+        back: bool,
+        point: Vec2,
+        direction: Vec2,
+    ) -> Option<LightRay> {
+        let Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, uniform } =
+            triangle
+        else {
+            return None;
+        };
+        let b = warp::triangle_uniform(point);
+        let (at, ng) = (corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate());
+        let frame = Frame::from_normal(if *two_sided && back { -ng } else { ng });
+        let (d, weight) = spread.sample(direction);
+        let d = frame.to_world(d);
+        let radiance =
+            if *uniform { *radiance } else { textured_radiance(shapes, materials, (*instance, *primitive), b)? };
+        let cos = ng.dot(d).abs();
+        if cos < MIN_COSINE {
+            return None;
+        }
+        let flux = radiance * (PI * area * weight * if *two_sided { 2.0 } else { 1.0 });
+        let origin = offset_origin(at, ng, d, position_error(corners));
+        let onward = Self::cosine_density(cos, *two_sided, spread);
+        Some(LightRay { origin, direction: d, flux, start: 1.0 / area, onward, cos })
+    }
+
+    /// Aims the start of a light path from infinity at caustic targets (see [`CausticTargets::aim`]). Other starts do
+    /// not change.
     #[inline]
     pub fn aim(&self, emission: &mut EmissionSample, u: f32, point: Vec2) {
         if emission.infinite {
@@ -572,8 +610,9 @@ impl Lights {
         }
     }
 
-    /// The same, and part of the paths from infinity through the disc of a region of interest, if there is one. Flux
-    /// and density are those without the region.
+    /// Aims the start of a light path from infinity at caustic targets, and part of the starts at the region of
+    /// interest, if there is one. Flux and density do not account for the region yet: see
+    /// [`Lights::density_with_region`].
     #[inline]
     pub fn aim_with_region(&self, emission: &mut EmissionSample, region: Option<Region>, u: f32, point: Vec2) {
         match region {
@@ -584,32 +623,32 @@ impl Lights {
         }
     }
 
-    /// Density that a start has where none are aimed.
+    /// Density of a start in emission without aiming.
     #[inline]
-    pub fn plain(&self, emission: &EmissionSample) -> f32 {
+    pub fn unaimed_density(&self, emission: &EmissionSample) -> f32 {
         if emission.infinite { 1.0 / (PI * self.sky.radius * self.sky.radius) } else { emission.density.onward }
     }
 
-    /// Density that an aimed start has with the region in the mixture, and the part of it that paths of all light have:
-    /// those through the whole scene and the region, without what is aimed.
+    /// Density of an aimed start in the mixture with the region, and the part of this density without the caustic
+    /// targets: paths through the disc of the whole scene or of the region.
     #[inline]
     pub fn density_with_region(&self, emission: &EmissionSample, region: Option<Region>) -> (f32, f32) {
         let onward = emission.density.onward;
         match region {
             _ if !emission.infinite => (onward, onward),
             Some(region) => self.targets.density_with_region(&self.sky, emission, region),
-            None => (onward, onward * self.targets.unaimed(&self.sky, emission)),
+            None => (onward, onward * self.targets.unaimed_share(&self.sky, emission)),
         }
     }
 
-    /// A point of the disc, before the scene as seen along `d`, through which light of direction `d` enters the scene.
-    fn disc(&self, u: Vec2, d: Vec3) -> Vec3 {
+    /// Samples a point of the disc through which light of direction `d` enters the scene's bounding sphere.
+    fn sample_scene_disc(&self, u: Vec2, d: Vec3) -> Vec3 {
         let frame = Frame::from_normal(d);
         let q = warp::disc_concentric(u) * self.sky.radius;
         self.sky.center + frame.t * q.x + frame.b * q.y - d * self.sky.radius
     }
 
-    /// Whether any triangle of the instance gives light.
+    /// Whether any triangle of the instance is a light.
     pub fn emits(&self, instance: u32) -> bool {
         self.relative[instance as usize].iter().any(|&i| i != u32::MAX)
     }

@@ -1,4 +1,4 @@
-//! Light sources: emissive triangles, points, spots, suns and the environment, and how they are sampled.
+//! Light sources (emissive triangles, points, spots, suns and the environment), and their sampling.
 
 mod aim;
 mod cdf;

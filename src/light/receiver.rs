@@ -1,21 +1,21 @@
-//! Where light is received.
+//! Receivers of light.
 
 use crate::math::Vec3;
 
 /// A point that receives light.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
-    /// Where.
+    /// Position.
     pub p: Vec3,
-    /// Unit normal on the side that light has to come from; zero where it may come from anywhere.
+    /// Unit normal on the side that receives light; zero if light may come from any direction.
     pub n: Vec3,
-    /// It is in a medium. Lights are chosen for it by power alone: points on the way through a medium are drawn by the
-    /// lamp, which has to be chosen before them.
+    /// Whether the point is in a medium. Lights are then selected by power alone: points along a ray in a medium are
+    /// sampled for a given light, so the light has to be selected before the point.
     pub in_medium: bool,
 }
 
 impl Receiver {
-    /// A point lit from anywhere, outside of media.
+    /// A receiver outside media that light reaches from any direction.
     #[inline]
     pub fn anywhere(p: Vec3) -> Receiver {
         Receiver { p, n: Vec3::ZERO, in_medium: false }

@@ -1,4 +1,4 @@
-//! The choice of a light for a point that receives light.
+//! Selection of a light for next-event estimation at a receiver.
 
 use super::cdf::Cdf;
 use super::emitter::{Emitter, Sky};
@@ -7,70 +7,73 @@ use super::tree::LightTree;
 use crate::math::luminance;
 use std::f32::consts::PI;
 
-/// Share of the choices that go by power wherever the light is received: what a near lamp behind a wall takes from the
-/// others has this bound.
-const BY_POWER: f64 = 0.1;
-/// Least share of the other choices for lights at infinity, and for all others, where there are both.
-const LEAST_SHARE: f32 = 0.0625;
+/// Share of the selection probability that is proportional to power for every receiver. It limits how much probability a
+/// near light behind a wall can take from the other lights.
+const POWER_SHARE: f64 = 0.1;
+/// Smallest share of the remaining probability for lights at infinity and for finite lights, if a scene has both.
+const MIN_SHARE: f32 = 0.0625;
 
-/// Probability of a choice that goes by power or by what arrives.
+/// Probability of a light in the mixture of both distributions: by power, and by expected irradiance.
 #[inline]
 fn mixed(by_power: f32, near: f32) -> f32 {
-    BY_POWER as f32 * by_power + (1.0 - BY_POWER as f32) * near
+    POWER_SHARE as f32 * by_power + (1.0 - POWER_SHARE as f32) * near
 }
 
-/// Which light is asked for light.
+/// Selects lights by power and by the irradiance expected at the receiver.
 pub(super) struct LightSampler {
     power: Cdf,
-    /// Where there is more to choose from than the halves of one rectangle.
-    near: Option<Near>,
+    /// `None` if a scene has one light only, or two triangles of one object.
+    near: Option<IrradianceSampler>,
 }
 
-/// By what arrives.
-struct Near {
+/// Selects lights by the irradiance expected at the receiver.
+struct IrradianceSampler {
     tree: LightTree,
-    /// Lights at infinity, by the irradiance they may bring.
+    /// Lights at infinity, by the irradiance on a surface that faces them.
     infinite: Option<Cdf>,
 }
 
 impl LightSampler {
-    /// `None` if no light gives any light; `powers` are those of the emitters, with a floor.
+    /// Builds the distributions; `powers` are the selection weights of the emitters. `None` if all are zero.
     pub fn new(emitters: &[Emitter], sky: &Sky, powers: impl Iterator<Item = f64>) -> Option<LightSampler> {
         let power = Cdf::new(powers)?;
-        let near = several(emitters).then(|| LightTree::new(emitters)).flatten().map(|tree| {
+        let near = has_several_lights(emitters).then(|| LightTree::new(emitters)).flatten().map(|tree| {
             let irradiance = |emitter: &Emitter| match emitter {
                 Emitter::Sun { irradiance, .. } => luminance(*irradiance),
                 Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| luminance(e.mean()) * PI),
                 _ => 0.0,
             };
-            Near { tree, infinite: Cdf::new(emitters.iter().map(|emitter| f64::from(irradiance(emitter)))) }
+            IrradianceSampler {
+                tree,
+                infinite: Cdf::new(emitters.iter().map(|emitter| f64::from(irradiance(emitter)))),
+            }
         });
         Some(LightSampler { power, near })
     }
 
-    /// By power alone, as emission is chosen.
+    /// The distribution by power alone, which selects lights for emission.
     #[inline]
     pub fn power(&self) -> &Cdf {
         &self.power
     }
 
-    /// A light and its probability.
+    /// Selects a light by the uniform number `u`, and returns its index and its probability.
     #[inline]
     pub fn sample(&self, at: &Receiver, u: f64) -> Option<(usize, f32)> {
         let Some(near) = self.near.as_ref().filter(|_| !at.in_medium) else {
             let (index, pdf, _) = self.power.sample(u);
             return Some((index, pdf));
         };
-        if u < BY_POWER {
-            let (index, pdf, _) = self.power.sample(u / BY_POWER);
+        if u < POWER_SHARE {
+            let (index, pdf, _) = self.power.sample(u / POWER_SHARE);
             return Some((index, mixed(pdf, near.pdf(at, index))));
         }
-        let u = ((u - BY_POWER) / (1.0 - BY_POWER)).min(1.0f64.next_down());
+        let u = ((u - POWER_SHARE) / (1.0 - POWER_SHARE)).min(1.0f64.next_down());
         let (index, pdf) = near.sample(at, u)?;
         Some((index, mixed(self.power.pdf(index), pdf)))
     }
 
-    /// Probability of choosing a light.
+    /// Probability with which [`LightSampler::sample`] selects a light.
     #[inline]
     pub fn pdf(&self, at: &Receiver, index: usize) -> f32 {
         let power = self.power.pdf(index);
@@ -81,26 +84,26 @@ impl LightSampler {
     }
 }
 
-/// Whether it matters which emitter is chosen.
-fn several(emitters: &[Emitter]) -> bool {
+/// Whether selection depends on the receiver: not for one emitter, or the two triangles of a rectangle.
+fn has_several_lights(emitters: &[Emitter]) -> bool {
     match emitters {
         [Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }] => a != b,
         _ => emitters.len() > 1,
     }
 }
 
-impl Near {
-    /// Share of the lights at infinity.
+impl IrradianceSampler {
+    /// Probability of selecting a light at infinity.
     #[inline]
-    fn share(&self, at: &Receiver) -> f32 {
+    fn infinite_share(&self, at: &Receiver) -> f32 {
         let Some(infinite) = &self.infinite else { return 0.0 };
         let (irradiance, near) = (infinite.total() as f32, self.tree.importance(at));
-        if near > 0.0 { (irradiance / (irradiance + near)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) } else { 1.0 }
+        if near > 0.0 { (irradiance / (irradiance + near)).clamp(MIN_SHARE, 1.0 - MIN_SHARE) } else { 1.0 }
     }
 
     #[inline]
     fn sample(&self, at: &Receiver, u: f64) -> Option<(usize, f32)> {
-        let share = self.share(at);
+        let share = self.infinite_share(at);
         let split = f64::from(share);
         match &self.infinite {
             Some(infinite) if u < split => {
@@ -117,7 +120,7 @@ impl Near {
 
     #[inline]
     fn pdf(&self, at: &Receiver, index: usize) -> f32 {
-        let share = self.share(at);
+        let share = self.infinite_share(at);
         match &self.infinite {
             Some(infinite) if infinite.pdf(index) > 0.0 => share * infinite.pdf(index),
             _ => (1.0 - share) * self.tree.pdf(at, index),

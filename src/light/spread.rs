@@ -1,49 +1,49 @@
-//! How a glowing surface spreads its light: as a Lambertian emitter, or into a cone, as area lamps of Cycles do; below a
-//! clear coat or not.
+//! Angular distribution of the light of an emissive surface: Lambertian, or within a cone as for area lights of Cycles,
+//! with or without a clear coat above.
 
 use crate::bsdf::coat_reflectance;
 use crate::math::{Vec2, Vec3, warp};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 
-/// The radiance of a glowing surface by its angle to the normal, over the mean that its flux tells (flux is pi times
-/// radiance times area). Into a cone of half angle h it is (tan h - tan x) / (tan h - h), x the angle: that of a
-/// Lambertian emitter behind a fine honeycomb, which all the flux leaves all the same.
+/// Radiance of an emissive surface as a function of the angle x to its normal, relative to the mean radiance
+/// flux / (pi area). Within a cone of half angle h, the relative radiance is (tan h - tan x) / (tan h - h): a
+/// Lambertian emitter behind a fine honeycomb, scaled so that the flux does not change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// Tangent of the half angle.
+    /// Tangent of the half angle h.
     tan: f32,
     /// 1 / (tan h - h).
     scale: f32,
-    /// Squared sine of the half angle; 1: Lambertian.
+    /// Squared sine of the half angle; 1 for a Lambertian emitter.
     sin2: f32,
-    /// Strength of the clear coat above it.
+    /// Strength of the clear coat above the emitter.
     coat: f32,
 }
 
 impl Spread {
-    /// The same radiance in all directions.
+    /// A Lambertian emitter: equal radiance in all directions.
     pub const LAMBERTIAN: Spread = Spread { tan: f32::INFINITY, scale: 0.0, sin2: 1.0, coat: 0.0 };
-    /// Half angles below this (rad) are taken for it, as in Cycles: cosines of less have few digits left.
-    const LEAST: f32 = 0.5 * std::f32::consts::PI / 180.0;
+    /// Smallest half angle (rad), as in Cycles. Cosines of smaller angles have too few digits in f32.
+    const MIN_HALF_ANGLE: f32 = 0.5 * std::f32::consts::PI / 180.0;
 
-    /// Into a cone of this half angle (rad); a right angle and more is Lambertian.
+    /// Emission into a cone of half angle `half` (rad); Lambertian from a right angle on.
     pub fn new(half: f32) -> Spread {
         if half >= FRAC_PI_2 * 0.999 {
             return Spread::LAMBERTIAN;
         }
-        let half = f64::from(half.max(Spread::LEAST));
+        let half = f64::from(half.max(Spread::MIN_HALF_ANGLE));
         let (sin, tan) = (half.sin(), half.tan());
         Spread { tan: tan as f32, scale: (1.0 / (tan - half)) as f32, sin2: (sin * sin) as f32, coat: 0.0 }
     }
 
-    /// The same below a clear coat of this strength, which reflects a part of it back (KHR_materials_clearcoat).
+    /// Emission below a clear coat of strength `coat`, which reflects part of the light back (KHR_materials_clearcoat).
     pub fn below_coat(self, coat: f32) -> Spread {
         Spread { coat, ..self }
     }
 
-    /// Radiance over the mean, at a cosine above zero.
+    /// Radiance over the mean radiance, at a cosine above zero.
     #[inline]
-    pub(super) fn of(&self, cos: f32) -> f32 {
+    pub(super) fn relative_radiance(&self, cos: f32) -> f32 {
         let passes = if self.coat > 0.0 { 1.0 - self.coat * coat_reflectance(cos) } else { 1.0 };
         if self.sin2 == 1.0 {
             return passes;
@@ -64,16 +64,17 @@ impl Spread {
         }
     }
 
-    /// A direction about +Z in the cone, by its cosine, and what flux along it is over the mean.
+    /// Samples a direction in the cone about +Z, proportionally to the cosine. Returns the direction and its flux over
+    /// the mean flux.
     #[inline]
     pub(super) fn sample(&self, u: Vec2) -> (Vec3, f32) {
         if self.sin2 == 1.0 {
             let d = warp::hemisphere_cosine(u);
-            return (d, self.of(d.z));
+            return (d, self.relative_radiance(d.z));
         }
         let on = warp::disc_concentric(u) * self.sin2.sqrt();
         let cos = (1.0 - on.length_squared()).max(0.0).sqrt();
-        (on.extend(cos), self.of(cos) * self.sin2)
+        (on.extend(cos), self.relative_radiance(cos) * self.sin2)
     }
 }
 
@@ -81,9 +82,9 @@ impl Spread {
 mod tests {
     use super::*;
 
-    /// Flux by the closed form and by the samples' weights is that of a Lambertian emitter, whatever the angle.
+    /// The mean weight of the samples is 1 for every half angle: a cone emits the flux of a Lambertian emitter.
     #[test]
-    fn all_flux_leaves() {
+    fn every_half_angle_emits_the_same_flux() {
         for degrees in [0.1f32, 0.5, 1.0, 10.0, 60.0, 89.0, 90.0] {
             let spread = Spread::new(degrees.to_radians());
             let (n, mut mean) = (400, 0.0);
@@ -98,14 +99,13 @@ mod tests {
         }
     }
 
-    /// The extension's formula at 0 and 80 degrees, where Fresnel's equations reflect 0.04 and 0.388, by value and by
-    /// sample.
+    /// The formula of KHR_materials_clearcoat at 0 and 80 degrees, where Fresnel reflectance is 0.04 and 0.388.
     #[test]
-    fn a_coat_dims_what_is_below() {
+    fn a_coat_dims_the_emission_below() {
         let spread = Spread::LAMBERTIAN.below_coat(0.5);
-        assert!((spread.of(1.0) - 0.98).abs() < 1e-6);
-        assert!((spread.of(80f32.to_radians().cos()) - (1.0 - 0.5 * 0.3877)).abs() < 1e-3);
+        assert!((spread.relative_radiance(1.0) - 0.98).abs() < 1e-6);
+        assert!((spread.relative_radiance(80f32.to_radians().cos()) - (1.0 - 0.5 * 0.3877)).abs() < 1e-3);
         let (d, flux) = spread.sample(Vec2::new(0.9, 0.2));
-        assert_eq!(flux, spread.of(d.z));
+        assert_eq!(flux, spread.relative_radiance(d.z));
     }
 }

@@ -1,10 +1,11 @@
-//! Choosing lights by what they may bring to a point: a tree of clusters, each with a bound on where it shines [Conty
-//! and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018].
+//! Light selection by expected irradiance: a tree of clusters with bounds on their positions and directions [Conty and
+//! Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018].
 //!
-//! A cluster is a sphere around its lights and a cone around their axes. A choice goes from the root to a leaf, at each
-//! step by how much light each half may send to the point: intensity by the least angle to an axis over the distance
-//! squared. What is certain to send nothing is never chosen. Where a cluster is small and far away and all its lights
-//! look one way, it makes no difference how it is divided: there the choice goes by power.
+//! A cluster has a bounding sphere of its lights and a bounding cone of their axes. Selection descends from the root to a
+//! leaf. At each node, the probability of a child is proportional to a bound on its irradiance at the receiver: intensity
+//! at the smallest possible angle to an axis, over the squared distance. A cluster that cannot light the receiver is
+//! never selected. In a small and distant cluster whose lights have similar axes, all lights are seen alike, so selection
+//! there is by power.
 
 mod bounds;
 
@@ -15,20 +16,21 @@ use bounds::{Bounds, split, union};
 use std::f32::consts::PI;
 use std::ops::Range;
 
-/// Nearer lights (m2) count as if they were that far, so that sums stay finite.
-const LEAST_DISTANCE2: f32 = 1e-12;
-/// What light along a surface counts for over light from above, since it may be reflected well; and from behind, where
-/// a normal is no longer sure.
+/// Minimum squared distance (m2) in the estimated irradiance, which keeps sums finite.
+const MIN_DISTANCE2: f32 = 1e-12;
+/// Weight of light at grazing incidence, relative to normal incidence: glossy surfaces reflect it.
 const GRAZING: f32 = 0.1;
+/// Weight of light from behind the surface, where shading normals may still receive it.
 const BEHIND: f32 = 0.01;
-/// A cluster is small and far where its squared radius is less than this of its squared distance,
-const SMALL: f32 = 1.0 / 64.0;
-/// and looks one way where its axes are within this cosine of theirs.
-const ONE_WAY: f32 = 0.7;
-/// What is not in the tree.
+/// A cluster is compact if its squared radius is less than this share of its squared distance, and its axes are within
+/// `COMPACT_COSINE`.
+const COMPACT_RADIUS2: f32 = 1.0 / 64.0;
+/// Cosine of the largest half angle of the axes of a compact cluster.
+const COMPACT_COSINE: f32 = 0.7;
+/// Index of a parent or a leaf that does not exist.
 const NONE: u32 = u32::MAX;
 
-/// What a choice asks of a cluster, in a cache line.
+/// The data of a cluster that selection needs, in one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Node {
@@ -41,10 +43,11 @@ struct Node {
     cos_reach: f32,
     two_sided: bool,
     cosine: bool,
-    /// Its lights: where they begin in [`LightTree::order`], and how many.
+    /// Index in [`LightTree::order`] of the first light of the cluster.
     first: u32,
+    /// Number of lights in the cluster.
     count: u32,
-    /// The first of two children side by side; 0 in a leaf.
+    /// Index of the first child; the second one follows. 0 for a leaf.
     children: u32,
     parent: u32,
 }
@@ -69,19 +72,19 @@ impl Node {
         }
     }
 
-    /// Whether its lights are as good as in one place, seen from a receiver.
+    /// Whether a receiver sees all lights of the cluster at about the same distance and angle.
     #[inline]
     fn is_compact(&self, at: &Receiver) -> bool {
-        self.cos_spread > ONE_WAY && self.radius2 < SMALL * at.p.distance_squared(self.center)
+        self.cos_spread > COMPACT_COSINE && self.radius2 < COMPACT_RADIUS2 * at.p.distance_squared(self.center)
     }
 
-    /// Irradiance that the cluster may bring to a receiver (W/m2, luminance), about; 0 only where it is certain to
-    /// bring none.
+    /// Approximate upper bound on the irradiance of the cluster at a receiver (W/m2, luminance); 0 only if the cluster
+    /// certainly does not light the receiver.
     #[inline]
     fn importance(&self, at: &Receiver) -> f32 {
         let to = at.p - self.center;
         let distance2 = to.length_squared();
-        let inverse = 1.0 / distance2.max(self.radius2).max(LEAST_DISTANCE2);
+        let inverse = 1.0 / distance2.max(self.radius2).max(MIN_DISTANCE2);
         if distance2 <= self.radius2 {
             return self.intensity * inverse;
         }
@@ -89,11 +92,11 @@ impl Node {
         let cos = self.axis.dot(to) * inverse_distance;
         let cos = if self.two_sided { cos.abs() } else { cos };
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        // The angle beyond the cone of the axes, then beyond that of the sphere as well.
-        let (cos, sin) = less(cos, sin, self.cos_spread, self.sin_spread);
+        // Subtracts the half angle of the axes, then the half angle that the bounding sphere subtends.
+        let (cos, sin) = subtract_angle(cos, sin, self.cos_spread, self.sin_spread);
         let sin2_sphere = self.radius2 * inverse;
         let (cos_sphere, sin_sphere) = ((1.0 - sin2_sphere).max(0.0).sqrt(), sin2_sphere.sqrt());
-        let (cos, _) = less(cos, sin, cos_sphere, sin_sphere);
+        let (cos, _) = subtract_angle(cos, sin, cos_sphere, sin_sphere);
         if cos <= self.cos_reach {
             return 0.0;
         }
@@ -103,30 +106,30 @@ impl Node {
         }
         let cos = -at.n.dot(to) * inverse_distance;
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let (cos, _) = less(cos, sin, cos_sphere, sin_sphere);
+        let (cos, _) = subtract_angle(cos, sin, cos_sphere, sin_sphere);
         intensity * if cos > 0.0 { GRAZING + (1.0 - GRAZING) * cos } else { BEHIND }
     }
 }
 
-/// Cosine and sine of the difference of two angles in [0, pi], not below zero.
+/// Cosine and sine of the difference of two angles in [0, pi], clamped at zero.
 #[inline]
-fn less(cos: f32, sin: f32, cos_by: f32, sin_by: f32) -> (f32, f32) {
+fn subtract_angle(cos: f32, sin: f32, cos_by: f32, sin_by: f32) -> (f32, f32) {
     if cos >= cos_by { (1.0, 0.0) } else { (cos * cos_by + sin * sin_by, sin * cos_by - cos * sin_by) }
 }
 
-/// The tree over all lights that are somewhere.
+/// The tree over all lights at finite positions.
 pub(super) struct LightTree {
     nodes: Vec<Node>,
-    /// Emitters in the order of leaves.
+    /// Indices of emitters, in the order of the leaves.
     order: Vec<u32>,
-    /// Sums of intensity of all before each of them, and of all.
+    /// Cumulative intensity: for each index in `order`, the sum over the lights before; then the total.
     below: Vec<f64>,
-    /// The leaf of every emitter; [`NONE`] for those without.
+    /// Index of the leaf of each emitter; [`NONE`] for emitters outside the tree.
     leaves: Vec<u32>,
 }
 
 impl LightTree {
-    /// `None` where no light is anywhere.
+    /// Builds the tree; `None` if no light has a finite position.
     pub fn new(emitters: &[Emitter]) -> Option<LightTree> {
         let mut lights: Vec<(u32, Bounds)> =
             (0..).zip(emitters).filter_map(|(i, emitter)| Some((i, Bounds::of(emitter)?))).collect();
@@ -135,7 +138,7 @@ impl LightTree {
         let (leaves, order, below) = (vec![NONE; emitters.len()], Vec::new(), Vec::new());
         let mut tree = LightTree { nodes: vec![root], order, below, leaves };
         tree.nodes.reserve(2 * lights.len());
-        // Depth first, without recursion: a node and its lights, a range of the list.
+        // A stack of nodes to split: index, range of `lights`, depth.
         let mut open = vec![(0u32, 0..lights.len(), 0u32)];
         while let Some((node, range, depth)) = open.pop() {
             if range.len() == 1 {
@@ -161,31 +164,32 @@ impl LightTree {
         Some(tree)
     }
 
-    /// Share of one light, by its place in the order, in the power of the node that it belongs to.
+    /// Share of the light at index `k` of `order` in the intensity of the node that contains it.
     #[inline]
-    fn share(&self, k: usize, node: &Node) -> f32 {
-        let of = |first: usize, count: usize| self.below[first + count] - self.below[first];
-        let all = of(node.first as usize, node.count as usize);
-        // Beside far stronger ones before it a node may be lost in the sums.
-        if all > 0.0 { (of(k, 1) / all) as f32 } else { 0.0 }
+    fn intensity_share(&self, k: usize, node: &Node) -> f32 {
+        let sum = |first: usize, count: usize| self.below[first + count] - self.below[first];
+        let all = sum(node.first as usize, node.count as usize);
+        // The difference may round to zero if far stronger lights precede the node.
+        if all > 0.0 { (sum(k, 1) / all) as f32 } else { 0.0 }
     }
 
-    /// One of the lights of a node by power, and its probability.
+    /// Selects a light of a node by intensity. Returns its emitter and its probability.
     #[inline]
-    fn by_power(&self, node: &Node, u: f64) -> (u32, f32) {
+    fn sample_by_intensity(&self, node: &Node, u: f64) -> (u32, f32) {
         let (start, end) = (node.first as usize, (node.first + node.count) as usize);
         let target = self.below[start] + u * (self.below[end] - self.below[start]);
         let k = start + self.below[start + 1..end].partition_point(|&below| below <= target);
-        (self.order[k], self.share(k, node))
+        (self.order[k], self.intensity_share(k, node))
     }
 
-    /// Irradiance that all lights may bring to a receiver (W/m2, luminance).
+    /// Approximate upper bound on the irradiance of all lights at a receiver (W/m2, luminance).
     #[inline]
     pub fn importance(&self, at: &Receiver) -> f32 {
         self.nodes[0].importance(at)
     }
 
-    /// An emitter and its probability; `None` where none shines.
+    /// Selects an emitter for a receiver. Returns its index and its probability; `None` if no light can reach the
+    /// receiver.
     #[inline]
     pub fn sample(&self, at: &Receiver, mut u: f64) -> Option<(usize, f32)> {
         let (mut node, mut pdf) = (&self.nodes[0], 1.0);
@@ -210,12 +214,12 @@ impl LightTree {
             u = u.min(1.0f64.next_down());
         }
         let (emitter, share) =
-            if node.children == 0 { (self.order[node.first as usize], 1.0) } else { self.by_power(node, u) };
+            if node.children == 0 { (self.order[node.first as usize], 1.0) } else { self.sample_by_intensity(node, u) };
         pdf *= share;
         (pdf > 0.0).then_some((emitter as usize, pdf))
     }
 
-    /// Probability of choosing an emitter.
+    /// Probability with which [`LightTree::sample`] selects an emitter.
     #[inline]
     pub fn pdf(&self, at: &Receiver, emitter: usize) -> f32 {
         let mut node = self.leaves[emitter];
@@ -231,10 +235,10 @@ impl LightTree {
             let sum = importance[0] + importance[1];
             pdf *= if sum > 0.0 { importance[(node - first) as usize] / sum } else { 0.0 };
             node = parent;
-            // From here down the choice went by power.
+            // Below a compact cluster, selection is by intensity.
             let cluster = &self.nodes[node as usize];
             if cluster.is_compact(at) {
-                pdf = self.share(own, cluster);
+                pdf = self.intensity_share(own, cluster);
             }
         }
         pdf
@@ -255,7 +259,7 @@ mod tests {
     use crate::math::{Rgb, Vec2, Vec4, warp};
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Triangles, points and spots of all orientations, in a box of 10 m.
+    /// Triangles, points and spots of random orientation, in a box of 10 m.
     fn lights(n: u64) -> Vec<Emitter> {
         let light = |i: u64| {
             let draws = |k: u64| Stream::new(4, k, Domain::Test, i).vertex(0);
@@ -289,7 +293,7 @@ mod tests {
                         spread: Spread::LAMBERTIAN,
                         plane: Vec4::new(n.x, n.y, n.z, n.dot(p)),
                         corners,
-                        plain: true,
+                        uniform: true,
                     }
                 }
             }
@@ -297,7 +301,7 @@ mod tests {
         (0..n).map(light).collect()
     }
 
-    /// Whether any point of the light shines on `p`.
+    /// Whether some point of the light shines on `p`.
     fn shines(emitter: &Emitter, p: Vec3) -> bool {
         match emitter {
             Emitter::Triangle { two_sided, plane, .. } => *two_sided || plane.truncate().dot(p) - plane.w > 1e-4,
@@ -311,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_are_those_of_sampling_and_sum_to_one() {
+    fn probabilities_match_sampling_and_sum_to_one() {
         let emitters = lights(61);
         let tree = LightTree::new(&emitters).unwrap();
         for i in 0..50 {
@@ -323,7 +327,7 @@ mod tests {
             let n = 4096;
             let (mut count, mut none) = (vec![0u32; emitters.len()], 0);
             for k in 0..n {
-                // A cluster may promise light that neither half has.
+                // The bound of a cluster may be positive although those of both children are zero.
                 let Some((index, pdf)) = tree.sample(&at, (f64::from(k) + 0.5) / f64::from(n)) else {
                     none += 1;
                     continue;
@@ -333,16 +337,17 @@ mod tests {
             }
             assert!((sum + none as f32 / n as f32 - 1.0).abs() < 2e-3, "{sum} and {none} at {p}");
             for (index, &count) in count.iter().enumerate() {
-                // Numbers in equal steps: each interval of choice misses less than one at either end.
+                // `u` is in equal steps, so each interval of selection gains or loses less than one at either end.
                 let expected = tree.pdf(&at, index) * n as f32;
                 assert!((count as f32 - expected).abs() <= 2.0, "{count} {expected}");
             }
         }
     }
 
-    /// What shines has a chance at every point, and the nearer of two equal lamps the greater one.
+    /// Every light that shines on a point has a positive probability there, and the nearer of two equal lights has the
+    /// higher one.
     #[test]
-    fn no_light_that_shines_is_impossible() {
+    fn every_light_that_shines_on_a_point_can_be_selected() {
         let emitters = lights(200);
         let tree = LightTree::new(&emitters).unwrap();
         let (mut shining, mut never) = (0, 0);
@@ -361,15 +366,15 @@ mod tests {
             }
         }
         assert!(shining > 30_000 && never > 3_000, "{shining} {never}");
-        let lamp = |x: f32| Emitter::Point { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::ONE };
-        let tree = LightTree::new(&[lamp(0.0), lamp(10.0)]).unwrap();
+        let point = |x: f32| Emitter::Point { p: Vec3::new(x, 0.0, 0.0), intensity: Rgb::ONE };
+        let tree = LightTree::new(&[point(0.0), point(10.0)]).unwrap();
         assert!((tree.pdf(&Receiver::anywhere(Vec3::X), 0) - 81.0 / 82.0).abs() < 1e-5);
     }
 
     #[test]
-    fn lamps_in_one_place_and_none_at_all() {
-        let lamp = Emitter::Point { p: Vec3::ONE, intensity: Rgb::ONE };
-        let tree = LightTree::new(&vec![lamp; 1000]).unwrap();
+    fn coincident_lights_are_equally_probable_and_a_tree_needs_a_light() {
+        let light = Emitter::Point { p: Vec3::ONE, intensity: Rgb::ONE };
+        let tree = LightTree::new(&vec![light; 1000]).unwrap();
         for p in [Vec3::ONE, Vec3::ZERO] {
             assert!((tree.pdf(&Receiver::anywhere(p), 17) - 1e-3).abs() < 1e-6);
         }

@@ -54,7 +54,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     };
     let others = description.lights.iter().filter(|light| !light.is_sphere());
     let (light_names, others) = others.map(|light| (light.name.clone(), punctual(light, origin))).unzip();
-    let lights = Lights::new(&shapes, &materials, others, sky).grouped(groups);
+    let lights = Lights::new(&shapes, &materials, others, sky).with_groups(groups);
     warn_of_cut_solids(&shapes, &materials, &mut warnings);
     warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
     if description.cameras.is_empty() {
@@ -101,7 +101,7 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
     let mut groups = Groups::default();
     let mut of = |name: &Option<String>| {
         let Some(name) = name.as_deref().filter(|name| !name.is_empty()) else { return Group::NONE };
-        groups.named(name).unwrap_or_else(|| {
+        groups.get_or_add(name).unwrap_or_else(|| {
             let warning = format!("light group \"{name}\": it is left out: there are {MAX_GROUPS} others");
             if !warnings.contains(&warning) {
                 warnings.push(warning);
@@ -211,7 +211,7 @@ pub(super) fn rebuild_with_materials(
     let lamps = scene.lights.emitters().iter();
     let lamps = lamps.filter(|lamp| !matches!(lamp, Emitter::Triangle { .. } | Emitter::Environment)).cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
-    let lights = Lights::new(&shapes, &materials, lamps.collect(), sky).grouped(scene.lights.groups().clone());
+    let lights = Lights::new(&shapes, &materials, lamps.collect(), sky).with_groups(scene.lights.groups().clone());
     Ok(Scene {
         source: scene.source.clone(),
         converted: scene.converted.clone(),

@@ -123,7 +123,7 @@ fn around_lights(scene: &Scene) -> Vec<InitialMedium> {
                 return InitialMedium::Differs;
             }
         }
-        InitialMedium::Same(emitter.anywhere(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
+        InitialMedium::Same(emitter.any_point(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
     };
     scene.lights.emitters().iter().map(&mut around).collect()
 }

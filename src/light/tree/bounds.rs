@@ -1,33 +1,33 @@
-//! Where lights are and shine, and into which halves they are best split.
+//! Bounds on the positions and directions of lights, and the best split of a cluster into halves.
 
 use crate::light::emitter::Emitter;
 use crate::math::{Vec3, luminance};
 use std::f32::consts::PI;
 
-/// Classes of position along an axis at whose borders clusters are split.
+/// Number of buckets along an axis; candidate splits are at their borders.
 const BUCKETS: usize = 12;
-/// From this depth on clusters are halved by number, so that the tree's depth has a bound.
+/// Depth from which on clusters are split into halves of equal size, which limits the depth of the tree.
 const BALANCED_FROM: u32 = 40;
 
-/// Where lights of a cluster are and shine.
+/// Bounds on the positions and directions of the lights of a cluster.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     pub low: Vec3,
     pub high: Vec3,
     pub axis: Vec3,
-    /// Greatest angle between the axis and that of a light (rad).
+    /// Maximum angle between `axis` and the axis of a light (rad).
     pub spread: f32,
-    /// Greatest angle between a light's axis and what it sends (rad).
+    /// Maximum angle between the axis of a light and its emission (rad).
     pub reach: f32,
     pub two_sided: bool,
-    /// All of them send as much as the cosine says, not the same up to `reach`.
+    /// Whether the intensity of all lights falls off with the cosine, instead of being constant up to `reach`.
     pub cosine: bool,
-    /// Sum of the lights' greatest radiant intensities (W/sr, luminance).
+    /// Sum of the maximum radiant intensities of the lights (W/sr, luminance).
     pub intensity: f32,
 }
 
 impl Bounds {
-    /// Of one light; `None` for those at infinity and those that send nothing.
+    /// Bounds of one light; `None` for lights at infinity and lights without intensity.
     pub fn of(emitter: &Emitter) -> Option<Bounds> {
         let at = |p: Vec3, axis, spread, reach, intensity| Bounds {
             low: p,
@@ -42,13 +42,13 @@ impl Bounds {
         let bounds = match emitter {
             Emitter::Triangle { area, two_sided, radiance, spread, plane, corners, .. } => {
                 let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
-                let intensity = luminance(*radiance) * area * spread.of(1.0);
+                let intensity = luminance(*radiance) * area * spread.relative_radiance(1.0);
                 let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);
                 Bounds { low: a.min(b).min(c), high: a.max(b).max(c), two_sided: *two_sided, cosine: true, ..bounds }
             }
             Emitter::Point { p, intensity } => at(*p, Vec3::Z, PI, 0.5 * PI, luminance(*intensity)),
             Emitter::Spot { p, radius, frame, intensity, outer, .. } => {
-                // The half angle's sine is half of the chord.
+                // 1 - cos(x) = 2 sin^2(x / 2).
                 let reach = 2.0 * (0.5 * outer).clamp(0.0, 1.0).sqrt().asin();
                 let (low, high) = (p - *radius, p + *radius);
                 Bounds { low, high, ..at(*p, frame.n, 0.0, reach, luminance(*intensity)) }
@@ -76,18 +76,18 @@ impl Bounds {
         }
     }
 
-    /// What it costs to have these lights in one cluster: intensity times the size in space and in directions.
+    /// Cost of a cluster of these lights: intensity times the extent in space and in directions.
     pub fn cost(&self) -> f32 {
         let (spread, edge) = (self.spread, (self.spread + self.reach).min(PI));
         let (sin, cos) = spread.sin_cos();
-        // The solid angle of the axes, and around it that of the reach, by the cosine.
+        // The solid angle of the axes, plus the cosine-weighted solid angle of the reach around it.
         let rim = 2.0 * edge * sin - (spread - 2.0 * edge).cos() - 2.0 * spread * sin + cos;
         let directions = 2.0 * PI * (1.0 - cos) + 0.5 * PI * rim;
         self.intensity * directions * self.low.distance_squared(self.high)
     }
 }
 
-/// The cone around two cones, each an axis and a half angle.
+/// The cone around two cones, each given by an axis and a half angle (rad).
 fn joint_cone(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
     let apart = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
@@ -105,16 +105,16 @@ fn joint_cone(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     }
 }
 
-/// Of several lights; `None` if there are none.
+/// Bounds of several lights; `None` if there are none.
 pub fn union(lights: &[(u32, Bounds)]) -> Option<Bounds> {
     lights.iter().map(|light| light.1).reduce(|a, b| a.union(&b))
 }
 
-/// Sorts lights into two halves at the least cost; the length of the first.
+/// Reorders lights into two parts with the least total cost, and returns the length of the first part.
 pub fn split(lights: &mut [(u32, Bounds)], depth: u32) -> usize {
-    let middles = || lights.iter().map(|light| light.1.center());
-    let low = middles().fold(Vec3::INFINITY, Vec3::min);
-    let extent = middles().fold(Vec3::NEG_INFINITY, Vec3::max) - low;
+    let centers = || lights.iter().map(|light| light.1.center());
+    let low = centers().fold(Vec3::INFINITY, Vec3::min);
+    let extent = centers().fold(Vec3::NEG_INFINITY, Vec3::max) - low;
     let bucket =
         |axis: usize, p: Vec3| (((p[axis] - low[axis]) / extent[axis] * BUCKETS as f32) as usize).min(BUCKETS - 1);
     let mut best: Option<(f32, usize, usize)> = None;
@@ -128,7 +128,7 @@ pub fn split(lights: &mut [(u32, Bounds)], depth: u32) -> usize {
             (Some(a), Some(b)) => Some(a.union(b)),
             (a, b) => a.or(*b),
         };
-        // Thin boxes cost more: their halves see the lights from all sides.
+        // Splits along a short axis cost more: their halves are long and thin, so the bounds are loose.
         let thin = extent.max_element() / extent[axis];
         for border in 1..BUCKETS {
             let below = buckets[..border].iter().fold(None, join);
@@ -141,7 +141,7 @@ pub fn split(lights: &mut [(u32, Bounds)], depth: u32) -> usize {
         }
     }
     if let Some((_, axis, border)) = best {
-        // Stable, so that the tree does not depend on how a sort breaks ties.
+        // A stable sort, so that the tree does not depend on how a sort breaks ties.
         lights.sort_by_key(|light| bucket(axis, light.1.center()) >= border);
         let middle = lights.partition_point(|light| bucket(axis, light.1.center()) < border);
         if middle > 0 && middle < lights.len() {
