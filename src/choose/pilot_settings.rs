@@ -1,6 +1,6 @@
 //! Small renders of the same view: their settings, and what their pixels are worth.
 
-use crate::estimator::{InitialBandwidth, Pixel};
+use crate::estimator::{InitialBandwidth, PixelAccumulator};
 use crate::finish::{Size, window};
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
@@ -60,7 +60,7 @@ pub(super) fn scale(value: f64, floor: f64) -> f64 {
 /// What pixels are worth, so that errors can be relative to it: the median of the neighbourhood, at the smoothest of
 /// `levels`. A pixel's own mean would not do: where one bright sample is all that it has, it is as large as its error.
 /// It counts where two eye paths agree on it, for lamps stand out.
-pub(super) fn values(pixels: &[Pixel], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
+pub(super) fn values(pixels: &[PixelAccumulator], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
     let smoothest = levels.count - 1;
     const REACH: usize = 2;
     let size = Size { width: width as usize, height: height as usize };

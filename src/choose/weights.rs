@@ -8,7 +8,7 @@
 
 use super::pilot_settings::{self, WORST, mean, scale, values};
 use crate::camera::Camera;
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::math::DVec3;
 use crate::plan::{ClassSet, Effect, Presence, switch};
 use crate::render::{Candidate, Cost, Session, Settings, Stage};
@@ -63,7 +63,7 @@ pub(super) fn making(scene: &Scene, effect: Effect) -> f64 {
 type Halves = [Vec<[DVec3; 5]>; 2];
 
 /// The pixels of a picture, and their parts.
-fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<Pixel>, Halves) {
+fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<PixelAccumulator>, Halves) {
     let stage = Stage::new(scene, camera, settings);
     let mut session = Session::new(&stage);
     let mut advance = || {
@@ -85,7 +85,7 @@ fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<Pixel>, 
 }
 
 /// Sums of the additive parts of a pixel.
-fn parts(pixel: &Pixel) -> [DVec3; 5] {
+fn parts(pixel: &PixelAccumulator) -> [DVec3; 5] {
     let parts = pixel.parts();
     [parts.emission, parts.direct, parts.indirect, parts.caustic, parts.volume]
 }

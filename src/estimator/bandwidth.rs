@@ -1,4 +1,4 @@
-//! Initial bandwidths: one per pixel and kind of photons, for both eye paths, from a pilot pass whose photons are not
+//! Initial bandwidths: one per pixel and kind of photons, for both camera paths, from a pilot pass whose photons are not
 //! accumulated.
 //!
 //! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest
@@ -13,7 +13,7 @@ use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::photon::{Located, Nearest, PhotonMap, VolumePhoton};
 use crate::random::{Domain, Stream, Streams};
 use crate::stat::median;
-use crate::transport::{Eye, GatherPoint, PathStart};
+use crate::transport::{CameraPaths, GatherPoint, PathStart};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -59,14 +59,16 @@ pub fn footprint(camera: &Camera, length: f32) -> f32 {
 /// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the
 /// picture's width, if one photon is expected within that.
 pub fn initial_bandwidths<const MAPS: usize>(
-    eye: &Eye<'_>,
+    camera_paths: &CameraPaths<'_>,
     rule: InitialBandwidth,
     widest: f32,
     seed: u64,
     pilots: [&PhotonMap; MAPS],
 ) -> Vec<[f32; MAPS]> {
     let enough = pilots.map(|pilot| enough(rule, pilot, f32::sqrt));
-    bandwidths(eye, (rule, Bounds { widest, enough }), seed, pilots, |arena, start| eye.gather_point(arena, start))
+    bandwidths(camera_paths, (rule, Bounds { widest, enough }), seed, pilots, |arena, start| {
+        camera_paths.gather_point(arena, start)
+    })
 }
 
 /// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path,
@@ -77,15 +79,16 @@ pub fn initial_bandwidths<const MAPS: usize>(
 /// medium that bound may be so near that hardly a pixel ever finds a photon, and all are dark: it is not below the
 /// radius in which one is expected.
 pub fn initial_volume_bandwidths(
-    eye: &Eye<'_>,
+    camera_paths: &CameraPaths<'_>,
     rule: InitialBandwidth,
     widest: f32,
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
     let bounds = Bounds { widest, enough: [enough(rule, pilot, f32::cbrt)] };
-    let found = bandwidths(eye, (rule, bounds), seed, [pilot], |arena, start| eye.volume_point(arena, start));
-    medians(found.as_flattened(), eye.camera.size().0 as usize)
+    let found =
+        bandwidths(camera_paths, (rule, bounds), seed, [pilot], |arena, start| camera_paths.volume_point(arena, start));
+    medians(found.as_flattened(), camera_paths.camera.size().0 as usize)
 }
 
 /// The median of every pixel's neighbourhood, of `2 NEIGHBOURHOOD + 1` pixels squared within the picture.
@@ -136,13 +139,13 @@ pub fn usual_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
 }
 
 fn bandwidths<P: Located, const MAPS: usize>(
-    eye: &Eye<'_>,
+    camera_paths: &CameraPaths<'_>,
     (rule, bounds): (InitialBandwidth, Bounds<MAPS>),
     seed: u64,
     pilots: [&PhotonMap<P>; MAPS],
     find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
 ) -> Vec<[f32; MAPS]> {
-    let (scene, camera) = (eye.scene, eye.camera);
+    let (scene, camera) = (camera_paths.scene, camera_paths.camera);
     let (width, height) = camera.size();
     let pixels = width as usize * height as usize;
     if let InitialBandwidth::Fixed(r) = rule {
@@ -160,13 +163,13 @@ fn bandwidths<P: Located, const MAPS: usize>(
         r.max(least)
     };
     let mut found: Vec<Option<[f32; MAPS]>> = vec![None; pixels];
-    let streams = Streams::new(seed, 0, Domain::PilotEye);
+    let streams = Streams::new(seed, 0, Domain::PilotCamera);
     par_pixels(
         found.par_chunks_mut(pixels_per_band(width)),
         (width, height),
         || (Bump::new(), std::array::from_fn::<_, MAPS, _>(|_| Nearest::default())),
         |(arena, nearest), found, places| {
-            let starts = eye.starts(places, streams);
+            let starts = camera_paths.starts(places, streams);
             for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                 let of = |point| std::array::from_fn(|map| of_point(map, &mut nearest[map], &point));
                 found[place.at] = find(arena, start).map(of);

@@ -1,4 +1,4 @@
-//! Which instances a pixel's eye paths hit first, and how often: what cryptomattes and alpha are made of.
+//! Which instances a pixel's camera paths hit first, and how often: what cryptomattes and alpha are made of.
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
@@ -16,7 +16,7 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Counts one eye path that hit `instance` first, or nothing.
+    /// Counts one camera path that hit `instance` first, or nothing.
     #[inline]
     pub fn add(&mut self, instance: Option<u32>) {
         self.paths += 1;

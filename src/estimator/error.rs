@@ -7,12 +7,12 @@
 //! bias: sums over pixels keep the sign and stay unbiased, a single pixel cuts it off at zero.
 //!
 //! In media squared bandwidths are a factor 2^(2/3) apart; the difference is scaled to tell the bias there, too
-//! ([`Pixel::add`]).
+//! ([`PixelAccumulator::add`]).
 //!
 //! This holds where light varies smoothly over the kernel. At edges narrower than the bandwidth the bias falls
 //! more slowly than that, and the estimate is too small.
 
-use super::Pixel;
+use super::PixelAccumulator;
 use crate::math::DVec3;
 
 /// Estimated squared error of one pixel, per channel.
@@ -26,7 +26,7 @@ pub struct SquaredError {
 
 impl SquaredError {
     /// The error of level `own` (from 0) of `count`; `None` before two iterations.
-    pub fn of(pixel: &Pixel, own: usize, count: usize) -> Option<SquaredError> {
+    pub fn of(pixel: &PixelAccumulator, own: usize, count: usize) -> Option<SquaredError> {
         if pixel.iterations < 2 {
             return None;
         }
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
-    use crate::transport::EyeMeasure;
+    use crate::transport::PixelSample;
 
     /// Levels whose bias halves from one to the next and whose noise is uniform: over many pixels the estimates average
     /// to the bias squared, and to nothing without bias. Over 4000 pixels of 16 iterations the mean of (D^2 - var) has
@@ -59,13 +59,13 @@ mod tests {
         for bias in [0.0, 0.3] {
             let (mut squared_bias, mut variance) = (0.0, 0.0);
             for index in 0..4000 {
-                let mut pixel = Pixel::new(2, 0, [1.0; 2]);
+                let mut pixel = PixelAccumulator::new(2, 0, [1.0; 2]);
                 for i in 1..=16 {
                     let draws = Stream::new(9, i, Domain::Test, index).vertex(0);
                     let noise = draws.two(Purpose::Pixel);
                     let small = 1.0 + bias + 0.8 * (noise.x - 0.5);
                     let large = 1.0 + 2.0 * bias + 0.8 * (noise.y - 0.5);
-                    let mut measure = EyeMeasure::default();
+                    let mut measure = PixelSample::default();
                     measure.indirect_photons[..2].copy_from_slice(&[small, large].map(Rgb::splat));
                     pixel.add(i, &measure, None);
                 }
@@ -83,8 +83,8 @@ mod tests {
 
     #[test]
     fn one_iteration_tells_nothing() {
-        let mut pixel = Pixel::new(5, 0, [1.0; 2]);
-        pixel.add(1, &EyeMeasure::default(), None);
+        let mut pixel = PixelAccumulator::new(5, 0, [1.0; 2]);
+        pixel.add(1, &PixelSample::default(), None);
         assert_eq!(SquaredError::of(&pixel, 3, 5), None);
     }
 }

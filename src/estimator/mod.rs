@@ -1,9 +1,9 @@
-//! From what eye paths measure to estimates: the state per pixel and level, and the rules for bandwidths.
+//! From what camera paths measure to estimates: the state per pixel and level, and the rules for bandwidths.
 
 pub mod bandwidth;
 mod coverage;
 mod error;
-mod pixel;
+mod pixel_accumulator;
 mod quarters;
 mod rejected;
 pub mod rule;
@@ -12,7 +12,7 @@ mod state;
 pub use bandwidth::InitialBandwidth;
 pub use coverage::Coverage;
 pub use error::SquaredError;
-pub use pixel::{FAR, Parts, Pixel, QUARTERS};
+pub use pixel_accumulator::{FAR, Parts, PixelAccumulator, QUARTERS};
 pub use quarters::variance_ratio;
 pub use rejected::Rejected;
 pub use state::{BandwidthState, Schedule, level_factor2};

@@ -5,7 +5,7 @@
 //! but has three degrees of freedom a pixel. The layers take the shape of the noise from the sample variance and its size,
 //! over windows, from the quarters.
 
-use super::{Pixel, SquaredError};
+use super::{PixelAccumulator, SquaredError};
 use rayon::prelude::*;
 
 /// Pixels to each side of the windows over which either variance is summed: 81 pixels have 243 degrees of freedom.
@@ -14,8 +14,8 @@ const REACH: usize = 4;
 /// Variance by quarters over the sample variance, of the own image at every pixel over a window; 1 where
 /// neither is known or there is no variance. `own` is the level (from 0) that quarters are of. Pixels row by row,
 /// `width` a row.
-pub fn variance_ratio(pixels: &[Pixel], width: usize, own: usize) -> Vec<f32> {
-    let of_pixel = |pixel: &Pixel| {
+pub fn variance_ratio(pixels: &[PixelAccumulator], width: usize, own: usize) -> Vec<f32> {
+    let of_pixel = |pixel: &PixelAccumulator| {
         let sample = SquaredError::of(pixel, own, own + 1).map(|error| error.variance);
         match (pixel.variance_by_quarters(), sample) {
             (Some(quarters), Some(sample)) => [quarters.element_sum(), sample.element_sum()],
@@ -48,19 +48,19 @@ mod tests {
     use super::*;
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, QUARTERS, Stream, quarter};
-    use crate::transport::EyeMeasure;
+    use crate::transport::PixelSample;
 
     /// A picture whose iterations are uniform; `antithetic` ones of a quarter come in pairs that cancel, as
     /// low-discrepancy points do.
-    fn picture(antithetic: bool) -> Vec<Pixel> {
+    fn picture(antithetic: bool) -> Vec<PixelAccumulator> {
         let pixel = |index: u64| {
-            let mut pixel = Pixel::new(1, 0, [0.0; 2]);
+            let mut pixel = PixelAccumulator::new(1, 0, [0.0; 2]);
             for pass in 1..=32u64 {
                 let (quarter, at) = (quarter(pass), (pass - 1) / QUARTERS);
                 let pair = if antithetic { at / 2 } else { at };
                 let draw = Stream::new(3, quarter * 100 + pair, Domain::Test, index).vertex(0).one(Purpose::Pixel);
                 let value = if antithetic && at % 2 == 1 { 1.0 - draw } else { draw };
-                let measure = EyeMeasure { direct: Rgb::splat(value), ..EyeMeasure::default() };
+                let measure = PixelSample { direct: Rgb::splat(value), ..PixelSample::default() };
                 pixel.add(pass, &measure, None);
             }
             pixel
@@ -78,7 +78,9 @@ mod tests {
         assert!((mean - 1.0).abs() < 0.08, "{mean}");
         assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 5.0 * (2f32 / 75.0).sqrt()));
         assert!(variance_ratio(&picture(true), 32, 0).iter().all(|ratio| *ratio < 1e-9));
-        assert!(variance_ratio(&vec![Pixel::new(1, 0, [0.0; 2]); 6], 3, 0).iter().all(|ratio| *ratio == 1.0));
+        assert!(
+            variance_ratio(&vec![PixelAccumulator::new(1, 0, [0.0; 2]); 6], 3, 0).iter().all(|ratio| *ratio == 1.0)
+        );
         let column = picture(false);
         assert_eq!(variance_ratio(&column, 1, 0).len(), column.len());
     }

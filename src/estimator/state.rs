@@ -3,7 +3,7 @@
 //! Levels nest: each kernel's measure (an area on surfaces, a volume in media) is half that of the next larger
 //! \[post-reconstruction 2021, 4.1\].
 
-use super::Pixel;
+use super::PixelAccumulator;
 use super::rule::{memoryless, volume};
 use crate::photon::{ByKind, Kind};
 
@@ -78,7 +78,7 @@ impl BandwidthState {
 
     /// Squared radius of a level (from 0, the smallest) of the pixel that has this index (square scene units).
     #[inline]
-    pub fn radius2(&self, index: usize, pixel: &Pixel, kind: Kind, level: usize) -> f32 {
+    pub fn radius2(&self, index: usize, pixel: &PixelAccumulator, kind: Kind, level: usize) -> f32 {
         match &self.counted {
             Some(radii2) => radii2[kind as usize][index * self.schedule.levels + level],
             None => self.schedule.radius2(pixel.bandwidths[kind as usize], level),
@@ -87,7 +87,7 @@ impl BandwidthState {
 
     /// Radius in media of a level of a pixel (scene units).
     #[inline]
-    pub fn volume_radius(&self, pixel: &Pixel, level: usize) -> f32 {
+    pub fn volume_radius(&self, pixel: &PixelAccumulator, level: usize) -> f32 {
         self.schedule.volume_radius(pixel.volume_bandwidth, level)
     }
 }
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn what_a_rule_has_counted_takes_the_place_of_the_schedule_on_surfaces_alone() {
         let schedule = Schedule::new(1, 2, 0.5, 0.5);
-        let mut pixel = Pixel::new(2, 0, [1.0, 2.0]);
+        let mut pixel = PixelAccumulator::new(2, 0, [1.0, 2.0]);
         pixel.volume_bandwidth = 5.0;
         let plain = BandwidthState::memoryless(schedule);
         assert_eq!([0, 1].map(|level| plain.radius2(7, &pixel, Kind::Caustic, level)), [2.0, 4.0]);

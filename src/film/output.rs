@@ -15,7 +15,7 @@
 use super::kind::{CAUSTIC, LIGHT_GROUP, kind_of};
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
-use crate::estimator::{BandwidthState, FAR, Parts, Pixel, QUARTERS, SquaredError, variance_ratio};
+use crate::estimator::{BandwidthState, FAR, Parts, PixelAccumulator, QUARTERS, SquaredError, variance_ratio};
 use crate::math::{DVec3, Vec3};
 use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Part};
@@ -52,7 +52,7 @@ pub struct Shape {
 
 /// A pixel as the layers see it.
 struct At<'a> {
-    pixel: &'a Pixel,
+    pixel: &'a PixelAccumulator,
     /// Of the pixel, row by row from the top.
     index: usize,
     bandwidths: &'a BandwidthState,
@@ -81,7 +81,7 @@ impl Column {
         Column { name, components, get: Box::new(get) }
     }
 
-    fn rgb(name: impl Into<String>, get: impl Fn(&Pixel) -> DVec3 + Sync + 'static) -> Column {
+    fn rgb(name: impl Into<String>, get: impl Fn(&PixelAccumulator) -> DVec3 + Sync + 'static) -> Column {
         Column::new(name, move |at| three(get(at.pixel).as_vec3()))
     }
 
@@ -91,7 +91,7 @@ impl Column {
         Column::new(name, move |at| three(get(at).min(most).as_vec3()))
     }
 
-    fn xyz(name: &str, get: impl Fn(&Pixel) -> Vec3 + Sync + 'static) -> Column {
+    fn xyz(name: &str, get: impl Fn(&PixelAccumulator) -> Vec3 + Sync + 'static) -> Column {
         Column::new(name, move |at| three(get(at.pixel)))
     }
 
@@ -170,7 +170,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
             Some(error) => SquaredError { variance: error.variance * at.ratio, ..error }.root(),
             None => at.pixel.mean(own).abs(),
         }),
-        Column::rgb("albedo", Pixel::albedo),
+        Column::rgb("albedo", PixelAccumulator::albedo),
         Column::xyz("normal", |p| p.normal().as_vec3()),
         Column::one("depth", |at| at.pixel.depth().map_or(BACKGROUND, |depth| depth as f32)),
         Column::one("Z", |at| at.pixel.first().0),
@@ -181,7 +181,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
 }
 
 /// Variance of the mean of a level; before two iterations the square of the mean.
-fn variance(pixel: &Pixel, level: usize) -> DVec3 {
+fn variance(pixel: &PixelAccumulator, level: usize) -> DVec3 {
     if pixel.iterations < 2 { pixel.mean(level) * pixel.mean(level) } else { pixel.variance_of_mean(level) }
 }
 
@@ -196,7 +196,7 @@ pub fn names(shape: &Shape) -> Vec<String> {
 /// There are not `width * height` pixels.
 pub fn layers(
     (width, height): (u32, u32),
-    pixels: &[Pixel],
+    pixels: &[PixelAccumulator],
     bandwidths: &BandwidthState,
     shape: &Shape,
     wanted: impl Fn(&str) -> bool,
@@ -247,7 +247,7 @@ mod tests {
     use super::*;
     use crate::estimator::Schedule;
     use crate::math::Rgb;
-    use crate::transport::{EyeMeasure, Features, FirstHit};
+    use crate::transport::{Features, FirstHit, PixelSample};
 
     fn shape() -> Shape {
         Shape {
@@ -264,9 +264,9 @@ mod tests {
     }
 
     /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
-    fn measure(x: f32, hit: bool) -> EyeMeasure {
+    fn measure(x: f32, hit: bool) -> PixelSample {
         let photons = std::array::from_fn(|k| Rgb::splat(x + k as f32));
-        EyeMeasure {
+        PixelSample {
             emission: Rgb::splat(x),
             direct: Rgb::new(x, 2.0 * x, 3.0 * x),
             indirect: Rgb::splat(0.5 * x),
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn the_parts_sum_to_the_image_and_radii_halve_their_squares() {
-        let mut pixel = Pixel::new(5, 0, [2.0, 4.0]).with_groups(1);
+        let mut pixel = PixelAccumulator::new(5, 0, [2.0, 4.0]).with_groups(1);
         pixel.volume_bandwidth = 3.0;
         for i in 0..5 {
             let x = 0.1 + 0.37 * i as f32;
@@ -346,10 +346,10 @@ mod tests {
     /// Squares of what f32 can hold are not always f32.
     #[test]
     fn the_variance_of_great_radiance_is_finite() {
-        let mut pixel = Pixel::new(5, 0, [1.0; 2]).with_groups(1);
+        let mut pixel = PixelAccumulator::new(5, 0, [1.0; 2]).with_groups(1);
         for pass in 1..=4 {
             let light = Rgb::splat(if pass % 2 == 0 { 1e20 } else { 3e20 });
-            let measure = EyeMeasure { direct: light, ..EyeMeasure::default() };
+            let measure = PixelSample { direct: light, ..PixelSample::default() };
             pixel.add(pass, &measure, Some(&measure));
         }
         let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
@@ -360,7 +360,7 @@ mod tests {
 
     #[test]
     fn one_iteration_has_an_error_of_its_own_size_and_background_is_far() {
-        let mut pixel = Pixel::new(5, 0, [1.0; 2]).with_groups(1);
+        let mut pixel = PixelAccumulator::new(5, 0, [1.0; 2]).with_groups(1);
         pixel.add(1, &measure(0.5, false), Some(&measure(0.5, false)));
         let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
         let mean = value(&set, "Level2", "R");

@@ -17,7 +17,7 @@ const MAX_LEVELS: usize = 10;
 /// Bits per axis of the Morton code.
 const MORTON_BITS: u32 = 21;
 
-/// What kind of light path left a photon: how hard to find its light is for eye paths, where all bounces so far were
+/// What kind of light path left a photon: how hard to find its light is for camera paths, where all bounces so far were
 /// delta; nothing is known of others.
 ///
 /// A byte: 1 if the light is a delta light, else twice the exponent of the density of emission, which so is known to a
@@ -26,7 +26,7 @@ const MORTON_BITS: u32 = 21;
 pub struct PhotonFlags(u8);
 
 impl PhotonFlags {
-    /// The light is a delta light: no eye path that continues can find it.
+    /// The light is a delta light: no camera path that continues can find it.
     pub const UNREACHABLE: PhotonFlags = PhotonFlags(1);
     /// What is added to exponents, and the least and the largest that there are.
     const BIAS: i32 = 64;

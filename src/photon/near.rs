@@ -1,6 +1,6 @@
 //! Queries that follow one another closely: photons around a place are kept and scanned, instead of looked for again.
 //!
-//! The eye paths of neighbouring pixels gather within a fraction of the bandwidth of each other. What a scan visits,
+//! The camera paths of neighbouring pixels gather within a fraction of the bandwidth of each other. What a scan visits,
 //! and in which order, is what the tree would have visited, so nothing depends on what happens to be kept.
 
 use super::map::{Located, PhotonMap};

@@ -5,7 +5,7 @@
 
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::image::atomic;
 use crate::render::{Candidate, State};
 use crate::scene::gltf;
@@ -57,7 +57,7 @@ pub struct Head {
 ///
 /// # Errors
 /// The file system.
-pub fn write(path: &Path, head: &Head, state: State<&[Pixel]>) -> Result<()> {
+pub fn write(path: &Path, head: &Head, state: State<&[PixelAccumulator]>) -> Result<()> {
     let head = serde_json::to_vec(head).map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
     let (state, pixels) = state.exchange(());
     let state = postcard::to_allocvec(&state).map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
@@ -121,7 +121,7 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
         return Err(error(&cause).hint("go on with that version, or start anew without --resume"));
     }
     let state: State<()> = postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
-    let mut pixels: Vec<Pixel> = Vec::new();
+    let mut pixels: Vec<PixelAccumulator> = Vec::new();
     let read = records::read_blocks(&mut file, |block| {
         pixels.extend(block);
         Ok(())

@@ -5,7 +5,7 @@ use super::layers;
 use super::worst::{Seen, Worst};
 use super::{Ready, Watch};
 use crate::error::{Error, Result};
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::film::{LayerSet, Naming, Selection};
 use crate::finish::{Account, ERROR, Verdict, reads};
 use crate::image::exr::{self, Attributes};
@@ -62,7 +62,7 @@ pub(super) fn deliver(
     mut rendered: Rendered,
     (ready, watch): (Option<&mut Ready>, Option<&mut dyn Watch>),
     keep: bool,
-) -> Result<(Delivery, Vec<Pixel>)> {
+) -> Result<(Delivery, Vec<PixelAccumulator>)> {
     let Writing { facts, selection, naming, plan, arguments, reproducible, more } = writing;
     let mut header = rendered.account((!reproducible).then_some(rayon::current_num_threads()));
     let (rejections, unseen) = (rendered.rejections(), rendered.unseen());

@@ -1,7 +1,7 @@
 //! The layers that a render has, and those that are wanted.
 
 use crate::error::Result;
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use crate::film::output::{self, Shape};
 use crate::film::{
@@ -125,7 +125,7 @@ pub(super) fn cryptomattes(
             continue;
         }
         let mattes = Cryptomatte::new(kind, names.iter().cloned());
-        let ranks = |pixel: &Pixel| {
+        let ranks = |pixel: &PixelAccumulator| {
             let mut ranks = PixelRanks::default();
             for (instance, fraction) in pixel.coverage.fractions() {
                 let of = named.instances.get(instance as usize).map(|of| of[which] as usize);

@@ -1,7 +1,7 @@
 //! Whether a render fits into memory, asked before it begins.
 
 use crate::error::{Error, Result};
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::estimator::rule::{adaptive, chi_squared, local};
 use crate::film;
 use crate::finish::{BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
@@ -67,7 +67,7 @@ fn needed(
     let own = 2 * (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
     let per_pixel = own
         + pictures
-        + (Pixel::bytes(settings.levels.count, groups) + bytes_of_measures(settings)) as u64
+        + (PixelAccumulator::bytes(settings.levels.count, groups) + bytes_of_measures(settings)) as u64
         + (channels * size_of::<f32>()) as u64
         + merged
         + splats;

@@ -7,7 +7,7 @@ use super::finish;
 use super::layers;
 use super::shard::Open;
 use crate::error::{Error, ErrorKind, Result};
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::film::Naming;
 use crate::render::{Part, Rendered, Settings};
 use rayon::prelude::*;
@@ -128,7 +128,7 @@ impl Shards {
         let selection = layers::selection(&order.layers, &facts.shape, order.finish.is_some())?;
         let levels = part.settings.levels.count;
         let mut ready = order.finish.as_ref().map(|finish| finish::open(finish, Some(levels))).transpose()?;
-        let mut pixels: Vec<Pixel> = Vec::new();
+        let mut pixels: Vec<PixelAccumulator> = Vec::new();
         for (path, open) in &mut files {
             watch(Step::Reads(path));
             join(path, open, &mut pixels)?;
@@ -155,7 +155,7 @@ impl Shards {
 }
 
 /// Adds the pixels of a file to those of the others.
-fn join(path: &Path, open: &mut Open, pixels: &mut Vec<Pixel>) -> Result<()> {
+fn join(path: &Path, open: &mut Open, pixels: &mut Vec<PixelAccumulator>) -> Result<()> {
     let first = pixels.is_empty();
     let mut at = 0;
     open.pixels(path, |block| {

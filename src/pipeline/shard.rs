@@ -9,7 +9,7 @@ use super::checkpoint::{BLOCK, Head};
 use super::facts::Facts;
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::render::Part;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -29,7 +29,7 @@ pub struct Tail {
     /// What it is besides its pixels.
     pub part: Part,
     /// Its pixels.
-    pub pixels: Vec<Pixel>,
+    pub pixels: Vec<PixelAccumulator>,
 }
 
 impl Tail {
@@ -93,11 +93,11 @@ impl Open {
     ///
     /// # Errors
     /// The file is damaged, or there are not as many as the picture has.
-    pub fn pixels(&mut self, path: &Path, mut each: impl FnMut(Vec<Pixel>)) -> Result<()> {
+    pub fn pixels(&mut self, path: &Path, mut each: impl FnMut(Vec<PixelAccumulator>)) -> Result<()> {
         let (levels, groups) = (self.part.settings.levels.count, self.facts.shape.groups.len());
         let (width, height) = self.part.size;
         let (whole, mut count) = (width as usize * height as usize, 0);
-        let read = records::read_blocks(&mut self.file, |block: Vec<Pixel>| {
+        let read = records::read_blocks(&mut self.file, |block: Vec<PixelAccumulator>| {
             count += block.len();
             if count > whole || !block.iter().all(|pixel| pixel.holds(levels, groups)) {
                 return Err(io::ErrorKind::InvalidData.into());

@@ -5,7 +5,7 @@
 //! more. An object is who covers most of a pixel.
 
 use super::layers::Named;
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::film::{Layer, LayerSet};
 use crate::finish::{Size, Windows};
 use rayon::prelude::*;
@@ -40,8 +40,8 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    pub fn of(pixels: &[Pixel], named: &Named) -> Seen {
-        let most = |pixel: &Pixel| {
+    pub fn of(pixels: &[PixelAccumulator], named: &Named) -> Seen {
+        let most = |pixel: &PixelAccumulator| {
             let (instance, fraction) = pixel.coverage.fractions().next()?;
             named.instances.get(instance as usize).copied().filter(|_| fraction >= 0.5)
         };

@@ -26,13 +26,13 @@
 //! a narrow lobe. Nobody sees a light without size but by a lobe that has a width: where only perfect mirrors and glass
 //! are between the two, that lobe, if it is sharp, shows a caustic.
 //!
-//! [`EyeSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class
-//! ([`EyeSuffix::class_with`]).
+//! [`CameraSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class
+//! ([`CameraSuffix::class_with`]).
 
 mod camera_suffix;
 mod present;
 
-pub use camera_suffix::{EyeSuffix, LightPrefix};
+pub use camera_suffix::{CameraSuffix, LightPrefix};
 pub use present::classes_in;
 
 use super::effect::{Effect, EffectSet, Switches};
@@ -141,7 +141,7 @@ impl PathClass {
 
     /// Of a whole path, from the camera to a light, `sizeless` or not.
     pub fn of(events: impl IntoIterator<Item = Event>, sizeless: bool) -> PathClass {
-        events.into_iter().fold(EyeSuffix::START, EyeSuffix::then).class_at_light(sizeless)
+        events.into_iter().fold(CameraSuffix::START, CameraSuffix::then).class_at_light(sizeless)
     }
 
     /// The part of the picture that it belongs to.

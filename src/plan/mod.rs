@@ -14,7 +14,7 @@ mod presence;
 mod search;
 pub mod switch;
 
-pub use class::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass, classes_in};
+pub use class::{CameraSuffix, ClassSet, Event, LightPrefix, Part, PathClass, classes_in};
 pub use effect::{Effect, EffectSet, Switches};
 pub use presence::Presence;
 pub use search::{Owner, Search};

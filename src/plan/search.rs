@@ -8,7 +8,7 @@ use crate::scene::{Scene, Survey};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Search {
     /// Paths from the eye, connected to lights.
-    EyePaths,
+    CameraPaths,
     /// Paths from the lights, connected to the eye.
     LightPaths,
     /// Both, connected to each other.
@@ -48,7 +48,7 @@ impl Search {
         Some(match (self, class) {
             // No other technique can find these.
             (_, C::Emission | C::Coat) => Owner::Hits,
-            (Search::EyePaths, _) => Owner::Lit,
+            (Search::CameraPaths, _) => Owner::Lit,
             (Search::LightPaths, _) => Owner::LightPaths,
             (Search::Connections | Search::ConnectionsAndMerging, _) => Owner::Connections,
             (Search::Merging, C::Single | C::Volume) | (Search::Map, C::Volume) => return None,
@@ -70,7 +70,7 @@ impl Search {
     pub fn finds(self, effect: Effect, scene: &Survey) -> bool {
         let Survey { delta_lights, scattering, cloudy_glass, .. } = *scene;
         match (self, effect) {
-            (Search::EyePaths, Effect::Caustic | Effect::Sds) => !delta_lights,
+            (Search::CameraPaths, Effect::Caustic | Effect::Sds) => !delta_lights,
             (Search::LightPaths, Effect::Sds) => false,
             (Search::Connections, Effect::Sds) => !delta_lights,
             // Light that comes into clear glass and scatters there once: photons are merged on surfaces alone.
@@ -88,14 +88,14 @@ impl Search {
         // Photons of caustics, if there are any, share what sharp lobes show of lamps.
         let shared = scene.survey.glints && !scene.lights.targets().spheres().is_empty();
         let gathers = matches!(self, Search::Map | Search::Photons);
-        let walks = matches!(self, Search::EyePaths | Search::PathsAndPhotons);
+        let walks = matches!(self, Search::CameraPaths | Search::PathsAndPhotons);
         match (effect, self) {
             (Effect::Environment | Effect::Alpha | Effect::Textures | Effect::Dispersion, _) => "all paths",
             (Effect::Volume, _) if !media_scatter => "all paths",
             (_, Search::LightPaths) => "light paths",
             (Effect::Glossy, Search::Photons | Search::PathsAndPhotons) if shared => "eye paths and photons",
             (Effect::Emission | Effect::Glossy | Effect::DepthOfField, _) => "eye paths",
-            (Effect::Direct, Search::EyePaths | Search::PathsAndPhotons | Search::Map | Search::Photons) => {
+            (Effect::Direct, Search::CameraPaths | Search::PathsAndPhotons | Search::Map | Search::Photons) => {
                 "connections to lights"
             }
             (Effect::Caustic | Effect::Sds, Search::ConnectionsAndMerging | Search::PathsAndPhotons) => "photons",

@@ -22,21 +22,21 @@ use glam::Vec2;
 #[repr(u64)]
 pub enum Domain {
     /// The eye path of a pixel that feeds level 1 (and single-path methods).
-    EyeIndependent = 1,
+    CameraIndependent = 1,
     /// The eye path of a pixel that feeds levels 2 and up.
-    EyeCorrelated = 2,
+    CameraCorrelated = 2,
     /// Light paths.
     Light = 3,
     /// Eye paths of the pilot pass that sets initial bandwidths.
-    PilotEye = 4,
+    PilotCamera = 4,
     /// Light paths of the pilot pass.
     PilotLight = 5,
-    /// Light paths that serve the eye paths of [`Domain::EyeCorrelated`].
+    /// Light paths that serve the eye paths of [`Domain::CameraCorrelated`].
     LightCorrelated = 6,
     /// Light paths by which emission is guided.
     GuideLight = 7,
     /// Eye paths by which emission is guided.
-    GuideEye = 8,
+    GuideCamera = 8,
     /// Anything in tests.
     Test = 99,
 }
@@ -414,7 +414,9 @@ mod tests {
             for path in 0..16 {
                 for vertex in [0, 1, VERTICES - 1, VERTICES] {
                     let draws = |index| {
-                        Streams::in_sequence(path, pass(group, index), Domain::EyeCorrelated).path(path).vertex(vertex)
+                        Streams::in_sequence(path, pass(group, index), Domain::CameraCorrelated)
+                            .path(path)
+                            .vertex(vertex)
                     };
                     let (sequence, nth) = (in_net(&draws), in_net(&|index| draws(index).nth(3)));
                     assert_eq!(
@@ -498,7 +500,7 @@ mod tests {
             let draws = |i| Streams::in_sequence(3, pass(0, i), domain).path(path).vertex(1);
             (0..16).map(|i| integrand(draws(i))).sum::<f64>() / 16.0 - INTEGRAL
         };
-        let domains = (0..n).map(|path| (in_domain(Domain::EyeIndependent, path), in_domain(Domain::Light, path)));
+        let domains = (0..n).map(|path| (in_domain(Domain::CameraIndependent, path), in_domain(Domain::Light, path)));
         let domains = correlation(domains);
         assert!([paths, seeds, domains].iter().all(|z| z.abs() < 5.0), "{paths}, {seeds}, {domains}");
         let halves = correlation((0..n).map(|path| {

@@ -1,18 +1,18 @@
-//! Bandwidths where eye paths gather: what gathering asks of those who set them, and tells them.
+//! Bandwidths where camera paths gather: what gathering asks of those who set them, and tells them.
 
 use crate::math::Vec3;
 use crate::photon::{ByKind, Kind, PhotonMap, ThinningKey};
 use wide::f32x8;
 
-/// Most bandwidth levels of one eye path.
+/// Most bandwidth levels of one camera path.
 pub const MAX_LEVELS: usize = 5;
 
-/// Bandwidths of the levels of one eye path: radii squared in ascending order.
+/// Bandwidths of the levels of one camera path: radii squared in ascending order.
 #[derive(Clone, Copy, Debug)]
 pub struct LevelRadii {
     pub(super) radius2: [f32; MAX_LEVELS],
     pub(super) count: usize,
-    /// Largest radius squared beyond the eye path's first broad bounce.
+    /// Largest radius squared beyond the camera path's first broad bounce.
     pub(super) later2: f32,
     /// The level of each radius.
     pub(super) order: [u8; MAX_LEVELS],
@@ -81,7 +81,7 @@ pub(super) fn lane(x: f32, others: f32) -> f32x8 {
     f32x8::from([x, others, others, others, others, others, others, others])
 }
 
-/// Bandwidths where an eye path gathers.
+/// Bandwidths where a camera path gathers.
 pub trait Bandwidths {
     /// What counting needs to know of a vertex, whatever the kind.
     type Place;

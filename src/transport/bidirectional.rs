@@ -2,11 +2,11 @@
 //!
 //! One presets-and-parts module serves light tracing, bidirectional path tracing \[Veach 1997, 10\], bidirectional
 //! photon mapping and vertex connection and merging \[Georgiev et al. 2012\]. A light path is walked first; it leaves
-//! splats (its vertices connected to the camera), vertices for the one eye path it belongs to, and photons for all eye
+//! splats (its vertices connected to the camera), vertices for the one camera path it belongs to, and photons for all eye
 //! paths of the next pass. No light vertex outlives its pixel.
 
+use super::camera_paths::CameraPaths;
 use super::cause::Cause;
-use super::eye::Eye;
 use super::initial_media::InitialMedia;
 use super::mis::{Eta, Merges, Ratios, one_merge};
 use crate::light::Group;
@@ -15,64 +15,64 @@ use crate::plan::PathClass;
 
 /// Which strategies take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Strategies {
+pub struct TechniqueSet {
     /// Light vertices are connected to the camera.
     pub camera: bool,
-    /// Next-event estimation, connection of vertices, and eye paths that run into lights.
+    /// Next-event estimation, connection of vertices, and camera paths that run into lights.
     pub connect: bool,
     /// Photons are merged.
     pub merge: bool,
-    /// Depth of the first vertex of a light path and of an eye path that is merged (1 is the first surface).
+    /// Depth of the first vertex of a light path and of a camera path that is merged (1 is the first surface).
     pub first_merged: [u32; 2],
 }
 
-impl Strategies {
+impl TechniqueSet {
     /// Light tracing.
-    pub const LIGHT: Strategies = Strategies { camera: true, connect: false, merge: false, first_merged: [1, 1] };
+    pub const LIGHT: TechniqueSet = TechniqueSet { camera: true, connect: false, merge: false, first_merged: [1, 1] };
     /// Bidirectional path tracing.
-    pub const BDPT: Strategies = Strategies { camera: true, connect: true, merge: false, first_merged: [1, 1] };
+    pub const BDPT: TechniqueSet = TechniqueSet { camera: true, connect: true, merge: false, first_merged: [1, 1] };
     /// Bidirectional photon mapping: every vertex merges, even direct light.
-    pub const BPM: Strategies = Strategies { camera: false, connect: false, merge: true, first_merged: [1, 1] };
+    pub const BPM: TechniqueSet = TechniqueSet { camera: false, connect: false, merge: true, first_merged: [1, 1] };
     /// Vertex connection and merging. Direct light is not merged, nor what the camera sees directly: other strategies do
     /// both better, without bias.
-    pub const VCM: Strategies = Strategies { camera: true, connect: true, merge: true, first_merged: [2, 2] };
+    pub const VCM: TechniqueSet = TechniqueSet { camera: true, connect: true, merge: true, first_merged: [2, 2] };
 
     /// Whether a light path's vertex at `depth` leaves photons.
     #[inline]
-    pub fn light_merges(&self, depth: u32) -> bool {
+    pub fn light_vertex_merges(&self, depth: u32) -> bool {
         self.merge && depth >= self.first_merged[0]
     }
 
-    /// Whether an eye path's vertex at `depth` merges photons.
+    /// Whether a camera path's vertex at `depth` merges photons.
     #[inline]
-    pub fn eye_merges(&self, depth: u32) -> bool {
+    pub fn camera_vertex_merges(&self, depth: u32) -> bool {
         self.merge && depth >= self.first_merged[1]
     }
 
-    /// The merge that weights count at an eye path's vertex at `depth`, if any; `clear`: all before it are delta.
+    /// The merge that weights count at a camera path's vertex at `depth`, if any; `clear`: all before it are delta.
     #[inline]
-    pub fn eye_merge(&self, depth: u32, clear: bool) -> Merges {
-        if self.eye_merges(depth) { one_merge(clear) } else { Merges::ZERO }
+    pub fn camera_vertex_merge(&self, depth: u32, clear: bool) -> Merges {
+        if self.camera_vertex_merges(depth) { one_merge(clear) } else { Merges::ZERO }
     }
 
-    /// The merge that weights count at a light path's vertex at `depth`, if any: the eye path's vertex behind it is not
+    /// The merge that weights count at a light path's vertex at `depth`, if any: the camera path's vertex behind it is not
     /// delta.
     #[inline]
-    pub fn light_merge(&self, depth: u32) -> Merges {
-        if self.light_merges(depth) { one_merge(false) } else { Merges::ZERO }
+    pub fn light_vertex_merge(&self, depth: u32) -> Merges {
+        if self.light_vertex_merges(depth) { one_merge(false) } else { Merges::ZERO }
     }
 }
 
 /// What the bidirectional paths of a render share.
 #[derive(Clone, Copy)]
 pub struct Bidirectional<'a> {
-    /// Eye paths.
-    pub eye: Eye<'a>,
+    /// Camera paths.
+    pub camera_paths: CameraPaths<'a>,
     /// The solids around the lights.
     pub initial_media: &'a InitialMedia,
     /// What finds paths.
-    pub strategies: Strategies,
-    /// Light paths connected to the camera for every eye path of a pixel.
+    pub techniques: TechniqueSet,
+    /// Light paths connected to the camera for every camera path of a pixel.
     pub light_paths: f32,
     /// Light paths of a pass whose photons are merged.
     pub merged_paths: f32,
@@ -86,41 +86,41 @@ pub struct Bidirectional<'a> {
 pub struct Division {
     /// Segments of the path.
     pub segments: u32,
-    /// 0 is the camera, to which a light vertex is connected; `segments` the light, which an eye path runs into.
-    pub eye: u32,
+    /// 0 is the camera, to which a light vertex is connected; `segments` the light, which a camera path runs into.
+    pub camera: u32,
 }
 
 impl Division {
     /// That of a path found by connecting.
     pub fn of(technique: Technique) -> Option<Division> {
-        let (segments, eye) = match technique {
-            Technique::Hit { eye } => (eye, eye),
-            Technique::NextEvent { eye } => (eye + 1, eye),
-            Technique::Connect { light, eye } => (light + eye + 1, eye),
+        let (segments, camera) = match technique {
+            Technique::Hit { camera } => (camera, camera),
+            Technique::NextEvent { camera } => (camera + 1, camera),
+            Technique::Connect { light, camera } => (light + camera + 1, camera),
             Technique::Camera { light } => (light + 1, 0),
             Technique::Merge { .. } => return None,
         };
-        Some(Division { segments, eye })
+        Some(Division { segments, camera })
     }
 
-    /// Depth of the light walk's last vertex, 0 being the light; `None` where the eye path runs into that.
+    /// Depth of the light walk's last vertex, 0 being the light; `None` where the camera path runs into that.
     #[inline]
     pub fn light(self) -> Option<u32> {
-        self.segments.checked_sub(self.eye + 1)
+        self.segments.checked_sub(self.camera + 1)
     }
 }
 
 impl Bidirectional<'_> {
-    /// Whether an eye path that runs into a light with segment number `depth` tells of it.
+    /// Whether a camera path that runs into a light with segment number `depth` tells of it.
     #[inline]
     pub(super) fn hits_at(&self, depth: u32) -> bool {
-        self.only.is_none_or(|only| only.eye == depth && only.segments == depth)
+        self.only.is_none_or(|only| only.camera == depth && only.segments == depth)
     }
 
-    /// Whether an eye path's vertex at `depth` is connected.
+    /// Whether a camera path's vertex at `depth` is connected.
     #[inline]
-    pub(super) fn connects_eye(&self, depth: u32) -> bool {
-        self.only.is_none_or(|only| only.eye == depth && only.segments > depth)
+    pub(super) fn connects_camera_vertex(&self, depth: u32) -> bool {
+        self.only.is_none_or(|only| only.camera == depth && only.segments > depth)
     }
 
     /// Whether it is connected to a light itself.
@@ -131,32 +131,32 @@ impl Bidirectional<'_> {
 
     /// Whether a light path's vertex at `depth` is connected.
     #[inline]
-    pub(super) fn connects_light(&self, depth: u32) -> bool {
+    pub(super) fn connects_light_vertex(&self, depth: u32) -> bool {
         self.only.is_none_or(|only| only.light() == Some(depth))
     }
 
     /// Whether a light path's vertex is connected to the camera.
     #[inline]
     pub(super) fn connects_camera(&self) -> bool {
-        self.only.is_none_or(|only| only.eye == 0)
+        self.only.is_none_or(|only| only.camera == 0)
     }
 
-    /// Whether an eye path has an end at `depth`.
+    /// Whether a camera path has an end at `depth`.
     #[inline]
-    pub(super) fn ends_eye(&self, depth: u32) -> bool {
-        self.only.is_some_and(|only| only.eye <= depth)
+    pub(super) fn ends_camera_path(&self, depth: u32) -> bool {
+        self.only.is_some_and(|only| only.camera <= depth)
     }
 
     /// Whether a light path has an end at `depth`.
     #[inline]
-    pub(super) fn ends_light(&self, depth: u32) -> bool {
+    pub(super) fn ends_light_path(&self, depth: u32) -> bool {
         self.only.is_some_and(|only| only.light().is_none_or(|light| light <= depth))
     }
 
     /// Number of pixels of the whole picture.
     #[inline]
     pub fn pixels(&self) -> f32 {
-        self.eye.camera.whole_pixels()
+        self.camera_paths.camera.whole_pixels()
     }
 }
 
@@ -164,22 +164,22 @@ impl Bidirectional<'_> {
 /// from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Technique {
-    /// The eye path ran into a light with its segment number `eye`.
+    /// The camera path ran into a light with its segment number `eye`.
     Hit {
         /// See above.
-        eye: u32,
+        camera: u32,
     },
     /// Next-event estimation.
     NextEvent {
         /// See above.
-        eye: u32,
+        camera: u32,
     },
     /// Two vertices connected.
     Connect {
         /// See above.
         light: u32,
         /// See above.
-        eye: u32,
+        camera: u32,
     },
     /// A light vertex connected to the camera.
     Camera {
@@ -191,7 +191,7 @@ pub enum Technique {
         /// See above.
         light: u32,
         /// See above.
-        eye: u32,
+        camera: u32,
     },
 }
 
@@ -217,7 +217,7 @@ pub trait Record {
         let _ = (technique, value, from, ratios);
     }
 
-    /// `technique` brings light to the eye path's own pixel: of a class and of a group of lights, on a `level`, `value`
+    /// `technique` brings light to the camera path's own pixel: of a class and of a group of lights, on a `level`, `value`
     /// unweighted, with visibility and kernel, and its weight. Depths count from 1, also for light from infinity.
     #[inline]
     fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
@@ -227,7 +227,7 @@ pub trait Record {
 
 impl Record for () {}
 
-/// Bandwidths of the levels of one eye path, ascending, with their etas.
+/// Bandwidths of the levels of one camera path, ascending, with their etas.
 #[derive(Clone, Copy, Debug)]
 pub struct MergeLevels {
     radius2: [f32; super::MAX_LEVELS],

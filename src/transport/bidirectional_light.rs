@@ -1,9 +1,9 @@
 //! Light paths of the bidirectional methods: what one leaves behind.
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
+use super::camera_paths::PixelSample;
 use super::cause::Cause;
-use super::eye::EyeMeasure;
-use super::light::{Emitted, LightPass};
+use super::light::{Emitted, LightPaths};
 use super::light_vertex::{LightVertex, Scatterer};
 use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
@@ -16,7 +16,7 @@ use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{Group, Receiver};
 use crate::math::{Rgb, is_lit};
 use crate::medium::FlightDensity;
-use crate::plan::{Event, EyeSuffix, LightPrefix, Part, PathClass};
+use crate::plan::{CameraSuffix, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 
 /// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
@@ -39,7 +39,7 @@ pub struct Splat {
 impl Splat {
     /// Adds the weighted light to the pixel's measure.
     #[inline]
-    pub fn apply(&self, levels: &MergeLevels, measure: &mut EyeMeasure) {
+    pub fn apply(&self, levels: &MergeLevels, measure: &mut PixelSample) {
         if !self.value.is_finite() {
             return measure.reject(Cause::Splat);
         }
@@ -49,7 +49,7 @@ impl Splat {
 
 /// Adds light to all levels of a measure, each with its own weight.
 #[inline]
-pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, class: PathClass, value: Rgb, ratios: Ratios) {
+pub(super) fn add(measure: &mut PixelSample, levels: &MergeLevels, class: PathClass, value: Rgb, ratios: Ratios) {
     let into = match class.part() {
         // Neither can be merged before its first vertex, so no eta is in their weights.
         Part::Emission => return measure.emission += value * ratios.weight(levels.eta()[0]),
@@ -63,10 +63,10 @@ pub(super) fn add(measure: &mut EyeMeasure, levels: &MergeLevels, class: PathCla
     }
 }
 
-/// Vertices of one light path, for the eye path it belongs to.
+/// Vertices of one light path, for the camera path it belongs to.
 pub type LightVertices<'s> = bumpalo::collections::Vec<'s, LightVertex<'s>>;
 
-/// What light paths leave for others than their own eye path.
+/// What light paths leave for others than their own camera path.
 #[derive(Default)]
 pub struct Deposits {
     /// For the film, of all paths so far.
@@ -111,19 +111,19 @@ impl<R: Record> LightWalk<'_, '_, R> {
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };
         if scattered.is_none() {
-            self.mis = self.mis.received(self.shared.eye.scene.lights.choice_ratio(at, self.light));
+            self.mis = self.mis.received(self.shared.camera_paths.scene.lights.choice_ratio(at, self.light));
         }
         self.mis = self.mis.arrive(distance2, cos).fly(flight);
     }
 
     fn connect_camera<S: ScatterPoint>(&mut self, vertex: &S) {
-        let Bidirectional { eye, strategies, light_paths, .. } = self.shared;
-        let (draws, seen) = (vertex.draws(), (EyeSuffix::START, self.beam));
-        if !wanted(vertex, seen.0, seen.1, eye.classes) {
+        let Bidirectional { camera_paths, techniques, light_paths, .. } = self.shared;
+        let (draws, seen) = (vertex.draws(), (CameraSuffix::START, self.beam));
+        if !wanted(vertex, seen.0, seen.1, camera_paths.classes) {
             return;
         }
-        let Some(sample) = eye.camera.sample(vertex.p(), draws.two(Purpose::Lens)) else { return };
-        if vertex.is_culled(eye.scene, sample.wi) {
+        let Some(sample) = camera_paths.camera.sample(vertex.p(), draws.two(Purpose::Lens)) else { return };
+        if vertex.is_culled(camera_paths.scene, sample.wi) {
             return;
         }
         let (f, _) = vertex.evaluate_cos(sample.wi, Transport::Importance, LobeSet::ALL);
@@ -132,8 +132,8 @@ impl<R: Record> LightWalk<'_, '_, R> {
         let value = vertex.throughput() * f * (pdf_a / light_paths);
         // What is no number is the end of the sample that it would have come to, and costs no ray.
         if value.is_nan() {
-            if let Some(((x, y), _)) = eye.camera.pixel(sample.film, || draws.two(Purpose::Splat)) {
-                let (pixel, light, group) = (y * eye.camera.size().0 + x, vertex.depth(), self.group);
+            if let Some(((x, y), _)) = camera_paths.camera.pixel(sample.film, || draws.two(Purpose::Splat)) {
+                let (pixel, light, group) = (y * camera_paths.camera.size().0 + x, vertex.depth(), self.group);
                 let (class, ratios) = (PathClass::Indirect, Ratios::ALONE);
                 self.left.splats.push(Splat { pixel, light, class, group, value: Rgb::NAN, ratios });
             }
@@ -142,12 +142,12 @@ impl<R: Record> LightWalk<'_, '_, R> {
         if !is_lit(value) {
             return;
         }
-        let token = camera_token(eye.scene, draws, Purpose::ShadowAlpha);
-        let way = vertex.shadow_ray(eye.scene, sample.wi, Some(sample.lens), token);
+        let token = camera_token(camera_paths.scene, draws, Purpose::ShadowAlpha);
+        let way = vertex.shadow_ray(camera_paths.scene, sample.wi, Some(sample.lens), token);
         if !is_lit(way.left) {
             return;
         }
-        let ratios = if strategies.connect {
+        let ratios = if techniques.connect {
             let reverse = vertex.reverse_pdf(sample.wi, Transport::Radiance);
             let arrival = pdf_a * vertex.cos(sample.wi) * way.flight.reverse;
             mis::camera(&self.mis, arrival, *light_paths, reverse)
@@ -157,10 +157,12 @@ impl<R: Record> LightWalk<'_, '_, R> {
         self.record.contribution(Technique::Camera { light: vertex.depth() }, value, sample.lens, ratios);
         let value = value * way.left;
         if value.max_element() > 0.0 {
-            let Some(((x, y), weight)) = eye.camera.pixel(sample.film, || draws.two(Purpose::Splat)) else { return };
+            let Some(((x, y), weight)) = camera_paths.camera.pixel(sample.film, || draws.two(Purpose::Splat)) else {
+                return;
+            };
             let value = value * weight;
-            let (pixel, light, group) = (y * eye.camera.size().0 + x, vertex.depth(), self.group);
-            let shares = shares(vertex, seen, (sample.wi, Transport::Importance, f), eye.classes);
+            let (pixel, light, group) = (y * camera_paths.camera.size().0 + x, vertex.depth(), self.group);
+            let shares = shares(vertex, seen, (sample.wi, Transport::Importance, f), camera_paths.classes);
             let splat = |(class, share)| Splat { pixel, light, class, group, value: value * share, ratios };
             self.left.splats.extend(shares.iter().map(splat));
         }
@@ -170,7 +172,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
 impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 's>, scattered: Option<Scattered>) -> Next {
-        let Bidirectional { eye, strategies, merged_paths, .. } = self.shared;
+        let Bidirectional { camera_paths, techniques, merged_paths, .. } = self.shared;
         self.arrive(
             &vertex.receiver(),
             vertex.distance,
@@ -182,13 +184,16 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         self.lobes = Some(lobes);
         // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders
         // of materials.
-        if lobes != LobeSet::DELTA && strategies.light_merges(vertex.depth) && vertex.depth < eye.max_depth {
+        if lobes != LobeSet::DELTA
+            && techniques.light_vertex_merges(vertex.depth)
+            && vertex.depth < camera_paths.max_depth
+        {
             let flux = vertex.throughput / *merged_paths;
             self.left.photons.push(MergePhoton::new(vertex, flux, (self.beam, self.group), &self.mis));
         }
-        let connected = self.shared.connects_light(vertex.depth);
-        if connected && lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < eye.max_depth {
-            if strategies.connect {
+        let connected = self.shared.connects_light_vertex(vertex.depth);
+        if connected && lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth {
+            if techniques.connect {
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Surface(*vertex.surface, *vertex.shading),
                     wo: vertex.wo,
@@ -200,24 +205,24 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     group: self.group,
                 });
             }
-            if strategies.camera
+            if techniques.camera
                 && self.shared.connects_camera()
-                && !eye.scene.shapes.instances[vertex.surface.instance as usize].hidden_from_camera
+                && !camera_paths.scene.shapes.instances[vertex.surface.instance as usize].hidden_from_camera
             {
                 self.connect_camera(vertex);
             }
         }
-        if self.shared.ends_light(vertex.depth) { Next::Stop } else { Next::Continue(LobeSet::ALL) }
+        if self.shared.ends_light_path(vertex.depth) { Next::Stop } else { Next::Continue(LobeSet::ALL) }
     }
 
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        let Bidirectional { eye, strategies, .. } = self.shared;
+        let Bidirectional { camera_paths, techniques, .. } = self.shared;
         self.arrive(&vertex.receiver(), vertex.met.distance, 1.0, vertex.flight, scattered);
         self.lobes = None;
-        let connected = self.shared.connects_light(vertex.depth);
-        if connected && !self.photons_only && vertex.depth < eye.max_depth {
-            if strategies.connect {
+        let connected = self.shared.connects_light_vertex(vertex.depth);
+        if connected && !self.photons_only && vertex.depth < camera_paths.max_depth {
+            if techniques.connect {
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Medium(vertex.met.p, vertex.phase()),
                     wo: vertex.wo,
@@ -229,11 +234,11 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     group: self.group,
                 });
             }
-            if strategies.camera && self.shared.connects_camera() {
+            if techniques.camera && self.shared.connects_camera() {
                 self.connect_camera(vertex);
             }
         }
-        if self.shared.ends_light(vertex.depth) { Next::Stop } else { Next::Continue(LobeSet::ALL) }
+        if self.shared.ends_light_path(vertex.depth) { Next::Stop } else { Next::Continue(LobeSet::ALL) }
     }
 
     fn lost(&mut self) {
@@ -247,7 +252,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 's>, sample: &BsdfSample) {
-        let merges = self.shared.strategies.light_merge(vertex.depth);
+        let merges = self.shared.techniques.light_vertex_merge(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, merges);
     }
 }
@@ -273,14 +278,14 @@ impl<'s> Bidirectional<'s> {
     #[inline]
     pub fn light_path<R: Record>(
         &self,
-        pass: &LightPass,
+        pass: &LightPaths,
         index: u32,
         photons_only: bool,
         vertices: &mut LightVertices<'s>,
         left: &mut Deposits,
         record: &mut R,
     ) {
-        let Some(emitted) = pass.emit(self.eye.scene, self.initial_media, index) else { return };
+        let Some(emitted) = pass.emit(self.camera_paths.scene, self.initial_media, index) else { return };
         self.light_path_of(pass, &emitted, photons_only, vertices, left, record);
     }
 
@@ -288,14 +293,14 @@ impl<'s> Bidirectional<'s> {
     #[inline]
     pub fn light_path_of<R: Record>(
         &self,
-        pass: &LightPass,
+        pass: &LightPaths,
         emitted: &Emitted,
         photons_only: bool,
         vertices: &mut LightVertices<'s>,
         left: &mut Deposits,
         record: &mut R,
     ) {
-        let eye = &self.eye;
+        let camera_paths = &self.camera_paths;
         let arena = vertices.bump();
         let mut start = emitted.start;
         start.throughput *= pass.paths() as f32;
@@ -303,7 +308,7 @@ impl<'s> Bidirectional<'s> {
             shared: self,
             mis: MisState::light(&emitted.density),
             light: emitted.light,
-            group: eye.scene.lights.group(emitted.light),
+            group: camera_paths.scene.lights.group(emitted.light),
             infinite: emitted.density.infinite,
             beam: LightPrefix::start(emitted.delta),
             lobes: None,
@@ -312,6 +317,14 @@ impl<'s> Bidirectional<'s> {
             left,
             record,
         };
-        walk(eye.scene, arena, &start, emitted.stream, Transport::Importance, eye.max_depth, &mut visitor);
+        walk(
+            camera_paths.scene,
+            arena,
+            &start,
+            emitted.stream,
+            Transport::Importance,
+            camera_paths.max_depth,
+            &mut visitor,
+        );
     }
 }

@@ -3,13 +3,13 @@
 /// What has brought a sample something that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The eye path itself: its weight.
+    /// The camera path itself: its weight.
     Path,
-    /// A light that the eye path has run into.
+    /// A light that the camera path has run into.
     Emission,
     /// Next-event estimation, on surfaces or in media.
     DirectLight,
-    /// A light path's vertex connected to the eye path.
+    /// A light path's vertex connected to the camera path.
     Connection,
     /// Photons, gathered or merged.
     Photons,

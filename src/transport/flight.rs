@@ -2,7 +2,7 @@
 //!
 //! A walk by chance ([`Fly`]) draws where it is scattered and is there or goes past: paths as long as they come. A walk
 //! that splits ([`Split`]) shows its visitor one vertex in every medium on its way and goes on to the surface behind,
-//! attenuated. Such a vertex is measured, not scattered from; it suits eye paths that gather, for which a vertex in a
+//! attenuated. Such a vertex is measured, not scattered from; it suits camera paths that gather, for which a vertex in a
 //! medium is an end.
 //!
 //! Such a vertex is drawn by how much of the ray is scattered where, as suits all light but that straight from a lamp

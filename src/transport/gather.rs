@@ -8,7 +8,7 @@ use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
 use bumpalo::Bump;
 use wide::{CmpEq, CmpLt, f32x8};
 
-/// What a worker keeps from eye path to eye path of one pass.
+/// What a worker keeps from camera path to camera path of one pass.
 #[derive(Default)]
 pub struct Scratch {
     /// What the vertices of a path need.
@@ -65,7 +65,7 @@ pub(super) struct Batch<'a, 's, K> {
     p: Vec3,
     throughput: Rgb,
     gathering: Gathering<'a>,
-    /// For photons that no eye path that goes on could find; `None` where it is the same.
+    /// For photons that no camera path that goes on could find; `None` where it is the same.
     unreachable: Option<Gathering<'a>>,
     waiting: &'s mut Waiting,
     /// By level, of every eighth photon.
@@ -109,7 +109,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         }
     }
 
-    /// Adds a photon that no eye path could find: few, and out of the way of the others.
+    /// Adds a photon that no camera path could find: few, and out of the way of the others.
     #[inline(never)]
     fn push_unreachable<C: Counter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
         let Some(gathering) = &self.unreachable else { return };

@@ -1,17 +1,17 @@
-//! Light of lamps that have a size, sent by perfect mirrors and clear glass to the sharp lobes of a vertex X. Eye paths
+//! Light of lamps that have a size, sent by perfect mirrors and clear glass to the sharp lobes of a vertex X. Camera paths
 //! that go on find it, and so do photons: each well where the other does not. A bulb behind glass that a varnished door
-//! shows is met by one eye path in thousands, which then is a bright spot; the photons around X know of it. A sharp
-//! highlight is found by every other eye path and blurred by photons.
+//! shows is met by one camera path in thousands, which then is a bright spot; the photons around X know of it. A sharp
+//! highlight is found by every other camera path and blurred by photons.
 //!
 //! Both are weighed by the balance heuristic, as vertex merging and unidirectional sampling are \[Georgiev et al. 2012,
-//! (10)\]. An eye path goes from X along a direction with a density `pdf` per solid angle. Light paths leave the lamp
+//! (10)\]. A camera path goes from X along a direction with a density `pdf` per solid angle. Light paths leave the lamp
 //! along the same ray with a density e per area that faces it and per solid angle; as mirrors and clear glass keep the
 //! area times the solid angle of light, they come to X along it with `e cos` per area and solid angle. So within the
 //! squared radius r^2 of X there are, of n light paths,
 //!
 //! `n pi r^2 e cos / pdf`
 //!
-//! photons for every eye path. What one of them brings is bounded, however small r is. Weights need only be the same
+//! photons for every camera path. What one of them brings is bounded, however small r is. Weights need only be the same
 //! function of the whole path on either side: of e both know the leading power of two ([`PhotonFlags::density`]).
 
 use super::bandwidths::{LevelRadii, MAX_LEVELS};
@@ -40,7 +40,7 @@ impl Merged {
     const NOTHING: Merged = Merged { areas: [0.0; MAX_LEVELS], order: [0; MAX_LEVELS], count: 0, going: 1.0 };
 }
 
-/// What an eye path knows of its last X.
+/// What a camera path knows of its last X.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glints {
     /// At the last vertex that is not a perfect mirror or clear glass.
@@ -152,13 +152,13 @@ impl<K: Kernel> Merging<'_, K> {
         let Merging { shading, ng, onward, .. } = *self;
         let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, onward);
         let cosine = photon.cosine();
-        let (cos, eye) = (photon.wi.dot(ng).abs(), pdf * self.going);
+        let (cos, pdf) = (photon.wi.dot(ng).abs(), pdf * self.going);
         // What is no number goes on, for the sample to be rejected by.
-        if eye <= 0.0 || cosine <= 0.0 || cos <= 0.0 {
+        if pdf <= 0.0 || cosine <= 0.0 || cos <= 0.0 {
             return Rgb::ZERO;
         }
-        // Area within which a photon is expected for every eye path.
-        let one_each = eye / (self.paths * photon.flags.density() * cos);
+        // Area within which a photon is expected for every camera path.
+        let one_each = pdf / (self.paths * photon.flags.density() * cos);
         let light = photon.flux * f / cosine;
         for (sum, radius2) in self.sums.iter_mut().zip(self.radius2) {
             if distance2 < radius2 {

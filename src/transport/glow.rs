@@ -1,6 +1,6 @@
 //! What glows without a body: lamps that light passes as if they were not there, as area lamps of Cycles and Blender.
 //!
-//! Eye paths alone ask for them, on each of their segments: what they emit is added, and the path goes on to what is
+//! Camera paths alone ask for them, on each of their segments: what they emit is added, and the path goes on to what is
 //! behind. Light paths start from them and next-event estimation samples them as any other lamp; shadow rays and light
 //! paths do not meet them. So all strategies see the same paths, with the same densities.
 
@@ -11,7 +11,7 @@ use crate::medium::FlightDensity;
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
-/// A lamp without a body on a segment of an eye path.
+/// A lamp without a body on a segment of a camera path.
 pub struct Glow {
     /// Where it is met.
     pub surface: Surface,

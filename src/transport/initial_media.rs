@@ -30,7 +30,7 @@ impl InitialMedium {
 /// The solids around the camera and around each light.
 pub struct InitialMedia {
     /// InitialMedium the camera.
-    pub eye: InitialMedium,
+    pub camera: InitialMedium,
     /// InitialMedium the lights, by index; empty when the scene has no solids.
     lights: Vec<InitialMedium>,
 }
@@ -41,15 +41,15 @@ impl InitialMedia {
         let mut initial_media = InitialMedia::new(scene, camera.position());
         let starts = Extent::of(camera.origins());
         if scene.survey.solids && Solid::all(scene).iter().any(|solid| solid.meets(scene, &starts)) {
-            initial_media.eye = InitialMedium::Differs;
+            initial_media.camera = InitialMedium::Differs;
         }
         initial_media
     }
 
     /// The same of a camera whose rays start in one point.
-    pub fn new(scene: &Scene, eye: Vec3) -> InitialMedia {
+    pub fn new(scene: &Scene, camera: Vec3) -> InitialMedia {
         let lights = if scene.survey.solids { around_lights(scene) } else { Vec::new() };
-        InitialMedia { eye: InitialMedium::Same(Interior::at(scene, eye)), lights }
+        InitialMedia { camera: InitialMedium::Same(Interior::at(scene, camera)), lights }
     }
 
     /// InitialMedium a point just off light `index`.

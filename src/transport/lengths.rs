@@ -1,8 +1,8 @@
 //! How long paths are: what the cost of a method is estimated from, without a clock.
 
-use super::eye::Eye;
+use super::camera_paths::CameraPaths;
 use super::initial_media::InitialMedia;
-use super::light::LightPass;
+use super::light::LightPaths;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::walk;
 use crate::bsdf::{LobeSet, Transport};
@@ -22,25 +22,25 @@ const CHUNK: usize = 256;
 /// Mean numbers of vertices of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lengths {
-    /// Of an eye path that goes on whatever the lobes; on surfaces, as all that follow.
-    pub eye: f64,
+    /// Of a camera path that goes on whatever the lobes; on surfaces, as all that follow.
+    pub camera: f64,
     /// Of one that ends at broad lobes and goes straight through media.
-    pub eye_to_broad: f64,
+    pub camera_to_broad: f64,
     /// Of a light path that goes on whatever the lobes.
     pub light: f64,
     /// Of one that ends at broad lobes.
     pub light_to_broad: f64,
-    /// Those of an eye path that have lobes which are not delta: they ask for light, gather photons and are connected.
-    pub eye_open: f64,
+    /// Those of a camera path that have lobes which are not delta: they ask for light, gather photons and are connected.
+    pub camera_connectable: f64,
     /// The same of a light path.
-    pub light_open: f64,
-    /// Vertices in media that scatter: of an eye path and of a light path that go on whatever the lobes, and of an eye
+    pub light_connectable: f64,
+    /// Vertices in media that scatter: of a camera path and of a light path that go on whatever the lobes, and of an eye
     /// path that ends at broad lobes and passes through media, looking at points on its way.
-    pub eye_media: f64,
+    pub camera_media: f64,
     /// The same of a light path.
     pub light_media: f64,
-    /// Points that an eye path which ends at broad lobes looks at on its straight way through media.
-    pub on_the_way: f64,
+    /// Points that a camera path which ends at broad lobes looks at on its straight way through media.
+    pub media_samples: f64,
     /// Share of the vertices on surfaces whose material has textures.
     pub textured: f64,
     /// Vertices of light paths that one of the eye merges with, where there are as many light paths as pixels.
@@ -134,47 +134,71 @@ impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
 }
 
 impl Lengths {
-    /// Of paths of a view, the light paths guided if there is a guide. `reach` is the radius within which an eye path
+    /// Of paths of a view, the light paths guided if there is a guide. `reach` is the radius within which a camera path
     /// merges that is so long up to where it first may.
     pub fn new(
-        eye: &Eye<'_>,
+        camera_paths: &CameraPaths<'_>,
         initial_media: &InitialMedia,
         seed: u64,
         guide: Option<&Guide>,
         reach: impl Fn(f32) -> f32 + Sync,
     ) -> Lengths {
-        let (width, height) = eye.camera.size();
+        let (width, height) = camera_paths.camera.size();
         let pixels = u64::from(width) * u64::from(height);
-        let lights = LightPass::new(seed, 0, Domain::GuideLight, PATHS, eye.max_depth).guided(guide);
+        let lights = LightPaths::new(seed, 0, Domain::GuideLight, PATHS, camera_paths.max_depth).guided(guide);
         let from_light = |index: u32| {
-            let mut count = Count::new(eye.scene);
-            if let Some(emitted) = lights.emit(eye.scene, initial_media, index) {
+            let mut count = Count::new(camera_paths.scene);
+            if let Some(emitted) = lights.emit(camera_paths.scene, initial_media, index) {
                 let (start, stream) = (&emitted.start, emitted.stream);
-                walk(eye.scene, &Bump::new(), start, stream, Transport::Importance, eye.max_depth, &mut count);
+                walk(
+                    camera_paths.scene,
+                    &Bump::new(),
+                    start,
+                    stream,
+                    Transport::Importance,
+                    camera_paths.max_depth,
+                    &mut count,
+                );
             }
             count
         };
         let start = |index: u32| {
             let pixel = u64::from(index) * pixels / u64::from(PATHS);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
-            let stream = Stream::new(seed, u64::MAX, Domain::GuideEye, u64::from(index));
-            (eye.start(at, stream), stream)
+            let stream = Stream::new(seed, u64::MAX, Domain::GuideCamera, u64::from(index));
+            (camera_paths.start(at, stream), stream)
         };
-        let from_eye = |index: u32| {
-            let (mut count, (start, stream)) = (Count::<false>::new(eye.scene), start(index));
-            walk(eye.scene, &Bump::new(), &start, stream, Transport::Radiance, eye.max_depth, &mut count);
+        let from_camera = |index: u32| {
+            let (mut count, (start, stream)) = (Count::<false>::new(camera_paths.scene), start(index));
+            walk(
+                camera_paths.scene,
+                &Bump::new(),
+                &start,
+                stream,
+                Transport::Radiance,
+                camera_paths.max_depth,
+                &mut count,
+            );
             count
         };
         let through = |index: u32| {
-            let (mut count, (start, stream)) = (Count::<true>::new(eye.scene), start(index));
-            walk(eye.scene, &Bump::new(), &start, stream, Transport::Radiance, eye.max_depth, &mut count);
+            let (mut count, (start, stream)) = (Count::<true>::new(camera_paths.scene), start(index));
+            walk(
+                camera_paths.scene,
+                &Bump::new(),
+                &start,
+                stream,
+                Transport::Radiance,
+                camera_paths.max_depth,
+                &mut count,
+            );
             count.counts()
         };
         let paths = || (0..PATHS).into_par_iter().with_min_len(CHUNK);
         let light: Vec<Count<'_, false>> = paths().map(from_light).collect();
         let through: Vec<[f64; 6]> =
-            if eye.scene.survey.scattering { paths().map(through).collect() } else { Vec::new() };
-        let eye: Vec<Count<'_, false>> = paths().map(from_eye).collect();
+            if camera_paths.scene.survey.scattering { paths().map(through).collect() } else { Vec::new() };
+        let camera: Vec<Count<'_, false>> = paths().map(from_camera).collect();
         let map = PhotonMap::build(light.iter().flat_map(|count| &count.open).copied().collect());
         // As many as are there are found in an area that is larger by as much as these paths are fewer.
         let larger = pixels as f32 / PATHS as f32;
@@ -185,29 +209,29 @@ impl Lengths {
             }
             merged
         };
-        let merged: Vec<u64> = eye.par_iter().with_min_len(CHUNK).map(merged).collect();
+        let merged: Vec<u64> = camera.par_iter().with_min_len(CHUNK).map(merged).collect();
         // Whole numbers: their sums do not depend on any order.
         let mean = |counts: &mut dyn Iterator<Item = [f64; 6]>| {
             let sum = counts.fold([0.0; 6], |sum, counts| std::array::from_fn(|k| sum[k] + counts[k]));
             sum.map(|sum| sum / f64::from(PATHS))
         };
-        let [whole, light] = [&eye, &light].map(|counts| mean(&mut counts.iter().map(Count::counts)));
+        let [whole, light] = [&camera, &light].map(|counts| mean(&mut counts.iter().map(Count::counts)));
         let straight = if through.is_empty() { whole } else { mean(&mut through.into_iter()) };
-        let [eye, _, eye_open, eye_media, _, eye_textured] = whole;
-        let [light, light_to_broad, light_open, light_media, _, light_textured] = light;
-        let [_, eye_to_broad, _, _, on_the_way, _] = straight;
-        let textured = (eye_textured + light_textured) / (eye + light).max(1.0);
+        let [camera, _, camera_connectable, camera_media, _, camera_textured] = whole;
+        let [light, light_to_broad, light_connectable, light_media, _, light_textured] = light;
+        let [_, camera_to_broad, _, _, media_samples, _] = straight;
+        let textured = (camera_textured + light_textured) / (camera + light).max(1.0);
         let merged = merged.iter().sum::<u64>() as f64 / f64::from(PATHS);
         Lengths {
-            eye,
-            eye_to_broad,
+            camera,
+            camera_to_broad,
             light,
             light_to_broad,
-            eye_open,
-            light_open,
-            eye_media,
+            camera_connectable,
+            light_connectable,
+            camera_media,
             light_media,
-            on_the_way,
+            media_samples,
             textured,
             merged,
         }

@@ -1,6 +1,6 @@
 //! Light paths that leave photons.
 
-use super::eye::Indirect;
+use super::camera_paths::Indirect;
 use super::initial_media::InitialMedia;
 use super::segment::{PrecomputedHit, token};
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
@@ -19,7 +19,7 @@ use bumpalo::Bump;
 
 /// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
 #[derive(Clone, Copy)]
-pub struct LightPass<'a> {
+pub struct LightPaths<'a> {
     streams: Streams,
     paths: u32,
     max_depth: u32,
@@ -59,13 +59,13 @@ pub struct Emitted {
     pub unaimed: f32,
 }
 
-impl<'a> LightPass<'a> {
+impl<'a> LightPaths<'a> {
     /// Pass `pass` of `paths` light paths.
-    pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPass<'a> {
+    pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPaths<'a> {
         let key = mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(GOLDEN)) ^ domain as u64);
         let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
         let (choice, point, direction) = (pair(1), pair(2), pair(3));
-        LightPass {
+        LightPaths {
             streams: Streams::new(seed, pass, domain),
             paths,
             max_depth,
@@ -81,39 +81,39 @@ impl<'a> LightPass<'a> {
     }
 
     /// The same with emission guided, if there is a guide.
-    pub fn guided(self, guide: Option<&'a Guide>) -> LightPass<'a> {
-        LightPass { guide, ..self }
+    pub fn guided(self, guide: Option<&'a Guide>) -> LightPaths<'a> {
+        LightPaths { guide, ..self }
     }
 
     /// The same with part of the light from infinity through a region, if there is one.
     #[must_use]
-    pub fn lighting(self, region: Option<Region>) -> LightPass<'a> {
-        LightPass { region, ..self }
+    pub fn lighting(self, region: Option<Region>) -> LightPaths<'a> {
+        LightPaths { region, ..self }
     }
 
     /// The same with other draws for all but emission, whose points are spread over the paths of a pass.
     #[must_use]
-    pub fn drawing(self, streams: Streams) -> LightPass<'a> {
-        LightPass { streams, ..self }
+    pub fn drawing(self, streams: Streams) -> LightPaths<'a> {
+        LightPaths { streams, ..self }
     }
 
-    /// For eye paths to which photons bring no other classes than `wanted`: none, if that is none; else without those
+    /// For camera paths to which photons bring no other classes than `wanted`: none, if that is none; else without those
     /// of caustics, or with those alone.
     #[must_use]
-    pub fn wanting(self, wanted: ClassSet, indirect: Indirect) -> LightPass<'a> {
-        LightPass { paths: if wanted.is_empty() { 0 } else { self.paths }, kinds: indirect.kinds(wanted), ..self }
+    pub fn wanting(self, wanted: ClassSet, indirect: Indirect) -> LightPaths<'a> {
+        LightPaths { paths: if wanted.is_empty() { 0 } else { self.paths }, kinds: indirect.kinds(wanted), ..self }
     }
 
     /// Whose paths take no other wavelengths than these.
     #[must_use]
-    pub fn with(self, wavelengths: IterationWavelengths) -> LightPass<'a> {
-        LightPass { wavelengths: Some(wavelengths), ..self }
+    pub fn with(self, wavelengths: IterationWavelengths) -> LightPaths<'a> {
+        LightPaths { wavelengths: Some(wavelengths), ..self }
     }
 
     /// Which ends where its iteration is given up.
     #[must_use]
-    pub fn stopped_by(self, stop: &'a Stop) -> LightPass<'a> {
-        LightPass { stop: Some(stop), ..self }
+    pub fn stopped_by(self, stop: &'a Stop) -> LightPaths<'a> {
+        LightPaths { stop: Some(stop), ..self }
     }
 
     /// Whether path `index` and all others of its iteration are given up.
@@ -267,7 +267,7 @@ impl<'a> Deposit<'a> {
     fn new(
         scene: &'a Scene,
         photons: &'a mut Photons,
-        pass: &LightPass,
+        pass: &LightPaths,
         emitted: &Emitted,
         probability: f32,
     ) -> Deposit<'a> {
@@ -369,7 +369,7 @@ pub fn light_path(
     scene: &Scene,
     arena: &Bump,
     initial_media: &InitialMedia,
-    pass: &LightPass,
+    pass: &LightPaths,
     index: u32,
     photons: &mut Photons,
 ) -> Option<(usize, u32)> {
@@ -383,7 +383,7 @@ pub fn light_path(
 /// Flux of all lights (W), from the beginnings of light paths.
 pub fn emitted_flux(scene: &Scene, initial_media: &InitialMedia) -> DVec3 {
     const SAMPLES: u32 = 4096;
-    let pass = LightPass::new(0, 0, Domain::PilotLight, SAMPLES, u32::MAX);
+    let pass = LightPaths::new(0, 0, Domain::PilotLight, SAMPLES, u32::MAX);
     let emitted = (0..SAMPLES).filter_map(|index| pass.emit(scene, initial_media, index));
     // `emit` divides by the number of paths.
     emitted.map(|emitted| emitted.start.throughput.as_dvec3()).sum()
@@ -416,7 +416,7 @@ impl EqualFlux {
         scene: &Scene,
         arena: &mut Bump,
         initial_media: &InitialMedia,
-        pass: &LightPass,
+        pass: &LightPaths,
         index: u32,
         photons: &mut Photons,
     ) {

@@ -1,4 +1,4 @@
-//! Vertices of light paths that eye vertices are connected to.
+//! Vertices of light paths that camera vertices are connected to.
 
 use super::mis::MisState;
 use crate::bsdf::{LobeSet, Shading, Transport};
@@ -20,7 +20,7 @@ pub enum Scatterer<'s> {
     Medium(Vec3, HenyeyGreenstein),
 }
 
-/// A light path's vertex that eye vertices can be connected to.
+/// A light path's vertex that camera vertices can be connected to.
 #[derive(Clone, Copy, Debug)]
 pub struct LightVertex<'s> {
     /// Where and how it scatters.
@@ -35,7 +35,7 @@ pub struct LightVertex<'s> {
     pub mis: MisState,
     /// What has happened on the way here.
     pub beam: LightPrefix,
-    /// The path has taken a wavelength, the one its eye path takes if it does.
+    /// The path has taken a wavelength, the one its camera path takes if it does.
     pub dispersed: bool,
     /// Of its light.
     pub group: Group,
@@ -111,7 +111,7 @@ impl LightVertex<'_> {
         }
     }
 
-    /// Density with which an eye path that comes along `wi` would go back along the light path.
+    /// Density with which a camera path that comes along `wi` would go back along the light path.
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3) -> f32 {
         match &self.scatterer {

@@ -7,16 +7,16 @@
 //! `dVM = dVC / eta` holds at the start and is kept by (34) to (36), one pair of coefficients serves both.
 //! [`Eta::NONE`] is bidirectional path tracing; [`Eta::MERGE_ONLY`] leaves merging as the only strategy.
 //!
-//! All photons merged at one vertex share the eye path up to there, and the balance heuristic counts them as if they
-//! did not. Given the eye path they are independent: with `X` what one of `n` light paths brings,
-//! `E[(sum X)^2] = n E[X^2] + n (n - 1) E[E[X | eye path]^2]`. `X` is nothing but where the light path lands in the
+//! All photons merged at one vertex share the camera path up to there, and the balance heuristic counts them as if they
+//! did not. Given the camera path they are independent: with `X` what one of `n` light paths brings,
+//! `E[(sum X)^2] = n E[X^2] + n (n - 1) E[E[X | camera path]^2]`. `X` is nothing but where the light path lands in the
 //! disc, with probability `N / n`, so the second term is about `N` times the first, and those merges are worth
 //! `1 / (1 + N)` of what they are counted for: correlation-aware MIS \[Grittmann et al. 2021\]. Where all earlier
-//! vertices of the eye path are delta, other eye paths of the pixel come to the same disc, nothing varies with them,
+//! vertices of the camera path are delta, other camera paths of the pixel come to the same disc, nothing varies with them,
 //! and a merge counts in full. So merges have two coefficients, [`Merges`]. Light paths know but one: behind each of
-//! their vertices but the last merged the eye path has a vertex that is not delta.
+//! their vertices but the last merged the camera path has a vertex that is not delta.
 //!
-//! An eye path does not know yet whether what comes next is the light. Where direct light is not merged, the merge at
+//! A camera path does not know yet whether what comes next is the light. Where direct light is not merged, the merge at
 //! its last vertex must not count when it is: [`MisState::last`] keeps that term apart for one more vertex.
 //!
 //! A vertex in a medium is one whose cosine is 1, whose densities are per volume, and where nothing is merged; flight
@@ -44,11 +44,11 @@ pub struct Eta {
     worth: Merges,
 }
 
-/// A number each for merges where all earlier vertices of the eye path are delta (`x`), and for those that share a path
+/// A number each for merges where all earlier vertices of the camera path are delta (`x`), and for those that share a path
 /// which might have gone elsewhere (`y`).
 pub type Merges = DVec2;
 
-/// The merge of a vertex: `clear` says that all earlier vertices of the eye path are delta.
+/// The merge of a vertex: `clear` says that all earlier vertices of the camera path are delta.
 #[inline]
 pub fn one_merge(clear: bool) -> Merges {
     if clear { DVec2::X } else { DVec2::Y }
@@ -66,7 +66,7 @@ impl Eta {
         Eta { value: std::f64::consts::PI * f64::from(radius2) * f64::from(light_paths), worth: DVec2::ONE }
     }
 
-    /// The same where so many photons of a pass are expected in a disc, all of one eye path.
+    /// The same where so many photons of a pass are expected in a disc, all of one camera path.
     #[must_use]
     #[inline]
     pub fn sharing(self, photons: f32) -> Eta {
@@ -128,8 +128,8 @@ impl MisState {
         MisState { d_vcm: 1.0 / onward, plain, ..MisState::default() }
     }
 
-    /// An eye path's start \[(31)\]: light paths that are connected to the camera for every eye path of a pixel, over
-    /// the density per solid angle of that eye path; 0 when the camera cannot be connected to.
+    /// A camera path's start \[(31)\]: light paths that are connected to the camera for every camera path of a pixel, over
+    /// the density per solid angle of that camera path; 0 when the camera cannot be connected to.
     #[inline]
     pub fn camera(light_paths: f32, camera_pdf_w: f32) -> MisState {
         let d_vcm = if camera_pdf_w > 0.0 { f64::from(light_paths) / f64::from(camera_pdf_w) } else { 0.0 };
@@ -214,35 +214,35 @@ struct Side {
     merged: Merges,
 }
 
-/// An eye path that runs into a light \[(43)\]. For light from infinity: before the arrival \[5.1\]. Direct light is
+/// A camera path that runs into a light \[(43)\]. For light from infinity: before the arrival \[5.1\]. Direct light is
 /// never merged.
 #[inline]
-pub fn hit(eye: &MisState, light: &EmissionDensity) -> Ratios {
+pub fn hit(camera: &MisState, light: &EmissionDensity) -> Ratios {
     let emission = f64::from(light.start) * f64::from(light.onward);
-    let plain = 1.0 + f64::from(light.direct) * eye.d_vcm + emission * eye.plain;
-    Ratios { plain, merged: eye.merged * emission, own: DVec2::ZERO }
+    let plain = 1.0 + f64::from(light.direct) * camera.d_vcm + emission * camera.plain;
+    Ratios { plain, merged: camera.merged * emission, own: DVec2::ZERO }
 }
 
 /// Next-event estimation \[(44), (45)\].
 ///
-/// `pdf_w`, `reverse_pdf_w`: densities at the eye vertex of the direction to the light and back; `light_pdf_w`: that of
+/// `pdf_w`, `reverse_pdf_w`: densities at the camera vertex of the direction to the light and back; `light_pdf_w`: that of
 /// next-event estimation (the choice of the light included); `arrival_pdf_a`: of emission from the light's point per
-/// area of the eye vertex, the choice of the light over that of next-event estimation included. A delta light cannot be
+/// area of the camera vertex, the choice of the light over that of next-event estimation included. A delta light cannot be
 /// run into. Direct light is never merged.
 #[inline]
 pub fn next_event(
-    eye: &MisState,
+    camera: &MisState,
     (pdf_w, reverse_pdf_w): (f32, f32),
     (light_pdf_w, arrival_pdf_a): (f32, f32),
     delta: bool,
 ) -> Ratios {
     let hit = if delta { 0.0 } else { f64::from(pdf_w) / f64::from(light_pdf_w) };
     let arrival_pdf_a = f64::from(arrival_pdf_a);
-    let eye = eye.earlier(reverse_pdf_w);
-    Ratios { plain: hit + 1.0 + arrival_pdf_a * eye.plain, merged: eye.merged * arrival_pdf_a, own: DVec2::ZERO }
+    let camera = camera.earlier(reverse_pdf_w);
+    Ratios { plain: hit + 1.0 + arrival_pdf_a * camera.plain, merged: camera.merged * arrival_pdf_a, own: DVec2::ZERO }
 }
 
-/// A light vertex connected to the camera \[(46), (47)\]: density of an eye path's arrival per area there, over the
+/// A light vertex connected to the camera \[(46), (47)\]: density of a camera path's arrival per area there, over the
 /// number of light paths connected; density of scattering back along the light path. What the camera sees directly is
 /// not merged.
 #[inline]
@@ -267,20 +267,20 @@ pub struct End<'a> {
 
 /// Two vertices connected \[(40), (41)\].
 #[inline]
-pub fn connect(light: &End<'_>, eye: &End<'_>) -> Ratios {
-    let (l, e) = (light.mis.earlier(light.reverse_pdf_w), eye.mis.earlier(eye.reverse_pdf_w));
-    let (by_eye, by_light) = (f64::from(light.arrival_pdf_a), f64::from(eye.arrival_pdf_a));
+pub fn connect(light: &End<'_>, camera: &End<'_>) -> Ratios {
+    let (l, e) = (light.mis.earlier(light.reverse_pdf_w), camera.mis.earlier(camera.reverse_pdf_w));
+    let (by_camera, by_light) = (f64::from(light.arrival_pdf_a), f64::from(camera.arrival_pdf_a));
     Ratios {
-        plain: by_eye * l.plain + 1.0 + by_light * e.plain,
-        merged: (l.merged + light.merges) * by_eye + (e.merged + eye.merges) * by_light,
+        plain: by_camera * l.plain + 1.0 + by_light * e.plain,
+        merged: (l.merged + light.merges) * by_camera + (e.merged + camera.merges) * by_light,
         own: DVec2::ZERO,
     }
 }
 
-/// A light vertex merged into an eye vertex \[(38), (39)\]: densities there of scattering towards the photon's past and
+/// A light vertex merged into a camera vertex \[(38), (39)\]: densities there of scattering towards the photon's past and
 /// towards the eye, and the vertex's [`one_merge`]. For [`Ratios::merge_weight`].
 #[inline]
-pub fn merge(light: &MisState, eye: &MisState, pdf_w: f32, reverse_pdf_w: f32, own: Merges) -> Ratios {
-    let (l, e) = (light.earlier(pdf_w), eye.earlier(reverse_pdf_w));
+pub fn merge(light: &MisState, camera: &MisState, pdf_w: f32, reverse_pdf_w: f32, own: Merges) -> Ratios {
+    let (l, e) = (light.earlier(pdf_w), camera.earlier(reverse_pdf_w));
     Ratios { plain: l.plain + e.plain, merged: own + l.merged + e.merged, own }
 }

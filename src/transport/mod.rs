@@ -2,12 +2,12 @@
 
 mod bandwidths;
 pub mod bidirectional;
-mod bidirectional_eye;
+mod bidirectional_camera;
 mod bidirectional_light;
 mod boundary_kernel;
+mod camera_paths;
 mod cause;
 mod direct;
-mod eye;
 mod flight;
 mod gather;
 mod glint;
@@ -31,18 +31,18 @@ mod volume;
 mod walk;
 
 pub use bandwidths::{Bandwidths, Counter, Found, LevelRadii, MAX_LEVELS};
-pub use bidirectional::{Bidirectional, Division, MergeLevels, Record, Strategies, Technique};
-pub use bidirectional_eye::CameraWalkContext;
+pub use bidirectional::{Bidirectional, Division, MergeLevels, Record, Technique, TechniqueSet};
+pub use bidirectional_camera::CameraWalkContext;
 pub use bidirectional_light::{Deposits, LightVertices, Splat};
+pub use camera_paths::{CameraPaths, Features, Indirect, PixelSample};
 pub use cause::Cause;
 pub use direct::{balance, direct_light};
-pub use eye::{Eye, EyeMeasure, Features, Indirect};
 pub use gather::Scratch;
 pub use glow::Glow;
 pub use initial_media::{InitialMedia, InitialMedium};
 pub use interior::{Crossing, Interior};
 pub use lengths::Lengths;
-pub use light::{Emitted, EqualFlux, LightPass, Photons, emitted_flux, light_path};
+pub use light::{Emitted, EqualFlux, LightPaths, Photons, emitted_flux, light_path};
 pub use light_vertex::{LightVertex, Scatterer};
 pub use path::{path_measure, path_radiance};
 pub use photon_merge::MergePhoton;

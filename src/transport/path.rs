@@ -4,9 +4,9 @@
 //! a vertex at once (`direct_light` splits them), so that the two check each other.
 
 use super::bidirectional::{Record, Technique};
-use super::bidirectional_eye::{look, look_in_medium};
+use super::bidirectional_camera::{look, look_in_medium};
+use super::camera_paths::{CameraPaths, PixelSample};
 use super::cause::Cause;
-use super::eye::{Eye, EyeMeasure};
 use super::glow::Glow;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::token;
@@ -27,7 +27,7 @@ struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
     classes: ClassSet,
-    measure: &'a mut EyeMeasure,
+    measure: &'a mut PixelSample,
     trail: Trail,
     last: Receiver,
     /// Depth of the last vertex.
@@ -67,7 +67,7 @@ impl<R: Record> PathTracer<'_, R> {
         let pdf = pdf * vertex.survival(LobeSet::ALL) * way.flight.forward;
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * way.left);
-        let technique = Technique::NextEvent { eye: self.depth };
+        let technique = Technique::NextEvent { camera: self.depth };
         let shares = shares(vertex, (self.trail.sight, beam), (light.wi, Transport::Radiance, f), self.classes);
         for (class, share) in shares.iter() {
             self.add(technique, (class, scene.lights.group(light.light)), value * share, weight);
@@ -117,7 +117,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
         {
             let of = (self.trail.sight.class_at_light(false), self.scene.lights.surface_group(vertex.surface));
             let weight = Self::weight(scattered, pdf);
-            self.add(Technique::Hit { eye: self.depth }, of, vertex.throughput * radiance * weight, weight);
+            self.add(Technique::Hit { camera: self.depth }, of, vertex.throughput * radiance * weight, weight);
         }
         self.last = vertex.receiver();
         self.lit(vertex);
@@ -140,7 +140,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
             let weight = Self::weight(scattered, pdf);
             let light = glow.throughput * radiance * weight;
             let of = (trail.sight.class_at_light(false), self.scene.lights.surface_group(&glow.surface));
-            self.add(Technique::Hit { eye: glow.depth }, of, light, weight);
+            self.add(Technique::Hit { camera: glow.depth }, of, light, weight);
         }
     }
 
@@ -158,7 +158,7 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
             self.trail.scattered(scattered.lobe);
         }
         let class = self.trail.sight.class_at_light(false);
-        let (scene, technique) = (self.scene, Technique::Hit { eye: self.depth + 1 });
+        let (scene, technique) = (self.scene, Technique::Hit { camera: self.depth + 1 });
         let last = self.last;
         scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |light, pdf, _, group| {
             let weight = Self::weight(scattered, pdf);
@@ -169,23 +169,23 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
 
 /// What one path measures, on one level, into `measure` in place of what was there.
 pub fn path_measure(
-    eye: &Eye<'_>,
+    camera_paths: &CameraPaths<'_>,
     arena: &Bump,
     (start, stream): &(PathStart, Stream),
     record: &mut impl Record,
-    measure: &mut EyeMeasure,
+    measure: &mut PixelSample,
 ) {
-    *measure = EyeMeasure::default();
+    *measure = PixelSample::default();
     let trail = Trail::START;
-    let Eye { scene, max_depth, classes, .. } = *eye;
+    let CameraPaths { scene, max_depth, classes, .. } = *camera_paths;
     let last = Receiver::anywhere(start.origin);
     let mut tracer = PathTracer { scene, max_depth, classes, measure, trail, last, depth: 0, record };
-    walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut tracer);
+    walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
-pub fn path_radiance(eye: &Eye<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
-    let mut measure = EyeMeasure::default();
-    path_measure(eye, &Bump::new(), &(eye.start(pixel, stream), stream), &mut (), &mut measure);
+pub fn path_radiance(camera_paths: &CameraPaths<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
+    let mut measure = PixelSample::default();
+    path_measure(camera_paths, &Bump::new(), &(camera_paths.start(pixel, stream), stream), &mut (), &mut measure);
     measure.radiance(0)
 }

@@ -8,7 +8,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::light::Group;
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::photon::{Located, PhotonMap, same_surface};
-use crate::plan::{ClassSet, EyeSuffix, LightPrefix, PathClass};
+use crate::plan::{CameraSuffix, ClassSet, LightPrefix, PathClass};
 use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
@@ -96,7 +96,7 @@ pub(super) fn merge_photons<R: Record>(
     (photons, levels): (&PhotonMap<MergePhoton>, &MergeLevels),
     vertex: &Vertex<'_, '_>,
     (mis, own): (&MisState, Merges),
-    (sight, classes): (EyeSuffix, ClassSet),
+    (sight, classes): (CameraSuffix, ClassSet),
     longest: u32,
     record: &mut R,
     mut add: impl FnMut(PathClass, usize, Rgb),
@@ -126,7 +126,7 @@ pub(super) fn merge_photons<R: Record>(
         let shares = merged.shares(photon.beam, photon.wi, f);
         let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
         let ratios = mis::merge(&photon.mis(), mis, pdf, reverse, own);
-        let technique = Technique::Merge { light: u32::from(photon.depth), eye: vertex.depth };
+        let technique = Technique::Merge { light: u32::from(photon.depth), camera: vertex.depth };
         record.contribution(technique, value, photon.p, ratios);
         for (level, (&radius2, &eta)) in radii.iter().zip(levels.eta()).enumerate() {
             if distance2 < radius2 {

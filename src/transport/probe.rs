@@ -1,7 +1,7 @@
-//! Where an eye path first gathers photons, and what a photon there would count in its pixel.
+//! Where a camera path first gathers photons, and what a photon there would count in its pixel.
 
+use super::camera_paths::CameraPaths;
 use super::direct::direct_light;
-use super::eye::Eye;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
@@ -11,18 +11,18 @@ use crate::random::Stream;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
-/// Where an eye path would gather photons first.
+/// Where a camera path would gather photons first.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
     /// World position.
     pub p: Vec3,
     /// Unit geometric normal; [`crate::photon::NO_NORMAL`] in a medium.
     pub ng: Vec3,
-    /// Length of the eye path.
+    /// Length of the camera path.
     pub length: f32,
 }
 
-/// The first vertex of an eye path that gathers photons on a surface, and its light.
+/// The first vertex of a camera path that gathers photons on a surface, and its light.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
     /// Where it is.
@@ -55,8 +55,8 @@ impl<'a, T, F: FnMut(&Vertex<'_, '_>) -> T> Visitor<'a> for Find<F, T> {
     }
 }
 
-impl Eye<'_> {
-    /// The first vertex of an eye path whose lobes gather photons.
+impl CameraPaths<'_> {
+    /// The first vertex of a camera path whose lobes gather photons.
     pub fn gather_point(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<GatherPoint> {
         self.find(arena, start, |_| ()).map(|(point, ())| point)
     }
@@ -83,8 +83,8 @@ impl Eye<'_> {
     }
 }
 
-impl Eye<'_> {
-    /// The first vertex of an eye path in a medium that scatters. Its length is that of the path to the surface behind,
+impl CameraPaths<'_> {
+    /// The first vertex of a camera path in a medium that scatters. Its length is that of the path to the surface behind,
     /// if there is one.
     pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
         let mut find = FindVolumePoint { found: None, length: 0.0 };

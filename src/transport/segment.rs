@@ -31,7 +31,7 @@ pub struct Arrival {
     pub distance: f32,
 }
 
-/// The first hit of an eye path.
+/// The first hit of a camera path.
 #[derive(Clone, Copy, Debug)]
 pub struct FirstHit {
     /// World position.

@@ -12,7 +12,7 @@ use super::light_vertex::LightVertex;
 use super::scattering_vertex::ScatterPoint;
 use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
-use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, PathClass};
+use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, PathClass};
 
 /// Classes and their shares of some light, by channel.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +59,7 @@ fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
 /// Classes of light that comes to a vertex at the end of `sight` by `beam`: what its lobes make of it, broad ones
 /// first.
 #[inline]
-fn classes<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightPrefix) -> (PathClass, Option<PathClass>) {
+fn classes<S: ScatterPoint>(vertex: &S, sight: CameraSuffix, beam: LightPrefix) -> (PathClass, Option<PathClass>) {
     let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
     let class = |event| sight.then(event).class_with(beam);
     (class(first), second.map(class))
@@ -67,7 +67,7 @@ fn classes<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightPrefix) -> 
 
 /// Whether any class of that light is wanted.
 #[inline]
-pub(super) fn wanted<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightPrefix, on: ClassSet) -> bool {
+pub(super) fn wanted<S: ScatterPoint>(vertex: &S, sight: CameraSuffix, beam: LightPrefix, on: ClassSet) -> bool {
     on.is_all() || {
         let (first, second) = classes(vertex, sight, beam);
         on.has(first) || second.is_some_and(|second| on.has(second))
@@ -75,7 +75,7 @@ pub(super) fn wanted<S: ScatterPoint>(vertex: &S, sight: EyeSuffix, beam: LightP
 }
 
 /// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
-pub(super) fn leads(sight: EyeSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
+pub(super) fn leads(sight: CameraSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
     let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).reachable_classes() & on).is_empty();
     each.filter(|lobe| set.has(*lobe)).any(ahead)
@@ -91,7 +91,7 @@ fn ratio(broad: Rgb, all: Rgb) -> Rgb {
 #[inline]
 pub(super) fn shares<S: ScatterPoint>(
     vertex: &S,
-    (sight, beam): (EyeSuffix, LightPrefix),
+    (sight, beam): (CameraSuffix, LightPrefix),
     (wi, transport, f): (Vec3, Transport, Rgb),
     on: ClassSet,
 ) -> Shares {
@@ -121,7 +121,7 @@ fn shares_of<S: ScatterPoint>(
 /// Shares of the light of many photons at one vertex: each kind of [`LightPrefix`] is looked at once.
 pub(super) struct Merged<'v, S> {
     vertex: &'v S,
-    sight: EyeSuffix,
+    sight: CameraSuffix,
     on: ClassSet,
     known: [Option<(PathClass, Option<PathClass>)>; LightPrefix::COUNT],
 }
@@ -129,7 +129,7 @@ pub(super) struct Merged<'v, S> {
 impl<'v, S: ScatterPoint> Merged<'v, S> {
     /// At a vertex at the end of `sight`.
     #[inline]
-    pub fn new(vertex: &'v S, sight: EyeSuffix, on: ClassSet) -> Merged<'v, S> {
+    pub fn new(vertex: &'v S, sight: CameraSuffix, on: ClassSet) -> Merged<'v, S> {
         Merged { vertex, sight, on, known: [None; LightPrefix::COUNT] }
     }
 
@@ -148,7 +148,7 @@ impl<'v, S: ScatterPoint> Merged<'v, S> {
 pub(super) fn connected<S: ScatterPoint>(
     vertex: &S,
     light: &LightVertex<'_>,
-    sight: EyeSuffix,
+    sight: CameraSuffix,
     (d, f, f_light): (Vec3, Rgb, Rgb),
     on: ClassSet,
 ) -> Shares {

@@ -1,14 +1,14 @@
-//! What an eye path has gone through, which decides the class of the light it finds.
+//! What a camera path has gone through, which decides the class of the light it finds.
 
 use super::shares::leads;
 use crate::bsdf::LobeSet;
-use crate::plan::{ClassSet, Event, EyeSuffix};
+use crate::plan::{CameraSuffix, ClassSet, Event};
 
-/// What decides which class the light of an eye path is of.
+/// What decides which class the light of a camera path is of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trail {
     /// What has happened up to the last vertex.
-    pub sight: EyeSuffix,
+    pub sight: CameraSuffix,
     /// Lobes of the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
     /// Length of the path so far.
@@ -18,7 +18,7 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    pub const START: Trail = Trail { sight: EyeSuffix::START, lobes: None, length: 0.0, delta: true };
+    pub const START: Trail = Trail { sight: CameraSuffix::START, lobes: None, length: 0.0, delta: true };
 
     /// The last vertex sent the path on by `lobe`.
     #[inline]

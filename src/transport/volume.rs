@@ -1,7 +1,7 @@
 //! Photons gathered in media.
 //!
 //! A photon carries flux times length, so the photons of a ball over its volume are the fluence there; what the medium
-//! makes of it, its scattering coefficient and phase function, the eye path's vertex knows \[Jensen and Christensen
+//! makes of it, its scattering coefficient and phase function, the camera path's vertex knows \[Jensen and Christensen
 //! 1998, "Efficient simulation of light transport in scenes with participating media using photon maps", (10), with the
 //! coefficient taken out of the photon\].
 
@@ -11,7 +11,7 @@ use crate::math::Rgb;
 use crate::photon::{Kernel, NO_NORMAL, Near, PhotonMap, VolumePhoton};
 use std::f32::consts::FRAC_1_PI;
 
-/// The photons in media, and the bandwidths of an eye path's levels.
+/// The photons in media, and the bandwidths of a camera path's levels.
 #[derive(Clone, Copy)]
 pub struct Volume<'a> {
     photons: &'a PhotonMap<VolumePhoton>,

@@ -151,7 +151,7 @@ fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
             "the rule: {rule:+.1} % (median of the differences of {iterations} pairs; 95 % interval {low:+.1} to {high:+.1})"
         );
         let state = levels * (12 * 4 + 8);
-        let pixel = size_of::<caustique::estimator::Pixel>();
+        let pixel = size_of::<caustique::estimator::PixelAccumulator>();
         let share = state as f64 / pixel as f64 * 100.0;
         println!("memory: {state} bytes a pixel and kind of photons on top of {pixel}, {share:+.1} %");
         rows.push(json!({"scene": path, "levels": levels, "seconds": seconds, "rule_percent": rule, "rule_percent_95": [low, high], "state_bytes": state, "pixel_bytes": pixel}));

@@ -266,8 +266,8 @@ fn forged_shards_are_refused() {
         tail.write(&mut file).expect("it can be written");
         folder.run("merge --partial forged.exr -o merged.exr --no-combine --layers all")
     };
-    let few = || caustique::estimator::Pixel::new(1, 0, [0.0; 2]);
-    let many = || caustique::estimator::Pixel::new(5, 0, [0.0; 2]).with_groups(3);
+    let few = || caustique::estimator::PixelAccumulator::new(1, 0, [0.0; 2]);
+    let many = || caustique::estimator::PixelAccumulator::new(5, 0, [0.0; 2]).with_groups(3);
     let changes: [&dyn Fn(&mut Tail); 10] = [
         &|tail| tail.facts.shape.levels = 67,
         &|tail| tail.facts.shape.own = 66,

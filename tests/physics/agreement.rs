@@ -14,7 +14,9 @@ use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::{Indirect, path_radiance};
-use support::scenes::{add, build, cuboid, eye, glass, glossy_balls, lit_room, look_at, matte, quad, sphere, square};
+use support::scenes::{
+    add, build, camera_paths, cuboid, glass, glossy_balls, lit_room, look_at, matte, quad, sphere, square,
+};
 use support::stats::t_critical;
 use support::tiles::{SIZE, TILES, average, tiles};
 
@@ -55,12 +57,13 @@ fn by_photons(
 
 fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
-    let eye = eye(scene, &camera);
+    let camera_paths = camera_paths(scene, &camera);
     (0..seeds)
         .map(|seed| {
             tiles(|index| {
                 let (x, y, index) = (index as u32 % SIZE, index as u32 / SIZE, index as u64);
-                let path = |pass| mean(path_radiance(&eye, (x, y), Stream::new(seed, pass, Domain::Test, index)));
+                let path =
+                    |pass| mean(path_radiance(&camera_paths, (x, y), Stream::new(seed, pass, Domain::Test, index)));
                 (0..paths).map(path).sum::<f64>() / paths as f64
             })
         })

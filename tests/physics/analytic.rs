@@ -17,7 +17,9 @@ use caustique::render::{Control, Levels, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
 use caustique::transport::path_radiance;
-use support::scenes::{add, build, cuboid, eye, glass, look_at, matte, mirror, point_light, quad, sphere, square};
+use support::scenes::{
+    add, build, camera_paths, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square,
+};
 use support::stats::Check;
 
 /// Checks in this file that share the error rate.
@@ -42,15 +44,15 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
 /// The same by path tracing with `paths` paths per pixel.
 fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
-    let eye = eye(scene, &camera);
+    let camera_paths = camera_paths(scene, &camera);
     (0..seeds)
         .map(|seed| {
             let mut sum = 0.0;
             for index in 0..u64::from(size * size) {
                 for pass in 0..paths {
-                    let stream = Stream::new(seed, pass, Domain::EyeIndependent, index);
+                    let stream = Stream::new(seed, pass, Domain::CameraIndependent, index);
                     let pixel = ((index % u64::from(size)) as u32, (index / u64::from(size)) as u32);
-                    sum += f64::from(path_radiance(&eye, pixel, stream).x);
+                    sum += f64::from(path_radiance(&camera_paths, pixel, stream).x);
                 }
             }
             sum / (f64::from(size * size) * paths as f64)

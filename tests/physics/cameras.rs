@@ -102,7 +102,7 @@ fn windows_are_the_whole_picture_there() {
             for [x, y, width, height] in [[16, 16, 16, 13], [5, 3, 23, 19], [36, 0, 1, 29]] {
                 let view = CameraRequest { crop: Some(Crop::Pixels([x, y, width, height])), ..whole.clone() };
                 let window = rendered(&scene, &view, (method, 3), 5);
-                let bits = |pixel: &caustique::estimator::Pixel| {
+                let bits = |pixel: &caustique::estimator::PixelAccumulator| {
                     let values = [pixel.mean(0), pixel.variance_of_mean(0), pixel.albedo(), pixel.parts().indirect];
                     values.map(|value| value.to_array().map(f64::to_bits))
                 };

@@ -18,7 +18,7 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, P
 use caustique::scene::{Description, Scene};
 use caustique::spectrum::{BANDS, Band, IterationWavelengths, Wavelength, WavelengthSample, observer};
 use caustique::transport::{
-    InitialMedia, Interior, LightPass, Next, PathStart, Photons, Scattered, Vertex, Visitor, light_path, walk,
+    InitialMedia, Interior, LightPaths, Next, PathStart, Photons, Scattered, Vertex, Visitor, light_path, walk,
 };
 use glam::DQuat;
 use support::channels::{self, SIZE, agree, disagreeing};
@@ -336,7 +336,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
         let initial_media = InitialMedia::new(&scene, Vec3::new(0.0, 5.0, 0.0));
         let mut means: [Vec<f64>; 3] = Default::default();
         for seed in 0..seeds {
-            let pass = LightPass::new(seed, 0, Domain::Light, 40_000, 3);
+            let pass = LightPaths::new(seed, 0, Domain::Light, 40_000, 3);
             let mut photons = Photons::default();
             for index in 0..pass.paths() {
                 light_path(&scene, &Bump::new(), &initial_media, &pass, index, &mut photons);

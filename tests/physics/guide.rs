@@ -7,7 +7,7 @@
 use crate::support;
 
 use caustique::choose::{Choice, Weight, choose};
-use caustique::estimator::{InitialBandwidth, Pixel};
+use caustique::estimator::{InitialBandwidth, PixelAccumulator};
 use caustique::finish::{Denoiser, Finish};
 use caustique::light::{Guide, Region, SpotEdge};
 use caustique::material::Material;
@@ -22,7 +22,7 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, P
 use caustique::scene::{Description, Scene, View};
 use caustique::stat::floor;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
-use caustique::transport::{Indirect, InitialMedia, LightPass};
+use caustique::transport::{Indirect, InitialMedia, LightPaths};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
@@ -84,7 +84,7 @@ fn lit() -> Vec<(&'static str, Scene)> {
 fn flux(scene: &Scene, guide: Option<&Guide>, region: Option<Region>, first: u64, honest: bool) -> Vec<[f64; 4]> {
     let initial_media = InitialMedia::new(scene, Vec3::new(0.0, 1.5, 4.0));
     let pass = |pass| {
-        let pass = LightPass::new(3, first + pass, Domain::Test, PATHS, u32::MAX).guided(guide).lighting(region);
+        let pass = LightPaths::new(3, first + pass, Domain::Test, PATHS, u32::MAX).guided(guide).lighting(region);
         let mut sums = [0.0; 4];
         for emitted in (0..PATHS).filter_map(|index| pass.emit(scene, &initial_media, index)) {
             let (origin, d) = (emitted.start.origin, emitted.start.direction);
@@ -148,7 +148,7 @@ fn cells_follow_the_error_they_leave() {
     let mut guide = Guide::new(&scene.lights, false).expect("something to aim at");
     assert_eq!(guide.cells(), 3);
     let share = |guide: &Guide, seed| {
-        let pass = LightPass::new(seed, 0, Domain::Test, 20_000, u32::MAX).guided(Some(guide));
+        let pass = LightPaths::new(seed, 0, Domain::Test, 20_000, u32::MAX).guided(Some(guide));
         let initial_media = InitialMedia::new(scene, Vec3::new(0.0, 1.5, 4.0));
         let mut counts = [0.0f64; 3];
         for emitted in (0..20_000).filter_map(|index| pass.emit(scene, &initial_media, index)) {
@@ -179,7 +179,7 @@ fn cells_follow_the_error_they_leave() {
 
 /// Light of a part of the picture and the variance of all of it, summed over pixels, after twelve iterations of one
 /// level.
-fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&Pixel) -> DVec3) -> (f64, f64) {
+fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&PixelAccumulator) -> DVec3) -> (f64, f64) {
     let camera = scene.camera(&square(16)).expect("a camera");
     let settings = Settings { levels: Levels::new(1), iterations: Some(12), ..settings };
     let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);

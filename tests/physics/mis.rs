@@ -24,9 +24,9 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
-    Bidirectional, CameraWalkContext, Deposits, Eye, EyeMeasure, Indirect, InitialMedia, LightPass, LightVertices,
-    MediumVertex, MergeLevels, Next, PathStart, Record, Scattered, Strategies, Technique, Vertex, Visitor, lit_side,
-    walk,
+    Bidirectional, CameraPaths, CameraWalkContext, Deposits, Indirect, InitialMedia, LightPaths, LightVertices,
+    MediumVertex, MergeLevels, Next, PathStart, PixelSample, Record, Scattered, Technique, TechniqueSet, Vertex,
+    Visitor, lit_side, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -214,7 +214,7 @@ impl<'s> Whole<'s> {
         FlightDensity { forward: self.flies(j, self.in_medium(j)) as f32, reverse: self.flies(j, starts) as f32 }
     }
 
-    fn strategies(&self) -> Vec<Candidate> {
+    fn techniques(&self) -> Vec<Candidate> {
         let k = self.nodes.len();
         let mut all = vec![Candidate::Hit, Candidate::NextEvent];
         all.extend((1..k).map(Candidate::Connect));
@@ -266,7 +266,7 @@ impl<'s> Whole<'s> {
     }
 
     /// Number of samples times density of the path by a strategy, of merges what they are worth.
-    fn density(&self, strategy: Candidate, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
+    fn density(&self, strategy: Candidate, which: &TechniqueSet, light_paths: f64, eta: f64) -> f64 {
         let k = self.nodes.len();
         let smooth = |j: usize| !self.nodes[j].delta;
         let light = |n: usize| (0..n).map(|j| self.light_pdf_a(j)).product::<f64>() * f64::from(self.light.start);
@@ -281,8 +281,12 @@ impl<'s> Whole<'s> {
             Candidate::Connect(s) if smooth(s - 1) && smooth(s) => light(s) * eye(s),
             Candidate::Camera if smooth(k - 1) => light_paths * light(k),
             Candidate::Merge(m) => {
-                let (from_light, from_eye) = (m as u32 + 1, (k - m) as u32);
-                if !smooth(m) || self.in_medium(m) || !which.light_merges(from_light) || !which.eye_merges(from_eye) {
+                let (from_light, from_camera) = (m as u32 + 1, (k - m) as u32);
+                if !smooth(m)
+                    || self.in_medium(m)
+                    || !which.light_vertex_merges(from_light)
+                    || !which.camera_vertex_merges(from_camera)
+                {
                     return 0.0;
                 }
                 let worth = if self.is_clear(m) { 1.0 } else { 1.0 / (1.0 + f64::from(SHARING)) };
@@ -292,19 +296,26 @@ impl<'s> Whole<'s> {
         }
     }
 
-    fn weight(&self, strategy: Candidate, which: &Strategies, light_paths: f64, eta: f64) -> f64 {
-        let sum: f64 = self.strategies().into_iter().map(|s| self.density(s, which, light_paths, eta)).sum();
+    fn weight(&self, strategy: Candidate, which: &TechniqueSet, light_paths: f64, eta: f64) -> f64 {
+        let sum: f64 = self.techniques().into_iter().map(|s| self.density(s, which, light_paths, eta)).sum();
         self.density(strategy, which, light_paths, eta) / sum
     }
 
     /// Weights of all strategies by the recursion.
-    fn recursive(&self, which: &Strategies, light_paths: f64, (eta, oracle): (Eta, f64), bug: Option<Bug>) -> Vec<f64> {
+    fn recursive(
+        &self,
+        which: &TechniqueSet,
+        light_paths: f64,
+        (eta, oracle): (Eta, f64),
+        bug: Option<Bug>,
+    ) -> Vec<f64> {
         let k = self.nodes.len();
         let one = |merges: bool, clear: bool| {
             if merges { one_merge(clear) } else { Merges::ZERO }
         };
         let by_light = |j: usize, merges: bool| one(merges && !self.in_medium(j), bug == Some(Bug::NothingShared));
-        let by_eye = |j: usize| one(which.eye_merges((k - j) as u32) && !self.in_medium(j), self.is_clear(j));
+        let by_camera =
+            |j: usize| one(which.camera_vertex_merges((k - j) as u32) && !self.in_medium(j), self.is_clear(j));
         let cosine = |c: f64| if bug == Some(Bug::Cosine) { 1.0 } else { c as f32 };
         let flight = |j: usize, eye_side: bool| {
             let FlightDensity { forward, reverse } =
@@ -335,7 +346,7 @@ impl<'s> Whole<'s> {
             mis = mis.arrive(distance2, cosine(self.nodes[j].cos[0])).fly(flight(j, false));
             lights.push(mis);
             let from = if bug == Some(Bug::DirectMerged) { 1 } else { j as u32 + 1 };
-            let merges = which.light_merges(from) || (bug == Some(Bug::DirectMerged) && which.merge);
+            let merges = which.light_vertex_merges(from) || (bug == Some(Bug::DirectMerged) && which.merge);
             mis = go(mis, j, false, by_light(j, merges));
         }
         let mut mis = MisState::camera(light_paths as f32, self.camera_pdf_w as f32);
@@ -343,7 +354,7 @@ impl<'s> Whole<'s> {
         for j in (0..k).rev() {
             mis = mis.arrive(self.distance2[j + 1] as f32, cosine(self.nodes[j].cos[1])).fly(flight(j + 1, true));
             eyes[j] = mis;
-            mis = go(mis, j, true, by_eye(j));
+            mis = go(mis, j, true, by_camera(j));
             before_light = mis;
         }
         let possible = |s: Candidate| self.density(s, which, light_paths, oracle) > 0.0;
@@ -376,13 +387,13 @@ impl<'s> Whole<'s> {
                         mis: &lights[s - 1],
                         reverse_pdf_w: reverse(s - 1, true),
                         arrival_pdf_a: self.eye_pdf_a(s - 1) as f32,
-                        merges: by_light(s - 1, which.light_merges(s as u32)),
+                        merges: by_light(s - 1, which.light_vertex_merges(s as u32)),
                     };
                     let eye = mis::End {
                         mis: &eyes[s],
                         reverse_pdf_w: reverse(s, false),
                         arrival_pdf_a: self.light_pdf_a(s) as f32,
-                        merges: by_eye(s),
+                        merges: by_camera(s),
                     };
                     mis::connect(&light, &eye).weight(eta)
                 }
@@ -391,11 +402,12 @@ impl<'s> Whole<'s> {
                     mis::camera(&lights[k - 1], pdf_a, light_paths as f32, back).weight(eta)
                 }
                 Candidate::Merge(m) => {
-                    mis::merge(&lights[m], &eyes[m], reverse(m, true), reverse(m, false), by_eye(m)).merge_weight(eta)
+                    mis::merge(&lights[m], &eyes[m], reverse(m, true), reverse(m, false), by_camera(m))
+                        .merge_weight(eta)
                 }
             })
         };
-        self.strategies().into_iter().map(weight).collect()
+        self.techniques().into_iter().map(weight).collect()
     }
 }
 
@@ -471,21 +483,21 @@ struct Lab<'a> {
 
 impl<'a> Lab<'a> {
     fn new(scene: &'a Scene, camera: &'a Camera, initial_media: &'a InitialMedia, radius: f32) -> Lab<'a> {
-        let eye = Eye {
+        let camera_paths = CameraPaths {
             scene,
             camera,
-            interior: initial_media.eye,
+            interior: initial_media.camera,
             max_depth: 12,
             indirect: Indirect::Photons,
             classes: ClassSet::ALL,
             stop: None,
         };
         let pixels = (SIZE * SIZE) as f32;
-        let strategies = Strategies::VCM;
+        let techniques = TechniqueSet::VCM;
         let shared = Bidirectional {
-            eye,
+            camera_paths,
             initial_media,
-            strategies,
+            techniques,
             light_paths: pixels,
             merged_paths: 2.0 * pixels,
             only: None,
@@ -499,36 +511,42 @@ impl<'a> Lab<'a> {
 
     /// Sum of the weights of all strategies of a path by the recursion.
     fn sum(&self, whole: &Whole<'_>, bug: Option<Bug>) -> f64 {
-        let Bidirectional { strategies, light_paths, .. } = self.shared;
-        whole.recursive(&strategies, f64::from(light_paths), (self.eta, self.oracle), bug).iter().sum()
+        let Bidirectional { techniques, light_paths, .. } = self.shared;
+        whole.recursive(&techniques, f64::from(light_paths), (self.eta, self.oracle), bug).iter().sum()
     }
 
     /// All whole paths that a random pair of paths is put together to.
     fn paths(&self, path: u32, mut each: impl FnMut(Technique, Candidate, &Whole<'_>, Ratios)) {
         let Lab { scene, camera, initial_media, shared, ref levels, .. } = *self;
-        let (eye, pixels) = (shared.eye, shared.light_paths);
+        let (camera_paths, pixels) = (shared.camera_paths, shared.light_paths);
         let (pass, index) = (u64::from(path / (SIZE * SIZE)), path % (SIZE * SIZE));
-        let lights = LightPass::new(1, pass, Domain::Light, SIZE * SIZE, 12);
-        let stream = Stream::new(1, pass, Domain::EyeIndependent, u64::from(index));
+        let lights = LightPaths::new(1, pass, Domain::Light, SIZE * SIZE, 12);
+        let stream = Stream::new(1, pass, Domain::CameraIndependent, u64::from(index));
         let pixel = (index % SIZE, index / SIZE);
         let arena = Bump::new();
         let mut vertices = LightVertices::new_in(&arena);
-        let (mut left, mut by_light, mut by_eye) = (Deposits::default(), Said::default(), Said::default());
+        let (mut left, mut by_light, mut by_camera) = (Deposits::default(), Said::default(), Said::default());
         shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
         let map = PhotonMap::build(left.photons.clone());
         let meets = CameraWalkContext { vertices: &vertices, photons: Some(&map), levels };
-        let mut measure = EyeMeasure::default();
-        shared.eye_path(&arena, &(shared.eye.start(pixel, stream), stream), &meets, &mut by_eye, &mut measure);
+        let mut measure = PixelSample::default();
+        shared.camera_path(
+            &arena,
+            &(shared.camera_paths.start(pixel, stream), stream),
+            &meets,
+            &mut by_camera,
+            &mut measure,
+        );
 
-        let start = eye.start(pixel, stream);
+        let start = camera_paths.start(pixel, stream);
         let eye_notes = notes(scene, &arena, start, stream, Transport::Radiance);
         let emitted = lights.emit(scene, initial_media, index);
         let light_notes = emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, Transport::Importance));
         let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);
-        let from_eye = &eye_notes.met[..];
+        let from_camera = &eye_notes.met[..];
         let camera_pdf_w = f64::from(camera.pdf_w(start.direction) * pixels);
         let square = |d: f32| f64::from(d) * f64::from(d);
-        for (technique, from, ratios) in by_light.0.into_iter().chain(by_eye.0) {
+        for (technique, from, ratios) in by_light.0.into_iter().chain(by_camera.0) {
             let density = emitted.as_ref().zip(from_light.first()).map(|(e, met)| EmissionDensity {
                 direct: e.density.start * scene.lights.choice_ratio(&met.receiver(), e.light),
                 ..e.density
@@ -543,30 +561,30 @@ impl<'a> Lab<'a> {
                 camera_pdf_w,
             };
             let strategy = match technique {
-                Technique::Hit { eye: 1 } => continue,
-                Technique::Hit { eye: 0 } => {
-                    if from_eye.is_empty() {
+                Technique::Hit { camera: 1 } => continue,
+                Technique::Hit { camera: 0 } => {
+                    if from_camera.is_empty() {
                         continue;
                     }
                     let direction = eye_notes.escaped.expect("an escape");
-                    let met = from_eye[from_eye.len() - 1];
+                    let met = from_camera[from_camera.len() - 1];
                     whole.light = EmissionDensity { onward: scene.lights.entry_pdf_a(met.p, direction), ..infinity };
                     scene.lights.for_each_infinite(&met.receiver(), direction, false, |_, direct, start, _| {
                         (whole.light.direct, whole.light.start) = (direct, start);
                     });
                     whole.segment(1.0, None);
-                    whole.append(from_eye[..from_eye.len()].iter().rev(), true);
+                    whole.append(from_camera[..from_camera.len()].iter().rev(), true);
                     Candidate::Hit
                 }
-                Technique::Hit { eye: t } => {
+                Technique::Hit { camera: t } => {
                     let t = t as usize;
-                    whole.light = from_eye[t - 1].emitted.expect("a lamp");
-                    whole.segment(square(from_eye[t - 1].distance), from_eye[t - 1].medium);
-                    whole.append(from_eye[..t - 1].iter().rev(), true);
+                    whole.light = from_camera[t - 1].emitted.expect("a lamp");
+                    whole.segment(square(from_camera[t - 1].distance), from_camera[t - 1].medium);
+                    whole.append(from_camera[..t - 1].iter().rev(), true);
                     Candidate::Hit
                 }
-                Technique::NextEvent { eye: t } => {
-                    let met = &from_eye[t as usize - 1];
+                Technique::NextEvent { camera: t } => {
+                    let met = &from_camera[t as usize - 1];
                     let draws = stream.vertex(t);
                     let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
                     let sample = {
@@ -613,18 +631,18 @@ impl<'a> Lab<'a> {
                     };
                     assert_eq!(from, sample.target.unwrap_or(sample.wi));
                     whole.segment(distance2, scene.medium);
-                    whole.append(from_eye[..t as usize].iter().rev(), true);
+                    whole.append(from_camera[..t as usize].iter().rev(), true);
                     whole.nodes[0] = node(met, met, sample.wi, met.wo);
                     Candidate::NextEvent
                 }
-                Technique::Connect { light: s, eye: t } => {
+                Technique::Connect { light: s, camera: t } => {
                     let (s, t) = (s as usize, t as usize);
-                    let (a, b) = (&from_light[s - 1], &from_eye[t - 1]);
+                    let (a, b) = (&from_light[s - 1], &from_camera[t - 1]);
                     let d = (b.p - a.p).normalize();
                     whole.append(from_light[..s].iter(), false);
                     whole.nodes[s - 1] = node(a, a, a.wo, d);
                     whole.segment(f64::from(b.p.distance_squared(a.p)), scene.medium);
-                    whole.append(from_eye[..t].iter().rev(), true);
+                    whole.append(from_camera[..t].iter().rev(), true);
                     whole.nodes[s] = node(b, b, -d, b.wo);
                     Candidate::Connect(s)
                 }
@@ -638,14 +656,14 @@ impl<'a> Lab<'a> {
                     whole.camera_pdf_w = f64::from(camera.pdf_w(-d) * pixels);
                     Candidate::Camera
                 }
-                Technique::Merge { light: s, eye: t } => {
+                Technique::Merge { light: s, camera: t } => {
                     let (s, t) = (s as usize, t as usize);
-                    let (a, b) = (&from_light[s - 1], &from_eye[t - 1]);
+                    let (a, b) = (&from_light[s - 1], &from_camera[t - 1]);
                     assert_eq!(a.p, from);
                     whole.append(from_light[..s].iter(), false);
                     whole.nodes.pop();
                     let merged = node(a, b, a.wo, b.wo);
-                    whole.append(from_eye[..t].iter().rev(), true);
+                    whole.append(from_camera[..t].iter().rev(), true);
                     whole.nodes[s - 1] = merged;
                     Candidate::Merge(s - 1)
                 }
@@ -671,11 +689,11 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
     let lab = Lab::new(scene, &camera, &initial_media, radius);
-    let Bidirectional { strategies, light_paths, .. } = lab.shared;
+    let Bidirectional { techniques, light_paths, .. } = lab.shared;
     let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; BUGS.len()], in_media: 0 };
     for path in 0..paths {
         lab.paths(path, |technique, strategy, whole, ratios| {
-            let expected = whole.weight(strategy, &strategies, f64::from(light_paths), lab.oracle);
+            let expected = whole.weight(strategy, &techniques, f64::from(light_paths), lab.oracle);
             let found = match strategy {
                 Candidate::Merge(_) => ratios.merge_weight(lab.eta),
                 _ => ratios.weight(lab.eta),
@@ -688,7 +706,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
             tally.weights += 1;
             tally.in_media += usize::from(whole.nodes.iter().any(|node| node.scatters.in_medium()));
             *tally.techniques.entry(name(strategy)).or_default() += 1;
-            if strategy != Candidate::Hit || whole.strategies().len() > 2 {
+            if strategy != Candidate::Hit || whole.techniques().len() > 2 {
                 let error = (lab.sum(whole, None) - 1.0).abs();
                 assert!(error <= TOLERANCE, "{what}, path {path}, {technique:?}: the weights sum to 1 + {error}");
                 tally.sums += 1;

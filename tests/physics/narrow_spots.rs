@@ -7,7 +7,7 @@ use caustique::math::{DAffine3, DVec3, Rgb, Vec2, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::description::{PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{InitialMedia, LightPass};
+use caustique::transport::{InitialMedia, LightPaths};
 use glam::Vec3Swizzles;
 use support::scenes::{add, build, look_at, matte, quad};
 use support::stats::chi_squared_p;
@@ -50,7 +50,7 @@ fn narrow_spots_send_what_they_should() {
             let expected = flux(f64::from(inner), f64::from(outer), mean);
             let initial_media = InitialMedia::new(&scene, Vec3::ZERO);
             let paths = 4096;
-            let pass = LightPass::new(0, 1, Domain::Light, paths, 1);
+            let pass = LightPaths::new(0, 1, Domain::Light, paths, 1);
             let starts: Vec<_> = (0..paths).filter_map(|index| pass.emit(&scene, &initial_media, index)).collect();
             let sent: f64 = starts.iter().map(|start| f64::from(start.start.throughput.x)).sum();
             assert!((sent / expected - 1.0).abs() < 1e-3, "{degrees} {share}: sends {sent} of {expected}");
@@ -93,7 +93,7 @@ fn edges_are_sampled_as_they_shine() {
         let scene = scene(0.0, 0.5, edge, 0.0);
         let initial_media = InitialMedia::new(&scene, Vec3::ZERO);
         let paths = 50_000;
-        let pass = LightPass::new(0, 1, Domain::Light, paths, 1);
+        let pass = LightPaths::new(0, 1, Domain::Light, paths, 1);
         let mut counts = [0.0; 10];
         for index in 0..paths {
             let start = pass.emit(&scene, &initial_media, index).expect("a path");
@@ -129,7 +129,7 @@ fn spots_shine_from_a_disc() {
     assert!((arrives / expected - 1.0).abs() < 5e-3, "{arrives} of {expected}");
     let initial_media = InitialMedia::new(&scene, Vec3::ZERO);
     let (paths, within) = (400_000, 0.2f32);
-    let pass = LightPass::new(0, 1, Domain::Light, paths, 1);
+    let pass = LightPaths::new(0, 1, Domain::Light, paths, 1);
     let mut flux = 0.0;
     for start in (0..paths).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
         let start = start.start;

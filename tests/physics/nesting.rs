@@ -11,7 +11,7 @@ use caustique::random::{Domain, Stream};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, Projection};
 use caustique::scene::{Description, Scene, View};
-use caustique::transport::{Eye, Indirect, InitialMedia, Interior, LightPass};
+use caustique::transport::{CameraPaths, Indirect, InitialMedia, Interior, LightPaths};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
@@ -150,7 +150,7 @@ fn light_starts_where_its_lamp_is() {
     let scene = build(description);
     let camera = scene.camera(&square(8)).expect("a camera");
     let initial_media = InitialMedia::of(&scene, &camera);
-    let pass = LightPass::new(0, 1, Domain::Light, 4096, 8);
+    let pass = LightPaths::new(0, 1, Domain::Light, 4096, 8);
     let (mut wet, mut inside, mut outside) = (0, 0, 0);
     for emitted in (0..pass.paths()).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
         let (p, d) = (emitted.start.origin, emitted.start.direction);
@@ -183,8 +183,8 @@ fn rays_start_where_the_film_is() {
     description.cameras.push(described);
     let scene = build(description);
     let camera = scene.camera(&square(16)).expect("a camera");
-    let (interior, classes) = (InitialMedia::of(&scene, &camera).eye, ClassSet::ALL);
-    let eye = Eye {
+    let (interior, classes) = (InitialMedia::of(&scene, &camera).camera, ClassSet::ALL);
+    let camera_paths = CameraPaths {
         scene: &scene,
         camera: &camera,
         interior,
@@ -194,7 +194,7 @@ fn rays_start_where_the_film_is() {
         stop: None,
     };
     for index in 0..256u32 {
-        let start = eye.start((index % 16, index / 16), Stream::new(0, 1, Domain::Test, u64::from(index)));
+        let start = camera_paths.start((index % 16, index / 16), Stream::new(0, 1, Domain::Test, u64::from(index)));
         let wet = start.interior.material(&scene).is_some();
         assert_eq!(wet, start.origin.y < 0.0, "{}", start.origin);
     }

@@ -14,7 +14,7 @@ use caustique::random::{Domain, QUARTERS, quarter};
 use caustique::render::{Control, KernelChoice, Levels, Method, RadiusRule, Rendered, Settings, render};
 use caustique::scene::description::PunctualLight;
 use caustique::scene::{Description, Scene};
-use caustique::transport::{EqualFlux, InitialMedia, LightPass, Photons};
+use caustique::transport::{EqualFlux, InitialMedia, LightPaths, Photons};
 use support::field::{self, Field, PixelField};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
@@ -63,7 +63,7 @@ fn lights_too_rare_for_the_sample_keep_their_channel() {
     let initial_media = InitialMedia::new(&scene, Vec3::ZERO);
     let blue = EqualFlux::new(&scene, &initial_media, 2).expect("there is a blue lamp");
     let starts = 1 << 22;
-    let pass = LightPass::new(3, 1, Domain::Light, starts, u32::MAX);
+    let pass = LightPaths::new(3, 1, Domain::Light, starts, u32::MAX);
     let (mut photons, mut arena) = (Photons::default(), bumpalo::Bump::new());
     for index in 0..starts {
         blue.light_path(&scene, &mut arena, &initial_media, &pass, index, &mut photons);

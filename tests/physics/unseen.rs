@@ -2,7 +2,7 @@
 
 use crate::support;
 
-use caustique::estimator::{InitialBandwidth, Pixel};
+use caustique::estimator::{InitialBandwidth, PixelAccumulator};
 use caustique::finish::{Denoiser, Finish};
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Accuracy, Levels, Method, Part, Rendered, Session, Settings, Shard, Stage, StopReason};
@@ -123,7 +123,7 @@ fn counts_join() {
         let shards = [0, 1, 2]
             .map(|index| rendered(&scene, &Settings { shard: Shard { index, count: 3 }, ..settings.clone() }).0);
         let parts: Vec<Part> = shards.iter().map(Rendered::part).collect();
-        let mut pixels: Vec<Pixel> = shards[0].pixels.clone();
+        let mut pixels: Vec<PixelAccumulator> = shards[0].pixels.clone();
         for shard in &shards[1..] {
             pixels.iter_mut().zip(&shard.pixels).for_each(|(own, other)| own.join(other.clone()));
         }

@@ -5,7 +5,7 @@
 //! mean over discs. Photons of equal flux that fall independently have the variance of a Poisson process.
 
 use super::scenes::{add, build, look_at, matte, mirror, point_light, quad};
-use caustique::estimator::{InitialBandwidth, Pixel};
+use caustique::estimator::{InitialBandwidth, PixelAccumulator};
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Levels, Settings};
 use caustique::scene::description::Projection;
@@ -144,7 +144,7 @@ pub fn view(finer: u32) -> CameraRequest {
 }
 
 /// What photons bring to a pixel, on average over its iterations.
-pub fn photons_of(pixel: &Pixel) -> f64 {
+pub fn photons_of(pixel: &PixelAccumulator) -> f64 {
     (pixel.parts().caustic.x + pixel.parts().indirect.x) / f64::from(pixel.iterations.max(1))
 }
 

@@ -9,7 +9,7 @@ use caustique::scene::description::{
     CameraDescription, Description, PlacedMesh, Projection, PunctualKind, PunctualLight,
 };
 use caustique::scene::{CameraRequest, Scene};
-use caustique::transport::{Eye, Indirect, InitialMedia};
+use caustique::transport::{CameraPaths, Indirect, InitialMedia};
 
 /// A diffuse material of some reflectance that gives some radiance, without any Fresnel layer.
 pub fn matte(reflectance: f32, emission: f32) -> Material {
@@ -136,10 +136,10 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
 }
 
 /// What paths are traced from: all classes of light, of any length.
-pub fn eye<'a>(scene: &'a Scene, camera: &'a Camera) -> Eye<'a> {
-    let interior = InitialMedia::of(scene, camera).eye;
+pub fn camera_paths<'a>(scene: &'a Scene, camera: &'a Camera) -> CameraPaths<'a> {
+    let interior = InitialMedia::of(scene, camera).camera;
     let (indirect, classes) = (Indirect::Photons, ClassSet::ALL);
-    Eye { scene, camera, interior, max_depth: u32::MAX, indirect, classes, stop: None }
+    CameraPaths { scene, camera, interior, max_depth: u32::MAX, indirect, classes, stop: None }
 }
 
 /// Builds a scene, panicking with the error: tests know their scenes are good.

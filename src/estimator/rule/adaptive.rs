@@ -38,7 +38,7 @@ const LEAST_PHOTONS: u32 = 10;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Adaptive<K>(PhantomData<K>);
 
-/// The bandwidth of one level of one pixel. The sums of the largest level of an eye path stand for all of them, and the
+/// The bandwidth of one level of one pixel. The sums of the largest level of a camera path stand for all of them, and the
 /// levels keep their ratio.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Bandwidth {
@@ -60,7 +60,7 @@ pub struct Bandwidth {
     noise: f64,
 }
 
-/// What an eye path finds.
+/// What a camera path finds.
 #[derive(Debug, Default)]
 pub struct Tally {
     /// Photons within the bandwidth.

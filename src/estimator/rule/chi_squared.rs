@@ -77,7 +77,7 @@ const EVEN: u64 = {
     mask
 };
 
-/// What the photons of one eye path add to counts.
+/// What the photons of one camera path add to counts.
 #[derive(Debug, Default)]
 pub struct Tally {
     /// By level, photons in the usual cells, and last, in the bits that are left over, those that are not within; the

@@ -13,13 +13,13 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// A rule whose bandwidths follow from the photons found so far. One bandwidth per level of a pixel; the levels of one
-/// eye path are counted and updated together.
+/// camera path are counted and updated together.
 pub trait CountingRule: Sync {
     /// State of a level of a pixel, kept between iterations.
     type Bandwidth: Copy + Send + Sync + Serialize + DeserializeOwned;
     /// What is kept beside it.
     type Count: Copy + Default + Send + Sync + Serialize + DeserializeOwned;
-    /// What the photons of one eye path add up to, at all its levels.
+    /// What the photons of one camera path add up to, at all its levels.
     type Tally: Default;
 
     /// Whether photons beyond the largest bandwidth may be counted.
@@ -53,6 +53,6 @@ pub trait CountingRule: Sync {
         frame: &Frame,
         photons: &Found,
     );
-    /// After the eye path of iteration `i` (from 1), of whose photons `tally` is.
+    /// After the camera path of iteration `i` (from 1), of whose photons `tally` is.
     fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], counts: &mut [Self::Count], tally: &mut Self::Tally);
 }

@@ -13,7 +13,7 @@ enum First {
 
 /// A path so far, from the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EyeSuffix {
+pub struct CameraSuffix {
     first: First,
     /// Anything has happened.
     begun: bool,
@@ -33,9 +33,9 @@ pub struct EyeSuffix {
     glint: bool,
 }
 
-impl EyeSuffix {
+impl CameraSuffix {
     /// Nothing has happened yet.
-    pub const START: EyeSuffix = EyeSuffix {
+    pub const START: CameraSuffix = CameraSuffix {
         first: First::Nothing,
         begun: false,
         alone: false,
@@ -50,7 +50,7 @@ impl EyeSuffix {
     /// It goes on.
     #[must_use]
     #[inline]
-    pub fn then(self, event: Event) -> EyeSuffix {
+    pub fn then(self, event: Event) -> CameraSuffix {
         let clear = self.first == First::Nothing;
         let narrow = event.is_narrow();
         let first = match (self.first, event) {
@@ -62,7 +62,7 @@ impl EyeSuffix {
         };
         let sharp = event == Event::Sharp;
         let marks = self.spreads == 0 && (sharp || !narrow);
-        EyeSuffix {
+        CameraSuffix {
             first,
             begun: true,
             alone: clear && first != First::Nothing,

@@ -78,7 +78,7 @@ fn halves_tell_the_class_of_the_whole() {
             let whole = PathClass::of(path.iter().copied(), sizeless);
             // Where they meet is a vertex with a lobe that is not delta.
             for (at, _) in path.iter().enumerate().filter(|(_, event)| !matches!(event, Event::Clear | Event::Mirror)) {
-                let sight = path[..=at].iter().fold(EyeSuffix::START, |sight, event| sight.then(*event));
+                let sight = path[..=at].iter().fold(CameraSuffix::START, |sight, event| sight.then(*event));
                 let beam =
                     path[at + 1..].iter().rev().fold(LightPrefix::start(sizeless), |beam, event| beam.then(*event));
                 assert_eq!(sight.class_with(beam), whole, "{} {sizeless} at {at}", letters(&path));
@@ -92,7 +92,7 @@ fn nothing_is_ahead_that_was_not_told() {
     for path in paths(6) {
         for sizeless in [false, true] {
             let class = PathClass::of(path.iter().copied(), sizeless);
-            let mut sight = EyeSuffix::START;
+            let mut sight = CameraSuffix::START;
             for event in &path {
                 assert!(sight.reachable_classes().has(class), "{}", letters(&path));
                 sight = sight.then(*event);
@@ -100,7 +100,7 @@ fn nothing_is_ahead_that_was_not_told() {
             assert!(sight.reachable_classes().has(class), "{}", letters(&path));
         }
     }
-    let caustic = EyeSuffix::START.then(Event::Broad).then(Event::Clear);
+    let caustic = CameraSuffix::START.then(Event::Broad).then(Event::Clear);
     assert!(
         !caustic.reachable_classes().has(PathClass::Sds) && !caustic.reachable_classes().has(PathClass::Reflection)
     );

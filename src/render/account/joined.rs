@@ -4,7 +4,7 @@ use super::error_estimate::ErrorEstimate;
 use super::history::{History, StopReason};
 use super::result::{Rendered, error_estimate};
 use super::unseen::PhotonRecord;
-use crate::estimator::{BandwidthState, Pixel};
+use crate::estimator::{BandwidthState, PixelAccumulator};
 use crate::render::clock::Phases;
 use crate::render::pass::PhotonCounts;
 use crate::render::settings::{Settings, Shard};
@@ -84,7 +84,7 @@ impl Part {
     }
 
     /// The render with these pixels.
-    pub fn rendered(self, pixels: Vec<Pixel>) -> Rendered {
+    pub fn rendered(self, pixels: Vec<PixelAccumulator>) -> Rendered {
         Rendered {
             width: self.size.0,
             height: self.size.1,

@@ -1,6 +1,6 @@
 //! What a render has left out because it was not finite, and when that is too much.
 
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::transport::Cause;
 use serde_json::{Map, Value, json};
 
@@ -22,7 +22,7 @@ pub struct Rejections {
 
 impl Rejections {
     /// Those of pixels, and of the light paths that served them.
-    pub fn of(pixels: &[Pixel], light: u64) -> Rejections {
+    pub fn of(pixels: &[PixelAccumulator], light: u64) -> Rejections {
         let mut all = Rejections { light, ..Rejections::default() };
         for pixel in pixels {
             let by_cause = pixel.rejected.by_cause().map(u64::from);
@@ -75,15 +75,15 @@ impl Rejections {
 mod tests {
     use super::*;
     use crate::math::Rgb;
-    use crate::transport::EyeMeasure;
+    use crate::transport::PixelSample;
 
     /// One sample of a million is none too many, two are.
     #[test]
     fn more_than_one_in_a_million_is_many() {
         let pixel = |broken: u64| {
-            let mut pixel = Pixel::new(1, 0, [1.0; 2]);
+            let mut pixel = PixelAccumulator::new(1, 0, [1.0; 2]);
             for pass in 1..=1000 {
-                let mut measure = EyeMeasure { direct: Rgb::ONE, ..EyeMeasure::default() };
+                let mut measure = PixelSample { direct: Rgb::ONE, ..PixelSample::default() };
                 if pass <= broken {
                     measure.reject(Cause::Connection);
                 }

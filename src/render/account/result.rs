@@ -4,7 +4,7 @@ use super::error_estimate::ErrorEstimate;
 use super::history::{History, StopReason};
 use super::rejections::Rejections;
 use super::unseen::{PhotonRecord, Unseen};
-use crate::estimator::{BandwidthState, Pixel, SquaredError};
+use crate::estimator::{BandwidthState, PixelAccumulator, SquaredError};
 use crate::math::DVec3;
 use crate::photon::Kind;
 use crate::render::clock::Phases;
@@ -20,7 +20,7 @@ pub struct Rendered {
     /// Height of the picture.
     pub height: u32,
     /// Pixels, row by row from the top.
-    pub pixels: Vec<Pixel>,
+    pub pixels: Vec<PixelAccumulator>,
     /// A picture per technique, if [`Settings::techniques`] and the method has several.
     pub techniques: Vec<TechniquePicture>,
     /// Bandwidths of the last iteration.
@@ -51,7 +51,7 @@ impl Rendered {
     /// Bytes that a pixel takes: its sums, those of its levels and light groups among them, and what an iteration
     /// keeps of it besides ([`bytes_of_measures`]).
     pub fn bytes_per_pixel(&self) -> [usize; 2] {
-        [self.pixels.first().map_or(0, Pixel::size), bytes_of_measures(&self.settings)]
+        [self.pixels.first().map_or(0, PixelAccumulator::size), bytes_of_measures(&self.settings)]
     }
 
     /// Whether the maps of [`Method::Pm`](crate::render::Method::Pm), traced once, had no room for the photons of all its light paths.
@@ -98,11 +98,11 @@ impl Rendered {
 }
 
 /// See [`Rendered::relative_error`].
-pub(in crate::render) fn error_estimate(pixels: &[Pixel], settings: &Settings) -> Option<ErrorEstimate> {
+pub(in crate::render) fn error_estimate(pixels: &[PixelAccumulator], settings: &Settings) -> Option<ErrorEstimate> {
     let (own, compared) = (settings.levels.own(), settings.compared_levels());
     let (mut variance, mut squared_bias) = (0.0, 0.0);
     let (mut lit, mut unknown) = (false, 0.0);
-    let value = |pixel: &Pixel| pixel.mean(own).element_sum() / 3.0;
+    let value = |pixel: &PixelAccumulator| pixel.mean(own).element_sum() / 3.0;
     let floor = floor::relative_to_mean(pixels.iter().map(value));
     for pixel in pixels {
         let Some(error) = SquaredError::of(pixel, own, compared) else {
@@ -128,7 +128,7 @@ pub(in crate::render) fn error_estimate(pixels: &[Pixel], settings: &Settings) -
 }
 
 /// Whether a surface is seen that is not black.
-fn could_show_light(pixel: &Pixel) -> bool {
+fn could_show_light(pixel: &PixelAccumulator) -> bool {
     pixel.depth().is_some() && pixel.albedo() != DVec3::ZERO
 }
 
@@ -137,22 +137,22 @@ mod tests {
     use super::*;
     use crate::math::{Rgb, Vec3};
     use crate::render::Levels;
-    use crate::transport::{EyeMeasure, Features};
+    use crate::transport::{Features, PixelSample};
 
     /// So many samples, the first of them not finite; each sees a surface of this albedo if it sees any.
-    fn pixel(finite: u64, broken: u64, light: Rgb, albedo: Option<Rgb>) -> Pixel {
-        let mut pixel = Pixel::new(1, 0, [1.0; 2]);
+    fn pixel(finite: u64, broken: u64, light: Rgb, albedo: Option<Rgb>) -> PixelAccumulator {
+        let mut pixel = PixelAccumulator::new(1, 0, [1.0; 2]);
         for pass in 1..=finite + broken {
             let depth = if albedo.is_some() { 1.0 } else { 0.0 };
             let features = Features { albedo: albedo.unwrap_or_default(), normal: Vec3::ZERO, depth };
             let direct = if pass > broken { light } else { Rgb::NAN };
-            pixel.add(pass, &EyeMeasure { direct, features, ..EyeMeasure::default() }, None);
+            pixel.add(pass, &PixelSample { direct, features, ..PixelSample::default() }, None);
         }
         pixel
     }
 
     /// Two finite samples, equal ones: no error at all.
-    fn certain() -> Pixel {
+    fn certain() -> PixelAccumulator {
         pixel(2, 0, Rgb::ONE, None)
     }
 
@@ -160,8 +160,8 @@ mod tests {
     fn pixels_without_finite_samples_are_errors() {
         let levels = Settings { levels: Levels::new(1), ..Settings::default() };
         let [rejected, once] = [pixel(0, 2, Rgb::ONE, None), pixel(1, 1, Rgb::ONE, None)];
-        let relative_error = |pixels: &[&Pixel], s: &Settings| {
-            let pixels: Vec<Pixel> = pixels.iter().map(|&pixel| pixel.clone()).collect();
+        let relative_error = |pixels: &[&PixelAccumulator], s: &Settings| {
+            let pixels: Vec<PixelAccumulator> = pixels.iter().map(|&pixel| pixel.clone()).collect();
             error_estimate(&pixels, s).map(|e| e.root())
         };
         let certain = &certain();
@@ -176,7 +176,7 @@ mod tests {
     #[test]
     fn light_that_is_not_seen_is_not_known_to_be_none() {
         let levels = Settings { levels: Levels::new(1), ..Settings::default() };
-        let relative_error = |pixels: &[Pixel]| error_estimate(pixels, &levels).map(|e| e.root());
+        let relative_error = |pixels: &[PixelAccumulator]| error_estimate(pixels, &levels).map(|e| e.root());
         let empty = || pixel(14, 0, Rgb::ZERO, None);
         let dark = || pixel(14, 0, Rgb::ZERO, Some(Rgb::splat(0.5)));
         assert_eq!(relative_error(&[certain(), certain(), empty(), empty()]), Some(0.0));

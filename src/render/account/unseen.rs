@@ -16,7 +16,7 @@
 //! all pixels within a kernel gather. Before the first it follows from the flux of a light path, and from the bandwidths
 //! and the reflectance of the pixels: a bandwidth far below the distance between photons makes it large.
 
-use crate::estimator::{BandwidthState, FAR, Pixel};
+use crate::estimator::{BandwidthState, FAR, PixelAccumulator};
 use crate::math::Vec3;
 use crate::photon::{ByKind, Kind};
 use crate::plan::{ClassSet, Owner, Part, classes_in};
@@ -68,7 +68,7 @@ impl PhotonRecord {
     /// The error by light of which hardly any has come, after so many light paths.
     pub(in crate::render) fn unseen(
         &self,
-        (pixels, bandwidths): (&[Pixel], &BandwidthState),
+        (pixels, bandwidths): (&[PixelAccumulator], &BandwidthState),
         settings: &Settings,
         light_paths: u64,
     ) -> Unseen {
@@ -134,8 +134,8 @@ impl Unseen {
 }
 
 /// The light of a kind, summed over pixels.
-fn part_of(pixels: &[Pixel], kind: Kind) -> f64 {
-    let of_pixel = |pixel: &Pixel| {
+fn part_of(pixels: &[PixelAccumulator], kind: Kind) -> f64 {
+    let of_pixel = |pixel: &PixelAccumulator| {
         let parts = pixel.parts();
         let part = if kind == Kind::Caustic { parts.caustic } else { parts.indirect };
         part.element_sum() / 3.0 / f64::from(pixel.iterations.max(1))
@@ -144,9 +144,14 @@ fn part_of(pixels: &[Pixel], kind: Kind) -> f64 {
 }
 
 /// The share of the pixels that lie within the kernel of one of them, on average: these gather the same photons.
-fn share_of_kernel(pixels: &[Pixel], radius2: &(impl Fn(usize) -> f32 + Sync)) -> f64 {
-    let seen: Vec<(usize, Vec3)> =
-        pixels.iter().map(Pixel::first).enumerate().filter(|(_, (z, _))| *z < FAR).map(|(i, (_, p))| (i, p)).collect();
+fn share_of_kernel(pixels: &[PixelAccumulator], radius2: &(impl Fn(usize) -> f32 + Sync)) -> f64 {
+    let seen: Vec<(usize, Vec3)> = pixels
+        .iter()
+        .map(PixelAccumulator::first)
+        .enumerate()
+        .filter(|(_, (z, _))| *z < FAR)
+        .map(|(i, (_, p))| (i, p))
+        .collect();
     let chosen: Vec<&(usize, Vec3)> = seen.iter().step_by(seen.len().div_ceil(SAMPLES).max(1)).collect();
     let within = |&&(i, p): &&(usize, Vec3)| {
         seen.iter().filter(|(j, other)| i == *j || p.distance_squared(*other) < radius2(i)).count()

@@ -1,13 +1,13 @@
 //! One iteration of the methods made of pairs of walks: light tracing, bidirectional path tracing, bidirectional photon
 //! mapping, vertex connection and merging.
 //!
-//! Tiles of constant size are the unit of work. A tile walks the light path and then the eye path of each of its
+//! Tiles of constant size are the unit of work. A tile walks the light path and then the camera path of each of its
 //! pixels. Where the film is a window and nothing is merged, the light paths of all other pixels are walked, too: their
 //! light reaches the window as it reaches the whole picture, and so the window's pixels are those of the whole picture
 //! to the bit. What light paths send to the film is a list per tile, added by the tiles that it goes to in the order of those
 //! that have left it, so the sums do not depend on threads; photons are likewise concatenated and wait for the next iteration.
 //!
-//! With bandwidth levels every pixel has two light paths and two eye paths: level 1 is made of the first pair alone,
+//! With bandwidth levels every pixel has two light paths and two camera paths: level 1 is made of the first pair alone,
 //! the other levels of the second. They share nothing but the photons, those of both light paths.
 
 use super::guiding::learnt;
@@ -18,10 +18,10 @@ use super::techniques::{TechniquePicture, Watch, Watched};
 use super::tiles::{Group, TILE_PIXELS, Tiles, WholeTile};
 use crate::camera::{Camera, GROUP_SIZE};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
-use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
+use crate::estimator::{InitialBandwidth, PixelAccumulator, level_factor2};
 use crate::light::Guide;
 use crate::photon::{ByKind, PhotonMap};
-use crate::plan::{Event, EyeSuffix, Part};
+use crate::plan::{CameraSuffix, Event, Part};
 use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
@@ -31,17 +31,17 @@ use crate::spectrum::IterationWavelengths;
 use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraWalkContext, Deposits, Eye, EyeMeasure, InitialMedia, LightPass, LightVertices, MergeLevels,
-    MergePhoton, Splat, Strategies,
+    Bidirectional, CameraPaths, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertices, MergeLevels,
+    MergePhoton, PixelSample, Splat, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// A light path and an eye path for every pixel, and the levels they make.
+/// A light path and a camera path for every pixel, and the levels they make.
 struct Pair {
     light: Domain,
-    eye: Domain,
+    camera: Domain,
     /// First level and number of levels.
     levels: (usize, usize),
 }
@@ -83,23 +83,26 @@ impl<'a> Passes<'a> {
         camera: &'a Camera,
         settings: &'a Settings,
         initial_media: &'a InitialMedia,
-        strategies: Strategies,
+        techniques: TechniqueSet,
     ) -> Passes<'a> {
         let levels = settings.levels;
-        let mut pairs = vec![Pair { light: Domain::Light, eye: Domain::EyeIndependent, levels: (0, levels.count) }];
+        let mut pairs =
+            vec![Pair { light: Domain::Light, camera: Domain::CameraIndependent, levels: (0, levels.count) }];
         if levels.two_paths && levels.count > 1 {
             pairs[0].levels = (0, 1);
             let rest = (1, levels.count - 1);
-            pairs.push(Pair { light: Domain::LightCorrelated, eye: Domain::EyeCorrelated, levels: rest });
+            pairs.push(Pair { light: Domain::LightCorrelated, camera: Domain::CameraCorrelated, levels: rest });
         }
         let tiles = Tiles::new(camera);
         let sources: Vec<WholeTile> =
-            if strategies.merge { tiles.of_film().collect() } else { tiles.of_whole().collect() };
-        let pixels = light_paths(camera, strategies) as f32;
-        let eye = settings.eye(scene, camera, initial_media);
+            if techniques.merge { tiles.of_film().collect() } else { tiles.of_whole().collect() };
+        let pixels = light_paths(camera, techniques) as f32;
+        let camera_paths = settings.camera_paths(scene, camera, initial_media);
         let merged_paths = pixels * pairs.len() as f32;
-        let shared = Bidirectional { eye, initial_media, strategies, light_paths: pixels, merged_paths, only: None };
-        let guide = settings.guided.then(|| learnt(&eye, initial_media, settings, None)).flatten().map(Arc::new);
+        let shared =
+            Bidirectional { camera_paths, initial_media, techniques, light_paths: pixels, merged_paths, only: None };
+        let guide =
+            settings.guided.then(|| learnt(&camera_paths, initial_media, settings, None)).flatten().map(Arc::new);
         let measures = pairs.iter().map(|pair| Measures::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
         Passes {
             scene,
@@ -119,17 +122,17 @@ impl<'a> Passes<'a> {
         }
     }
 
-    fn eye(&self) -> Eye<'a> {
-        self.settings.eye(self.scene, self.camera, self.initial_media)
+    fn camera_paths(&self) -> CameraPaths<'a> {
+        self.settings.camera_paths(self.scene, self.camera, self.initial_media)
     }
 
-    fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPass<'g> {
+    fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPaths<'g> {
         let Settings { seed, max_depth, .. } = *self.settings;
-        let paths = light_paths(self.camera, self.shared.strategies);
-        let pass = LightPass::new(seed, i, pair.light, paths, max_depth).guided(guide);
+        let paths = light_paths(self.camera, self.shared.techniques);
+        let pass = LightPaths::new(seed, i, pair.light, paths, max_depth).guided(guide);
         // Others put paths together of one wavelength alone, whichever it is. There each light path is its pixel's own, and
         // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
-        if self.shared.strategies.merge {
+        if self.shared.techniques.merge {
             pass.with(IterationWavelengths::drifting(seed, i))
         } else {
             pass.drawing(Streams::in_sequence(seed, i, pair.light))
@@ -146,7 +149,7 @@ impl<'a> Passes<'a> {
             let walk = |tile| {
                 let (mut left, mut arena) = (Deposits::default(), Bump::new());
                 for place in tiles.pixels(tile) {
-                    if shared.eye.is_given_up() {
+                    if shared.camera_paths.is_given_up() {
                         break;
                     }
                     arena.reset();
@@ -162,9 +165,9 @@ impl<'a> Passes<'a> {
 
     /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged; `None`
     /// where it was given up.
-    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> Option<Work> {
+    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [PixelAccumulator], watches: &mut [W]) -> Option<Work> {
         let shared = self.shared;
-        if shared.strategies.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
+        if shared.techniques.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // Before the first pass of all, too: without photons it would lack the light that only they bring.
             let photons = self.photons_of(i - 1);
             if self.settings.stop.aborted() {
@@ -179,7 +182,7 @@ impl<'a> Passes<'a> {
             MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
                 let radius2 = schedule.radius2(bandwidth, level);
                 let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
-                let eta = match (merged, shared.strategies.connect) {
+                let eta = match (merged, shared.techniques.connect) {
                     (false, _) => Eta::NONE,
                     (true, true) => Eta::new(radius2, shared.merged_paths).sharing(expected * shrunk),
                     (true, false) => Eta::MERGE_ONLY,
@@ -192,26 +195,27 @@ impl<'a> Passes<'a> {
         let merges = map.map_or(0, |map| map.photons().len());
         let mut rejected = map.map_or(0, PhotonMap::rejected);
         let stored = map.map_or([0; 2], count_by_kind);
-        let bandwidths: &[Pixel] = pixels;
+        let bandwidths: &[PixelAccumulator] = pixels;
         let mut photons: Vec<MergePhoton> = Vec::new();
         let guide = self.guide.clone();
         let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
         for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
             let own = pair.own(self.settings.levels.own());
-            let streams = Streams::in_sequence(seed, i, pair.eye);
+            let streams = Streams::in_sequence(seed, i, pair.camera);
             let mut on_film = measures.par_tiles().zip(watches.par_iter_mut()).collect::<Vec<_>>().into_iter();
             let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
             self.sources.par_iter().zip(film).zip(&mut self.left).for_each(|((tile, mut film), left)| {
                 left.clear();
-                let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
+                let (mut arena, mut measure) = (Bump::new(), PixelSample::default());
                 for Group { keys, places } in tiles.all_groups(*tile) {
-                    if shared.eye.is_given_up() {
+                    if shared.camera_paths.is_given_up() {
                         return;
                     }
-                    let mut starts = film.as_ref().map(|_| shared.eye.starts(&places, streams)).unwrap_or_default();
+                    let mut starts =
+                        film.as_ref().map(|_| shared.camera_paths.starts(&places, streams)).unwrap_or_default();
                     for k in 0..GROUP_SIZE {
                         let of_film = places[k].map(|place| place.index);
-                        let Some(index) = (if shared.strategies.merge { of_film } else { keys[k] }) else { continue };
+                        let Some(index) = (if shared.techniques.merge { of_film } else { keys[k] }) else { continue };
                         let index = index as u32;
                         arena.reset();
                         let mut vertices = LightVertices::new_in(&arena);
@@ -226,7 +230,7 @@ impl<'a> Passes<'a> {
                         let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
                         let meets = CameraWalkContext { vertices: &vertices, photons: map, levels: &levels };
                         watch.begin(place.at, own);
-                        shared.eye_path(&arena, start, &meets, *watch, &mut measure);
+                        shared.camera_path(&arena, start, &meets, *watch, &mut measure);
                         measures.set(place.at, &measure);
                     }
                 }
@@ -252,8 +256,8 @@ impl<'a> Passes<'a> {
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
         let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
         let gathered =
-            measures::add(&self.measures, (&shared.eye, i), pixels, |index| tiles.slot(index as u32), groups);
-        if shared.strategies.merge && self.settings.shard.count == 1 {
+            measures::add(&self.measures, (&shared.camera_paths, i), pixels, |index| tiles.slot(index as u32), groups);
+        if shared.techniques.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons)));
         }
         Some(Work { light_paths: walked, photons: merges, rejected, counts: PhotonCounts { stored, gathered } })
@@ -262,7 +266,7 @@ impl<'a> Passes<'a> {
 
 /// Photons by the kind of light that a surface shows of them.
 fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
-    let sight = EyeSuffix::START.then(Event::Broad);
+    let sight = CameraSuffix::START.then(Event::Broad);
     let caustics =
         map.photons().par_iter().filter(|photon| sight.class_with(photon.beam).part() == Part::Caustic).count();
     [map.photons().len() - caustics, caustics].map(|count| count as u64)
@@ -270,8 +274,8 @@ fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
 
 /// Light paths of a pass: where nothing is merged, as many as the whole picture has pixels, of which the film may be a
 /// window.
-fn light_paths(camera: &Camera, strategies: Strategies) -> u32 {
-    let (width, height) = if strategies.merge { camera.size() } else { camera.whole()[0] };
+fn light_paths(camera: &Camera, techniques: TechniqueSet) -> u32 {
+    let (width, height) = if techniques.merge { camera.size() } else { camera.whole()[0] };
     width * height
 }
 
@@ -318,7 +322,7 @@ impl<'l> SplatsByTile<'l> {
 }
 
 impl Iterate for Passes<'_> {
-    fn pixels(&mut self) -> Vec<Pixel> {
+    fn pixels(&mut self) -> Vec<PixelAccumulator> {
         if !self.settings.method.has_bandwidths() {
             return self.settings.pixels(self.scene, self.camera);
         }
@@ -328,12 +332,13 @@ impl Iterate for Passes<'_> {
             _ => InitialBandwidth::Footprint,
         };
         let Settings { widest: [widest, _], seed, .. } = *self.settings;
-        let (none, eye) = (PhotonMap::build(Vec::new()), self.eye());
-        let all = initial_bandwidths(&eye, initial, widest, seed, [&none; 2]);
+        let (none, camera_paths) = (PhotonMap::build(Vec::new()), self.camera_paths());
+        let all = initial_bandwidths(&camera_paths, initial, widest, seed, [&none; 2]);
         // A footprint is the same number of pixels everywhere; a fixed radius is compared with the median one.
         let pixels = match initial {
             InitialBandwidth::Fixed(radius) => {
-                let footprints = initial_bandwidths(&eye, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1]);
+                let footprints =
+                    initial_bandwidths(&camera_paths, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1]);
                 let mut footprints = footprints.into_flattened();
                 FOOTPRINT_PIXELS * radius / median(&mut footprints, f32::total_cmp).unwrap_or(f32::INFINITY)
             }
@@ -347,7 +352,7 @@ impl Iterate for Passes<'_> {
         self.guide.as_deref()
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
         let start = cpu_seconds();
         let mut watched = std::mem::take(&mut self.watched);
         let work = match watched.begin() {
@@ -355,7 +360,7 @@ impl Iterate for Passes<'_> {
             None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
         };
         self.watched = watched;
-        // Light and eye paths take turns within a pixel.
+        // Light and camera paths take turns within a pixel.
         phases.eye += cpu_seconds() - start;
         work
     }

@@ -17,7 +17,7 @@ use crate::photon::{Kernel, kernel};
 use crate::render::settings::{BandwidthRule, Method};
 use crate::render::settings::{KernelChoice, Settings};
 use crate::scene::Scene;
-use crate::transport::{InitialMedia, Strategies};
+use crate::transport::{InitialMedia, TechniqueSet};
 
 /// The passes of a render, nothing done yet.
 pub(in crate::render) fn passes<'a>(
@@ -26,17 +26,17 @@ pub(in crate::render) fn passes<'a>(
     settings: &'a Settings,
     initial_media: &'a InitialMedia,
 ) -> Box<dyn Iterate + 'a> {
-    let pairs = |strategies| Box::new(Passes::new(scene, camera, settings, initial_media, strategies));
+    let pairs = |techniques| Box::new(Passes::new(scene, camera, settings, initial_media, techniques));
     match settings.method {
         Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => {
             gathering(Sppm::new(scene, camera, settings, initial_media), settings)
         }
         Method::Pm => Box::new(Pm::new(scene, camera, settings, initial_media)),
-        Method::Path => Box::new(Paths::new(settings.eye(scene, camera, initial_media), settings)),
-        Method::Light => pairs(Strategies::LIGHT),
-        Method::Bdpt => pairs(Strategies::BDPT),
-        Method::Bpm => pairs(Strategies::BPM),
-        Method::Vcm => pairs(Strategies::VCM),
+        Method::Path => Box::new(Paths::new(settings.camera_paths(scene, camera, initial_media), settings)),
+        Method::Light => pairs(TechniqueSet::LIGHT),
+        Method::Bdpt => pairs(TechniqueSet::BDPT),
+        Method::Bpm => pairs(TechniqueSet::BPM),
+        Method::Vcm => pairs(TechniqueSet::VCM),
         Method::Mlt => Box::new(Metropolis::new(scene, camera, settings, initial_media)),
     }
 }

@@ -10,7 +10,7 @@ use crate::render::settings::BandwidthRule;
 use crate::render::settings::Candidate;
 use crate::render::settings::Settings;
 use crate::scene::{Scene, Survey};
-use crate::transport::{Eye, Indirect, InitialMedia, Lengths};
+use crate::transport::{CameraPaths, Indirect, InitialMedia, Lengths};
 
 /// A ray from the eye, the pixel it belongs to and its statistics.
 const EYE_PATH: f64 = 0.135e-6;
@@ -77,12 +77,13 @@ impl Cost {
     /// Counts what paths of a view meet; light paths are guided if there is a guide.
     pub fn count(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
         let initial_media = InitialMedia::of(scene, camera);
-        let eye = Eye { indirect: Indirect::Photons, ..settings.eye(scene, camera, &initial_media) };
+        let camera_paths =
+            CameraPaths { indirect: Indirect::Photons, ..settings.camera_paths(scene, camera, &initial_media) };
         let reach = |length: f32| match settings.initial {
             InitialBandwidth::Fixed(radius) => radius,
             _ => footprint(camera, length),
         };
-        let lengths = Lengths::new(&eye, &initial_media, settings.seed, guide, reach);
+        let lengths = Lengths::new(&camera_paths, &initial_media, settings.seed, guide, reach);
         let triangles = scene.shapes.triangles().max(1) as f64;
         let dispersion = if scene.survey.dispersion { DISPERSION } else { 1.0 };
         Cost { lengths, survey: scene.survey, factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
@@ -100,14 +101,17 @@ impl Cost {
 
     /// Core-seconds of an iteration of a picture of so many pixels, which is no window of another.
     pub fn of(&self, candidate: Candidate, settings: &Settings, pixels: f64) -> f64 {
-        let Lengths { eye, eye_to_broad, light, light_to_broad, merged, textured, .. } = self.lengths;
-        let Lengths { eye_media, light_media, on_the_way, eye_open, light_open, .. } = self.lengths;
+        let Lengths { camera: camera_vertices, camera_to_broad, light, light_to_broad, merged, textured, .. } =
+            self.lengths;
+        let Lengths { camera_media, light_media, media_samples, camera_connectable, light_connectable, .. } =
+            self.lengths;
         let paths = pixels * eye_paths(settings);
         // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
         let unwanted = candidate.method.gathers() && settings.of_photons(&self.survey).is_empty();
         let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
         let wanted = |classes: ClassSet| !(settings.classes & classes_in(&self.survey) & classes).is_empty();
-        let (eye_alone, eye_media_alone) = if wanted(SCATTERED) { (eye, eye_media) } else { (eye_to_broad, 0.0) };
+        let (camera_alone, camera_media_alone) =
+            if wanted(SCATTERED) { (camera_vertices, camera_media) } else { (camera_to_broad, 0.0) };
         let scattered = wanted(SCATTERED.and(REFLECTED));
         let (light_alone, light_media_alone) = if scattered { (light, light_media) } else { (light_to_broad, 0.0) };
         let start = LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 };
@@ -119,29 +123,31 @@ impl Cost {
             _ => GATHER,
         };
         let all = match (candidate.method, candidate.indirect) {
-            (method, _) if method.search() == Search::EyePaths => {
-                pixels * (EYE_PATH + eye_alone * eye_vertex + eye_media_alone * EYE_MEDIUM)
+            (method, _) if method.search() == Search::CameraPaths => {
+                pixels * (EYE_PATH + camera_alone * eye_vertex + camera_media_alone * EYE_MEDIUM)
             }
             (method, Indirect::Photons) if method.gathers() => {
-                paths * (EYE_PATH + eye_to_broad * (eye_vertex + gather) + on_the_way * ON_THE_WAY)
+                paths * (EYE_PATH + camera_to_broad * (eye_vertex + gather) + media_samples * ON_THE_WAY)
                     + photons * (start + light_alone * light_vertex + light_media_alone * LIGHT_VERTEX)
             }
             (method, Indirect::Paths) if method.gathers() => {
-                paths * (EYE_PATH + eye_alone * eye_vertex + eye_open * gather)
+                paths * (EYE_PATH + camera_alone * eye_vertex + camera_connectable * gather)
                     + photons * (start + light_to_broad * light_vertex)
             }
             (method, _) => {
                 // Without light that was scattered before, few pairs are left.
-                let (from_eye, from_light) = match wanted(SCATTERED) {
-                    true => (eye_open + eye_media, light_open + light_media),
-                    false => (eye_to_broad, light_to_broad),
+                let (from_camera, from_light) = match wanted(SCATTERED) {
+                    true => (camera_connectable + camera_media, light_connectable + light_media),
+                    false => (camera_to_broad, light_to_broad),
                 };
-                let merges = if method.has_bandwidths() { from_eye * LOOK + merged * MERGE } else { 0.0 };
-                let vertices = (eye + light) * two_way_vertex + (eye_media + light_media) * TWO_WAY_MEDIUM;
-                paths * (EYE_PATH + start + vertices + from_eye * from_light * CONNECTION + merges)
+                let merges = if method.has_bandwidths() { from_camera * LOOK + merged * MERGE } else { 0.0 };
+                let vertices =
+                    (camera_vertices + light) * two_way_vertex + (camera_media + light_media) * TWO_WAY_MEDIUM;
+                paths * (EYE_PATH + start + vertices + from_camera * from_light * CONNECTION + merges)
             }
         };
-        let left_out = if wanted(ClassSet::of(Effect::Direct)) { 0.0 } else { paths * eye_to_broad.min(1.0) * DIRECT };
+        let left_out =
+            if wanted(ClassSet::of(Effect::Direct)) { 0.0 } else { paths * camera_to_broad.min(1.0) * DIRECT };
         (all - left_out).max(0.0) * self.factor
     }
 }

@@ -11,7 +11,7 @@ use super::sppm::Sppm;
 use super::volume::Maps;
 use crate::camera::{par_pixels, pixels_per_band};
 use crate::estimator::rule::CountingRule;
-use crate::estimator::{InitialBandwidth, Pixel, level_factor2};
+use crate::estimator::{InitialBandwidth, PixelAccumulator, level_factor2};
 use crate::math::{Frame, Vec3};
 use crate::photon::{ByKind, Kernel, Kind, PhotonMap};
 use crate::processor::prefetch;
@@ -19,7 +19,7 @@ use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
 use crate::render::settings::Settings;
-use crate::transport::{Bandwidths, Counter, EqualFlux, EyeMeasure, Found, LevelRadii, PathStart, Scratch};
+use crate::transport::{Bandwidths, Counter, EqualFlux, Found, LevelRadii, PathStart, PixelSample, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ use std::ops::Range;
 struct States<'a, R: CountingRule> {
     bandwidths: &'a mut [R::Bandwidth],
     counts: &'a mut [R::Count],
-    /// Of the eye path.
+    /// Of the camera path.
     tally: R::Tally,
 }
 
@@ -94,14 +94,14 @@ impl Layout {
     }
 }
 
-/// Those of an eye path, by kind; of one that is not there, no levels.
+/// Those of a camera path, by kind; of one that is not there, no levels.
 struct OfPath<'a, R: CountingRule> {
     rule: &'a R,
     states: ByKind<States<'a, R>>,
 }
 
 impl<R: CountingRule> OfPath<'_, R> {
-    /// After the eye path of iteration `i`.
+    /// After the camera path of iteration `i`.
     #[inline(always)]
     fn finish(&mut self, i: u64) {
         for States { bandwidths, counts, tally } in &mut self.states {
@@ -134,7 +134,7 @@ impl<'a, R: CountingRule> Bandwidths for &mut OfPath<'a, R> {
     }
 }
 
-/// Those of a kind, where an eye path gathers it.
+/// Those of a kind, where a camera path gathers it.
 struct OfVertex<'c, 'a, R: CountingRule> {
     rule: &'a R,
     states: &'c mut States<'a, R>,
@@ -186,7 +186,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         Counting { sppm, settings, rule, kernel, channels, layout, bandwidths: Vec::new(), counts: Vec::new() }
     }
 
-    /// Random numbers of the eye paths of a domain in iteration `i`: for their points on film and lens, and for all
+    /// Random numbers of the camera paths of a domain in iteration `i`: for their points on film and lens, and for all
     /// else.
     fn streams(&self, i: u64, domain: Domain) -> [Streams; 2] {
         // Measurement points stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: what one point of the film sees,
@@ -196,12 +196,13 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
     }
 
     /// `maps` holds the photons, or those of each channel.
-    fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &[Pixel]) {
+    fn eye_pass(&mut self, i: u64, maps: &[Maps], pixels: &[PixelAccumulator]) {
         let [independent, correlated] =
-            [Domain::EyeIndependent, Domain::EyeCorrelated].map(|domain| self.streams(i, domain));
+            [Domain::CameraIndependent, Domain::CameraCorrelated].map(|domain| self.streams(i, domain));
         let Counting { sppm, settings, rule, kernel, layout, bandwidths, counts, .. } = self;
-        let (eye, rule, kernel, layout, levels) = (sppm.eye(), &*rule, *kernel, *layout, settings.levels);
-        let (size, count, each) = (eye.camera.size(), levels.count, layout.counts);
+        let (camera_paths, rule, kernel, layout, levels) =
+            (sppm.camera_paths(), &*rule, *kernel, *layout, settings.levels);
+        let (size, count, each) = (camera_paths.camera.size(), levels.count, layout.counts);
         let states = layout.count() * maps.len();
         let line = (64 / size_of::<R::Count>().max(1)).max(1);
         let bands = pixels
@@ -211,7 +212,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
             .zip(counts.par_chunks_mut(pixels_per_band(size.0) * states * each));
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
         par_pixels(bands, size, scratches, |scratches, (((pixels, measures), bandwidths), counts), places| {
-            if eye.is_given_up() {
+            if camera_paths.is_given_up() {
                 return;
             }
             for place in places.iter().flatten() {
@@ -221,7 +222,8 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 prefetch(counts.iter().step_by(line).chain(counts.last()).copied());
                 prefetch([R::radius2(&bandwidths[first])]);
             }
-            let starts = |[film, streams]: [Streams; 2]| maps[0].tune(eye.starts_through(places, film, streams));
+            let starts =
+                |[film, streams]: [Streams; 2]| maps[0].tune(camera_paths.starts_through(places, film, streams));
             let independent = starts(independent);
             let correlated = levels.two_paths.then(|| starts(correlated));
             for (k, place) in places.iter().enumerate() {
@@ -229,21 +231,22 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let pixel = &pixels[place.at];
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
                 let counts = &mut counts[place.at * states * each..][..states * each];
-                // Measures some levels by one eye path, with the photons of a channel, and updates them.
-                let mut measure = |pixel: &Pixel, start: &(PathStart, _), channel: usize, levels: Range<usize>| {
-                    let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
-                    let volume = maps.volume(pixel, levels.clone());
-                    let states = layout.states(channel, levels, bandwidths, counts);
-                    let mut own = OfPath { rule, states };
-                    let measure = eye.measure(scratch, start, &maps.surface, volume, &mut own, kernel);
-                    own.finish(i);
-                    measure
-                };
+                // Measures some levels by one camera path, with the photons of a channel, and updates them.
+                let mut measure =
+                    |pixel: &PixelAccumulator, start: &(PathStart, _), channel: usize, levels: Range<usize>| {
+                        let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
+                        let volume = maps.volume(pixel, levels.clone());
+                        let states = layout.states(channel, levels, bandwidths, counts);
+                        let mut own = OfPath { rule, states };
+                        let measure = camera_paths.measure(scratch, start, &maps.surface, volume, &mut own, kernel);
+                        own.finish(i);
+                        measure
+                    };
                 let correlated = correlated.as_ref().and_then(|starts| starts[k].as_ref());
                 let own = if correlated.is_some() { 0..1 } else { 0..count };
                 let mut first = measure(pixel, start, 0, own.clone());
                 let mut others = correlated.map(|start| measure(pixel, start, 0, 1..count));
-                // The same eye paths each time: only the photons differ, and those of one channel bring light to it
+                // The same camera paths each time: only the photons differ, and those of one channel bring light to it
                 // alone.
                 for channel in 1..maps.len() {
                     add_photons(&mut first, &measure(pixel, start, channel, own.clone()));
@@ -261,7 +264,7 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
 }
 
 /// Adds what photons brought to another measure of the same path.
-fn add_photons(all: &mut EyeMeasure, measure: &EyeMeasure) {
+fn add_photons(all: &mut PixelSample, measure: &PixelSample) {
     let sums = all.caustic_photons.iter_mut().chain(&mut all.indirect_photons).chain(&mut all.volume_photons);
     let photons = measure.caustic_photons.iter().chain(&measure.indirect_photons).chain(&measure.volume_photons);
     for (sum, light) in sums.zip(photons) {
@@ -271,7 +274,7 @@ fn add_photons(all: &mut EyeMeasure, measure: &EyeMeasure) {
 }
 
 impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
-    fn pixels(&mut self) -> Vec<Pixel> {
+    fn pixels(&mut self) -> Vec<PixelAccumulator> {
         let pixels = self.sppm.pixels();
         let levels = self.settings.levels;
         let neighbours = match self.settings.initial {
@@ -298,7 +301,7 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
         pixels
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
         let (maps, work) = match &self.channels {
             None => {
                 let (map, work) = self.sppm.map(i, phases);
@@ -310,7 +313,7 @@ impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
             }
         };
         let start = cpu_seconds();
-        // Eye paths change them; an iteration that is given up must not have.
+        // Camera paths change them; an iteration that is given up must not have.
         let before = (self.bandwidths.clone(), self.counts.clone());
         self.eye_pass(i, &maps, pixels);
         let done = self.sppm.add(i, pixels, work);

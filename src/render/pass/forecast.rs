@@ -7,7 +7,7 @@ use crate::random::Domain;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::spectrum::IterationWavelengths;
-use crate::transport::{InitialMedia, LightPass};
+use crate::transport::{InitialMedia, LightPaths};
 
 /// Light paths looked at.
 const SAMPLES: u32 = 2048;
@@ -16,7 +16,7 @@ const SAMPLES: u32 = 2048;
 /// misses the scene, many in a closed white room. Where light paths are merged every vertex is one.
 pub fn photons_per_path(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
     let initial_media = InitialMedia::new(scene, camera.position());
-    let pass = LightPass::new(settings.seed, 0, Domain::PilotLight, SAMPLES, settings.max_depth)
+    let pass = LightPaths::new(settings.seed, 0, Domain::PilotLight, SAMPLES, settings.max_depth)
         .with(IterationWavelengths::new(settings.seed, 0));
     let pass = match settings.method.counts_photons() {
         true => pass.wanting(settings.of_photons(&scene.survey), settings.indirect),

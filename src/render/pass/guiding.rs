@@ -1,6 +1,6 @@
-//! Learning where light paths are to start: rounds of a few light paths and eye paths before the first iteration.
+//! Learning where light paths are to start: rounds of a few light paths and camera paths before the first iteration.
 //!
-//! A round draws light paths by what the rounds before it have learnt, gathers their photons where eye paths look, and
+//! A round draws light paths by what the rounds before it have learnt, gathers their photons where camera paths look, and
 //! adds up by cell of the guide how much squared relative error every photon leaves in the picture: its own share of
 //! the pixel, squared, for it is there or not. The pixel's value is what the round itself finds there.
 //!
@@ -17,7 +17,7 @@ use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
 use crate::render::settings::Candidate;
 use crate::render::settings::Settings;
-use crate::transport::{Eye, Indirect, InitialMedia, LightPass, Photons, Probe, light_path};
+use crate::transport::{CameraPaths, Indirect, InitialMedia, LightPaths, Photons, Probe, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -27,10 +27,10 @@ pub(super) const ROUNDS: u64 = 5;
 const LIGHT_PATHS: f64 = 0.25;
 const LEAST: u32 = 1 << 12;
 const MOST: u32 = 1 << 15;
-/// Eye paths of a round, but one in so many pixels at most.
+/// Camera paths of a round, but one in so many pixels at most.
 const EYE_PATHS: u32 = 1 << 13;
 const PIXELS_PER_EYE_PATH: u64 = 4;
-/// Eye paths per unit of work.
+/// Camera paths per unit of work.
 const CHUNK: u32 = 256;
 /// Photons of either kind that a pixel gathers.
 const NEIGHBOURS: usize = 16;
@@ -65,20 +65,20 @@ impl Located for Marked {
 
 /// The guide of a view, learnt; `None` where there is nothing to choose, or nothing to gain by it.
 pub(super) fn learnt(
-    eye: &Eye<'_>,
+    camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
     settings: &Settings,
     region: Option<Region>,
 ) -> Option<Guide> {
     let seed = settings.seed;
     let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
-    let mut guide = Guide::new(&eye.scene.lights, eye.indirect == Indirect::Photons)?;
+    let mut guide = Guide::new(&camera_paths.scene.lights, camera_paths.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
-        let (maps, walked) = photons(eye, initial_media, (light_paths, region), seed, round, &guide);
-        let error = error(eye, seed, round, &maps, guide.cells());
+        let (maps, walked) = photons(camera_paths, initial_media, (light_paths, region), seed, round, &guide);
+        let error = error(camera_paths, seed, round, &maps, guide.cells());
         let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
         let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
-        if round + 1 == ROUNDS && error.ratio() * dearer(eye, settings, &guide) > WORTH {
+        if round + 1 == ROUNDS && error.ratio() * dearer(camera_paths, settings, &guide) > WORTH {
             return None;
         }
         guide.learn(&error.of_cells, &paths, &work);
@@ -88,11 +88,11 @@ pub(super) fn learnt(
 
 /// What an iteration costs with the guide over what it costs without, counted: guided light paths meet glass at once,
 /// and are longer.
-fn dearer(eye: &Eye<'_>, settings: &Settings, guide: &Guide) -> f64 {
-    let (width, height) = eye.camera.size();
+fn dearer(camera_paths: &CameraPaths<'_>, settings: &Settings, guide: &Guide) -> f64 {
+    let (width, height) = camera_paths.camera.size();
     let cost = |guide: Option<&Guide>| {
         let candidate = Candidate { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
-        Cost::count(eye.scene, eye.camera, settings, guide).of(
+        Cost::count(camera_paths.scene, camera_paths.camera, settings, guide).of(
             candidate,
             settings,
             f64::from(width) * f64::from(height),
@@ -111,22 +111,22 @@ struct Walked {
 
 /// Photons of a round, and the light paths by cell.
 fn photons(
-    eye: &Eye<'_>,
+    camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
     (light_paths, region): (u32, Option<Region>),
     seed: u64,
     round: u64,
     guide: &Guide,
 ) -> (ByKind<PhotonMap<Marked>>, Vec<Walked>) {
-    let pass = LightPass::new(seed, round, Domain::GuideLight, light_paths, eye.max_depth)
+    let pass = LightPaths::new(seed, round, Domain::GuideLight, light_paths, camera_paths.max_depth)
         .guided(Some(guide))
         .lighting(region)
-        .wanting(ClassSet::ALL, eye.indirect);
+        .wanting(ClassSet::ALL, camera_paths.indirect);
     let trace = |paths: std::ops::Range<u32>| {
         let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), ByKind::<Vec<Marked>>::default());
         let mut walked = vec![Walked::default(); guide.cells()];
         for index in paths {
-            let path = light_path(eye.scene, &arena, initial_media, &pass, index, &mut photons);
+            let path = light_path(camera_paths.scene, &arena, initial_media, &pass, index, &mut photons);
             let Some((cell, vertices)) = path else { continue };
             arena.reset();
             photons.volume.clear();
@@ -151,7 +151,7 @@ fn photons(
     (all.map(PhotonMap::build), walked)
 }
 
-/// Sums over a round's eye paths of the squared relative errors that photons leave.
+/// Sums over a round's camera paths of the squared relative errors that photons leave.
 struct CellErrors {
     of_cells: Vec<f64>,
     /// What as many unguided light paths would leave with the same bandwidths: a photon of weight w stands for w
@@ -175,24 +175,30 @@ impl CellErrors {
     }
 }
 
-/// What the photons of a round leave where its eye paths look.
-fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>, cells: usize) -> CellErrors {
-    let (width, height) = eye.camera.size();
+/// What the photons of a round leave where its camera paths look.
+fn error(
+    camera_paths: &CameraPaths<'_>,
+    seed: u64,
+    round: u64,
+    maps: &ByKind<PhotonMap<Marked>>,
+    cells: usize,
+) -> CellErrors {
+    let (width, height) = camera_paths.camera.size();
     let pixels = u64::from(width) * u64::from(height);
     let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
     // Pixels in even steps from a first one drawn anew every round.
-    let offset = Stream::new(seed, round, Domain::GuideEye, u64::MAX).vertex(0).one(Purpose::Pixel);
+    let offset = Stream::new(seed, round, Domain::GuideCamera, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
         let mut error = CellErrors::none(cells);
         let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<Marked>>::default());
         for index in first..paths.min(first + CHUNK) {
             arena.reset();
-            let stream = Stream::new(seed, round, Domain::GuideEye, u64::from(index));
+            let stream = Stream::new(seed, round, Domain::GuideCamera, u64::from(index));
             let pixel = ((f64::from(index) + f64::from(offset)) * pixels as f64 / f64::from(paths)) as u64;
             let pixel = pixel.min(pixels - 1);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
-            if let Some(probe) = eye.probe(&arena, &(eye.start(at, stream), stream)) {
-                weigh(eye, maps, &mut nearest, &probe, &mut error);
+            if let Some(probe) = camera_paths.probe(&arena, &(camera_paths.start(at, stream), stream)) {
+                weigh(camera_paths, maps, &mut nearest, &probe, &mut error);
             }
         }
         error
@@ -205,14 +211,14 @@ fn error(eye: &Eye<'_>, seed: u64, round: u64, maps: &ByKind<PhotonMap<Marked>>,
 
 /// Adds what the photons around a probe leave in its pixel.
 fn weigh(
-    eye: &Eye<'_>,
+    camera_paths: &CameraPaths<'_>,
     maps: &ByKind<PhotonMap<Marked>>,
     nearest: &mut ByKind<Nearest<Marked>>,
     probe: &Probe,
     error: &mut CellErrors,
 ) {
     let point = &probe.point;
-    let cap = SCREEN_CAP * span(eye.camera, point.length);
+    let cap = SCREEN_CAP * span(camera_paths.camera, point.length);
     let mut light = Vec::with_capacity(2 * NEIGHBOURS);
     let mut sum = Rgb::ZERO;
     for (map, nearest) in maps.iter().zip(nearest) {

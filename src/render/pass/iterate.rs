@@ -2,7 +2,7 @@
 
 use super::photon_counts::PhotonCounts;
 use super::techniques::TechniquePicture;
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::light::Guide;
 use crate::photon::ByKind;
 use crate::render::clock::Phases;
@@ -23,10 +23,10 @@ pub(in crate::render) struct Work {
 /// The passes of a method.
 pub(in crate::render) trait Iterate {
     /// The pixels before the first iteration.
-    fn pixels(&mut self) -> Vec<Pixel>;
+    fn pixels(&mut self) -> Vec<PixelAccumulator>;
     /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`; `None` where it was given up
     /// ([`Settings::stop`](crate::render::Settings::stop)) and has changed nothing.
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work>;
+    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work>;
     /// Squared radii by kind of photons of every pixel and level after the last iteration (square scene units), of
     /// methods where they do not follow from the iteration.
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {

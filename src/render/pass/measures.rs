@@ -3,11 +3,11 @@
 //! all.
 
 use super::tiles::TILE_PIXELS;
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::math::{Rgb, is_lit};
 use crate::photon::ByKind;
 use crate::render::settings::{Levels, Settings};
-use crate::transport::{Cause, Eye, EyeMeasure, Features, FirstHit};
+use crate::transport::{CameraPaths, Cause, Features, FirstHit, PixelSample};
 use rayon::prelude::*;
 use std::mem::size_of;
 
@@ -33,7 +33,7 @@ type OfLevel = [Rgb; 3];
 pub fn bytes_of_measures(settings: &Settings) -> usize {
     let pairs = 1 + usize::from(settings.levels.two_paths);
     match settings.method.has_chains() {
-        true => size_of::<EyeMeasure>(),
+        true => size_of::<PixelSample>(),
         false => pairs * size_of::<Shared>() + settings.levels.count * size_of::<OfLevel>(),
     }
 }
@@ -89,7 +89,7 @@ impl Measures {
 
     /// The measure of the pixel that is kept at `slot`.
     #[inline]
-    pub fn get(&self, slot: usize) -> EyeMeasure {
+    pub fn get(&self, slot: usize) -> PixelSample {
         unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
     }
 }
@@ -104,14 +104,14 @@ pub(super) struct SomeMeasures<'m> {
 impl SomeMeasures<'_> {
     /// The measure at a slot of them.
     #[inline]
-    pub fn get(&self, slot: usize) -> EyeMeasure {
+    pub fn get(&self, slot: usize) -> PixelSample {
         unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
     }
 
     /// Keeps a measure; nothing of it but its first levels may be lit.
     #[inline]
-    pub fn set(&mut self, slot: usize, measure: &EyeMeasure) {
-        let &EyeMeasure { emission, direct, indirect, volume, features, first, broken, .. } = measure;
+    pub fn set(&mut self, slot: usize, measure: &PixelSample) {
+        let &PixelSample { emission, direct, indirect, volume, features, first, broken, .. } = measure;
         self.shared[slot] = Shared { emission, direct, indirect, volume, features, first, broken };
         for (level, into) in self.by_level[slot * self.levels..][..self.levels].iter_mut().enumerate() {
             *into = [measure.caustic_photons[level], measure.indirect_photons[level], measure.volume_photons[level]];
@@ -123,22 +123,22 @@ impl SomeMeasures<'_> {
 /// and its light by `groups`. Returns the number of pixels to whose own image photons of each kind have brought light.
 pub(super) fn add<'g>(
     measures: &[Measures],
-    (eye, i): (&Eye<'_>, u64),
-    pixels: &mut [Pixel],
+    (camera_paths, i): (&CameraPaths<'_>, u64),
+    pixels: &mut [PixelAccumulator],
     slot: impl Fn(usize) -> usize + Sync,
     groups: impl Fn(usize) -> &'g [[Rgb; 2]] + Sync,
 ) -> ByKind<u64> {
-    let add = |(index, pixel): (usize, &mut Pixel)| {
+    let add = |(index, pixel): (usize, &mut PixelAccumulator)| {
         let slot = slot(index);
         let measure = measures[0].get(slot);
-        pixel.see(i, || eye.seen(&measure));
+        pixel.see(i, || camera_paths.seen(&measure));
         let others = measures.get(1).map(|measures| measures.get(slot));
         let (own, level) = pixel.own_of(&measure, others.as_ref());
         let light = [own.indirect_photons[level], own.caustic_photons[level]];
         pixel.add_with_groups(i, &measure, others.as_ref(), groups(slot));
         light.map(|light| u64::from(is_lit(light)))
     };
-    let all = |(part, pixels): (usize, &mut [Pixel])| {
+    let all = |(part, pixels): (usize, &mut [PixelAccumulator])| {
         let indices = part * PIXELS_PER_TASK..;
         indices.zip(pixels).map(add).fold([0; 2], |[a, b], [c, d]| [a + c, b + d])
     };
@@ -147,9 +147,9 @@ pub(super) fn add<'g>(
 }
 
 #[inline]
-fn unpack(shared: &Shared, by_level: &[OfLevel]) -> EyeMeasure {
+fn unpack(shared: &Shared, by_level: &[OfLevel]) -> PixelSample {
     let Shared { emission, direct, indirect, volume, features, first, broken } = *shared;
-    let shared = EyeMeasure { emission, direct, indirect, volume, features, first, broken, ..EyeMeasure::default() };
+    let shared = PixelSample { emission, direct, indirect, volume, features, first, broken, ..PixelSample::default() };
     by_level.iter().enumerate().fold(shared, |mut measure, (level, &[caustic, indirect, volume])| {
         measure.caustic_photons[level] = caustic;
         measure.indirect_photons[level] = indirect;
@@ -170,7 +170,7 @@ mod tests {
             let mut measures = Measures::new(2 * TILE_PIXELS, levels);
             let measure = |at: usize| {
                 let value = |k: usize| Rgb::new(at as f32, k as f32, 0.5);
-                let mut measure = EyeMeasure { emission: value(1), direct: value(2), ..EyeMeasure::default() };
+                let mut measure = PixelSample { emission: value(1), direct: value(2), ..PixelSample::default() };
                 (measure.indirect, measure.volume) = (value(3), value(4));
                 measure.features.depth = at as f32;
                 measure.first = at.is_multiple_of(2).then_some(FirstHit { p: value(5), instance: at as u32 });

@@ -18,7 +18,7 @@
 use super::iterate::{Iterate, Work};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::light::Group;
 use crate::math::{Rgb, UVec2, Vec2};
 use crate::plan::{Part, PathClass};
@@ -29,8 +29,8 @@ use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraWalkContext, Deposits, Division, Eye, EyeMeasure, InitialMedia, LightPass, LightVertices,
-    MergeLevels, Record, Splat, Strategies, Technique,
+    Bidirectional, CameraPaths, CameraWalkContext, Deposits, Division, InitialMedia, LightPaths, LightVertices,
+    MergeLevels, PixelSample, Record, Splat, Technique, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ use smallvec::SmallVec;
 /// Steps of a chain, where there are pixels enough for many. Each iteration finds new starts in proportion to their
 /// light, so short ones, which are many, are spread better: 512 had 1.1 to 1.2 times the error.
 const STEPS: usize = 64;
-/// Vertex of an eye path whose draws are the chain's own: its place on the film and how paths are divided.
+/// Vertex of a camera path whose draws are the chain's own: its place on the film and how paths are divided.
 const OWN: u32 = u32::MAX;
 
 /// Chains of an iteration at least.
@@ -70,7 +70,7 @@ struct Candidate {
 /// What one path brings that chains look for.
 #[derive(Default)]
 struct Found {
-    /// The pixel that its eye path starts in.
+    /// The pixel that its camera path starts in.
     pixel: u32,
     deposits: SmallVec<[(Technique, Deposit); 4]>,
 }
@@ -111,31 +111,31 @@ struct State {
 
 /// What the iterations share.
 pub(super) struct Metropolis<'a> {
-    eye: Eye<'a>,
+    camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
     shared: Bidirectional<'a>,
     tiles: Tiles,
-    measures: Vec<EyeMeasure>,
+    measures: Vec<PixelSample>,
     levels: MergeLevels,
 }
 
 /// The walks of one iteration.
 struct Walks<'i, 'a> {
     shared: &'i Bidirectional<'a>,
-    pass: LightPass<'i>,
+    pass: LightPaths<'i>,
     levels: &'i MergeLevels,
-    eyes: Streams,
+    cameras: Streams,
     lights: Streams,
     size: UVec2,
 }
 
-/// Where an eye path starts: its pixel, and the point of that, uniform on the unit square.
+/// Where a camera path starts: its pixel, and the point of that, uniform on the unit square.
 type Film = (UVec2, Vec2);
 
 impl Walks<'_, '_> {
     /// The draws of both walks of a path.
     fn streams(&self, path: u32) -> (Stream, Stream) {
-        (self.eyes.path(u64::from(path)), self.lights.path(u64::from(path)))
+        (self.cameras.path(u64::from(path)), self.lights.path(u64::from(path)))
     }
 
     /// Both walks of a path; what they find goes to `left`, `found` and `measure`.
@@ -143,21 +143,21 @@ impl Walks<'_, '_> {
         &self,
         shared: &Bidirectional<'s>,
         arena: &'s Bump,
-        ((pixel, within), (eye, light)): (Film, (Stream, Stream)),
+        ((pixel, within), (camera, light)): (Film, (Stream, Stream)),
         (left, found): (&mut Deposits, &mut Found),
-        measure: &mut EyeMeasure,
+        measure: &mut PixelSample,
     ) {
         let mut vertices = LightVertices::new_in(arena);
         if shared.only.is_none_or(|only| only.light().is_some_and(|depth| depth > 0))
-            && let Some(emitted) = self.pass.emit_from(shared.eye.scene, shared.initial_media, light)
+            && let Some(emitted) = self.pass.emit_from(shared.camera_paths.scene, shared.initial_media, light)
         {
             shared.light_path_of(&self.pass, &emitted, false, &mut vertices, left, &mut ());
         }
-        if shared.only.is_none_or(|only| only.eye > 0) {
-            let mut start = shared.eye.start_at((pixel.x, pixel.y), within, eye);
+        if shared.only.is_none_or(|only| only.camera > 0) {
+            let mut start = shared.camera_paths.start_at((pixel.x, pixel.y), within, camera);
             start.wavelength_sample = self.pass.wavelength_sample_of(light);
             let meets = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
-            shared.eye_path(arena, &(start, eye), &meets, found, measure);
+            shared.camera_path(arena, &(start, camera), &meets, found, measure);
         }
     }
 
@@ -168,11 +168,11 @@ impl Walks<'_, '_> {
         (path, pixel): (u32, UVec2),
         left: &mut Deposits,
         candidates: &mut Vec<Candidate>,
-    ) -> EyeMeasure {
+    ) -> PixelSample {
         arena.reset();
         let streams = self.streams(path);
         let mut found = Found { pixel: path, ..Found::default() };
-        let mut measure = EyeMeasure::default();
+        let mut measure = PixelSample::default();
         let first = left.splats.len();
         let within = streams.0.vertex(0).two(Purpose::Pixel);
         self.walk(self.shared, arena, ((pixel, within), streams), (left, &mut found), &mut measure);
@@ -190,14 +190,14 @@ impl Walks<'_, '_> {
         let own = streams.0.vertex(OWN);
         let (mut left, mut found) = (Deposits::default(), Found::default());
         chain.during(|| {
-            let eye = ((own.one(Purpose::Division) * (segments + 1) as f32) as u32).min(segments);
+            let camera = ((own.one(Purpose::Division) * (segments + 1) as f32) as u32).min(segments);
             let film = own.two(Purpose::Film) * self.size.as_vec2();
             let pixel = film.as_uvec2().min(self.size - 1);
             found.pixel = pixel.y * self.size.x + pixel.x;
-            let shared = Bidirectional { only: Some(Division { segments, eye }), ..*self.shared };
+            let shared = Bidirectional { only: Some(Division { segments, camera }), ..*self.shared };
             let within = (film - pixel.as_vec2()).clamp(Vec2::ZERO, Vec2::splat(1.0 - f32::EPSILON));
             let start = ((pixel, within), streams);
-            self.walk(&shared, arena, start, (&mut left, &mut found), &mut EyeMeasure::default());
+            self.walk(&shared, arena, start, (&mut left, &mut found), &mut PixelSample::default());
         });
         found.splats(&left.splats);
         let deposits: SmallVec<[Deposit; 4]> = found.deposits.into_iter().map(|(_, deposit)| deposit).collect();
@@ -208,14 +208,14 @@ impl Walks<'_, '_> {
     /// A chain that starts at `candidate` and takes so many steps. What it finds, with weights that sum to one for a
     /// step, each divided by its importance.
     fn chain(&self, arena: &mut Bump, number: u64, candidate: &Candidate, steps: usize) -> Vec<Deposit> {
-        let Candidate { path, division: Division { segments, eye }, .. } = *candidate;
-        let (eyes, lights) = self.streams(path);
-        let streams = (eyes.chained(), lights.chained());
-        let mut chain = Chain::new(mix(eyes.vertex(OWN).bits(Purpose::Film) ^ mix(number)));
+        let Candidate { path, division: Division { segments, camera }, .. } = *candidate;
+        let (cameras, lights) = self.streams(path);
+        let streams = (cameras.chained(), lights.chained());
+        let mut chain = Chain::new(mix(cameras.vertex(OWN).bits(Purpose::Film) ^ mix(number)));
         let own = streams.0.vertex(OWN);
         let place = UVec2::new(path % self.size.x, path / self.size.x).as_vec2();
-        chain.set(own.id(Purpose::Film), (place + eyes.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2());
-        chain.set(own.id(Purpose::Division), Vec2::splat((eye as f32 + 0.5) / (segments + 1) as f32));
+        chain.set(own.id(Purpose::Film), (place + cameras.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2());
+        chain.set(own.id(Purpose::Division), Vec2::splat((camera as f32 + 0.5) / (segments + 1) as f32));
         let mut deposits = Vec::new();
         let mut leave = |state: &State, weight: f32| {
             if weight > 0.0 && state.importance > 0.0 {
@@ -226,7 +226,7 @@ impl Walks<'_, '_> {
         let mut current = self.state(arena, &mut chain, segments, streams);
         let mut stayed = 0.0;
         for _ in 0..steps {
-            if self.shared.eye.is_given_up() {
+            if self.shared.camera_paths.is_given_up() {
                 break;
             }
             chain.propose();
@@ -278,14 +278,20 @@ impl<'a> Metropolis<'a> {
     ) -> Metropolis<'a> {
         let (width, height) = camera.size();
         let pixels = (width * height) as f32;
-        let eye = settings.eye(scene, camera, initial_media);
-        let strategies = Strategies::BDPT;
-        let shared =
-            Bidirectional { eye, initial_media, strategies, light_paths: pixels, merged_paths: pixels, only: None };
+        let camera_paths = settings.camera_paths(scene, camera, initial_media);
+        let techniques = TechniqueSet::BDPT;
+        let shared = Bidirectional {
+            camera_paths,
+            initial_media,
+            techniques,
+            light_paths: pixels,
+            merged_paths: pixels,
+            only: None,
+        };
         let tiles = Tiles::new(camera);
-        let measures = vec![EyeMeasure::default(); tiles.count() * TILE_PIXELS];
+        let measures = vec![PixelSample::default(); tiles.count() * TILE_PIXELS];
         let levels = MergeLevels::new(std::iter::once((0.0, Eta::NONE)));
-        Metropolis { eye, settings, shared, tiles, measures, levels }
+        Metropolis { camera_paths, settings, shared, tiles, measures, levels }
     }
 
     /// One pair of walks for every pixel: all that is seen directly, direct light, and what chains can start from. Last,
@@ -299,15 +305,15 @@ impl<'a> Metropolis<'a> {
             .map(|(tile, measures)| {
                 let (mut arena, mut left, mut found) = (Bump::new(), Deposits::default(), Vec::new());
                 for place in tiles.pixels(tile) {
-                    if walks.shared.eye.is_given_up() {
+                    if walks.shared.camera_paths.is_given_up() {
                         break;
                     }
                     let index = place.index as u32;
                     let pixel = UVec2::new(index % width, index / width);
                     let measure = walks.ordinary(&mut arena, (index, pixel), &mut left, &mut found);
-                    let EyeMeasure { emission, direct, features, first, broken, .. } = measure;
+                    let PixelSample { emission, direct, features, first, broken, .. } = measure;
                     measures[place.at] =
-                        EyeMeasure { emission, direct, features, first, broken, ..EyeMeasure::default() };
+                        PixelSample { emission, direct, features, first, broken, ..PixelSample::default() };
                 }
                 (left, found)
             })
@@ -325,27 +331,27 @@ impl<'a> Metropolis<'a> {
 }
 
 impl Iterate for Metropolis<'_> {
-    fn pixels(&mut self) -> Vec<Pixel> {
-        self.settings.pixels(self.eye.scene, self.eye.camera)
+    fn pixels(&mut self) -> Vec<PixelAccumulator> {
+        self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
         let started = cpu_seconds();
         let Settings { seed, max_depth, .. } = *self.settings;
-        let (width, height) = self.eye.camera.size();
+        let (width, height) = self.camera_paths.camera.size();
         let (shared, levels) = (self.shared, self.levels);
         let walks = Walks {
             shared: &shared,
-            pass: LightPass::new(seed, i, Domain::Light, width * height, max_depth),
+            pass: LightPaths::new(seed, i, Domain::Light, width * height, max_depth),
             levels: &levels,
-            eyes: Streams::new(seed, i, Domain::EyeIndependent),
+            cameras: Streams::new(seed, i, Domain::CameraIndependent),
             lights: Streams::new(seed, i, Domain::Light),
             size: UVec2::new(width, height),
         };
         let (candidates, rejected) = self.walk_all(&walks);
         let count = (pixels.len() / STEPS).max(CHAINS);
         let steps = pixels.len().div_ceil(count);
-        let u = walks.eyes.path(u64::MAX).vertex(OWN).one_fine(Purpose::Film);
+        let u = walks.cameras.path(u64::MAX).vertex(OWN).one_fine(Purpose::Film);
         let (starts, total) = starts(&candidates, count, u);
         drop(candidates);
         let left: Vec<Vec<Deposit>> = starts
@@ -367,10 +373,10 @@ impl Iterate for Metropolis<'_> {
             };
             *into += value * scale;
         }
-        let (eye, tiles, measures) = (self.eye, self.tiles, &self.measures);
+        let (camera_paths, tiles, measures) = (self.camera_paths, self.tiles, &self.measures);
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
             let measure = &measures[tiles.slot(index as u32)];
-            pixel.see(i, || eye.seen(measure));
+            pixel.see(i, || camera_paths.seen(measure));
             pixel.add(i, measure, None);
         });
         phases.eye += cpu_seconds() - started;

@@ -4,18 +4,18 @@ use super::iterate::{Iterate, Work};
 use super::measures::{self, Measures};
 use super::techniques::{TechniquePicture, Watch, Watched};
 use super::tiles::{TILE_PIXELS, Tiles};
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
 use crate::render::settings::Settings;
-use crate::transport::{Eye, EyeMeasure, path_measure};
+use crate::transport::{CameraPaths, PixelSample, path_measure};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
 /// The passes of a render.
 pub(super) struct Paths<'a> {
-    eye: Eye<'a>,
+    camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
     tiles: Tiles,
     measures: [Measures; 1],
@@ -24,28 +24,28 @@ pub(super) struct Paths<'a> {
 
 impl<'a> Paths<'a> {
     /// Nothing done yet.
-    pub fn new(eye: Eye<'a>, settings: &'a Settings) -> Paths<'a> {
-        let tiles = Tiles::new(eye.camera);
+    pub fn new(camera_paths: CameraPaths<'a>, settings: &'a Settings) -> Paths<'a> {
+        let tiles = Tiles::new(camera_paths.camera);
         let measures = [Measures::new(tiles.count() * TILE_PIXELS, 1)];
-        Paths { eye, settings, tiles, measures, watched: Watched::new(settings, eye.scene, &tiles) }
+        Paths { camera_paths, settings, tiles, measures, watched: Watched::new(settings, camera_paths.scene, &tiles) }
     }
 
     /// Adds iteration `i` (from 1) to all pixels; false where it was given up.
-    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [Pixel], watches: &mut [W]) -> bool {
-        let (eye, tiles) = (self.eye, self.tiles);
-        let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
+    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [PixelAccumulator], watches: &mut [W]) -> bool {
+        let (camera_paths, tiles) = (self.camera_paths, self.tiles);
+        let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);
         let parts = self.measures[0].par_tiles().zip(watches.par_iter_mut());
         parts.enumerate().for_each(|(tile, (mut measures, watch))| {
-            let (mut arena, mut measure) = (Bump::new(), EyeMeasure::default());
+            let (mut arena, mut measure) = (Bump::new(), PixelSample::default());
             for places in tiles.groups(tile) {
-                if eye.is_given_up() {
+                if camera_paths.is_given_up() {
                     return;
                 }
-                let starts = eye.starts(&places, streams);
+                let starts = camera_paths.starts(&places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     arena.reset();
                     watch.begin(place.at, Some(0));
-                    path_measure(&eye, &arena, start, watch, &mut measure);
+                    path_measure(&camera_paths, &arena, start, watch, &mut measure);
                     measures.set(place.at, &measure);
                 }
             }
@@ -54,17 +54,17 @@ impl<'a> Paths<'a> {
             return false;
         }
         let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
-        measures::add(&self.measures, (&eye, i), pixels, |index| tiles.slot(index as u32), groups);
+        measures::add(&self.measures, (&camera_paths, i), pixels, |index| tiles.slot(index as u32), groups);
         true
     }
 }
 
 impl Iterate for Paths<'_> {
-    fn pixels(&mut self) -> Vec<Pixel> {
-        self.settings.pixels(self.eye.scene, self.eye.camera)
+    fn pixels(&mut self) -> Vec<PixelAccumulator> {
+        self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
         let start = cpu_seconds();
         let mut watched = std::mem::take(&mut self.watched);
         let done = match watched.begin() {

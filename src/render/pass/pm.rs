@@ -1,8 +1,8 @@
 //! Classical photon mapping \[Jensen 1996\]: photons traced once, and the nearest of caustics and of all others around
-//! every point that an eye path sees.
+//! every point that a camera path sees.
 //!
 //! As comparisons of progressive methods show it \[Hachisuka 2013\], without final gathering: direct light by
-//! next-event estimation, caustics and all other indirect light from the maps. Eye paths accumulate over iterations,
+//! next-event estimation, caustics and all other indirect light from the maps. Camera paths accumulate over iterations,
 //! the maps stay. So the picture tends to their own blurred and blotched one, never to the truth: only more photons
 //! help, and memory bounds their number. The estimated error, which is told from differences between iterations, does
 //! not know of it.
@@ -17,7 +17,7 @@ use super::measures::{self, Measures};
 use super::sppm::trace_some;
 use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
-use crate::estimator::{InitialBandwidth, Pixel};
+use crate::estimator::{InitialBandwidth, PixelAccumulator};
 use crate::math::Vec3;
 use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel, kind};
 use crate::random::{Domain, Streams};
@@ -25,7 +25,9 @@ use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::transport::{Bandwidths, Eye, Indirect, InitialMedia, LevelRadii, LightPass, Photons, Scratch, light_path};
+use crate::transport::{
+    Bandwidths, CameraPaths, Indirect, InitialMedia, LevelRadii, LightPaths, Photons, Scratch, light_path,
+};
 use bumpalo::Bump;
 
 /// Light paths traced between two looks at the memory.
@@ -39,7 +41,7 @@ pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 fn trace(
     scene: &Scene,
     initial_media: &InitialMedia,
-    pass: &LightPass,
+    pass: &LightPaths,
     most: usize,
 ) -> (ByKind<Vec<Photon>>, u32, u64) {
     let (mut photons, mut traced, mut lost): (ByKind<Vec<Photon>>, _, _) = (ByKind::default(), 0, 0);
@@ -104,7 +106,7 @@ impl Bandwidths for Neighbours<'_> {
 
 /// The passes of a render.
 pub(super) struct Pm<'a> {
-    eye: Eye<'a>,
+    camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
     initial_media: &'a InitialMedia,
     /// Built by the first iteration.
@@ -122,20 +124,20 @@ impl<'a> Pm<'a> {
         settings: &'a Settings,
         initial_media: &'a InitialMedia,
     ) -> Pm<'a> {
-        let eye = settings.eye(scene, camera, initial_media);
+        let camera_paths = settings.camera_paths(scene, camera, initial_media);
         let measures = [Measures::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
-        Pm { eye, settings, initial_media, maps: None, counted: false, measures }
+        Pm { camera_paths, settings, initial_media, maps: None, counted: false, measures }
     }
 
     /// The maps, how many light paths they are of, and what was left out.
     fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32, u64) {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
-        let pass = LightPass::new(seed, 1, Domain::Light, photons, max_depth)
-            .wanting(self.settings.of_photons(&self.eye.scene.survey), Indirect::Photons)
+        let pass = LightPaths::new(seed, 1, Domain::Light, photons, max_depth)
+            .wanting(self.settings.of_photons(&self.camera_paths.scene.survey), Indirect::Photons)
             .stopped_by(&self.settings.stop);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
-        let (photons, traced, lost) = trace(self.eye.scene, self.initial_media, &pass, most);
+        let (photons, traced, lost) = trace(self.camera_paths.scene, self.initial_media, &pass, most);
         phases.light += cpu_seconds() - start;
         let start = cpu_seconds();
         let maps = photons.map(PhotonMap::build);
@@ -146,11 +148,11 @@ impl<'a> Pm<'a> {
 }
 
 impl Iterate for Pm<'_> {
-    fn pixels(&mut self) -> Vec<Pixel> {
-        self.settings.pixels(self.eye.scene, self.eye.camera)
+    fn pixels(&mut self) -> Vec<PixelAccumulator> {
+        self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [Pixel], phases: &mut Phases) -> Option<Work> {
+    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
         let (maps, traced, rejected) = match self.maps.take() {
             Some(maps) => (maps, 0, 0),
             None => self.build(phases),
@@ -159,31 +161,31 @@ impl Iterate for Pm<'_> {
             return None;
         }
         let start = cpu_seconds();
-        let (eye, camera) = (&self.eye, self.eye.camera);
+        let (camera_paths, camera) = (&self.camera_paths, self.camera_paths.camera);
         let count = match self.settings.initial {
             InitialBandwidth::Nearest(k) => k.clamp(2, MAX_NEIGHBOURS),
             _ => self.settings.method.neighbours(1),
         };
-        let least = LEAST * eye.scene.lights.sky().radius;
-        let streams = Streams::in_sequence(self.settings.seed, i, Domain::EyeIndependent);
+        let least = LEAST * camera_paths.scene.lights.sky().radius;
+        let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(
             self.measures[0].par_parts(pixels_per_band(camera.size().0)),
             camera.size(),
             scratch,
             |(scratch, nearest), measures, places| {
-                if eye.is_given_up() {
+                if camera_paths.is_given_up() {
                     return;
                 }
-                let starts = eye.starts(places, streams);
+                let starts = camera_paths.starts(places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    measures.set(place.at, &eye.measure(scratch, start, &maps, None, neighbours, kernel::Box));
+                    measures.set(place.at, &camera_paths.measure(scratch, start, &maps, None, neighbours, kernel::Box));
                 }
             },
         );
         if !self.settings.stop.aborted() {
-            measures::add(&self.measures, (eye, i), pixels, |index| index, |_| &[]);
+            measures::add(&self.measures, (camera_paths, i), pixels, |index| index, |_| &[]);
         }
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 use crate::random::{Domain, Streams};
 use crate::scene::Scene;
 use crate::stat::median;
-use crate::transport::Eye;
+use crate::transport::CameraPaths;
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -19,21 +19,21 @@ const HELD: (f64, f32) = (0.8, 1.5);
 const WIDEST: f32 = 0.25;
 
 /// A sphere around most of what the eye's paths see, if that is little of the scene.
-pub(super) fn region(eye: &Eye<'_>, seed: u64) -> Option<Region> {
-    let Scene { lights, .. } = eye.scene;
+pub(super) fn region(camera_paths: &CameraPaths<'_>, seed: u64) -> Option<Region> {
+    let Scene { lights, .. } = camera_paths.scene;
     if !lights.emitters().iter().any(|emitter| emitter.is_infinite()) {
         return None;
     }
-    let (width, height) = eye.camera.size();
-    let camera = eye.camera.subsample((PATHS / (f64::from(width) * f64::from(height))).sqrt().min(1.0));
-    let eye = Eye { camera: &camera, ..*eye };
+    let (width, height) = camera_paths.camera.size();
+    let camera = camera_paths.camera.subsample((PATHS / (f64::from(width) * f64::from(height))).sqrt().min(1.0));
+    let camera_paths = CameraPaths { camera: &camera, ..*camera_paths };
     let (width, height) = camera.size();
     let mut seen: Vec<Option<Vec3>> = vec![None; width as usize * height as usize];
-    let streams = Streams::new(seed, 0, Domain::PilotEye);
+    let streams = Streams::new(seed, 0, Domain::PilotCamera);
     par_pixels(seen.par_chunks_mut(pixels_per_band(width)), (width, height), Bump::new, |arena, seen, places| {
-        let starts = eye.starts(places, streams);
+        let starts = camera_paths.starts(places, streams);
         for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-            seen[place.at] = eye.gather_point(arena, start).map(|point| point.p);
+            seen[place.at] = camera_paths.gather_point(arena, start).map(|point| point.p);
             arena.reset();
         }
     });

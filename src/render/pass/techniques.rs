@@ -38,11 +38,11 @@ impl TechniquePicture {
     pub fn name(&self) -> String {
         let count = |depth: u32| format!("{}{}", depth + 1, if depth >= DEEPEST { "up" } else { "" });
         match self.technique {
-            Technique::Hit { eye } => format!("hit_s0_t{}", count(eye)),
-            Technique::NextEvent { eye } => format!("nextevent_s1_t{}", count(eye)),
-            Technique::Connect { light, eye } => format!("connect_s{}_t{}", count(light), count(eye)),
+            Technique::Hit { camera } => format!("hit_s0_t{}", count(camera)),
+            Technique::NextEvent { camera } => format!("nextevent_s1_t{}", count(camera)),
+            Technique::Connect { light, camera } => format!("connect_s{}_t{}", count(light), count(camera)),
             Technique::Camera { light } => format!("camera_s{}_t1", count(light)),
-            Technique::Merge { light, eye } => format!("merge_s{}_t{}", count(light), count(eye)),
+            Technique::Merge { light, camera } => format!("merge_s{}_t{}", count(light), count(camera)),
         }
     }
 }
@@ -51,24 +51,24 @@ impl TechniquePicture {
 fn index(technique: Technique) -> usize {
     let at = |depth: u32| depth.clamp(1, DEEPEST) as usize - 1;
     match technique {
-        Technique::Hit { eye } => at(eye),
-        Technique::NextEvent { eye } => DEPTHS + at(eye),
+        Technique::Hit { camera } => at(camera),
+        Technique::NextEvent { camera } => DEPTHS + at(camera),
         Technique::Camera { light } => 2 * DEPTHS + at(light),
-        Technique::Connect { light, eye } => (3 + at(light)) * DEPTHS + at(eye),
-        Technique::Merge { light, eye } => (3 + DEPTHS + at(light)) * DEPTHS + at(eye),
+        Technique::Connect { light, camera } => (3 + at(light)) * DEPTHS + at(camera),
+        Technique::Merge { light, camera } => (3 + DEPTHS + at(light)) * DEPTHS + at(camera),
     }
 }
 
 /// The inverse of [`index`].
 fn technique(index: usize) -> Technique {
-    let (row, eye) = (index / DEPTHS, (index % DEPTHS) as u32 + 1);
+    let (row, camera) = (index / DEPTHS, (index % DEPTHS) as u32 + 1);
     let light = |row: usize| row as u32 + 1;
     match row {
-        0 => Technique::Hit { eye },
-        1 => Technique::NextEvent { eye },
-        2 => Technique::Camera { light: eye },
-        row if row < 3 + DEPTHS => Technique::Connect { light: light(row - 3), eye },
-        row => Technique::Merge { light: light(row - 3 - DEPTHS), eye },
+        0 => Technique::Hit { camera },
+        1 => Technique::NextEvent { camera },
+        2 => Technique::Camera { light: camera },
+        row if row < 3 + DEPTHS => Technique::Connect { light: light(row - 3), camera },
+        row => Technique::Merge { light: light(row - 3 - DEPTHS), camera },
     }
 }
 
@@ -241,6 +241,6 @@ mod tests {
             assert!(names.insert(picture.name()), "{}", picture.name());
         }
         assert!(names.contains("connect_s2_t7up") && names.contains("hit_s0_t2") && names.contains("camera_s7up_t1"));
-        assert_eq!(index(Technique::Merge { light: 40, eye: 2 }), index(Technique::Merge { light: 6, eye: 2 }));
+        assert_eq!(index(Technique::Merge { light: 40, camera: 2 }), index(Technique::Merge { light: 6, camera: 2 }));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::photon_counts::PhotonCounts;
 use crate::camera::GROUP_SIZE;
-use crate::estimator::{Pixel, Schedule};
+use crate::estimator::{PixelAccumulator, Schedule};
 use crate::photon::{PhotonMap, PhotonMaps, VolumePhoton};
 use crate::random::Stream;
 use crate::render::settings::Settings;
@@ -40,7 +40,7 @@ impl Maps {
         self.lost + surface + self.volume.as_ref().map_or(0, |volume| volume.map.rejected())
     }
 
-    /// The starts of eye paths that take no other wavelengths.
+    /// The starts of camera paths that take no other wavelengths.
     #[inline]
     pub fn tune(
         &self,
@@ -54,7 +54,7 @@ impl Maps {
 
     /// The photons in media for some of the levels of `pixel`.
     #[inline]
-    pub fn volume(&self, pixel: &Pixel, levels: impl Iterator<Item = usize>) -> Option<Volume<'_>> {
+    pub fn volume(&self, pixel: &PixelAccumulator, levels: impl Iterator<Item = usize>) -> Option<Volume<'_>> {
         let VolumeMap { map, schedule } = self.volume.as_ref()?;
         Some(Volume::new(map, levels.map(|level| schedule.volume_radius(pixel.volume_bandwidth, level))))
     }

@@ -3,7 +3,7 @@
 use super::control::{Control, Progress};
 use super::{Session, Stage};
 use crate::camera::Camera;
-use crate::estimator::{Pixel, QUARTERS};
+use crate::estimator::{PixelAccumulator, QUARTERS};
 use crate::render::account::Rendered;
 use crate::render::account::StopReason;
 use crate::render::settings::Settings;
@@ -23,7 +23,7 @@ pub fn render(
     scene: &Scene,
     camera: &Camera,
     settings: &Settings,
-    mut observe: impl FnMut(&Progress, &[Pixel]) -> Control,
+    mut observe: impl FnMut(&Progress, &[PixelAccumulator]) -> Control,
 ) -> Rendered {
     let stage = Stage::new(scene, camera, settings);
     let mut session = Session::new(&stage);

@@ -11,7 +11,7 @@ pub use state::State;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::estimator::bandwidth::initial_volume_bandwidths;
-use crate::estimator::{BandwidthState, Pixel};
+use crate::estimator::{BandwidthState, PixelAccumulator};
 use crate::film::{self, LayerSet};
 use crate::finish::Verdict;
 use crate::light::Guide;
@@ -56,8 +56,8 @@ impl<'a> Stage<'a> {
     /// The largest that bandwidths in media may be, by pixel: what they are without photons.
     pub fn widest_in_media(&self) -> Vec<f32> {
         let Settings { initial, widest, seed, .. } = self.settings;
-        let eye = self.settings.eye(self.scene, self.camera, &self.initial_media);
-        initial_volume_bandwidths(&eye, initial, widest[1], seed, &PhotonMap::build(Vec::new()))
+        let camera_paths = self.settings.camera_paths(self.scene, self.camera, &self.initial_media);
+        initial_volume_bandwidths(&camera_paths, initial, widest[1], seed, &PhotonMap::build(Vec::new()))
     }
 
     /// Width and height of the picture (pixels).
@@ -70,7 +70,7 @@ impl<'a> Stage<'a> {
 pub struct Session<'a> {
     stage: &'a Stage<'a>,
     passes: Box<dyn Iterate + 'a>,
-    pixels: Vec<Pixel>,
+    pixels: Vec<PixelAccumulator>,
     phases: Phases,
     spent: Spent,
     pilot_seconds: f64,
@@ -152,7 +152,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// None: it is written to memory.
-    pub fn state(&self) -> postcard::Result<State<&[Pixel]>> {
+    pub fn state(&self) -> postcard::Result<State<&[PixelAccumulator]>> {
         let rest = Rest {
             next: self.next,
             done: self.done,
@@ -281,7 +281,7 @@ impl<'a> Session<'a> {
     }
 
     /// The pixels as they are.
-    pub fn pixels(&self) -> &[Pixel] {
+    pub fn pixels(&self) -> &[PixelAccumulator] {
         &self.pixels
     }
 

@@ -1,6 +1,6 @@
 //! The whole state of a render between two iterations, as it is saved and read again.
 
-use crate::estimator::Pixel;
+use crate::estimator::PixelAccumulator;
 use crate::render::account::History;
 use crate::render::account::PhotonRecord;
 use crate::render::clock::Phases;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// The state. What follows from scene, camera and settings alone is not in it: pilots, guides, and maps of photons, which
 /// are functions of the iteration's number.
 #[derive(Debug, Serialize, Deserialize)]
-pub struct State<P = Vec<Pixel>> {
+pub struct State<P = Vec<PixelAccumulator>> {
     /// Pixels, row by row from the top.
     pub(super) pixels: P,
     /// All else.

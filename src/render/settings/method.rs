@@ -113,7 +113,7 @@ macro_rules! methods {
 
 methods! {
     /// Path tracing with next-event estimation.
-    Path = Row { name: "path", help: "Path tracing", search: Search::EyePaths, ..Row::UNBIASED };
+    Path = Row { name: "path", help: "Path tracing", search: Search::CameraPaths, ..Row::UNBIASED };
 
     /// Light tracing with connections to the camera; of eye paths only what mirrors and clear glass show of lights.
     Light = Row {

@@ -10,14 +10,14 @@ use crate::camera::Camera;
 use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::{memoryless, volume};
-use crate::estimator::{InitialBandwidth, Pixel, Schedule};
+use crate::estimator::{InitialBandwidth, PixelAccumulator, Schedule};
 use crate::photon::ByKind;
 #[cfg(doc)]
 use crate::photon::kernel;
 use crate::plan::{ClassSet, Owner, Search, classes_in};
 use crate::scene::{Scene, Survey};
 use crate::stop::Stop;
-use crate::transport::{Eye, Indirect, InitialMedia, MAX_LEVELS};
+use crate::transport::{CameraPaths, Indirect, InitialMedia, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 
 /// Iterations when no stop condition is given.
@@ -229,27 +229,27 @@ impl Settings {
     }
 
     /// The eye of a render with these settings.
-    pub(in crate::render) fn eye<'a>(
+    pub(in crate::render) fn camera_paths<'a>(
         &'a self,
         scene: &'a Scene,
         camera: &'a Camera,
         initial_media: &InitialMedia,
-    ) -> Eye<'a> {
+    ) -> CameraPaths<'a> {
         let Settings { max_depth, indirect, classes, .. } = *self;
         // Pictures per technique are summed at once, and cannot do without part of an iteration.
         let stop = (!self.techniques).then_some(&self.stop);
-        Eye { scene, camera, interior: initial_media.eye, max_depth, indirect, classes, stop }
+        CameraPaths { scene, camera, interior: initial_media.camera, max_depth, indirect, classes, stop }
     }
 
     /// What makes its pixels before the first iteration, from their largest initial bandwidths.
-    pub(in crate::render) fn pixel(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> Pixel + use<> {
+    pub(in crate::render) fn pixel(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.power_exponent());
         let groups = self.light_groups(scene);
-        move |bandwidths| Pixel::new(levels, exponent, bandwidths).with_groups(groups)
+        move |bandwidths| PixelAccumulator::new(levels, exponent, bandwidths).with_groups(groups)
     }
 
     /// All pixels before the first iteration, of methods without bandwidths of pixels.
-    pub(in crate::render) fn pixels(&self, scene: &Scene, camera: &Camera) -> Vec<Pixel> {
+    pub(in crate::render) fn pixels(&self, scene: &Scene, camera: &Camera) -> Vec<PixelAccumulator> {
         let (width, height) = camera.size();
         vec![self.pixel(scene)([0.0; 2]); width as usize * height as usize]
     }

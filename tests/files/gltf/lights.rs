@@ -160,7 +160,7 @@ fn clip_planes() {
     let told = |camera: Value, at: [f64; 3]| {
         let mut file = Glb::new();
         file.push("cameras", camera);
-        file.node(json!({"name": "Eye", "camera": 0, "translation": at}));
+        file.node(json!({"name": "CameraPaths", "camera": 0, "translation": at}));
         let mesh = file.cube("cube", None);
         file.node(json!({"mesh": mesh}));
         read(&file).warnings
@@ -169,11 +169,11 @@ fn clip_planes() {
     let orthographic = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.5, "zfar": 3}});
     // The cube's near face is at a depth of 4, its far one at 6.
     let ahead = [0.0, 0.0, 5.0];
-    let near = "camera \"Eye\": what is nearer than its znear of 4.5 m is shown all the same: clip planes are ignored \
+    let near = "camera \"CameraPaths\": what is nearer than its znear of 4.5 m is shown all the same: clip planes are ignored \
                 (hide or remove it)";
     let far = |zfar: &str| {
         format!(
-            "camera \"Eye\": what is farther than its zfar of {zfar} m is shown all the same: clip planes are ignored (hide or \
+            "camera \"CameraPaths\": what is farther than its zfar of {zfar} m is shown all the same: clip planes are ignored (hide or \
                  remove it)"
         )
     };

@@ -147,7 +147,7 @@ fn suns_and_environments_in_different_units() {
 fn lamps_without_size_behind_glass() {
     let globe = || with(lit(), "Globe", sphere(Vec3::new(0.0, 3.0, 0.0), 0.5, 16), glass(1.5));
     silent(globe());
-    let warnings = plan_by(globe(), Search::EyePaths).warnings;
+    let warnings = plan_by(globe(), Search::CameraPaths).warnings;
     assert_eq!(
         warnings.last().map(String::as_str),
         Some(
@@ -157,9 +157,9 @@ fn lamps_without_size_behind_glass() {
     );
     let mut sized = globe();
     sized.lights[0].radius = 0.1;
-    assert_eq!(plan_by(sized, Search::EyePaths).warnings, [""; 0]);
+    assert_eq!(plan_by(sized, Search::CameraPaths).warnings, [""; 0]);
     // Glass beside the lamp, not around it.
-    let beside = plan_by(ball(glass(1.5)), Search::EyePaths).warnings;
+    let beside = plan_by(ball(glass(1.5)), Search::CameraPaths).warnings;
     assert!(beside.iter().all(|warning| !warning.contains("% of its light")), "{beside:?}");
 }
 

@@ -2,11 +2,11 @@
 
 use super::room;
 use caustique::bsdf::{LobeSet, Transport};
-use caustique::plan::{Event, EyeSuffix, LightPrefix, Owner, PathClass, Search};
+use caustique::plan::{CameraSuffix, Event, LightPrefix, Owner, PathClass, Search};
 use caustique::random::{Domain, Stream};
 use caustique::scene::{Scene, gltf};
 use caustique::transport::{
-    Eye, Indirect, InitialMedia, LightPass, MediumVertex, Next, Scattered, Vertex, Visitor, walk,
+    CameraPaths, Indirect, InitialMedia, LightPaths, MediumVertex, Next, Scattered, Vertex, Visitor, walk,
 };
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -87,13 +87,13 @@ fn random_paths(scene: &Scene, walks: u32, found: &mut HashSet<Whole>) {
     let camera = scene.camera(&crate::support::scenes::square(64)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
     let classes = caustique::plan::ClassSet::ALL;
-    let (interior, indirect) = (initial_media.eye, Indirect::Photons);
-    let eye = Eye { scene, camera: &camera, interior, max_depth: 7, indirect, classes, stop: None };
-    let pass = LightPass::new(5, 0, Domain::Test, walks, 7);
+    let (interior, indirect) = (initial_media.camera, Indirect::Photons);
+    let camera_paths = CameraPaths { scene, camera: &camera, interior, max_depth: 7, indirect, classes, stop: None };
+    let pass = LightPaths::new(5, 0, Domain::Test, walks, 7);
     for index in 0..walks {
         let arena = bumpalo::Bump::new();
         let stream = Stream::new(3, 0, Domain::Test, u64::from(index));
-        let start = eye.start((index % 64, index / 64 % 64), stream);
+        let start = camera_paths.start((index % 64, index / 64 % 64), stream);
         let mut scribe = Scribe { scene, sofar: String::new(), last: None, from_light: None, found };
         walk(scene, &arena, &start, stream, Transport::Radiance, 7, &mut scribe);
         if let Some(emitted) = pass.emit(scene, &initial_media, index) {
@@ -135,18 +135,18 @@ fn counted(search: Search, (path, sizeless): &Whole) -> Vec<Owner> {
         };
         reached && left && !after.is_empty() && "SBV".contains(what)
     };
-    let by_eye = match search {
-        Search::EyePaths => lit || run_into,
+    let by_camera = match search {
+        Search::CameraPaths => lit || run_into,
         Search::PathsAndPhotons => match path.rfind('B') {
             Some(last) => last + 1 == path.len(),
             None => lit || run_into,
         },
         _ => narrow(&path[..path.len() - 1]) && (lit || (run_into && narrow(path))),
     };
-    if by_eye {
+    if by_camera {
         owners.push(Owner::Lit);
     }
-    if search != Search::EyePaths {
+    if search != Search::CameraPaths {
         owners.extend(path.char_indices().filter(|(at, what)| gathers(*at, *what)).map(|_| Owner::Photons));
     }
     owners
@@ -158,7 +158,7 @@ fn faults(paths: &HashSet<Whole>, search: Search, counted: impl Fn(&Whole) -> Ve
     // Without photons nobody finds a light without size by a mirror; eye paths that go on are not for media that
     // scatter; a map holds none of them.
     let invisible = |(path, sizeless): &Whole| {
-        *sizeless && (delta(path) || (search == Search::EyePaths && path.ends_with(['C', 'M'])))
+        *sizeless && (delta(path) || (search == Search::CameraPaths && path.ends_with(['C', 'M'])))
     };
     let beyond = |(path, _): &Whole| search == Search::PathsAndPhotons && path.contains('V');
     let wrong = |whole: &&Whole| counted(whole) != Vec::from_iter(search.owner(class(whole)));
@@ -166,7 +166,7 @@ fn faults(paths: &HashSet<Whole>, search: Search, counted: impl Fn(&Whole) -> Ve
     all.map(|whole| format!("{whole:?} {:?}: {:?}", class(whole), counted(whole))).collect()
 }
 
-const SEARCHES: [Search; 3] = [Search::EyePaths, Search::Photons, Search::PathsAndPhotons];
+const SEARCHES: [Search; 3] = [Search::CameraPaths, Search::Photons, Search::PathsAndPhotons];
 
 /// Of the scenes that are shipped, and of a room with everything.
 fn all_paths() -> HashSet<Whole> {
@@ -189,7 +189,7 @@ fn random_paths_have_one_class_and_one_owner() {
         *numbers.entry(class).or_insert(0u32) += 1;
         // From both sides, wherever they meet.
         for (at, _) in path.char_indices().filter(|(_, c)| "SBV".contains(*c)) {
-            let sight = path[..=at].chars().map(event).fold(EyeSuffix::START, EyeSuffix::then);
+            let sight = path[..=at].chars().map(event).fold(CameraSuffix::START, CameraSuffix::then);
             let beam = path[at + 1..].chars().rev().map(event).fold(LightPrefix::start(*sizeless), LightPrefix::then);
             assert_eq!(sight.class_with(beam), class, "{path} {sizeless} at {at}");
         }
@@ -247,7 +247,7 @@ fn planted_faults_are_found() {
 #[test]
 fn every_class_has_an_owner_in_every_plan() {
     let searches = [
-        Search::EyePaths,
+        Search::CameraPaths,
         Search::LightPaths,
         Search::Connections,
         Search::Map,

@@ -1,12 +1,12 @@
 //! Sums over iterations: those of pixels, of their squares, and as many terms as are allowed.
 
 use super::exact::Exact;
-use caustique::estimator::Pixel;
+use caustique::estimator::PixelAccumulator;
 use caustique::math::{DVec3, Rgb};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::stat::sum::{Grid, MAX_TERMS, Sum};
 use caustique::stat::{Grids, Moments};
-use caustique::transport::EyeMeasure;
+use caustique::transport::PixelSample;
 
 const MILLION: u32 = 1_000_000;
 
@@ -72,13 +72,13 @@ fn as_many_terms_as_are_allowed_lose_no_digit() {
 /// rejected: means are zero or what they must be, variances and errors are numbers, and counts are right.
 #[test]
 fn pixels_that_see_nothing() {
-    let pixel = |measure: &dyn Fn(u32) -> EyeMeasure| {
-        let mut pixel = Pixel::new(1, 0, [1.0; 2]);
+    let pixel = |measure: &dyn Fn(u32) -> PixelSample| {
+        let mut pixel = PixelAccumulator::new(1, 0, [1.0; 2]);
         (1..=MILLION).for_each(|pass| pixel.add(u64::from(pass), &measure(pass), None));
         pixel
     };
-    let light = |direct: Rgb| EyeMeasure { direct, ..EyeMeasure::default() };
-    let never = pixel(&|_| EyeMeasure::default());
+    let light = |direct: Rgb| PixelSample { direct, ..PixelSample::default() };
+    let never = pixel(&|_| PixelSample::default());
     assert_eq!((never.iterations, never.mean(0), never.variance_of_mean(0)), (MILLION, DVec3::ZERO, DVec3::ZERO));
     assert_eq!((never.depth(), never.albedo(), never.coverage.hit_fraction()), (None, DVec3::ZERO, 0.0));
     let once = pixel(&|pass| light(if pass == 77 { Rgb::splat(3e30) } else { Rgb::ZERO }));

@@ -7,7 +7,7 @@ use caustique::math::{DVec3, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::scene::Description;
 use caustique::transport::mis::{self, End, Eta, Merges, MisState, one_merge};
-use caustique::transport::{InitialMedia, LightPass, Strategies};
+use caustique::transport::{InitialMedia, LightPaths, TechniqueSet};
 
 const PATHS: u64 = 100_000;
 const LIGHT_PATHS: f32 = 1e6;
@@ -43,14 +43,14 @@ impl Chain {
     }
 
     /// Weights of all strategies; with a planted bug the cosines of light paths' arrivals are forgotten.
-    fn weights(&self, which: &Strategies, eta: Eta, bug: bool) -> Vec<f32> {
+    fn weights(&self, which: &TechniqueSet, eta: Eta, bug: bool) -> Vec<f32> {
         let (k, light) = (self.vertices.len(), &self.light);
         let [cos, to_eye, to_light] = [0, 1, 2].map(|part| move |j: usize| self.vertices[j][part]);
-        let by_light = |j: usize| which.light_merge(j as u32 + 1);
-        let by_eye = |j: usize| which.eye_merge((k - j) as u32, j + 1 == k);
+        let by_light = |j: usize| which.light_vertex_merge(j as u32 + 1);
+        let by_camera = |j: usize| which.camera_vertex_merge((k - j) as u32, j + 1 == k);
         // Densities per area of arriving at a vertex from either side.
         let from_light = |j: usize| if j == 0 { light.onward } else { to_eye(j - 1) } * (cos(j) / self.distance2[j]);
-        let from_eye =
+        let from_camera =
             |j: usize| if j + 1 == k { self.camera } else { to_light(j + 1) } * (cos(j) / self.distance2[j + 1]);
         let (mut lights, mut eyes) = (Vec::new(), vec![MisState::default(); k]);
         let mut mis = MisState::light(light);
@@ -63,22 +63,22 @@ impl Chain {
         for j in (0..k).rev() {
             mis = mis.arrive(self.distance2[j + 1], cos(j));
             eyes[j] = mis;
-            mis = mis.scatter(cos(j), to_light(j), to_eye(j), by_eye(j));
+            mis = mis.scatter(cos(j), to_light(j), to_eye(j), by_camera(j));
         }
         let solid = self.distance2[0] / light.cos;
         let arrival = light.onward * (cos(0) / self.distance2[0]);
         let mut all = vec![
             mis::hit(&mis.arrive(self.distance2[0], light.cos), light).weight(eta),
             mis::next_event(&eyes[0], (to_light(0), to_eye(0)), (light.direct * solid, arrival), false).weight(eta),
-            mis::camera(&lights[k - 1], from_eye(k - 1), LIGHT_PATHS, to_light(k - 1)).weight(eta),
+            mis::camera(&lights[k - 1], from_camera(k - 1), LIGHT_PATHS, to_light(k - 1)).weight(eta),
         ];
         for s in 1..k {
             let end = |mis, reverse_pdf_w, arrival_pdf_a, merges| End { mis, reverse_pdf_w, arrival_pdf_a, merges };
-            let light = end(&lights[s - 1], to_light(s - 1), from_eye(s - 1), by_light(s - 1));
-            all.push(mis::connect(&light, &end(&eyes[s], to_eye(s), from_light(s), by_eye(s))).weight(eta));
+            let light = end(&lights[s - 1], to_light(s - 1), from_camera(s - 1), by_light(s - 1));
+            all.push(mis::connect(&light, &end(&eyes[s], to_eye(s), from_light(s), by_camera(s))).weight(eta));
         }
         for m in 0..k {
-            if by_light(m) != Merges::ZERO && by_eye(m) != Merges::ZERO {
+            if by_light(m) != Merges::ZERO && by_camera(m) != Merges::ZERO {
                 let own = one_merge(m + 1 == k);
                 all.push(mis::merge(&lights[m], &eyes[m], to_light(m), to_eye(m), own).merge_weight(eta));
             }
@@ -90,7 +90,7 @@ impl Chain {
 /// Each weight is a number from 0 to 1 and all sum to one, whatever the densities and the bandwidth.
 #[test]
 fn weights_of_any_densities_sum_to_one() {
-    let strategies = Strategies::VCM;
+    let techniques = TechniqueSet::VCM;
     let (mut worst, mut planted) = (0.0f64, 0.0f64);
     for index in 0..PATHS {
         let chain = Chain::new(index);
@@ -99,14 +99,14 @@ fn weights_of_any_densities_sum_to_one() {
             1 => Eta::new(1e-10, LIGHT_PATHS).sharing(7.0),
             _ => Eta::new(10.0, LIGHT_PATHS),
         };
-        let strategies = if index % 3 == 0 { Strategies::BDPT } else { strategies };
-        let weights = chain.weights(&strategies, eta, false);
+        let techniques = if index % 3 == 0 { TechniqueSet::BDPT } else { techniques };
+        let weights = chain.weights(&techniques, eta, false);
         assert!(weights.iter().all(|weight| (0.0..=1.0 + 1e-6).contains(weight)), "path {index}: {weights:?}");
         let sum = |weights: &[f32]| weights.iter().map(|weight| f64::from(*weight)).sum::<f64>();
         let error = (sum(&weights) - 1.0).abs();
         assert!(error < TOLERANCE, "path {index}: {weights:?} sum to 1 + {error:e}");
         worst = worst.max(error);
-        planted = planted.max((sum(&chain.weights(&strategies, eta, true)) - 1.0).abs());
+        planted = planted.max((sum(&chain.weights(&techniques, eta, true)) - 1.0).abs());
     }
     println!("{PATHS} paths: sums off by {worst:.1e}, with a cosine forgotten by {planted:.1e}");
     assert!(planted > 100.0 * TOLERANCE, "{planted:e}");
@@ -132,7 +132,7 @@ fn guided_starts_share_out_all_light() {
     for all in [true, false] {
         let guide = Guide::new(&scene.lights, all).expect("there is something to guide to");
         const STARTS: u32 = 1_000_000;
-        let pass = LightPass::new(5, 1, Domain::Light, STARTS, 8).guided(Some(&guide));
+        let pass = LightPaths::new(5, 1, Domain::Light, STARTS, 8).guided(Some(&guide));
         let (mut sum, mut squares) = (0.0, 0.0);
         for emitted in (0..STARTS).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
             assert!(emitted.ratio > 0.0 && emitted.weight > 0.0 && (0.0..=1.0 + 1e-5).contains(&emitted.unaimed));

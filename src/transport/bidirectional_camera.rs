@@ -1,10 +1,10 @@
-//! Eye paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass
+//! Camera paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass
 //! before.
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};
+use super::camera_paths::{CameraPaths, Features, PixelSample};
 use super::cause::Cause;
-use super::eye::{Eye, EyeMeasure, Features};
 use super::glow::Glow;
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
@@ -25,7 +25,7 @@ use crate::random::{Purpose, Stream, mix};
 use crate::stop::Stop;
 use bumpalo::Bump;
 
-/// What an eye path meets.
+/// What a camera path meets.
 pub struct CameraWalkContext<'a> {
     /// Vertices of its light path.
     pub vertices: &'a [LightVertex<'a>],
@@ -38,7 +38,7 @@ pub struct CameraWalkContext<'a> {
 /// Vertices between two looks at whether the iteration is given up.
 const LOOK: u32 = 64;
 
-struct EyeWalk<'a, R> {
+struct CameraWalk<'a, R> {
     shared: &'a Bidirectional<'a>,
     meets: &'a CameraWalkContext<'a>,
     mis: MisState,
@@ -47,13 +47,18 @@ struct EyeWalk<'a, R> {
     last: Receiver,
     /// Its depth.
     depth: u32,
-    measure: &'a mut EyeMeasure,
+    measure: &'a mut PixelSample,
     record: &'a mut R,
 }
 
 /// The first hit and the features of a path that arrives at `vertex`.
 #[inline]
-pub(super) fn look(trail: &mut Trail, vertex: &Vertex<'_, '_>, scattered: Option<Scattered>, measure: &mut EyeMeasure) {
+pub(super) fn look(
+    trail: &mut Trail,
+    vertex: &Vertex<'_, '_>,
+    scattered: Option<Scattered>,
+    measure: &mut PixelSample,
+) {
     match scattered {
         None => measure.first = Some(FirstHit { p: vertex.surface.p, instance: vertex.surface.instance }),
         Some(scattered) => trail.scattered(scattered.lobe),
@@ -76,7 +81,7 @@ pub(super) fn look_in_medium(
     trail: &mut Trail,
     vertex: &MediumVertex,
     scattered: Option<Scattered>,
-    measure: &mut EyeMeasure,
+    measure: &mut PixelSample,
 ) {
     match scattered {
         None => measure.first = vertex.met.first,
@@ -88,7 +93,7 @@ pub(super) fn look_in_medium(
     }
 }
 
-impl<R: Record> EyeWalk<'_, R> {
+impl<R: Record> CameraWalk<'_, R> {
     /// Whether a technique has found light that is worth a ray. What is no number rejects the sample.
     #[inline]
     fn finds(&mut self, technique: Technique, light: Rgb) -> bool {
@@ -114,23 +119,23 @@ impl<R: Record> EyeWalk<'_, R> {
     #[inline]
     fn run_into(&mut self, (value, group): (Rgb, Group), depth: u32, at: Vec3, density: &EmissionDensity) {
         let class = self.trail.sight.class_at_light(false);
-        if !self.shared.hits_at(self.depth) || !self.shared.eye.classes.has(class) {
+        if !self.shared.hits_at(self.depth) || !self.shared.camera_paths.classes.has(class) {
             return;
         }
         let ratios = if self.trail.delta {
             Ratios::ALONE
-        } else if self.shared.strategies.connect {
+        } else if self.shared.techniques.connect {
             mis::hit(&self.mis, density)
         } else {
             return;
         };
-        self.record.contribution(Technique::Hit { eye: depth }, value, at, ratios);
-        self.add(Technique::Hit { eye: self.depth }, (class, group), value, ratios);
+        self.record.contribution(Technique::Hit { camera: depth }, value, at, ratios);
+        self.add(Technique::Hit { camera: self.depth }, (class, group), value, ratios);
     }
 
     #[inline]
     fn next_event<S: ScatterPoint>(&mut self, vertex: &S) {
-        let Eye { scene, classes, .. } = self.shared.eye;
+        let CameraPaths { scene, classes, .. } = self.shared.camera_paths;
         let (draws, seen) = (vertex.draws(), (self.trail.sight, LightPrefix::start(false)));
         if !wanted(vertex, seen.0, seen.1, classes) {
             return;
@@ -143,7 +148,7 @@ impl<R: Record> EyeWalk<'_, R> {
         };
         let (f, pdf) = vertex.evaluate_cos(light.wi, Transport::Radiance, LobeSet::ALL);
         let value = vertex.throughput() * f * light.radiance / light.pdf_w;
-        let technique = Technique::NextEvent { eye: vertex.depth() };
+        let technique = Technique::NextEvent { camera: vertex.depth() };
         if !self.finds(technique, value) {
             return;
         }
@@ -164,20 +169,20 @@ impl<R: Record> EyeWalk<'_, R> {
 
     #[inline]
     fn connect<S: ScatterPoint>(&mut self, vertex: &S, light: &LightVertex<'_>) {
-        let Bidirectional { eye, strategies, .. } = self.shared;
+        let Bidirectional { camera_paths, techniques, .. } = self.shared;
         let to = light.p() - vertex.p();
         let distance2 = to.length_squared();
         let distance = distance2.sqrt();
         let d = to / distance;
         let (f_eye, pdf_eye) = vertex.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
-        let technique = Technique::Connect { light: light.depth, eye: vertex.depth() };
+        let technique = Technique::Connect { light: light.depth, camera: vertex.depth() };
         if !self.finds(technique, f_eye) {
             return;
         }
         let (f_light, pdf_light) = light.evaluate_cos(-d);
         let sight = self.trail.sight;
-        let shares = || connected(vertex, light, sight, (d, f_eye, f_light), eye.classes);
-        if !eye.classes.is_all() && shares().is_empty() {
+        let shares = || connected(vertex, light, sight, (d, f_eye, f_light), camera_paths.classes);
+        if !camera_paths.classes.is_all() && shares().is_empty() {
             return;
         }
         let mut value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
@@ -189,9 +194,9 @@ impl<R: Record> EyeWalk<'_, R> {
         }
         // Every pair of vertices has its own decisions at cut-outs.
         let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
-        let token = told(eye.scene, bits as u32, false);
+        let token = told(camera_paths.scene, bits as u32, false);
         let end = Some(light.shadow_end(-d, distance));
-        let way = vertex.shadow_ray_to(eye.scene, d, end, token, light.in_medium(), light.touching());
+        let way = vertex.shadow_ray_to(camera_paths.scene, d, end, token, light.in_medium(), light.touching());
         if !is_lit(way.left) {
             return;
         }
@@ -201,7 +206,7 @@ impl<R: Record> EyeWalk<'_, R> {
                 mis: &light.mis,
                 reverse_pdf_w: light.reverse_pdf(-d),
                 arrival_pdf_a: pdf_eye * cos_light / distance2 * way.flight.forward,
-                merges: if light.in_medium() { Merges::ZERO } else { strategies.light_merge(light.depth) },
+                merges: if light.in_medium() { Merges::ZERO } else { techniques.light_vertex_merge(light.depth) },
             },
             &End {
                 mis: &self.mis,
@@ -210,7 +215,7 @@ impl<R: Record> EyeWalk<'_, R> {
                 merges: if S::IN_MEDIUM {
                     Merges::ZERO
                 } else {
-                    strategies.eye_merge(vertex.depth(), self.trail.delta)
+                    techniques.camera_vertex_merge(vertex.depth(), self.trail.delta)
                 },
             },
         );
@@ -223,13 +228,13 @@ impl<R: Record> EyeWalk<'_, R> {
     /// Next-event estimation and connections.
     #[inline]
     fn connect_all(&mut self, vertex: &impl ScatterPoint) {
-        if !self.shared.connects_eye(vertex.depth()) {
+        if !self.shared.connects_camera_vertex(vertex.depth()) {
             return;
         }
         if self.shared.next_event() {
             self.next_event(vertex);
         }
-        let longest = self.shared.eye.max_depth - vertex.depth();
+        let longest = self.shared.camera_paths.max_depth - vertex.depth();
         for light in self.meets.vertices.iter().take_while(|light| light.depth < longest) {
             self.connect(vertex, light);
         }
@@ -238,38 +243,38 @@ impl<R: Record> EyeWalk<'_, R> {
     /// What a segment's length does to densities; rays of an orthographic camera do not spread.
     #[inline]
     fn distance2(&self, distance: f32, scattered: Option<Scattered>) -> f32 {
-        if scattered.is_none() && self.shared.eye.camera.is_orthographic() { 1.0 } else { distance * distance }
+        if scattered.is_none() && self.shared.camera_paths.camera.is_orthographic() { 1.0 } else { distance * distance }
     }
 
     /// Whether the work of a path that has grown long is in vain.
     #[inline]
     fn is_given_up(&self, depth: u32) -> bool {
-        depth.is_multiple_of(LOOK) && self.shared.eye.stop.is_some_and(Stop::should_abort)
+        depth.is_multiple_of(LOOK) && self.shared.camera_paths.stop.is_some_and(Stop::should_abort)
     }
 }
 
-impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
+impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
-        let Bidirectional { eye, strategies, .. } = self.shared;
+        let Bidirectional { camera_paths, techniques, .. } = self.shared;
         look(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
         self.mis = self.mis.arrive(self.distance2(vertex.distance, scattered), cos).fly(vertex.flight);
         if let Some((radiance, density)) =
-            eye.scene.lights.emitted(&eye.scene.materials, &self.last, vertex.surface, vertex.wo)
+            camera_paths.scene.lights.emitted(&camera_paths.scene.materials, &self.last, vertex.surface, vertex.wo)
         {
-            let group = eye.scene.lights.surface_group(vertex.surface);
+            let group = camera_paths.scene.lights.surface_group(vertex.surface);
             self.run_into((vertex.throughput * radiance, group), vertex.depth, vertex.surface.p, &density);
         }
         let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
-        if smooth && vertex.depth < eye.max_depth {
-            if strategies.connect {
+        if smooth && vertex.depth < camera_paths.max_depth {
+            if techniques.connect {
                 self.connect_all(vertex);
             }
-            if let (true, Some(photons)) = (strategies.eye_merges(vertex.depth), self.meets.photons) {
+            if let (true, Some(photons)) = (techniques.camera_vertex_merges(vertex.depth), self.meets.photons) {
                 let measure = &mut *self.measure;
-                let longest = eye.max_depth - vertex.depth;
+                let longest = camera_paths.max_depth - vertex.depth;
                 let add = |class: PathClass, level: usize, radiance: Rgb| {
                     *match class.part() {
                         Part::Volume => &mut measure.volume_photons[level],
@@ -280,7 +285,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
                     } += radiance;
                 };
                 let own = one_merge(self.trail.delta);
-                let seen = (self.trail.sight, eye.classes);
+                let seen = (self.trail.sight, camera_paths.classes);
                 let merging = (photons, self.meets.levels);
                 if !merge_photons(merging, vertex, (&self.mis, own), seen, longest, self.record, add) {
                     self.measure.reject(Cause::Photons);
@@ -289,16 +294,19 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         }
         self.trail.leave(Some(vertex.shading.bsdf.lobes()));
         // One that is to run into a light has its end there.
-        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) || self.is_given_up(vertex.depth) {
+        if !self.trail.leads(camera_paths.classes)
+            || self.shared.ends_camera_path(vertex.depth)
+            || self.is_given_up(vertex.depth)
+        {
             return Next::Stop;
         }
         self.last = vertex.receiver();
         // Without connections and merging only what mirrors and clear glass show is left to find.
-        Next::Continue(if strategies.connect || strategies.merge { LobeSet::ALL } else { LobeSet::DELTA })
+        Next::Continue(if techniques.connect || techniques.merge { LobeSet::ALL } else { LobeSet::DELTA })
     }
 
     fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
-        let (lights, materials) = (&self.shared.eye.scene.lights, &self.shared.eye.scene.materials);
+        let (lights, materials) = (&self.shared.camera_paths.scene.lights, &self.shared.camera_paths.scene.materials);
         let Some((radiance, density)) = lights.emitted(materials, &self.last, &glow.surface, glow.wo) else { return };
         let before = (self.mis, self.trail, self.depth);
         if let Some(scattered) = scattered {
@@ -322,26 +330,29 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
-        let merges = self.shared.strategies.eye_merge(vertex.depth, self.trail.delta);
+        let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.trail.delta);
         self.mis = scatter(self.mis, vertex, sample, Transport::Importance, merges);
     }
 
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        let Bidirectional { eye, strategies, .. } = self.shared;
+        let Bidirectional { camera_paths, techniques, .. } = self.shared;
         look_in_medium(&mut self.trail, vertex, scattered, self.measure);
         self.depth = vertex.depth;
         self.mis = self.mis.arrive(self.distance2(vertex.met.distance, scattered), 1.0).fly(vertex.flight);
-        if strategies.connect && vertex.depth < eye.max_depth {
+        if techniques.connect && vertex.depth < camera_paths.max_depth {
             self.connect_all(vertex);
         }
         self.trail.leave(None);
-        if !self.trail.leads(eye.classes) || self.shared.ends_eye(vertex.depth) || self.is_given_up(vertex.depth) {
+        if !self.trail.leads(camera_paths.classes)
+            || self.shared.ends_camera_path(vertex.depth)
+            || self.is_given_up(vertex.depth)
+        {
             return Next::Stop;
         }
         self.last = vertex.receiver();
         // As on surfaces: only mirrors and clear glass show what light tracing does not find.
-        if strategies.connect || strategies.merge { Next::Continue(LobeSet::ALL) } else { Next::Stop }
+        if techniques.connect || techniques.merge { Next::Continue(LobeSet::ALL) } else { Next::Stop }
     }
 
     #[inline]
@@ -356,7 +367,7 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
         }
         self.depth += 1;
         self.mis = self.mis.fly(flight);
-        let lights = &self.shared.eye.scene.lights;
+        let lights = &self.shared.camera_paths.scene.lights;
         let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
         lights.for_each_infinite(&last, direction, scattered.is_none(), |radiance, direct, start, group| {
             let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
@@ -366,20 +377,20 @@ impl<'a, R: Record> Visitor<'a> for EyeWalk<'_, R> {
 }
 
 impl Bidirectional<'_> {
-    /// Walks an eye path and measures all levels, into `measure` in place of what was there.
+    /// Walks a camera path and measures all levels, into `measure` in place of what was there.
     #[inline]
-    pub fn eye_path<R: Record>(
+    pub fn camera_path<R: Record>(
         &self,
         arena: &Bump,
         (start, stream): &(PathStart, Stream),
         meets: &CameraWalkContext<'_>,
         record: &mut R,
-        measure: &mut EyeMeasure,
+        measure: &mut PixelSample,
     ) {
-        *measure = EyeMeasure::default();
-        let eye = &self.eye;
-        let pdf_w = eye.camera.pdf_w(start.direction) * self.pixels();
-        let mut visitor = EyeWalk {
+        *measure = PixelSample::default();
+        let camera_paths = &self.camera_paths;
+        let pdf_w = camera_paths.camera.pdf_w(start.direction) * self.pixels();
+        let mut visitor = CameraWalk {
             shared: self,
             meets,
             mis: MisState::camera(self.light_paths, pdf_w),
@@ -389,6 +400,6 @@ impl Bidirectional<'_> {
             measure,
             record,
         };
-        walk(eye.scene, arena, start, *stream, Transport::Radiance, eye.max_depth, &mut visitor);
+        walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut visitor);
     }
 }

@@ -6,7 +6,7 @@ use crate::photon::ByKind;
 use crate::random;
 use crate::stat::sum::Term;
 use crate::stat::{Grids, Moments, Sum, Total, variance_of_mean};
-use crate::transport::{Cause, EyeMeasure, MAX_LEVELS};
+use crate::transport::{Cause, MAX_LEVELS, PixelSample};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
@@ -46,9 +46,9 @@ struct Quarter {
 }
 
 /// Statistics of one pixel over the iterations so far. All of it are sums and counts that do not depend on the order of
-/// iterations: those of disjoint iterations join to the ones of all ([`Pixel::join`]).
+/// iterations: those of disjoint iterations join to the ones of all ([`PixelAccumulator::join`]).
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Pixel {
+pub struct PixelAccumulator {
     /// Grids of all sums of light.
     grids: Grids,
     /// Squares of the own image's estimates; their sum is that of the quarters.
@@ -65,16 +65,16 @@ pub struct Pixel {
     parts: [Sum<DVec3>; PARTS],
     /// Light of each group of lights, and its caustics.
     groups: Box<[[Sum<DVec3>; 2]]>,
-    /// Sums of G-buffers over all eye paths.
+    /// Sums of G-buffers over all camera paths.
     albedo: DVec3,
     normal: DVec3,
     /// Sum over those paths that have such a hit.
     depth: Total,
-    /// Eye paths whose measure was finite.
+    /// Camera paths whose measure was finite.
     features: u32,
     /// Those of them with a hit that is not a perfect mirror or clear glass.
     depths: u32,
-    /// First hits of all eye paths.
+    /// First hits of all camera paths.
     pub coverage: Coverage,
     /// Iterations counted.
     pub iterations: u32,
@@ -105,33 +105,35 @@ impl Default for FirstSeen {
     }
 }
 
-impl Pixel {
+impl PixelAccumulator {
     /// A pixel of an image of so many levels before its first iteration. Sums of light scale exactly with it by powers
     /// of two if `exponent`, that of the scene's light, does ([`Grids::new`]).
-    pub fn new(levels: usize, exponent: i32, bandwidths: ByKind<f32>) -> Pixel {
-        let others = vec![Moments::default(); Pixel::others(levels)].into_boxed_slice();
-        Pixel { grids: Grids::new(exponent), others, bandwidths, ..Pixel::default() }
+    pub fn new(levels: usize, exponent: i32, bandwidths: ByKind<f32>) -> PixelAccumulator {
+        let others = vec![Moments::default(); PixelAccumulator::others(levels)].into_boxed_slice();
+        PixelAccumulator { grids: Grids::new(exponent), others, bandwidths, ..PixelAccumulator::default() }
     }
 
     /// With so many groups of lights.
     #[must_use]
-    pub fn with_groups(self, groups: usize) -> Pixel {
-        Pixel { groups: vec![[Sum::default(); 2]; groups].into_boxed_slice(), ..self }
+    pub fn with_groups(self, groups: usize) -> PixelAccumulator {
+        PixelAccumulator { groups: vec![[Sum::default(); 2]; groups].into_boxed_slice(), ..self }
     }
 
     /// Bytes of a pixel with so many levels and groups.
     pub fn bytes(levels: usize, groups: usize) -> usize {
-        size_of::<Pixel>() + Pixel::others(levels) * size_of::<Moments>() + groups * size_of::<[Sum<DVec3>; 2]>()
+        size_of::<PixelAccumulator>()
+            + PixelAccumulator::others(levels) * size_of::<Moments>()
+            + groups * size_of::<[Sum<DVec3>; 2]>()
     }
 
     /// Bytes of this one.
     pub fn size(&self) -> usize {
-        Pixel::bytes(self.levels(), self.groups.len())
+        PixelAccumulator::bytes(self.levels(), self.groups.len())
     }
 
     /// Whether there are sums of so many levels and groups of lights.
     pub fn holds(&self, levels: usize, groups: usize) -> bool {
-        self.others.len() == Pixel::others(levels) && self.groups.len() == groups
+        self.others.len() == PixelAccumulator::others(levels) && self.groups.len() == groups
     }
 
     /// Sums of other levels beside the own image's: theirs, and a difference.
@@ -203,12 +205,12 @@ impl Pixel {
         self.groups[group].map(|sum| sum.value() / count)
     }
 
-    /// Mean albedo of all eye paths.
+    /// Mean albedo of all camera paths.
     pub fn albedo(&self) -> DVec3 {
         if self.features == 0 { DVec3::ZERO } else { self.albedo / f64::from(self.features) }
     }
 
-    /// Eye paths whose albedo, normal or depth was not finite.
+    /// Camera paths whose albedo, normal or depth was not finite.
     pub fn features_rejected(&self) -> u32 {
         self.coverage.paths() - self.features
     }
@@ -218,7 +220,7 @@ impl Pixel {
         self.normal.normalize_or_zero()
     }
 
-    /// Mean distance along eye paths to their first rough hit, of those that have one.
+    /// Mean distance along camera paths to their first rough hit, of those that have one.
     pub fn depth(&self) -> Option<f64> {
         (self.depths > 0).then(|| self.depth.value() / f64::from(self.depths))
     }
@@ -246,7 +248,7 @@ impl Pixel {
     }
 
     /// Keeps what iteration `pass` (from 1) sees first, its camera depth and position, if none has been counted before.
-    /// To be called before [`Pixel::add`].
+    /// To be called before [`PixelAccumulator::add`].
     #[inline]
     pub fn see(&mut self, pass: u64, first: impl FnOnce() -> Option<(f32, Vec3)>) {
         if self.iterations == 0 {
@@ -256,9 +258,9 @@ impl Pixel {
     }
 
     /// Adds iteration `pass` (from 1): level 1 from `independent`, the others from `correlated` (of one level less), or
-    /// all from `independent` when they share one eye path.
+    /// all from `independent` when they share one camera path.
     #[inline]
-    pub fn add(&mut self, pass: u64, independent: &EyeMeasure, correlated: Option<&EyeMeasure>) {
+    pub fn add(&mut self, pass: u64, independent: &PixelSample, correlated: Option<&PixelSample>) {
         self.add_with_groups(pass, independent, correlated, &[]);
     }
 
@@ -266,8 +268,8 @@ impl Pixel {
     pub fn add_with_groups(
         &mut self,
         pass: u64,
-        independent: &EyeMeasure,
-        correlated: Option<&EyeMeasure>,
+        independent: &PixelSample,
+        correlated: Option<&PixelSample>,
         groups: &[[Rgb; 2]],
     ) {
         let (count, own) = (self.levels(), self.own());
@@ -331,9 +333,9 @@ impl Pixel {
     #[inline]
     pub fn own_of<'m>(
         &self,
-        independent: &'m EyeMeasure,
-        correlated: Option<&'m EyeMeasure>,
-    ) -> (&'m EyeMeasure, usize) {
+        independent: &'m PixelSample,
+        correlated: Option<&'m PixelSample>,
+    ) -> (&'m PixelSample, usize) {
         match (correlated, self.own()) {
             (Some(correlated), own @ 1..) => (correlated, own - 1),
             (_, own) => (independent, own),
@@ -345,8 +347,8 @@ impl Pixel {
     fn difference_of(
         &self,
         values: &[Rgb; MAX_LEVELS],
-        independent: &EyeMeasure,
-        correlated: Option<&EyeMeasure>,
+        independent: &PixelSample,
+        correlated: Option<&PixelSample>,
     ) -> Rgb {
         let own = self.own();
         let mut difference = values[own + 1] - values[own];
@@ -377,7 +379,7 @@ impl Pixel {
     }
 
     /// Adds other iterations of the same pixel: the same bits as if all had been added here, whatever their order.
-    pub fn join(&mut self, mut other: Pixel) {
+    pub fn join(&mut self, mut other: PixelAccumulator) {
         let grids = self.grids.max(other.grids);
         self.make_room(grids);
         other.make_room(grids);
@@ -397,7 +399,9 @@ impl Pixel {
         self.depths += other.depths;
         self.coverage.join(&other.coverage);
         // The first that is counted; where none is, the last one looked at.
-        let of = |pixel: &Pixel| if pixel.iterations > 0 { (0, pixel.first.pass) } else { (1, !pixel.first.pass) };
+        let of = |pixel: &PixelAccumulator| {
+            if pixel.iterations > 0 { (0, pixel.first.pass) } else { (1, !pixel.first.pass) }
+        };
         if of(&other) < of(self) {
             self.first = other.first;
         }
@@ -426,7 +430,7 @@ mod tests {
     fn differences_of_levels_are_the_bias_on_surfaces_and_in_media() {
         let biases = |level: i32| (0.01 * 2f32.powi(level), 0.02 * (2.0 / 3.0 * level as f32).exp2());
         let measure = |first: i32| {
-            let mut measure = EyeMeasure { direct: Rgb::ONE, volume: Rgb::ONE, ..EyeMeasure::default() };
+            let mut measure = PixelSample { direct: Rgb::ONE, volume: Rgb::ONE, ..PixelSample::default() };
             for level in 0..MAX_LEVELS {
                 let (surface, volume) = biases(first + level as i32);
                 measure.indirect_photons[level] = Rgb::splat(surface);
@@ -435,7 +439,10 @@ mod tests {
             measure
         };
         for media in [true, false] {
-            let mut pixel = Pixel { volume_bandwidth: if media { 0.1 } else { 0.0 }, ..Pixel::new(5, 0, [0.1; 2]) };
+            let mut pixel = PixelAccumulator {
+                volume_bandwidth: if media { 0.1 } else { 0.0 },
+                ..PixelAccumulator::new(5, 0, [0.1; 2])
+            };
             pixel.add(1, &measure(0), Some(&measure(1)));
             let (surface, volume) = biases(3);
             let [difference, _] = pixel.difference().expect("there are levels");
@@ -446,7 +453,7 @@ mod tests {
 
     /// An iteration of a pixel that sees all kinds of light of sizes far apart, and now and then a sample that is not
     /// finite.
-    fn iteration(pass: u64) -> [EyeMeasure; 2] {
+    fn iteration(pass: u64) -> [PixelSample; 2] {
         [0, 1].map(|path| {
             let draw = |index| {
                 let draws = Stream::new(1, pass, Domain::Test, 100 * path + index).vertex(0);
@@ -455,7 +462,7 @@ mod tests {
             };
             let photons = |first: u64| std::array::from_fn(|level| draw(first + level as u64));
             let broken = pass % 11 == 1;
-            EyeMeasure {
+            PixelSample {
                 emission: if broken { Rgb::splat(f32::NAN) } else { draw(0) },
                 direct: draw(1),
                 indirect: draw(2),
@@ -474,8 +481,8 @@ mod tests {
         })
     }
 
-    fn pixel(levels: usize, passes: impl Iterator<Item = u64>) -> Pixel {
-        let mut pixel = Pixel { volume_bandwidth: 0.1, ..Pixel::new(levels, 7, [0.1; 2]) };
+    fn pixel(levels: usize, passes: impl Iterator<Item = u64>) -> PixelAccumulator {
+        let mut pixel = PixelAccumulator { volume_bandwidth: 0.1, ..PixelAccumulator::new(levels, 7, [0.1; 2]) };
         for pass in passes {
             let [independent, correlated] = iteration(pass);
             pixel.see(pass, || independent.first.map(|first| (first.p.x, first.p)));
@@ -485,7 +492,7 @@ mod tests {
     }
 
     /// All that is told of a pixel, to the last bit.
-    fn told(pixel: &Pixel, levels: usize) -> Vec<u64> {
+    fn told(pixel: &PixelAccumulator, levels: usize) -> Vec<u64> {
         let mut all = vec![pixel.albedo(), pixel.normal(), DVec3::splat(pixel.depth().unwrap_or(-1.0))];
         for level in 0..levels {
             all.extend([pixel.mean(level), pixel.variance_of_mean(level)]);
@@ -528,11 +535,11 @@ mod tests {
     #[test]
     fn means_and_variances_are_those_of_two_passes() {
         let mut values = Vec::new();
-        let mut pixel = Pixel::new(1, 0, [0.0; 2]);
+        let mut pixel = PixelAccumulator::new(1, 0, [0.0; 2]);
         for pass in 1..=200u64 {
             let draw = Stream::new(2, pass, Domain::Test, 0).vertex(0).two(Purpose::Pixel);
             let direct = Rgb::new(draw.x, draw.y, 0.01 * draw.x);
-            pixel.add(pass, &EyeMeasure { direct, ..EyeMeasure::default() }, None);
+            pixel.add(pass, &PixelSample { direct, ..PixelSample::default() }, None);
             values.push(direct.as_dvec3());
         }
         let mean = values.iter().sum::<DVec3>() / 200.0;

@@ -1,18 +1,18 @@
-//! Eye paths that gather photons: what one path of a pixel measures at every bandwidth level.
+//! Camera paths that gather photons: what one path of a pixel measures at every bandwidth level.
 //!
 //! Who carries which light, so that every path is counted once (X is the vertex where photons may be gathered, seen
 //! from the light):
 //! - a light, then X: next-event estimation at X and its second strategy ([`direct_light`]), whatever the lobes of X;
-//! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the eye path itself,
+//! - a light, at least one bounce, then X: photons, for the broad lobes of X; for its sharp lobes, the camera path itself,
 //!   which goes on;
 //! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X: no path that goes on could find
 //!   that light;
 //! - another light, delta bounces only, then the sharp lobes of X: both, weighed ([`super::glint`]).
 //!
-//! Where only caustics are left to photons ([`Indirect::Paths`]), the eye path goes on with the broad lobes of X, too.
+//! Where only caustics are left to photons ([`Indirect::Paths`]), the camera path goes on with the broad lobes of X, too.
 //! Between its last broad bounce and a light there is then at least one vertex:
-//! - one that scatters the light broadly: next-event estimation there and its second strategy, the eye path;
-//! - narrow lobes alone: photons of caustics, at every vertex of the eye path, for its broad lobes. The eye path itself
+//! - one that scatters the light broadly: next-event estimation there and its second strategy, the camera path;
+//! - narrow lobes alone: photons of caustics, at every vertex of the camera path, for its broad lobes. The camera path itself
 //!   does not count such light.
 //!
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the
@@ -37,7 +37,7 @@ use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec2, Vec3};
 use crate::medium::FlightDensity;
 use crate::photon::{ByKind, Kernel, Kind, Near, Photon, PhotonMap, PhotonMaps, VolumePhoton};
-use crate::plan::{ClassSet, Event, EyeSuffix, LightPrefix, Part, PathClass};
+use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream, Streams};
 use crate::scene::Scene;
 use crate::spectrum::{Wavelength, WavelengthSample};
@@ -57,9 +57,9 @@ pub struct Features {
     pub depth: f32,
 }
 
-/// Everything one eye path measures. Radiance per channel.
+/// Everything one camera path measures. Radiance per channel.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct EyeMeasure {
+pub struct PixelSample {
     /// Emitters seen directly or through perfect mirrors and clear glass.
     pub emission: Rgb,
     /// Light from lights at the first vertex that scatters otherwise.
@@ -82,7 +82,7 @@ pub struct EyeMeasure {
     pub broken: Option<Cause>,
 }
 
-impl EyeMeasure {
+impl PixelSample {
     /// Something that is not finite has come to the sample; what came first is its cause.
     #[cold]
     pub fn reject(&mut self, cause: Cause) {
@@ -101,7 +101,7 @@ impl EyeMeasure {
 /// Least probability of going on with either set of lobes where there are two.
 const LEAST_CHANCE: f32 = 0.1;
 
-/// Who brings light that has been scattered broadly before the eye path's first broad bounce.
+/// Who brings light that has been scattered broadly before the camera path's first broad bounce.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -109,12 +109,12 @@ pub enum Indirect {
     /// Photons
     #[default]
     Photons,
-    /// Eye paths, which go on; photons bring caustics alone
+    /// Camera paths, which go on; photons bring caustics alone
     Paths,
 }
 
 impl Indirect {
-    /// Kinds of photons that bring these classes to eye paths.
+    /// Kinds of photons that bring these classes to camera paths.
     pub fn kinds(self, wanted: ClassSet) -> ByKind<bool> {
         let caustics: ClassSet = match self {
             Indirect::Photons => [PathClass::Caustic, PathClass::Sds].into_iter().collect(),
@@ -135,11 +135,11 @@ struct Gather<'a, B, K, const PATHS: bool> {
     waiting: &'a mut Waiting,
     bandwidths: B,
     max_depth: u32,
-    measure: EyeMeasure,
+    measure: PixelSample,
     /// Length of the path so far.
     length: f32,
     /// What has happened up to the last vertex.
-    sight: EyeSuffix,
+    sight: CameraSuffix,
     /// Lobes of the last vertex.
     lobes: LobeSet,
     classes: ClassSet,
@@ -193,7 +193,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
 
     /// What has happened to a path that arrives at the next vertex.
     #[inline]
-    fn arrived(&self, scattered: Option<Scattered>) -> EyeSuffix {
+    fn arrived(&self, scattered: Option<Scattered>) -> CameraSuffix {
         scattered.map_or(self.sight, |scattered| self.sight.then(Event::of(scattered.lobe, self.lobes)))
     }
 
@@ -208,7 +208,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
 
     /// Whether a medium is lit.
     #[inline]
-    fn lit_in_medium(&self, sight: EyeSuffix) -> bool {
+    fn lit_in_medium(&self, sight: CameraSuffix) -> bool {
         self.classes.has(sight.then(Event::Medium).class_at_light(false))
     }
 
@@ -272,7 +272,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         for (kind, beam) in [(Kind::Indirect, LightPrefix::SCATTERED), (Kind::Caustic, LightPrefix::FOCUSED)] {
             let class = sight.class_with(beam);
             let photons = &self.photons[kind as usize];
-            // Where none has come this time, eye paths still leave photons their share.
+            // Where none has come this time, camera paths still leave photons their share.
             let shares = onward.has(LobeSet::SHARP) && photons.paths() > 0;
             if (photons.photons().is_empty() && !shares) || !self.classes.has(class) {
                 continue;
@@ -514,9 +514,9 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     }
 }
 
-/// What all eye paths of a render share.
+/// What all camera paths of a render share.
 #[derive(Clone, Copy)]
-pub struct Eye<'a> {
+pub struct CameraPaths<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// The camera.
@@ -533,7 +533,7 @@ pub struct Eye<'a> {
     pub stop: Option<&'a Stop>,
 }
 
-impl Eye<'_> {
+impl CameraPaths<'_> {
     /// Whether the iteration under way is given up.
     #[inline]
     pub fn is_given_up(&self) -> bool {
@@ -542,12 +542,12 @@ impl Eye<'_> {
 
     /// Camera depth and position of what a measure has seen first, if anything (scene units; of the scene as it was
     /// read).
-    pub fn seen(&self, measure: &EyeMeasure) -> Option<(f32, Vec3)> {
+    pub fn seen(&self, measure: &PixelSample) -> Option<(f32, Vec3)> {
         let p = measure.first?.p;
         Some((self.camera.depth(p), (p.as_dvec3() + self.scene.origin).as_vec3()))
     }
 
-    /// The first ray of an eye path through a uniform point of pixel `(x, y)`.
+    /// The first ray of a camera path through a uniform point of pixel `(x, y)`.
     #[inline]
     pub fn start(&self, pixel: (u32, u32), stream: Stream) -> PathStart {
         self.start_at(pixel, stream.vertex(0).two(Purpose::Pixel), stream)
@@ -572,7 +572,7 @@ impl Eye<'_> {
         }
     }
 
-    /// The starts of the eye paths of neighbouring pixels, first rays traced together.
+    /// The starts of the camera paths of neighbouring pixels, first rays traced together.
     #[inline]
     pub fn starts(
         &self,
@@ -619,7 +619,7 @@ impl Eye<'_> {
         starts
     }
 
-    /// Traces one eye path and measures all levels of `bandwidths`, and of `volume` where media scatter, with `kernel`.
+    /// Traces one camera path and measures all levels of `bandwidths`, and of `volume` where media scatter, with `kernel`.
     /// `scratch` has served no other photons.
     #[inline]
     pub fn measure(
@@ -630,7 +630,7 @@ impl Eye<'_> {
         volume: Option<Volume<'_>>,
         bandwidths: impl Bandwidths,
         kernel: impl Kernel,
-    ) -> EyeMeasure {
+    ) -> PixelSample {
         match self.indirect {
             Indirect::Photons => {
                 self.measure_by::<_, _, false>(scratch, start, *stream, photons, volume, bandwidths, kernel)
@@ -652,7 +652,7 @@ impl Eye<'_> {
         volume: Option<Volume<'_>>,
         bandwidths: B,
         kernel: K,
-    ) -> EyeMeasure {
+    ) -> PixelSample {
         let mut gather = Gather::<B, K, PATHS> {
             kernel,
             scene: self.scene,
@@ -663,9 +663,9 @@ impl Eye<'_> {
             waiting: &mut scratch.waiting,
             bandwidths,
             max_depth: self.max_depth,
-            measure: EyeMeasure::default(),
+            measure: PixelSample::default(),
             length: 0.0,
-            sight: EyeSuffix::START,
+            sight: CameraSuffix::START,
             lobes: LobeSet::NONE,
             classes: self.classes,
             broadly: false,
