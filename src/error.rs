@@ -9,29 +9,29 @@ use std::path::Path;
 /// Result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What sort of thing went wrong; decides the exit code.
+/// The category of an error, which determines the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// The command line asks for something that cannot be (exit code 2).
+    /// Options are invalid or contradict each other (exit code 2).
     Usage,
-    /// A scene file is malformed, or asks for what we cannot do.
+    /// A scene file is malformed, uses an unsupported feature, or needs too much memory.
     Scene,
     /// An image (EXR, PNG, HDR, texture) cannot be read or written.
     Image,
     /// A file or folder cannot be opened, read, written or renamed.
     Io,
-    /// A shared library (Embree, ONNX Runtime, Open Image Denoise) is missing or refuses.
+    /// A shared library (Embree, ONNX Runtime, Open Image Denoise) is missing or unusable.
     Library,
-    /// A network file is not what the combiner needs.
+    /// The file of the combiner's neural network is unusable.
     Model,
     /// Stopped by the user (exit code 130); finished work has been written.
     Interrupted,
 }
 
-/// An error: `place` (a file, and the place in it), `cause`, and a `hint` that says what to do.
+/// An error with its category, its place, its cause, and a hint about the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
-    /// What sort of thing went wrong.
+    /// The category.
     pub kind: ErrorKind,
     /// File and place in it, such as `pool.glb: mesh "water", primitive 0`; empty when there is none.
     pub place: String,
@@ -47,12 +47,12 @@ impl Error {
         Error { kind, place: place.to_string(), cause: cause.to_string(), hint: None }
     }
 
-    /// An error of the options of a call: `cause` names them as on the command line, `--max-depth`.
+    /// An error in the options. `cause` names them as on the command line, such as `--max-depth`.
     pub fn usage(cause: impl fmt::Display) -> Self {
         Error::new(ErrorKind::Usage, "command line", cause)
     }
 
-    /// The same error with advice.
+    /// Sets the hint.
     #[must_use]
     pub fn hint(mut self, hint: impl fmt::Display) -> Self {
         self.hint = Some(hint.to_string());
@@ -64,7 +64,7 @@ impl Error {
         Error::new(ErrorKind::Io, path.display(), cause)
     }
 
-    /// The same error, its place preceded by `outer` (a file's name, say).
+    /// Puts `outer`, such as the name of a file, in front of the place.
     #[must_use]
     pub fn within(mut self, outer: impl fmt::Display) -> Self {
         self.place = if self.place.is_empty() { outer.to_string() } else { format!("{outer}: {}", self.place) };

@@ -1,31 +1,31 @@
-//! What `scripts/setup.sh` has installed for the program: libraries below `.deps`, Pythons in `.venv-*`.
+//! Finds the libraries (in `.deps`) and Pythons (in `.venv-*`) that `scripts/setup.sh` has installed.
 //!
-//! Both lie in the folder that [`HOME_VARIABLE`] names, else in a folder above the program or, in Python, above the package.
-//! The current folder is never searched, because what is found there would run, and it may hold anybody's files.
+//! They are in the folder named by the environment variable [`HOME_VARIABLE`], or else in a folder above the program or
+//! the Python package. The current folder is never searched: it may hold files of other users, and what is found is run.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 pub use caustique_library::path_from_env;
 
-/// Environment variable that names the folder in which `scripts/setup.sh` lies in `scripts`, and then no other.
+/// Environment variable that names the project's folder, the parent of `scripts`. If set, no other folder is searched.
 pub const HOME_VARIABLE: &str = "CAUSTIQUE_HOME";
 
-/// Folders where everybody may create files, such as `/tmp`, have this bit in their mode.
-const STICKY: u32 = 0o1000;
+/// Mode bit of folders where everybody may create files, such as `/tmp`.
+const STICKY_BIT: u32 = 0o1000;
 
-/// The places where something installed may lie, the nearest first. `relative` is its path in the project's folder.
+/// The paths to try for something installed at `relative` in the project's folder, nearest folder first.
 pub fn candidates(relative: &str) -> Vec<PathBuf> {
     project_folders().iter().map(|home| home.join(relative)).collect()
 }
 
-/// The nearest of [`candidates`] where there is a file or a folder.
+/// The first of [`candidates`] that exists.
 pub fn find(relative: &str) -> Option<PathBuf> {
     candidates(relative).into_iter().find(|path| path.exists())
 }
 
-/// Where the library or Python at `path` comes from: the environment variable that names it, `scripts/setup.sh`, which
-/// installs it below `relative` in the project's folder, or the system.
+/// The origin of the library or Python at `path`, for messages: the name of the environment `variable` if it is set,
+/// `scripts/setup.sh` if the path is below `relative` in a project folder, or `system`.
 pub fn origin(variable: &'static str, relative: &str, path: &Path) -> &'static str {
     let below = |place: &PathBuf| path.starts_with(place) || place.canonicalize().is_ok_and(|it| path.starts_with(it));
     if path_from_env(variable).is_some() {
@@ -37,30 +37,30 @@ pub fn origin(variable: &'static str, relative: &str, path: &Path) -> &'static s
     }
 }
 
-/// The folders that may be the project's, the nearest first.
+/// The folders that may be the project's, nearest first.
 fn project_folders() -> Vec<PathBuf> {
     match path_from_env(HOME_VARIABLE) {
         Some(home) => std::path::absolute(home).into_iter().collect(),
-        None => own_file().map(|own| above(&own)).unwrap_or_default(),
+        None => own_file().map(|own| folders_above(&own)).unwrap_or_default(),
     }
 }
 
-/// The folders above a file, but for those where everybody may put files.
-fn above(file: &Path) -> Vec<PathBuf> {
-    let shared = |folder: &&Path| folder.metadata().is_ok_and(|known| known.mode() & STICKY != 0);
+/// The folders above a file, except folders where everybody may create files.
+fn folders_above(file: &Path) -> Vec<PathBuf> {
+    let shared = |folder: &&Path| folder.metadata().is_ok_and(|data| data.mode() & STICKY_BIT != 0);
     file.ancestors().skip(1).filter(|folder| !shared(folder)).map(Path::to_path_buf).collect()
 }
 
-/// The file that holds this code: the program, or the Python module.
+/// The file that contains this code: the program or the Python module.
 fn own_file() -> Option<PathBuf> {
-    let here = own_file as fn() -> Option<PathBuf> as usize;
-    let holds_here = |line: &str| {
+    let address = own_file as fn() -> Option<PathBuf> as usize;
+    let path_if_mapped = |line: &str| {
         let (from, to) = line.split_whitespace().next()?.split_once('-')?;
         let [from, to] = [from, to].map(|digits| usize::from_str_radix(digits, 16).unwrap_or(0));
-        (from..to).contains(&here).then(|| line.find('/').map(|at| PathBuf::from(&line[at..])))?
+        (from..to).contains(&address).then(|| line.find('/').map(|at| PathBuf::from(&line[at..])))?
     };
     let mapped = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
-    mapped.lines().find_map(holds_here).or_else(|| std::env::current_exe().ok())
+    mapped.lines().find_map(path_if_mapped).or_else(|| std::env::current_exe().ok())
 }
 
 #[cfg(test)]
@@ -68,17 +68,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn this_code_is_in_the_test_program() {
+    fn the_file_of_this_code_is_the_test_program() {
         assert_eq!(own_file(), std::env::current_exe().ok());
     }
 
     #[test]
-    fn folders_above_a_file_are_searched_but_not_those_of_everybody() {
+    fn folders_that_everybody_can_write_are_not_searched() {
         let shared = tempfile::tempdir().unwrap();
         let own = shared.path().join("own");
         std::fs::create_dir(&own).unwrap();
         std::fs::set_permissions(shared.path(), std::os::unix::fs::PermissionsExt::from_mode(0o1777)).unwrap();
-        let found = above(&own.join("program"));
+        let found = folders_above(&own.join("program"));
         assert_eq!(found.first(), Some(&own));
         assert!(found.contains(&PathBuf::from("/")) && !found.contains(&shared.path().to_path_buf()), "{found:?}");
     }

@@ -1,7 +1,7 @@
 //! caustique renders caustics, and caustics seen through glass, water and mirrors.
 //!
-//! Data flows one way: scene file -> [`scene::Description`] -> scene -> plan -> passes -> estimator -> layers -> finish
-//! -> EXR. Each module uses only modules declared above it ([`error`] may be used anywhere).
+//! Data flows one way: scene file -> [`scene::Description`] -> scene -> plan -> iterations -> estimator -> layers ->
+//! finish -> EXR. Each module uses only modules declared above it; all may use [`error`].
 
 pub mod error;
 

@@ -1,32 +1,31 @@
-//! Memory that the process may still take, asked before much of it is taken.
+//! Checks of free memory before large allocations.
 //!
-//! What a few numbers of a scene or of the command line ask for (copies, vertices, pixels, light paths) is multiplied
-//! out first and refused with that number: Rust ends the process where an allocation fails, Embree does, and Linux ends
-//! it where one is given but not there. The least of three counts: what the machine has left, `ulimit -v`, and the
-//! `memory.max` of the control groups (containers, batch systems, systemd).
+//! A few numbers in a scene or on the command line (copies, vertices, pixels, light paths) can request any amount of
+//! memory. Rust and Embree abort the process if an allocation fails, and Linux kills it if memory is overcommitted. So
+//! large amounts are computed and compared with the free memory first: the least of the memory that the machine has
+//! left, that `ulimit -v` leaves, and that `memory.max` of the control groups (containers, batch systems, systemd) leaves.
 
 use crate::error::{Error, ErrorKind, Result};
 use rustix::process::{Resource, getrlimit};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// Smaller amounts than this are not asked about.
+/// Allocations below this number of bytes need no check.
 pub const MIN_CHECKED_BYTES: u64 = 16 << 20;
 
-/// Bytes of samples that a byte of an EXR stands for at most: no compression packs better than deflate (1032 to 1) over
-/// run lengths of blocks of 64 samples.
+/// Largest compression ratio of an EXR: that of deflate (1032) over run lengths in blocks of 64 samples.
 pub const MAX_EXR_RATIO: u64 = 1032 * 64;
 
-/// Bytes that may still be taken, and who says so.
+/// Free memory, and the limit that determines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Available {
-    /// How many.
+    /// Bytes that the process may still allocate.
     pub bytes: u64,
-    /// Whose limit it is: `available`, `left by 'ulimit -v'`.
+    /// The limit, in words that follow the amount: `available`, `left by 'ulimit -v'`.
     pub source: &'static str,
 }
 
-/// The least of what the machine and the limits of the process leave; `None` where none of them tells.
+/// Free memory: the least that the machine, `ulimit -v` and the control groups leave. `None` if no limit can be read.
 pub fn available() -> Option<Available> {
     let machine = || kib(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
     let address_space = || {
@@ -43,10 +42,10 @@ pub fn available() -> Option<Available> {
     limits.min_by_key(|limit| limit.bytes)
 }
 
-/// Checks that `bytes` can be taken, which `what` need.
+/// Checks that `bytes` of memory are free. `what` names their users in the message, in the plural: "9 copies".
 ///
 /// # Errors
-/// There is less: with both numbers, without a place, to which the caller adds the remedy.
+/// Less memory is free. The error names both amounts; the caller adds place and hint.
 pub fn require(bytes: u64, what: impl Display) -> Result<()> {
     match available() {
         Some(Available { bytes: left, source }) if bytes > left => {
@@ -58,10 +57,10 @@ pub fn require(bytes: u64, what: impl Display) -> Result<()> {
     }
 }
 
-/// An empty vector with room for `count` items; `what` they are.
+/// An empty vector with capacity for `count` items. `what` names the items in the message.
 ///
 /// # Errors
-/// The allocator has no room for them.
+/// The allocation fails.
 pub fn reserve<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
     let mut items = Vec::new();
     match items.try_reserve_exact(count) {
@@ -73,15 +72,15 @@ pub fn reserve<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
     }
 }
 
-/// The value of a line of `/proc` in bytes: `MemAvailable:  123 kB`.
+/// Parses a line of `/proc`, such as `MemAvailable:  123 kB`, and returns the bytes.
 fn kib(text: &str, key: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// What the control groups leave that `/proc/self/cgroup` names (version 2: `0::/path`; version 1: `9:memory:/path`),
-/// below the mount at `root`. A group's own limit binds, and so do those around it; a container may see its own group
-/// as the root.
+/// Bytes that the control groups leave. `text` is `/proc/self/cgroup` (version 2: `0::/path`; version 1:
+/// `9:memory:/path`), `root` the mount point. The limits of a group and of all its ancestors apply. In a container, the
+/// process's own group may be the root.
 fn left_by_groups(text: &str, root: &Path) -> Option<u64> {
     let groups = text.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':').skip(1);
@@ -102,8 +101,7 @@ fn left_by_groups(text: &str, root: &Path) -> Option<u64> {
     left.min()
 }
 
-/// The limit of a group, less what it uses and could not give back: its files' pages count as used until they are
-/// wanted elsewhere.
+/// The limit of a group minus the memory in use. Pages of inactive files are reclaimable and do not count as used.
 fn left_by_group(group: &Path, [limit, usage, files]: [&str; 3]) -> Option<u64> {
     let number = |name: &str| std::fs::read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
     let (limit, usage) = (number(limit)?, number(usage)?);
@@ -117,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_tightest_group_binds() {
+    fn the_smallest_limit_of_all_groups_applies() {
         let root = tempfile::tempdir().expect("a folder");
         let write = |path: &str, text: &str| {
             let path = root.path().join(path);
@@ -135,15 +133,15 @@ mod tests {
         assert_eq!(left("0::/jobs/7\n"), Some(3600));
         write("jobs/7/memory.max", "1000\n");
         assert_eq!(left("0::/jobs/7\n"), Some(100));
-        // The first version, in a container that sees its group as the root.
+        // Version 1, in a container that sees its own group as the root.
         write("memory/memory.limit_in_bytes", "4096\n");
         write("memory/memory.usage_in_bytes", "96\n");
         assert_eq!(left("4:cpu,cpuacct:/x\n3:memory:/docker/abc\n"), Some(4000));
     }
 
     #[test]
-    fn what_does_not_fit_is_an_error_with_its_number() {
-        assert!(available().expect("Linux tells").bytes > 0);
+    fn errors_name_the_amount_that_does_not_fit() {
+        assert!(available().expect("a limit").bytes > 0);
         assert!(require(1 << 20, "few").is_ok());
         let error = require(1 << 60, "9 copies").expect_err("no machine has that");
         assert!(error.cause.starts_with("9 copies need about 1073741824.0 GiB of memory, "), "{error}");

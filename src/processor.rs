@@ -1,45 +1,45 @@
-//! The processor: whether it has the instructions that the program was built with, and how to hide its cache misses.
+//! Checks that the processor has the instructions that the program was built with, and prefetches memory.
 //!
-//! `.cargo/config.toml` builds for x86-64-v3. `is_x86_feature_detected!` is no help: where a feature is enabled at
-//! build time it is simply `true`. So the kernel is asked, which lists the features as `flags` in `/proc/cpuinfo`.
+//! `.cargo/config.toml` builds for x86-64-v3. The check reads `flags` in `/proc/cpuinfo`, because
+//! `is_x86_feature_detected!` is always true for a feature that is enabled at build time.
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// Features of x86-64-v3 by the kernel's names.
-const NEEDED: [&str; 5] = ["avx2", "bmi2", "f16c", "fma", "movbe"];
+/// Features of x86-64-v3 by their names in `/proc/cpuinfo`.
+const REQUIRED_FEATURES: [&str; 5] = ["avx2", "bmi2", "f16c", "fma", "movbe"];
 
-/// Reads values from memory that several steps are about to use one after the other, so that the processor waits for
-/// all of them at once.
+/// Reads `values` from memory before the code that uses them, so that their cache misses overlap.
 #[inline(always)]
 pub fn prefetch<T>(values: impl IntoIterator<Item = T>) {
     for value in values {
-        // The compiler may not drop the read.
+        // Keeps the compiler from removing the read.
         std::hint::black_box(value);
     }
 }
 
-/// Checks the processor; without the instructions the program would end with a signal somewhere in the middle.
+/// Checks that the processor has all required instructions. Without one, the program would die by a signal when it first
+/// uses it.
 ///
 /// # Errors
-/// An instruction is lacking.
+/// An instruction is missing.
 pub fn check() -> Result<()> {
     if !cfg!(all(target_arch = "x86_64", target_os = "linux", target_feature = "avx2")) {
         return Ok(());
     }
-    let lacking = std::fs::read_to_string("/proc/cpuinfo").map(|text| lacking(&text)).unwrap_or_default();
-    if lacking.is_empty() {
+    let missing = std::fs::read_to_string("/proc/cpuinfo").map(|text| missing_features(&text)).unwrap_or_default();
+    if missing.is_empty() {
         return Ok(());
     }
-    let cause = format!("it lacks instructions that this build needs ({})", lacking.join(", "));
+    let cause = format!("it lacks instructions that this build needs ({})", missing.join(", "));
     Err(Error::new(ErrorKind::Library, "processor", cause)
         .hint("use a processor made since 2013, or build from source without the flags in .cargo/config.toml"))
 }
 
-/// Needed features that the first processor does not list; none where nothing is listed.
-fn lacking(cpuinfo: &str) -> Vec<&'static str> {
+/// Required features that the first processor in `cpuinfo` does not list. Empty if it has no list of features.
+fn missing_features(cpuinfo: &str) -> Vec<&'static str> {
     let flags = cpuinfo.lines().find_map(|line| line.strip_prefix("flags")?.split_once(':'));
     let Some((_, flags)) = flags else { return Vec::new() };
-    NEEDED.into_iter().filter(|needed| !flags.split_whitespace().any(|flag| flag == *needed)).collect()
+    REQUIRED_FEATURES.into_iter().filter(|name| !flags.split_whitespace().any(|flag| flag == *name)).collect()
 }
 
 #[cfg(test)]
@@ -49,7 +49,7 @@ mod tests {
     #[test]
     fn missing_features_are_named() {
         let modern = "processor\t: 0\nflags\t\t: fpu avx2 bmi2 f16c fma movbe sse2\nbogomips\t: 1\n";
-        assert!(lacking(modern).is_empty() && lacking("no such line").is_empty());
-        assert_eq!(lacking("flags\t\t: fpu sse2 avx f16c movbe"), ["avx2", "bmi2", "fma"]);
+        assert!(missing_features(modern).is_empty() && missing_features("no such line").is_empty());
+        assert_eq!(missing_features("flags\t\t: fpu sse2 avx f16c movbe"), ["avx2", "bmi2", "fma"]);
     }
 }

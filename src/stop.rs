@@ -1,14 +1,14 @@
-//! What ends an iteration before it is done. Its units of work ask; once one of them was told to end, the iteration is
-//! given up as a whole, and what it has measured counts for nothing.
+//! Ends an iteration early, by a stop request or a deadline. Its units of work poll [`Stop::should_abort`]. Once a poll
+//! returns true, the whole iteration is aborted and its results are discarded.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
-/// No deadline.
-const NEVER: u64 = u64::MAX;
+/// Value of [`State::deadline`] without a deadline.
+const NO_DEADLINE: u64 = u64::MAX;
 
-/// Tells units of work to end. Clones share what they know.
+/// A stop request and a deadline that units of work poll. Clones share the state.
 #[derive(Clone, Debug)]
 pub struct Stop {
     requested: Arc<AtomicBool>,
@@ -17,48 +17,49 @@ pub struct Stop {
 
 #[derive(Debug)]
 struct State {
-    begun: Instant,
-    /// Nanoseconds after that.
+    created: Instant,
+    /// Nanoseconds after `created`, or [`NO_DEADLINE`].
     deadline: AtomicU64,
     aborted: AtomicBool,
 }
 
 impl Default for Stop {
-    /// Nobody asks for an end.
+    /// Without a stop request.
     fn default() -> Stop {
         Stop::from_flag(Arc::default())
     }
 }
 
 impl Stop {
-    /// One that tells to end as soon as `asked` is set.
+    /// A stop that is requested by setting `requested`.
     #[allow(clippy::disallowed_methods, reason = "a deadline decides when a render stops, and nothing else")]
     pub fn from_flag(requested: Arc<AtomicBool>) -> Stop {
-        let (deadline, aborted) = (AtomicU64::new(NEVER), AtomicBool::new(false));
-        Stop { requested, state: Arc::new(State { begun: Instant::now(), deadline, aborted }) }
+        let (deadline, aborted) = (AtomicU64::new(NO_DEADLINE), AtomicBool::new(false));
+        Stop { requested, state: Arc::new(State { created: Instant::now(), deadline, aborted }) }
     }
 
-    /// Begins an iteration, which must end within so many seconds if there is a number.
+    /// Starts an iteration, with a deadline `seconds` from now, if any.
     pub fn start_iteration(&self, seconds: Option<f64>) {
         let end = |seconds: f64| (self.nanoseconds() as f64 + 1e9 * seconds.max(0.0)) as u64;
-        self.state.deadline.store(seconds.map_or(NEVER, end), Ordering::Relaxed);
+        self.state.deadline.store(seconds.map_or(NO_DEADLINE, end), Ordering::Relaxed);
         self.state.aborted.store(false, Ordering::Relaxed);
     }
 
     fn nanoseconds(&self) -> u64 {
-        self.state.begun.elapsed().as_nanos() as u64
+        self.state.created.elapsed().as_nanos() as u64
     }
 
-    /// Whether an end was asked for, by whatever but the clock.
+    /// Whether a stop was requested. The deadline does not count.
     pub fn requested(&self) -> bool {
         self.requested.load(Ordering::Relaxed)
     }
 
-    /// Asks whether a unit of work is to end. If so, its iteration is given up.
+    /// Whether a unit of work must end, because of a request, the deadline or an earlier abort. If so, the iteration
+    /// becomes aborted.
     pub fn should_abort(&self) -> bool {
         let late = || {
             let deadline = self.state.deadline.load(Ordering::Relaxed);
-            deadline != NEVER && self.nanoseconds() >= deadline
+            deadline != NO_DEADLINE && self.nanoseconds() >= deadline
         };
         let ends = self.aborted() || self.requested() || late();
         if ends {
@@ -67,7 +68,7 @@ impl Stop {
         ends
     }
 
-    /// Whether the iteration that was begun last is given up.
+    /// Whether the iteration that was started last is aborted.
     pub fn aborted(&self) -> bool {
         self.state.aborted.load(Ordering::Relaxed)
     }
@@ -77,17 +78,17 @@ impl Stop {
 mod tests {
     use super::*;
 
-    /// Units end from the moment on that an end is asked for or time is up, until another iteration begins.
+    /// An aborted iteration stays aborted until the next iteration starts.
     #[test]
-    fn an_iteration_is_given_up_once_and_for_all() {
-        let asked = Arc::new(AtomicBool::new(false));
-        let stop = Stop::from_flag(Arc::clone(&asked));
+    fn an_aborted_iteration_stays_aborted() {
+        let requested = Arc::new(AtomicBool::new(false));
+        let stop = Stop::from_flag(Arc::clone(&requested));
         stop.start_iteration(None);
         assert!(!stop.should_abort() && !stop.aborted());
-        asked.store(true, Ordering::Relaxed);
-        assert!(!stop.aborted(), "all units were done before");
+        requested.store(true, Ordering::Relaxed);
+        assert!(!stop.aborted(), "no unit has polled since the request");
         assert!(stop.clone().should_abort() && stop.aborted());
-        asked.store(false, Ordering::Relaxed);
+        requested.store(false, Ordering::Relaxed);
         assert!(stop.should_abort());
         stop.start_iteration(Some(3600.0));
         assert!(!stop.should_abort());

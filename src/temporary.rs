@@ -5,11 +5,11 @@ use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use tempfile::TempDir;
 
-/// A folder of its own among the temporary files, gone when it is dropped, whose name begins with `prefix`. Nobody else
-/// can look into it, whatever the umask is: files of other people's scenes lie there, and programs that are run.
+/// Creates a temporary folder whose name begins with `prefix`. Dropping the result deletes it. Only the user has access,
+/// independent of the umask, because it may hold files of a private scene and programs to run.
 ///
 /// # Errors
-/// The file system.
+/// The folder cannot be created.
 pub fn create_folder(prefix: &str) -> Result<TempDir> {
     let folder = tempfile::Builder::new().prefix(prefix).permissions(Permissions::from_mode(0o700)).tempdir();
     folder.map_err(|cause| Error::io(&std::env::temp_dir(), &cause))
@@ -20,9 +20,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nobody_else_looks_into_a_temporary_folder() {
+    fn only_the_user_has_access_to_a_temporary_folder() {
         let folder = create_folder("caustique-test-").expect("a folder");
-        let mode = std::fs::metadata(folder.path()).expect("it is there").permissions().mode();
+        let mode = std::fs::metadata(folder.path()).expect("metadata").permissions().mode();
         assert_eq!(mode & 0o777, 0o700);
     }
 }

@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-/// Two unit vectors that complete the unit vector `n` to a right-handed orthonormal basis,
-/// without branches on the data \[Duff et al. 2017, "Building an Orthonormal Basis, Revisited"\].
-/// A pure function of `n`: every iteration sees the same tangents.
+/// Two unit vectors that complete the unit vector `n` to a right-handed orthonormal basis, without branches on the data
+/// \[Duff et al. 2017, "Building an Orthonormal Basis, Revisited"\].
 #[inline]
 pub fn orthonormal_basis(n: Vec3) -> (Vec3, Vec3) {
     let sign = 1.0f32.copysign(n.z);
@@ -32,8 +31,8 @@ impl Frame {
         Frame { t, b, n }
     }
 
-    /// A frame around the unit normal `n` whose x axis is as near to `tangent` as it can be.
-    /// A tangent that is zero, not finite or parallel to `n` is ignored.
+    /// A frame around the unit normal `n` whose x axis is `tangent` projected into the plane of `n` and normalized. A
+    /// tangent that is zero, not finite or parallel to `n` is ignored.
     #[inline]
     pub fn from_normal_tangent(n: Vec3, tangent: Vec3) -> Frame {
         let t = tangent - n * n.dot(tangent);
@@ -46,13 +45,13 @@ impl Frame {
         }
     }
 
-    /// World to local.
+    /// Transforms a vector from world space to the frame.
     #[inline]
     pub fn to_local(&self, v: Vec3) -> Vec3 {
         Vec3::new(v.dot(self.t), v.dot(self.b), v.dot(self.n))
     }
 
-    /// Local to world.
+    /// Transforms a vector from the frame to world space.
     #[inline]
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         self.t * v.x + self.b * v.y + self.n * v.z

@@ -1,4 +1,4 @@
-//! Vectors (glam), frames, transforms, warps, colour.
+//! Vectors and transforms (from glam), orthonormal frames, sample warps and colours.
 
 mod frame;
 mod rgb;
@@ -14,8 +14,8 @@ pub fn sqr(x: f32) -> f32 {
     x * x
 }
 
-/// 1 - cos of the angle between unit vectors, from the chord: exact for small angles, where the cosine itself has no
-/// digits left.
+/// 1 - cos of the angle between two unit vectors. It is computed from the chord, because 1 minus a dot product loses all
+/// digits at small angles.
 #[inline]
 pub fn one_minus_cos(a: Vec3, b: Vec3) -> f32 {
     0.5 * (a - b).length_squared()

@@ -1,7 +1,5 @@
-//! Warps from the unit square to what is sampled; each with its density beside it.
-//!
-//! `u` is uniform on `[0, 1)`. Densities are per unit of the measure in the name: `_w` solid angle,
-//! `_a` area.
+//! Warps of uniform points `u` of the unit square `[0, 1)^2` to other distributions, and their densities. The suffix
+//! `_pdf_w` means a density per solid angle.
 
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
@@ -35,8 +33,8 @@ pub fn sphere_uniform(u: Vec2) -> Vec3 {
     Vec3::new(r * phi.cos(), r * phi.sin(), z)
 }
 
-/// Uniform direction of the cone of half angle `acos(1 - one_minus_cos)` around local z.
-/// Taking `1 - cos` keeps narrow cones (the sun) exact in f32.
+/// Uniform direction of the cone of half angle `acos(1 - one_minus_cos)` around local z. Narrow cones (the sun) stay
+/// exact in f32 because the argument is `1 - cos`.
 #[inline]
 pub fn cone_uniform(u: Vec2, one_minus_cos: f32) -> Vec3 {
     let h = u.x * one_minus_cos;

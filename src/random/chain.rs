@@ -1,12 +1,13 @@
-//! Primary sample space: the uniform numbers that a path is made of, as the coordinates of a Markov chain \[Kelemen et
-//! al. 2002, "A Simple and Robust Mutation Candidate for the Metropolis Light Transport Algorithm"\].
+//! Primary sample space: a Markov chain whose state is the uniform numbers that determine a path \[Kelemen et al. 2002,
+//! "A Simple and Robust Mutation Strategy for the Metropolis Light Transport Algorithm"\].
 //!
-//! A coordinate belongs to a decision (path, vertex, purpose), as a draw does, and comes into being when that decision
-//! is first made. One that a proposal does not ask for stays what it was, and catches up with all small steps since
-//! when it is asked for again: n Gaussian steps are one that is `sqrt(n)` as wide \[Pharr, Jakob, Humphreys 2016, 16.4\].
+//! Each decision (path, vertex, purpose) has its own coordinates, a point of the unit square, created when a path first
+//! makes that decision. A proposal updates only the coordinates that its path reads. The next proposal that reads the
+//! others applies all small steps in between at once: n Gaussian steps are one step of `sqrt(n)` times the standard
+//! deviation \[Pharr, Jakob, Humphreys 2016, 16.4\].
 //!
-//! A chain is the work of one thread at a time, and its draws are asked for from deep within walks that know of no
-//! chain: while one is at work it lies with the thread ([`Chain::during`]).
+//! Path code reads random numbers through [`Stream`](super::Stream) and does not know about chains, so the active chain
+//! is a thread-local variable ([`Chain::run`]).
 
 use super::{GOLDEN, mix, square, unit};
 use glam::Vec2;
@@ -16,19 +17,19 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 /// Standard deviation of a small step.
 const STEP: f32 = 0.01;
-/// Probability of a large step, which forgets all coordinates \[Kelemen et al. 2002, 3\]. Low, for chains are short and
-/// start anew in every iteration.
-const LARGE: f32 = 0.1;
+/// Probability of a large step, which redraws all coordinates \[Kelemen et al. 2002, 3\]. Low, because chains are short
+/// and restart in every iteration.
+const LARGE_STEP_PROBABILITY: f32 = 0.1;
 
 thread_local! {
-    static AT_WORK: RefCell<Option<Chain>> = const { RefCell::new(None) };
+    static ACTIVE: RefCell<Option<Chain>> = const { RefCell::new(None) };
 }
 
-/// Keys are hashes already.
+/// Hasher of keys that are hashes already.
 #[derive(Default)]
-struct Keys(u64);
+struct KeyHasher(u64);
 
-impl Hasher for Keys {
+impl Hasher for KeyHasher {
     fn write(&mut self, bytes: &[u8]) {
         bytes.iter().for_each(|byte| self.0 = mix(self.0 ^ u64::from(*byte)));
     }
@@ -45,7 +46,7 @@ impl Hasher for Keys {
 #[derive(Clone, Copy)]
 struct Coordinate {
     value: Vec2,
-    /// Step of the chain after which it had this value.
+    /// Number of accepted steps of the chain that `value` includes.
     step: u64,
 }
 
@@ -53,15 +54,17 @@ struct Coordinate {
 #[derive(Default)]
 pub struct Chain {
     key: u64,
-    coordinates: HashMap<u64, Coordinate, BuildHasherDefault<Keys>>,
-    /// Coordinates as they were before this proposal; `None`: there were none.
-    before: Vec<(u64, Option<Coordinate>)>,
-    /// Accepted steps, and the last of them that was large.
+    coordinates: HashMap<u64, Coordinate, BuildHasherDefault<KeyHasher>>,
+    /// Earlier values of the coordinates that the current proposal has changed, for its rejection. `None`: the
+    /// proposal has created the coordinate.
+    replaced: Vec<(u64, Option<Coordinate>)>,
+    /// Number of accepted steps.
     steps: u64,
-    large: u64,
-    /// Proposals so far.
+    /// Value of `steps` after the last accepted large step.
+    last_large_step: u64,
+    /// Number of proposals.
     proposals: u64,
-    /// What is proposed.
+    /// The current proposal.
     proposed: Option<Proposal>,
 }
 
@@ -71,17 +74,17 @@ enum Proposal {
     Small,
 }
 
-/// A key of decisions that are the chain's own.
-const OWN: u64 = 0x6d6c_745f_6f77_6e00;
+/// Key of the random numbers that decide about steps and acceptance.
+const STEP_KEY: u64 = 0x6d6c_745f_6f77_6e00;
 
 impl Chain {
-    /// Where all coordinates are the draws of a path that is no chain's; `key` tells chains apart.
+    /// A chain that starts at the ordinary draws of its first path. Chains of different `key` are independent.
     pub fn new(key: u64) -> Chain {
         Chain { key, ..Chain::default() }
     }
 
-    /// Says what a coordinate is at the start.
-    pub fn set(&mut self, id: u64, value: Vec2) {
+    /// Sets the initial value of the coordinates `id` (see [`Draws::id`](super::Draws::id)).
+    pub fn set_initial(&mut self, id: u64, value: Vec2) {
         self.coordinates.insert(id, Coordinate { value, step: 0 });
     }
 
@@ -89,28 +92,30 @@ impl Chain {
         mix(mix(self.key ^ id).wrapping_add((self.proposals ^ salt << 56).wrapping_mul(GOLDEN)))
     }
 
-    /// A uniform number for a decision of the chain itself, about this proposal.
-    fn own(&self, what: u64) -> f32 {
-        unit((self.hash(OWN ^ what, 3) >> 32) as u32)
+    /// A uniform number for decision number `decision` about the current proposal.
+    fn step_draw(&self, decision: u64) -> f32 {
+        unit((self.hash(STEP_KEY ^ decision, 3) >> 32) as u32)
     }
 
-    /// Begins a proposal: what is drawn from now on is its.
+    /// Begins a proposal: coordinates that are read from now on are mutated.
     pub fn propose(&mut self) {
         self.proposals += 1;
-        self.proposed = Some(if self.own(1) < LARGE { Proposal::Large } else { Proposal::Small });
+        let large = self.step_draw(1) < LARGE_STEP_PROBABILITY;
+        self.proposed = Some(if large { Proposal::Large } else { Proposal::Small });
     }
 
-    /// Ends the proposal, which is taken with a probability; whether it was.
-    pub fn decide(&mut self, acceptance: f32) -> bool {
-        let taken = self.own(2) < acceptance;
-        if taken {
+    /// Accepts the current proposal with the probability `acceptance`, else restores the state before it. Returns
+    /// whether it was accepted.
+    pub fn accept_or_reject(&mut self, acceptance: f32) -> bool {
+        let accepted = self.step_draw(2) < acceptance;
+        if accepted {
             self.steps += 1;
             if self.proposed == Some(Proposal::Large) {
-                self.large = self.steps;
+                self.last_large_step = self.steps;
             }
-            self.before.clear();
+            self.replaced.clear();
         } else {
-            for (id, coordinate) in self.before.drain(..).rev() {
+            for (id, coordinate) in self.replaced.drain(..).rev() {
                 match coordinate {
                     Some(coordinate) => self.coordinates.insert(id, coordinate),
                     None => self.coordinates.remove(&id),
@@ -118,23 +123,24 @@ impl Chain {
             }
         }
         self.proposed = None;
-        taken
+        accepted
     }
 
-    /// Does `work`, whose draws from streams that are [chained](super::Stream::chained) are this chain's. It must not
-    /// share its work with other threads.
-    pub fn during<T>(&mut self, work: impl FnOnce() -> T) -> T {
-        AT_WORK.set(Some(std::mem::take(self)));
-        let done = work();
-        if let Some(chain) = AT_WORK.take() {
+    /// Runs `trace`, which reads this chain wherever it draws from a [chained](super::Stream::chained) stream. `trace`
+    /// must stay on this thread.
+    pub fn run<T>(&mut self, trace: impl FnOnce() -> T) -> T {
+        ACTIVE.set(Some(std::mem::take(self)));
+        let result = trace();
+        if let Some(chain) = ACTIVE.take() {
             *self = chain;
         }
-        done
+        result
     }
 
-    /// The coordinates of a decision, uniform on the unit square; `first` is what they are where the chain starts.
-    pub(super) fn draw_here(id: u64, first: Vec2) -> Vec2 {
-        AT_WORK.with_borrow_mut(|chain| chain.as_mut().map_or(first, |chain| chain.draw(id, first)))
+    /// The coordinates of decision `id` in the active chain, a point of the unit square. `first` is their value in the
+    /// chain's initial state, and the result without an active chain.
+    pub(super) fn draw_active(id: u64, first: Vec2) -> Vec2 {
+        ACTIVE.with_borrow_mut(|chain| chain.as_mut().map_or(first, |chain| chain.draw(id, first)))
     }
 
     fn draw(&mut self, id: u64, first: Vec2) -> Vec2 {
@@ -145,33 +151,33 @@ impl Chain {
         {
             return known.value;
         }
-        // Of the accepted state: a coordinate that the last large step has not been asked for is what that would have
-        // drawn, at whatever time it is asked for.
-        let at_large = || square(mix(mix(self.key ^ id) ^ mix(self.large)));
+        // The accepted state. If the last large step did not read this coordinate, its value there is a hash of the
+        // step, so it does not matter when it is read.
+        let at_large_step = || square(mix(mix(self.key ^ id) ^ mix(self.last_large_step)));
         let mut now = match known {
-            Some(known) if known.step >= self.large => known,
-            _ if self.large == 0 => Coordinate { value: first, step: 0 },
-            _ => Coordinate { value: at_large(), step: self.large },
+            Some(known) if known.step >= self.last_large_step => known,
+            _ if self.last_large_step == 0 => Coordinate { value: first, step: 0 },
+            _ => Coordinate { value: at_large_step(), step: self.last_large_step },
         };
         now.value = match self.proposed {
             Some(Proposal::Large) => square(self.hash(id, 1)),
-            _ => stepped(now.value, (next - now.step) as f32, self.hash(id, 2)),
+            _ => apply_small_steps(now.value, (next - now.step) as f32, self.hash(id, 2)),
         };
         now.step = next;
         if self.proposed.is_some() {
-            self.before.push((id, known));
+            self.replaced.push((id, known));
         }
         self.coordinates.insert(id, now);
         now.value
     }
 }
 
-/// After so many small steps; what leaves the unit square comes back at the other side.
-fn stepped(at: Vec2, steps: f32, bits: u64) -> Vec2 {
+/// The point `at` after `steps` small steps, wrapped around the unit square.
+fn apply_small_steps(at: Vec2, steps: f32, bits: u64) -> Vec2 {
     if steps == 0.0 {
         return at;
     }
-    // Box and Muller: two independent normal numbers.
+    // Box-Muller transform: two independent normal numbers.
     let u = square(bits);
     let r = (-2.0 * (1.0 - u.x).ln()).sqrt() * STEP * steps.sqrt();
     let (sin, cos) = (std::f32::consts::TAU * u.y).sin_cos();
@@ -184,11 +190,10 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Streams};
 
-    /// A chain whose proposals are all taken visits the unit square evenly, and each axis: squared deviations of counts
-    /// in 16 cells from their mean, and a coordinate that is asked for rarely. A planted fault, reflecting off no
-    /// border, would leave the cells.
+    /// A chain that accepts every proposal visits 16 cells of the unit square equally often, within 5 sigma. This also
+    /// holds for a coordinate that only every seventh path reads.
     #[test]
-    fn a_chain_is_uniform_where_all_is_accepted() {
+    fn a_chain_that_accepts_every_proposal_is_uniform() {
         let stream = Streams::new(1, 1, Domain::Test).path(0).chained();
         let (often, rarely) = (stream.vertex(1), stream.vertex(2));
         let mut chain = Chain::new(7);
@@ -197,7 +202,7 @@ mod tests {
         for i in 0..n {
             chain.propose();
             let cell = |u: Vec2| (u.x * 4.0) as usize * 4 + (u.y * 4.0) as usize;
-            let (a, b) = chain.during(|| {
+            let (a, b) = chain.run(|| {
                 let b = (i % 7 == 0).then(|| rarely.two(Purpose::Direction));
                 (often.two(Purpose::Direction), b)
             });
@@ -205,7 +210,7 @@ mod tests {
             if let Some(b) = b {
                 counts[1][cell(b)] += 1;
             }
-            assert!(chain.decide(1.0));
+            assert!(chain.accept_or_reject(1.0));
         }
         for (counts, n) in counts.iter().zip([n as f64, n as f64 / 7.0]) {
             // Large steps make the chain independent every few steps: samples count as n / 7.
@@ -215,20 +220,20 @@ mod tests {
         }
     }
 
-    /// What was rejected leaves no trace, and a state is the same however often it is asked for.
+    /// A rejected proposal changes nothing, and reading a coordinate twice gives the same value.
     #[test]
-    fn rejected_proposals_leave_the_state() {
+    fn rejected_proposals_leave_the_state_unchanged() {
         let stream = Streams::new(1, 1, Domain::Test).path(0);
         let (draws, plain) = (stream.chained().vertex(1), stream.vertex(1));
         let mut chain = Chain::new(7);
-        let first = chain.during(|| draws.two(Purpose::Direction));
+        let first = chain.run(|| draws.two(Purpose::Direction));
         assert_eq!(first, plain.two(Purpose::Direction));
         let mut moved = 0;
         for _ in 0..100 {
             chain.propose();
-            moved += u32::from(chain.during(|| draws.two(Purpose::Direction)) != first);
-            assert!(!chain.decide(0.0));
-            assert_eq!(chain.during(|| draws.two(Purpose::Direction)), first);
+            moved += u32::from(chain.run(|| draws.two(Purpose::Direction)) != first);
+            assert!(!chain.accept_or_reject(0.0));
+            assert_eq!(chain.run(|| draws.two(Purpose::Direction)), first);
         }
         assert_eq!(moved, 100);
     }

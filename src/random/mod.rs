@@ -1,13 +1,13 @@
-//! Counter-based random numbers: a draw is a function of (seed, pass, domain, path, vertex, purpose).
+//! Counter-based random numbers: a draw is a function of (seed, iteration, domain, path, vertex, purpose).
 //!
-//! Nothing is consumed, so a draw does not depend on which other draws were made: a richer
-//! scene tier gives the same bits on a plainer scene, and threads, shards and resumed renders agree.
+//! There is no generator state, so a draw does not depend on which other draws were made. Any number of threads, shards
+//! and resumed renders give the same numbers.
 //!
-//! The function is a hash; for the first vertices of paths that ask for it ([`Streams::in_sequence`]) it is a point
-//! of an Owen-scrambled Sobol' sequence, whose error falls faster than that of independent points \[Owen 1997,
-//! "Scrambled net variance for integrals of smooth functions"\]: (path, vertex, purpose) has a sequence of its own,
-//! and passes take its points one after the other. Passes are then not independent any more. What tells variances
-//! takes [`QUARTERS`] of them, whose sequences are.
+//! The function is a hash. In streams made by [`Streams::in_sequence`], it is a point of an Owen-scrambled Sobol'
+//! sequence for the first vertices of a path, because the error of such points falls faster than that of independent
+//! ones \[Owen 1997, "Scrambled net variance for integrals of smooth functions"\]. Each (path, vertex, purpose) has its
+//! own sequence, which advances by one point per iteration. Iterations are then not independent of each other. Variances
+//! are therefore estimated from [`QUARTERS`], groups of iterations with independent sequences.
 
 mod chain;
 mod sobol;
@@ -17,31 +17,31 @@ pub use sobol::SobolPair;
 
 use glam::Vec2;
 
-/// What kind of path a stream belongs to; keeps eye paths, light paths and pilots independent.
+/// The kind of path that a stream belongs to. Streams of different domains are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Domain {
-    /// The eye path of a pixel that feeds level 1 (and single-path methods).
+    /// The camera path of a pixel for bandwidth level 1, and for methods with one camera path per pixel.
     CameraIndependent = 1,
-    /// The eye path of a pixel that feeds levels 2 and up.
+    /// The camera path of a pixel that the bandwidth levels 2 and up share.
     CameraCorrelated = 2,
     /// Light paths.
     Light = 3,
-    /// Eye paths of the pilot pass that sets initial bandwidths.
+    /// Camera paths of the pilot iteration that sets initial bandwidths.
     PilotCamera = 4,
-    /// Light paths of the pilot pass.
+    /// Light paths of the pilot iteration that sets initial bandwidths.
     PilotLight = 5,
-    /// Light paths that serve the eye paths of [`Domain::CameraCorrelated`].
+    /// Light paths for the camera paths of [`Domain::CameraCorrelated`].
     LightCorrelated = 6,
-    /// Light paths by which emission is guided.
+    /// Light paths that train the guiding of emission.
     GuideLight = 7,
-    /// Eye paths by which emission is guided.
+    /// Camera paths that train the guiding of emission.
     GuideCamera = 8,
-    /// Anything in tests.
+    /// Paths in tests.
     Test = 99,
 }
 
-/// What a draw is for. One variant per decision of a walk; 2D purposes take two words.
+/// The decision that a draw is for. (2D) marks decisions that take a point of the unit square, [`Draws::two`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
@@ -49,17 +49,17 @@ pub enum Purpose {
     Pixel = 1,
     /// Position on the lens (2D).
     Lens = 2,
-    /// Which lobe of a BSDF.
+    /// Choice of a lobe of a BSDF.
     Lobe = 3,
-    /// Direction from a BSDF (2D).
+    /// Direction from a lobe (2D).
     Direction = 4,
     /// Russian roulette.
     Roulette = 5,
-    /// Which light next-event estimation takes.
+    /// Choice of the light in next-event estimation.
     LightChoice = 6,
-    /// Point or direction on that light (2D).
+    /// Point or direction on the light of next-event estimation (2D).
     LightPoint = 7,
-    /// Which light a light path starts from.
+    /// Choice of the light that a light path starts from.
     EmitterChoice = 8,
     /// Point of emission (2D).
     EmitterPoint = 9,
@@ -67,13 +67,13 @@ pub enum Purpose {
     EmitterDirection = 10,
     /// Alpha cut-outs along the segment that leaves this vertex.
     Alpha = 11,
-    /// Whether the second direct-light strategy is tried.
+    /// Whether direct light is also estimated by BSDF sampling, the second technique.
     SecondTechnique = 12,
-    /// Lobe of that second strategy.
+    /// Lobe of the second technique.
     SecondLobe = 13,
-    /// Direction of that second strategy (2D).
+    /// Direction of the second technique (2D).
     SecondDirection = 14,
-    /// Free flight in a medium.
+    /// Free-flight distance in a medium (2D).
     Flight = 15,
     /// Direction from a phase function (2D).
     Phase = 16,
@@ -81,25 +81,25 @@ pub enum Purpose {
     Wavelength = 17,
     /// Alpha cut-outs along a shadow ray.
     ShadowAlpha = 18,
-    /// Alpha cut-outs along the second strategy's ray.
+    /// Alpha cut-outs along the ray of the second technique.
     SecondAlpha = 19,
-    /// Whether a photon of constant flux outlives what it lost on its way here.
+    /// Russian roulette that keeps the flux of photons constant.
     Loss = 20,
-    /// Which of several sets of lobes a path goes on with.
+    /// Choice among the sets of lobes that a path may continue with.
     LobeChoice = 21,
-    /// Distance of a point in a medium by the angle as seen from a lamp.
+    /// Distance of a point in a medium, sampled equiangularly.
     Equiangular = 22,
-    /// Rank of a photon among those of other weights.
+    /// Thinning rank of a photon.
     ThinningKey = 23,
-    /// Directions in which the borders of a medium are looked for.
+    /// Directions of the rays that look for the boundaries of a medium.
     Border = 24,
-    /// How they are turned.
+    /// Rotation of these directions.
     BorderTurn = 25,
-    /// Which of the pixels that see a point of the film a light path goes to (2D).
+    /// Choice of the pixel that receives a light path's contribution to a film point (2D).
     Splat = 26,
-    /// Where on the film a Markov chain's path starts (2D).
+    /// Film point where a path of a Markov chain starts (2D).
     Film = 27,
-    /// How such a path is divided among the two walks.
+    /// Number of camera and light vertices of a path of a Markov chain.
     Division = 28,
 }
 
@@ -111,71 +111,71 @@ pub fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Steps between numbers that are to be mixed: 2^64 over the golden ratio \[Steele, Lea, Flood 2014\].
+/// Increment between consecutive inputs of [`mix`]: 2^64 over the golden ratio \[Steele, Lea, Flood 2014\].
 pub const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// 24 random bits to a float in `[0, 1)`.
+/// A float in `[0, 1)` from the upper 24 of 32 random bits.
 #[inline]
 fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// 64 random bits to a point of the unit square.
+/// A point of the unit square from 64 random bits.
 #[inline]
 fn square(bits: u64) -> Vec2 {
     Vec2::new(unit((bits >> 32) as u32), unit(bits as u32))
 }
 
-/// 32 random bits to a number in `[0, 1)`, all of them kept.
+/// A number in `[0, 1)` with all of 32 random bits.
 #[inline]
-fn fine(bits: u32) -> f64 {
+fn unit_f64(bits: u32) -> f64 {
     f64::from(bits) * (1.0 / 4_294_967_296.0)
 }
 
-/// Number of groups into which the passes of a render fall. Every group has sequences of its own, so means over
-/// groups are independent, though the passes of a group are not. As few as still tell a variance: the fewer, the
-/// longer the sequences.
+/// Number of groups (quarters) of the iterations of a render. Each quarter has its own sequences, so the means of
+/// quarters are independent although the iterations within one are not. Four, because sequences are longer with fewer
+/// quarters, and fewer give no usable variance.
 pub const QUARTERS: u64 = 4;
 
-/// Vertices of a path whose draws are points of sequences, the endpoint it starts from included. Eight rather than four
-/// lowers squared errors by up to 3 % and costs no time that can be measured; later vertices bring too little.
-const VERTICES: u32 = 8;
+/// Number of vertices of a path, its endpoint included, whose draws are points of sequences. Eight instead of four
+/// lowers squared errors by up to 3 % at no measurable cost; more gain too little.
+const SEQUENCE_VERTICES: u32 = 8;
 
-/// The group of pass `pass`. Passes of the picture count from 1 and take groups in turn.
+/// The quarter of an iteration. Iterations count from 1 and take quarters in turn.
 #[inline]
-pub fn quarter(pass: u64) -> u64 {
-    turn(pass) % QUARTERS
+pub fn quarter(iteration: u64) -> u64 {
+    iterations_before(iteration) % QUARTERS
 }
 
-/// Passes of the picture before this one. Pass 0 comes after all others: no number of passes gets there.
+/// Number of iterations before this one. Iteration 0, which is not part of the picture, counts as the last.
 #[inline]
-fn turn(pass: u64) -> u64 {
-    pass.wrapping_sub(1)
+fn iterations_before(iteration: u64) -> u64 {
+    iteration.wrapping_sub(1)
 }
 
-/// The draws of all paths of a domain in one pass.
+/// The draws of all paths of a domain in one iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct Streams(Stream);
 
 impl Streams {
-    /// Those of `domain` in pass `pass` of a render with `seed`, all of them hashes.
-    pub fn new(seed: u64, pass: u64, domain: Domain) -> Streams {
+    /// Streams of hashes for `domain` in an iteration of a render with `seed`.
+    pub fn new(seed: u64, iteration: u64, domain: Domain) -> Streams {
         let key = mix(seed.wrapping_add(GOLDEN));
-        let key = mix(key ^ pass.wrapping_mul(GOLDEN).wrapping_add(domain as u64));
+        let key = mix(key ^ iteration.wrapping_mul(GOLDEN).wrapping_add(domain as u64));
         Streams(Stream { key, reversed: 0, vertices: 0, chained: false })
     }
 
-    /// The same with the first vertices of every path drawn from sequences, of which pass `pass` takes one point.
-    pub fn in_sequence(seed: u64, pass: u64, domain: Domain) -> Streams {
-        let index = turn(pass) / QUARTERS;
-        // Where the index has more bits than a point, there are new sequences.
-        let group = (index >> 32) * QUARTERS + quarter(pass);
+    /// Streams whose draws at the first vertices of every path are points of Sobol' sequences, one point per iteration.
+    pub fn in_sequence(seed: u64, iteration: u64, domain: Domain) -> Streams {
+        let index = iterations_before(iteration) / QUARTERS;
+        // Points have 32 bits of index. The higher bits of the index select other sequences.
+        let group = (index >> 32) * QUARTERS + quarter(iteration);
         let key = mix(mix(seed.wrapping_add(GOLDEN)) ^ 0x2545_f491_4f6c_dd1d);
         let key = mix(key ^ group.wrapping_mul(GOLDEN).wrapping_add(domain as u64));
-        Streams(Stream { key, reversed: (index as u32).reverse_bits(), vertices: VERTICES, chained: false })
+        Streams(Stream { key, reversed: (index as u32).reverse_bits(), vertices: SEQUENCE_VERTICES, chained: false })
     }
 
-    /// Those of path `index`.
+    /// The stream of path number `index`.
     #[inline]
     pub fn path(self, index: u64) -> Stream {
         Stream { key: mix(self.0.key.wrapping_add(index.wrapping_mul(GOLDEN))), ..self.0 }
@@ -185,47 +185,48 @@ impl Streams {
 /// The draws of one path.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream {
-    /// That of all passes of a group, where draws are in sequences.
+    /// Key of the hashes. With sequences, all iterations of a quarter share it.
     key: u64,
-    /// Index in the sequences of the group, bits in reverse order; 0 where there are none.
+    /// Index of this iteration's point in the sequences, with its bits in reverse order; 0 without sequences.
     reversed: u32,
-    /// Vertices whose draws are points of sequences.
+    /// Number of vertices whose draws are points of sequences.
     vertices: u32,
-    /// Its draws are the coordinates of a Markov chain.
+    /// Whether draws are the coordinates of the active Markov chain.
     chained: bool,
 }
 
 impl Stream {
-    /// The stream of path `index` in `domain` of pass `pass` of a render with `seed`, all its draws hashes.
+    /// The stream of hashes of path number `index` of `domain` in an iteration of a render with `seed`.
     #[inline]
-    pub fn new(seed: u64, pass: u64, domain: Domain, index: u64) -> Stream {
-        Streams::new(seed, pass, domain).path(index)
+    pub fn new(seed: u64, iteration: u64, domain: Domain, index: u64) -> Stream {
+        Streams::new(seed, iteration, domain).path(index)
     }
 
-    /// The same with draws that are the coordinates of the Markov chain at work on this thread, and start as they are.
+    /// A stream whose draws are the coordinates of the thread's active [`Chain`]. This stream's own draws are the
+    /// chain's initial state.
     #[must_use]
     pub fn chained(self) -> Stream {
         Stream { chained: true, ..self }
     }
 
-    /// The draws at vertex `vertex` of the path (0 is the endpoint the path starts from).
+    /// The draws at vertex number `vertex` of the path. Vertex 0 is its endpoint on the lens or light.
     #[inline]
     pub fn vertex(self, vertex: u32) -> Draws {
         Draws {
             key: mix(self.key ^ (u64::from(vertex) + 1).wrapping_mul(0xd1b5_4a32_d192_ed03)),
             reversed: self.reversed,
-            source: match vertex < self.vertices {
-                _ if self.chained => Source::Chain,
-                true => Source::Sequence,
-                false => Source::Hash,
+            generator: match vertex < self.vertices {
+                _ if self.chained => Generator::Chain,
+                true => Generator::Sequence,
+                false => Generator::Hash,
             },
         }
     }
 }
 
-/// Where draws come from.
+/// How draws are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Source {
+enum Generator {
     Hash,
     Sequence,
     Chain,
@@ -234,33 +235,33 @@ enum Source {
 /// The draws at one vertex of a path.
 #[derive(Clone, Copy, Debug)]
 pub struct Draws {
-    /// Of a stream in sequences, the key of all passes of a group.
+    /// Key of the hashes. With sequences, all iterations of a quarter share it.
     key: u64,
     reversed: u32,
-    source: Source,
+    generator: Generator,
 }
 
 impl Draws {
-    /// Draws for the `n`-th of several like decisions at this vertex.
+    /// Draws for decision number `n`, where a vertex makes several decisions of the same purpose.
     #[inline]
     pub fn nth(self, n: u32) -> Draws {
         Draws { key: mix(self.key ^ (u64::from(n) + 1).wrapping_mul(0xa076_1d64_78bd_642f)), ..self }
     }
 
-    /// 64 bits for `purpose`, which passes of a group share.
+    /// Key for `purpose`. With sequences, all iterations of a quarter share it.
     #[inline]
     fn key_of(self, purpose: Purpose) -> u64 {
         self.key.wrapping_add((purpose as u64).wrapping_mul(GOLDEN))
     }
 
-    /// The coordinates of a chain.
+    /// The coordinates for `purpose` in the active chain.
     #[cold]
     #[inline(never)]
     fn chained(self, purpose: Purpose) -> Vec2 {
-        Chain::draw_here(self.id(purpose), square(self.hash(purpose)))
+        Chain::draw_active(self.id(purpose), square(self.hash(purpose)))
     }
 
-    /// What tells the coordinates of a chain apart.
+    /// Identifies the coordinates for `purpose` in a [`Chain`].
     pub fn id(self, purpose: Purpose) -> u64 {
         mix(self.key_of(purpose))
     }
@@ -268,7 +269,7 @@ impl Draws {
     /// 64 random bits for `purpose`.
     #[inline]
     pub fn bits(self, purpose: Purpose) -> u64 {
-        if self.source == Source::Chain {
+        if self.generator == Generator::Chain {
             let u = self.chained(purpose);
             return mix(u64::from(u.x.to_bits()) << 32 | u64::from(u.y.to_bits()));
         }
@@ -288,34 +289,34 @@ impl Draws {
     /// Uniform on `[0, 1)`.
     #[inline]
     pub fn one(self, purpose: Purpose) -> f32 {
-        match self.source {
-            Source::Sequence => self.pair(purpose).first_reversed(self.reversed),
-            Source::Hash => unit((self.hash(purpose) >> 32) as u32),
-            Source::Chain => self.chained(purpose).x,
+        match self.generator {
+            Generator::Sequence => self.pair(purpose).first_reversed(self.reversed),
+            Generator::Hash => unit((self.hash(purpose) >> 32) as u32),
+            Generator::Chain => self.chained(purpose).x,
         }
     }
 
-    /// The number of [`Draws::one`] with all of its 32 bits: to choose among more than 2^24.
+    /// The number of [`Draws::one`] with all of its 32 bits, for choices among more than 2^24.
     #[inline]
     pub fn one_fine(self, purpose: Purpose) -> f64 {
-        match self.source {
-            Source::Sequence => fine(self.pair(purpose).first_bits(self.reversed)),
-            Source::Hash => fine((self.hash(purpose) >> 32) as u32),
-            Source::Chain => f64::from(self.chained(purpose).x),
+        match self.generator {
+            Generator::Sequence => unit_f64(self.pair(purpose).first_bits(self.reversed)),
+            Generator::Hash => unit_f64((self.hash(purpose) >> 32) as u32),
+            Generator::Chain => f64::from(self.chained(purpose).x),
         }
     }
 
     /// Uniform on `[0, 1)^2`.
     #[inline]
     pub fn two(self, purpose: Purpose) -> Vec2 {
-        match self.source {
-            Source::Sequence => self.pair(purpose).point_reversed(self.reversed),
-            Source::Hash => square(self.hash(purpose)),
-            Source::Chain => self.chained(purpose),
+        match self.generator {
+            Generator::Sequence => self.pair(purpose).point_reversed(self.reversed),
+            Generator::Hash => square(self.hash(purpose)),
+            Generator::Chain => self.chained(purpose),
         }
     }
 
-    /// 32 random bits, the token of a ray's alpha decisions: a hash.
+    /// 32 random bits for the alpha decisions along a ray, see [`Ray::token`](crate::trace::Ray::token).
     #[inline]
     pub fn token(self, purpose: Purpose) -> u32 {
         (self.bits(purpose) >> 32) as u32
@@ -326,7 +327,7 @@ impl Draws {
 mod tests {
     use super::*;
 
-    /// Mean and lag correlations of 10^6 draws stay within 5 sigma (error rate below 1e-5 with the 4 checks here).
+    /// The mean and three correlations of 10^6 draws are within 5 sigma (error rate below 1e-5).
     #[test]
     fn draws_are_uniform_and_uncorrelated() {
         let n = 1_000_000u64;
@@ -349,24 +350,24 @@ mod tests {
         }
     }
 
-    /// The pass that takes point `index` of a group's sequences.
-    fn pass(group: u64, index: u64) -> u64 {
-        1 + group + QUARTERS * index
+    /// The iteration that takes point `index` of a quarter's sequences.
+    fn iteration(quarter: u64, index: u64) -> u64 {
+        1 + quarter + QUARTERS * index
     }
 
-    fn draws(seed: u64, pass: u64, path: u64) -> Draws {
-        Streams::in_sequence(seed, pass, Domain::Test).path(path).vertex(1)
+    fn draws(seed: u64, iteration: u64, path: u64) -> Draws {
+        Streams::in_sequence(seed, iteration, Domain::Test).path(path).vertex(1)
     }
 
-    /// All draws of 10^6 paths of one pass, as those that are hashes: within 5 sigma (error rate below 1e-5 with the
-    /// 12 checks here).
+    /// The mean and four correlations of 10^6 paths of one iteration are within 5 sigma (three iterations, error rate
+    /// below 1e-5).
     #[test]
     fn draws_in_sequence_are_uniform_and_uncorrelated_between_paths_vertices_and_purposes() {
         let n = 1_000_000u64;
-        for turn in [0, 5, 1 << 40] {
+        for index in [0, 5, 1 << 40] {
             let (mut sum, mut products, mut last) = (0.0f64, [0.0f64; 4], 0.0);
             for i in 0..n {
-                let stream = Streams::in_sequence(1, pass(2, turn), Domain::Test).path(i);
+                let stream = Streams::in_sequence(1, iteration(2, index), Domain::Test).path(i);
                 let (first, second) = (stream.vertex(0), stream.vertex(1));
                 let u = first.two(Purpose::Pixel);
                 let (x, y) = (f64::from(u.x) - 0.5, f64::from(u.y) - 0.5);
@@ -385,10 +386,10 @@ mod tests {
         }
     }
 
-    /// 2^m points in a row, from a multiple of their number on, of every sequence of (path, vertex, purpose, n-th) of
-    /// every group put one point in every elementary interval of area 2^-m; hashes do not.
+    /// In every sequence (quarter, path, vertex, n), points `k 2^m .. (k + 1) 2^m` put one point in every elementary
+    /// interval of area 2^-m. Hashes do not.
     #[test]
-    fn passes_of_a_group_are_nets() {
+    fn iterations_of_a_quarter_are_nets() {
         let in_net = |draws: &dyn Fn(u64) -> Draws| {
             let m = 6u32;
             let n = 1u64 << m;
@@ -410,34 +411,33 @@ mod tests {
                     })
             })
         };
-        for group in 0..QUARTERS {
+        for quarter in 0..QUARTERS {
             for path in 0..16 {
-                for vertex in [0, 1, VERTICES - 1, VERTICES] {
+                for vertex in [0, 1, SEQUENCE_VERTICES - 1, SEQUENCE_VERTICES] {
                     let draws = |index| {
-                        Streams::in_sequence(path, pass(group, index), Domain::CameraCorrelated)
-                            .path(path)
-                            .vertex(vertex)
+                        let streams = Streams::in_sequence(path, iteration(quarter, index), Domain::CameraCorrelated);
+                        streams.path(path).vertex(vertex)
                     };
                     let (sequence, nth) = (in_net(&draws), in_net(&|index| draws(index).nth(3)));
                     assert_eq!(
                         (sequence, nth),
-                        (vertex < VERTICES, vertex < VERTICES),
-                        "group {group}, path {path}, vertex {vertex}"
+                        (vertex < SEQUENCE_VERTICES, vertex < SEQUENCE_VERTICES),
+                        "quarter {quarter}, path {path}, vertex {vertex}"
                     );
                 }
             }
         }
     }
 
-    /// Whatever is not a sample stays a hash of all that a pass is told apart by; hashed streams are the plain formula.
+    /// [`Draws::bits`] differs between all iterations, vertices and n. Streams without sequences follow the formula.
     #[test]
     fn tokens_and_later_vertices_are_hashes() {
         let mut seen = std::collections::HashSet::new();
-        for pass in 0..1000 {
-            for vertex in 0..VERTICES + 2 {
-                let draws = Streams::in_sequence(7, pass, Domain::Test).path(5).vertex(vertex);
-                assert!(seen.insert(draws.bits(Purpose::Alpha)), "pass {pass}, vertex {vertex}");
-                assert!(seen.insert(draws.nth(1).bits(Purpose::Alpha)), "pass {pass}, vertex {vertex}");
+        for iteration in 0..1000 {
+            for vertex in 0..SEQUENCE_VERTICES + 2 {
+                let draws = Streams::in_sequence(7, iteration, Domain::Test).path(5).vertex(vertex);
+                assert!(seen.insert(draws.bits(Purpose::Alpha)), "iteration {iteration}, vertex {vertex}");
+                assert!(seen.insert(draws.nth(1).bits(Purpose::Alpha)), "iteration {iteration}, vertex {vertex}");
             }
         }
         let hashed = Stream::new(7, 3, Domain::Light, 5).vertex(2);
@@ -447,18 +447,19 @@ mod tests {
         assert_eq!((hashed.bits(Purpose::Lobe), hashed.one(Purpose::Lobe)), (bits, unit((bits >> 32) as u32)));
     }
 
-    /// Passes 0 and those beyond 2^32 points of a sequence have draws of their own.
+    /// Iteration 0 and iterations beyond the 2^32 points of a sequence have their own draws.
     #[test]
-    fn every_pass_has_its_own_points() {
-        let passes = [0, 1, 2, 5, pass(0, 1 << 32), pass(0, (1 << 32) + 1), pass(1, 2 << 32), u64::MAX];
-        let points: std::collections::HashSet<_> =
-            passes.map(|pass| draws(1, pass, 0).two(Purpose::Pixel).to_array().map(f32::to_bits)).into_iter().collect();
-        assert_eq!(points.len(), passes.len());
+    fn every_iteration_has_its_own_points() {
+        let late = [iteration(0, 1 << 32), iteration(0, (1 << 32) + 1), iteration(1, 2 << 32)];
+        let iterations = [0, 1, 2, 5, late[0], late[1], late[2], u64::MAX];
+        let point = |iteration| draws(1, iteration, 0).two(Purpose::Pixel).to_array().map(f32::to_bits);
+        let points: std::collections::HashSet<_> = iterations.map(point).into_iter().collect();
+        assert_eq!(points.len(), iterations.len());
         assert_eq!([1, 2, 3, 4, 5, 8, 9].map(quarter), [0, 1, 2, 3, 0, 3, 0]);
     }
 
-    /// A quarter disc, of area pi / 4, times a slope, of mean 1/2: both are far from what elementary intervals tell
-    /// at once.
+    /// The indicator of a quarter disc (area pi / 4) times a linear function (mean 1/2). Neither is aligned with
+    /// elementary intervals.
     fn integrand(draws: Draws) -> f64 {
         let inside = draws.two(Purpose::Direction).length_squared() < 1.0;
         f64::from(u8::from(inside)) * f64::from(draws.one(Purpose::Lobe))
@@ -466,14 +467,14 @@ mod tests {
 
     const INTEGRAL: f64 = std::f64::consts::PI / 8.0;
 
-    /// Error of the mean over the first `count` points of a group's sequence.
-    fn error(seed: u64, group: u64, path: u64, count: u64) -> f64 {
-        let sum: f64 = (0..count).map(|index| integrand(draws(seed, pass(group, index), path))).sum();
+    /// Error of the mean over the first `count` points of a quarter's sequence.
+    fn error(seed: u64, quarter: u64, path: u64, count: u64) -> f64 {
+        let sum: f64 = (0..count).map(|index| integrand(draws(seed, iteration(quarter, index), path))).sum();
         sum / count as f64 - INTEGRAL
     }
 
-    /// Correlation of two errors, times the root of the number of pairs: of independent ones a standard normal
-    /// deviate, nearly.
+    /// Correlation of two errors times the square root of the number of pairs. Nearly a standard normal deviate if the
+    /// errors are independent.
     fn correlation(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         let (mut xy, mut xx, mut yy, mut n) = (0.0, 0.0, 0.0, 0.0f64);
         for (x, y) in pairs {
@@ -482,22 +483,21 @@ mod tests {
         xy / (xx * yy).sqrt() * n.sqrt()
     }
 
-    /// Means over 16 points of groups, of neighbouring paths and of the domains of a pixel: within 5 sigma over 20
-    /// 000 pixels (9 checks, error rate below 1e-5). Two stretches of one sequence, which make up for each other, do
-    /// not pass.
+    /// Means over 16 points are uncorrelated between quarters, neighbouring paths, seeds and domains: within 5 sigma
+    /// over 20,000 pixels (9 checks, error rate below 1e-5). Halves of one sequence are correlated and must fail.
     #[test]
-    fn groups_paths_and_domains_are_independent() {
+    fn quarters_paths_and_domains_are_independent() {
         let n = 20_000;
         for a in 0..QUARTERS {
             for b in 0..a {
                 let z = correlation((0..n).map(|path| (error(3, a, path, 16), error(3, b, path, 16))));
-                assert!(z.abs() < 5.0, "groups {a} and {b}: {z}");
+                assert!(z.abs() < 5.0, "quarters {a} and {b}: {z}");
             }
         }
         let paths = correlation((0..n).map(|path| (error(3, 0, path, 16), error(3, 0, path + 1, 16))));
         let seeds = correlation((0..n).map(|path| (error(3, 0, path, 16), error(4, 0, path, 16))));
         let in_domain = |domain, path| {
-            let draws = |i| Streams::in_sequence(3, pass(0, i), domain).path(path).vertex(1);
+            let draws = |i| Streams::in_sequence(3, iteration(0, i), domain).path(path).vertex(1);
             (0..16).map(|i| integrand(draws(i))).sum::<f64>() / 16.0 - INTEGRAL
         };
         let domains = (0..n).map(|path| (in_domain(Domain::CameraIndependent, path), in_domain(Domain::Light, path)));
@@ -510,32 +510,31 @@ mod tests {
         assert!(halves < -5.0, "halves of a sequence pass for independent: {halves}");
     }
 
-    /// Errors of 64 passes, over 4000 pixels: without bias; the variance that groups tell is the true one; both
-    /// within 5 sigma (error rate below 1e-5 with that of the hashes). Squared errors are below 0.4 of those of
-    /// hashes, which fail that bound.
+    /// Over 64 iterations and 4,000 pixels, the mean is unbiased and the variance between quarters is the true variance,
+    /// both within 5 sigma (error rate below 1e-5). Squared errors are below 0.4 times those of hashes.
     #[test]
-    fn sequences_tell_integrals_better_than_hashes() {
-        let (pixels, passes) = (4000u64, 64);
-        let (mut sum, mut squares, mut told, mut hashed) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+    fn sequences_integrate_better_than_hashes() {
+        let (pixels, iterations) = (4000u64, 64);
+        let (mut sum, mut squares, mut estimated, mut hashed) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
         for path in 0..pixels {
-            let groups: Vec<f64> = (0..QUARTERS).map(|group| error(9, group, path, passes / QUARTERS)).collect();
-            let mean = groups.iter().sum::<f64>() / QUARTERS as f64;
+            let quarters: Vec<f64> = (0..QUARTERS).map(|q| error(9, q, path, iterations / QUARTERS)).collect();
+            let mean = quarters.iter().sum::<f64>() / QUARTERS as f64;
             (sum, squares) = (sum + mean, squares + mean * mean);
-            let spread: f64 = groups.iter().map(|group| (group - mean) * (group - mean)).sum();
-            told += spread / (QUARTERS * (QUARTERS - 1)) as f64;
-            let of_hashes = (1..=passes).map(|pass| integrand(Stream::new(9, pass, Domain::Test, path).vertex(1)));
-            hashed += (of_hashes.sum::<f64>() / passes as f64 - INTEGRAL).powi(2);
+            let spread: f64 = quarters.iter().map(|quarter| (quarter - mean) * (quarter - mean)).sum();
+            estimated += spread / (QUARTERS * (QUARTERS - 1)) as f64;
+            let hash = |iteration| integrand(Stream::new(9, iteration, Domain::Test, path).vertex(1));
+            hashed += ((1..=iterations).map(hash).sum::<f64>() / iterations as f64 - INTEGRAL).powi(2);
         }
         let n = pixels as f64;
         assert!((sum / n).abs() < 5.0 * (squares / n / n).sqrt(), "bias {}", sum / n);
-        // Both are chi-squared, with one degree of freedom and with three per pixel.
+        // `squares` has one degree of freedom per pixel, `estimated` three.
         let sigma = (2.0 / n + 2.0 / (n * (QUARTERS - 1) as f64)).sqrt();
-        assert!((told / squares - 1.0).abs() < 5.0 * sigma, "groups tell {told} of {squares}");
-        // Variance of an integrand whose square has mean pi / 12, over 64 points.
-        let independent = n * (std::f64::consts::PI / 12.0 - INTEGRAL * INTEGRAL) / passes as f64;
+        assert!((estimated / squares - 1.0).abs() < 5.0 * sigma, "estimated {estimated}, true {squares}");
+        // Variance of the mean of 64 independent points; the squared integrand has the mean pi / 12.
+        let independent = n * (std::f64::consts::PI / 12.0 - INTEGRAL * INTEGRAL) / iterations as f64;
         let low = |squares: f64| squares < 0.4 * independent;
-        assert!(low(squares), "squared errors {} of hashes'", squares / independent);
-        assert!(!low(hashed), "hashes pass: {}", hashed / independent);
+        assert!(low(squares), "squared error over that of hashes: {}", squares / independent);
+        assert!(!low(hashed), "hashes are below the bound: {}", hashed / independent);
         assert!((hashed / independent - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "hashes: {}", hashed / independent);
     }
 }

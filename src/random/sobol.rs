@@ -1,18 +1,17 @@
 //! Owen-scrambled Sobol' points in padded pairs of dimensions \[Burley 2020, "Practical Hash-based Owen Scrambling"\].
 //!
 //! Each pair of dimensions is the (0,2)-sequence of the first two Sobol' dimensions with its own shuffle of the index
-//! and its own scramble, both keyed by a seed. Pairs of different seeds are independent. Sums that are taken for
-//! independent must not share a seed: points of one sequence avoid each other, and a variance told from them would
-//! lie.
+//! and its own scramble, both keyed by a seed. Pairs of different seeds are independent. Points of one sequence are
+//! negatively correlated, so a variance must be estimated from sums over different seeds.
 //!
-//! A scramble works on bits in reverse order, least significant first; where one follows another the reversals between
-//! them cancel.
+//! A scramble works on bits in reverse order, least significant first. Where one scramble follows another, the two
+//! reversals between them cancel and are left out.
 
 use super::mix;
 use glam::{DVec2, Vec2};
 
-/// Laine-Karras style hash: a random binary-tree permutation when applied to bit-reversed integers
-/// (constants by Vegdahl 2021, which pass more tests than the original ones).
+/// Laine-Karras style hash: a random binary-tree permutation of bit-reversed integers. The constants are those of Vegdahl
+/// 2021.
 #[inline]
 fn tree_hash(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -25,10 +24,9 @@ fn tree_hash(mut x: u32, seed: u32) -> u32 {
 
 /// Second Sobol' dimension of `index`, bits least significant first.
 ///
-/// Its generator matrix is Pascal's triangle modulo 2: the bit of weight 2^(-1-j) is the sum modulo 2 of those bits k
-/// of the index for which the binomial coefficient of k over j is odd, that is (Lucas 1878) for which the binary
-/// digits of j are among those of k. Such sums over supersets of a set of five digits are made one digit after the
-/// other.
+/// The generator matrix is Pascal's triangle modulo 2. The bit of weight 2^(-1-j) is the sum modulo 2 of the bits k of
+/// the index for which the binomial coefficient "k over j" is odd. By Lucas' theorem these are the k whose binary digits
+/// include those of j. The sums over all such k are accumulated digit by digit, five digits for 32 bits.
 #[inline]
 fn sobol_second(index: u32) -> u32 {
     let mut x = index;
@@ -54,7 +52,7 @@ impl SobolPair {
         SobolPair { shuffle: a as u32, scramble: [b as u32, (b >> 32) as u32] }
     }
 
-    /// A pair keyed by 64 bits that are random already. Of its first dimension alone, it costs no further hash.
+    /// The pair keyed by 64 random bits. The first dimension uses them directly; only the second costs a hash.
     #[inline]
     pub(super) fn keyed(bits: u64) -> SobolPair {
         let second = mix(bits ^ 0x5851_f42d_4c95_7f2d);
@@ -75,24 +73,24 @@ impl SobolPair {
         Vec2::new(super::unit(self.bits_of(index)), super::unit(y))
     }
 
-    /// Its first coordinate.
+    /// First coordinate of the point whose index has these bits in reverse order.
     #[inline]
     pub(super) fn first_reversed(&self, reversed: u32) -> f32 {
         super::unit(self.first_bits(reversed))
     }
 
-    /// The same with all of its 32 bits.
+    /// All 32 bits of the first coordinate of the point whose index has these bits in reverse order.
     #[inline]
     pub(super) fn first_bits(&self, reversed: u32) -> u32 {
         self.bits_of(self.shuffled(reversed))
     }
 
-    /// Point `index` as [`SobolPair::point`] gives it, with all of the 32 bits of either coordinate.
+    /// [`SobolPair::point`] with all 32 bits of each coordinate.
     #[inline]
-    pub fn fine(&self, index: u32) -> DVec2 {
+    pub fn point_f64(&self, index: u32) -> DVec2 {
         let index = self.shuffled(index.reverse_bits());
         let y = tree_hash(sobol_second(index), self.scramble[1]).reverse_bits();
-        DVec2::new(super::fine(self.bits_of(index)), super::fine(y))
+        DVec2::new(super::unit_f64(self.bits_of(index)), super::unit_f64(y))
     }
 
     #[inline]
@@ -100,7 +98,8 @@ impl SobolPair {
         tree_hash(reversed, self.shuffle).reverse_bits()
     }
 
-    /// The first dimension is the radical inverse: bits least significant first, it is the index itself.
+    /// First coordinate of the point at a shuffled index. The first dimension is the radical inverse: with bits least
+    /// significant first, it is the index itself.
     #[inline]
     fn bits_of(&self, index: u32) -> u32 {
         tree_hash(index, self.scramble[0]).reverse_bits()
@@ -131,9 +130,9 @@ mod tests {
         }
     }
 
-    /// By the direction numbers of the primitive polynomial x + 1: v_k = v_{k-1} ^ (v_{k-1} >> 1).
+    /// The direction numbers of the primitive polynomial x + 1 are v_k = v_{k-1} ^ (v_{k-1} >> 1).
     #[test]
-    fn the_second_dimension_is_that_of_its_direction_numbers() {
+    fn the_second_dimension_agrees_with_its_direction_numbers() {
         for k in 0..100_000u64 {
             let index = mix(k) as u32;
             let (mut direction, mut x) = (0x8000_0000u32, 0);

@@ -1,39 +1,42 @@
-//! The wavelengths of one pass.
+//! The wavelengths of one iteration.
 
 use super::WavelengthSample;
 use crate::random::mix;
 
-/// One wavelength in each band, at the same place in all of them. Whatever paths of a pass meet, if they are of one
-/// band, they are of one wavelength. Over all seeds the place is uniform in every pass.
+/// The wavelengths that the paths of one iteration may take: one per band, at the same offset in every band. So two
+/// paths of one band have the same wavelength when they are connected. Over all seeds the offset is uniform in every
+/// iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct IterationWavelengths {
+    /// Position within each band, in `[0, 1)`.
     offset: f32,
 }
 
 impl IterationWavelengths {
-    /// Of pass `pass` of a render with `seed`: places of successive passes fill the bands evenly, by the golden ratio.
-    pub fn new(seed: u64, pass: u64) -> IterationWavelengths {
+    /// The wavelengths of an iteration of a render with `seed`. Offsets advance by the golden ratio per iteration, so
+    /// they fill the bands evenly.
+    pub fn new(seed: u64, iteration: u64) -> IterationWavelengths {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        IterationWavelengths { offset: ((pass as f64 * GOLDEN + start(seed)) % 1.0) as f32 }
+        IterationWavelengths { offset: ((iteration as f64 * GOLDEN + first_offset(seed)) % 1.0) as f32 }
     }
 
-    /// For passes whose paths meet photons of the pass before: places move to and fro with the square root of the
-    /// number of passes. Over a render they are everywhere, and their steps shrink as bandwidths do, and with them the
-    /// difference of wavelengths that meet.
-    pub fn drifting(seed: u64, pass: u64) -> IterationWavelengths {
-        let at = ((pass as f64).sqrt() + 2.0 * start(seed)) % 2.0;
+    /// The wavelengths of an iteration whose camera paths merge photons of the iteration before. The offset moves back
+    /// and forth with the square root of the iteration number, so consecutive iterations have similar wavelengths. It
+    /// covers the whole band in the long run, and its steps shrink as bandwidths do.
+    pub fn drifting(seed: u64, iteration: u64) -> IterationWavelengths {
+        let at = ((iteration as f64).sqrt() + 2.0 * first_offset(seed)) % 2.0;
         IterationWavelengths { offset: (if at < 1.0 { at } else { 2.0 - at }) as f32 }
     }
 
-    /// The wavelength of its band.
+    /// This iteration's wavelength in the band of `wavelength`.
     #[inline]
     pub fn nearest(self, wavelength: WavelengthSample) -> WavelengthSample {
         WavelengthSample::within(wavelength.band().0, self.offset)
     }
 }
 
-/// Where the passes of a render begin, uniform in `[0, 1)`.
-fn start(seed: u64) -> f64 {
+/// Offset of iteration 0 of a render with `seed`, uniform in `[0, 1)` over seeds.
+fn first_offset(seed: u64) -> f64 {
     (mix(seed ^ 0x51ed_270b_8f7c_2a35) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
@@ -42,9 +45,10 @@ mod tests {
     use super::*;
     use crate::spectrum::BANDS;
 
-    /// Places are uniform over seeds in every pass, and over the passes of a render; slow ones take steps that shrink.
+    /// Offsets are uniform over seeds in every iteration, and over the iterations of a render. The steps of drifting
+    /// offsets shrink.
     #[test]
-    fn places_are_uniform() {
+    fn offsets_are_uniform() {
         // Kolmogorov's distance of 4000 uniform numbers exceeds 2.2 / sqrt(4000) with probability 1e-4.
         let distance = |mut offsets: Vec<f32>| {
             offsets.sort_by(f32::total_cmp);
@@ -52,26 +56,26 @@ mod tests {
             offsets.iter().enumerate().map(|(i, x)| (x - i as f32 / n).abs()).fold(0.0, f32::max)
         };
         for wavelengths in [IterationWavelengths::new, IterationWavelengths::drifting] {
-            for pass in [0, 1, 7] {
+            for iteration in [0, 1, 7] {
                 assert!(
-                    distance((0..4000).map(|seed| wavelengths(seed, pass).offset).collect()) < 0.035,
-                    "pass {pass}"
+                    distance((0..4000).map(|seed| wavelengths(seed, iteration).offset).collect()) < 0.035,
+                    "iteration {iteration}"
                 );
             }
-            assert!(distance((1..4000).map(|pass| wavelengths(3, pass).offset).collect()) < 0.02);
+            assert!(distance((1..4000).map(|iteration| wavelengths(3, iteration).offset).collect()) < 0.02);
         }
-        assert!(distance((1..40).map(|pass| IterationWavelengths::new(3, pass).offset).collect()) < 0.08);
-        for pass in 1..4000u64 {
-            let step = (IterationWavelengths::drifting(3, pass).offset
-                - IterationWavelengths::drifting(3, pass + 1).offset)
+        assert!(distance((1..40).map(|iteration| IterationWavelengths::new(3, iteration).offset).collect()) < 0.08);
+        for iteration in 1..4000u64 {
+            let step = (IterationWavelengths::drifting(3, iteration).offset
+                - IterationWavelengths::drifting(3, iteration + 1).offset)
                 .abs();
-            assert!(f64::from(step) < 0.51 / (pass as f64).sqrt(), "{pass}: {step}");
+            assert!(f64::from(step) < 0.51 / (iteration as f64).sqrt(), "{iteration}: {step}");
         }
     }
 
-    /// The hues of a pass are one to a band, and stay in their band.
+    /// An iteration has one wavelength per band, and `nearest` keeps the band.
     #[test]
-    fn hues_keep_their_band() {
+    fn the_nearest_wavelength_is_in_the_same_band() {
         for (seed, i) in (0..1000).map(|i| (i % 7, i)) {
             let wavelength = WavelengthSample::new(i as f32 / 1000.0);
             let near = IterationWavelengths::new(seed, 5).nearest(wavelength);

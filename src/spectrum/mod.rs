@@ -1,13 +1,14 @@
 //! Wavelengths, for paths through glass whose index of refraction depends on them.
 //!
-//! Scenes are RGB, and so are paths. One that meets dispersive glass takes a wavelength, the only one it stands for
-//! from then on \[hero wavelength, Wilkie et al. 2014, without companions\], and its weight is multiplied by a colour
-//! ([`observer`]) whose mean over all wavelengths is white: light that is not dispersed stays as it is.
+//! Scenes and paths are RGB. A path that meets dispersive glass takes one wavelength, which it keeps \[hero wavelength
+//! without companions, Wilkie et al. 2014\]. Its throughput is multiplied by the colour of the wavelength ([`observer`]).
+//! The mean of these colours is white, so light that is not dispersed keeps its colour.
 //!
-//! Two paths that are put together must not have taken different wavelengths, nor count a colour twice. So the spectrum
-//! is divided into [`BANDS`] of equal probability, paths of different bands do not meet, and those of one band count
-//! [`BANDS`] times: of two bands drawn independently, one in so many pairs is equal. Within a pass all paths of a band
-//! take the same wavelength ([`IterationWavelengths`]), so nothing is blurred.
+//! Two paths may only be connected or merged if they have the same wavelength, and its colour must count once. So the
+//! spectrum is divided into [`BANDS`] bands of equal probability. Paths of different bands are not connected, and
+//! contributions of equal bands are multiplied by [`BANDS`], because two independent paths have equal bands with the
+//! probability `1 / BANDS`. Within an iteration all paths of a band have the same wavelength ([`IterationWavelengths`]),
+//! so colours are not blurred.
 
 mod iteration_wavelengths;
 pub mod observer;
@@ -16,14 +17,14 @@ pub use iteration_wavelengths::IterationWavelengths;
 
 use crate::math::Rgb;
 
-/// Number of bands. More of them would waste more photons where light comes through dispersive glass and is seen
-/// through it; fewer would show in the colours of a single pass.
+/// Number of bands. With more bands, more photons are wasted where dispersed light is seen through dispersive glass.
+/// With fewer, the colours of a single iteration show.
 pub const BANDS: u8 = 8;
 
-/// Weights below this are none: their light is not seen in this colour.
-const LEAST_WEIGHT: f32 = 1e-6;
+/// Channels of weights below this are treated as zero: [`Wavelength::inverse_weight`] is then zero, too.
+const MIN_WEIGHT: f32 = 1e-6;
 
-/// A place in the spectrum, uniform on `[0, 1)`: what a path would take if it met dispersive glass.
+/// The uniform number in `[0, 1)` that determines the wavelength of a path if it meets dispersive glass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WavelengthSample(f32);
 
@@ -34,7 +35,7 @@ impl WavelengthSample {
         WavelengthSample(u)
     }
 
-    /// The band it is in, from 0, and how far, in `[0, 1]`.
+    /// The index of the band, and the position within it in `[0, 1]`.
     #[inline]
     fn band(self) -> (u8, f32) {
         let x = self.0 * f32::from(BANDS);
@@ -42,21 +43,22 @@ impl WavelengthSample {
         (band, x - f32::from(band))
     }
 
+    /// The sample at `offset`, in `[0, 1]`, within a band.
     #[inline]
     fn within(band: u8, offset: f32) -> WavelengthSample {
         WavelengthSample((f32::from(band) + offset) * (1.0 / f32::from(BANDS)))
     }
 
-    /// The wavelength here.
+    /// The wavelength of this sample.
     #[inline]
     pub fn wavelength(self) -> Wavelength {
         let (nm, weight) = observer::sample(self.0);
         Wavelength { nm, weight, band: Band(self.band().0 + 1) }
     }
 
-    /// A wavelength for a path that carries one channel (0 to 2) alone, drawn from its bands by `u` in proportion to
-    /// what they weigh in this channel: so all such paths weigh the same. Its weight is that of the channel, in all
-    /// channels; 1 on average.
+    /// A wavelength for a path that carries only one RGB channel (0 to 2). The number `u` draws the band in proportion
+    /// to its weight in that channel, so all such paths have the same weight. All three channels of `weight` are set to
+    /// it; its mean over offsets is 1.
     #[inline]
     pub fn sample_in_channel(self, channel: usize, u: f32) -> Wavelength {
         let offset = self.band().1;
@@ -77,23 +79,23 @@ impl WavelengthSample {
 /// The wavelength that a path has taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wavelength {
-    /// Nanometres.
+    /// Wavelength (nm).
     pub nm: f32,
-    /// What light of it weighs: no more than 3, and on average white.
+    /// Factor of the path's throughput. At most 3 per channel; the mean over wavelengths is white.
     pub weight: Rgb,
-    /// Its band.
+    /// The band that contains the wavelength.
     pub band: Band,
 }
 
-/// The band of a path's wavelength, if it has taken one.
+/// The band of a path's wavelength (1 to [`BANDS`]), or 0 for a path without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Band(u8);
 
 impl Band {
-    /// Of paths that have not met dispersive glass.
+    /// The band of paths that have not met dispersive glass.
     pub const WHITE: Band = Band(0);
 
-    /// Of a path that has taken this wavelength, or none.
+    /// The band of a path's wavelength; [`Band::WHITE`] for `None`.
     #[inline]
     pub fn of(wavelength: Option<&Wavelength>) -> Band {
         wavelength.map_or(Band::WHITE, |wavelength| wavelength.band)
@@ -101,14 +103,14 @@ impl Band {
 }
 
 impl Wavelength {
-    /// One over the weight: what a path is multiplied with that would count it twice.
+    /// Reciprocal of [`Wavelength::weight`]. It removes the weight from one of two subpaths that both contain it.
     #[inline]
     pub fn inverse_weight(&self) -> Rgb {
-        Rgb::select(self.weight.cmpgt(Rgb::splat(LEAST_WEIGHT)), self.weight.recip(), Rgb::ZERO)
+        Rgb::select(self.weight.cmpgt(Rgb::splat(MIN_WEIGHT)), self.weight.recip(), Rgb::ZERO)
     }
 
-    /// What light of a path of some band is multiplied with where this path meets it, both drawn independently; `None`:
-    /// they do not meet.
+    /// Factor of the contribution of an independent subpath of `band` that is connected to or merged with this one.
+    /// `None` if the bands differ, so that the subpaths are not connected.
     #[inline]
     pub fn connection_factor(&self, band: Band) -> Option<Rgb> {
         if band == Band::WHITE {

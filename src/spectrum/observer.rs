@@ -1,24 +1,24 @@
-//! The colours of wavelengths.
+//! The RGB colours of wavelengths.
 //!
-//! The CIE 1931 standard observer \[multi-lobe fits of Wyman, Sloan, Shirley 2013, "Simple Analytic Approximations to
-//! the CIE XYZ Color Matching Functions"\] in linear Rec. 709. What most wavelengths are there is no colour that a
-//! screen can show: some channel is negative. It is cut off at zero, and the three curves are scaled to one integral.
-//! Light of flat spectrum stays white, as lamps of RGB scenes have no other; a photon's flux stays positive, as
-//! roulette and the statistics of photons want it; and what is lost is saturation that no picture could hold.
-//! Wavelengths are drawn in proportion to the mean of the three curves, so no channel weighs more than 3.
+//! They are the CIE 1931 standard observer \[multi-lobe fits of Wyman, Sloan, Shirley 2013, "Simple Analytic
+//! Approximations to the CIE XYZ Color Matching Functions"\] in linear Rec. 709. Most wavelengths are outside the gamut:
+//! some channel is negative. Negative values are set to zero, and the three curves are scaled to the same integral. So a
+//! flat spectrum, the spectrum of white lights in an RGB scene, stays white. Photon fluxes stay positive, which Russian
+//! roulette and photon statistics need. Only saturation outside the gamut is lost. Wavelengths are drawn in proportion
+//! to the mean of the three curves, so no channel of a weight exceeds 3.
 
 use crate::math::Rgb;
 use std::sync::LazyLock;
 
-/// The range of wavelengths (nm): beyond it the fits are below 0.2 % of their peaks.
+/// Shortest and longest wavelength (nm). Outside, the fits are below 0.2 % of their peaks.
 pub const RANGE: (f64, f64) = (390.0, 720.0);
 
-/// Steps of the table over uniform numbers.
+/// Number of steps of the table over uniform numbers.
 const STEPS: usize = 256;
-/// Steps of the integrals over wavelengths.
-const FINE: usize = 3300;
+/// Number of steps of the integrals over wavelengths.
+const INTEGRATION_STEPS: usize = 3300;
 
-/// A lobe: a Gaussian with a width for either side.
+/// A Gaussian with different widths below and above its peak (nm).
 fn lobe(nm: f64, height: f64, peak: f64, below: f64, above: f64) -> f64 {
     let t = (nm - peak) / if nm < peak { below } else { above };
     height * (-0.5 * t * t).exp()
@@ -33,7 +33,7 @@ fn xyz(nm: f64) -> [f64; 3] {
     ]
 }
 
-/// Linear Rec. 709 of a wavelength, what is negative cut off; of no particular scale.
+/// Linear Rec. 709 colour of a wavelength with negative channels set to zero, in arbitrary units.
 fn rgb(nm: f64) -> [f64; 3] {
     let [x, y, z] = xyz(nm);
     [
@@ -44,45 +44,46 @@ fn rgb(nm: f64) -> [f64; 3] {
     .map(|channel| channel.max(0.0))
 }
 
-/// Wavelengths and weights at equal steps of probability.
+/// Wavelengths (nm) and weights at equal steps of the cumulative distribution of wavelengths.
 struct Table {
     nm: [f32; STEPS + 1],
     weight: [Rgb; STEPS + 1],
 }
 
 static TABLE: LazyLock<Table> = LazyLock::new(|| {
-    let step = (RANGE.1 - RANGE.0) / FINE as f64;
+    let step = (RANGE.1 - RANGE.0) / INTEGRATION_STEPS as f64;
     let at = |i: usize| RANGE.0 + step * i as f64;
-    let curves: Vec<[f64; 3]> = (0..=FINE).map(|i| rgb(at(i))).collect();
-    // Trapezoids, everywhere: the table's own integrals are exact then.
+    let curves: Vec<[f64; 3]> = (0..=INTEGRATION_STEPS).map(|i| rgb(at(i))).collect();
+    // The trapezoidal rule is exact for the table, which is interpolated linearly.
     let integral = |of: &dyn Fn(usize) -> f64, n: usize| (0..n).map(|i| 0.5 * (of(i) + of(i + 1))).sum::<f64>();
-    let sums: [f64; 3] = std::array::from_fn(|c| integral(&|i| curves[i][c], FINE) * step);
+    let sums: [f64; 3] = std::array::from_fn(|c| integral(&|i| curves[i][c], INTEGRATION_STEPS) * step);
     let curves: Vec<[f64; 3]> = curves.iter().map(|rgb| std::array::from_fn(|c| rgb[c] / sums[c])).collect();
     let density = |i: usize| curves[i].iter().sum::<f64>() / 3.0;
     let mut cumulative = vec![0.0];
-    for i in 0..FINE {
+    for i in 0..INTEGRATION_STEPS {
         cumulative.push(cumulative[i] + 0.5 * step * (density(i) + density(i + 1)));
     }
-    let total = cumulative[FINE];
+    let total = cumulative[INTEGRATION_STEPS];
     let (mut nm, mut weight) = ([0.0; STEPS + 1], [[0.0f64; 3]; STEPS + 1]);
     for (k, (nm, weight)) in nm.iter_mut().zip(&mut weight).enumerate() {
-        let wanted = total * k as f64 / STEPS as f64;
-        let after = cumulative.partition_point(|&c| c < wanted).clamp(1, FINE);
+        let target = total * k as f64 / STEPS as f64;
+        let after = cumulative.partition_point(|&c| c < target).clamp(1, INTEGRATION_STEPS);
         let (low, high) = (cumulative[after - 1], cumulative[after]);
-        let t = if high > low { ((wanted - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
+        let t = if high > low { ((target - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 };
         *nm = (at(after - 1) + t * step) as f32;
         *weight = std::array::from_fn(|c| {
             let curve = curves[after - 1][c] * (1.0 - t) + curves[after][c] * t;
             curve / (density(after - 1) * (1.0 - t) + density(after) * t)
         });
     }
-    // What the coarse steps have changed of the means.
+    // The coarse steps change the means a little. Dividing by them makes the mean of the table exactly white.
     let means: [f64; 3] = std::array::from_fn(|c| integral(&|k| weight[k][c], STEPS) / STEPS as f64);
     let weight = weight.map(|w| Rgb::from_array(std::array::from_fn(|c| (w[c] / means[c]) as f32)));
     Table { nm, weight }
 });
 
-/// The wavelength (nm) at `u` in `[0, 1]`, uniform, and what it weighs: on average exactly white.
+/// The wavelength (nm) that the uniform number `u` in `[0, 1]` draws, and its colour over its density. The mean of the
+/// colours over `u` is exactly white.
 #[inline]
 pub fn sample(u: f32) -> (f32, Rgb) {
     let table = &*TABLE;
@@ -96,7 +97,7 @@ pub fn sample(u: f32) -> (f32, Rgb) {
 mod tests {
     use super::*;
 
-    /// The fits are the observer's: peaks and integrals of the CIE's tables (Y: 106.857 nm; X, Z within 1 %).
+    /// The fits have the peak of Y and, within 1 %, the integrals of the CIE's tables (106.857 nm for Y).
     #[test]
     fn the_observer_is_the_standard_one() {
         let n = 4700;

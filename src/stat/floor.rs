@@ -1,32 +1,32 @@
-//! What is added to squared values that errors are relative to, so that darkness does not count for ever.
+//! The constant that relative squared errors add to the denominator, so that dark pixels do not dominate.
 //!
-//! The papers' relMSE adds 0.01: a radiance of a tenth, squared, which is little in their pictures, whose mean is about
-//! one. In one whose lamps are a hundredth as bright it is everything, and no error counts. An estimate of the error
-//! must not depend on the unit of radiance: it adds 0.01 times the squared mean radiance, which is the same in pictures
-//! like theirs.
+//! The relMSE of most papers adds 0.01, the square of a radiance of 0.1. That is little in their pictures, whose mean is
+//! about 1. In a picture with a mean of 0.01 the constant would hide all errors. An error estimate must not depend on the
+//! unit of radiance, so it adds 0.01 times the squared mean radiance, which is the same number if the mean is 1.
 
-/// The papers' own constant.
+/// The constant of the papers' relMSE.
 pub const ABSOLUTE: f64 = 0.01;
 
-/// Share of the pixels that the mean leaves out, the brightest: lamps that are seen, and fireflies.
-const BRIGHTEST: f64 = 0.01;
+/// Share of the pixels that the mean leaves out, the brightest ones: visible lights and fireflies.
+const BRIGHTEST_SHARE: f64 = 0.01;
 
-/// 0.01 times the squared mean of the values of a picture's pixels without the brightest; with them where the others
-/// are black; the papers' constant where all are. Scaling the values by a power of two scales it exactly.
+/// 0.01 times the squared mean of the pixel `values`, without the brightest 1 %. If all others are black, the mean
+/// includes them; if every pixel is black, the result is [`ABSOLUTE`]. Scaling the values by a power of two scales the
+/// result exactly.
 pub fn relative_to_mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
-    let kept = values.len() - (values.len() as f64 * BRIGHTEST) as usize;
+    let kept = values.len() - (values.len() as f64 * BRIGHTEST_SHARE) as usize;
     if kept == 0 {
         return ABSOLUTE;
     }
     let mut sorted = values.clone();
-    let most = *sorted.select_nth_unstable_by(kept - 1, f64::total_cmp).1;
-    let mean = |most: f64| {
-        let (sum, count) = values.iter().filter(|value| **value <= most).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+    let brightest_kept = *sorted.select_nth_unstable_by(kept - 1, f64::total_cmp).1;
+    let mean_up_to = |max: f64| {
+        let (sum, count) = values.iter().filter(|value| **value <= max).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
         sum / count
     };
-    let floor = |mean: f64| ABSOLUTE * mean * mean;
-    [mean(most), mean(f64::INFINITY)].map(floor).into_iter().find(|floor| *floor > 0.0).unwrap_or(ABSOLUTE)
+    let floors = [brightest_kept, f64::INFINITY].map(mean_up_to).map(|mean| ABSOLUTE * mean * mean);
+    floors.into_iter().find(|floor| *floor > 0.0).unwrap_or(ABSOLUTE)
 }
 
 #[cfg(test)]
@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_follows_the_picture() {
+    fn the_floor_scales_with_the_picture_and_ignores_fireflies() {
         let mut values: Vec<f64> = (0..200).map(|i| 0.5 + 0.005 * f64::from(i)).collect();
         // Two fireflies are the brightest hundredth.
         values[17] = 1e9;
@@ -47,7 +47,7 @@ mod tests {
         }
         assert_eq!(relative_to_mean([0.0; 300]), ABSOLUTE);
         assert_eq!(relative_to_mean([]), ABSOLUTE);
-        // Light in one pixel alone.
+        // Only one pixel is lit.
         let lit = relative_to_mean((0..300).map(|i| if i == 7 { 3.0 } else { 0.0 }));
         assert!((lit - 1e-6).abs() < 1e-12, "{lit}");
     }

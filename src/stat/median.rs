@@ -1,8 +1,8 @@
-//! The median, of values that may be put in another order.
+//! The median.
 
 use std::cmp::Ordering;
 
-/// The upper median by `order`; `None` of nothing.
+/// The upper median of `values` by `order`; `None` if there are no values. Reorders the values.
 pub fn median<T: Copy>(values: &mut [T], order: impl FnMut(&T, &T) -> Ordering) -> Option<T> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, order).1)

@@ -1,4 +1,4 @@
-//! Running statistics, and fits.
+//! Order-independent sums and moments, medians, and fits.
 
 pub mod floor;
 mod median;
@@ -6,8 +6,8 @@ mod moments;
 mod power_law;
 pub mod sum;
 
-/// Share of the pixels that trimmed errors leave out, the worst ones: a few bright samples (fireflies) would rule the
-/// mean.
+/// Share of the pixels that trimmed errors leave out, those with the largest errors: a few bright samples (fireflies)
+/// would dominate the mean.
 pub const TRIMMED_SHARE: f64 = 0.005;
 
 pub use median::median;

@@ -1,13 +1,13 @@
 //! Mean and variance from sums that do not depend on the order of their terms.
 //!
-//! The sum of squares loses the digits that the square of the mean takes: relative variances of single values below
-//! 10^-9 are not told from none.
+//! The variance is a difference of sums of squares, which cancels: relative variances of single values below 10^-9 are
+//! indistinguishable from zero.
 
 use super::sum::{Grid, Rounding, Sum};
 use crate::math::{DVec3, Rgb};
 use serde::{Deserialize, Serialize};
 
-/// The grids of some values and of their squares.
+/// The summation grids of values and of their squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grids {
     values: Grid,
@@ -15,50 +15,50 @@ pub struct Grids {
 }
 
 impl Grids {
-    /// The finest, relative to two to this exponent, see [`Grid::new`].
+    /// The finest grids for values in units of 2^`exponent`, see [`Grid::new`].
     pub fn new(exponent: i32) -> Grids {
         Grids { values: Grid::new(exponent), squares: Grid::new(2 * exponent) }
     }
 
-    /// With room for values of this size.
+    /// The grids, coarsened if needed, that can sum values of absolute value up to `max`.
     #[inline]
     #[must_use]
-    pub fn with_room_for(self, most: f64) -> Grids {
-        Grids { values: self.values.with_room_for(most), squares: self.squares.with_room_for(most * most) }
+    pub fn with_room_for(self, max: f64) -> Grids {
+        Grids { values: self.values.with_room_for(max), squares: self.squares.with_room_for(max * max) }
     }
 
-    /// The coarser of either.
+    /// The coarser grid of values and the coarser grid of squares.
     #[must_use]
     pub fn max(self, other: Grids) -> Grids {
         Grids { values: self.values.max(other.values), squares: self.squares.max(other.squares) }
     }
 
-    /// What rounds values and squares.
+    /// Rounding of values and of squares to these grids.
     #[inline]
     pub fn rounding(self) -> [Rounding; 2] {
         [self.values.rounding(), self.squares.rounding()]
     }
 
-    /// Takes a sum of values to other grids.
+    /// Converts a sum of values from these grids to coarser ones.
     #[inline]
     pub fn coarsen_values(self, sum: &mut Sum<DVec3>, to: Grids) {
         sum.coarsen(self.values, to.values);
     }
 
-    /// Takes a sum of squares to other grids.
+    /// Converts a sum of squares from these grids to coarser ones.
     #[inline]
     pub fn coarsen_squares(self, sum: &mut Sum<DVec3>, to: Grids) {
         sum.coarsen(self.squares, to.squares);
     }
 }
 
-/// Sums of an RGB quantity and of its squares; their grids and their count are kept by the owner, which has many of
-/// these.
+/// Sums of an RGB quantity and of its squares. The owner stores the grids and the number of values, because many sums
+/// share them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Moments {
     /// Sum of the values.
     pub values: Sum<DVec3>,
-    /// Sum of their squares.
+    /// Sum of the squared values.
     pub squares: Sum<DVec3>,
 }
 
@@ -71,7 +71,7 @@ impl Moments {
         self.squares.add(value * value, squares);
     }
 
-    /// Mean of `count` values, zero for none.
+    /// Mean of `count` values; zero if `count` is zero.
     #[inline]
     pub fn mean(&self, count: f64) -> DVec3 {
         if count == 0.0 { DVec3::ZERO } else { self.values.value() / count }
@@ -83,22 +83,22 @@ impl Moments {
         variance_of_mean(self.values.value(), self.squares.value(), count)
     }
 
-    /// Goes over to grids that are no finer.
+    /// Converts the sums to grids that are equal or coarser.
     #[inline]
     pub fn coarsen(&mut self, from: Grids, to: Grids) {
         from.coarsen_values(&mut self.values, to);
         from.coarsen_squares(&mut self.squares, to);
     }
 
-    /// Adds those of other values on the same grids.
+    /// Adds the sums of other values, which must be on the same grids.
     pub fn join(&mut self, other: &Moments) {
         self.values.join(&other.values);
         self.squares.join(&other.squares);
     }
 }
 
-/// Variance of the mean of `count` values from their sum and that of their squares; infinite for fewer than two:
-/// nothing is known.
+/// Variance of the mean of `count` values, from their sum and the sum of their squares. Infinite for fewer than two
+/// values.
 #[inline]
 pub fn variance_of_mean(sum: DVec3, squares: DVec3, count: f64) -> DVec3 {
     if count < 2.0 {
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn agrees_with_two_passes_far_from_zero() {
+    fn mean_and_variance_agree_with_two_pass_formulas() {
         let values: Vec<f64> = (0..1000).map(|i| 1e3 + f64::from((i * 7919) % 101)).collect();
         let grids = Grids::default().with_room_for(2e3);
         let mut moments = Moments::default();
@@ -124,9 +124,9 @@ mod tests {
         assert_eq!(Moments::default().variance_of_mean(1.0).x, f64::INFINITY);
     }
 
-    /// Of values that are all alike no more is seen than the sum of squares has digits.
+    /// The variance of equal values is the rounding error of the sum of squares.
     #[test]
-    fn equal_values_have_next_to_no_variance() {
+    fn equal_values_have_almost_no_variance() {
         let mut worst = 0.0f64;
         for value in (0..200).map(|i| 1.1f32.powi(i - 100)) {
             let grids = Grids::default().with_room_for(f64::from(value));

@@ -1,19 +1,19 @@
-//! Straight lines in log-log plots.
+//! Fits of power laws.
 
 /// `y = factor * x^exponent`, fitted by least squares of the logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLaw {
-    /// The slope in the log-log plot.
+    /// Exponent: the slope in a log-log plot.
     pub exponent: f64,
-    /// Its standard error as the scatter about the line tells it, taking points for independent.
+    /// Standard error of the exponent from the scatter of the points about the line, if the points are independent.
     pub exponent_error: f64,
     /// `y` at `x = 1`.
     pub factor: f64,
 }
 
 impl PowerLaw {
-    /// Fits points `(x, y)`; those that are not finite and above zero do not count. `None` with fewer than three, or
-    /// all at one `x`.
+    /// Fits points `(x, y)`. Points with a coordinate that is not finite and positive are ignored. `None` for fewer than
+    /// three points, or if all have the same `x`.
     pub fn fit(points: impl IntoIterator<Item = (f64, f64)>) -> Option<PowerLaw> {
         let usable = |v: f64| v.is_finite() && v > 0.0;
         let logs: Vec<(f64, f64)> =
@@ -44,8 +44,8 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// 400 fits of 8 points with 10 % noise. The standard error must be that of the exponents found, and a wrong
-    /// exponent must be far outside.
+    /// 400 fits of 8 points with 10 % noise. The standard error must match the scatter of the fitted exponents, and a
+    /// wrong exponent must be more than three standard errors away.
     #[test]
     fn planted_exponents_come_back_within_their_standard_error() {
         for planted in [-1.0, -2.0 / 3.0, -0.5] {
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_is_no_line() {
+    fn too_few_points_give_no_fit() {
         assert_eq!(PowerLaw::fit([(1.0, 1.0), (2.0, 0.5)]), None);
         assert_eq!(PowerLaw::fit([(1.0, 1.0), (1.0, 0.5), (1.0, 0.7)]), None);
         assert_eq!(PowerLaw::fit([(1.0, 1.0), (2.0, 0.5), (3.0, 0.0), (4.0, f64::NAN)]), None);

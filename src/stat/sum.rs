@@ -1,11 +1,11 @@
-//! Sums that do not depend on the order of their terms, so that parts of a render made anywhere join to the bytes of the
-//! whole.
+//! Sums that do not depend on the order of their terms, so that shards of a render join to the bytes of one render
+//! \[Demmel and Nguyen 2015, "Parallel Reproducible Summation"\].
 //!
-//! Grids of multiples of a power of two lie 30 powers apart. A term is rounded to the coarsest grid that has room
-//! for the largest one so far, and what is left to the next finer one. Both sums are exact, so that terms commute; what
-//! is cut off, less than 2^-30 of the largest term, is cut off each term alike wherever it stands. When a larger term
-//! calls for a coarser grid, the coarse sum becomes the fine one, which is what it would have been from the beginning
-//! \[Demmel and Nguyen 2015, Parallel Reproducible Summation\].
+//! A grid is the set of multiples of a power of two; consecutive grids are 30 powers apart. A term is split in two: a
+//! multiple of the grid that fits the largest term so far, and the remainder, rounded to the next finer grid. Both parts
+//! are summed exactly, so the order does not matter. All terms lose the same low bits, less than 2^-30 of the largest
+//! term. When a larger term needs a coarser grid, the coarse sum becomes the fine sum, as if that grid had been used from
+//! the start.
 
 use crate::math::DVec3;
 use serde::{Deserialize, Serialize};
@@ -13,14 +13,15 @@ use std::ops::{Add, AddAssign, Sub};
 
 /// Powers of two from one grid to the next.
 const STEP: i16 = 30;
-/// The finest coarse grid: below the squares of all that f32 can hold.
-const LOWEST: i16 = -330;
-/// Terms that can be added before a sum may lose a digit: a term has at most 30 digits of a grid, an f64 has 53.
+/// Exponent of the finest coarse grid: below the squares of all f32 values.
+const MIN_EXPONENT: i16 = -330;
+/// Number of terms that can be added before a sum may lose a bit: a term has at most 30 bits above its grid, an f64 has
+/// 53 bits.
 pub const MAX_TERMS: u64 = 1 << (53 - STEP as u64);
 
-/// What can be summed.
+/// A number or vector that can be summed.
 pub trait Term: Copy + Default + Add<Output = Self> + AddAssign + Sub<Output = Self> {
-    /// To the nearest multiple of a grid, which is the distance of neighbours of `magic` in f64.
+    /// Rounds to the nearest multiple of the spacing of f64 numbers around `magic`.
     #[must_use]
     fn rounded(self, magic: f64) -> Self;
 }
@@ -39,19 +40,19 @@ impl Term for DVec3 {
     }
 }
 
-/// A number whose neighbours in f64 are apart by two to this exponent on either side.
+/// A number around which f64 numbers are spaced by 2^`exponent`.
 #[inline]
 fn magic(exponent: i16) -> f64 {
     1.5 * two_to(52 + exponent)
 }
 
-/// Two to this exponent, which f64 can hold.
+/// 2^`exponent`, for exponents of normal f64 numbers.
 #[inline]
 fn two_to(exponent: i16) -> f64 {
     f64::from_bits(((1023 + i64::from(exponent)) as u64) << 52)
 }
 
-/// The coarse grid of sums: multiples of two to this exponent.
+/// The coarse grid of a sum: multiples of two to this exponent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Grid(i16);
 
@@ -62,25 +63,25 @@ impl Default for Grid {
 }
 
 impl Grid {
-    /// The finest. Grids stand relative to `exponent`: terms times a power of two, on grids whose exponent is larger by
-    /// as much, have sums times that power.
+    /// The finest grid for values in units of 2^`exponent`. If all terms are scaled by 2^k and `exponent` grows by k, sums
+    /// scale exactly by 2^k.
     pub fn new(exponent: i32) -> Grid {
-        Grid(LOWEST + exponent.rem_euclid(i32::from(STEP)) as i16)
+        Grid(MIN_EXPONENT + exponent.rem_euclid(i32::from(STEP)) as i16)
     }
 
-    /// This or the next coarser one that has room for `most`, which is finite: the largest size of a term.
+    /// This grid, or the next coarser one that can sum terms of absolute value up to `max`, which must be finite.
     #[inline]
     #[must_use]
-    pub fn with_room_for(self, most: f64) -> Grid {
+    pub fn with_room_for(self, max: f64) -> Grid {
         let mut grid = self;
-        // Half of the next grid's step, which would round to it.
-        while most >= two_to(grid.0 + STEP - 1) {
+        // Half the spacing of the next grid: larger terms would not round to zero there.
+        while max >= two_to(grid.0 + STEP - 1) {
             grid.0 += STEP;
         }
         grid
     }
 
-    /// What rounds terms.
+    /// Rounding of terms to this grid and the next finer one.
     #[inline]
     pub fn rounding(self) -> Rounding {
         Rounding { coarse: magic(self.0), fine: magic(self.0 - STEP) }
@@ -94,7 +95,7 @@ pub struct Rounding {
     fine: f64,
 }
 
-/// A sum; its grid is kept by the owner, which has many of these.
+/// An order-independent sum. The owner stores the grid, because many sums share one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sum<T> {
     coarse: T,
@@ -102,7 +103,7 @@ pub struct Sum<T> {
 }
 
 impl<T: Term> Sum<T> {
-    /// Adds a term for which the grid has room.
+    /// Adds a term, for which the grid must have room.
     #[inline(always)]
     pub fn add(&mut self, term: T, rounding: Rounding) {
         let coarse = term.rounded(rounding.coarse);
@@ -116,7 +117,7 @@ impl<T: Term> Sum<T> {
         self.coarse + self.fine
     }
 
-    /// Goes over to a grid that is no finer.
+    /// Converts the sum from one grid to an equal or coarser one.
     #[inline]
     pub fn coarsen(&mut self, from: Grid, to: Grid) {
         match to.0 - from.0 {
@@ -133,7 +134,7 @@ impl<T: Term> Sum<T> {
     }
 }
 
-/// A sum with a grid of its own.
+/// An order-independent sum that stores its own grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Total {
     grid: Grid,
@@ -144,7 +145,7 @@ impl Total {
     /// Adds a finite term.
     #[inline]
     pub fn add(&mut self, term: f64) {
-        self.reach(self.grid.with_room_for(term.abs()));
+        self.coarsen_to(self.grid.with_room_for(term.abs()));
         self.sum.add(term, self.grid.rounding());
     }
 
@@ -157,13 +158,13 @@ impl Total {
     pub fn join(&mut self, other: &Total) {
         let mut other = *other;
         let grid = self.grid.max(other.grid);
-        self.reach(grid);
-        other.reach(grid);
+        self.coarsen_to(grid);
+        other.coarsen_to(grid);
         self.sum.join(&other.sum);
     }
 
     #[inline]
-    fn reach(&mut self, grid: Grid) {
+    fn coarsen_to(&mut self, grid: Grid) {
         if grid != self.grid {
             self.sum.coarsen(self.grid, grid);
             self.grid = grid;
@@ -176,7 +177,7 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Terms of either sign over 60 powers of ten, so that grids change many times.
+    /// Terms of both signs over 60 powers of ten, so that grids change many times.
     fn terms(count: u64) -> Vec<f64> {
         let draw = |index| Stream::new(5, 1, Domain::Test, index).vertex(0).two(Purpose::Pixel);
         let term = |u: crate::math::Vec2| {
@@ -205,12 +206,12 @@ mod tests {
             (0..parts - 1).for_each(|index| joined.join(&part(index)));
             assert_eq!(joined, whole, "{parts} parts");
         }
-        // The same terms summed plainly in either order differ: there is something to be independent of.
+        // Plain f64 sums in the two orders differ, so the test is sensitive.
         assert_ne!(terms.iter().sum::<f64>(), backwards.iter().sum::<f64>());
     }
 
     #[test]
-    fn a_sum_is_right_to_a_part_in_a_thousand_million_of_its_largest_term() {
+    fn the_error_of_a_sum_is_below_1e_9_of_its_largest_term_per_term() {
         for range in [1e-30, 1.0, 1e30] {
             let terms: Vec<f64> = terms(1000).iter().map(|term| range * term.abs().powf(0.01)).collect();
             let largest = terms.iter().fold(0.0, |most: f64, term| most.max(*term));

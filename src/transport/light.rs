@@ -148,7 +148,7 @@ impl<'a> LightPaths<'a> {
     /// The beginning of path `index`, its flux divided by the number of paths.
     #[inline]
     pub fn emit(&self, scene: &Scene, initial_media: &InitialMedia, index: u32) -> Option<Emitted> {
-        let draws = (self.choice.fine(index), self.point.point(index), self.direction.point(index));
+        let draws = (self.choice.point_f64(index), self.point.point(index), self.direction.point(index));
         self.emit_by(scene, initial_media, self.stream(u64::from(index)), draws)
     }
 

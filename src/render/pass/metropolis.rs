@@ -189,7 +189,7 @@ impl Walks<'_, '_> {
         arena.reset();
         let own = streams.0.vertex(OWN);
         let (mut left, mut found) = (Deposits::default(), Found::default());
-        chain.during(|| {
+        chain.run(|| {
             let camera = ((own.one(Purpose::Division) * (segments + 1) as f32) as u32).min(segments);
             let film = own.two(Purpose::Film) * self.size.as_vec2();
             let pixel = film.as_uvec2().min(self.size - 1);
@@ -214,8 +214,8 @@ impl Walks<'_, '_> {
         let mut chain = Chain::new(mix(cameras.vertex(OWN).bits(Purpose::Film) ^ mix(number)));
         let own = streams.0.vertex(OWN);
         let place = UVec2::new(path % self.size.x, path / self.size.x).as_vec2();
-        chain.set(own.id(Purpose::Film), (place + cameras.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2());
-        chain.set(own.id(Purpose::Division), Vec2::splat((camera as f32 + 0.5) / (segments + 1) as f32));
+        chain.set_initial(own.id(Purpose::Film), (place + cameras.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2());
+        chain.set_initial(own.id(Purpose::Division), Vec2::splat((camera as f32 + 0.5) / (segments + 1) as f32));
         let mut deposits = Vec::new();
         let mut leave = |state: &State, weight: f32| {
             if weight > 0.0 && state.importance > 0.0 {
@@ -236,7 +236,7 @@ impl Walks<'_, '_> {
                 0.0 => 1.0,
                 importance => (proposal.importance / importance).min(1.0),
             };
-            if chain.decide(acceptance) {
+            if chain.accept_or_reject(acceptance) {
                 leave(&current, stayed + 1.0 - acceptance);
                 (current, stayed) = (proposal, acceptance);
             } else {
