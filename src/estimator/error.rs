@@ -65,9 +65,9 @@ mod tests {
                     let noise = draws.two(Purpose::Pixel);
                     let small = 1.0 + bias + 0.8 * (noise.x - 0.5);
                     let large = 1.0 + 2.0 * bias + 0.8 * (noise.y - 0.5);
-                    let mut measure = PixelSample::default();
-                    measure.indirect_photons[..2].copy_from_slice(&[small, large].map(Rgb::splat));
-                    pixel.add(i, &measure, None);
+                    let mut sample = PixelSample::default();
+                    sample.indirect_photons[..2].copy_from_slice(&[small, large].map(Rgb::splat));
+                    pixel.add(i, &sample, None);
                 }
                 let error = SquaredError::of(&pixel, 0, 2).expect("two iterations are done");
                 squared_bias += error.squared_bias.x / 4000.0;

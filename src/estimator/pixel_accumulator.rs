@@ -250,7 +250,7 @@ impl PixelAccumulator {
     /// Keeps what iteration `pass` (from 1) sees first, its camera depth and position, if none has been counted before.
     /// To be called before [`PixelAccumulator::add`].
     #[inline]
-    pub fn see(&mut self, pass: u64, first: impl FnOnce() -> Option<(f32, Vec3)>) {
+    pub fn record_first_hit(&mut self, pass: u64, first: impl FnOnce() -> Option<(f32, Vec3)>) {
         if self.iterations == 0 {
             let (z, p) = first().unwrap_or((FAR, Vec3::ZERO));
             self.first = FirstSeen { pass, z, p };
@@ -280,24 +280,24 @@ impl PixelAccumulator {
                 _ => independent.radiance(level),
             };
         }
-        let (measure, level) = self.own_of(independent, correlated);
+        let (sample, level) = self.own_of(independent, correlated);
         let parts: [Rgb; PARTS] = [
-            measure.emission,
-            measure.direct,
-            measure.caustic_photons[level],
-            measure.indirect + measure.indirect_photons[level],
-            measure.volume + measure.volume_photons[level],
+            sample.emission,
+            sample.direct,
+            sample.caustic_photons[level],
+            sample.indirect + sample.indirect_photons[level],
+            sample.volume + sample.volume_photons[level],
         ];
         let difference = if count > 1 { self.difference_of(&values, independent, correlated) } else { Rgb::ZERO };
         let all =
             || values[..count].iter().chain(&parts).chain(std::iter::once(&difference)).chain(groups.as_flattened());
-        let broken = independent.broken.or_else(|| correlated.and_then(|measure| measure.broken));
-        if let Some(cause) = broken.or_else(|| (!all().all(|value| value.is_finite())).then_some(Cause::Sum)) {
+        let rejection = independent.rejection.or_else(|| correlated.and_then(|sample| sample.rejection));
+        if let Some(cause) = rejection.or_else(|| (!all().all(|value| value.is_finite())).then_some(Cause::Sum)) {
             return self.rejected.count(cause);
         }
         self.iterations += 1;
         let most = all().fold(Rgb::ZERO, |most, value| most.max(value.abs()));
-        self.make_room(self.grids.with_room_for(f64::from(most.max_element())));
+        self.coarsen_grids(self.grids.with_room_for(f64::from(most.max_element())));
         let rounding = self.grids.rounding();
         let quarter = &mut self.quarters[random::quarter(pass) as usize];
         let light = values[own].as_dvec3();
@@ -316,9 +316,9 @@ impl PixelAccumulator {
         for (sum, light) in self.groups.as_flattened_mut().iter_mut().zip(groups.as_flattened()) {
             sum.add(light.as_dvec3(), rounding[0]);
         }
-        for measure in std::iter::once(independent).chain(correlated) {
-            self.coverage.add(measure.first.map(|first| first.instance));
-            let features = measure.features;
+        for sample in std::iter::once(independent).chain(correlated) {
+            self.coverage.add(sample.first.map(|first| first.instance));
+            let features = sample.features;
             if features.albedo.is_finite() && features.normal.is_finite() && features.depth.is_finite() {
                 self.albedo += on_fixed_grid(features.albedo);
                 self.normal += on_fixed_grid(features.normal);
@@ -364,7 +364,7 @@ impl PixelAccumulator {
 
     /// Takes all sums of light to grids that are no finer.
     #[inline]
-    fn make_room(&mut self, to: Grids) {
+    fn coarsen_grids(&mut self, to: Grids) {
         let from = std::mem::replace(&mut self.grids, to);
         if from == to {
             return;
@@ -381,8 +381,8 @@ impl PixelAccumulator {
     /// Adds other iterations of the same pixel: the same bits as if all had been added here, whatever their order.
     pub fn join(&mut self, mut other: PixelAccumulator) {
         let grids = self.grids.max(other.grids);
-        self.make_room(grids);
-        other.make_room(grids);
+        self.coarsen_grids(grids);
+        other.coarsen_grids(grids);
         self.own_squares.join(&other.own_squares);
         for (own, other) in self.quarters.iter_mut().zip(&other.quarters) {
             own.sum.join(&other.sum);
@@ -429,21 +429,21 @@ mod tests {
     #[test]
     fn differences_of_levels_are_the_bias_on_surfaces_and_in_media() {
         let biases = |level: i32| (0.01 * 2f32.powi(level), 0.02 * (2.0 / 3.0 * level as f32).exp2());
-        let measure = |first: i32| {
-            let mut measure = PixelSample { direct: Rgb::ONE, volume: Rgb::ONE, ..PixelSample::default() };
+        let sample = |first: i32| {
+            let mut sample = PixelSample { direct: Rgb::ONE, volume: Rgb::ONE, ..PixelSample::default() };
             for level in 0..MAX_LEVELS {
                 let (surface, volume) = biases(first + level as i32);
-                measure.indirect_photons[level] = Rgb::splat(surface);
-                measure.volume_photons[level] = Rgb::splat(volume);
+                sample.indirect_photons[level] = Rgb::splat(surface);
+                sample.volume_photons[level] = Rgb::splat(volume);
             }
-            measure
+            sample
         };
         for media in [true, false] {
             let mut pixel = PixelAccumulator {
                 volume_bandwidth: if media { 0.1 } else { 0.0 },
                 ..PixelAccumulator::new(5, 0, [0.1; 2])
             };
-            pixel.add(1, &measure(0), Some(&measure(1)));
+            pixel.add(1, &sample(0), Some(&sample(1)));
             let (surface, volume) = biases(3);
             let [difference, _] = pixel.difference().expect("there are levels");
             let ratio = difference.x / f64::from(surface + volume);
@@ -461,9 +461,9 @@ mod tests {
                 Rgb::new(a.x, a.y, b.x) * 10f32.powf(16.0 * b.y - 8.0)
             };
             let photons = |first: u64| std::array::from_fn(|level| draw(first + level as u64));
-            let broken = pass % 11 == 1;
+            let rejection = pass % 11 == 1;
             PixelSample {
-                emission: if broken { Rgb::splat(f32::NAN) } else { draw(0) },
+                emission: if rejection { Rgb::splat(f32::NAN) } else { draw(0) },
                 direct: draw(1),
                 indirect: draw(2),
                 caustic_photons: photons(10),
@@ -476,7 +476,7 @@ mod tests {
                     depth: draw(7).x,
                 },
                 first: (!pass.is_multiple_of(3)).then(|| FirstHit { p: draw(8), instance: (pass % 10) as u32 }),
-                broken: (pass % 13 == 1).then_some(Cause::Splat),
+                rejection: (pass % 13 == 1).then_some(Cause::Splat),
             }
         })
     }
@@ -485,7 +485,7 @@ mod tests {
         let mut pixel = PixelAccumulator { volume_bandwidth: 0.1, ..PixelAccumulator::new(levels, 7, [0.1; 2]) };
         for pass in passes {
             let [independent, correlated] = iteration(pass);
-            pixel.see(pass, || independent.first.map(|first| (first.p.x, first.p)));
+            pixel.record_first_hit(pass, || independent.first.map(|first| (first.p.x, first.p)));
             pixel.add(pass, &independent, (levels > 1).then_some(&correlated));
         }
         pixel

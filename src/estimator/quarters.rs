@@ -60,8 +60,8 @@ mod tests {
                 let pair = if antithetic { at / 2 } else { at };
                 let draw = Stream::new(3, quarter * 100 + pair, Domain::Test, index).vertex(0).one(Purpose::Pixel);
                 let value = if antithetic && at % 2 == 1 { 1.0 - draw } else { draw };
-                let measure = PixelSample { direct: Rgb::splat(value), ..PixelSample::default() };
-                pixel.add(pass, &measure, None);
+                let sample = PixelSample { direct: Rgb::splat(value), ..PixelSample::default() };
+                pixel.add(pass, &sample, None);
             }
             pixel
         };

@@ -279,7 +279,7 @@ mod tests {
             } else {
                 Features::default()
             },
-            broken: None,
+            rejection: None,
             first: hit.then_some(FirstHit { p: Vec3::X, instance: 3 }),
         }
     }

@@ -34,7 +34,7 @@ impl PhotonFlags {
 
     /// The light has a size and is emitted with this density ([`crate::light::EmissionDensity::ray_density`]).
     #[inline]
-    pub fn straight(density: f32) -> PhotonFlags {
+    pub fn from_area_light(density: f32) -> PhotonFlags {
         let exponent = (density.to_bits() >> 23 & 0xff) as i32 - 127;
         let (least, largest) = Self::EXPONENTS;
         PhotonFlags(((exponent.clamp(least, largest) + Self::BIAS) << 1) as u8)
@@ -66,7 +66,7 @@ pub struct Photon {
     /// Of the light path's wavelength.
     pub band: Band,
     /// Its weight; nothing where light paths are not guided.
-    pub mark: ThinningKey,
+    pub thinning_key: ThinningKey,
 }
 
 impl Photon {
@@ -356,7 +356,7 @@ mod tests {
                     flags: PhotonFlags(0),
                     depth: 2,
                     band: Band::WHITE,
-                    mark: ThinningKey::default(),
+                    thinning_key: ThinningKey::default(),
                 }
             })
             .collect()
@@ -398,7 +398,7 @@ mod tests {
             flags: PhotonFlags(0),
             depth: 2,
             band: Band::WHITE,
-            mark: ThinningKey::default(),
+            thinning_key: ThinningKey::default(),
         }]);
         let count = |radius2| {
             let mut n = 0;

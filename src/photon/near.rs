@@ -175,7 +175,7 @@ mod tests {
                     flags: PhotonFlags::default(),
                     depth: 2,
                     band: Band::WHITE,
-                    mark: ThinningKey::default(),
+                    thinning_key: ThinningKey::default(),
                 }
             })
             .collect();

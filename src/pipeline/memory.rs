@@ -9,8 +9,8 @@ use crate::memory;
 use crate::photon;
 use crate::plan::Search;
 use crate::render::{
-    BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, WHOLE_TILE, bytes_of_measures, bytes_per_whole_tile,
-    photons_per_path,
+    BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, WHOLE_TILE, bytes_per_whole_tile, photons_per_path,
+    sample_bytes,
 };
 use crate::scene::View;
 use crate::transport::{MergePhoton, Splat};
@@ -67,7 +67,7 @@ fn needed(
     let own = 2 * (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
     let per_pixel = own
         + pictures
-        + (PixelAccumulator::bytes(settings.levels.count, groups) + bytes_of_measures(settings)) as u64
+        + (PixelAccumulator::bytes(settings.levels.count, groups) + sample_bytes(settings)) as u64
         + (channels * size_of::<f32>()) as u64
         + merged
         + splats;

@@ -14,8 +14,8 @@ pub use account::{
 pub use clock::{Clock, Phases, Spent, cpu_seconds, peak_memory};
 pub(crate) use pass::Cost;
 pub use pass::{
-    MAX_TECHNIQUES, PHOTON_BYTES, PhotonCounts, TechniquePicture, WHOLE_TILE, bytes_of_measures, bytes_per_whole_tile,
-    photons_per_path,
+    MAX_TECHNIQUES, PHOTON_BYTES, PhotonCounts, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile, photons_per_path,
+    sample_bytes,
 };
 pub use session::{Control, LEAST, Progress, Session, Stage, State, drive, render};
 pub use settings::{

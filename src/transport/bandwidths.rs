@@ -53,7 +53,7 @@ impl LevelRadii {
 
 /// Up to eight photons that bring light to a vertex.
 #[derive(Clone, Copy, Debug)]
-pub struct Found {
+pub struct FoundPhotons {
     /// Where they are from the vertex.
     pub offset: [f32x8; 3],
     /// Their distances squared; infinite where there is none.
@@ -61,14 +61,14 @@ pub struct Found {
     /// What they add to the path's measure, mean of RGB, before it is divided by an area.
     pub light: f32x8,
     /// Their marks' bits, for those who ask for marks.
-    pub marks: [u32; 8],
+    pub thinning_keys: [u32; 8],
 }
 
-impl Found {
+impl FoundPhotons {
     /// One photon.
-    pub fn one(offset: Vec3, distance2: f32, light: f32, mark: ThinningKey) -> Found {
-        Found {
-            marks: [mark.bits(), 0, 0, 0, 0, 0, 0, 0],
+    pub fn one(offset: Vec3, distance2: f32, light: f32, thinning_key: ThinningKey) -> FoundPhotons {
+        FoundPhotons {
+            thinning_keys: [thinning_key.bits(), 0, 0, 0, 0, 0, 0, 0],
             offset: offset.to_array().map(|x| lane(x, 0.0)),
             distance2: lane(distance2, f32::INFINITY),
             light: lane(light, 0.0),
@@ -106,10 +106,10 @@ pub trait Counter {
     /// Whether [`Counter::reach2`] may be larger than the largest bandwidth.
     const BEYOND: bool = false;
     /// Whether photons' marks are asked for.
-    const MARKS: bool = false;
+    const NEEDS_THINNING_KEYS: bool = false;
 
     /// Photons within reach.
-    fn count(&mut self, photons: &Found);
+    fn count(&mut self, photons: &FoundPhotons);
     /// Radius squared within which photons are to be counted, at least `largest2`, that of the largest bandwidth.
     #[inline]
     fn reach2(&self, largest2: f32) -> f32 {
@@ -122,7 +122,7 @@ impl Counter for () {
     const COUNTS: bool = false;
 
     #[inline]
-    fn count(&mut self, _: &Found) {}
+    fn count(&mut self, _: &FoundPhotons) {}
 }
 
 /// The same all along the path.

@@ -5,14 +5,14 @@ use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};
 use super::camera_paths::{CameraPaths, Features, PixelSample};
 use super::cause::Cause;
-use super::glow::Glow;
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
+use super::pass_through::PassThroughHit;
+use super::path_history::PathHistory;
 use super::photon_merge::{MergePhoton, merge_photons};
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, token, told};
 use super::shares::{connected, shares, wanted};
-use super::trail::Trail;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
@@ -42,54 +42,54 @@ struct CameraWalk<'a, R> {
     shared: &'a Bidirectional<'a>,
     meets: &'a CameraWalkContext<'a>,
     mis: MisState,
-    trail: Trail,
+    history: PathHistory,
     /// The last vertex.
     last: Receiver,
     /// Its depth.
     depth: u32,
-    measure: &'a mut PixelSample,
+    sample: &'a mut PixelSample,
     record: &'a mut R,
 }
 
 /// The first hit and the features of a path that arrives at `vertex`.
 #[inline]
-pub(super) fn look(
-    trail: &mut Trail,
+pub(super) fn record_surface(
+    history: &mut PathHistory,
     vertex: &Vertex<'_, '_>,
     scattered: Option<Scattered>,
-    measure: &mut PixelSample,
+    sample: &mut PixelSample,
 ) {
     match scattered {
-        None => measure.first = Some(FirstHit { p: vertex.surface.p, instance: vertex.surface.instance }),
-        Some(scattered) => trail.scattered(scattered.lobe),
+        None => sample.first = Some(FirstHit { p: vertex.surface.p, instance: vertex.surface.instance }),
+        Some(scattered) => history.scattered(scattered.lobe),
     }
-    trail.length += vertex.distance;
+    history.length += vertex.distance;
     let shading = vertex.shading;
-    if trail.is_clear() && shading.bsdf.lobes().has(LobeSet::SMOOTH) {
+    if history.is_clear() && shading.bsdf.lobes().has(LobeSet::SMOOTH) {
         let n = shading.frame.n;
-        measure.features = Features {
+        sample.features = Features {
             albedo: shading.albedo(LobeSet::ALL),
             normal: if n.dot(vertex.wo) < 0.0 { -n } else { n },
-            depth: trail.length,
+            depth: history.length,
         };
     }
 }
 
 /// As [`look`], in a medium.
 #[inline]
-pub(super) fn look_in_medium(
-    trail: &mut Trail,
+pub(super) fn record_medium(
+    history: &mut PathHistory,
     vertex: &MediumVertex,
     scattered: Option<Scattered>,
-    measure: &mut PixelSample,
+    sample: &mut PixelSample,
 ) {
     match scattered {
-        None => measure.first = vertex.met.first,
-        Some(scattered) => trail.scattered(scattered.lobe),
+        None => sample.first = vertex.met.first,
+        Some(scattered) => history.scattered(scattered.lobe),
     }
-    trail.length += vertex.met.distance;
-    if trail.is_clear() {
-        measure.features = Features { albedo: vertex.albedo(), normal: vertex.wo, depth: trail.length };
+    history.length += vertex.met.distance;
+    if history.is_clear() {
+        sample.features = Features { albedo: vertex.albedo(), normal: vertex.wo, depth: history.length };
     }
 }
 
@@ -98,7 +98,7 @@ impl<R: Record> CameraWalk<'_, R> {
     #[inline]
     fn finds(&mut self, technique: Technique, light: Rgb) -> bool {
         if light.is_nan() {
-            self.measure.reject(technique.cause());
+            self.sample.reject(technique.cause());
             return false;
         }
         is_lit(light)
@@ -107,22 +107,22 @@ impl<R: Record> CameraWalk<'_, R> {
     #[inline]
     fn add(&mut self, technique: Technique, of: (PathClass, Group), value: Rgb, ratios: Ratios) {
         if !value.is_finite() {
-            return self.measure.reject(technique.cause());
+            return self.sample.reject(technique.cause());
         }
         for (level, &eta) in self.meets.levels.eta().iter().enumerate() {
             self.record.arrival(technique, of, level, value, ratios.weight(eta));
         }
-        add(self.measure, self.meets.levels, of.0, value, ratios);
+        add(self.sample, self.meets.levels, of.0, value, ratios);
     }
 
     /// The path has run into a light that sends it `value`.
     #[inline]
     fn run_into(&mut self, (value, group): (Rgb, Group), depth: u32, at: Vec3, density: &EmissionDensity) {
-        let class = self.trail.sight.class_at_light(false);
+        let class = self.history.suffix.class_at_light(false);
         if !self.shared.hits_at(self.depth) || !self.shared.camera_paths.classes.has(class) {
             return;
         }
-        let ratios = if self.trail.delta {
+        let ratios = if self.history.delta {
             Ratios::ALONE
         } else if self.shared.techniques.connect {
             mis::hit(&self.mis, density)
@@ -136,7 +136,7 @@ impl<R: Record> CameraWalk<'_, R> {
     #[inline]
     fn next_event<S: ScatterPoint>(&mut self, vertex: &S) {
         let CameraPaths { scene, classes, .. } = self.shared.camera_paths;
-        let (draws, seen) = (vertex.draws(), (self.trail.sight, LightPrefix::start(false)));
+        let (draws, seen) = (vertex.draws(), (self.history.suffix, LightPrefix::start(false)));
         if !wanted(vertex, seen.0, seen.1, classes) {
             return;
         }
@@ -180,8 +180,8 @@ impl<R: Record> CameraWalk<'_, R> {
             return;
         }
         let (f_light, pdf_light) = light.evaluate_cos(-d);
-        let sight = self.trail.sight;
-        let shares = || connected(vertex, light, sight, (d, f_eye, f_light), camera_paths.classes);
+        let suffix = self.history.suffix;
+        let shares = || connected(vertex, light, suffix, (d, f_eye, f_light), camera_paths.classes);
         if !camera_paths.classes.is_all() && shares().is_empty() {
             return;
         }
@@ -215,7 +215,7 @@ impl<R: Record> CameraWalk<'_, R> {
                 merges: if S::IN_MEDIUM {
                     Merges::ZERO
                 } else {
-                    techniques.camera_vertex_merge(vertex.depth(), self.trail.delta)
+                    techniques.camera_vertex_merge(vertex.depth(), self.history.delta)
                 },
             },
         );
@@ -257,7 +257,7 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
-        look(&mut self.trail, vertex, scattered, self.measure);
+        record_surface(&mut self.history, vertex, scattered, self.sample);
         self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
         self.mis = self.mis.arrive(self.distance2(vertex.distance, scattered), cos).fly(vertex.flight);
@@ -273,28 +273,28 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
                 self.connect_all(vertex);
             }
             if let (true, Some(photons)) = (techniques.camera_vertex_merges(vertex.depth), self.meets.photons) {
-                let measure = &mut *self.measure;
+                let sample = &mut *self.sample;
                 let longest = camera_paths.max_depth - vertex.depth;
                 let add = |class: PathClass, level: usize, radiance: Rgb| {
                     *match class.part() {
-                        Part::Volume => &mut measure.volume_photons[level],
+                        Part::Volume => &mut sample.volume_photons[level],
                         // Only where all is merged, which has one level.
-                        Part::Emission | Part::Direct => &mut measure.direct,
-                        Part::Caustic => &mut measure.caustic_photons[level],
-                        Part::Indirect => &mut measure.indirect_photons[level],
+                        Part::Emission | Part::Direct => &mut sample.direct,
+                        Part::Caustic => &mut sample.caustic_photons[level],
+                        Part::Indirect => &mut sample.indirect_photons[level],
                     } += radiance;
                 };
-                let own = one_merge(self.trail.delta);
-                let seen = (self.trail.sight, camera_paths.classes);
+                let own = one_merge(self.history.delta);
+                let seen = (self.history.suffix, camera_paths.classes);
                 let merging = (photons, self.meets.levels);
                 if !merge_photons(merging, vertex, (&self.mis, own), seen, longest, self.record, add) {
-                    self.measure.reject(Cause::Photons);
+                    self.sample.reject(Cause::Photons);
                 }
             }
         }
-        self.trail.leave(Some(vertex.shading.bsdf.lobes()));
+        self.history.leave(Some(vertex.shading.bsdf.lobes()));
         // One that is to run into a light has its end there.
-        if !self.trail.leads(camera_paths.classes)
+        if !self.history.leads(camera_paths.classes)
             || self.shared.ends_camera_path(vertex.depth)
             || self.is_given_up(vertex.depth)
         {
@@ -305,46 +305,46 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
         Next::Continue(if techniques.connect || techniques.merge { LobeSet::ALL } else { LobeSet::DELTA })
     }
 
-    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
+    fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
         let (lights, materials) = (&self.shared.camera_paths.scene.lights, &self.shared.camera_paths.scene.materials);
-        let Some((radiance, density)) = lights.emitted(materials, &self.last, &glow.surface, glow.wo) else { return };
-        let before = (self.mis, self.trail, self.depth);
+        let Some((radiance, density)) = lights.emitted(materials, &self.last, &hit.surface, hit.wo) else { return };
+        let before = (self.mis, self.history, self.depth);
         if let Some(scattered) = scattered {
-            self.trail.scattered(scattered.lobe);
+            self.history.scattered(scattered.lobe);
         }
-        self.depth = glow.depth;
-        let cos = glow.wo.dot(glow.surface.ng).abs();
-        self.mis = self.mis.arrive(self.distance2(glow.distance, scattered), cos).fly(glow.flight);
+        self.depth = hit.depth;
+        let cos = hit.wo.dot(hit.surface.ng).abs();
+        self.mis = self.mis.arrive(self.distance2(hit.distance, scattered), cos).fly(hit.flight);
         self.run_into(
-            (glow.throughput * radiance, lights.surface_group(&glow.surface)),
-            glow.depth,
-            glow.surface.p,
+            (hit.throughput * radiance, lights.surface_group(&hit.surface)),
+            hit.depth,
+            hit.surface.p,
             &density,
         );
-        (self.mis, self.trail, self.depth) = before;
+        (self.mis, self.history, self.depth) = before;
     }
 
     fn lost(&mut self) {
-        self.measure.reject(Cause::Path);
+        self.sample.reject(Cause::Path);
     }
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
-        let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.trail.delta);
+        let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.history.delta);
         self.mis = scatter(self.mis, vertex, sample, Transport::Importance, merges);
     }
 
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
-        look_in_medium(&mut self.trail, vertex, scattered, self.measure);
+        record_medium(&mut self.history, vertex, scattered, self.sample);
         self.depth = vertex.depth;
         self.mis = self.mis.arrive(self.distance2(vertex.met.distance, scattered), 1.0).fly(vertex.flight);
         if techniques.connect && vertex.depth < camera_paths.max_depth {
             self.connect_all(vertex);
         }
-        self.trail.leave(None);
-        if !self.trail.leads(camera_paths.classes)
+        self.history.leave(None);
+        if !self.history.leads(camera_paths.classes)
             || self.shared.ends_camera_path(vertex.depth)
             || self.is_given_up(vertex.depth)
         {
@@ -363,7 +363,7 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
     #[inline]
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: FlightDensity) {
         if let Some(scattered) = scattered {
-            self.trail.scattered(scattered.lobe);
+            self.history.scattered(scattered.lobe);
         }
         self.depth += 1;
         self.mis = self.mis.fly(flight);
@@ -385,19 +385,19 @@ impl Bidirectional<'_> {
         (start, stream): &(PathStart, Stream),
         meets: &CameraWalkContext<'_>,
         record: &mut R,
-        measure: &mut PixelSample,
+        sample: &mut PixelSample,
     ) {
-        *measure = PixelSample::default();
+        *sample = PixelSample::default();
         let camera_paths = &self.camera_paths;
         let pdf_w = camera_paths.camera.pdf_w(start.direction) * self.pixels();
         let mut visitor = CameraWalk {
             shared: self,
             meets,
             mis: MisState::camera(self.light_paths, pdf_w),
-            trail: Trail::START,
+            history: PathHistory::START,
             last: Receiver::anywhere(start.origin),
             depth: 0,
-            measure,
+            sample,
             record,
         };
         walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut visitor);

@@ -39,24 +39,24 @@ pub struct Splat {
 impl Splat {
     /// Adds the weighted light to the pixel's measure.
     #[inline]
-    pub fn apply(&self, levels: &MergeLevels, measure: &mut PixelSample) {
+    pub fn apply(&self, levels: &MergeLevels, sample: &mut PixelSample) {
         if !self.value.is_finite() {
-            return measure.reject(Cause::Splat);
+            return sample.reject(Cause::Splat);
         }
-        add(measure, levels, self.class, self.value, self.ratios);
+        add(sample, levels, self.class, self.value, self.ratios);
     }
 }
 
 /// Adds light to all levels of a measure, each with its own weight.
 #[inline]
-pub(super) fn add(measure: &mut PixelSample, levels: &MergeLevels, class: PathClass, value: Rgb, ratios: Ratios) {
+pub(super) fn add(sample: &mut PixelSample, levels: &MergeLevels, class: PathClass, value: Rgb, ratios: Ratios) {
     let into = match class.part() {
         // Neither can be merged before its first vertex, so no eta is in their weights.
-        Part::Emission => return measure.emission += value * ratios.weight(levels.eta()[0]),
-        Part::Direct => return measure.direct += value * ratios.weight(levels.eta()[0]),
-        Part::Caustic => &mut measure.caustic_photons,
-        Part::Indirect => &mut measure.indirect_photons,
-        Part::Volume => &mut measure.volume_photons,
+        Part::Emission => return sample.emission += value * ratios.weight(levels.eta()[0]),
+        Part::Direct => return sample.direct += value * ratios.weight(levels.eta()[0]),
+        Part::Caustic => &mut sample.caustic_photons,
+        Part::Indirect => &mut sample.indirect_photons,
+        Part::Volume => &mut sample.volume_photons,
     };
     for (into, &eta) in into.iter_mut().zip(levels.eta()) {
         *into += value * ratios.weight(eta);
@@ -93,7 +93,7 @@ struct LightWalk<'a, 's, R> {
     light: u32,
     group: Group,
     infinite: bool,
-    beam: LightPrefix,
+    prefix: LightPrefix,
     /// Lobes of the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
     photons_only: bool,
@@ -106,7 +106,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
     #[inline(always)]
     fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: FlightDensity, scattered: Option<Scattered>) {
         if let Some(scattered) = scattered {
-            self.beam = self.beam.then(Event::by(scattered.lobe, self.lobes));
+            self.prefix = self.prefix.then(Event::by(scattered.lobe, self.lobes));
         }
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };
@@ -118,7 +118,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
 
     fn connect_camera<S: ScatterPoint>(&mut self, vertex: &S) {
         let Bidirectional { camera_paths, techniques, light_paths, .. } = self.shared;
-        let (draws, seen) = (vertex.draws(), (CameraSuffix::START, self.beam));
+        let (draws, seen) = (vertex.draws(), (CameraSuffix::START, self.prefix));
         if !wanted(vertex, seen.0, seen.1, camera_paths.classes) {
             return;
         }
@@ -189,7 +189,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
             && vertex.depth < camera_paths.max_depth
         {
             let flux = vertex.throughput / *merged_paths;
-            self.left.photons.push(MergePhoton::new(vertex, flux, (self.beam, self.group), &self.mis));
+            self.left.photons.push(MergePhoton::new(vertex, flux, (self.prefix, self.group), &self.mis));
         }
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth {
@@ -200,7 +200,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     throughput: vertex.throughput,
                     depth: vertex.depth,
                     mis: self.mis,
-                    beam: self.beam,
+                    prefix: self.prefix,
                     dispersed: vertex.wavelength.is_some(),
                     group: self.group,
                 });
@@ -229,7 +229,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
                     throughput: vertex.throughput,
                     depth: vertex.depth,
                     mis: self.mis,
-                    beam: self.beam,
+                    prefix: self.prefix,
                     dispersed: vertex.wavelength.is_some(),
                     group: self.group,
                 });
@@ -310,7 +310,7 @@ impl<'s> Bidirectional<'s> {
             light: emitted.light,
             group: camera_paths.scene.lights.group(emitted.light),
             infinite: emitted.density.infinite,
-            beam: LightPrefix::start(emitted.delta),
+            prefix: LightPrefix::start(emitted.delta),
             lobes: None,
             photons_only,
             vertices,

@@ -18,13 +18,13 @@
 //! An X in a medium is like one with broad lobes alone. Every segment has one in each medium it goes through, and the
 //! surface behind as well ([`super::flight`]).
 
-use super::bandwidths::{Bandwidths, Counter, Found, MAX_LEVELS};
+use super::bandwidths::{Bandwidths, Counter, FoundPhotons, MAX_LEVELS};
 use super::cause::Cause;
 use super::direct::{SECOND_STRATEGY, balance, direct_light, next_event};
 use super::gather::{Batch, Scratch, Waiting};
 use super::glint::{Glints, Merging};
-use super::glow::Glow;
 use super::initial_media::InitialMedium;
+use super::pass_through::PassThroughHit;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, PrecomputedHit, camera_token};
 use super::shares::leads;
@@ -79,14 +79,14 @@ pub struct PixelSample {
     /// First visible hit.
     pub first: Option<FirstHit>,
     /// What was not finite, if anything: the sample is to be rejected.
-    pub broken: Option<Cause>,
+    pub rejection: Option<Cause>,
 }
 
 impl PixelSample {
     /// Something that is not finite has come to the sample; what came first is its cause.
     #[cold]
     pub fn reject(&mut self, cause: Cause) {
-        self.broken.get_or_insert(cause);
+        self.rejection.get_or_insert(cause);
     }
 
     /// The radiance estimate of a level.
@@ -135,11 +135,11 @@ struct Gather<'a, B, K, const PATHS: bool> {
     waiting: &'a mut Waiting,
     bandwidths: B,
     max_depth: u32,
-    measure: PixelSample,
+    sample: PixelSample,
     /// Length of the path so far.
     length: f32,
     /// What has happened up to the last vertex.
-    sight: CameraSuffix,
+    suffix: CameraSuffix,
     /// Lobes of the last vertex.
     lobes: LobeSet,
     classes: ClassSet,
@@ -165,66 +165,67 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             // A caustic.
             return;
         }
-        let class = self.sight.class_at_light(false);
+        let class = self.suffix.class_at_light(false);
         if !self.classes.has(class) {
             return;
         }
         let arriving = throughput * radiance;
         if !arriving.is_finite() {
-            return self.measure.reject(Cause::Emission);
+            return self.sample.reject(Cause::Emission);
         }
         let weighted = match scattered {
             Some(s) if !s.lobe.has(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
             // Behind a perfect mirror or clear glass next-event estimation cannot see it, but photons may.
             Some(_) if self.glints.shared() => {
                 for (level, weight) in density().iter().flat_map(|density| self.glints.weights(density)) {
-                    self.measure.indirect_photons[level] += arriving * weight;
+                    self.sample.indirect_photons[level] += arriving * weight;
                 }
                 return;
             }
             _ => arriving,
         };
         *match class.part() {
-            Part::Emission => &mut self.measure.emission,
-            Part::Direct => &mut self.measure.direct,
-            _ => &mut self.measure.indirect,
+            Part::Emission => &mut self.sample.emission,
+            Part::Direct => &mut self.sample.direct,
+            _ => &mut self.sample.indirect,
         } += weighted;
     }
 
     /// What has happened to a path that arrives at the next vertex.
     #[inline]
     fn arrived(&self, scattered: Option<Scattered>) -> CameraSuffix {
-        scattered.map_or(self.sight, |scattered| self.sight.then(Event::of(scattered.lobe, self.lobes)))
+        scattered.map_or(self.suffix, |scattered| self.suffix.then(Event::of(scattered.lobe, self.lobes)))
     }
 
     /// The lobes that are lit at a vertex, broad ones and those that the path goes on with: all, but for classes that
     /// are switched off.
     #[inline]
     fn lit_lobes(&self, broad: LobeSet, onward: LobeSet) -> (LobeSet, LobeSet) {
-        let on = |event: Event| self.classes.is_all() || self.classes.has(self.sight.then(event).class_at_light(false));
+        let on =
+            |event: Event| self.classes.is_all() || self.classes.has(self.suffix.then(event).class_at_light(false));
         let only = |set: LobeSet, event: Event| if on(event) { set } else { LobeSet::NONE };
         (only(broad, Event::Broad), only(onward, Event::Sharp))
     }
 
     /// Whether a medium is lit.
     #[inline]
-    fn lit_in_medium(&self, sight: CameraSuffix) -> bool {
-        self.classes.has(sight.then(Event::Medium).class_at_light(false))
+    fn lit_in_medium(&self, suffix: CameraSuffix) -> bool {
+        self.classes.has(suffix.then(Event::Medium).class_at_light(false))
     }
 
     /// Whether going on by some lobes of the last vertex can come to light of a class that is wanted.
     #[inline]
     fn leads(&self, set: LobeSet) -> bool {
-        self.classes.is_all() || leads(self.sight, self.lobes, set, self.classes)
+        self.classes.is_all() || leads(self.suffix, self.lobes, set, self.classes)
     }
 
     /// Adds direct light at a vertex.
     #[inline]
     fn add_direct(&mut self, light: Rgb) {
         if !light.is_finite() {
-            self.measure.reject(Cause::DirectLight);
+            self.sample.reject(Cause::DirectLight);
         }
-        *if self.sight.is_clear() { &mut self.measure.direct } else { &mut self.measure.indirect } += light;
+        *if self.suffix.is_clear() { &mut self.sample.direct } else { &mut self.sample.indirect } += light;
     }
 
     /// Direct light and photons at a vertex from which the path goes on whatever its lobes, and with which of them.
@@ -267,10 +268,10 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     #[inline]
     fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, onward: LobeSet, going: f32) {
         // What a photon of a light without size makes of sharp lobes is in the same class.
-        let sight = self.sight.then(Event::Broad);
+        let suffix = self.suffix.then(Event::Broad);
         let place = B::place(vertex.surface.ng);
-        for (kind, beam) in [(Kind::Indirect, LightPrefix::SCATTERED), (Kind::Caustic, LightPrefix::FOCUSED)] {
-            let class = sight.class_with(beam);
+        for (kind, prefix) in [(Kind::Indirect, LightPrefix::SCATTERED), (Kind::Caustic, LightPrefix::FOCUSED)] {
+            let class = suffix.class_with(prefix);
             let photons = &self.photons[kind as usize];
             // Where none has come this time, camera paths still leave photons their share.
             let shares = onward.has(LobeSet::SHARP) && photons.paths() > 0;
@@ -305,7 +306,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         let sharp = onward & LobeSet::SHARP;
         let shared = kind == Kind::Caustic
             && !sharp.is_empty()
-            && self.classes.has(self.sight.then(Event::Sharp).class_with(LightPrefix::FOCUSED));
+            && self.classes.has(self.suffix.then(Event::Sharp).class_with(LightPrefix::FOCUSED));
         let mut glints =
             shared.then(|| self.glints.merge(self.kernel, (vertex.shading, ng), (onward, going), &radii, photons));
         let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
@@ -326,7 +327,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
                     let light = glints.push(photon, distance2);
                     if counts && light != Rgb::ZERO {
                         let light = (light * vertex.throughput).element_sum() / 3.0;
-                        counter.count(&Found::one(photon.p - p, distance2, light, photon.mark));
+                        counter.count(&FoundPhotons::one(photon.p - p, distance2, light, photon.thinning_key));
                     }
                 }
                 batch.push(photon, distance2, &mut counter);
@@ -337,7 +338,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             Some(wavelength) => gather_dispersed(photons, near, vertex, wavelength, reach2, push),
         }
         let sums = batch.finish(&mut counter);
-        let into = if caustic { &mut self.measure.caustic_photons } else { &mut self.measure.indirect_photons };
+        let into = if caustic { &mut self.sample.caustic_photons } else { &mut self.sample.indirect_photons };
         let mut finite = true;
         for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
             let light = vertex.throughput * (FRAC_1_PI / radius2) * sum;
@@ -347,10 +348,10 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         for (level, sum) in order.into_iter().zip(glints.into_iter().flat_map(Merging::finish)) {
             let light = vertex.throughput * sum;
             finite &= light.is_finite();
-            self.measure.indirect_photons[usize::from(level)] += light;
+            self.sample.indirect_photons[usize::from(level)] += light;
         }
         if !finite {
-            self.measure.reject(Cause::Photons);
+            self.sample.reject(Cause::Photons);
         }
     }
 }
@@ -380,10 +381,10 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let (surface, shading) = (vertex.surface, vertex.shading);
         if scattered.is_none() {
-            self.measure.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
+            self.sample.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
             self.last = Receiver::anywhere(vertex.from);
         }
-        self.sight = self.arrived(scattered);
+        self.suffix = self.arrived(scattered);
         self.length += vertex.distance;
         let (lights, materials, from) = (&self.scene.lights, &self.scene.materials, self.last);
         if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, surface, vertex.wo) {
@@ -394,8 +395,8 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let lobes = shading.bsdf.lobes();
         let smooth = lobes & LobeSet::SMOOTH;
         // Lamps and other surfaces that scatter nothing have features, too.
-        if self.sight.is_clear() && lobes != LobeSet::DELTA {
-            self.measure.features = Features {
+        if self.suffix.is_clear() && lobes != LobeSet::DELTA {
+            self.sample.features = Features {
                 albedo: shading.albedo(LobeSet::ALL),
                 normal: if shading.frame.n.dot(vertex.wo) < 0.0 { -shading.frame.n } else { shading.frame.n },
                 depth: self.length,
@@ -422,26 +423,26 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         if self.leads(onward) { Next::Continue(onward) } else { Next::Stop }
     }
 
-    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
-        let (lights, materials, before) = (&self.scene.lights, &self.scene.materials, self.sight);
+    fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
+        let (lights, materials, before) = (&self.scene.lights, &self.scene.materials, self.suffix);
         let from =
-            if scattered.is_none() { Receiver::anywhere(glow.surface.p + glow.wo * glow.distance) } else { self.last };
-        self.sight = self.arrived(scattered);
-        if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, &glow.surface, glow.wo) {
-            let density = || Some(lights.emitted(materials, &from, &glow.surface, glow.wo)?.1);
-            self.run_into((radiance, glow.throughput), pdf, scattered, density);
+            if scattered.is_none() { Receiver::anywhere(hit.surface.p + hit.wo * hit.distance) } else { self.last };
+        self.suffix = self.arrived(scattered);
+        if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, &hit.surface, hit.wo) {
+            let density = || Some(lights.emitted(materials, &from, &hit.surface, hit.wo)?.1);
+            self.run_into((radiance, hit.throughput), pdf, scattered, density);
         }
-        self.sight = before;
+        self.suffix = before;
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         // A medium hides what is behind it as often as it takes the light.
-        if scattered.is_none() && self.measure.first.is_none() && vertex.draws.one(Purpose::Roulette) < vertex.opacity {
-            self.measure.first = vertex.met.first;
+        if scattered.is_none() && self.sample.first.is_none() && vertex.draws.one(Purpose::Roulette) < vertex.opacity {
+            self.sample.first = vertex.met.first;
         }
         if vertex.depth < self.max_depth {
-            let sight = self.arrived(scattered);
-            let lit = self.lit_in_medium(sight);
+            let suffix = self.arrived(scattered);
+            let lit = self.lit_in_medium(suffix);
             let direct = if lit {
                 vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0)
             } else {
@@ -457,22 +458,22 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
                 }
                 sums
             };
-            let wanted = self.classes.has(sight.then(Event::Medium).class_with(LightPrefix::SCATTERED));
+            let wanted = self.classes.has(suffix.then(Event::Medium).class_with(LightPrefix::SCATTERED));
             let gathered = self.volume.filter(|_| wanted).map(gather);
-            let measure = &mut self.measure;
-            let (light, photons) = if sight.is_clear() {
-                (&mut measure.volume, &mut measure.volume_photons)
+            let sample = &mut self.sample;
+            let (light, photons) = if suffix.is_clear() {
+                (&mut sample.volume, &mut sample.volume_photons)
             } else {
-                (&mut measure.indirect, &mut measure.indirect_photons)
+                (&mut sample.indirect, &mut sample.indirect_photons)
             };
             *light += direct;
             for (sum, gathered) in photons.iter_mut().zip(gathered.into_iter().flatten()) {
                 *sum += gathered;
             }
             if !direct.is_finite() {
-                measure.reject(Cause::DirectLight);
+                sample.reject(Cause::DirectLight);
             } else if !gathered.iter().flatten().all(|light| light.is_finite()) {
-                measure.reject(Cause::Photons);
+                sample.reject(Cause::Photons);
             }
         }
         Next::Stop
@@ -480,21 +481,21 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
 
     #[inline]
     fn lit(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
-        let sight = self.arrived(scattered);
-        if vertex.depth < self.max_depth && !self.scene.lights.is_empty() && self.lit_in_medium(sight) {
+        let suffix = self.arrived(scattered);
+        if vertex.depth < self.max_depth && !self.scene.lights.is_empty() && self.lit_in_medium(suffix) {
             let light = vertex.throughput
                 * next_event(self.scene, vertex, [(LobeSet::BROAD, SECOND_STRATEGY), (LobeSet::NONE, 0.0)]);
             if !light.is_finite() {
-                self.measure.reject(Cause::DirectLight);
+                self.sample.reject(Cause::DirectLight);
             }
-            *if sight.is_clear() { &mut self.measure.volume } else { &mut self.measure.indirect } += light;
+            *if suffix.is_clear() { &mut self.sample.volume } else { &mut self.sample.indirect } += light;
         }
     }
 
     #[inline]
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {
         let scene = self.scene;
-        self.sight = self.arrived(scattered);
+        self.suffix = self.arrived(scattered);
         let last = self.last;
         scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |radiance, direct, start, _| {
             let onward = || scene.lights.entry_pdf_a(last.p, direction);
@@ -510,7 +511,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
     }
 
     fn lost(&mut self) {
-        self.measure.reject(Cause::Path);
+        self.sample.reject(Cause::Path);
     }
 }
 
@@ -542,8 +543,8 @@ impl CameraPaths<'_> {
 
     /// Camera depth and position of what a measure has seen first, if anything (scene units; of the scene as it was
     /// read).
-    pub fn seen(&self, measure: &PixelSample) -> Option<(f32, Vec3)> {
-        let p = measure.first?.p;
+    pub fn first_hit(&self, sample: &PixelSample) -> Option<(f32, Vec3)> {
+        let p = sample.first?.p;
         Some((self.camera.depth(p), (p.as_dvec3() + self.scene.origin).as_vec3()))
     }
 
@@ -622,7 +623,7 @@ impl CameraPaths<'_> {
     /// Traces one camera path and measures all levels of `bandwidths`, and of `volume` where media scatter, with `kernel`.
     /// `scratch` has served no other photons.
     #[inline]
-    pub fn measure(
+    pub fn sample(
         &self,
         scratch: &mut Scratch,
         (start, stream): &(PathStart, Stream),
@@ -633,17 +634,17 @@ impl CameraPaths<'_> {
     ) -> PixelSample {
         match self.indirect {
             Indirect::Photons => {
-                self.measure_by::<_, _, false>(scratch, start, *stream, photons, volume, bandwidths, kernel)
+                self.sample_with::<_, _, false>(scratch, start, *stream, photons, volume, bandwidths, kernel)
             }
             Indirect::Paths => {
-                self.measure_by::<_, _, true>(scratch, start, *stream, photons, volume, bandwidths, kernel)
+                self.sample_with::<_, _, true>(scratch, start, *stream, photons, volume, bandwidths, kernel)
             }
         }
     }
 
     #[inline]
-    #[allow(clippy::too_many_arguments, reason = "those of `measure`")]
-    fn measure_by<B: Bandwidths, K: Kernel, const PATHS: bool>(
+    #[allow(clippy::too_many_arguments, reason = "those of `sample`")]
+    fn sample_with<B: Bandwidths, K: Kernel, const PATHS: bool>(
         &self,
         scratch: &mut Scratch,
         start: &PathStart,
@@ -663,9 +664,9 @@ impl CameraPaths<'_> {
             waiting: &mut scratch.waiting,
             bandwidths,
             max_depth: self.max_depth,
-            measure: PixelSample::default(),
+            sample: PixelSample::default(),
             length: 0.0,
-            sight: CameraSuffix::START,
+            suffix: CameraSuffix::START,
             lobes: LobeSet::NONE,
             classes: self.classes,
             broadly: false,
@@ -673,8 +674,8 @@ impl CameraPaths<'_> {
             last: Receiver::anywhere(Vec3::ZERO),
         };
         walk(self.scene, &scratch.arena, start, stream, Transport::Radiance, self.max_depth, &mut gather);
-        let measure = gather.measure;
+        let sample = gather.sample;
         scratch.arena.reset();
-        measure
+        sample
     }
 }

@@ -7,7 +7,7 @@
 //! path itself, which goes on with probability `survival`. A strategy tried with probability n has density n p in the
 //! balance heuristic.
 
-use super::glow::glows;
+use super::pass_through::for_each_pass_through_light;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{End, Start, next_surface, token};
 use crate::bsdf::{LobeSet, Transport};
@@ -108,7 +108,7 @@ fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> 
         }
         End::Medium(_) | End::Lost => {}
     }
-    glows(scene, &start, reach, S::IN_MEDIUM, |surface, _, left, _| {
+    for_each_pass_through_light(scene, &start, reach, S::IN_MEDIUM, |surface, _, left, _| {
         if let Some((radiance, pdf)) =
             scene.lights.hit_radiance(&scene.materials, &vertex.receiver(), surface, -sample.wi)
         {

@@ -1,6 +1,6 @@
 //! Photons gathered at a vertex, eight at a time.
 
-use super::bandwidths::{Counter, Found, MAX_LEVELS, lane};
+use super::bandwidths::{Counter, FoundPhotons, MAX_LEVELS, lane};
 use super::vertex::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3};
@@ -114,8 +114,12 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
     fn push_unreachable<C: Counter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
         let Some(gathering) = &self.unreachable else { return };
         let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
-        let found =
-            Found::one(photon.p - self.p, distance2, (light * self.throughput).element_sum() / 3.0, photon.mark);
+        let found = FoundPhotons::one(
+            photon.p - self.p,
+            distance2,
+            (light * self.throughput).element_sum() / 3.0,
+            photon.thinning_key,
+        );
         self.add::<C>(&light.to_array().map(|light| lane(light, 0.0)), found.distance2);
         if C::COUNTS && light != Rgb::ZERO {
             counter.count(&found);
@@ -140,11 +144,15 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
             let light = found[0].mul_add(weight[0], found[1].mul_add(weight[1], found[2] * weight[2]));
             // Photons that bring nothing do not count [CPPM 2020, 7.2].
             let dark = light.cmp_eq(f32x8::ZERO);
-            counter.count(&Found {
+            counter.count(&FoundPhotons {
                 offset,
                 distance2: dark.blend(f32x8::splat(f32::INFINITY), distance2),
                 light: light * (1.0 / 3.0),
-                marks: if C::MARKS { self.waiting.photons.map(|photon| photon.mark.bits()) } else { [0; 8] },
+                thinning_keys: if C::NEEDS_THINNING_KEYS {
+                    self.waiting.photons.map(|photon| photon.thinning_key.bits())
+                } else {
+                    [0; 8]
+                },
             });
         }
         self.waiting.count = 0;

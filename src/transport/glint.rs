@@ -111,7 +111,7 @@ impl Glints {
     /// Levels, and the weight of this path in each, where it has run into light of some density.
     #[inline]
     pub fn weights(&self, density: &EmissionDensity) -> impl Iterator<Item = (usize, f32)> {
-        let density = PhotonFlags::straight(density.ray_density()).density();
+        let density = PhotonFlags::from_area_light(density.ray_density()).density();
         let Merged { areas, order, count, .. } = self.at;
         let onward = self.onward;
         (0..count).map(move |k| (usize::from(order[k]), 1.0 / (1.0 + areas[k] * density * onward)))
@@ -234,7 +234,7 @@ mod tests {
                     wi: sample.wi,
                     ng: Vec3::Z,
                     flux,
-                    flags: PhotonFlags::straight(density.ray_density()),
+                    flags: PhotonFlags::from_area_light(density.ray_density()),
                     ..Photon::default()
                 };
                 let mut glints = Glints::NONE;
@@ -265,8 +265,13 @@ mod tests {
         let parameters = Parameters { metallic: 1.0, alpha_x: 0.1, alpha_y: 0.1, ..Parameters::default() };
         let interface = Interface::new(&parameters, &tables);
         let shading = Shading::new(Frame::from_normal(Vec3::Z), Vec3::Z, Bsdf::new(&parameters, &interface), Vec3::Z);
-        let known =
-            Photon { wi: Vec3::Z, ng: Vec3::Z, flux: Rgb::ONE, flags: PhotonFlags::straight(1.0), ..Photon::default() };
+        let known = Photon {
+            wi: Vec3::Z,
+            ng: Vec3::Z,
+            flux: Rgb::ONE,
+            flags: PhotonFlags::from_area_light(1.0),
+            ..Photon::default()
+        };
         for (photon, paths, merges) in
             [(known, PATHS, true), (known, 0, false), (Photon { flags: PhotonFlags::default(), ..known }, PATHS, false)]
         {
@@ -284,11 +289,11 @@ mod tests {
     fn densities_are_known_to_a_factor_of_two() {
         for exponent in -62..63 {
             let density = 2f32.powi(exponent);
-            assert_eq!(PhotonFlags::straight(density).density(), density);
-            assert_eq!(PhotonFlags::straight(1.999 * density).density(), density);
+            assert_eq!(PhotonFlags::from_area_light(density).density(), density);
+            assert_eq!(PhotonFlags::from_area_light(1.999 * density).density(), density);
         }
         for extreme in [0.0, f32::MIN_POSITIVE, 1e30, f32::INFINITY] {
-            let flags = PhotonFlags::straight(extreme);
+            let flags = PhotonFlags::from_area_light(extreme);
             assert!(flags.density() > 0.0 && flags != PhotonFlags::UNREACHABLE && flags != PhotonFlags::default());
         }
         assert_eq!(PhotonFlags::UNREACHABLE.density(), 0.0);

@@ -71,7 +71,7 @@ impl Interior {
     /// Enters a solid.
     #[inline]
     fn push(&mut self, scene: &Scene, instance: u32) {
-        if usize::from(self.len) == INNERMOST && !self.make_room(scene) {
+        if usize::from(self.len) == INNERMOST && !self.spill_outermost(scene) {
             // As if it replaced the last.
             self.len -= 1;
         }
@@ -82,7 +82,7 @@ impl Interior {
     /// Moves the first of those it has with it to the others.
     #[cold]
     #[inline(never)]
-    fn make_room(&mut self, scene: &Scene) -> bool {
+    fn spill_outermost(&mut self, scene: &Scene) -> bool {
         let Some(outer) = pushed(scene, self.outer, self.inside[0]) else { return false };
         self.outer = outer;
         self.inside.copy_within(1.., 0);

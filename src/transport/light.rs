@@ -281,7 +281,7 @@ impl<'a> Deposit<'a> {
             flags: if emitted.delta {
                 PhotonFlags::UNREACHABLE
             } else {
-                PhotonFlags::straight(emitted.density.ray_density())
+                PhotonFlags::from_area_light(emitted.density.ray_density())
             },
             within: false,
             thinned: false,
@@ -323,7 +323,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
-            let mark =
+            let thinning_key =
                 self.weight.map(|weight| ThinningKey::new(weight * self.scale, vertex.draws.one(Purpose::ThinningKey)));
             self.photons.surface[kind as usize].push(Photon {
                 p: vertex.surface.p,
@@ -333,7 +333,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flags: self.flags,
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
                 band: Band::of(vertex.wavelength.as_ref()),
-                mark: mark.unwrap_or_default(),
+                thinning_key: thinning_key.unwrap_or_default(),
             });
         }
         Next::Continue(self.onward)

@@ -34,7 +34,7 @@ pub struct LightVertex<'s> {
     /// Partial sums of the weights.
     pub mis: MisState,
     /// What has happened on the way here.
-    pub beam: LightPrefix,
+    pub prefix: LightPrefix,
     /// The path has taken a wavelength, the one its camera path takes if it does.
     pub dispersed: bool,
     /// Of its light.

@@ -4,14 +4,14 @@
 //! a vertex at once (`direct_light` splits them), so that the two check each other.
 
 use super::bidirectional::{Record, Technique};
-use super::bidirectional_camera::{look, look_in_medium};
+use super::bidirectional_camera::{record_medium, record_surface};
 use super::camera_paths::{CameraPaths, PixelSample};
 use super::cause::Cause;
-use super::glow::Glow;
+use super::pass_through::PassThroughHit;
+use super::path_history::PathHistory;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::token;
 use super::shares::{shares, wanted};
-use super::trail::Trail;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
@@ -27,8 +27,8 @@ struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
     classes: ClassSet,
-    measure: &'a mut PixelSample,
-    trail: Trail,
+    sample: &'a mut PixelSample,
+    history: PathHistory,
     last: Receiver,
     /// Depth of the last vertex.
     depth: u32,
@@ -46,8 +46,8 @@ impl<R: Record> PathTracer<'_, R> {
 
     /// Light straight from a light at a vertex.
     fn lit<S: ScatterPoint>(&mut self, vertex: &S) {
-        let (scene, draws, beam) = (self.scene, vertex.draws(), LightPrefix::start(false));
-        if vertex.depth() >= self.max_depth || !wanted(vertex, self.trail.sight, beam, self.classes) {
+        let (scene, draws, prefix) = (self.scene, vertex.draws(), LightPrefix::start(false));
+        if vertex.depth() >= self.max_depth || !wanted(vertex, self.history.suffix, prefix, self.classes) {
             return;
         }
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
@@ -68,7 +68,7 @@ impl<R: Record> PathTracer<'_, R> {
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * way.left);
         let technique = Technique::NextEvent { camera: self.depth };
-        let shares = shares(vertex, (self.trail.sight, beam), (light.wi, Transport::Radiance, f), self.classes);
+        let shares = shares(vertex, (self.history.suffix, prefix), (light.wi, Transport::Radiance, f), self.classes);
         for (class, share) in shares.iter() {
             self.add(technique, (class, scene.lights.group(light.light)), value * share, weight);
         }
@@ -81,24 +81,24 @@ impl<R: Record> PathTracer<'_, R> {
             return;
         }
         if !light.is_finite() {
-            return self.measure.reject(technique.cause());
+            return self.sample.reject(technique.cause());
         }
         if weight > 0.0 {
             self.record.arrival(technique, of, 0, light / weight, weight);
         }
-        let measure = &mut *self.measure;
+        let sample = &mut *self.sample;
         *match class.part() {
-            Part::Emission => &mut measure.emission,
-            Part::Direct => &mut measure.direct,
-            Part::Caustic => &mut measure.caustic_photons[0],
-            Part::Indirect => &mut measure.indirect,
-            Part::Volume => &mut measure.volume,
+            Part::Emission => &mut sample.emission,
+            Part::Direct => &mut sample.direct,
+            Part::Caustic => &mut sample.caustic_photons[0],
+            Part::Indirect => &mut sample.indirect,
+            Part::Volume => &mut sample.volume,
         } += light;
     }
 
     /// What the walk does after the last vertex.
     fn next(&self) -> Next {
-        if self.trail.leads(self.classes) { Next::Continue(LobeSet::ALL) } else { Next::Stop }
+        if self.history.leads(self.classes) { Next::Continue(LobeSet::ALL) } else { Next::Stop }
     }
 }
 
@@ -109,55 +109,55 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     const SPARED: f32 = 0.25;
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
-        look(&mut self.trail, vertex, scattered, self.measure);
+        record_surface(&mut self.history, vertex, scattered, self.sample);
         self.depth = vertex.depth;
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
         if let Some((radiance, pdf)) =
             self.scene.lights.hit_radiance(&self.scene.materials, &from, vertex.surface, vertex.wo)
         {
-            let of = (self.trail.sight.class_at_light(false), self.scene.lights.surface_group(vertex.surface));
+            let of = (self.history.suffix.class_at_light(false), self.scene.lights.surface_group(vertex.surface));
             let weight = Self::weight(scattered, pdf);
             self.add(Technique::Hit { camera: self.depth }, of, vertex.throughput * radiance * weight, weight);
         }
         self.last = vertex.receiver();
         self.lit(vertex);
-        self.trail.leave(Some(vertex.shading.bsdf.lobes()));
+        self.history.leave(Some(vertex.shading.bsdf.lobes()));
         self.next()
     }
 
     fn lost(&mut self) {
-        self.measure.reject(Cause::Path);
+        self.sample.reject(Cause::Path);
     }
 
-    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
-        let mut trail = self.trail;
+    fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
+        let mut history = self.history;
         if let Some(scattered) = scattered {
-            trail.scattered(scattered.lobe);
+            history.scattered(scattered.lobe);
         }
         if let Some((radiance, pdf)) =
-            self.scene.lights.hit_radiance(&self.scene.materials, &self.last, &glow.surface, glow.wo)
+            self.scene.lights.hit_radiance(&self.scene.materials, &self.last, &hit.surface, hit.wo)
         {
             let weight = Self::weight(scattered, pdf);
-            let light = glow.throughput * radiance * weight;
-            let of = (trail.sight.class_at_light(false), self.scene.lights.surface_group(&glow.surface));
-            self.add(Technique::Hit { camera: glow.depth }, of, light, weight);
+            let light = hit.throughput * radiance * weight;
+            let of = (history.suffix.class_at_light(false), self.scene.lights.surface_group(&hit.surface));
+            self.add(Technique::Hit { camera: hit.depth }, of, light, weight);
         }
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        look_in_medium(&mut self.trail, vertex, scattered, self.measure);
+        record_medium(&mut self.history, vertex, scattered, self.sample);
         self.depth = vertex.depth;
         self.last = vertex.receiver();
         self.lit(vertex);
-        self.trail.leave(None);
+        self.history.leave(None);
         self.next()
     }
 
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {
         if let Some(scattered) = scattered {
-            self.trail.scattered(scattered.lobe);
+            self.history.scattered(scattered.lobe);
         }
-        let class = self.trail.sight.class_at_light(false);
+        let class = self.history.suffix.class_at_light(false);
         let (scene, technique) = (self.scene, Technique::Hit { camera: self.depth + 1 });
         let last = self.last;
         scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |light, pdf, _, group| {
@@ -168,24 +168,24 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
 }
 
 /// What one path measures, on one level, into `measure` in place of what was there.
-pub fn path_measure(
+pub fn path_sample(
     camera_paths: &CameraPaths<'_>,
     arena: &Bump,
     (start, stream): &(PathStart, Stream),
     record: &mut impl Record,
-    measure: &mut PixelSample,
+    sample: &mut PixelSample,
 ) {
-    *measure = PixelSample::default();
-    let trail = Trail::START;
+    *sample = PixelSample::default();
+    let history = PathHistory::START;
     let CameraPaths { scene, max_depth, classes, .. } = *camera_paths;
     let last = Receiver::anywhere(start.origin);
-    let mut tracer = PathTracer { scene, max_depth, classes, measure, trail, last, depth: 0, record };
+    let mut tracer = PathTracer { scene, max_depth, classes, sample, history, last, depth: 0, record };
     walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
 }
 
 /// Radiance of one path through a uniform point of pixel `(x, y)`.
 pub fn path_radiance(camera_paths: &CameraPaths<'_>, pixel: (u32, u32), stream: Stream) -> Rgb {
-    let mut measure = PixelSample::default();
-    path_measure(camera_paths, &Bump::new(), &(camera_paths.start(pixel, stream), stream), &mut (), &mut measure);
-    measure.radiance(0)
+    let mut sample = PixelSample::default();
+    path_sample(camera_paths, &Bump::new(), &(camera_paths.start(pixel, stream), stream), &mut (), &mut sample);
+    sample.radiance(0)
 }

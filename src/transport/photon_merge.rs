@@ -30,7 +30,7 @@ pub struct MergePhoton {
     /// Segments of the light path up to here.
     pub depth: u16,
     /// What has happened on the way here.
-    pub beam: LightPrefix,
+    pub prefix: LightPrefix,
     /// Of the light path's wavelength.
     band: Band,
     /// Of its light.
@@ -64,7 +64,12 @@ fn single(sum: f64) -> f32 {
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`.
     #[inline]
-    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, (beam, group): (LightPrefix, Group), mis: &MisState) -> MergePhoton {
+    pub fn new(
+        vertex: &Vertex<'_, '_>,
+        flux: Rgb,
+        (prefix, group): (LightPrefix, Group),
+        mis: &MisState,
+    ) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
@@ -74,7 +79,7 @@ impl MergePhoton {
             plain: single(mis.plain),
             merged: single(mis.merged.y + mis.last.y),
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
-            beam,
+            prefix,
             band: Band::of(vertex.wavelength.as_ref()),
             group,
         }
@@ -96,7 +101,7 @@ pub(super) fn merge_photons<R: Record>(
     (photons, levels): (&PhotonMap<MergePhoton>, &MergeLevels),
     vertex: &Vertex<'_, '_>,
     (mis, own): (&MisState, Merges),
-    (sight, classes): (CameraSuffix, ClassSet),
+    (suffix, classes): (CameraSuffix, ClassSet),
     longest: u32,
     record: &mut R,
     mut add: impl FnMut(PathClass, usize, Rgb),
@@ -105,7 +110,7 @@ pub(super) fn merge_photons<R: Record>(
     let mut finite = true;
     let Some(&largest) = radii.last() else { return finite };
     let (ng, shading) = (vertex.surface.ng, vertex.shading);
-    let mut merged = Merged::new(vertex, sight, classes);
+    let mut merged = Merged::new(vertex, suffix, classes);
     photons.within(vertex.surface.p, largest, |photon, distance2| {
         if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
             return;
@@ -123,7 +128,7 @@ pub(super) fn merge_photons<R: Record>(
             return;
         }
         finite &= value.is_finite();
-        let shares = merged.shares(photon.beam, photon.wi, f);
+        let shares = merged.shares(photon.prefix, photon.wi, f);
         let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
         let ratios = mis::merge(&photon.mis(), mis, pdf, reverse, own);
         let technique = Technique::Merge { light: u32::from(photon.depth), camera: vertex.depth };

@@ -59,25 +59,25 @@ fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
 /// Classes of light that comes to a vertex at the end of `sight` by `beam`: what its lobes make of it, broad ones
 /// first.
 #[inline]
-fn classes<S: ScatterPoint>(vertex: &S, sight: CameraSuffix, beam: LightPrefix) -> (PathClass, Option<PathClass>) {
+fn classes<S: ScatterPoint>(vertex: &S, suffix: CameraSuffix, prefix: LightPrefix) -> (PathClass, Option<PathClass>) {
     let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
-    let class = |event| sight.then(event).class_with(beam);
+    let class = |event| suffix.then(event).class_with(prefix);
     (class(first), second.map(class))
 }
 
 /// Whether any class of that light is wanted.
 #[inline]
-pub(super) fn wanted<S: ScatterPoint>(vertex: &S, sight: CameraSuffix, beam: LightPrefix, on: ClassSet) -> bool {
+pub(super) fn wanted<S: ScatterPoint>(vertex: &S, suffix: CameraSuffix, prefix: LightPrefix, on: ClassSet) -> bool {
     on.is_all() || {
-        let (first, second) = classes(vertex, sight, beam);
+        let (first, second) = classes(vertex, suffix, prefix);
         on.has(first) || second.is_some_and(|second| on.has(second))
     }
 }
 
 /// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
-pub(super) fn leads(sight: CameraSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
+pub(super) fn leads(suffix: CameraSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
-    let ahead = |lobe: LobeSet| !(sight.then(Event::of(lobe, lobes)).reachable_classes() & on).is_empty();
+    let ahead = |lobe: LobeSet| !(suffix.then(Event::of(lobe, lobes)).reachable_classes() & on).is_empty();
     each.filter(|lobe| set.has(*lobe)).any(ahead)
 }
 
@@ -91,11 +91,11 @@ fn ratio(broad: Rgb, all: Rgb) -> Rgb {
 #[inline]
 pub(super) fn shares<S: ScatterPoint>(
     vertex: &S,
-    (sight, beam): (CameraSuffix, LightPrefix),
+    (suffix, prefix): (CameraSuffix, LightPrefix),
     (wi, transport, f): (Vec3, Transport, Rgb),
     on: ClassSet,
 ) -> Shares {
-    shares_of(vertex, classes(vertex, sight, beam), (wi, transport, f), on)
+    shares_of(vertex, classes(vertex, suffix, prefix), (wi, transport, f), on)
 }
 
 /// The same where the classes are known.
@@ -121,7 +121,7 @@ fn shares_of<S: ScatterPoint>(
 /// Shares of the light of many photons at one vertex: each kind of [`LightPrefix`] is looked at once.
 pub(super) struct Merged<'v, S> {
     vertex: &'v S,
-    sight: CameraSuffix,
+    suffix: CameraSuffix,
     on: ClassSet,
     known: [Option<(PathClass, Option<PathClass>)>; LightPrefix::COUNT],
 }
@@ -129,15 +129,15 @@ pub(super) struct Merged<'v, S> {
 impl<'v, S: ScatterPoint> Merged<'v, S> {
     /// At a vertex at the end of `sight`.
     #[inline]
-    pub fn new(vertex: &'v S, sight: CameraSuffix, on: ClassSet) -> Merged<'v, S> {
-        Merged { vertex, sight, on, known: [None; LightPrefix::COUNT] }
+    pub fn new(vertex: &'v S, suffix: CameraSuffix, on: ClassSet) -> Merged<'v, S> {
+        Merged { vertex, suffix, on, known: [None; LightPrefix::COUNT] }
     }
 
     /// Shares of light that comes by `beam` along `wi`, of which the vertex scatters `f` towards the eye.
     #[inline]
-    pub fn shares(&mut self, beam: LightPrefix, wi: Vec3, f: Rgb) -> Shares {
-        let known = &mut self.known[beam.index()];
-        let classes = *known.get_or_insert_with(|| classes(self.vertex, self.sight, beam));
+    pub fn shares(&mut self, prefix: LightPrefix, wi: Vec3, f: Rgb) -> Shares {
+        let known = &mut self.known[prefix.index()];
+        let classes = *known.get_or_insert_with(|| classes(self.vertex, self.suffix, prefix));
         shares_of(self.vertex, classes, (wi, Transport::Radiance, f), self.on)
     }
 }
@@ -148,15 +148,15 @@ impl<'v, S: ScatterPoint> Merged<'v, S> {
 pub(super) fn connected<S: ScatterPoint>(
     vertex: &S,
     light: &LightVertex<'_>,
-    sight: CameraSuffix,
+    suffix: CameraSuffix,
     (d, f, f_light): (Vec3, Rgb, Rgb),
     on: ClassSet,
 ) -> Shares {
     let (first, second) = events(light.smooth(), light.in_medium());
-    let of = |event: Event| shares(vertex, (sight, light.beam.then(event)), (d, Transport::Radiance, f), on);
+    let of = |event: Event| shares(vertex, (suffix, light.prefix.then(event)), (d, Transport::Radiance, f), on);
     let Some(second) = second else { return of(first) };
     let parts = |event: Event| {
-        let (first, second) = classes(vertex, sight, light.beam.then(event));
+        let (first, second) = classes(vertex, suffix, light.prefix.then(event));
         (first.part(), second.map(PathClass::part))
     };
     if on.is_all() && parts(first) == parts(second) {

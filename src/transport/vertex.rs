@@ -1,7 +1,7 @@
 //! Vertices of a path, and who receives them.
 
-use super::glow::Glow;
 use super::interior::Interior;
+use super::pass_through::PassThroughHit;
 use super::roulette::survival;
 use super::segment::MediumArrival;
 use crate::bsdf::{BsdfSample, LobeSet, Shading};
@@ -137,8 +137,8 @@ pub trait Visitor<'a> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;
     /// A lamp without a body on the way to the next vertex, of walks from the eye.
     #[inline]
-    fn glow(&mut self, glow: &Glow, scattered: Option<Scattered>) {
-        let _ = (glow, scattered);
+    fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
+        let _ = (hit, scattered);
     }
     /// As [`Visitor::surface`], in a medium that scatters. A walk that splits goes on whatever the answer.
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {

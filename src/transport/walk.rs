@@ -2,8 +2,8 @@
 //! is a [`Visitor`].
 
 use super::flight::{Fly, Split};
-use super::glow::{Glow, glows};
 use super::interior::Interior;
+use super::pass_through::{PassThroughHit, for_each_pass_through_light};
 use super::roulette::late_survival;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{
@@ -216,7 +216,7 @@ impl<'a> Path<'a> {
             end
         };
         if self.transport == Transport::Radiance && scene.pass_through_lights.is_some() {
-            show_glows(scene, &start, &end, (self.in_medium, throughput, depth), scattered, visitor);
+            visit_pass_through_lights(scene, &start, &end, (self.in_medium, throughput, depth), scattered, visitor);
         }
         if BESIDES >= SCATTERING
             && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut self.scattered)
@@ -385,7 +385,7 @@ impl<'a> Path<'a> {
 /// some weight and is the last of so many.
 #[cold]
 #[inline(never)]
-fn show_glows<'a, V: Visitor<'a>>(
+fn visit_pass_through_lights<'a, V: Visitor<'a>>(
     scene: &Scene,
     start: &Start,
     end: &End,
@@ -395,9 +395,9 @@ fn show_glows<'a, V: Visitor<'a>>(
 ) {
     // Behind a vertex of a medium there may be more, whose light comes past it.
     let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
-    glows(scene, start, reach, from_medium, |surface, distance, left, flight| {
+    for_each_pass_through_light(scene, start, reach, from_medium, |surface, distance, left, flight| {
         let (surface, wo, throughput) = (*surface, -start.direction, throughput * left);
         let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
-        visitor.glow(&Glow { surface, wo, throughput, depth, distance, flight }, scattered);
+        visitor.pass_through_light(&PassThroughHit { surface, wo, throughput, depth, distance, flight }, scattered);
     });
 }

@@ -13,7 +13,7 @@ use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Levels, Method, Session, Settings, Stage};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{CameraRequest, Scene};
-use caustique::transport::Found;
+use caustique::transport::FoundPhotons;
 use serde_json::{Value, json};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 
@@ -47,11 +47,11 @@ fn main() {
 }
 
 /// A photon at a uniform point of the unit disc.
-fn uniform(frame: &Frame, stream: Stream) -> Found {
+fn uniform(frame: &Frame, stream: Stream) -> FoundPhotons {
     let u: Vec2 = stream.vertex(0).two(Purpose::Pixel);
     let (sin, cos) = (std::f32::consts::TAU * u.y).sin_cos();
     let r = u.x.sqrt();
-    Found::one(frame.t * (r * cos) + frame.b * (r * sin), u.x, 1.0, ThinningKey::default())
+    FoundPhotons::one(frame.t * (r * cos) + frame.b * (r * sin), u.x, 1.0, ThinningKey::default())
 }
 
 /// Share of uniform samples that are rejected, by their number.

@@ -175,7 +175,7 @@ fn main() {
             flags: PhotonFlags::default(),
             depth: 2,
             band: Band::WHITE,
-            mark: ThinningKey::default(),
+            thinning_key: ThinningKey::default(),
         };
         let t = Instant::now();
         let map = PhotonMap::build(points.iter().map(photon).collect());

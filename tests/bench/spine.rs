@@ -132,7 +132,7 @@ fn main() {
                 flags,
                 depth: 2,
                 band: Band::WHITE,
-                mark: ThinningKey::default(),
+                thinning_key: ThinningKey::default(),
             }
         })
         .collect();

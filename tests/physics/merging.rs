@@ -12,7 +12,7 @@ use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
 use caustique::scene::{Description, Scene};
-use caustique::transport::{InitialMedia, Lengths};
+use caustique::transport::{InitialMedia, VertexCounts};
 use std::f64::consts::PI;
 use support::scenes::{
     add, build, camera_paths, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square,
@@ -147,8 +147,8 @@ fn as_many_are_merged_as_are_there() {
         let initial_media = InitialMedia::new(&scene, camera.position());
         let radius = 0.04 * 64.0 / f64::from(size);
         let ratio = |seed: u64| {
-            let Lengths { camera_connectable, light_connectable, merged, .. } =
-                Lengths::new(&camera_paths(&scene, &camera), &initial_media, seed, None, |_| radius as f32);
+            let VertexCounts { camera_connectable, light_connectable, merged, .. } =
+                VertexCounts::new(&camera_paths(&scene, &camera), &initial_media, seed, None, |_| radius as f32);
             merged / (camera_connectable * light_connectable * f64::from(size).powi(2) * PI * radius * radius / 24.0)
         };
         let mean = (1..=SEEDS).map(ratio).sum::<f64>() / SEEDS as f64;

@@ -20,7 +20,7 @@ use super::CountingRule;
 use super::memoryless::radius2_factor;
 use crate::math::Frame;
 use crate::photon::{Kernel, kernel::laplacian};
-use crate::transport::Found;
+use crate::transport::FoundPhotons;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::marker::PhantomData;
@@ -97,7 +97,7 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], _: &mut [()], tally: &mut Tally, _: &Frame, photons: &Found) {
+    fn count(&self, bandwidths: &[Bandwidth], _: &mut [()], tally: &mut Tally, _: &Frame, photons: &FoundPhotons) {
         let Some(bandwidth) = bandwidths.last() else { return };
         let within = photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2));
         tally.photons += within.move_mask().count_ones();
@@ -182,7 +182,7 @@ mod tests {
                     let u = Stream::new(5, i, Domain::Test, k).vertex(0);
                     let p = (u.two(Purpose::Pixel) - 0.5) * 1.0;
                     let keep = (1.0 + d / 4.0 * f64::from(p.length_squared())) / 1.8;
-                    let photon = Found::one(Vec3::ZERO, p.length_squared(), 1.0, ThinningKey::default());
+                    let photon = FoundPhotons::one(Vec3::ZERO, p.length_squared(), 1.0, ThinningKey::default());
                     if p.length_squared() < 0.04 && f64::from(u.one(Purpose::Lobe)) < keep {
                         let bandwidths = std::slice::from_ref(&bandwidth);
                         rule.count(bandwidths, &mut [], &mut tally, &Frame::from_normal(Vec3::Z), &photon);

@@ -7,7 +7,7 @@
 
 use super::CountingRule;
 use crate::math::{Frame, Vec3};
-use crate::transport::{Found, MAX_LEVELS};
+use crate::transport::{FoundPhotons, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, i32x4, u32x4, u64x4};
@@ -183,7 +183,7 @@ impl ChiSquared {
         counts: &mut [u32],
         tally: &mut Tally,
         frame: &Frame,
-        photons: &Found,
+        photons: &FoundPhotons,
     ) {
         let sectors = self.sectors(frame, &photons.offset);
         for (level, (bandwidth, counts)) in bandwidths.iter().zip(counts.chunks_exact_mut(self.counts())).enumerate() {
@@ -206,7 +206,13 @@ impl ChiSquared {
     /// The same for two annuli of six sectors, without a loop over borders, nor one over photons: those of a path are
     /// first counted by five bits a cell.
     #[inline(always)]
-    fn count_usual(bandwidths: &[Bandwidth], counts: &mut [u32], tally: &mut Tally, frame: &Frame, photons: &Found) {
+    fn count_usual(
+        bandwidths: &[Bandwidth],
+        counts: &mut [u32],
+        tally: &mut Tally,
+        frame: &Frame,
+        photons: &FoundPhotons,
+    ) {
         let by = f32x8::splat;
         // The borders at 60 and 120 degrees.
         let (u, v) = (along(frame.t, &photons.offset) * 3f32.sqrt(), along(frame.b, &photons.offset));
@@ -332,7 +338,14 @@ impl CountingRule for ChiSquared {
     }
 
     #[inline(always)]
-    fn count(&self, bandwidths: &[Bandwidth], counts: &mut [u32], tally: &mut Tally, frame: &Frame, photons: &Found) {
+    fn count(
+        &self,
+        bandwidths: &[Bandwidth],
+        counts: &mut [u32],
+        tally: &mut Tally,
+        frame: &Frame,
+        photons: &FoundPhotons,
+    ) {
         if self.usual {
             return Self::count_usual(bandwidths, counts, tally, frame, photons);
         }
@@ -380,7 +393,7 @@ mod tests {
             counts,
             &mut tally,
             &frame,
-            &Found::one(offset, x * x + y * y, 1.0, ThinningKey::default()),
+            &FoundPhotons::one(offset, x * x + y * y, 1.0, ThinningKey::default()),
         );
         tally.unpack(0, counts);
     }
@@ -411,7 +424,7 @@ mod tests {
             let rule = ChiSquared::new(&ChiSquaredSettings { sectors, ..ChiSquaredSettings::default() });
             let frame = Frame::from_normal(Vec3::new(0.0, 1.0, 0.0));
             let sector = |offset: Vec3| {
-                rule.sectors(&frame, &Found::one(offset, 0.0, 1.0, ThinningKey::default()).offset).to_array()[0]
+                rule.sectors(&frame, &FoundPhotons::one(offset, 0.0, 1.0, ThinningKey::default()).offset).to_array()[0]
                     as usize
             };
             for i in 0..2000 {
@@ -442,11 +455,11 @@ mod tests {
                 let (x, y) = uniform(trial, k as u64);
                 (offset[0][k], offset[1][k], distance2[k]) = (x, y, x * x + y * y);
             }
-            let found = Found {
+            let found = FoundPhotons {
                 offset: offset.map(f32x8::from),
                 distance2: f32x8::from(distance2),
                 light: f32x8::ONE,
-                marks: [0; 8],
+                thinning_keys: [0; 8],
             };
             // As often as a path may find photons at its vertices, and more often than a tally holds.
             let times = trial % 37;

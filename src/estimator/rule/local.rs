@@ -9,7 +9,7 @@
 
 use super::CountingRule;
 use crate::math::Frame;
-use crate::transport::{Found, MAX_LEVELS};
+use crate::transport::{FoundPhotons, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 use wide::{CmpLt, f32x8};
 
@@ -45,7 +45,14 @@ impl CountingRule for LocalStatistics {
     }
 
     #[inline]
-    fn count(&self, bandwidths: &[Bandwidth], _: &mut [()], tally: &mut Self::Tally, _: &Frame, photons: &Found) {
+    fn count(
+        &self,
+        bandwidths: &[Bandwidth],
+        _: &mut [()],
+        tally: &mut Self::Tally,
+        _: &Frame,
+        photons: &FoundPhotons,
+    ) {
         for (bandwidth, photons_within) in bandwidths.iter().zip(tally) {
             *photons_within +=
                 photons.distance2.cmp_lt(f32x8::splat(bandwidth.radius2 as f32)).move_mask().count_ones();

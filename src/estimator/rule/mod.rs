@@ -8,7 +8,7 @@ pub mod thinned;
 pub mod volume;
 
 use crate::math::Frame;
-use crate::transport::Found;
+use crate::transport::FoundPhotons;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -26,7 +26,7 @@ pub trait CountingRule: Sync {
     const BEYOND: bool = false;
 
     /// Whether it asks for photons' marks.
-    const MARKS: bool = false;
+    const NEEDS_THINNING_KEYS: bool = false;
 
     /// Counts per bandwidth.
     fn counts(&self) -> usize {
@@ -51,7 +51,7 @@ pub trait CountingRule: Sync {
         counts: &mut [Self::Count],
         tally: &mut Self::Tally,
         frame: &Frame,
-        photons: &Found,
+        photons: &FoundPhotons,
     );
     /// After the camera path of iteration `i` (from 1), of whose photons `tally` is.
     fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], counts: &mut [Self::Count], tally: &mut Self::Tally);

@@ -13,7 +13,7 @@ use super::chi_squared::{self, Bandwidth, ChiSquared, ChiSquaredSettings};
 use crate::math::Frame;
 use crate::photon::thinning_key;
 use crate::random::{GOLDEN, mix};
-use crate::transport::{Found, MAX_LEVELS};
+use crate::transport::{FoundPhotons, MAX_LEVELS};
 use wide::f32x8;
 
 /// The rule.
@@ -46,7 +46,7 @@ impl CountingRule for Thinned {
     type Count = u32;
     type Tally = [chi_squared::Tally; MAX_LEVELS];
 
-    const MARKS: bool = true;
+    const NEEDS_THINNING_KEYS: bool = true;
 
     /// One per cell, and the largest weight.
     fn counts(&self) -> usize {
@@ -69,14 +69,14 @@ impl CountingRule for Thinned {
         counts: &mut [u32],
         tally: &mut Self::Tally,
         frame: &Frame,
-        photons: &Found,
+        photons: &FoundPhotons,
     ) {
         let distance2 = photons.distance2.to_array();
         let levels = bandwidths.iter().zip(counts.chunks_exact_mut(self.counts())).zip(tally);
         for ((bandwidth, counts), tally) in levels {
             let Some((heaviest, counts)) = counts.split_last_mut() else { continue };
             let within = |k: usize| distance2[k] < bandwidth.radius2;
-            let weight = |k: usize| if within(k) { thinning_key::weight(photons.marks[k]) } else { 0 };
+            let weight = |k: usize| if within(k) { thinning_key::weight(photons.thinning_keys[k]) } else { 0 };
             let found = (0..8).map(weight).fold(0, u32::max);
             if found > *heaviest {
                 tally.settle(counts);
@@ -84,9 +84,10 @@ impl CountingRule for Thinned {
                 thin(counts, f64::from(thinning_key::bound(*heaviest) / thinning_key::bound(found)), seed);
                 *heaviest = found;
             }
-            let counted =
-                |k: usize| if thinning_key::above(photons.marks[k], *heaviest) { distance2[k] } else { f32::INFINITY };
-            let photons = Found { distance2: f32x8::from(std::array::from_fn(counted)), ..*photons };
+            let counted = |k: usize| {
+                if thinning_key::above(photons.thinning_keys[k], *heaviest) { distance2[k] } else { f32::INFINITY }
+            };
+            let photons = FoundPhotons { distance2: f32x8::from(std::array::from_fn(counted)), ..*photons };
             self.0.count(std::slice::from_ref(bandwidth), counts, tally, frame, &photons);
         }
     }
@@ -140,8 +141,8 @@ mod tests {
                     continue;
                 }
                 let weight = if dense { 1.0 / denser } else { 1.0 };
-                let mark = ThinningKey::new(weight, draws.one(Purpose::Loss));
-                let found = Found::one(frame.t * x + frame.b * y, u.x, 1.0, mark);
+                let thinning_key = ThinningKey::new(weight, draws.one(Purpose::Loss));
+                let found = FoundPhotons::one(frame.t * x + frame.b * y, u.x, 1.0, thinning_key);
                 thinned.count(&a, &mut counts_a, &mut tally_a, &frame, &found);
                 plain.count(&b, &mut counts_b, &mut tally_b, &frame, &found);
             }
@@ -179,13 +180,14 @@ mod tests {
         let count = |heavy_first: bool| -> f64 {
             let mut bandwidths = [rule.begin(1.0, 10.0, 0)];
             let (mut counts, mut tally) = ([0u32; 13], <Thinned as CountingRule>::Tally::default());
-            let heavy = Found::one(Vec3::ZERO, 0.0, 1.0, ThinningKey::new(4.0, 0.5));
+            let heavy = FoundPhotons::one(Vec3::ZERO, 0.0, 1.0, ThinningKey::new(4.0, 0.5));
             if heavy_first {
                 rule.count(&bandwidths, &mut counts, &mut tally, &frame, &heavy);
             }
             for i in 0..40_000 {
                 let draws = Stream::new(22, 0, Domain::Test, i).vertex(0);
-                let found = Found::one(Vec3::X * 0.5, 0.25, 1.0, ThinningKey::new(1.0, draws.one(Purpose::Lobe)));
+                let found =
+                    FoundPhotons::one(Vec3::X * 0.5, 0.25, 1.0, ThinningKey::new(1.0, draws.one(Purpose::Lobe)));
                 rule.count(&bandwidths, &mut counts, &mut tally, &frame, &found);
             }
             if !heavy_first {

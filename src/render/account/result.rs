@@ -9,7 +9,7 @@ use crate::math::DVec3;
 use crate::photon::Kind;
 use crate::render::clock::Phases;
 use crate::render::pass::TechniquePicture;
-use crate::render::pass::bytes_of_measures;
+use crate::render::pass::sample_bytes;
 use crate::render::settings::Settings;
 use crate::stat::floor;
 
@@ -51,7 +51,7 @@ impl Rendered {
     /// Bytes that a pixel takes: its sums, those of its levels and light groups among them, and what an iteration
     /// keeps of it besides ([`bytes_of_measures`]).
     pub fn bytes_per_pixel(&self) -> [usize; 2] {
-        [self.pixels.first().map_or(0, PixelAccumulator::size), bytes_of_measures(&self.settings)]
+        [self.pixels.first().map_or(0, PixelAccumulator::size), sample_bytes(&self.settings)]
     }
 
     /// Whether the maps of [`Method::Pm`](crate::render::Method::Pm), traced once, had no room for the photons of all its light paths.

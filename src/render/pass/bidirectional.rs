@@ -10,10 +10,10 @@
 //! With bandwidth levels every pixel has two light paths and two camera paths: level 1 is made of the first pair alone,
 //! the other levels of the second. They share nothing but the photons, those of both light paths.
 
-use super::guiding::learnt;
-use super::iterate::{Iterate, Work};
-use super::measures::{self, Measures};
+use super::guiding::learn_guide;
+use super::integrator::{Integrator, Work};
 use super::photon_counts::PhotonCounts;
+use super::sample_buffer::{self, SampleBuffer};
 use super::techniques::{TechniquePicture, Watch, Watched};
 use super::tiles::{Group, TILE_PIXELS, Tiles, WholeTile};
 use crate::camera::{Camera, GROUP_SIZE};
@@ -67,7 +67,7 @@ pub struct Passes<'a> {
     sources: Vec<WholeTile>,
     left: Vec<Deposits>,
     /// Measures of the iteration, by pair.
-    measures: Vec<Measures>,
+    samples: Vec<SampleBuffer>,
     /// Photons and the pass that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     watched: Watched,
@@ -102,8 +102,8 @@ impl<'a> Passes<'a> {
         let shared =
             Bidirectional { camera_paths, initial_media, techniques, light_paths: pixels, merged_paths, only: None };
         let guide =
-            settings.guided.then(|| learnt(&camera_paths, initial_media, settings, None)).flatten().map(Arc::new);
-        let measures = pairs.iter().map(|pair| Measures::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
+            settings.guided.then(|| learn_guide(&camera_paths, initial_media, settings, None)).flatten().map(Arc::new);
+        let samples = pairs.iter().map(|pair| SampleBuffer::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
         Passes {
             scene,
             camera,
@@ -115,7 +115,7 @@ impl<'a> Passes<'a> {
             tiles,
             left: sources.iter().map(|_| Deposits::default()).collect(),
             sources,
-            measures,
+            samples,
             photons: None,
             watched: Watched::new(settings, scene, &tiles),
             covered: 0.0,
@@ -199,14 +199,14 @@ impl<'a> Passes<'a> {
         let mut photons: Vec<MergePhoton> = Vec::new();
         let guide = self.guide.clone();
         let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
-        for ((pair, pass), measures) in self.pairs.iter().zip(&passes).zip(&mut self.measures) {
+        for ((pair, pass), samples) in self.pairs.iter().zip(&passes).zip(&mut self.samples) {
             let own = pair.own(self.settings.levels.own());
             let streams = Streams::in_sequence(seed, i, pair.camera);
-            let mut on_film = measures.par_tiles().zip(watches.par_iter_mut()).collect::<Vec<_>>().into_iter();
+            let mut on_film = samples.par_tiles().zip(watches.par_iter_mut()).collect::<Vec<_>>().into_iter();
             let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
             self.sources.par_iter().zip(film).zip(&mut self.left).for_each(|((tile, mut film), left)| {
                 left.clear();
-                let (mut arena, mut measure) = (Bump::new(), PixelSample::default());
+                let (mut arena, mut sample) = (Bump::new(), PixelSample::default());
                 for Group { keys, places } in tiles.all_groups(*tile) {
                     if shared.camera_paths.is_given_up() {
                         return;
@@ -220,7 +220,7 @@ impl<'a> Passes<'a> {
                         arena.reset();
                         let mut vertices = LightVertices::new_in(&arena);
                         shared.light_path(pass, index, false, &mut vertices, left, &mut ());
-                        let (Some((measures, watch)), Some(place), Some(start)) =
+                        let (Some((samples, watch)), Some(place), Some(start)) =
                             (&mut film, &places[k], &mut starts[k])
                         else {
                             continue;
@@ -230,8 +230,8 @@ impl<'a> Passes<'a> {
                         let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
                         let meets = CameraWalkContext { vertices: &vertices, photons: map, levels: &levels };
                         watch.begin(place.at, own);
-                        shared.camera_path(&arena, start, &meets, *watch, &mut measure);
-                        measures.set(place.at, &measure);
+                        shared.camera_path(&arena, start, &meets, *watch, &mut sample);
+                        samples.set(place.at, &sample);
                     }
                 }
             });
@@ -239,14 +239,14 @@ impl<'a> Passes<'a> {
                 return None;
             }
             let splats = SplatsByTile::new(&self.left, &tiles);
-            measures.par_tiles().zip(watches.par_iter_mut()).enumerate().for_each(|(tile, (mut measures, watch))| {
+            samples.par_tiles().zip(watches.par_iter_mut()).enumerate().for_each(|(tile, (mut samples, watch))| {
                 for splat in splats.of(tile) {
                     let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
                     let (_, slot) = tiles.place(splat.pixel);
                     watch.splat(slot, own, splat, &levels);
-                    let mut measure = measures.get(slot);
-                    splat.apply(&levels, &mut measure);
-                    measures.set(slot, &measure);
+                    let mut sample = samples.get(slot);
+                    splat.apply(&levels, &mut sample);
+                    samples.set(slot, &sample);
                 }
             });
             rejected += self.left.iter().map(|left| left.lost).sum::<u64>();
@@ -255,8 +255,13 @@ impl<'a> Passes<'a> {
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
         let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
-        let gathered =
-            measures::add(&self.measures, (&shared.camera_paths, i), pixels, |index| tiles.slot(index as u32), groups);
+        let gathered = sample_buffer::add(
+            &self.samples,
+            (&shared.camera_paths, i),
+            pixels,
+            |index| tiles.slot(index as u32),
+            groups,
+        );
         if shared.techniques.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons)));
         }
@@ -266,9 +271,9 @@ impl<'a> Passes<'a> {
 
 /// Photons by the kind of light that a surface shows of them.
 fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
-    let sight = CameraSuffix::START.then(Event::Broad);
+    let suffix = CameraSuffix::START.then(Event::Broad);
     let caustics =
-        map.photons().par_iter().filter(|photon| sight.class_with(photon.beam).part() == Part::Caustic).count();
+        map.photons().par_iter().filter(|photon| suffix.class_with(photon.prefix).part() == Part::Caustic).count();
     [map.photons().len() - caustics, caustics].map(|count| count as u64)
 }
 
@@ -321,7 +326,7 @@ impl<'l> SplatsByTile<'l> {
     }
 }
 
-impl Iterate for Passes<'_> {
+impl Integrator for Passes<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         if !self.settings.method.has_bandwidths() {
             return self.settings.pixels(self.scene, self.camera);

@@ -2,7 +2,7 @@
 
 use super::bidirectional::Passes;
 use super::counting::Counting;
-use super::iterate::Iterate;
+use super::integrator::Integrator;
 use super::metropolis::Metropolis;
 use super::path::Paths;
 use super::pm::Pm;
@@ -20,12 +20,12 @@ use crate::scene::Scene;
 use crate::transport::{InitialMedia, TechniqueSet};
 
 /// The passes of a render, nothing done yet.
-pub(in crate::render) fn passes<'a>(
+pub(in crate::render) fn integrator<'a>(
     scene: &'a Scene,
     camera: &'a Camera,
     settings: &'a Settings,
     initial_media: &'a InitialMedia,
-) -> Box<dyn Iterate + 'a> {
+) -> Box<dyn Integrator + 'a> {
     let pairs = |techniques| Box::new(Passes::new(scene, camera, settings, initial_media, techniques));
     match settings.method {
         Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => {
@@ -42,7 +42,7 @@ pub(in crate::render) fn passes<'a>(
 }
 
 /// Progressive photon mapping by the rule that the settings say.
-fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Iterate + 'a> {
+fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Integrator + 'a> {
     use BandwidthRule as Rule;
     match (settings.rule(), settings.kernel) {
         // Photons of equal flux are as dense as the light.
@@ -58,7 +58,7 @@ fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Iterate + 'a
     }
 }
 
-fn adaptive<'a, K: Kernel + Default>(sppm: Sppm<'a>, settings: &'a Settings, kernel: K) -> Box<dyn Iterate + 'a> {
+fn adaptive<'a, K: Kernel + Default>(sppm: Sppm<'a>, settings: &'a Settings, kernel: K) -> Box<dyn Integrator + 'a> {
     counting(sppm, settings, Adaptive::<K>::default(), kernel)
 }
 
@@ -67,6 +67,6 @@ fn counting<'a>(
     settings: &'a Settings,
     rule: impl CountingRule + 'a,
     kernel: impl Kernel,
-) -> Box<dyn Iterate + 'a> {
+) -> Box<dyn Integrator + 'a> {
     Box::new(Counting::new(sppm, settings, rule, kernel))
 }

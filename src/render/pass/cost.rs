@@ -10,7 +10,7 @@ use crate::render::settings::BandwidthRule;
 use crate::render::settings::Candidate;
 use crate::render::settings::Settings;
 use crate::scene::{Scene, Survey};
-use crate::transport::{CameraPaths, Indirect, InitialMedia, Lengths};
+use crate::transport::{CameraPaths, Indirect, InitialMedia, VertexCounts};
 
 /// A ray from the eye, the pixel it belongs to and its statistics.
 const EYE_PATH: f64 = 0.135e-6;
@@ -66,7 +66,7 @@ fn eye_paths(settings: &Settings) -> f64 {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cost {
     /// Mean numbers of vertices of paths.
-    pub lengths: Lengths,
+    pub lengths: VertexCounts,
     /// What there is.
     pub survey: Survey,
     /// Times as long as in a scene of [`TRIANGLES`] without dispersion.
@@ -83,7 +83,7 @@ impl Cost {
             InitialBandwidth::Fixed(radius) => radius,
             _ => footprint(camera, length),
         };
-        let lengths = Lengths::new(&camera_paths, &initial_media, settings.seed, guide, reach);
+        let lengths = VertexCounts::new(&camera_paths, &initial_media, settings.seed, guide, reach);
         let triangles = scene.shapes.triangles().max(1) as f64;
         let dispersion = if scene.survey.dispersion { DISPERSION } else { 1.0 };
         Cost { lengths, survey: scene.survey, factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
@@ -93,7 +93,7 @@ impl Cost {
     pub fn of_film(&self, candidate: Candidate, settings: &Settings, camera: &Camera) -> f64 {
         let [film, whole] = camera.sizes().map(|(width, height)| f64::from(width) * f64::from(height));
         let beyond = if candidate.method.walks_whole_picture() { whole - film } else { 0.0 };
-        let Lengths { light, light_media, textured, .. } = self.lengths;
+        let VertexCounts { light, light_media, textured, .. } = self.lengths;
         let start = LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 };
         let path = start + light * TWO_WAY_VERTEX * (1.0 + TEXTURED * textured) + light_media * TWO_WAY_MEDIUM;
         self.of(candidate, settings, film) + beyond * path * self.factor
@@ -101,9 +101,9 @@ impl Cost {
 
     /// Core-seconds of an iteration of a picture of so many pixels, which is no window of another.
     pub fn of(&self, candidate: Candidate, settings: &Settings, pixels: f64) -> f64 {
-        let Lengths { camera: camera_vertices, camera_to_broad, light, light_to_broad, merged, textured, .. } =
+        let VertexCounts { camera: camera_vertices, camera_to_broad, light, light_to_broad, merged, textured, .. } =
             self.lengths;
-        let Lengths { camera_media, light_media, media_samples, camera_connectable, light_connectable, .. } =
+        let VertexCounts { camera_media, light_media, media_samples, camera_connectable, light_connectable, .. } =
             self.lengths;
         let paths = pixels * eye_paths(settings);
         // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.

@@ -5,8 +5,8 @@
 //!
 //! An iteration depends on all before it, so shards cannot share them out.
 
-use super::iterate::{Iterate, Work};
-use super::measures::Measures;
+use super::integrator::{Integrator, Work};
+use super::sample_buffer::SampleBuffer;
 use super::sppm::Sppm;
 use super::volume::Maps;
 use crate::camera::{par_pixels, pixels_per_band};
@@ -19,19 +19,19 @@ use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
 use crate::render::settings::Settings;
-use crate::transport::{Bandwidths, Counter, EqualFlux, Found, LevelRadii, PathStart, PixelSample, Scratch};
+use crate::transport::{Bandwidths, Counter, EqualFlux, FoundPhotons, LevelRadii, PathStart, PixelSample, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// The bandwidths of some levels for one kind of photons, and what is counted within them.
-struct States<'a, R: CountingRule> {
+struct LevelBandwidths<'a, R: CountingRule> {
     bandwidths: &'a mut [R::Bandwidth],
     counts: &'a mut [R::Count],
     /// Of the camera path.
     tally: R::Tally,
 }
 
-impl<R: CountingRule> States<'_, R> {
+impl<R: CountingRule> LevelBandwidths<'_, R> {
     /// Each level may shrink on its own, so they may change places.
     #[inline(always)]
     fn radii(&self) -> LevelRadii {
@@ -80,7 +80,7 @@ impl Layout {
         levels: Range<usize>,
         bandwidths: &'a mut [R::Bandwidth],
         counts: &'a mut [R::Count],
-    ) -> ByKind<States<'a, R>> {
+    ) -> ByKind<LevelBandwidths<'a, R>> {
         let own = channel * self.count()..(channel + 1) * self.count();
         let first = self.of_kind(Kind::Indirect);
         let (indirect, caustic) = bandwidths[own.clone()].split_at_mut(first);
@@ -89,31 +89,31 @@ impl Layout {
         [(indirect, indirect_counts), (caustic, caustic_counts)].map(|(bandwidths, counts)| {
             let levels = levels.start.min(bandwidths.len())..levels.end.min(bandwidths.len());
             let counts = &mut counts[levels.start * self.counts..levels.end * self.counts];
-            States { bandwidths: &mut bandwidths[levels], counts, tally: R::Tally::default() }
+            LevelBandwidths { bandwidths: &mut bandwidths[levels], counts, tally: R::Tally::default() }
         })
     }
 }
 
 /// Those of a camera path, by kind; of one that is not there, no levels.
-struct OfPath<'a, R: CountingRule> {
+struct CameraPathBandwidths<'a, R: CountingRule> {
     rule: &'a R,
-    states: ByKind<States<'a, R>>,
+    states: ByKind<LevelBandwidths<'a, R>>,
 }
 
-impl<R: CountingRule> OfPath<'_, R> {
+impl<R: CountingRule> CameraPathBandwidths<'_, R> {
     /// After the camera path of iteration `i`.
     #[inline(always)]
     fn finish(&mut self, i: u64) {
-        for States { bandwidths, counts, tally } in &mut self.states {
+        for LevelBandwidths { bandwidths, counts, tally } in &mut self.states {
             self.rule.update(i, bandwidths, counts, tally);
         }
     }
 }
 
-impl<'a, R: CountingRule> Bandwidths for &mut OfPath<'a, R> {
+impl<'a, R: CountingRule> Bandwidths for &mut CameraPathBandwidths<'a, R> {
     type Place = Frame;
     type Counter<'c>
-        = OfVertex<'c, 'a, R>
+        = VertexCounter<'c, 'a, R>
     where
         Self: 'c;
 
@@ -129,25 +129,25 @@ impl<'a, R: CountingRule> Bandwidths for &mut OfPath<'a, R> {
     }
 
     #[inline(always)]
-    fn counter<'c>(&'c mut self, kind: Kind, frame: &'c Frame) -> OfVertex<'c, 'a, R> {
-        OfVertex { rule: self.rule, states: &mut self.states[kind as usize], frame }
+    fn counter<'c>(&'c mut self, kind: Kind, frame: &'c Frame) -> VertexCounter<'c, 'a, R> {
+        VertexCounter { rule: self.rule, states: &mut self.states[kind as usize], frame }
     }
 }
 
 /// Those of a kind, where a camera path gathers it.
-struct OfVertex<'c, 'a, R: CountingRule> {
+struct VertexCounter<'c, 'a, R: CountingRule> {
     rule: &'a R,
-    states: &'c mut States<'a, R>,
+    states: &'c mut LevelBandwidths<'a, R>,
     frame: &'c Frame,
 }
 
-impl<R: CountingRule> Counter for OfVertex<'_, '_, R> {
+impl<R: CountingRule> Counter for VertexCounter<'_, '_, R> {
     const BEYOND: bool = R::BEYOND;
-    const MARKS: bool = R::MARKS;
+    const NEEDS_THINNING_KEYS: bool = R::NEEDS_THINNING_KEYS;
 
     #[inline(always)]
-    fn count(&mut self, photons: &Found) {
-        let States { bandwidths, counts, tally } = &mut *self.states;
+    fn count(&mut self, photons: &FoundPhotons) {
+        let LevelBandwidths { bandwidths, counts, tally } = &mut *self.states;
         self.rule.count(bandwidths, counts, tally, self.frame, photons);
     }
 
@@ -207,11 +207,11 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
         let line = (64 / size_of::<R::Count>().max(1)).max(1);
         let bands = pixels
             .par_chunks(pixels_per_band(size.0))
-            .zip(Measures::par_of_paths(sppm.measures(), pixels_per_band(size.0)))
+            .zip(SampleBuffer::par_of_paths(sppm.samples(), pixels_per_band(size.0)))
             .zip(bandwidths.par_chunks_mut(pixels_per_band(size.0) * states))
             .zip(counts.par_chunks_mut(pixels_per_band(size.0) * states * each));
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
-        par_pixels(bands, size, scratches, |scratches, (((pixels, measures), bandwidths), counts), places| {
+        par_pixels(bands, size, scratches, |scratches, (((pixels, samples), bandwidths), counts), places| {
             if camera_paths.is_given_up() {
                 return;
             }
@@ -232,30 +232,30 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
                 let bandwidths = &mut bandwidths[place.at * states..][..states];
                 let counts = &mut counts[place.at * states * each..][..states * each];
                 // Measures some levels by one camera path, with the photons of a channel, and updates them.
-                let mut measure =
+                let mut sample =
                     |pixel: &PixelAccumulator, start: &(PathStart, _), channel: usize, levels: Range<usize>| {
                         let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
                         let volume = maps.volume(pixel, levels.clone());
                         let states = layout.states(channel, levels, bandwidths, counts);
-                        let mut own = OfPath { rule, states };
-                        let measure = camera_paths.measure(scratch, start, &maps.surface, volume, &mut own, kernel);
+                        let mut own = CameraPathBandwidths { rule, states };
+                        let sample = camera_paths.sample(scratch, start, &maps.surface, volume, &mut own, kernel);
                         own.finish(i);
-                        measure
+                        sample
                     };
                 let correlated = correlated.as_ref().and_then(|starts| starts[k].as_ref());
                 let own = if correlated.is_some() { 0..1 } else { 0..count };
-                let mut first = measure(pixel, start, 0, own.clone());
-                let mut others = correlated.map(|start| measure(pixel, start, 0, 1..count));
+                let mut first = sample(pixel, start, 0, own.clone());
+                let mut others = correlated.map(|start| sample(pixel, start, 0, 1..count));
                 // The same camera paths each time: only the photons differ, and those of one channel bring light to it
                 // alone.
                 for channel in 1..maps.len() {
-                    add_photons(&mut first, &measure(pixel, start, channel, own.clone()));
+                    add_photons(&mut first, &sample(pixel, start, channel, own.clone()));
                     if let (Some(others), Some(start)) = (&mut others, correlated) {
-                        add_photons(others, &measure(pixel, start, channel, 1..count));
+                        add_photons(others, &sample(pixel, start, channel, 1..count));
                     }
                 }
-                measures.0.set(place.at, &first);
-                if let (Some(into), Some(others)) = (&mut measures.1, &others) {
+                samples.0.set(place.at, &first);
+                if let (Some(into), Some(others)) = (&mut samples.1, &others) {
                     into.set(place.at, others);
                 }
             }
@@ -264,16 +264,16 @@ impl<'a, R: CountingRule, K: Kernel> Counting<'a, R, K> {
 }
 
 /// Adds what photons brought to another measure of the same path.
-fn add_photons(all: &mut PixelSample, measure: &PixelSample) {
+fn add_photons(all: &mut PixelSample, sample: &PixelSample) {
     let sums = all.caustic_photons.iter_mut().chain(&mut all.indirect_photons).chain(&mut all.volume_photons);
-    let photons = measure.caustic_photons.iter().chain(&measure.indirect_photons).chain(&measure.volume_photons);
+    let photons = sample.caustic_photons.iter().chain(&sample.indirect_photons).chain(&sample.volume_photons);
     for (sum, light) in sums.zip(photons) {
         *sum += *light;
     }
-    all.broken = all.broken.or(measure.broken);
+    all.rejection = all.rejection.or(sample.rejection);
 }
 
-impl<R: CountingRule, K: Kernel> Iterate for Counting<'_, R, K> {
+impl<R: CountingRule, K: Kernel> Integrator for Counting<'_, R, K> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         let pixels = self.sppm.pixels();
         let levels = self.settings.levels;

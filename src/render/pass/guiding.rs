@@ -64,7 +64,7 @@ impl Located for Marked {
 }
 
 /// The guide of a view, learnt; `None` where there is nothing to choose, or nothing to gain by it.
-pub(super) fn learnt(
+pub(super) fn learn_guide(
     camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
     settings: &Settings,
@@ -78,7 +78,7 @@ pub(super) fn learnt(
         let error = error(camera_paths, seed, round, &maps, guide.cells());
         let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
         let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
-        if round + 1 == ROUNDS && error.ratio() * dearer(camera_paths, settings, &guide) > WORTH {
+        if round + 1 == ROUNDS && error.ratio() * guiding_cost_ratio(camera_paths, settings, &guide) > WORTH {
             return None;
         }
         guide.learn(&error.of_cells, &paths, &work);
@@ -88,7 +88,7 @@ pub(super) fn learnt(
 
 /// What an iteration costs with the guide over what it costs without, counted: guided light paths meet glass at once,
 /// and are longer.
-fn dearer(camera_paths: &CameraPaths<'_>, settings: &Settings, guide: &Guide) -> f64 {
+fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide: &Guide) -> f64 {
     let (width, height) = camera_paths.camera.size();
     let cost = |guide: Option<&Guide>| {
         let candidate = Candidate { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
@@ -229,7 +229,7 @@ fn weigh(
             if photon.ng.dot(point.ng) > 0.0 {
                 let found = scale * photon.flux;
                 sum += found;
-                light.push((marked.cell, luminance(found), photon.mark.weight()));
+                light.push((marked.cell, luminance(found), photon.thinning_key.weight()));
             }
         });
     }

@@ -15,7 +15,7 @@
 //! 3. They walk as many steps as there are pixels. Both the state and the proposal are counted, each with the
 //!    probability that it is the next state \[the expected values of Veach 1997, 11.5\].
 
-use super::iterate::{Iterate, Work};
+use super::integrator::{Integrator, Work};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
 use crate::estimator::PixelAccumulator;
@@ -115,7 +115,7 @@ pub(super) struct Metropolis<'a> {
     settings: &'a Settings,
     shared: Bidirectional<'a>,
     tiles: Tiles,
-    measures: Vec<PixelSample>,
+    samples: Vec<PixelSample>,
     levels: MergeLevels,
 }
 
@@ -145,7 +145,7 @@ impl Walks<'_, '_> {
         arena: &'s Bump,
         ((pixel, within), (camera, light)): (Film, (Stream, Stream)),
         (left, found): (&mut Deposits, &mut Found),
-        measure: &mut PixelSample,
+        sample: &mut PixelSample,
     ) {
         let mut vertices = LightVertices::new_in(arena);
         if shared.only.is_none_or(|only| only.light().is_some_and(|depth| depth > 0))
@@ -157,7 +157,7 @@ impl Walks<'_, '_> {
             let mut start = shared.camera_paths.start_at((pixel.x, pixel.y), within, camera);
             start.wavelength_sample = self.pass.wavelength_sample_of(light);
             let meets = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
-            shared.camera_path(arena, &(start, camera), &meets, found, measure);
+            shared.camera_path(arena, &(start, camera), &meets, found, sample);
         }
     }
 
@@ -172,16 +172,16 @@ impl Walks<'_, '_> {
         arena.reset();
         let streams = self.streams(path);
         let mut found = Found { pixel: path, ..Found::default() };
-        let mut measure = PixelSample::default();
+        let mut sample = PixelSample::default();
         let first = left.splats.len();
         let within = streams.0.vertex(0).two(Purpose::Pixel);
-        self.walk(self.shared, arena, ((pixel, within), streams), (left, &mut found), &mut measure);
+        self.walk(self.shared, arena, ((pixel, within), streams), (left, &mut found), &mut sample);
         found.splats(&left.splats[first..]);
         candidates.extend(found.deposits.iter().filter_map(|(technique, deposit)| {
             let division = Division::of(*technique)?;
             Some(Candidate { path, division, importance: importance(deposit.value) })
         }));
-        measure
+        sample
     }
 
     /// The path at the chain's place.
@@ -289,9 +289,9 @@ impl<'a> Metropolis<'a> {
             only: None,
         };
         let tiles = Tiles::new(camera);
-        let measures = vec![PixelSample::default(); tiles.count() * TILE_PIXELS];
+        let samples = vec![PixelSample::default(); tiles.count() * TILE_PIXELS];
         let levels = MergeLevels::new(std::iter::once((0.0, Eta::NONE)));
-        Metropolis { camera_paths, settings, shared, tiles, measures, levels }
+        Metropolis { camera_paths, settings, shared, tiles, samples, levels }
     }
 
     /// One pair of walks for every pixel: all that is seen directly, direct light, and what chains can start from. Last,
@@ -299,10 +299,10 @@ impl<'a> Metropolis<'a> {
     fn walk_all(&mut self, walks: &Walks<'_, '_>) -> (Vec<Candidate>, u64) {
         let (tiles, width) = (self.tiles, walks.size.x);
         let left: Vec<(Deposits, Vec<Candidate>)> = self
-            .measures
+            .samples
             .par_chunks_mut(TILE_PIXELS)
             .enumerate()
-            .map(|(tile, measures)| {
+            .map(|(tile, samples)| {
                 let (mut arena, mut left, mut found) = (Bump::new(), Deposits::default(), Vec::new());
                 for place in tiles.pixels(tile) {
                     if walks.shared.camera_paths.is_given_up() {
@@ -310,10 +310,10 @@ impl<'a> Metropolis<'a> {
                     }
                     let index = place.index as u32;
                     let pixel = UVec2::new(index % width, index / width);
-                    let measure = walks.ordinary(&mut arena, (index, pixel), &mut left, &mut found);
-                    let PixelSample { emission, direct, features, first, broken, .. } = measure;
-                    measures[place.at] =
-                        PixelSample { emission, direct, features, first, broken, ..PixelSample::default() };
+                    let sample = walks.ordinary(&mut arena, (index, pixel), &mut left, &mut found);
+                    let PixelSample { emission, direct, features, first, rejection, .. } = sample;
+                    samples[place.at] =
+                        PixelSample { emission, direct, features, first, rejection, ..PixelSample::default() };
                 }
                 (left, found)
             })
@@ -322,7 +322,7 @@ impl<'a> Metropolis<'a> {
         for (left, found) in left {
             lost += left.lost;
             for splat in left.splats.iter().filter(|splat| !chained(splat.class)) {
-                splat.apply(&self.levels, &mut self.measures[tiles.slot(splat.pixel)]);
+                splat.apply(&self.levels, &mut self.samples[tiles.slot(splat.pixel)]);
             }
             candidates.extend(found);
         }
@@ -330,7 +330,7 @@ impl<'a> Metropolis<'a> {
     }
 }
 
-impl Iterate for Metropolis<'_> {
+impl Integrator for Metropolis<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
     }
@@ -365,19 +365,19 @@ impl Iterate for Metropolis<'_> {
         // A step stands for as many paths as there are pixels over steps, and light divided by its importance for `b`.
         let scale = (total / (count * steps) as f64) as f32;
         for Deposit { pixel, part, value } in left.into_iter().flatten() {
-            let measure = &mut self.measures[self.tiles.slot(pixel)];
+            let sample = &mut self.samples[self.tiles.slot(pixel)];
             let into = match part {
-                Part::Caustic => &mut measure.caustic_photons[0],
-                Part::Volume => &mut measure.volume_photons[0],
-                _ => &mut measure.indirect_photons[0],
+                Part::Caustic => &mut sample.caustic_photons[0],
+                Part::Volume => &mut sample.volume_photons[0],
+                _ => &mut sample.indirect_photons[0],
             };
             *into += value * scale;
         }
-        let (camera_paths, tiles, measures) = (self.camera_paths, self.tiles, &self.measures);
+        let (camera_paths, tiles, samples) = (self.camera_paths, self.tiles, &self.samples);
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
-            let measure = &measures[tiles.slot(index as u32)];
-            pixel.see(i, || camera_paths.seen(measure));
-            pixel.add(i, measure, None);
+            let sample = &samples[tiles.slot(index as u32)];
+            pixel.record_first_hit(i, || camera_paths.first_hit(sample));
+            pixel.add(i, sample, None);
         });
         phases.eye += cpu_seconds() - started;
         Some(Work { light_paths: u64::from(width) * u64::from(height), rejected, ..Work::default() })

@@ -1,7 +1,7 @@
 //! One iteration of path tracing.
 
-use super::iterate::{Iterate, Work};
-use super::measures::{self, Measures};
+use super::integrator::{Integrator, Work};
+use super::sample_buffer::{self, SampleBuffer};
 use super::techniques::{TechniquePicture, Watch, Watched};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::estimator::PixelAccumulator;
@@ -9,7 +9,7 @@ use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
 use crate::render::settings::Settings;
-use crate::transport::{CameraPaths, PixelSample, path_measure};
+use crate::transport::{CameraPaths, PixelSample, path_sample};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ pub(super) struct Paths<'a> {
     camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
     tiles: Tiles,
-    measures: [Measures; 1],
+    samples: [SampleBuffer; 1],
     watched: Watched,
 }
 
@@ -26,17 +26,17 @@ impl<'a> Paths<'a> {
     /// Nothing done yet.
     pub fn new(camera_paths: CameraPaths<'a>, settings: &'a Settings) -> Paths<'a> {
         let tiles = Tiles::new(camera_paths.camera);
-        let measures = [Measures::new(tiles.count() * TILE_PIXELS, 1)];
-        Paths { camera_paths, settings, tiles, measures, watched: Watched::new(settings, camera_paths.scene, &tiles) }
+        let samples = [SampleBuffer::new(tiles.count() * TILE_PIXELS, 1)];
+        Paths { camera_paths, settings, tiles, samples, watched: Watched::new(settings, camera_paths.scene, &tiles) }
     }
 
     /// Adds iteration `i` (from 1) to all pixels; false where it was given up.
     fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [PixelAccumulator], watches: &mut [W]) -> bool {
         let (camera_paths, tiles) = (self.camera_paths, self.tiles);
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);
-        let parts = self.measures[0].par_tiles().zip(watches.par_iter_mut());
-        parts.enumerate().for_each(|(tile, (mut measures, watch))| {
-            let (mut arena, mut measure) = (Bump::new(), PixelSample::default());
+        let parts = self.samples[0].par_tiles().zip(watches.par_iter_mut());
+        parts.enumerate().for_each(|(tile, (mut samples, watch))| {
+            let (mut arena, mut sample) = (Bump::new(), PixelSample::default());
             for places in tiles.groups(tile) {
                 if camera_paths.is_given_up() {
                     return;
@@ -45,8 +45,8 @@ impl<'a> Paths<'a> {
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     arena.reset();
                     watch.begin(place.at, Some(0));
-                    path_measure(&camera_paths, &arena, start, watch, &mut measure);
-                    measures.set(place.at, &measure);
+                    path_sample(&camera_paths, &arena, start, watch, &mut sample);
+                    samples.set(place.at, &sample);
                 }
             }
         });
@@ -54,12 +54,12 @@ impl<'a> Paths<'a> {
             return false;
         }
         let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
-        measures::add(&self.measures, (&camera_paths, i), pixels, |index| tiles.slot(index as u32), groups);
+        sample_buffer::add(&self.samples, (&camera_paths, i), pixels, |index| tiles.slot(index as u32), groups);
         true
     }
 }
 
-impl Iterate for Paths<'_> {
+impl Integrator for Paths<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
     }

@@ -12,8 +12,8 @@
 //! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the
 //! number of paths that were traced.
 
-use super::iterate::{Iterate, Work};
-use super::measures::{self, Measures};
+use super::integrator::{Integrator, Work};
+use super::sample_buffer::{self, SampleBuffer};
 use super::sppm::trace_some;
 use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
@@ -113,7 +113,7 @@ pub(super) struct Pm<'a> {
     maps: Option<PhotonMaps>,
     /// The light paths of the maps are counted.
     counted: bool,
-    measures: [Measures; 1],
+    samples: [SampleBuffer; 1],
 }
 
 impl<'a> Pm<'a> {
@@ -125,8 +125,8 @@ impl<'a> Pm<'a> {
         initial_media: &'a InitialMedia,
     ) -> Pm<'a> {
         let camera_paths = settings.camera_paths(scene, camera, initial_media);
-        let measures = [Measures::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
-        Pm { camera_paths, settings, initial_media, maps: None, counted: false, measures }
+        let samples = [SampleBuffer::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
+        Pm { camera_paths, settings, initial_media, maps: None, counted: false, samples }
     }
 
     /// The maps, how many light paths they are of, and what was left out.
@@ -147,7 +147,7 @@ impl<'a> Pm<'a> {
     }
 }
 
-impl Iterate for Pm<'_> {
+impl Integrator for Pm<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
     }
@@ -170,22 +170,22 @@ impl Iterate for Pm<'_> {
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(
-            self.measures[0].par_parts(pixels_per_band(camera.size().0)),
+            self.samples[0].par_parts(pixels_per_band(camera.size().0)),
             camera.size(),
             scratch,
-            |(scratch, nearest), measures, places| {
+            |(scratch, nearest), samples, places| {
                 if camera_paths.is_given_up() {
                     return;
                 }
                 let starts = camera_paths.starts(places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    measures.set(place.at, &camera_paths.measure(scratch, start, &maps, None, neighbours, kernel::Box));
+                    samples.set(place.at, &camera_paths.sample(scratch, start, &maps, None, neighbours, kernel::Box));
                 }
             },
         );
         if !self.settings.stop.aborted() {
-            measures::add(&self.measures, (camera_paths, i), pixels, |index| index, |_| &[]);
+            sample_buffer::add(&self.samples, (camera_paths, i), pixels, |index| index, |_| &[]);
         }
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();

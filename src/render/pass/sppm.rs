@@ -4,10 +4,10 @@
 //! the photons: one measures level 1, the other levels 2 and up, each set of levels with one query per vertex.
 
 use super::chunks::chunks;
-use super::guiding::learnt;
-use super::iterate::{Iterate, Work};
-use super::measures::{self, Measures};
+use super::guiding::learn_guide;
+use super::integrator::{Integrator, Work};
 use super::region::region;
+use super::sample_buffer::{self, SampleBuffer};
 use super::volume::{Maps, VolumeMap};
 use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths, usual_radius2};
@@ -67,7 +67,7 @@ fn eye_pass(
     i: u64,
     later2: f32,
     maps: &Maps,
-    (pixels, measures): (&[PixelAccumulator], &mut [Measures]),
+    (pixels, samples): (&[PixelAccumulator], &mut [SampleBuffer]),
     kernel: impl Kernel,
 ) {
     let photons = &maps.surface;
@@ -77,8 +77,8 @@ fn eye_pass(
     let [independent, correlated] = [Domain::CameraIndependent, Domain::CameraCorrelated]
         .map(|domain| Streams::in_sequence(settings.seed, i, domain));
     let band = pixels_per_band(size.0);
-    let bands = pixels.par_chunks(band).zip(Measures::par_of_paths(measures, band));
-    par_pixels(bands, size, Scratch::default, |scratch, (pixels, (measures, others)), places| {
+    let bands = pixels.par_chunks(band).zip(SampleBuffer::par_of_paths(samples, band));
+    par_pixels(bands, size, Scratch::default, |scratch, (pixels, (samples, others)), places| {
         if camera_paths.is_given_up() {
             return;
         }
@@ -93,16 +93,16 @@ fn eye_pass(
                     LevelRadii::new(radii2).later(later2 * schedule.factor2())
                 })
             };
-            let mut measure = |start: &(PathStart, _), levels: Range<usize>| {
+            let mut sample = |start: &(PathStart, _), levels: Range<usize>| {
                 let volume = maps.volume(pixel, levels.clone());
-                camera_paths.measure(scratch, start, photons, volume, &radii(levels), kernel)
+                camera_paths.sample(scratch, start, photons, volume, &radii(levels), kernel)
             };
             match (correlated.as_ref().and_then(|starts| starts[k].as_ref()), &mut *others) {
                 (Some(correlated), Some(others)) => {
-                    measures.set(place.at, &measure(start, 0..1));
-                    others.set(place.at, &measure(correlated, usize::from(levels.count > 1)..levels.count));
+                    samples.set(place.at, &sample(start, 0..1));
+                    others.set(place.at, &sample(correlated, usize::from(levels.count > 1)..levels.count));
                 }
-                _ => measures.set(place.at, &measure(start, 0..levels.count)),
+                _ => samples.set(place.at, &sample(start, 0..levels.count)),
             }
         }
     });
@@ -119,7 +119,7 @@ pub(super) struct Sppm<'a> {
     /// Largest initial bandwidth, squared, beyond a camera path's first broad bounce.
     later2: f32,
     /// Of the iteration, by camera path.
-    measures: Vec<Measures>,
+    samples: Vec<SampleBuffer>,
 }
 
 impl<'a> Sppm<'a> {
@@ -133,9 +133,9 @@ impl<'a> Sppm<'a> {
         let camera_paths = settings.camera_paths(scene, camera, initial_media);
         let guided = settings.guided && !settings.of_photons(&scene.survey).is_empty();
         let region = region(&camera_paths, settings.seed);
-        let guide = guided.then(|| learnt(&camera_paths, initial_media, settings, region)).flatten();
-        let measures = Measures::of_paths(camera.size().0 as usize * camera.size().1 as usize, settings.levels);
-        Sppm { camera_paths, settings, initial_media, guide, region, later2: f32::INFINITY, measures }
+        let guide = guided.then(|| learn_guide(&camera_paths, initial_media, settings, region)).flatten();
+        let samples = SampleBuffer::of_paths(camera.size().0 as usize * camera.size().1 as usize, settings.levels);
+        Sppm { camera_paths, settings, initial_media, guide, region, later2: f32::INFINITY, samples }
     }
 
     /// Camera paths.
@@ -149,8 +149,8 @@ impl<'a> Sppm<'a> {
     }
 
     /// What an iteration is to measure.
-    pub fn measures(&mut self) -> &mut [Measures] {
-        &mut self.measures
+    pub fn samples(&mut self) -> &mut [SampleBuffer] {
+        &mut self.samples
     }
 
     /// Adds iteration `i`, as it is measured, to the pixels, and the photons they have met to `work`; `None` where it was
@@ -159,7 +159,7 @@ impl<'a> Sppm<'a> {
         let done = !self.settings.stop.aborted();
         done.then(|| {
             work.counts.gathered =
-                measures::add(&self.measures, (&self.camera_paths, i), pixels, |index| index, |_| &[]);
+                sample_buffer::add(&self.samples, (&self.camera_paths, i), pixels, |index| index, |_| &[]);
             work
         })
     }
@@ -237,7 +237,7 @@ impl<'a> Sppm<'a> {
     }
 }
 
-impl Iterate for Sppm<'_> {
+impl Integrator for Sppm<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         let Settings { initial, widest, seed, .. } = *self.settings;
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
@@ -269,8 +269,8 @@ impl Iterate for Sppm<'_> {
     fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
         let (maps, work) = self.map(i, phases);
         let start = cpu_seconds();
-        let Sppm { camera_paths, settings, later2, measures, .. } = self;
-        let all = (&*pixels, &mut measures[..]);
+        let Sppm { camera_paths, settings, later2, samples, .. } = self;
+        let all = (&*pixels, &mut samples[..]);
         match settings.kernel {
             KernelChoice::Box => eye_pass(camera_paths, settings, i, *later2, &maps, all, kernel::Box),
             KernelChoice::Epanechnikov => {

@@ -22,8 +22,8 @@ use crate::render::account::{History, StopReason};
 use crate::render::account::{PhotonRecord, Unseen};
 use crate::render::account::{Rendered, error_estimate};
 use crate::render::clock::{Phases, Spent};
-use crate::render::pass::Iterate;
-use crate::render::pass::passes;
+use crate::render::pass::Integrator;
+use crate::render::pass::integrator;
 use crate::render::settings::{Levels, Settings};
 use crate::scene::Scene;
 use crate::stat::sum::MAX_TERMS;
@@ -69,7 +69,7 @@ impl<'a> Stage<'a> {
 /// A render under way.
 pub struct Session<'a> {
     stage: &'a Stage<'a>,
-    passes: Box<dyn Iterate + 'a>,
+    integrator: Box<dyn Integrator + 'a>,
     pixels: Vec<PixelAccumulator>,
     phases: Phases,
     spent: Spent,
@@ -97,14 +97,14 @@ impl<'a> Session<'a> {
     /// own.
     pub fn after(stage: &'a Stage<'a>, mut spent: Spent) -> Session<'a> {
         let Stage { scene, camera, settings, initial_media } = stage;
-        let (passes, pixels) = spent.during(|| {
-            let mut passes = passes(scene, camera, settings, initial_media);
-            let pixels = passes.pixels();
-            (passes, pixels)
+        let (integrator, pixels) = spent.during(|| {
+            let mut integrator = integrator(scene, camera, settings, initial_media);
+            let pixels = integrator.pixels();
+            (integrator, pixels)
         });
         Session {
             stage,
-            passes,
+            integrator,
             pixels,
             phases: Phases { pilot: spent.cpu_seconds, ..Phases::default() },
             spent,
@@ -130,7 +130,7 @@ impl<'a> Session<'a> {
         let (levels, groups) = (stage.settings.levels.count, stage.settings.light_groups(stage.scene));
         let fits = pixels.len() == session.pixels.len()
             && pixels.iter().all(|pixel| pixel.holds(levels, groups))
-            && session.passes.restore(&passes);
+            && session.integrator.restore(&passes);
         fits.then(|| Session {
             pixels,
             phases,
@@ -165,7 +165,7 @@ impl<'a> Session<'a> {
             phases: self.phases,
             spent: self.spent,
             pilot_seconds: self.pilot_seconds,
-            passes: self.passes.state()?,
+            passes: self.integrator.state()?,
         };
         Ok(State { pixels: &self.pixels, rest })
     }
@@ -246,7 +246,7 @@ impl<'a> Session<'a> {
     fn iterate(&mut self) -> Option<(bool, Option<ErrorEstimate>)> {
         let settings = &self.stage.settings;
         // Iterations count from 1; pass 0 is the pilot's.
-        let work = self.passes.iterate(self.next + 1, &mut self.pixels, &mut self.phases)?;
+        let work = self.integrator.iterate(self.next + 1, &mut self.pixels, &mut self.phases)?;
         self.next += settings.shard.count;
         self.done += 1;
         self.light_paths += work.light_paths;
@@ -277,7 +277,7 @@ impl<'a> Session<'a> {
 
     /// Where its light paths start, if they are guided.
     pub(crate) fn guide(&self) -> Option<&Guide> {
-        self.passes.guide()
+        self.integrator.guide()
     }
 
     /// The pixels as they are.
@@ -350,7 +350,7 @@ impl<'a> Session<'a> {
     /// Bandwidths of the last iteration.
     fn bandwidths(&self) -> BandwidthState {
         let settings = &self.stage.settings;
-        BandwidthState::new(settings.schedule(settings.last(self.done)), self.passes.counted())
+        BandwidthState::new(settings.schedule(settings.last(self.done)), self.integrator.counted())
     }
 
     /// Ends it.
@@ -362,7 +362,7 @@ impl<'a> Session<'a> {
         Rendered {
             width,
             height,
-            techniques: self.passes.techniques(self.done),
+            techniques: self.integrator.techniques(self.done),
             bandwidths: self.bandwidths(),
             pixels: self.pixels,
             settings: self.stage.settings.clone(),

@@ -9,7 +9,7 @@ use caustique::estimator::rule::{CountingRule, memoryless, volume};
 use caustique::math::{Frame, Vec3};
 use caustique::photon::kernel::{self, laplacian};
 use caustique::photon::{Kernel, ThinningKey};
-use caustique::transport::Found;
+use caustique::transport::FoundPhotons;
 use std::f64::consts::PI;
 use wide::f32x8;
 
@@ -58,11 +58,11 @@ fn local_statistics_follow_their_recursion() {
 }
 
 /// A photon in the frame of +Z: its distance as a share of the radius, and its direction as a share of a turn.
-fn found(radius2: f32, distance: f32, turn: f32) -> Found {
+fn found(radius2: f32, distance: f32, turn: f32) -> FoundPhotons {
     let (sin, cos) = (std::f32::consts::TAU * turn).sin_cos();
     let distance = distance * radius2.sqrt();
     let frame = Frame::from_normal(Vec3::Z);
-    Found::one((frame.t * cos + frame.b * sin) * distance, distance * distance, 1.0, ThinningKey::new(1.0, 0.5))
+    FoundPhotons::one((frame.t * cos + frame.b * sin) * distance, distance * distance, 1.0, ThinningKey::new(1.0, 0.5))
 }
 
 /// The chi-squared rule word for word, counts as integers, for two annuli of six sectors.

@@ -23,14 +23,14 @@ struct Shared {
     volume: Rgb,
     features: Features,
     first: Option<FirstHit>,
-    broken: Option<Cause>,
+    rejection: Option<Cause>,
 }
 
 /// What photons bring at a level, or what depends on their bandwidth: caustics, indirect light, light from media.
 type OfLevel = [Rgb; 3];
 
 /// Bytes that an iteration keeps of a pixel besides its sums.
-pub fn bytes_of_measures(settings: &Settings) -> usize {
+pub fn sample_bytes(settings: &Settings) -> usize {
     let pairs = 1 + usize::from(settings.levels.two_paths);
     match settings.method.has_chains() {
         true => size_of::<PixelSample>(),
@@ -39,46 +39,46 @@ pub fn bytes_of_measures(settings: &Settings) -> usize {
 }
 
 /// Measures of all pixels, in the order of the units of work.
-pub(super) struct Measures {
+pub(super) struct SampleBuffer {
     levels: usize,
     shared: Vec<Shared>,
     by_level: Vec<OfLevel>,
 }
 
-impl Measures {
+impl SampleBuffer {
     /// Those of a render whose pixels have two eye paths or one, by path.
-    pub fn of_paths(pixels: usize, levels: Levels) -> Vec<Measures> {
+    pub fn of_paths(pixels: usize, levels: Levels) -> Vec<SampleBuffer> {
         if levels.two_paths {
-            vec![Measures::new(pixels, 1), Measures::new(pixels, levels.count.max(2) - 1)]
+            vec![SampleBuffer::new(pixels, 1), SampleBuffer::new(pixels, levels.count.max(2) - 1)]
         } else {
-            vec![Measures::new(pixels, levels.count)]
+            vec![SampleBuffer::new(pixels, levels.count)]
         }
     }
 
     /// Of so many pixels and levels; nothing measured yet.
-    pub fn new(pixels: usize, levels: usize) -> Measures {
+    pub fn new(pixels: usize, levels: usize) -> SampleBuffer {
         let by_level = vec![OfLevel::default(); pixels * levels];
-        Measures { levels, shared: vec![Shared::default(); pixels], by_level }
+        SampleBuffer { levels, shared: vec![Shared::default(); pixels], by_level }
     }
 
     /// Those of each tile.
-    pub fn par_tiles(&mut self) -> impl IndexedParallelIterator<Item = SomeMeasures<'_>> {
+    pub fn par_tiles(&mut self) -> impl IndexedParallelIterator<Item = SampleBufferPart<'_>> {
         self.par_parts(TILE_PIXELS)
     }
 
     /// Those of each unit of work of so many pixels.
-    pub fn par_parts(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = SomeMeasures<'_>> {
+    pub fn par_parts(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = SampleBufferPart<'_>> {
         let levels = self.levels;
         let by_level = self.by_level.par_chunks_mut(pixels * levels);
-        let part = move |(shared, by_level)| SomeMeasures { levels, shared, by_level };
+        let part = move |(shared, by_level)| SampleBufferPart { levels, shared, by_level };
         self.shared.par_chunks_mut(pixels).zip(by_level).map(part)
     }
 
     /// Those of each unit of work of so many pixels, by one or two eye paths.
     pub fn par_of_paths(
-        all: &mut [Measures],
+        all: &mut [SampleBuffer],
         pixels: usize,
-    ) -> impl IndexedParallelIterator<Item = (SomeMeasures<'_>, Option<SomeMeasures<'_>>)> {
+    ) -> impl IndexedParallelIterator<Item = (SampleBufferPart<'_>, Option<SampleBufferPart<'_>>)> {
         let (first, others) = all.split_at_mut(1);
         let first: Vec<_> = first[0].par_parts(pixels).collect();
         let mut others: Vec<_> =
@@ -95,13 +95,13 @@ impl Measures {
 }
 
 /// Measures of the pixels of a unit of work.
-pub(super) struct SomeMeasures<'m> {
+pub(super) struct SampleBufferPart<'m> {
     levels: usize,
     shared: &'m mut [Shared],
     by_level: &'m mut [OfLevel],
 }
 
-impl SomeMeasures<'_> {
+impl SampleBufferPart<'_> {
     /// The measure at a slot of them.
     #[inline]
     pub fn get(&self, slot: usize) -> PixelSample {
@@ -110,11 +110,11 @@ impl SomeMeasures<'_> {
 
     /// Keeps a measure; nothing of it but its first levels may be lit.
     #[inline]
-    pub fn set(&mut self, slot: usize, measure: &PixelSample) {
-        let &PixelSample { emission, direct, indirect, volume, features, first, broken, .. } = measure;
-        self.shared[slot] = Shared { emission, direct, indirect, volume, features, first, broken };
+    pub fn set(&mut self, slot: usize, sample: &PixelSample) {
+        let &PixelSample { emission, direct, indirect, volume, features, first, rejection, .. } = sample;
+        self.shared[slot] = Shared { emission, direct, indirect, volume, features, first, rejection };
         for (level, into) in self.by_level[slot * self.levels..][..self.levels].iter_mut().enumerate() {
-            *into = [measure.caustic_photons[level], measure.indirect_photons[level], measure.volume_photons[level]];
+            *into = [sample.caustic_photons[level], sample.indirect_photons[level], sample.volume_photons[level]];
         }
     }
 }
@@ -122,7 +122,7 @@ impl SomeMeasures<'_> {
 /// Adds iteration `i`, measured by one or two eye paths, to the pixels: the measures that are kept at the pixel's `slot`,
 /// and its light by `groups`. Returns the number of pixels to whose own image photons of each kind have brought light.
 pub(super) fn add<'g>(
-    measures: &[Measures],
+    samples: &[SampleBuffer],
     (camera_paths, i): (&CameraPaths<'_>, u64),
     pixels: &mut [PixelAccumulator],
     slot: impl Fn(usize) -> usize + Sync,
@@ -130,12 +130,12 @@ pub(super) fn add<'g>(
 ) -> ByKind<u64> {
     let add = |(index, pixel): (usize, &mut PixelAccumulator)| {
         let slot = slot(index);
-        let measure = measures[0].get(slot);
-        pixel.see(i, || camera_paths.seen(&measure));
-        let others = measures.get(1).map(|measures| measures.get(slot));
-        let (own, level) = pixel.own_of(&measure, others.as_ref());
+        let sample = samples[0].get(slot);
+        pixel.record_first_hit(i, || camera_paths.first_hit(&sample));
+        let others = samples.get(1).map(|samples| samples.get(slot));
+        let (own, level) = pixel.own_of(&sample, others.as_ref());
         let light = [own.indirect_photons[level], own.caustic_photons[level]];
-        pixel.add_with_groups(i, &measure, others.as_ref(), groups(slot));
+        pixel.add_with_groups(i, &sample, others.as_ref(), groups(slot));
         light.map(|light| u64::from(is_lit(light)))
     };
     let all = |(part, pixels): (usize, &mut [PixelAccumulator])| {
@@ -148,13 +148,14 @@ pub(super) fn add<'g>(
 
 #[inline]
 fn unpack(shared: &Shared, by_level: &[OfLevel]) -> PixelSample {
-    let Shared { emission, direct, indirect, volume, features, first, broken } = *shared;
-    let shared = PixelSample { emission, direct, indirect, volume, features, first, broken, ..PixelSample::default() };
-    by_level.iter().enumerate().fold(shared, |mut measure, (level, &[caustic, indirect, volume])| {
-        measure.caustic_photons[level] = caustic;
-        measure.indirect_photons[level] = indirect;
-        measure.volume_photons[level] = volume;
-        measure
+    let Shared { emission, direct, indirect, volume, features, first, rejection } = *shared;
+    let shared =
+        PixelSample { emission, direct, indirect, volume, features, first, rejection, ..PixelSample::default() };
+    by_level.iter().enumerate().fold(shared, |mut sample, (level, &[caustic, indirect, volume])| {
+        sample.caustic_photons[level] = caustic;
+        sample.indirect_photons[level] = indirect;
+        sample.volume_photons[level] = volume;
+        sample
     })
 }
 
@@ -167,30 +168,30 @@ mod tests {
     #[test]
     fn a_measure_comes_back() {
         for levels in [1, 4, MAX_LEVELS] {
-            let mut measures = Measures::new(2 * TILE_PIXELS, levels);
-            let measure = |at: usize| {
+            let mut samples = SampleBuffer::new(2 * TILE_PIXELS, levels);
+            let sample = |at: usize| {
                 let value = |k: usize| Rgb::new(at as f32, k as f32, 0.5);
-                let mut measure = PixelSample { emission: value(1), direct: value(2), ..PixelSample::default() };
-                (measure.indirect, measure.volume) = (value(3), value(4));
-                measure.features.depth = at as f32;
-                measure.first = at.is_multiple_of(2).then_some(FirstHit { p: value(5), instance: at as u32 });
-                measure.broken = at.is_multiple_of(3).then_some(Cause::Sum);
+                let mut sample = PixelSample { emission: value(1), direct: value(2), ..PixelSample::default() };
+                (sample.indirect, sample.volume) = (value(3), value(4));
+                sample.features.depth = at as f32;
+                sample.first = at.is_multiple_of(2).then_some(FirstHit { p: value(5), instance: at as u32 });
+                sample.rejection = at.is_multiple_of(3).then_some(Cause::Sum);
                 for level in 0..levels {
-                    measure.caustic_photons[level] = value(10 + level);
-                    measure.indirect_photons[level] = value(20 + level);
-                    measure.volume_photons[level] = value(30 + level);
+                    sample.caustic_photons[level] = value(10 + level);
+                    sample.indirect_photons[level] = value(20 + level);
+                    sample.volume_photons[level] = value(30 + level);
                 }
-                measure
+                sample
             };
-            measures.par_tiles().enumerate().for_each(|(tile, mut measures)| {
+            samples.par_tiles().enumerate().for_each(|(tile, mut samples)| {
                 for slot in 0..TILE_PIXELS {
-                    measures.set(slot, &measure(tile * TILE_PIXELS + slot));
-                    let kept = measures.get(slot);
-                    assert_eq!(format!("{kept:?}"), format!("{:?}", measure(tile * TILE_PIXELS + slot)));
+                    samples.set(slot, &sample(tile * TILE_PIXELS + slot));
+                    let kept = samples.get(slot);
+                    assert_eq!(format!("{kept:?}"), format!("{:?}", sample(tile * TILE_PIXELS + slot)));
                 }
             });
             for at in 0..2 * TILE_PIXELS {
-                assert_eq!(format!("{:?}", measures.get(at)), format!("{:?}", measure(at)));
+                assert_eq!(format!("{:?}", samples.get(at)), format!("{:?}", sample(at)));
             }
         }
     }

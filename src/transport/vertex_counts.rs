@@ -21,7 +21,7 @@ const CHUNK: usize = 256;
 
 /// Mean numbers of vertices of a path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lengths {
+pub struct VertexCounts {
     /// Of a camera path that goes on whatever the lobes; on surfaces, as all that follow.
     pub camera: f64,
     /// Of one that ends at broad lobes and goes straight through media.
@@ -133,7 +133,7 @@ impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
     }
 }
 
-impl Lengths {
+impl VertexCounts {
     /// Of paths of a view, the light paths guided if there is a guide. `reach` is the radius within which a camera path
     /// merges that is so long up to where it first may.
     pub fn new(
@@ -142,7 +142,7 @@ impl Lengths {
         seed: u64,
         guide: Option<&Guide>,
         reach: impl Fn(f32) -> f32 + Sync,
-    ) -> Lengths {
+    ) -> VertexCounts {
         let (width, height) = camera_paths.camera.size();
         let pixels = u64::from(width) * u64::from(height);
         let lights = LightPaths::new(seed, 0, Domain::GuideLight, PATHS, camera_paths.max_depth).guided(guide);
@@ -222,7 +222,7 @@ impl Lengths {
         let [_, camera_to_broad, _, _, media_samples, _] = straight;
         let textured = (camera_textured + light_textured) / (camera + light).max(1.0);
         let merged = merged.iter().sum::<u64>() as f64 / f64::from(PATHS);
-        Lengths {
+        VertexCounts {
             camera,
             camera_to_broad,
             light,

@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
 /// A lamp without a body on a segment of a camera path.
-pub struct Glow {
+pub struct PassThroughHit {
     /// Where it is met.
     pub surface: Surface,
     /// Unit direction back along the path.
@@ -30,7 +30,7 @@ pub struct Glow {
 /// Calls `each` with every lamp without a body that a ray meets within `reach`, how far it is, what is left of its
 /// light and the densities of flight. Whether a medium scatters a walk on the way is not drawn: light comes attenuated.
 #[inline]
-pub(super) fn glows(
+pub(super) fn for_each_pass_through_light(
     scene: &Scene,
     start: &Start,
     reach: f32,

@@ -21,7 +21,7 @@ pub(in crate::render) struct Work {
 }
 
 /// The passes of a method.
-pub(in crate::render) trait Iterate {
+pub(in crate::render) trait Integrator {
     /// The pixels before the first iteration.
     fn pixels(&mut self) -> Vec<PixelAccumulator>;
     /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`; `None` where it was given up

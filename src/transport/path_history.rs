@@ -6,9 +6,9 @@ use crate::plan::{CameraSuffix, ClassSet, Event};
 
 /// What decides which class the light of a camera path is of.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Trail {
+pub(super) struct PathHistory {
     /// What has happened up to the last vertex.
-    pub sight: CameraSuffix,
+    pub suffix: CameraSuffix,
     /// Lobes of the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
     /// Length of the path so far.
@@ -17,20 +17,20 @@ pub(super) struct Trail {
     pub delta: bool,
 }
 
-impl Trail {
-    pub const START: Trail = Trail { sight: CameraSuffix::START, lobes: None, length: 0.0, delta: true };
+impl PathHistory {
+    pub const START: PathHistory = PathHistory { suffix: CameraSuffix::START, lobes: None, length: 0.0, delta: true };
 
     /// The last vertex sent the path on by `lobe`.
     #[inline]
     pub fn scattered(&mut self, lobe: LobeSet) {
         self.delta &= lobe == LobeSet::DELTA;
-        self.sight = self.sight.then(Event::by(lobe, self.lobes));
+        self.suffix = self.suffix.then(Event::by(lobe, self.lobes));
     }
 
     /// No vertex before this one scatters but by mirrors and clear glass.
     #[inline]
     pub fn is_clear(&self) -> bool {
-        self.sight.is_clear()
+        self.suffix.is_clear()
     }
 
     /// Leaves a vertex with some lobes; `None`: in a medium.
@@ -44,8 +44,8 @@ impl Trail {
     pub fn leads(&self, on: ClassSet) -> bool {
         on.is_all()
             || match self.lobes {
-                None => !(self.sight.then(Event::Medium).reachable_classes() & on).is_empty(),
-                Some(lobes) => leads(self.sight, lobes, lobes, on),
+                None => !(self.suffix.then(Event::Medium).reachable_classes() & on).is_empty(),
+                Some(lobes) => leads(self.suffix, lobes, lobes, on),
             }
     }
 }
