@@ -7,10 +7,10 @@
 //! finds too rarely to show noise is in its error, and the bias of photons is, too.
 
 use super::pilot_settings::WORST;
-use crate::finish::halves::{self, Judged};
+use crate::film::{Picture, channel_mean};
+use crate::finish::cross_product::{PixelError, squared_errors};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
 use crate::render::{Candidate, Session, Stage};
-use crate::stat::floor;
 use rayon::prelude::*;
 
 /// Iterations of a candidate: one for each quarter, and as many as its share of the pilot allows.
@@ -50,10 +50,10 @@ pub(super) struct CandidateRun<'a> {
 /// What a candidate's iterations show.
 struct Shown {
     /// Finished from the first half.
-    finished: Vec<[f32; 3]>,
+    finished: Picture,
     /// Finished from either quarter of it.
-    earlier: [Vec<[f32; 3]>; 2],
-    judges: [Vec<[f32; 3]>; 2],
+    earlier: [Picture; 2],
+    judges: [Picture; 2],
     /// Relative variance of the judges, without the worst pixels.
     noise: f64,
 }
@@ -88,7 +88,7 @@ impl<'a> CandidateRun<'a> {
         let estimate = Estimate::of(&set).ok()?;
         let finished = finish.picture(&estimate.first_half(&quarters)).ok()?;
         let [first, second, a, b] = quarters;
-        let mut quarter = |mean| finish.picture(&estimate.of_some(mean, 4.0)).ok();
+        let mut quarter = |mean| finish.picture(&estimate.from_partial(mean, 4.0)).ok();
         let earlier = [quarter(first)?, quarter(second)?];
         let noise = variance(&a, &b, &finished);
         Some(Shown { finished, earlier, judges: [a, b], noise })
@@ -96,12 +96,11 @@ impl<'a> CandidateRun<'a> {
 }
 
 /// Relative squared difference of two pictures, without the worst pixels.
-fn variance(a: &[[f32; 3]], b: &[[f32; 3]], values: &[[f32; 3]]) -> f64 {
-    let value = |index: usize| values[index].iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
-    let floor = floor::relative_to_mean((0..a.len()).map(value));
+fn variance(a: &Picture, b: &Picture, values: &Picture) -> f64 {
+    let floor = values.relative_floor();
     let square = |index: usize| -> f64 {
         let apart: f64 = (0..3).map(|c| f64::from(a[index][c] - b[index][c]).powi(2)).sum();
-        apart / 3.0 * super::pilot_settings::scale(value(index), floor)
+        apart / 3.0 * super::pilot_settings::scale(channel_mean(values[index]), floor)
     };
     without_worst((0..a.len()).into_par_iter().map(square).collect())
 }
@@ -115,25 +114,24 @@ fn without_worst(mut values: Vec<f64>) -> f64 {
 
 /// The judges, means of all candidates' by what their noise is, and the candidate whose finished picture says what
 /// pixels are worth.
-fn judges(shown: &[Option<Shown>]) -> Option<([Vec<[f32; 3]>; 2], &Shown)> {
+fn judges(shown: &[Option<Shown>]) -> Option<([Picture; 2], &Shown)> {
     let all: Vec<&Shown> = shown.iter().flatten().collect();
     let least = *all.iter().min_by(|a, b| a.noise.total_cmp(&b.noise))?;
     let weights: Vec<f64> = all.iter().map(|shown| 1.0 / shown.noise.max(f64::MIN_POSITIVE)).collect();
     let total: f64 = weights.iter().sum();
     let mean = |judge: usize| {
-        let pixel = |index: usize| {
+        Picture::from_fn(least.finished.size(), |index| {
             std::array::from_fn(|c| {
                 let parts = all.iter().zip(&weights).map(|(shown, w)| w * f64::from(shown.judges[judge][index][c]));
                 (parts.sum::<f64>() / total) as f32
             })
-        };
-        (0..least.finished.len()).map(pixel).collect()
+        })
     };
     Some(([mean(0), mean(1)], least))
 }
 
 /// What a candidate is expected to leave, by pixel; `None` where nothing was seen.
-struct Expected(Option<Vec<Judged>>);
+struct Expected(Option<Vec<PixelError>>);
 
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len().max(1) as f64;
@@ -144,8 +142,8 @@ impl Expected {
     /// Carries what was told of a candidate's half, and of either quarter of it, on to `more` times the half's
     /// iterations, as the power of their number that the mean errors show. It is linear in both, so that the power's
     /// own noise, which grows with the logarithm of `more`, is in what it is told to be worth.
-    fn carried(half: &[Judged], quarters: [&[Judged]; 2], more: f64) -> Expected {
-        let of = |pixels: &[Judged]| mean(pixels.iter().map(|pixel| pixel.error));
+    fn carried(half: &[PixelError], quarters: [&[PixelError]; 2], more: f64) -> Expected {
+        let of = |pixels: &[PixelError]| mean(pixels.iter().map(|pixel| pixel.squared));
         let (h, q) = (of(half), 0.5 * (of(quarters[0]) + of(quarters[1])));
         let more = more.max(1.0);
         // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is
@@ -158,18 +156,18 @@ impl Expected {
                 (scale * (1.0 + doublings), -scale * doublings * h / q)
             }
         };
-        let pixel = |((half, a), b): ((&Judged, &Judged), &Judged)| {
+        let pixel = |((half, a), b): ((&PixelError, &PixelError), &PixelError)| {
             let carried = |half: f64, a: f64, b: f64| of_half * half + of_quarter * 0.5 * (a + b);
-            Judged {
-                error: carried(half.error, a.error, b.error),
-                pulls: std::array::from_fn(|c| carried(half.pulls[c], a.pulls[c], b.pulls[c])),
+            PixelError {
+                squared: carried(half.squared, a.squared, b.squared),
+                noise: std::array::from_fn(|c| carried(half.noise[c], a.noise[c], b.noise[c])),
             }
         };
         Expected(Some(half.iter().zip(quarters[0]).zip(quarters[1]).map(pixel).collect()))
     }
 
     fn squared_error(&self) -> f64 {
-        let error = |pixels: &Vec<Judged>| mean(pixels.iter().map(|pixel| pixel.error)).max(f64::MIN_POSITIVE);
+        let error = |pixels: &Vec<PixelError>| mean(pixels.iter().map(|pixel| pixel.squared)).max(f64::MIN_POSITIVE);
         self.0.as_ref().map_or(f64::INFINITY, error)
     }
 
@@ -179,8 +177,8 @@ impl Expected {
         let (Some(pixels), Some(others)) = (&self.0, &other.0) else {
             return (if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY }, 0.0);
         };
-        let apart = pixels.iter().zip(others).map(|(a, b)| a.error - b.error);
-        let pull = |(a, b): (&Judged, &Judged)| (0..3).map(|c| (a.pulls[c] - b.pulls[c]).powi(2)).sum::<f64>();
+        let apart = pixels.iter().zip(others).map(|(a, b)| a.squared - b.squared);
+        let pull = |(a, b): (&PixelError, &PixelError)| (0..3).map(|c| (a.noise[c] - b.noise[c]).powi(2)).sum::<f64>();
         let count = pixels.len().max(1) as f64;
         (mean(apart), (mean(pixels.iter().zip(others).map(pull)) / count).sqrt())
     }
@@ -195,7 +193,7 @@ impl Expected {
     fn is_clearly_worse(&self, than: &Expected) -> bool {
         let (Some(pixels), Some(others)) = (&self.0, &than.0) else { return self.0.is_none() };
         let (more, noise) = self.more_than(than);
-        let square = |(a, b): (&Judged, &Judged)| (a.error - b.error).powi(2);
+        let square = |(a, b): (&PixelError, &PixelError)| (a.squared - b.squared).powi(2);
         let spread = (mean(pixels.iter().zip(others).map(square)) / pixels.len().max(1) as f64).sqrt();
         more > (TOLD * noise).max(spread)
     }
@@ -249,7 +247,7 @@ fn compare(candidates: &mut [CandidateRun<'_>], finish: &mut Finish, budget: f64
     let judged = judges(&shown);
     let left = |candidate: &CandidateRun<'_>, shown: &Option<Shown>| -> Option<Expected> {
         let (shown, ([a, b], worth)) = (shown.as_ref()?, judged.as_ref()?);
-        let of = |picture: &[[f32; 3]]| halves::judge(picture, [a, b], &worth.finished);
+        let of = |picture: &Picture| squared_errors(picture, [a, b], &worth.finished);
         let earlier = shown.earlier.each_ref().map(|picture| of(picture));
         // In the render's iterations over those of the half; the least number of iterations may have cost more than the
         // share.

@@ -1,7 +1,8 @@
 //! Small renders of the same view: their settings, and what their pixels are worth.
 
 use crate::estimator::{InitialBandwidth, PixelAccumulator};
-use crate::finish::{Size, window};
+use crate::film::Size;
+use crate::finish::window;
 use crate::math::DVec3;
 use crate::photon::MAX_NEIGHBOURS;
 use crate::render::{Levels, Settings, Shard};

@@ -56,7 +56,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let comparison = compared.map_err(|e| e.within(args.image.display()))?;
     if let Some(path) = &args.png {
         let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
-        png::write(path, image.width, image.height, colours)?;
+        png::write(path, image.size(), colours)?;
     }
     if let Some(path) = &args.page {
         let names = [&args.image, &args.reference].map(|path| path.display().to_string());

@@ -55,7 +55,7 @@ impl PictureArgs {
     pub fn write_png(&self, set: &LayerSet, made_for: &PictureDefaults) -> Result<()> {
         let Some(path) = &self.png else { return Ok(()) };
         let (exposure, tonemap) = self.look(made_for);
-        png::write_tonemapped(path, set.width, set.height, &set.beauty()?, exposure, tonemap)
+        png::write_tonemapped(path, &set.beauty()?, exposure, tonemap)
     }
 }
 

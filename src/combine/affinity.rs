@@ -16,8 +16,7 @@ use std::array::from_fn;
 use rayon::prelude::*;
 
 use super::Sums;
-use super::map::Map;
-use super::rect::Rect;
+use super::map::{Map, Rect};
 use super::stack::LevelStack;
 
 /// Channels per pair besides the feature space: source, centre, falloff.
@@ -66,7 +65,7 @@ fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features:
         let from = core.x0 - features.rect.x0;
         let scalar = |channel: usize| &features.row(channel, image_y)[from..from + core.width()];
         let (centre, falloff) = (scalar(centre), scalar(falloff));
-        let correlated = &stack.levels[pair + 1][image_y * stack.width + core.x0..][..core.width()];
+        let correlated = &stack.levels[pair + 1][image_y * stack.size.width + core.x0..][..core.width()];
         for (block, sums) in sums.chunks_mut(LANES).enumerate() {
             let x = block * LANES;
             let falloff = from_fn(|l| {
@@ -103,12 +102,12 @@ impl<const D: usize> Neighbours<D> {
         let rows = core.height() + 2 * radius;
         let (source, ..) = scalar_channels::<D>(stack.levels.len() - 1, pair);
         // Image columns that the planes show, and where they begin in a plane's row.
-        let (x0, x1) = (core.x0.saturating_sub(radius), (core.x1 + radius).min(stack.width));
+        let (x0, x1) = (core.x0.saturating_sub(radius), (core.x1 + radius).min(stack.size.width));
         let offset = x0 + radius - core.x0;
         let plane = |value: &(dyn Fn(usize, &mut [f32]) + Sync)| {
             let mut plane = vec![0.0; pitch * rows];
             plane.par_chunks_mut(pitch).enumerate().for_each(|(v, row)| {
-                let Some(y) = (core.y0 + v).checked_sub(radius).filter(|y| *y < stack.height) else { return };
+                let Some(y) = (core.y0 + v).checked_sub(radius).filter(|y| *y < stack.size.height) else { return };
                 value(y, &mut row[offset..offset + x1 - x0]);
             });
             plane
@@ -119,15 +118,15 @@ impl<const D: usize> Neighbours<D> {
                 row.iter_mut().zip(values).for_each(|(out, value)| *out = f(*value));
             })
         };
-        let mask = |y: usize| &valid[y * stack.width + x0..y * stack.width + x1];
+        let mask = |y: usize| &valid[y * stack.size.width + x0..y * stack.size.width + x1];
         let mut weight = channel(source, |x| exp_bounded(x, LOG_WEIGHT));
         weight.par_chunks_mut(pitch).enumerate().for_each(|(v, row)| {
-            let Some(y) = (core.y0 + v).checked_sub(radius).filter(|y| *y < stack.height) else { return };
+            let Some(y) = (core.y0 + v).checked_sub(radius).filter(|y| *y < stack.size.height) else { return };
             row[offset..].iter_mut().zip(mask(y)).filter(|(_, valid)| !**valid).for_each(|(w, _)| *w = 0.0);
         });
         let difference = |c: usize| {
             plane(&move |y, row| {
-                let start = y * stack.width + x0;
+                let start = y * stack.size.width + x0;
                 let pixels = stack.levels[0][start..].iter().zip(&stack.levels[pair + 1][start..]).zip(mask(y));
                 for (out, ((independent, correlated), valid)) in row.iter_mut().zip(pixels) {
                     // Zero times a value that is not finite would still spoil the sum.

@@ -8,8 +8,7 @@ use std::array::from_fn;
 use rayon::prelude::*;
 
 use super::Sums;
-use super::map::Map;
-use super::rect::Rect;
+use super::map::{Map, Rect};
 use super::stack::LevelStack;
 
 /// Weights are kept between these, so that they and their sums stay positive and finite whatever the network says.
@@ -25,12 +24,12 @@ pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, weights: &Map, p
         // behind.
         let mut window = vec![Sums::default(); sums.len()];
         for v in 0..side {
-            let Some(row) = (y + v).checked_sub(radius).filter(|row| *row < stack.height) else { continue };
+            let Some(row) = (y + v).checked_sub(radius).filter(|row| *row < stack.size.height) else { continue };
             for u in 0..side {
                 let w = &weights.row((pair * side + v) * side + u, y)[core.x0 - weights.rect.x0..];
                 for (x, (sum, w)) in (core.x0..).zip(window.iter_mut().zip(w)) {
-                    let column = (x + u).checked_sub(radius).filter(|column| *column < stack.width);
-                    let Some(i) = column.map(|column| row * stack.width + column).filter(|i| valid[*i]) else {
+                    let column = (x + u).checked_sub(radius).filter(|column| *column < stack.size.width);
+                    let Some(i) = column.map(|column| row * stack.size.width + column).filter(|i| valid[*i]) else {
                         continue;
                     };
                     // max and min, not clamp: they drop a weight that is no number.
@@ -40,7 +39,7 @@ pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, weights: &Map, p
                 }
             }
         }
-        let centre = &correlated[y * stack.width + core.x0..];
+        let centre = &correlated[y * stack.size.width + core.x0..];
         for ((sum, part), z) in sums.iter_mut().zip(&window).zip(centre) {
             sum.value = from_fn(|c| sum.value[c] + (part.value[c] + z[c] * part.weight));
             sum.weight += part.weight;

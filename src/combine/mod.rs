@@ -20,7 +20,6 @@ pub mod kernel;
 mod map;
 pub mod model;
 pub mod network;
-mod rect;
 pub mod runtime;
 mod stack;
 pub mod tensor;
@@ -32,6 +31,7 @@ mod tests;
 use rayon::prelude::*;
 
 use crate::error::Result;
+use crate::film::Picture;
 pub use model::Model;
 use network::{Network, Weights};
 pub use runtime::Runtime;
@@ -66,24 +66,24 @@ impl Combiner {
     /// # Errors
     /// [`ErrorKind::Image`](crate::error::ErrorKind::Image) when planes differ in size or the number of levels is not the
     /// network's; [`ErrorKind::Model`](crate::error::ErrorKind::Model) when the network fails.
-    pub fn run(&mut self, stack: &LevelStack) -> Result<Vec<[f32; 3]>> {
+    pub fn run(&mut self, stack: &LevelStack) -> Result<Picture> {
         let pixels = self.network.facts().tile_pixels();
         self.run_tiled(stack, pixels)
     }
 
     /// [`run`](Self::run) with tiles of about `pixels` pixels; the result does not depend on it beyond rounding.
-    pub(crate) fn run_tiled(&mut self, stack: &LevelStack, pixels: usize) -> Result<Vec<[f32; 3]>> {
+    pub(crate) fn run_tiled(&mut self, stack: &LevelStack, pixels: usize) -> Result<Picture> {
         let facts = self.network.facts().clone();
         stack.check(facts.levels)?;
         let valid = stack.valid();
         let normalisation = Normalisation::of(stack);
-        let mut image = vec![[0.0; 3]; stack.width * stack.height];
-        for tile in tile::tiles(stack.width, stack.height, &facts, pixels) {
+        let mut image = Picture::filled(stack.size, [0.0; 3]);
+        for tile in tile::tiles(stack.size, &facts, pixels) {
             let input = tensor::fill(stack, &normalisation, tile.input);
             let weights = self.network.run(&input, tile.input)?;
             let part = combine_tile(stack, &valid, &tile, &weights);
             for (y, row) in part.chunks(tile.core.width()).enumerate() {
-                let start = (tile.core.y0 + y) * stack.width + tile.core.x0;
+                let start = (tile.core.y0 + y) * stack.size.width + tile.core.x0;
                 image[start..start + row.len()].copy_from_slice(row);
             }
         }

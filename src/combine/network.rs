@@ -4,9 +4,8 @@ use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::value::{Outlet, TensorRef, ValueType};
 
-use super::map::Map;
+use super::map::{Map, Rect};
 use super::model::{Contract, Facts, Model};
-use super::rect::Rect;
 use super::runtime::{Quiet, Runtime};
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};

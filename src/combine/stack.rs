@@ -3,23 +3,21 @@
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::{Layer, LayerSet, Role};
+use crate::film::{LayerSet, Picture, Role, Size};
 
 /// The layers of one render that the combiner reads; every plane holds `width * height` pixels, rows from the top.
 #[derive(Clone, Debug, Default)]
 pub struct LevelStack {
-    /// Pixels a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
+    /// Width and height.
+    pub size: Size,
     /// `Level1`, `Level2`, ...: scene-linear radiance, smallest bandwidth first.
-    pub levels: Vec<Vec<[f32; 3]>>,
+    pub levels: Vec<Picture>,
     /// `Variance1`, `Variance2`, ...: variance of each level's mean.
-    pub variances: Vec<Vec<[f32; 3]>>,
+    pub variances: Vec<Picture>,
     /// `albedo`: reflectance at the first hit, 0 to 1.
-    pub albedo: Vec<[f32; 3]>,
+    pub albedo: Picture,
     /// `normal`: world-space unit normal at the first hit, zero on the background.
-    pub normal: Vec<[f32; 3]>,
+    pub normal: Picture,
     /// `depth`: distance along the path to the first hit; 1e9 and more (or not finite) is background.
     pub depth: Vec<f32>,
 }
@@ -30,11 +28,8 @@ impl LevelStack {
     /// # Errors
     /// There are no levels.
     pub fn of(set: &LayerSet) -> Result<LevelStack> {
-        let numbered = |stem: &str| {
-            let layers = (1..).map_while(|k| set.get(&format!("{stem}{k}")));
-            layers.map(Layer::triples).collect::<Vec<_>>()
-        };
-        let of_role = |role| set.find(role).map(Layer::triples).unwrap_or_default();
+        let numbered = |stem: &str| (1..).map_while(|k| set.picture(&format!("{stem}{k}"))).collect::<Vec<_>>();
+        let of_role = |role| set.find(role).map(|layer| set.picture_of(layer)).unwrap_or_default();
         let levels = numbered("Level");
         if levels.is_empty() {
             let error = Error::new(ErrorKind::Image, "", "the file has no bandwidth levels (Level1, Level2, ...)");
@@ -42,8 +37,7 @@ impl LevelStack {
         }
         let depth = set.find(Role::Depth).and_then(|layer| layer.planes.first());
         Ok(LevelStack {
-            width: set.width,
-            height: set.height,
+            size: set.size(),
             levels,
             variances: numbered("Variance"),
             albedo: of_role(Role::Albedo),
@@ -54,13 +48,10 @@ impl LevelStack {
 
     /// Checks that all planes are there, of one size, and that there are `expected` levels.
     pub(crate) fn check(&self, expected: usize) -> Result<()> {
-        let pixels = self.width.checked_mul(self.height).unwrap_or(0);
+        let Size { width, height } = self.size;
+        let pixels = width.checked_mul(height).unwrap_or(0);
         if pixels == 0 {
-            return Err(Error::new(
-                ErrorKind::Image,
-                "",
-                format!("an image of {} x {} pixels", self.width, self.height),
-            ));
+            return Err(Error::new(ErrorKind::Image, "", format!("an image of {width} x {height} pixels")));
         }
         let count = self.levels.len();
         if count != expected {
@@ -77,7 +68,7 @@ impl LevelStack {
         };
         for index in 0..count {
             plane(format!("Level{}", index + 1), self.levels[index].len())?;
-            plane(format!("Variance{}", index + 1), self.variances.get(index).map_or(0, Vec::len))?;
+            plane(format!("Variance{}", index + 1), self.variances.get(index).map_or(0, |plane| plane.len()))?;
         }
         plane("albedo".into(), self.albedo.len())?;
         plane("normal".into(), self.normal.len())?;
@@ -87,14 +78,14 @@ impl LevelStack {
     /// For every pixel whether all its levels are finite; only such pixels take part in equation (6).
     pub(crate) fn valid(&self) -> Vec<bool> {
         let at = |i: usize| self.levels.iter().all(|level| level[i].iter().all(|v| v.is_finite()));
-        (0..self.width * self.height).into_par_iter().map(at).collect()
+        (0..self.size.pixels()).into_par_iter().map(at).collect()
     }
 }
 
 /// Gives every pixel that is not valid its first finite level, else the mean of valid pixels of `image` no further than
 /// `radius` in x and y, else black.
-pub(crate) fn fill_invalid(stack: &LevelStack, valid: &[bool], radius: usize, image: &mut [[f32; 3]]) {
-    let (width, height) = (stack.width, stack.height);
+pub(crate) fn fill_invalid(stack: &LevelStack, valid: &[bool], radius: usize, image: &mut Picture) {
+    let Size { width, height } = stack.size;
     let replacement = |i: usize| {
         let own = stack.levels.iter().map(|level| level[i]).find(|rgb| rgb.iter().all(|v| v.is_finite()));
         own.unwrap_or_else(|| {

@@ -5,8 +5,9 @@
 
 use rayon::prelude::*;
 
-use super::rect::Rect;
+use super::map::Rect;
 use super::stack::LevelStack;
+use crate::film::Picture;
 use crate::stat::median;
 
 /// Version of channel order and scaling; a network states the one it was trained with.
@@ -66,7 +67,7 @@ impl Normalisation {
 
 /// The mean leaves out black pixels (how much background a picture has should not matter) and the brightest hundredth
 /// (a firefly should not either).
-fn exposure(level: Option<&Vec<[f32; 3]>>) -> f32 {
+fn exposure(level: Option<&Picture>) -> f32 {
     let luminance = |rgb: &[f32; 3]| {
         let [r, g, b] = rgb.map(finite);
         0.2126 * r + 0.7152 * g + 0.0722 * b
@@ -95,11 +96,11 @@ pub fn fill(stack: &LevelStack, normalisation: &Normalisation, rect: Rect) -> Ve
     // Rows of all channels are equal work: chunks of constant size whatever the number of threads.
     data.par_chunks_mut(width).enumerate().for_each(|(k, out)| {
         let (channel, y) = (order[k / rect.height()], rect.y0 + k % rect.height());
-        if y >= stack.height {
+        if y >= stack.size.height {
             return;
         }
-        let start = y * stack.width + rect.x0;
-        let count = width.min(stack.width.saturating_sub(rect.x0));
+        let start = y * stack.size.width + rect.x0;
+        let count = width.min(stack.size.width.saturating_sub(rect.x0));
         row(stack, normalisation, channel, start, &mut out[..count]);
     });
     data

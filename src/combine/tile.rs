@@ -5,8 +5,9 @@
 //! at multiples of the network's stride, so that its coarser grids fall on the same pixels in every tile; at the
 //! image's edge they end where the whole image does, so that zero padding acts in the same place.
 
+use super::map::Rect;
 use super::model::Facts;
-use super::rect::Rect;
+use crate::film::Size;
 
 /// A part of the image and what the network must see for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +19,7 @@ pub struct Tile {
 }
 
 /// Tiles of about `pixels` pixels each, whose cores cover the image once.
-pub fn tiles(width: usize, height: usize, facts: &Facts, pixels: usize) -> Vec<Tile> {
+pub fn tiles(Size { width, height }: Size, facts: &Facts, pixels: usize) -> Vec<Tile> {
     let side = pixels.isqrt();
     // A quarter wider than high: two by two tiles for a 16:9 picture at the usual size.
     let columns = spans(width, (side / 4).saturating_mul(5), facts);

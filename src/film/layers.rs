@@ -3,6 +3,7 @@
 //! A layer is a few planes, one per component, and `Level1.R` is the plane `R` of the layer `Level1`. The beauty is the
 //! layer with the empty name. A plane that stands alone in a file, such as `Z`, is the only plane `Z` of a layer `Z`.
 
+use super::picture::{Picture, Size};
 use crate::error::{Error, ErrorKind, Result};
 
 /// How a plane's values are stored in a file.
@@ -113,6 +114,11 @@ impl LayerSet {
         self.width * self.height
     }
 
+    /// Width and height.
+    pub fn size(&self) -> Size {
+        Size { width: self.width, height: self.height }
+    }
+
     /// Adds a layer, or replaces the one of that name.
     ///
     /// Errors: a plane whose size is not that of the picture.
@@ -159,13 +165,26 @@ impl LayerSet {
         exact.or_else(|| names.iter().skip(1).find_map(|name| self.layers.iter().find(|layer| last(layer, name))))
     }
 
-    /// The picture itself per pixel. Errors: there is none.
-    pub fn beauty(&self) -> Result<Vec<[f32; 3]>> {
+    /// The layer of exactly this name as a picture, see [`Layer::triples`].
+    pub fn picture(&self, name: &str) -> Option<Picture> {
+        self.get(name).map(|layer| self.picture_of(layer))
+    }
+
+    /// A layer of this set as a picture.
+    pub fn picture_of(&self, layer: &Layer) -> Picture {
+        Picture::new(self.size(), layer.triples())
+    }
+
+    /// The beauty.
+    ///
+    /// # Errors
+    /// No layer has the role [`Role::Beauty`].
+    pub fn beauty(&self) -> Result<Picture> {
         let layer = self.find(Role::Beauty).filter(|layer| !layer.planes.is_empty()).ok_or_else(|| {
             let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).take(8).collect();
             Error::new(ErrorKind::Image, "", format!("no picture among the layers ({})", names.join(", ")))
                 .hint("a picture has the channels R, G, B, or a layer named Combined, beauty or rgba")
         })?;
-        Ok(layer.triples())
+        Ok(self.picture_of(layer))
     }
 }

@@ -11,7 +11,8 @@
 //! there is counted.
 
 use super::Estimate;
-use super::window::{Size, window};
+use super::window::window;
+use crate::film::Picture;
 use rayon::prelude::*;
 
 /// `c`: how many standard errors a pixel may be moved.
@@ -26,8 +27,8 @@ const RANK: f32 = 0.8;
 ///
 /// A pixel takes over the standard errors of those around it alone whose estimate its own may be another sample of:
 /// beside a bright light its own samples say that it does not show the light.
-pub fn spread(estimate: &Estimate) -> Vec<[f32; 3]> {
-    let Estimate { size, mean, deviation, .. } = estimate;
+pub fn spread(estimate: &Estimate) -> Picture {
+    let Estimate { mean, deviation, .. } = estimate;
     let known = |value: f32| if value.is_finite() { value.max(0.0) } else { f32::INFINITY };
     let of_pixel = |ranked: &mut Vec<f32>, index: usize| {
         if estimate.is_exact(index) {
@@ -40,18 +41,18 @@ pub fn spread(estimate: &Estimate) -> Vec<[f32; 3]> {
                 if apart > LIMIT * error { 0.0 } else { error }
             };
             ranked.clear();
-            ranked.extend(window(*size, index, REACH).map(error_of));
+            ranked.extend(window(mean.size(), index, REACH).map(error_of));
             let rank = (RANK * (ranked.len() - 1) as f32).round() as usize;
             let (_, around, _) = ranked.select_nth_unstable_by(rank, f32::total_cmp);
             known(deviation[index][c]).max(*around)
         })
     };
-    (0..mean.len()).into_par_iter().map_init(Vec::new, of_pixel).collect()
+    Picture::new(mean.size(), (0..mean.len()).into_par_iter().map_init(Vec::new, of_pixel).collect())
 }
 
 /// The largest estimates within [`REACH`] of a pixel that are numbers; zero where there are none.
-pub fn brightest(mean: &[[f32; 3]], size: Size, index: usize) -> [f32; 3] {
-    window(size, index, REACH).fold([0.0; 3], |most, other| {
+pub fn brightest(mean: &Picture, index: usize) -> [f32; 3] {
+    window(mean.size(), index, REACH).fold([0.0; 3], |most, other| {
         std::array::from_fn(|c| if mean[other][c].is_finite() { most[c].max(mean[other][c]) } else { most[c] })
     })
 }
@@ -66,20 +67,10 @@ pub struct Clamped {
 }
 
 /// `mean` displaced towards `denoised` by at most [`LIMIT`] of `spread`; not below zero, not above the largest estimate
-/// within [`REACH`].
+/// within [`REACH`]. Also counts the pixels that zero or that largest estimate stopped.
 ///
 /// A value of `denoised` that is no number changes nothing; where `mean` is none, `denoised` stands alone.
-pub fn bounded(mean: &[[f32; 3]], denoised: &[[f32; 3]], spread: &[[f32; 3]], size: Size) -> Vec<[f32; 3]> {
-    bounded_and_counted(mean, denoised, spread, size).0
-}
-
-/// The same, with the pixels that were clamped.
-pub fn bounded_and_counted(
-    mean: &[[f32; 3]],
-    denoised: &[[f32; 3]],
-    spread: &[[f32; 3]],
-    size: Size,
-) -> (Vec<[f32; 3]>, Clamped) {
+pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture) -> (Picture, Clamped) {
     let displaced = |index: usize, c: usize| {
         let (m, d) = (mean[index][c], denoised[index][c]);
         match (m.is_finite(), d.is_finite()) {
@@ -93,19 +84,20 @@ pub fn bounded_and_counted(
         }
     };
     let of_pixel = |index: usize| {
-        let brightest = brightest(mean, size, index);
+        let brightest = brightest(mean, index);
         let free: [f32; 3] = std::array::from_fn(|c| displaced(index, c));
         let clamped = [(0..3).any(|c| free[c] < 0.0), (0..3).any(|c| free[c] > brightest[c])];
         (std::array::from_fn(|c| free[c].min(brightest[c]).max(0.0)), clamped)
     };
-    let (picture, clamped): (Vec<[f32; 3]>, Vec<[bool; 2]>) = (0..mean.len()).into_par_iter().map(of_pixel).unzip();
+    let (pixels, clamped): (Vec<[f32; 3]>, Vec<[bool; 2]>) = (0..mean.len()).into_par_iter().map(of_pixel).unzip();
     let [below_zero, too_bright] = [0, 1].map(|k: usize| clamped.iter().filter(|clamped| clamped[k]).count() as u64);
-    (picture, Clamped { below_zero, too_bright })
+    (Picture::new(mean.size(), pixels), Clamped { below_zero, too_bright })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Size;
     use crate::random::{Domain, Purpose, Stream};
 
     const SIZE: Size = Size { width: 40, height: 30 };
@@ -114,12 +106,16 @@ mod tests {
         Stream::new(seed, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel)
     }
 
-    fn plane(of: impl Fn(usize) -> f32) -> Vec<[f32; 3]> {
-        (0..SIZE.pixels()).map(|index| [of(index), 2.0 * of(index), 0.5 * of(index)]).collect()
+    fn plane(of: impl Fn(usize) -> f32 + Sync + Send) -> Picture {
+        Picture::from_fn(SIZE, |index| [of(index), 2.0 * of(index), 0.5 * of(index)])
     }
 
-    fn estimate(mean: &[[f32; 3]], deviation: Vec<[f32; 3]>) -> Estimate {
-        Estimate { size: SIZE, mean: mean.to_vec(), deviation, albedo: None, normal: None, alpha: None }
+    fn estimate(mean: &Picture, deviation: Picture) -> Estimate {
+        Estimate { mean: mean.clone(), deviation, albedo: None, normal: None, alpha: None }
+    }
+
+    fn bounded(mean: &Picture, denoised: &Picture, spread: &Picture) -> Picture {
+        displace(mean, denoised, spread).0
     }
 
     /// A denoiser that returns nonsense moves no pixel by more than the bound, and what it returns where it is not a
@@ -130,7 +126,7 @@ mod tests {
         let deviation = plane(|index| 0.01 + 0.01 * noise(2, index));
         let spread = spread(&estimate(&mean, deviation));
         for nonsense in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e30, 1e30, 0.0] {
-            let out = bounded(&mean, &plane(|_| nonsense), &spread, SIZE);
+            let out = bounded(&mean, &plane(|_| nonsense), &spread);
             for (index, out) in out.iter().enumerate() {
                 for c in 0..3 {
                     let (moved, most) = ((out[c] - mean[index][c]).abs(), LIMIT * spread[index][c]);
@@ -151,7 +147,7 @@ mod tests {
             let deviation = plane(|_| n.sqrt().recip());
             // Uniform noise of that deviation.
             let mean = plane(|index| 3.0 + (12f32 / n).sqrt() * (noise(n as u64, index) - 0.5));
-            let out = bounded(&mean, &wrong, &spread(&estimate(&mean, deviation)), SIZE);
+            let out = bounded(&mean, &wrong, &spread(&estimate(&mean, deviation)));
             out.iter().map(|out| f64::from((out[0] - 3.0).powi(2))).sum::<f64>() / SIZE.pixels() as f64
         };
         let slope = (error(1e5).ln() - error(1e3).ln()) / 100f64.ln();
@@ -166,15 +162,15 @@ mod tests {
         let mean = plane(|index| if index == at { 100.0 } else { 1.0 });
         let deviation = plane(|index| if index == at { 100.0 } else { 0.1 });
         let smeared = plane(|_| 5.0);
-        let out = bounded(&mean, &smeared, &spread(&estimate(&mean, deviation)), SIZE);
+        let out = bounded(&mean, &smeared, &spread(&estimate(&mean, deviation)));
         assert_eq!(out[at][0], 5.0);
         assert!(out.iter().enumerate().all(|(index, out)| index == at || out[0] < 1.31));
         // Nor is anything brighter than what was estimated around.
-        let far = bounded(&mean, &plane(|_| 1e6), &plane(|_| 1e6), SIZE);
+        let far = bounded(&mean, &plane(|_| 1e6), &plane(|_| 1e6));
         assert!(far.iter().all(|out| out[0] <= 100.0) && far[0][0] == 1.0);
-        let dark = bounded(&mean, &plane(|_| -1e6), &plane(|_| 1e6), SIZE);
+        let dark = bounded(&mean, &plane(|_| -1e6), &plane(|_| 1e6));
         assert!(dark.iter().flatten().all(|value| *value == 0.0));
-        let count = |value: f32| bounded_and_counted(&mean, &plane(|_| value), &plane(|_| 1e6), SIZE).1;
+        let count = |value: f32| displace(&mean, &plane(|_| value), &plane(|_| 1e6)).1;
         let pixels = SIZE.pixels() as u64;
         assert_eq!(count(-1e6), Clamped { below_zero: pixels, too_bright: 0 });
         assert_eq!(count(1e6), Clamped { below_zero: 0, too_bright: pixels });
@@ -186,7 +182,7 @@ mod tests {
     #[test]
     fn negative_estimates_do_not_get_through() {
         let mean = plane(|index| if index % 7 == 0 { -0.25 } else { 1.0 });
-        let (out, clamped) = bounded_and_counted(&mean, &mean, &plane(|_| 0.0), SIZE);
+        let (out, clamped) = displace(&mean, &mean, &plane(|_| 0.0));
         assert!(out.iter().flatten().all(|value| *value >= 0.0));
         assert_eq!(clamped.below_zero, (SIZE.pixels() as u64).div_ceil(7));
     }
@@ -195,9 +191,9 @@ mod tests {
     fn pictures_of_any_shape() {
         for (width, height) in [(0, 0), (1, 1), (1, 50), (50, 1), (3, 2)] {
             let size = Size { width, height };
-            let values = vec![[1.0; 3]; size.pixels()];
-            let estimate = Estimate { size, ..estimate(&values, values.clone()) };
-            assert_eq!(bounded(&values, &values, &spread(&estimate), size), values);
+            let values = Picture::filled(size, [1.0; 3]);
+            let estimate = estimate(&values, values.clone());
+            assert_eq!(bounded(&values, &values, &spread(&estimate)), values);
         }
     }
 
@@ -210,7 +206,7 @@ mod tests {
             let mean = plane(|index| if lit(index) { 1e6 } else { 0.2 });
             let deviation = plane(|index| if lit(index) { 1e5 } else { error });
             let spread = spread(&estimate(&mean, deviation));
-            let out = bounded(&mean, &plane(|_| 1.5), &spread, SIZE);
+            let out = bounded(&mean, &plane(|_| 1.5), &spread);
             let wall = out.iter().enumerate().filter(|(index, _)| !lit(*index));
             assert!(wall.map(|(_, out)| out[0]).all(|value| (value - 0.2).abs() <= LIMIT * error * 1.0001));
         }
@@ -233,7 +229,8 @@ mod tests {
     #[test]
     fn what_is_unknown_may_be_anything_and_no_estimate_is_replaced() {
         let size = Size { width: 2, height: 1 };
-        let out = bounded(&[[f32::NAN; 3], [4.0; 3]], &[[3.0; 3]; 2], &[[f32::INFINITY; 3], [0.0; 3]], size);
-        assert_eq!(out, [[3.0; 3], [4.0; 3]]);
+        let picture = |pixels: [f32; 2]| Picture::new(size, pixels.map(|value| [value; 3]).to_vec());
+        let out = bounded(&picture([f32::NAN, 4.0]), &picture([3.0; 2]), &picture([f32::INFINITY, 0.0]));
+        assert_eq!(out, picture([3.0, 4.0]));
     }
 }

@@ -8,6 +8,7 @@
 
 use super::Estimate;
 use super::bound::{LIMIT, brightest};
+use crate::film::Picture;
 use rayon::prelude::*;
 
 /// Light by channel.
@@ -25,9 +26,9 @@ fn significant(lost: f64, variance: f64, total: f64) -> f64 {
 
 /// A denoised picture within its bounds, and what they follow from.
 struct Balance<'a> {
-    picture: &'a [[f32; 3]],
-    mean: &'a [[f32; 3]],
-    denoised: &'a [[f32; 3]],
+    picture: &'a Picture,
+    mean: &'a Picture,
+    denoised: &'a Picture,
     estimate: &'a Estimate,
     /// The light that pixels are to get, all together; negative where they have too much.
     given: Light,
@@ -40,9 +41,9 @@ struct Balance<'a> {
 /// `estimate` and `spread` have the errors of the whole. No pixel ends farther from its estimate than [`LIMIT`] times
 /// its spread, or the root mean square error of pixels that show no more than noise.
 pub fn give_back(
-    picture: &mut [[f32; 3]],
-    (mean, denoised): (&[[f32; 3]], &[[f32; 3]]),
-    (estimate, spread): (&Estimate, &[[f32; 3]]),
+    picture: &mut Picture,
+    (mean, denoised): (&Picture, &Picture),
+    (estimate, spread): (&Estimate, &Picture),
 ) {
     let balance = Balance::of(picture, (mean, denoised), estimate);
     let wishes = balance.sum(|i, c| balance.wish(i, c));
@@ -54,7 +55,7 @@ pub fn give_back(
         if !balance.counts(i) {
             return picture[i];
         }
-        let brightest = brightest(mean, estimate.size, i);
+        let brightest = brightest(mean, i);
         std::array::from_fn(|c| {
             let of_wish = ratio(granted[c], wishes[c]) * balance.wish(i, c);
             let value = f64::from(picture[i][c]);
@@ -65,19 +66,14 @@ pub fn give_back(
             value.min(f64::from(brightest[c]).max(missed)).max(0.0) as f32
         })
     };
-    let changed: Vec<[f32; 3]> = (0..picture.len()).into_par_iter().map(changed).collect();
-    picture.copy_from_slice(&changed);
+    *picture = Picture::from_fn(picture.size(), changed);
 }
 
 /// Pixels that are summed together.
 const CHUNK: usize = 4096;
 
 impl<'a> Balance<'a> {
-    fn of(
-        picture: &'a [[f32; 3]],
-        (mean, denoised): (&'a [[f32; 3]], &'a [[f32; 3]]),
-        estimate: &'a Estimate,
-    ) -> Balance<'a> {
+    fn of(picture: &'a Picture, (mean, denoised): (&'a Picture, &'a Picture), estimate: &'a Estimate) -> Balance<'a> {
         let [given, missed] = [[0.0; 3]; 2];
         let balance = Balance { picture, mean, denoised, estimate, given, missed };
         let lost = balance.sum(|i, c| f64::from(mean[i][c]) - f64::from(picture[i][c]));
@@ -97,7 +93,7 @@ impl<'a> Balance<'a> {
 
     /// Whether all that is known of a pixel is a number, and noise.
     fn counts(&self, i: usize) -> bool {
-        let finite = |plane: &[[f32; 3]]| plane[i].iter().all(|value| value.is_finite());
+        let finite = |plane: &Picture| plane[i].iter().all(|value| value.is_finite());
         finite(self.mean) && finite(self.denoised) && finite(&self.estimate.deviation) && !self.estimate.is_exact(i)
     }
 
@@ -125,8 +121,8 @@ impl<'a> Balance<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::finish::Size;
-    use crate::finish::bound::{bounded, spread};
+    use crate::film::Size;
+    use crate::finish::bound::{displace, spread};
     use crate::random::{Domain, Purpose, Stream};
 
     const SIZE: Size = Size { width: 48, height: 40 };
@@ -141,18 +137,18 @@ mod tests {
             let of_one = 1.0 / (rate * SAMPLES as f32);
             [[unit * (0.1 + hits * of_one); 3], [unit * (0.01 + hits.sqrt() * of_one); 3]]
         };
-        let (mean, deviation) = (0..SIZE.pixels()).map(pixel).map(|[mean, error]| (mean, error)).unzip();
-        Estimate { size: SIZE, mean, deviation, albedo: None, normal: None, alpha: None }
+        let [mean, deviation] = [0, 1].map(|which| Picture::from_fn(SIZE, |index| pixel(index)[which]));
+        Estimate { mean, deviation, albedo: None, normal: None, alpha: None }
     }
 
-    fn mean(picture: &[[f32; 3]]) -> f32 {
+    fn mean(picture: &Picture) -> f32 {
         picture.iter().map(|rgb| rgb[1]).sum::<f32>() / picture.len() as f32
     }
 
     /// The picture within its bounds alone, and with the light given back, by a denoiser that returns a constant.
-    fn finished(estimate: &Estimate, constant: f32) -> [Vec<[f32; 3]>; 2] {
-        let (denoised, spread) = (vec![[constant; 3]; SIZE.pixels()], spread(estimate));
-        let within = bounded(&estimate.mean, &denoised, &spread, SIZE);
+    fn finished(estimate: &Estimate, constant: f32) -> [Picture; 2] {
+        let (denoised, spread) = (Picture::filled(SIZE, [constant; 3]), spread(estimate));
+        let (within, _) = displace(&estimate.mean, &denoised, &spread);
         let mut whole = within.clone();
         give_back(&mut whole, (&estimate.mean, &denoised), (estimate, &spread));
         [within, whole]
@@ -202,7 +198,7 @@ mod tests {
     fn it_is_consistent() {
         let apart = |n: f32| {
             let estimate = rare(0.5, 6, 1.0);
-            let deviation = estimate.deviation.iter().map(|rgb| rgb.map(|error| error / n.sqrt())).collect();
+            let deviation = estimate.deviation.map(|error| error / n.sqrt());
             let estimate = Estimate { deviation, ..estimate };
             let [_, whole] = finished(&estimate, 7.0);
             whole.iter().zip(&estimate.mean).map(|(out, mean)| (out[0] - mean[0]).powi(2)).fold(0.0, f32::max)

@@ -5,6 +5,7 @@ use super::Estimate;
 use super::bound::spread;
 use super::statistical;
 use crate::error::{Error, ErrorKind, Result};
+use crate::film::Picture;
 use crate::installed;
 use caustique_oidn as oidn;
 use serde::{Deserialize, Serialize};
@@ -81,28 +82,28 @@ impl Denoiser {
     ///
     /// # Errors
     /// [`ErrorKind::Library`] when Open Image Denoise fails.
-    pub fn run(&mut self, estimate: &Estimate, quality: Quality) -> Result<Vec<[f32; 3]>> {
-        let Estimate { size, mean, albedo, normal, .. } = estimate;
-        let (albedo, normal) = (albedo.as_deref(), normal.as_deref());
+    pub fn run(&mut self, estimate: &Estimate, quality: Quality) -> Result<Picture> {
+        let Estimate { mean, albedo, normal, .. } = estimate;
+        let (albedo, normal) = (albedo.as_ref(), normal.as_ref());
         match self {
             Denoiser::None => Ok(mean.clone()),
             Denoiser::Own => {
                 let spread = spread(estimate);
-                Ok(statistical::denoise(&statistical::Input { mean, spread: &spread, albedo, normal, size: *size }))
+                Ok(statistical::denoise(&statistical::Input { mean, spread: &spread, albedo, normal }))
             }
             Denoiser::Oidn { filter, .. } => {
-                let finite: Vec<[f32; 3]> = mean
-                    .iter()
-                    .map(|rgb| rgb.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 }))
-                    .collect();
+                let size = mean.size();
+                let finite = mean.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 });
                 let mut input = oidn::Input::new(size.width, size.height, &finite);
                 // Normals alone are no guide that it takes. Ours are averages over all eye paths: with `clean_aux` they
                 // served as well as denoised ones, and without it left 1.2 times the error.
-                input.albedo = albedo;
-                input.normal = normal.filter(|_| albedo.is_some());
+                input.albedo = albedo.map(|albedo| &**albedo);
+                input.normal = normal.filter(|_| albedo.is_some()).map(|normal| &**normal);
                 (input.hdr, input.clean_aux) = (true, albedo.is_some());
                 (input.quality, input.max_memory_mib) = (quality, Some(MEMORY_MIB));
-                filter.denoise(&input).map_err(|error| Error::new(ErrorKind::Library, "Open Image Denoise", error))
+                let pixels = filter.denoise(&input);
+                let pixels = pixels.map_err(|error| Error::new(ErrorKind::Library, "Open Image Denoise", error))?;
+                Ok(Picture::new(size, pixels))
             }
         }
     }

@@ -5,31 +5,32 @@
 //! to.
 
 use super::Estimate;
-use super::bound::bounded;
+use super::bound::displace;
 use super::conserve::give_back;
+use crate::film::Picture;
 use rayon::prelude::*;
 
 /// One part: its estimate and its denoised picture.
 pub struct Part {
     /// Estimate.
-    pub mean: Vec<[f32; 3]>,
+    pub mean: Picture,
     /// What the denoiser makes of it; the estimate itself where there is nothing to remove.
-    pub denoised: Vec<[f32; 3]>,
+    pub denoised: Picture,
 }
 
 /// Parts that sum to `whole`, in their order; estimate and spread are those of the whole picture.
 ///
 /// Where no part has light but the whole picture does, which is light that the denoiser has brought from around, the
 /// last takes it.
-pub fn shared(parts: &[Part], whole: &[[f32; 3]], (estimate, spread): (&Estimate, &[[f32; 3]])) -> Vec<Vec<[f32; 3]>> {
+pub fn split(parts: &[Part], whole: &Picture, (estimate, spread): (&Estimate, &Picture)) -> Vec<Picture> {
     let finish = |part: &Part| {
-        let mut picture = bounded(&part.mean, &part.denoised, spread, estimate.size);
+        let (mut picture, _) = displace(&part.mean, &part.denoised, spread);
         give_back(&mut picture, (&part.mean, &part.denoised), (estimate, spread));
         picture
     };
-    let mut finished: Vec<Vec<[f32; 3]>> = parts.iter().map(finish).collect();
+    let mut finished: Vec<Picture> = parts.iter().map(finish).collect();
     let Some((last, others)) = finished.split_last_mut() else { return finished };
-    let scale = |index: usize, c: usize, last: &[f32; 3], others: &[Vec<[f32; 3]>]| {
+    let scale = |index: usize, c: usize, last: &[f32; 3], others: &[Picture]| {
         let sum = f64::from(last[c]) + others.iter().map(|part| f64::from(part[index][c])).sum::<f64>();
         if sum > 0.0 { f64::from(whole[index][c]) / sum } else { 0.0 }
     };
@@ -55,27 +56,27 @@ pub fn shared(parts: &[Part], whole: &[[f32; 3]], (estimate, spread): (&Estimate
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::finish::Size;
+    use crate::film::Size;
     use crate::random::{Domain, Purpose, Stream};
 
     /// The whole picture, with the same standard error everywhere.
-    fn estimate(size: Size, mean: &[[f32; 3]], error: f32) -> Estimate {
-        let deviation = vec![[error; 3]; mean.len()];
-        Estimate { size, mean: mean.to_vec(), deviation, albedo: None, normal: None, alpha: None }
+    fn estimate(mean: &Picture, error: f32) -> Estimate {
+        let deviation = Picture::filled(mean.size(), [error; 3]);
+        Estimate { mean: mean.clone(), deviation, albedo: None, normal: None, alpha: None }
     }
 
     #[test]
     fn parts_sum_to_the_picture_and_are_never_negative() {
         let size = Size { width: 30, height: 20 };
-        let plane = |seed: u64| -> Vec<[f32; 3]> {
+        let plane = |seed: u64| {
             let draw = |index: usize| Stream::new(seed, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel);
-            (0..size.pixels()).map(|index| [draw(index), if index % 7 == 0 { 0.0 } else { draw(index) }, 0.0]).collect()
+            Picture::from_fn(size, |index| [draw(index), if index % 7 == 0 { 0.0 } else { draw(index) }, 0.0])
         };
         let part = |seed| Part { mean: plane(seed), denoised: plane(seed + 10) };
-        let parts = [part(1), part(2), Part { mean: vec![[0.0; 3]; size.pixels()], denoised: plane(20) }];
-        let (whole, spread) = (plane(3), vec![[0.1; 3]; size.pixels()]);
-        let estimate = estimate(size, &whole, 0.1);
-        let finished = shared(&parts, &whole, (&estimate, &spread));
+        let parts = [part(1), part(2), Part { mean: Picture::filled(size, [0.0; 3]), denoised: plane(20) }];
+        let (whole, spread) = (plane(3), Picture::filled(size, [0.1; 3]));
+        let estimate = estimate(&whole, 0.1);
+        let finished = split(&parts, &whole, (&estimate, &spread));
         for index in 0..size.pixels() {
             for c in 0..3 {
                 let sum: f32 = finished.iter().map(|part| part[index][c]).sum();
@@ -83,17 +84,18 @@ mod tests {
                 assert!(finished.iter().all(|part| part[index][c] >= 0.0));
             }
         }
-        assert!(shared(&[], &whole, (&estimate, &spread)).is_empty());
+        assert!(split(&[], &whole, (&estimate, &spread)).is_empty());
     }
 
     /// With standard errors of zero the parts are their estimates, which sum to the picture.
     #[test]
     fn sure_parts_stay() {
         let size = Size { width: 4, height: 4 };
-        let part = |value: f32| Part { mean: vec![[value; 3]; 16], denoised: vec![[9.0; 3]; 16] };
-        let whole = [[0.75; 3]; 16];
-        let sure = (&estimate(size, &whole, 0.0), &[[0.0; 3]; 16][..]);
-        let finished = shared(&[part(0.25), part(0.5)], &whole, sure);
-        assert_eq!(finished, [vec![[0.25; 3]; 16], vec![[0.5; 3]; 16]]);
+        let plane = |value: f32| Picture::filled(size, [value; 3]);
+        let part = |value: f32| Part { mean: plane(value), denoised: plane(9.0) };
+        let whole = plane(0.75);
+        let sure = (&estimate(&whole, 0.0), &plane(0.0));
+        let finished = split(&[part(0.25), part(0.5)], &whole, sure);
+        assert_eq!(finished, [plane(0.25), plane(0.5)]);
     }
 }

@@ -5,8 +5,8 @@
 //! surface is asked of albedo and normal (a joint bilateral weight). A first pass asks the noisy estimates, a second
 //! one the first's result, in which fainter differences show.
 
-use super::window::{Size, window};
-use rayon::prelude::*;
+use super::window::window;
+use crate::film::Picture;
 
 /// Pixels to each side of the window that is averaged.
 const REACH: usize = 8;
@@ -22,26 +22,25 @@ const APART: [f32; 2] = [3.0, 1.0];
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
     /// Estimates.
-    pub mean: &'a [[f32; 3]],
+    pub mean: &'a Picture,
     /// Standard errors ([`super::bound::spread`]).
-    pub spread: &'a [[f32; 3]],
+    pub spread: &'a Picture,
     /// Reflectances, or nothing.
-    pub albedo: Option<&'a [[f32; 3]]>,
+    pub albedo: Option<&'a Picture>,
     /// Unit normals, or nothing.
-    pub normal: Option<&'a [[f32; 3]]>,
-    /// Size of all planes.
-    pub size: Size,
+    pub normal: Option<&'a Picture>,
 }
 
 /// The denoised picture.
-pub fn denoise(input: &Input<'_>) -> Vec<[f32; 3]> {
+pub fn denoise(input: &Input<'_>) -> Picture {
     let first = pass(input, input.mean, APART[0]);
     pass(input, &first, APART[1])
 }
 
 /// Means of the estimates over neighbours whose `guide` differs by less than so many standard errors.
-fn pass(input: &Input<'_>, guide: &[[f32; 3]], apart: f32) -> Vec<[f32; 3]> {
-    let Input { mean, spread, albedo, normal, size } = *input;
+fn pass(input: &Input<'_>, guide: &Picture, apart: f32) -> Picture {
+    let Input { mean, spread, albedo, normal } = *input;
+    let size = mean.size();
     let of_pixel = |index: usize| {
         let (mut sum, mut total) = ([0f32; 3], 0f32);
         for other in window(size, index, REACH) {
@@ -55,7 +54,7 @@ fn pass(input: &Input<'_>, guide: &[[f32; 3]], apart: f32) -> Vec<[f32; 3]> {
             }
             let (dx, dy) = (index % size.width, index / size.width);
             let (dx, dy) = (dx.abs_diff(other % size.width) as f32, dy.abs_diff(other / size.width) as f32);
-            let feature = |plane: Option<&[[f32; 3]]>, scale: f32| {
+            let feature = |plane: Option<&Picture>, scale: f32| {
                 plane.map_or(0.0, |plane| distance2(plane[index], plane[other]) / (scale * scale))
             };
             let exponent = (dx * dx + dy * dy) / (NEAR * NEAR) + feature(albedo, ALBEDO) + feature(normal, NORMAL);
@@ -66,7 +65,7 @@ fn pass(input: &Input<'_>, guide: &[[f32; 3]], apart: f32) -> Vec<[f32; 3]> {
         }
         if total > 0.0 { sum.map(|sum| sum / total) } else { mean[index] }
     };
-    (0..mean.len()).into_par_iter().map(of_pixel).collect()
+    Picture::from_fn(size, of_pixel)
 }
 
 fn distance2(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -82,6 +81,7 @@ fn variance(a: [f32; 3], b: [f32; 3], apart: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Size;
     use crate::random::{Domain, Purpose, Stream};
 
     /// A step twice as bright on one side, with noise of a tenth: the noise goes, the step stays. Averages over 289
@@ -94,18 +94,18 @@ mod tests {
             let draw = Stream::new(1, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel);
             0.1 * 12f32.sqrt() * (draw - 0.5)
         };
-        let mean: Vec<[f32; 3]> = (0..size.pixels()).map(|index| [truth(index) + noise(index); 3]).collect();
-        let spread = vec![[0.1; 3]; size.pixels()];
-        let input = Input { mean: &mean, spread: &spread, albedo: None, normal: None, size };
-        let error = |picture: &[[f32; 3]]| {
+        let mean = Picture::from_fn(size, |index| [truth(index) + noise(index); 3]);
+        let spread = Picture::filled(size, [0.1; 3]);
+        let input = Input { mean: &mean, spread: &spread, albedo: None, normal: None };
+        let error = |picture: &Picture| {
             let squares = picture.iter().enumerate().map(|(index, value)| (value[0] - truth(index)).powi(2));
             (squares.sum::<f32>() / size.pixels() as f32).sqrt()
         };
         let (before, after) = (error(&mean), error(&denoise(&input)));
         assert!(after < 0.3 * before, "{before} to {after}");
         // Equal light on two surfaces of another colour stays apart.
-        let albedo: Vec<[f32; 3]> = (0..size.pixels()).map(|index| [0.4 * truth(index); 3]).collect();
-        let unsure = vec![[10.0; 3]; size.pixels()];
+        let albedo = Picture::from_fn(size, |index| [0.4 * truth(index); 3]);
+        let unsure = Picture::filled(size, [10.0; 3]);
         let guided = Input { albedo: Some(&albedo), spread: &unsure, ..input };
         let blurred = Input { albedo: None, ..guided };
         let (guided, blurred) = (error(&denoise(&guided)), error(&denoise(&blurred)));

@@ -1,22 +1,7 @@
 //! Windows of pixels around a pixel.
 
+use crate::film::Size;
 use rayon::prelude::*;
-
-/// Width and height of a picture in pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Size {
-    /// Pixels a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-}
-
-impl Size {
-    /// All pixels.
-    pub fn pixels(self) -> usize {
-        self.width * self.height
-    }
-}
 
 /// Indices of the pixels within `reach` of pixel `index` in x and y, itself among them, row by row; the picture's edge
 /// cuts windows off.

@@ -9,6 +9,7 @@ use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::tonemap::aces;
+use crate::film::{Picture, Size};
 use crate::math::{Rgb, luminance};
 
 /// Pixels a degree of the standard observer.
@@ -25,24 +26,23 @@ const DETECTOR_WIDTH: f32 = 0.082;
 /// Exponent of feature differences, FLIP 2020 section 4.2.
 const FEATURE_EXPONENT: f32 = 0.5;
 
-/// HDR-FLIP of `test` against `reference` per pixel, both scene-linear Rec. 709, `width * height` finite pixels each.
-/// Negative channels count as zero.
+/// HDR-FLIP of `test` against `reference` per pixel, both scene-linear Rec. 709, finite and of one
+/// size. Negative channels count as zero.
 ///
 /// Exposures go from the one that brings the reference's brightest pixel to 0.85 of the display to the one that does so
 /// with its median luminance (HDR-FLIP 2021 section 3.1), in steps of at most about one stop. Two cases the paper
 /// leaves open: if the median is zero, that of the luminances above zero takes its place; a black reference is looked
 /// at as it is.
-pub fn hdr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
+pub fn hdr(reference: &Picture, test: &Picture) -> Vec<f32> {
     let (first, last) = exposures(reference);
     let count = (last - first).ceil().max(2.0) as usize;
     let step = (last - first) / (count - 1) as f32;
     let detector = Detector::new();
-    let mut map = vec![0.0f32; width * height];
+    let mut map = vec![0.0f32; reference.len()];
     for i in 0..count {
         let scale = (first + i as f32 * step).exp2();
-        let expose = |c: &Rgb| Vec3::from_array((c.max(Vec3::ZERO) * scale).to_array().map(|v| aces(0.6 * v)));
-        let tonemapped = |image: &[Rgb]| image.par_iter().map(expose).collect::<Vec<_>>();
-        let ldr = detector.ldr(&tonemapped(reference), &tonemapped(test), width, height);
+        let tonemapped = |image: &Picture| image.map(|v| aces(0.6 * (v.max(0.0) * scale)));
+        let ldr = detector.ldr(&tonemapped(reference), &tonemapped(test));
         map.par_iter_mut().zip(ldr).for_each(|(worst, value)| *worst = worst.max(value));
         if step == 0.0 {
             break;
@@ -52,14 +52,15 @@ pub fn hdr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<
 }
 
 /// LDR-FLIP of `test` against `reference` per pixel, both display-linear Rec. 709 from 0 to 1.
-pub fn ldr(reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
-    let clamped = |image: &[Rgb]| image.iter().map(|c| c.clamp(Vec3::ZERO, Vec3::ONE)).collect::<Vec<_>>();
-    Detector::new().ldr(&clamped(reference), &clamped(test), width, height)
+pub fn ldr(reference: &Picture, test: &Picture) -> Vec<f32> {
+    let clamped = |image: &Picture| image.map(|v| v.clamp(0.0, 1.0));
+    Detector::new().ldr(&clamped(reference), &clamped(test))
 }
 
 /// First and last exposure in stops, HDR-FLIP 2021 section 3.1.
-fn exposures(reference: &[Rgb]) -> (f32, f32) {
-    let mut luminances: Vec<f32> = reference.iter().map(|c| luminance(c.max(Vec3::ZERO))).collect();
+fn exposures(reference: &Picture) -> (f32, f32) {
+    let mut luminances: Vec<f32> =
+        reference.iter().map(|rgb| luminance(Rgb::from_array(*rgb).max(Vec3::ZERO))).collect();
     luminances.sort_unstable_by(f32::total_cmp);
     let brightest = luminances.last().copied().unwrap_or(0.0);
     if brightest <= 0.0 {
@@ -134,9 +135,8 @@ impl Detector {
         }
     }
 
-    fn ldr(&self, reference: &[Rgb], test: &[Rgb], width: usize, height: usize) -> Vec<f32> {
-        let a = self.perceive(reference, width, height);
-        let b = self.perceive(test, width, height);
+    fn ldr(&self, reference: &Picture, test: &Picture) -> Vec<f32> {
+        let (a, b) = (self.perceive(reference), self.perceive(test));
         let knee = KNEE_FROM * self.largest;
         let pixel = |i: usize| {
             let difference = colour_distance(a.colour[i], b.colour[i]).powf(COLOUR_EXPONENT);
@@ -149,13 +149,14 @@ impl Detector {
             let feature = (feature * std::f32::consts::FRAC_1_SQRT_2).powf(FEATURE_EXPONENT);
             colour.powf(1.0 - feature)
         };
-        (0..width * height).into_par_iter().map(pixel).collect()
+        (0..reference.len()).into_par_iter().map(pixel).collect()
     }
 
-    /// What the eye makes of display-linear `image`: colours after its contrast sensitivity, edges and points.
-    fn perceive(&self, image: &[Rgb], width: usize, height: usize) -> Percept {
+    /// The display-linear `image` as an observer perceives it: colours after contrast sensitivity, edges and points.
+    fn perceive(&self, image: &Picture) -> Percept {
+        let Size { width, height } = image.size();
         let separable = |plane: &[f32], x: &[f32], y: &[f32]| vertical(&horizontal(plane, x, width), y, width, height);
-        let opponent: Vec<Vec3> = image.par_iter().map(|&c| ycxcz(c)).collect();
+        let opponent: Vec<Vec3> = image.par_iter().map(|rgb| ycxcz(Rgb::from_array(*rgb))).collect();
         let [y, cx, cz] = std::array::from_fn(|c| opponent.iter().map(|v| v[c]).collect::<Vec<f32>>());
         let fy = separable(&y, &self.achromatic, &self.achromatic);
         let fx = separable(&cx, &self.red_green, &self.red_green);

@@ -4,8 +4,7 @@ use serde::Serialize;
 
 use super::flip;
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::LayerSet;
-use crate::math::Rgb;
+use crate::film::{LayerSet, Picture, Size, channel_mean};
 use crate::memory;
 use crate::stat::{TRIMMED_SHARE, floor};
 
@@ -48,16 +47,12 @@ pub enum Floor {
 }
 
 impl Floor {
-    fn of(self, reference: &[[f32; 3]]) -> f64 {
+    fn of(self, reference: &Picture) -> f64 {
         match self {
             Floor::Papers => floor::ABSOLUTE,
-            Floor::Relative => floor::relative_to_mean(reference.iter().map(|r| mean(*r))),
+            Floor::Relative => reference.relative_floor(),
         }
     }
-}
-
-fn mean(r: [f32; 3]) -> f64 {
-    r.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0
 }
 
 /// The figures of a [`Comparison`] that need no look at neighbours.
@@ -74,11 +69,11 @@ pub struct Errors {
 }
 
 /// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is none.
-pub fn errors(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<Errors> {
+pub fn errors(a: &Picture, b: &Picture) -> Option<Errors> {
     errors_above(a, b, floor::ABSOLUTE)
 }
 
-fn errors_above(a: &[[f32; 3]], b: &[[f32; 3]], floor: f64) -> Option<Errors> {
+fn errors_above(a: &Picture, b: &Picture, floor: f64) -> Option<Errors> {
     let finite = |&i: &usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len().min(b.len())).filter(finite).collect();
     if pixels.is_empty() {
@@ -91,7 +86,7 @@ fn errors_above(a: &[[f32; 3]], b: &[[f32; 3]], floor: f64) -> Option<Errors> {
     relative.truncate(pixels.len() - (n * TRIMMED_SHARE) as usize);
     let relmse_trimmed = relative.iter().sum::<f64>() / relative.len() as f64;
     let mse = pixels.iter().map(|&i| squared_error(a[i], b[i])).sum::<f64>() / n;
-    let total = |image: &[[f32; 3]]| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
+    let total = |image: &Picture| pixels.iter().flat_map(|&i| image[i]).map(f64::from).sum::<f64>();
     let (sum_a, sum_b) = (total(a), total(b));
     Some(Errors { relmse, relmse_trimmed, mse, mean_ratio: (sum_b != 0.0).then(|| sum_a / sum_b) })
 }
@@ -103,7 +98,7 @@ pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 
 /// (mean of r over RGB)^2 + the floor.
 fn weight(r: [f32; 3], floor: f64) -> f64 {
-    mean(r).powi(2) + floor
+    channel_mean(r).powi(2) + floor
 }
 
 /// Mean over RGB of (x - r)^2.
@@ -118,14 +113,15 @@ pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 /// relMSE weighs; the mean over pixels and channels counts. White noise keeps 8/9 of its relMSE, an offset nothing.
 /// Pixels that are not finite in both pictures are left out, as neighbours too; `None` if there is no other, or if the
 /// sizes are not `width * height`.
-pub fn grain(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Option<f64> {
-    grain_above(a, b, (width, height), floor::ABSOLUTE)
+pub fn grain(a: &Picture, b: &Picture) -> Option<f64> {
+    grain_above(a, b, floor::ABSOLUTE)
 }
 
-fn grain_above(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize), floor: f64) -> Option<f64> {
-    if a.len() != width * height || b.len() != width * height {
+fn grain_above(a: &Picture, b: &Picture, floor: f64) -> Option<f64> {
+    if a.size() != b.size() {
         return None;
     }
+    let Size { width, height } = a.size();
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let error = |i: usize| -> Option<[f64; 3]> {
         finite(i).then(|| std::array::from_fn(|c| f64::from(a[i][c]) - f64::from(b[i][c])))
@@ -165,46 +161,45 @@ pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
 /// # Errors
 /// Those of [`compare`].
 pub fn compare_above(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Comparison> {
-    if (a.width, a.height) != (b.width, b.height) {
-        let cause = format!("pictures of {} x {} and {} x {} pixels", a.width, a.height, b.width, b.height);
-        return Err(Error::new(ErrorKind::Image, "", cause).hint("render both with the same --width and --height"));
-    }
+    check_sizes(a.size(), b.size())?;
     let bytes = (a.width as u64).saturating_mul(a.height as u64).saturating_mul(COMPARED_PIXEL_BYTES);
     if bytes >= memory::MIN_CHECKED_BYTES {
         let needed = memory::require(bytes, format_args!("comparing {} x {} pixels", a.width, a.height));
         needed.map_err(|e| e.hint("compare smaller pictures, or with more memory"))?;
     }
-    compare_values(&a.beauty()?, &b.beauty()?, (a.width, a.height), floor)
+    compare_pictures(&a.beauty()?, &b.beauty()?, floor)
 }
 
 /// Bytes of a pixel while two pictures are compared, besides those of the files: two pictures, twice as vectors and at an
 /// exposure, and what the eye makes of them.
 const COMPARED_PIXEL_BYTES: u64 = 200;
 
-/// Compares `a` with the reference `b`, `width * height` scene-linear pixels each, see [`compare`].
-pub fn compare_pixels(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Result<Comparison> {
-    compare_values(a, b, (width, height), Floor::Papers)
+fn check_sizes(a: Size, b: Size) -> Result<()> {
+    if a == b {
+        return Ok(());
+    }
+    let cause = format!("pictures of {} x {} and {} x {} pixels", a.width, a.height, b.width, b.height);
+    Err(Error::new(ErrorKind::Image, "", cause).hint("render both with the same --width and --height"))
 }
 
-fn compare_values(a: &[[f32; 3]], b: &[[f32; 3]], (width, height): (usize, usize), floor: Floor) -> Result<Comparison> {
-    if a.len() != width * height || b.len() != width * height {
-        let cause = format!("{} and {} values for {width} x {height} pixels", a.len(), b.len());
-        return Err(Error::new(ErrorKind::Image, "", cause));
-    }
+/// Compares the scene-linear picture `a` with the reference `b`, see [`compare`].
+///
+/// # Errors
+/// Sizes that differ; no pixel that is finite in both.
+pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor) -> Result<Comparison> {
+    check_sizes(a.size(), b.size())?;
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
     let floor = floor.of(b);
     let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
-        (errors_above(a, b, floor), grain_above(a, b, (width, height), floor))
+        (errors_above(a, b, floor), grain_above(a, b, floor))
     else {
         return Err(Error::new(ErrorKind::Image, "", "the pictures have no pixel with finite values in common"));
     };
 
     // FLIP filters over neighbours, so that a hole needs a value; black in both looks equal.
-    let filled = |image: &[[f32; 3]]| -> Vec<Rgb> {
-        (0..image.len()).map(|i| if finite(i) { Rgb::from_array(image[i]) } else { Rgb::ZERO }).collect()
-    };
-    let mut flip_map = flip::hdr(&filled(b), &filled(a), width, height);
+    let filled = |image: &Picture| Picture::from_fn(image.size(), |i| if finite(i) { image[i] } else { [0.0; 3] });
+    let mut flip_map = flip::hdr(&filled(b), &filled(a));
     let flip = pixels.iter().map(|&i| f64::from(flip_map[i])).sum::<f64>() / pixels.len() as f64;
     (0..a.len()).filter(|&i| !finite(i)).for_each(|i| flip_map[i] = 1.0);
     Ok(Comparison {

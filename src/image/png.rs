@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::{Error, ErrorKind, Result};
+use crate::film::{Picture, Size};
 use crate::image::atomic;
 use crate::image::tonemap::ToneMap;
 use crate::math::Rgb;
@@ -11,13 +12,13 @@ use crate::math::Rgb;
 /// [`atomic::write`]). What is not a number is black.
 ///
 /// Errors: a number of pixels that is not `width * height`, or none; the file system.
-pub fn write(path: &Path, width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>) -> Result<()> {
-    let bytes = encode(width, height, pixels).map_err(|error| error.within(path.display()))?;
+pub fn write(path: &Path, size: Size, pixels: impl IntoIterator<Item = Rgb>) -> Result<()> {
+    let bytes = encode(size, pixels).map_err(|error| error.within(path.display()))?;
     atomic::write_bytes(path, &bytes)
 }
 
 /// The bytes of such a file, see [`write()`].
-pub fn encode(width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>) -> Result<Vec<u8>> {
+pub fn encode(Size { width, height }: Size, pixels: impl IntoIterator<Item = Rgb>) -> Result<Vec<u8>> {
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     let bytes: Vec<u8> = pixels.into_iter().flat_map(|rgb| rgb.to_array().map(byte)).collect();
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok()).filter(|&(w, h)| w > 0 && h > 0);
@@ -30,14 +31,7 @@ pub fn encode(width: usize, height: usize, pixels: impl IntoIterator<Item = Rgb>
     Ok(encoded.into_inner())
 }
 
-/// Writes scene-linear Rec. 709 `pixels` after an exposure of `ev` stops and a tone curve, see [`write()`].
-pub fn write_tonemapped(
-    path: &Path,
-    width: usize,
-    height: usize,
-    pixels: &[[f32; 3]],
-    ev: f32,
-    curve: ToneMap,
-) -> Result<()> {
-    write(path, width, height, pixels.iter().map(|&rgb| curve.display(rgb.into(), ev)))
+/// Writes a scene-linear Rec. 709 picture after an exposure of `ev` stops and a tone curve, see [`write()`].
+pub fn write_tonemapped(path: &Path, picture: &Picture, ev: f32, curve: ToneMap) -> Result<()> {
+    write(path, picture.size(), picture.iter().map(|&rgb| curve.display(rgb.into(), ev)))
 }

@@ -194,7 +194,7 @@ impl RenderOptions {
 
     /// The finish of auto's pilots.
     pub fn pilot_finish(&self) -> Finish {
-        Finish::of_pilots(self.denoiser())
+        Finish::for_pilots(self.denoiser())
     }
 
     /// The finish of a pilot that predicts the error of the render: as the render's, but without a network.

@@ -4,6 +4,7 @@ use super::process::{self, End, Stop};
 use super::python::Interpreter;
 use super::{Peer, Renderer};
 use crate::error::{Error, ErrorKind, Result};
+use crate::film::{Picture, Size};
 use crate::image::exr;
 use crate::temporary;
 use serde::Deserialize;
@@ -45,8 +46,8 @@ pub struct Task {
 /// A render that was made.
 #[derive(Clone, Debug)]
 pub struct Rendering {
-    /// The picture, row by row from the top.
-    pub picture: Vec<[f32; 3]>,
+    /// The picture.
+    pub picture: Picture,
     /// Wall-clock seconds of rendering.
     pub seconds: f64,
     /// Core-seconds of rendering.
@@ -182,9 +183,9 @@ impl Drivers {
         }
     }
 
-    fn picture(&self, file: &Path) -> Result<Vec<[f32; 3]>> {
+    fn picture(&self, file: &Path) -> Result<Picture> {
         let (set, _) = exr::read(file)?;
-        let (width, height) = (self.size.0 as usize, self.size.1 as usize);
+        let Size { width, height } = self.size.into();
         if (set.width, set.height) != (width, height) {
             let cause = format!("a picture of {} x {} pixels, not {width} x {height}", set.width, set.height);
             return Err(Error::new(ErrorKind::Image, "", cause));

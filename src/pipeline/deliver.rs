@@ -7,7 +7,7 @@ use super::{Ready, Watch};
 use crate::error::{Error, Result};
 use crate::estimator::PixelAccumulator;
 use crate::film::{LayerSet, Naming, Selection};
-use crate::finish::{Account, ERROR, Verdict, reads};
+use crate::finish::{ERROR, Finished, FinishedError, reads};
 use crate::image::exr::{self, Attributes};
 use crate::render::{Accuracy, CONFIDENCE, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
@@ -25,7 +25,7 @@ pub struct Delivery {
     /// Pictures per sampling technique, if they were asked for.
     pub techniques: Vec<TechniquePicture>,
     /// What finished the picture, and what it did.
-    pub finished: Option<(String, Account)>,
+    pub finished: Option<(String, Finished)>,
     /// The error of the finished picture and what half of it costs, where its quarters tell.
     pub reached: Option<Reached>,
     /// Where that error is.
@@ -99,7 +99,7 @@ pub(super) fn deliver(
     }
     let applied = ready.map(|ready| {
         let mut account = ready.finish().apply(&mut set, |name| name == ERROR || selection.wants(name))?;
-        account.verdict = account.verdict.map(|verdict| Verdict { unseen: unseen.squared, ..verdict });
+        account.error = account.error.map(|error| FinishedError { unseen: unseen.squared, ..error });
         Ok((ready.name(), ready.facts(&account), account))
     });
     let finishing = clock.seconds();
@@ -107,18 +107,15 @@ pub(super) fn deliver(
         Ok(finished) => (finished, None),
         Err(error) => (None, Some(error)),
     };
-    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account.verdict));
+    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account.error));
     let error = of_finished.as_ref().map(Reached::error).or(of_estimate);
     let unseen = unseen.sentence(&settings).filter(|_| error.is_some_and(|error| unseen.rules(error)));
     if let Some(sentence) = &unseen {
         warnings.push(sentence);
         header.insert("warnings".into(), json!(warnings));
     }
-    let errors = finished.as_mut().and_then(|(_, _, account)| account.errors.take());
-    let worst = errors.map(|errors| {
-        let squared: Vec<[f32; 3]> = errors.squared().collect();
-        Worst::of(&squared, &errors.weight, &set, &seen)
-    });
+    let errors = finished.as_mut().and_then(|(_, _, account)| account.error_map.take());
+    let worst = errors.map(|errors| Worst::of(&errors.squared(), &errors.weight, &set, &seen));
     layers::add_dark(selection, &facts.shape, finishes, &mut set)?;
     // A render that is still to be finished keeps what that reads, and a shard has what it can have.
     if keep {
@@ -167,10 +164,10 @@ pub struct Reached {
 
 impl Reached {
     /// By a history and what the finish has told at its end; `None` where nothing is known.
-    fn of(mut history: Vec<History>, verdict: Option<Verdict>) -> Option<Reached> {
+    fn of(mut history: Vec<History>, error: Option<FinishedError>) -> Option<Reached> {
         let last = history.last_mut()?;
-        if verdict.is_some() {
-            last.finished = verdict;
+        if error.is_some() {
+            last.finished = error;
         }
         let last = *last;
         Some(Reached { accuracy: Accuracy::of(&history)?, history, last })
@@ -237,22 +234,22 @@ impl Reached {
 }
 
 /// What the finish of a stored picture has told of its error, in its header; nothing where the picture has no quarters.
-pub fn tell_stored(header: &mut Map<String, Value>, account: &Account) {
+pub fn tell_stored(header: &mut Map<String, Value>, account: &Finished) {
     let iterations = header.get("iterations").and_then(Value::as_u64).unwrap_or(1).max(1);
     let last = header.get("history").and_then(Value::as_array).and_then(|moments| moments.last());
     let number = |key: &str| last.and_then(|last| last.get(key)).and_then(Value::as_f64);
     let timed = number("seconds").is_some();
     let unseen = header.get("unseen").and_then(|unseen| unseen.get("error")).and_then(Value::as_f64).unwrap_or(0.0);
-    let verdict = account.verdict.map(|verdict| Verdict { unseen: unseen * unseen, ..verdict });
+    let error = account.error.map(|error| FinishedError { unseen: unseen * unseen, ..error });
     let history = History {
         seconds: number("seconds").unwrap_or(0.0),
         cpu_seconds: number("cpu_seconds").unwrap_or(0.0),
         iterations,
         light_paths: 0,
         estimate: None,
-        finished: verdict,
+        finished: error,
     };
-    if let Some(reached) = Reached::of(vec![history], verdict) {
+    if let Some(reached) = Reached::of(vec![history], error) {
         reached.tell(header, !timed);
     }
 }

@@ -3,7 +3,8 @@
 use crate::combine::{Combiner, Model, Runtime};
 use crate::error::{Error, Result};
 use crate::film::LayerSet;
-use crate::finish::{Account, Denoiser, DenoiserChoice, Finish, Quality, Size};
+use crate::film::Size;
+use crate::finish::{Denoiser, DenoiserChoice, Finish, Finished, Quality};
 use crate::render::Clock;
 use serde_json::{Value, json};
 
@@ -84,9 +85,9 @@ impl Ready {
         let small = Size { width: TIMED, height: TIMED };
         let mut time = |quality: Quality| -> Result<f64> {
             // The first run loads what the second finds ready.
-            self.finish.rehearse(small, quality)?;
+            self.finish.warm_up(small, quality)?;
             let clock = Clock::start();
-            self.finish.rehearse(small, quality)?;
+            self.finish.warm_up(small, quality)?;
             Ok(clock.seconds() * pixels as f64 / small.pixels() as f64)
         };
         let fast = time(Quality::Fast)?;
@@ -131,7 +132,7 @@ impl Ready {
     }
 
     /// What the header says of it.
-    pub fn facts(&self, account: &Account) -> Value {
+    pub fn facts(&self, account: &Finished) -> Value {
         let quality = match self.finish.quality {
             Quality::High => "high",
             Quality::Balanced => "balanced",
@@ -144,7 +145,7 @@ impl Ready {
             "levels": account.combined,
             "training": self.model.as_ref().map(|network| &network.training),
             "clamped": {"below_zero": account.clamped.below_zero, "too_bright": account.clamped.too_bright},
-            "error_at_half": account.verdict.map(|verdict| verdict.noise.max(0.0).sqrt()),
+            "error_at_half": account.error.map(|error| error.noise.max(0.0).sqrt()),
         })
     }
 }

@@ -39,7 +39,7 @@ pub(super) fn judge(
     let mut spent = Spent::default();
     let judged = spent.during(|| {
         let set = session.layers(reads_for_error)?;
-        ready.finish().verdict(&set)
+        ready.finish().estimate_error(&set)
     });
     session.charge(spent);
     session.judged(judged?);

@@ -55,7 +55,7 @@ pub fn outlook(
         if done == next || over {
             next = 2 * done;
             let set = session.layers(reads_for_error)?;
-            session.judged(finish.verdict(&set)?);
+            session.judged(finish.estimate_error(&set)?);
         }
         if over {
             break;

@@ -6,8 +6,8 @@
 
 use super::layers::Named;
 use crate::estimator::PixelAccumulator;
-use crate::film::{Layer, LayerSet};
-use crate::finish::{Size, Windows};
+use crate::film::{LayerSet, Picture};
+use crate::finish::Windows;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -120,11 +120,10 @@ impl Holders {
 
 impl Worst {
     /// By squared errors, what makes them relative, the layers of the kinds of light, and what is seen.
-    pub(super) fn of(squared: &[[f32; 3]], weight: &[f32], set: &LayerSet, seen: &Seen) -> Worst {
-        let size = Size { width: set.width, height: set.height };
+    pub(super) fn of(squared: &Picture, weight: &[f32], set: &LayerSet, seen: &Seen) -> Worst {
         let relative: Vec<f64> =
             squared.iter().zip(weight).map(|(rgb, weight)| f64::from(rgb.iter().sum::<f32>() / 3.0 * weight)).collect();
-        let shares = shares(set, size);
+        let (size, shares) = (set.size(), shares(set));
         let object = |i: usize| seen.of_pixels.get(i).copied().flatten();
         let side = size.width.max(size.height).div_ceil(TILES).max(1);
         let across = size.width.div_ceil(side);
@@ -159,15 +158,15 @@ impl Worst {
 }
 
 /// The share of each kind of light in a pixel's noise.
-fn shares(set: &LayerSet, size: Size) -> Vec<[f32; LIGHTS.len()]> {
-    let albedo = set.get("albedo").map(Layer::triples);
+fn shares(set: &LayerSet) -> Vec<[f32; LIGHTS.len()]> {
+    let size = set.size();
+    let albedo = set.picture("albedo");
     let albedo = |i: usize, c: usize| albedo.as_ref().map_or(1.0, |albedo| albedo[i][c].max(0.0) + DARK);
     let all = vec![true; size.pixels()];
     let noise = |(layer, _): (&str, &str)| -> Option<Vec<[f32; 1]>> {
-        let light = set.get(layer)?.triples();
+        let light = set.picture(layer)?;
         let finite = |value: f32| if value.is_finite() { value } else { 0.0 };
-        let plain = |i: usize| std::array::from_fn(|c| finite(light[i][c]) / albedo(i, c));
-        let plain: Vec<[f32; 3]> = (0..size.pixels()).into_par_iter().map(plain).collect();
+        let plain = Picture::from_fn(size, |i| std::array::from_fn(|c| finite(light[i][c]) / albedo(i, c)));
         let smooth = Windows::new(size, 1, &all).means(&plain);
         let grain = |i: usize| [(0..3).map(|c| ((plain[i][c] - smooth[i][c]) * albedo(i, c)).powi(2)).sum::<f32>()];
         let grain: Vec<[f32; 1]> = (0..size.pixels()).into_par_iter().map(grain).collect();
@@ -185,6 +184,7 @@ fn shares(set: &LayerSet, size: Size) -> Vec<[f32; LIGHTS.len()]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::{Layer, Size};
 
     /// A lamp of glass on the left with rough caustics, a floor on the right with a little rough direct light.
     #[test]
@@ -192,7 +192,7 @@ mod tests {
         let (width, height) = (80, 40);
         let left = |i: usize| i % width < width / 2;
         let rough = |i: usize, of: f32| of * if (i * 7919) % 13 < 6 { 1.0 } else { 0.5 };
-        let light = |of: &dyn Fn(usize) -> f32| (0..width * height).map(|i| [of(i); 3]).collect::<Vec<_>>();
+        let light = |of: &(dyn Fn(usize) -> f32 + Sync)| Picture::from_fn(Size { width, height }, |i| [of(i); 3]);
         let mut set = LayerSet::new(width, height);
         for (name, values) in [
             ("Caustic", light(&|i| if left(i) { rough(i, 2.0) } else { 0.0 })),
@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn a_picture_without_light_has_no_worst() {
         let set = LayerSet::new(3, 2);
-        let worst = Worst::of(&[[0.0; 3]; 6], &[1.0; 6], &set, &Seen::default());
+        let worst = Worst::of(&Picture::filled(set.size(), [0.0; 3]), &[1.0; 6], &set, &Seen::default());
         assert_eq!(worst, Worst { by: vec![], tiles: vec![] });
     }
 }

@@ -1,6 +1,7 @@
 //! Parts of pictures side by side: where the runs differ most.
 
 use crate::error::Result;
+use crate::film::{Picture, Size};
 use crate::image::tonemap::ToneMap;
 use crate::image::{heat, png, relative_squared_error};
 use std::ops::Range;
@@ -20,12 +21,12 @@ pub struct Window {
 
 impl Window {
     /// All of a picture.
-    pub fn whole(width: usize, height: usize) -> Window {
+    pub fn whole(Size { width, height }: Size) -> Window {
         Window { x: 0, y: 0, width, height }
     }
 
     /// Whether it lies within a picture and is not empty.
-    pub fn fits(&self, width: usize, height: usize) -> bool {
+    pub fn fits(&self, Size { width, height }: Size) -> bool {
         let within = |start: usize, length: usize, size: usize| {
             length > 0 && start.checked_add(length).is_some_and(|end| end <= size)
         };
@@ -39,6 +40,11 @@ impl Window {
             && cross(span(self.y, self.height), span(other.y, other.height))
     }
 
+    fn size(self) -> Size {
+        Size { width: self.width, height: self.height }
+    }
+
+    /// Indices of its pixels in a picture of this width.
     fn indices(self, width: usize) -> impl Iterator<Item = usize> {
         (self.y..self.y + self.height).flat_map(move |y| (self.x..self.x + self.width).map(move |x| y * width + x))
     }
@@ -61,12 +67,12 @@ fn relative_error(x: [f32; 3], r: [f32; 3]) -> f64 {
 
 /// Up to `count` windows, apart from each other, in which the mean error of the worst picture exceeds that of the best
 /// by most; with one picture those in which it is largest.
-pub fn choose(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], size: (usize, usize), count: usize) -> Vec<Window> {
-    let (width, height) = size;
+pub fn choose(pictures: &[Picture], reference: &Picture, count: usize) -> Vec<Window> {
+    let Size { width, height } = reference.size();
     let least = width.min(height);
     let side = (least / 4).clamp(least.min(24), least.min(160));
     let (w, h) = (side, side);
-    let tables: Vec<Vec<f64>> = pictures.iter().map(|picture| integral(picture, reference, width)).collect();
+    let tables: Vec<Vec<f64>> = pictures.iter().map(|picture| integral(picture, reference)).collect();
     let sum = |table: &Vec<f64>, x: usize, y: usize| {
         let at = |x: usize, y: usize| table[y * (width + 1) + x];
         at(x + w, y + h) - at(x, y + h) - at(x + w, y) + at(x, y)
@@ -92,7 +98,8 @@ pub fn choose(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], size: (usize, 
 }
 
 /// Sums of relative errors over all rectangles that begin in the corner, one row and column more than pixels.
-fn integral(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize) -> Vec<f64> {
+fn integral(picture: &Picture, reference: &Picture) -> Vec<f64> {
+    let width = reference.size().width;
     let mut table = vec![0.0; width + 1];
     for (row, reference) in picture.chunks(width).zip(reference.chunks(width)) {
         let above = table.len() - (width + 1);
@@ -108,8 +115,8 @@ fn integral(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize) -> Vec<f
 
 /// The relative error that is shown as the largest: the 95th percentile over all pictures within the windows, so that
 /// fireflies do not turn all else black.
-pub fn scale(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], width: usize, windows: &[Window]) -> f64 {
-    let pixels = windows.iter().flat_map(|window| window.indices(width));
+pub fn scale(pictures: &[Picture], reference: &Picture, windows: &[Window]) -> f64 {
+    let pixels = windows.iter().flat_map(|window| window.indices(reference.size().width));
     let mut errors: Vec<f64> =
         pixels.flat_map(|i| pictures.iter().map(move |picture| relative_error(picture[i], reference[i]))).collect();
     errors.sort_unstable_by(f64::total_cmp);
@@ -120,24 +127,18 @@ pub fn scale(pictures: &[Vec<[f32; 3]>], reference: &[[f32; 3]], width: usize, w
 ///
 /// # Errors
 /// None for a window within the picture.
-pub fn picture(pixels: &[[f32; 3]], width: usize, window: Window, look: Look) -> Result<Vec<u8>> {
-    let shown = window.indices(width).map(|i| look.tonemap.display(pixels[i].into(), look.exposure));
-    png::encode(window.width, window.height, shown)
+pub fn picture(picture: &Picture, window: Window, look: Look) -> Result<Vec<u8>> {
+    let pixels = window.indices(picture.size().width);
+    png::encode(window.size(), pixels.map(|i| look.tonemap.display(picture[i].into(), look.exposure)))
 }
 
 /// The relative error in a window as a heat map, `largest` being the palest.
 ///
 /// # Errors
 /// None for a window within the picture.
-pub fn heat_map(
-    pixels: &[[f32; 3]],
-    reference: &[[f32; 3]],
-    width: usize,
-    window: Window,
-    largest: f64,
-) -> Result<Vec<u8>> {
-    let shown = window.indices(width).map(|i| heat::magma((relative_error(pixels[i], reference[i]) / largest) as f32));
-    png::encode(window.width, window.height, shown)
+pub fn heat_map(picture: &Picture, reference: &Picture, window: Window, largest: f64) -> Result<Vec<u8>> {
+    let error = |i: usize| relative_error(picture[i], reference[i]) / largest;
+    png::encode(window.size(), window.indices(reference.size().width).map(|i| heat::magma(error(i) as f32)))
 }
 
 /// The colours of heat maps from left to right.
@@ -145,7 +146,7 @@ pub fn heat_map(
 /// # Errors
 /// None.
 pub fn heat_bar() -> Result<Vec<u8>> {
-    png::encode(256, 1, (0..256).map(|i| heat::magma(i as f32 / 255.0)))
+    png::encode(Size { width: 256, height: 1 }, (0..256).map(|i| heat::magma(i as f32 / 255.0)))
 }
 
 #[cfg(test)]
@@ -154,23 +155,23 @@ mod tests {
 
     #[test]
     fn the_windows_are_where_pictures_differ_and_apart() {
-        let (width, height) = (96, 64);
-        let reference = vec![[1.0; 3]; width * height];
+        let size = Size { width: 96, height: 64 };
+        let reference = Picture::filled(size, [1.0; 3]);
         let with = |x: Range<usize>, y: Range<usize>, value: f32| {
-            let mut picture = vec![[1.1; 3]; width * height];
-            y.for_each(|y| x.clone().for_each(|x| picture[y * width + x] = [value; 3]));
+            let mut picture = Picture::filled(size, [1.1; 3]);
+            y.for_each(|y| x.clone().for_each(|x| picture[y * size.width + x] = [value; 3]));
             picture
         };
         let pictures = [with(60..70, 30..40, 1.6), with(10..16, 5..11, 1.3)];
-        let windows = choose(&pictures, &reference, (width, height), 2);
+        let windows = choose(&pictures, &reference, 2);
         let holds =
             |w: &Window, x: usize, y: usize| (w.x..w.x + w.width).contains(&x) && (w.y..w.y + w.height).contains(&y);
         assert_eq!(windows.len(), 2);
         assert!(holds(&windows[0], 65, 35) && holds(&windows[1], 13, 8), "{windows:?}");
-        assert!(!windows[0].meets(&windows[1]) && windows.iter().all(|w| w.fits(width, height)));
-        assert!(!Window { x: 90, y: 0, width: 7, height: 1 }.fits(width, height));
-        assert!(!Window { x: usize::MAX, y: 0, width: 7, height: 1 }.fits(width, height));
-        let largest = scale(&pictures, &reference, width, &[Window::whole(width, height)]);
+        assert!(!windows[0].meets(&windows[1]) && windows.iter().all(|w| w.fits(size)));
+        assert!(!Window { x: 90, y: 0, width: 7, height: 1 }.fits(size));
+        assert!(!Window { x: usize::MAX, y: 0, width: 7, height: 1 }.fits(size));
+        let largest = scale(&pictures, &reference, &[Window::whole(size)]);
         assert!((0.09..0.61).contains(&largest), "{largest}");
     }
 }

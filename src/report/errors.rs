@@ -5,11 +5,10 @@ use super::crop::heat_bar;
 use super::number::short;
 use super::page::{data_url, document};
 use crate::error::Result;
-use crate::film::{Layer, LayerSet};
+use crate::film::{LayerSet, Picture, channel_mean};
 use crate::finish::ERROR;
 use crate::image::tonemap::ToneMap;
 use crate::image::{Comparison, heat, png};
-use crate::stat::floor;
 use maud::{Markup, html};
 
 /// Share of the pixels whose errors the scale has room for, so that fireflies do not turn all else black.
@@ -21,24 +20,23 @@ const SHOWN: f64 = 0.95;
 /// There is no picture in one of them.
 pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison: &Comparison) -> Result<String> {
     let (pixels, truth) = (image.beauty()?, reference.beauty()?);
-    let value = |rgb: &[f32; 3]| rgb.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
-    let floor = floor::relative_to_mean(truth.iter().map(value));
+    let floor = truth.relative_floor();
     // Of a pixel, whose squared error is given by channel.
-    let relative = |square: f64, worth: &[f32; 3]| (square / 3.0 / (value(worth).powi(2) + floor)).sqrt() as f32;
+    let relative =
+        |square: f64, worth: &[f32; 3]| (square / 3.0 / (channel_mean(*worth).powi(2) + floor)).sqrt() as f32;
     let distance =
         |(a, b): (&[f32; 3], &[f32; 3])| relative((0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum(), b);
     let found: Vec<f32> = pixels.iter().zip(&truth).map(distance).collect();
-    let told = image.get(ERROR).map(Layer::triples).map(|told| -> Vec<f32> {
+    let told = image.picture(ERROR).map(|told| -> Vec<f32> {
         let squares = told.iter().map(|error| error.iter().map(|e| f64::from(*e).powi(2)).sum::<f64>());
         squares.zip(&truth).map(|(square, worth)| relative(square, worth)).collect()
     });
     let largest = scale(found.iter().chain(told.iter().flatten()).copied());
-    let size = (image.width, image.height);
-    let look = |pixels: &[[f32; 3]]| {
-        png::encode(size.0, size.1, pixels.iter().map(|rgb| ToneMap::default().display((*rgb).into(), 0.0)))
+    let look = |pixels: &Picture| {
+        png::encode(pixels.size(), pixels.iter().map(|rgb| ToneMap::default().display((*rgb).into(), 0.0)))
     };
     let map = |errors: &[f32], largest: f32| {
-        png::encode(size.0, size.1, errors.iter().map(|error| heat::magma(error / largest)))
+        png::encode(image.size(), errors.iter().map(|error| heat::magma(error / largest)))
     };
     let bar = data_url(&heat_bar()?);
     let percents = |largest: f32| [0.0, 0.5, 1.0].map(|part| format!("{} %", short(100.0 * f64::from(part * largest))));
@@ -90,6 +88,7 @@ fn scale(errors: impl Iterator<Item = f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Layer;
     use crate::image::compare;
 
     #[test]

@@ -6,8 +6,8 @@ use super::point::Point;
 use super::reference::Reference;
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::film::Layer;
-use crate::finish::{Denoiser, Estimate, Quality, Size};
+use crate::film::Picture;
+use crate::finish::{Denoiser, Estimate, Quality};
 use crate::image::errors;
 use crate::peers::{Answer, Drivers, Peer, Rendering, Task};
 use crate::render::{Method, Session, Settings, Spent, Stage};
@@ -38,9 +38,9 @@ pub struct Denoising {
     /// Open Image Denoise.
     pub denoiser: Denoiser,
     /// Albedo.
-    pub albedo: Option<Vec<[f32; 3]>>,
+    pub albedo: Option<Picture>,
     /// Normal.
-    pub normal: Option<Vec<[f32; 3]>>,
+    pub normal: Option<Picture>,
 }
 
 impl Denoising {
@@ -56,16 +56,15 @@ impl Denoising {
             session.step();
         });
         let set = session.layers(|name| ["albedo", "normal"].contains(&name))?;
-        let [albedo, normal] = ["albedo", "normal"].map(|name| set.get(name).map(Layer::triples));
+        let [albedo, normal] = ["albedo", "normal"].map(|name| set.picture(name));
         Ok(Denoising { denoiser, albedo, normal })
     }
 
     /// The denoised picture, and what that took.
-    fn run(&mut self, picture: &[[f32; 3]], (width, height): (usize, usize)) -> Result<(Vec<[f32; 3]>, Spent)> {
+    fn run(&mut self, picture: &Picture) -> Result<(Picture, Spent)> {
         let estimate = Estimate {
-            size: Size { width, height },
-            mean: picture.to_vec(),
-            deviation: vec![[0.0; 3]; picture.len()],
+            mean: picture.clone(),
+            deviation: Picture::filled(picture.size(), [0.0; 3]),
             albedo: self.albedo.clone(),
             normal: self.normal.clone(),
             alpha: None,
@@ -110,7 +109,7 @@ pub struct Turn {
 /// What came of a turn.
 pub enum Made {
     /// Points without their lines and pictures' numbers: of the picture, and of the denoised one.
-    Points(Vec<(Point, Vec<[f32; 3]>)>),
+    Points(Vec<(Point, Picture)>),
     /// Nothing that can be measured.
     Nothing,
     /// It was stopped.
@@ -158,7 +157,7 @@ impl Guests {
             account.unfinished += 1;
             return Made::Nothing;
         }
-        let point = |picture: &[[f32; 3]], denoised: Option<Spent>| {
+        let point = |picture: &Picture, denoised: Option<Spent>| {
             let more = denoised.unwrap_or_default();
             Some(Point {
                 line: 0,
@@ -176,7 +175,7 @@ impl Guests {
         let mut made = Vec::new();
         made.extend(point(&picture, None).map(|point| (point, picture.clone())));
         if let Some(denoising) = &mut self.denoising {
-            match denoising.run(&picture, (reference.width, reference.height)) {
+            match denoising.run(&picture) {
                 Ok((denoised, spent)) => made.extend(point(&denoised, Some(spent)).map(|point| (point, denoised))),
                 Err(error) => account.out = Some(error.to_string()),
             }

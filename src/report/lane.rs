@@ -2,6 +2,7 @@
 
 use super::entry::Moments;
 use crate::error::Result;
+use crate::film::Picture;
 use crate::finish::{Finish, reads_for_picture};
 use crate::render::{Session, Spent};
 
@@ -65,7 +66,7 @@ impl<'a> Lane<'a> {
     }
 
     /// The picture, finished.
-    pub(super) fn finished(&mut self, finish: &mut Finish) -> Result<Vec<[f32; 3]>> {
+    pub(super) fn finished(&mut self, finish: &mut Finish) -> Result<Picture> {
         let mut spent = Spent::default();
         let session = &mut self.session;
         let picture = spent.during(|| {

@@ -7,6 +7,7 @@ use super::point::{Ending, Point};
 use super::reference::Reference;
 use super::spool::Spool;
 use crate::error::{Error, Result};
+use crate::film::Picture;
 use crate::finish::Finish;
 use crate::image::errors;
 use crate::render::{Rendered, Spent, StopReason};
@@ -45,7 +46,7 @@ impl Outcome {
     ///
     /// # Errors
     /// The file system.
-    pub fn picture(&mut self, point: &Point) -> Result<Option<Vec<[f32; 3]>>> {
+    pub fn picture(&mut self, point: &Point) -> Result<Option<Picture>> {
         point.picture.map(|number| self.pictures.get(number)).transpose()
     }
 }
@@ -173,7 +174,7 @@ impl Outcome {
     }
 
     /// Adds a measurement; none where the picture has no finite pixel yet.
-    fn add(&mut self, of: Of, picture: &[[f32; 3]], lane: &Lane<'_>, look: &Look<'_>) -> Result<()> {
+    fn add(&mut self, of: Of, picture: &Picture, lane: &Lane<'_>, look: &Look<'_>) -> Result<()> {
         let Some(errors) = errors(picture, &look.reference.picture) else { return Ok(()) };
         let spent = lane.session.spent();
         let estimate = lane.session.estimate().filter(|_| of.is_raw());
@@ -193,7 +194,7 @@ impl Outcome {
     }
 
     /// Adds a point to its curve, with its picture if it is of the first seed.
-    fn keep(&mut self, point: Point, of: Of, picture: &[[f32; 3]], look: &Look<'_>) -> Result<()> {
+    fn keep(&mut self, point: Point, of: Of, picture: &Picture, look: &Look<'_>) -> Result<()> {
         let number = if look.keep { Some(self.pictures.push(picture)?) } else { None };
         self.points.push(Point { line: self.line(of), picture: number, ..point });
         Ok(())

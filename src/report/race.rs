@@ -50,7 +50,7 @@ pub fn race(
     mut observe: impl FnMut(&Step<'_>) -> Control,
 ) -> Result<Outcome> {
     let entries = field.entries;
-    let mut outcome = Outcome::new(&field, Spool::new(folder, reference.picture.len())?);
+    let mut outcome = Outcome::new(&field, Spool::new(folder, reference.picture.size())?);
     for (round, &seed) in rules.seeds.iter().enumerate() {
         let of_entry = |entry: &Entry| {
             let settings =

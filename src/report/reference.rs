@@ -8,7 +8,7 @@
 use super::entry::Metric;
 use crate::camera::Camera;
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::{Layer, LayerSet};
+use crate::film::{Layer, LayerSet, Picture, Size};
 use crate::image::exr::{self, Attributes};
 use crate::image::{Errors, errors};
 use crate::render::{Control, Session, Settings, Stage};
@@ -53,12 +53,8 @@ impl OwnError {
 /// The reference.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// Width in pixels.
-    pub width: usize,
-    /// Height in pixels.
-    pub height: usize,
-    /// Pixels, row by row from the top.
-    pub picture: Vec<[f32; 3]>,
+    /// The picture.
+    pub picture: Picture,
     /// Its own error.
     pub error: OwnError,
     /// Where it is from, for people.
@@ -92,7 +88,7 @@ impl Reference {
     /// # Errors
     /// A set without a picture, or of another size.
     pub fn of(set: &LayerSet, header: &Value, size: (u32, u32), about: String) -> Result<Reference> {
-        let (width, height) = (size.0 as usize, size.1 as usize);
+        let Size { width, height } = size.into();
         if (set.width, set.height) != (width, height) {
             let cause = format!("the reference has {} x {} pixels, not {width} x {height}", set.width, set.height);
             let error = Error::new(ErrorKind::Usage, about, cause);
@@ -102,7 +98,7 @@ impl Reference {
         if !picture.iter().flatten().any(|v| v.is_finite()) {
             return Err(Error::new(ErrorKind::Image, about, "the reference has no finite value"));
         }
-        Ok(Reference { width, height, picture, error: told(header), about })
+        Ok(Reference { picture, error: told(header), about })
     }
 
     /// Writes it as a beauty with its estimated standard error, and its own error in the header.
@@ -110,11 +106,9 @@ impl Reference {
     /// # Errors
     /// The file system.
     pub fn write(&self, path: &Path, halves: &Halves) -> Result<()> {
-        let mut set = LayerSet::new(self.width, self.height);
+        let mut set = LayerSet::new(self.picture.size().width, self.picture.size().height);
         set.push(Layer::interleaved("", "RGB", self.picture.iter().copied()))?;
-        let errors = halves.a.iter().zip(&halves.b);
-        let errors = errors.map(|(a, b)| std::array::from_fn::<f32, 3, _>(|c| 0.5 * (a[c] - b[c]).abs()));
-        set.push(Layer::interleaved("Error", "RGB", errors))?;
+        set.push(Layer::interleaved("Error", "RGB", halves.a.half_difference(&halves.b)))?;
         let header = json!({
             "version": env!("CARGO_PKG_VERSION"),
             "method": halves.method,
@@ -142,9 +136,9 @@ fn told(header: &Value) -> OwnError {
 /// Two independent renders of as many iterations.
 pub struct Halves {
     /// One.
-    pub a: Vec<[f32; 3]>,
+    pub a: Picture,
     /// The other.
-    pub b: Vec<[f32; 3]>,
+    pub b: Picture,
     /// Their method.
     pub method: &'static str,
     /// Their seeds.
@@ -188,24 +182,19 @@ impl Halves {
     }
 
     /// Their mean, and its error.
-    pub fn reference(&self, (width, height): (u32, u32)) -> Reference {
-        let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
-        let picture: Vec<[f32; 3]> = self.a.iter().zip(&self.b).map(mean).collect();
+    pub fn reference(&self) -> Reference {
         let about = format!(
             "Two independent halves by {}, {} iterations each, {:.0} s in all",
             self.method, self.iterations, self.seconds
         );
-        let error = own_error(&self.a, &self.b);
-        Reference { width: width as usize, height: height as usize, picture, error, about }
+        Reference { picture: self.a.average(&self.b), error: own_error(&self.a, &self.b), about }
     }
 }
 
 /// The error of the mean of two independent halves: a quarter of their squared difference.
-pub fn own_error(a: &[[f32; 3]], b: &[[f32; 3]]) -> OwnError {
-    let mean = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
-    let mean: Vec<[f32; 3]> = a.iter().zip(b).map(mean).collect();
+pub fn own_error(a: &Picture, b: &Picture) -> OwnError {
     // Half the difference is the distance of either from the mean.
-    errors(a, &mean).map_or(OwnError::default(), |errors| OwnError {
+    errors(a, &a.average(b)).map_or(OwnError::default(), |errors| OwnError {
         relmse: Some(errors.relmse),
         relmse_trimmed: Some(errors.relmse_trimmed),
         mse: Some(errors.mse),
@@ -221,20 +210,20 @@ mod tests {
     /// error is below one percent; the halves' difference itself would be four times as much, half of it twice.
     #[test]
     fn the_stated_error_of_two_halves_is_their_means_error() {
-        let noisy = |seed: u64| -> Vec<[f32; 3]> {
-            let pixel = |i: u64| {
+        let size = Size { width: 200, height: 100 };
+        let noisy = |seed: u64| {
+            Picture::from_fn(size, |i| {
                 let truth = 0.2 + (i % 7) as f32;
                 std::array::from_fn(|c| {
-                    let u = Stream::new(seed, 1 + c as u64, Domain::Test, i).vertex(0).two(Purpose::Pixel).x;
+                    let u = Stream::new(seed, 1 + c as u64, Domain::Test, i as u64).vertex(0).two(Purpose::Pixel).x;
                     truth * (1.0 + 0.3 * (u - 0.5))
                 })
-            };
-            (0..20_000).map(pixel).collect()
+            })
         };
         let (a, b) = (noisy(1), noisy(2));
-        let truth: Vec<[f32; 3]> = (0..20_000).map(|i| [0.2 + (i % 7) as f32; 3]).collect();
+        let truth = Picture::from_fn(size, |i| [0.2 + (i % 7) as f32; 3]);
         let halves = Halves { a, b, method: "path", seeds: [1, 2], iterations: 2, seconds: 1.0 };
-        let reference = halves.reference((200, 100));
+        let reference = halves.reference();
         let real = errors(&reference.picture, &truth).expect("finite pixels");
         let stated = reference.error;
         assert!((stated.mse.expect("known") / real.mse - 1.0).abs() < 0.04, "{stated:?}, {real:?}");

@@ -1,6 +1,7 @@
 //! Pictures kept on disk while a race goes on: a gigabyte of them is nothing there, and much in memory.
 
 use crate::error::{Error, Result};
+use crate::film::{Picture, Size};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -9,25 +10,25 @@ use std::path::{Path, PathBuf};
 pub struct Spool {
     folder: PathBuf,
     file: File,
-    pixels: usize,
+    size: Size,
     count: u64,
 }
 
 impl Spool {
-    /// An empty one in a folder, for pictures of so many pixels.
+    /// An empty one in a folder, for pictures of this size.
     ///
     /// # Errors
     /// The file system.
-    pub fn new(folder: &Path, pixels: usize) -> Result<Spool> {
+    pub fn new(folder: &Path, size: Size) -> Result<Spool> {
         let file = tempfile::tempfile_in(folder).map_err(|cause| Error::io(folder, &cause))?;
-        Ok(Spool { folder: folder.into(), file, pixels, count: 0 })
+        Ok(Spool { folder: folder.into(), file, size, count: 0 })
     }
 
     /// Keeps a picture; returns its number.
     ///
     /// # Errors
     /// The file system, as when the disk is full.
-    pub fn push(&mut self, picture: &[[f32; 3]]) -> Result<u64> {
+    pub fn push(&mut self, picture: &Picture) -> Result<u64> {
         let bytes: Vec<u8> = picture.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         let number = self.count;
         self.count += 1;
@@ -40,16 +41,17 @@ impl Spool {
     ///
     /// # Errors
     /// The file system.
-    pub fn get(&mut self, number: u64) -> Result<Vec<[f32; 3]>> {
-        let mut bytes = vec![0; self.pixels * 12];
+    pub fn get(&mut self, number: u64) -> Result<Picture> {
+        let mut bytes = vec![0; self.size.pixels() * 12];
         let read = self.seek(number).and_then(|()| self.file.read_exact(&mut bytes));
         read.map_err(|cause| Error::io(&self.folder, &cause))?;
         let value = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-        Ok(bytes.chunks_exact(12).map(|p| [value(&p[0..4]), value(&p[4..8]), value(&p[8..12])]).collect())
+        let pixels = bytes.chunks_exact(12).map(|p| [value(&p[0..4]), value(&p[4..8]), value(&p[8..12])]);
+        Ok(Picture::new(self.size, pixels.collect()))
     }
 
     fn seek(&mut self, number: u64) -> std::io::Result<()> {
-        self.file.seek(SeekFrom::Start(number * self.pixels as u64 * 12)).map(|_| ())
+        self.file.seek(SeekFrom::Start(number * self.size.pixels() as u64 * 12)).map(|_| ())
     }
 }
 
@@ -60,11 +62,13 @@ mod tests {
     #[test]
     fn pictures_come_back_in_any_order() {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut spool = Spool::new(folder.path(), 2).expect("a file");
+        let size = Size { width: 2, height: 1 };
+        let mut spool = Spool::new(folder.path(), size).expect("a file");
         let pictures = [[[1.0, 2.0, 3.0], [4.0, 5.0, f32::INFINITY]], [[0.5; 3], [-1e-30; 3]]];
+        let pictures = pictures.map(|pixels| Picture::new(size, pixels.to_vec()));
         let numbers: Vec<u64> = pictures.iter().map(|p| spool.push(p).expect("it is written")).collect();
         for (number, picture) in numbers.iter().zip(&pictures).rev() {
-            assert_eq!(spool.get(*number).expect("it is there"), picture);
+            assert_eq!(spool.get(*number).expect("it is there"), *picture);
         }
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
     }

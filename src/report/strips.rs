@@ -8,6 +8,7 @@ use super::outcome::Outcome;
 use super::point::Point;
 use super::reference::Reference;
 use crate::error::Result;
+use crate::film::Picture;
 
 /// A picture of the report as PNG, with what stands below it.
 pub struct Shown {
@@ -80,20 +81,19 @@ pub(super) fn pictures(
     (wanted, look): (&[Window], Look),
     curves: &[Curve],
 ) -> Result<(Vec<Window>, Shown, Vec<Strip>)> {
-    let (width, height) = (reference.width, reference.height);
     let lines = outcome.lines.clone();
     let Meeting { time, error, at_time, at_error } = Meeting::of(lines.len(), outcome, metric);
-    let mut load = |points: &[Point]| -> Result<Vec<Vec<[f32; 3]>>> {
+    let mut load = |points: &[Point]| -> Result<Vec<Picture>> {
         points.iter().filter_map(|point| outcome.picture(point).transpose()).collect()
     };
     let (timed, equal) = (load(&at_time)?, load(&at_error)?);
     let mut windows = wanted.to_vec();
     if windows.is_empty() && !timed.is_empty() {
-        windows = crop::choose(&timed, &reference.picture, (width, height), 2);
+        windows = crop::choose(&timed, &reference.picture, 2);
     }
-    let strip = |title: String, points: &[Point], pictures: &[Vec<[f32; 3]>]| -> Result<Strip> {
-        let largest = crop::scale(pictures, &reference.picture, width, &windows);
-        let shown = |(point, picture): (&Point, &Vec<[f32; 3]>)| -> Result<Shown> {
+    let strip = |title: String, points: &[Point], pictures: &[Picture]| -> Result<Strip> {
+        let largest = crop::scale(pictures, &reference.picture, &windows);
+        let shown = |(point, picture): (&Point, &Picture)| -> Result<Shown> {
             let spot = curves[point.line]
                 .by_seed
                 .first()
@@ -110,10 +110,10 @@ pub(super) fn pictures(
             Ok(Shown {
                 name: line.name.clone(),
                 caption: format!("{count}, {seconds} s, {figure}"),
-                pictures: windows.iter().map(|w| crop::picture(picture, width, *w, look)).collect::<Result<_>>()?,
+                pictures: windows.iter().map(|w| crop::picture(picture, *w, look)).collect::<Result<_>>()?,
                 heat_maps: windows
                     .iter()
-                    .map(|w| crop::heat_map(picture, &reference.picture, width, *w, largest))
+                    .map(|w| crop::heat_map(picture, &reference.picture, *w, largest))
                     .collect::<Result<_>>()?,
             })
         };
@@ -126,15 +126,12 @@ pub(super) fn pictures(
         let title = format!("At equal error: {} about {}", metric.name(), short((error - own).max(0.0)));
         strips.push(strip(title, &at_error, &equal)?);
     }
-    let mut parts = vec![Window::whole(width, height)];
+    let mut parts = vec![Window::whole(reference.picture.size())];
     parts.extend(&windows);
     let truth = Shown {
         name: "reference".into(),
         caption: String::new(),
-        pictures: parts
-            .into_iter()
-            .map(|part| crop::picture(&reference.picture, width, part, look))
-            .collect::<Result<_>>()?,
+        pictures: parts.into_iter().map(|part| crop::picture(&reference.picture, part, look)).collect::<Result<_>>()?,
         heat_maps: Vec::new(),
     };
     Ok((windows, truth, strips))

@@ -1,20 +1,21 @@
 //! Error metrics against closed forms and against the reference implementation of FLIP; tone curves against published
 //! values.
 
-use caustique::film::{Layer, LayerSet};
+use caustique::film::{Layer, LayerSet, Picture, Size};
 use caustique::image::tonemap::{ToneMap, srgb_decode};
-use caustique::image::{compare, flip, heat, metrics};
+use caustique::image::{Floor, compare, flip, heat, metrics};
 use caustique::math::Rgb;
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
+const SIZE: Size = Size { width: WIDTH, height: HEIGHT };
 
 /// Edges in every direction and a bright square, then noise on each channel; `scale` is 1 for HDR and 1/2 for LDR.
 ///
 /// The expected FLIP values come from the authors' implementation, PyPI flip-evaluator 1.7, on the same pixels:
 /// `flip_evaluator.evaluate(reference, test, "HDR", inputsRGB=False, applyMagma=False)`, and `"LDR"` on halved and
 /// clipped ones.
-fn fixture(scale: f32) -> (Vec<Rgb>, Vec<Rgb>) {
+fn fixture(scale: f32) -> (Picture, Picture) {
     let (mut reference, mut test) = (Vec::new(), Vec::new());
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
@@ -23,11 +24,11 @@ fn fixture(scale: f32) -> (Vec<Rgb>, Vec<Rgb>) {
                 |c: usize| if lit { 20.0 } else { (0.05 + ((x * (c + 1) * 7 + y * 13) % 64) as f64 / 64.0) as f32 };
             let noise = |c: usize| ((x * 73_856_093) ^ (y * 19_349_663) ^ (c * 83_492_791)) % 256;
             let factor = |c: usize| (0.75 + 0.5 * noise(c) as f64 / 255.0) as f32;
-            reference.push(Rgb::from_array([0, 1, 2].map(base)) * scale);
-            test.push(Rgb::from_array([0, 1, 2].map(|c| base(c) * factor(c))) * scale);
+            reference.push([0, 1, 2].map(|c| base(c) * scale));
+            test.push([0, 1, 2].map(|c| base(c) * factor(c) * scale));
         }
     }
-    (reference, test)
+    (Picture::new(SIZE, reference), Picture::new(SIZE, test))
 }
 
 fn check_flip(map: &[f32], mean: f64, pixels: [(usize, usize, f32); 4]) {
@@ -42,14 +43,14 @@ fn check_flip(map: &[f32], mean: f64, pixels: [(usize, usize, f32); 4]) {
 #[test]
 fn hdr_flip_agrees_with_the_authors() {
     let (reference, test) = fixture(1.0);
-    let map = flip::hdr(&reference, &test, WIDTH, HEIGHT);
+    let map = flip::hdr(&reference, &test);
     check_flip(&map, 0.074_488, [(0, 0, 0.093_322), (25, 15, 0.026_383), (70, 40, 0.070_447), (95, 63, 0.203_080)]);
 }
 
 #[test]
 fn ldr_flip_agrees_with_the_authors() {
     let (reference, test) = fixture(0.5);
-    let map = flip::ldr(&reference, &test, WIDTH, HEIGHT);
+    let map = flip::ldr(&reference, &test);
     check_flip(&map, 0.073_109, [(0, 0, 0.024_880), (25, 15, 0.002_049), (70, 40, 0.069_052), (95, 63, 0.205_435)]);
 }
 
@@ -57,18 +58,20 @@ fn ldr_flip_agrees_with_the_authors() {
 fn flip_of_odd_pictures() {
     // Equal pictures do not differ, whatever their size; a picture against black differs.
     for (width, height) in [(1, 1), (3, 2), (1, 40)] {
-        let picture: Vec<Rgb> = (0..width * height).map(|i| Rgb::splat(i as f32)).collect();
-        assert!(flip::hdr(&picture, &picture, width, height).iter().all(|&v| v == 0.0));
-        let black = vec![Rgb::ZERO; picture.len()];
+        let size = Size { width, height };
+        let picture = Picture::from_fn(size, |i| [i as f32; 3]);
+        assert!(flip::hdr(&picture, &picture).iter().all(|&v| v == 0.0));
+        let black = Picture::filled(size, [0.0; 3]);
         for (a, b) in [(&picture, &black), (&black, &picture)] {
-            let map = flip::hdr(a, b, width, height);
+            let map = flip::hdr(a, b);
             assert!(map.iter().all(|v| (0.0..=1.0).contains(v)), "{map:?}");
         }
     }
     // A caustic on a black floor: the median luminance is zero, and the difference must still show.
-    let mut reference = vec![Rgb::ZERO; 100];
-    reference[55] = Rgb::splat(4.0);
-    let map = flip::hdr(&reference, &vec![Rgb::ZERO; 100], 10, 10);
+    let black = Picture::filled(Size { width: 10, height: 10 }, [0.0; 3]);
+    let mut reference = black.clone();
+    reference[55] = [4.0; 3];
+    let map = flip::hdr(&reference, &black);
     assert!(map[55] > 0.3 && map[0] == 0.0, "{} {}", map[55], map[0]);
 }
 
@@ -154,8 +157,9 @@ fn grain_leaves_out_what_is_not_finite() {
     let b = picture(9, 7, |i| if i == 30 { [f32::INFINITY; 3] } else { [1.0; 3] });
     let a = picture(9, 7, |i| if i == 12 { [f32::NAN, 1.5, 1.5] } else { [1.5; 3] });
     assert!(compare(&a, &b).unwrap().grain < 1e-25);
-    assert_eq!(metrics::grain(&[[f32::NAN; 3]; 6], &[[1.0; 3]; 6], 3, 2), None);
-    assert_eq!(metrics::grain(&[[1.0; 3]; 6], &[[1.0; 3]; 6], 2, 2), None);
+    let filled = |width, height, value| Picture::filled(Size { width, height }, [value; 3]);
+    assert_eq!(metrics::grain(&filled(3, 2, f32::NAN), &filled(3, 2, 1.0)), None);
+    assert_eq!(metrics::grain(&filled(3, 2, 1.0), &filled(2, 2, 1.0)), None);
 }
 
 #[test]
@@ -177,7 +181,8 @@ fn what_cannot_be_compared_is_an_error() {
     empty.push(Layer::interleaved("depth", "Z", [[0.0]; 8])).unwrap();
     let error = compare(&empty, &picture(4, 2, |_| [0.0; 3])).unwrap_err();
     assert!(error.cause.contains("no picture among the layers (depth)"), "{error}");
-    assert!(metrics::compare_pixels(&[[0.0; 3]; 4], &[[0.0; 3]; 3], 2, 2).is_err());
+    let black = |width, height| Picture::filled(Size { width, height }, [0.0; 3]);
+    assert!(metrics::compare_pictures(&black(2, 2), &black(3, 1), Floor::Papers).is_err());
 }
 
 #[test]
@@ -198,7 +203,7 @@ fn results_do_not_depend_on_threads() {
     let (reference, test) = fixture(1.0);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| flip::hdr(&reference, &test, WIDTH, HEIGHT))
+        pool.install(|| flip::hdr(&reference, &test))
     };
     let first = with(1);
     assert!(with(2) == first && with(3) == first);

@@ -47,8 +47,8 @@ fn rendered(scene: &Scene, settings: &Settings) -> (Rendered, Accuracy) {
         session.step();
     }
     let set = session.layers(|_| true).expect("all layers");
-    let verdict = Finish::new(Denoiser::Own, None).verdict(&set).expect("our own denoiser does not fail");
-    session.judged(verdict);
+    let error = Finish::new(Denoiser::Own, None).estimate_error(&set).expect("our own denoiser does not fail");
+    session.judged(error);
     let accuracy = Accuracy::of(session.history()).expect("there is noise");
     (session.finish(StopReason::Iterations), accuracy)
 }

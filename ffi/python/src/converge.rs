@@ -299,6 +299,6 @@ impl Comparison {
         let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {
             told.tell(json!({"run": null, "iterations": iterations, "seconds": seconds}))
         });
-        halves.reference(camera.size())
+        halves.reference()
     }
 }

@@ -180,7 +180,7 @@ impl Image {
                     self.tail.as_ref().map_or(Ok(()), |tail| tail.write(file))
                 })
             }
-            () if is("png") => png::write_tonemapped(&path, set.width, set.height, &set.beauty()?, exposure, curve),
+            () if is("png") => png::write_tonemapped(&path, &set.beauty()?, exposure, curve),
             () => Err(Error::new(ErrorKind::Usage, path.display(), "the name ends neither in .exr nor in .png")
                 .hint("an EXR holds all layers, a PNG is a picture to look at")),
         });

@@ -94,7 +94,7 @@ fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: us
         let Some(point) = outcome.points.iter().rfind(mine).cloned() else { continue };
         let Some(picture) = outcome.picture(&point)? else { continue };
         let header = header(subject, outcome, of, threads);
-        let mut set = LayerSet::new(subject.reference.width, subject.reference.height);
+        let mut set = LayerSet::new(picture.size().width, picture.size().height);
         set.push(Layer::interleaved("", "RGB", picture))?;
         let path = folder.join(format!("{name}.exr"));
         exr::write(&path, &set, &Attributes::of(&header)?, exr::Options::default())?;

@@ -129,7 +129,7 @@ fn targets_of(args: &ConvergeArgs, runs: &[Run]) -> Result<Vec<(usize, u64)>> {
 fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     let (width, height) = camera.size();
     let windows: Vec<Window> = args.crop.iter().map(|crop| crop.0).collect();
-    if let Some(w) = windows.iter().find(|w| !w.fits(width as usize, height as usize)) {
+    if let Some(w) = windows.iter().find(|w| !w.fits((width, height).into())) {
         let shown = format!("{},{},{},{}", w.x, w.y, w.width, w.height);
         let error = Error::new(ErrorKind::Usage, "--crop", format!("{shown} is not within the picture"));
         return Err(error.hint(format!("it has {width} x {height} pixels")));

@@ -128,7 +128,7 @@ pub fn get(
         if interrupt.asked() { Control::Stop } else { Control::Continue }
     });
     reporter.finish();
-    let reference = halves.reference(camera.size());
+    let reference = halves.reference();
     let path = args.output.join("reference.exr");
     reference.write(&path, &halves)?;
     if interrupt.asked() {

@@ -212,7 +212,7 @@ impl Telling<'_> {
         let written = files::write(args, set, attributes, tail.as_ref());
         let described = files::write_usd_layer(args, set);
         let pictured = args.picture.write_png(set, &made_for);
-        let debugged = techniques::write(args, (set.width, set.height), techniques, &made_for);
+        let debugged = techniques::write(args, techniques, &made_for);
         if let Some(mut preview) = preview {
             preview.show(beauty(set), attributes.frame);
         }

@@ -118,7 +118,7 @@ impl<'a> Preview<'a> {
         match self.target {
             Target::Png(path) => {
                 let (exposure, curve) = self.look.look(&self.made_for);
-                png::write_tonemapped(path, set.width, set.height, &set.beauty()?, exposure, curve)
+                png::write_tonemapped(path, &set.beauty()?, exposure, curve)
             }
             Target::Exr(path) => {
                 let options = exr::Options { compression: Compression::None, naming: Naming::Plain };

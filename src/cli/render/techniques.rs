@@ -2,7 +2,7 @@
 
 use super::options::RenderArgs;
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::film::{Layer, LayerSet};
+use caustique::film::{Layer, LayerSet, Picture};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
 use caustique::render::TechniquePicture;
@@ -25,33 +25,21 @@ pub fn prepare(args: &RenderArgs) -> Result<()> {
 ///
 /// # Errors
 /// The file system.
-pub fn write(
-    args: &RenderArgs,
-    size: (usize, usize),
-    pictures: &[TechniquePicture],
-    made_for: &PictureDefaults,
-) -> Result<()> {
+pub fn write(args: &RenderArgs, pictures: &[TechniquePicture], made_for: &PictureDefaults) -> Result<()> {
     let Some(folder) = &args.debug_techniques else { return Ok(()) };
     for picture in pictures {
         for (values, kind) in [(&picture.weighted, "weighted"), (&picture.unweighted, "unweighted")] {
-            one(args, folder, &format!("{}.{kind}", picture.name()), size, values, made_for)?;
+            one(args, folder, &format!("{}.{kind}", picture.name()), values, made_for)?;
         }
     }
     Ok(())
 }
 
-fn one(
-    args: &RenderArgs,
-    folder: &Path,
-    name: &str,
-    (width, height): (usize, usize),
-    values: &[[f32; 3]],
-    made_for: &PictureDefaults,
-) -> Result<()> {
-    let mut set = LayerSet::new(width, height);
-    set.push(Layer::interleaved("", "RGB", values.iter().copied()))?;
+fn one(args: &RenderArgs, folder: &Path, name: &str, picture: &Picture, made_for: &PictureDefaults) -> Result<()> {
+    let mut set = LayerSet::new(picture.size().width, picture.size().height);
+    set.push(Layer::interleaved("", "RGB", picture.iter().copied()))?;
     let options = args.picture.exr_options(args.run.exr_naming);
     exr::write(&folder.join(format!("{name}.exr")), &set, &Attributes::default(), options)?;
     let (exposure, curve) = args.picture.look(made_for);
-    png::write_tonemapped(&folder.join(format!("{name}.png")), width, height, values, exposure, curve)
+    png::write_tonemapped(&folder.join(format!("{name}.png")), picture, exposure, curve)
 }

@@ -1,8 +1,7 @@
 //! Agreement with the training code (`scripts/lab/train/fixture.py` writes the numbers), and what network files may say.
 
-use super::map::Map;
+use super::map::{Map, Rect};
 use super::model::{Contract, Facts};
-use super::rect::Rect;
 use super::*;
 use std::collections::HashMap;
 
@@ -16,8 +15,8 @@ impl Reader<'_> {
         head.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
     }
 
-    fn rgb(&mut self, count: usize) -> Vec<[f32; 3]> {
-        self.floats(3 * count).chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
+    fn rgb(&mut self, size: Size) -> Picture {
+        Picture::new(size, self.floats(3 * size.pixels()).chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect())
     }
 }
 
@@ -26,14 +25,14 @@ fn input_and_equation_equal_the_training_codes() {
     let mut reader = Reader(include_bytes!("../testdata/contract.f32"));
     let header: Vec<usize> = reader.floats(5).iter().map(|v| *v as usize).collect();
     let [levels, height, width, dimensions, side] = header[..] else { panic!() };
-    let n = width * height;
+    let size = Size { width, height };
+    let n = size.pixels();
     let stack = LevelStack {
-        width,
-        height,
-        levels: (0..levels).map(|_| reader.rgb(n)).collect(),
-        variances: (0..levels).map(|_| reader.rgb(n)).collect(),
-        albedo: reader.rgb(n),
-        normal: reader.rgb(n),
+        size,
+        levels: (0..levels).map(|_| reader.rgb(size)).collect(),
+        variances: (0..levels).map(|_| reader.rgb(size)).collect(),
+        albedo: reader.rgb(size),
+        normal: reader.rgb(size),
         depth: reader.floats(n),
     };
     let bright = stack.levels.iter().flatten().flatten().copied().fold(0.0, f32::max);
@@ -49,26 +48,20 @@ fn input_and_equation_equal_the_training_codes() {
     let data = reader.floats((levels - 1) * (dimensions + affinity::SCALARS) * n);
     let features = Weights::Features(Map { rect, window: 15, data });
     let got = combine_tile(&stack, &stack.valid(), &tile, &features);
-    assert!(distance(&got, &reader.rgb(n), bright) < 1e-5);
+    assert!(distance(&got, &reader.rgb(size), bright) < 1e-5);
 
     let got = combiner().run(&stack).unwrap();
-    assert!(distance(&got, &reader.rgb(n), bright) < 1e-5);
+    assert!(distance(&got, &reader.rgb(size), bright) < 1e-5);
 
     let corner = Rect { x0: 0, y0: 0, x1: width / 2, y1: height / 2 };
-    let cut = |plane: &Vec<[f32; 3]>| {
-        plane.chunks(width).take(corner.y1).flat_map(|row| &row[..corner.x1]).copied().collect()
-    };
-    let part = LevelStack {
-        width: corner.x1,
-        height: corner.y1,
-        levels: stack.levels.iter().map(cut).collect(),
-        ..LevelStack::default()
-    };
-    let n = corner.x1 * corner.y1;
+    let size = Size { width: corner.x1, height: corner.y1 };
+    let cut = |plane: &Picture| Picture::from_fn(size, |i| plane[i / size.width * width + i % size.width]);
+    let part = LevelStack { size, levels: stack.levels.iter().map(cut).collect(), ..LevelStack::default() };
+    let n = size.pixels();
     let data = reader.floats((levels - 1) * side * side * n);
     let weights = Weights::Kernel(Map { rect: corner, window: side, data });
     let got = combine_tile(&part, &part.valid(), &Tile { core: corner, input: corner }, &weights);
-    assert!(distance(&got, &reader.rgb(n), bright) < 1e-5);
+    assert!(distance(&got, &reader.rgb(size), bright) < 1e-5);
     assert!(reader.0.is_empty());
 }
 

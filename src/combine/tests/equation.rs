@@ -1,7 +1,6 @@
 //! Equation (6) with arbitrary positive weights.
 
-use super::map::Map;
-use super::rect::Rect;
+use super::map::{Map, Rect};
 use super::*;
 
 fn whole(width: usize, height: usize) -> Rect {
@@ -21,13 +20,13 @@ fn random_weights(random: &mut Random, width: usize, height: usize, levels: usiz
 }
 
 fn combine(stack: &LevelStack, weights: &Weights) -> Vec<[f32; 3]> {
-    let rect = whole(stack.width, stack.height);
+    let rect = whole(stack.size.width, stack.size.height);
     combine_tile(stack, &stack.valid(), &Tile { core: rect, input: rect }, weights)
 }
 
 /// Equation (6) word for word, in f64, with w_i^j from a function of pair, centre and neighbour.
 fn oracle(stack: &LevelStack, radius: isize, weight: impl Fn(usize, [isize; 2], [isize; 2]) -> f64) -> Vec<[f32; 3]> {
-    let (width, height) = (stack.width as isize, stack.height as isize);
+    let (width, height) = (stack.size.width as isize, stack.size.height as isize);
     let valid = stack.valid();
     let at = |[x, y]: [isize; 2]| (y * width + x) as usize;
     let pixel = |c: [isize; 2]| {

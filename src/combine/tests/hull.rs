@@ -10,11 +10,11 @@ const ROUNDING: f32 = 1e-5;
 
 /// Least and largest term of a pixel's channel, and what rounding may add.
 fn hull(stack: &LevelStack, valid: &[bool], pixel: usize, c: usize) -> (f32, f32, f32) {
-    let (x, y) = (pixel % stack.width, pixel / stack.width);
+    let (x, y) = (pixel % stack.size.width, pixel / stack.size.width);
     let (mut least, mut most, mut largest) = (f32::INFINITY, f32::NEG_INFINITY, 0f32);
-    for v in y.saturating_sub(REACH)..(y + REACH + 1).min(stack.height) {
-        for u in x.saturating_sub(REACH)..(x + REACH + 1).min(stack.width) {
-            let i = v * stack.width + u;
+    for v in y.saturating_sub(REACH)..(y + REACH + 1).min(stack.size.height) {
+        for u in x.saturating_sub(REACH)..(x + REACH + 1).min(stack.size.width) {
+            let i = v * stack.size.width + u;
             if !valid[i] {
                 continue;
             }
@@ -30,7 +30,7 @@ fn hull(stack: &LevelStack, valid: &[bool], pixel: usize, c: usize) -> (f32, f32
 }
 
 /// Pixels whose result lies outside.
-fn outside(stack: &LevelStack, image: &[[f32; 3]]) -> usize {
+fn outside(stack: &LevelStack, image: &Picture) -> usize {
     let valid = stack.valid();
     let beyond = |pixel: usize, c: usize| {
         let (least, most, allowed) = hull(stack, &valid, pixel, c);
@@ -63,7 +63,7 @@ fn results_lie_among_their_terms_in_any_picture() {
         let constant = picture(width, height, 0.0, |_| 3.0);
         let image = combiner.run(&constant).unwrap();
         assert_eq!(outside(&constant, &image), 0, "{width} x {height}");
-        let wrong: Vec<_> = image.iter().map(|rgb| rgb.map(|value| 1.001 * value)).collect();
+        let wrong = image.map(|value| 1.001 * value);
         assert_eq!(outside(&constant, &wrong), width * height);
         let black = picture(width, height, 0.0, |_| 0.0);
         assert!(combiner.run(&black).unwrap().iter().flatten().all(|value| *value == 0.0));

@@ -1,6 +1,6 @@
 //! The shipped network on whole images: sizes, tiles, threads, units, bad input.
 
-use super::rect::Rect;
+use super::map::Rect;
 use super::*;
 
 #[test]
@@ -55,7 +55,7 @@ fn cores_cover_the_image_once_and_inputs_keep_the_stride() {
     for (width, height, pixels) in [(1, 1, 1), (5, 3, 1), (211, 150, 2500), (1280, 720, 1 << 18), (3840, 2160, 1 << 18)]
     {
         let mut count = vec![0u8; width * height];
-        for tile in tile::tiles(width, height, &facts, pixels) {
+        for tile in tile::tiles(Size { width, height }, &facts, pixels) {
             for y in tile.core.y0..tile.core.y1 {
                 count[y * width + tile.core.x0..y * width + tile.core.x1].iter_mut().for_each(|n| *n += 1);
             }
@@ -144,9 +144,9 @@ fn input_of_the_wrong_shape_is_an_error_that_says_so() {
         "layer Variance5: the layer holds 0 pixels, the image 12"
     );
     assert_eq!(message(&mut combiner, &|s| s.depth.truncate(7)), "layer depth: the layer holds 7 pixels, the image 12");
-    assert_eq!(message(&mut combiner, &|s| s.width = 0), "an image of 0 x 3 pixels");
+    assert_eq!(message(&mut combiner, &|s| s.size.width = 0), "an image of 0 x 3 pixels");
 }
 
-fn bits(image: &[[f32; 3]]) -> Vec<[u32; 3]> {
+fn bits(image: &Picture) -> Vec<[u32; 3]> {
     image.iter().map(|rgb| rgb.map(f32::to_bits)).collect()
 }

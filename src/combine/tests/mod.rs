@@ -7,6 +7,7 @@ mod image;
 
 use super::*;
 use crate::error::ErrorKind;
+use crate::film::{Picture, Size};
 
 /// Uniform numbers in [0, 1), repeatable (splitmix64).
 struct Random(u64);
@@ -24,26 +25,27 @@ impl Random {
         (0..count).map(|_| low + (high - low) * self.next()).collect()
     }
 
-    fn rgb(&mut self, count: usize, low: f32, high: f32) -> Vec<[f32; 3]> {
-        (0..count).map(|_| std::array::from_fn(|_| low + (high - low) * self.next())).collect()
+    fn rgb(&mut self, size: Size, low: f32, high: f32) -> Picture {
+        let pixels = (0..size.pixels()).map(|_| std::array::from_fn(|_| low + (high - low) * self.next())).collect();
+        Picture::new(size, pixels)
     }
 
     /// Levels that share a picture and differ by noise.
     fn stack(&mut self, width: usize, height: usize, levels: usize) -> LevelStack {
-        let n = width * height;
+        let size = Size { width, height };
+        let n = size.pixels();
         let base: Vec<f32> =
             (0..n).map(|i| 1.0 + ((i % width) as f32 * 0.3).sin() + (i / width) as f32 * 0.05).collect();
         let level = |random: &mut Self, j: usize| {
-            let noise = random.rgb(n, -0.5 / (j + 1) as f32, 0.5 / (j + 1) as f32);
-            base.iter().zip(noise).map(|(b, e)| e.map(|e| b * (1.0 + e))).collect()
+            let noise = random.rgb(size, -0.5 / (j + 1) as f32, 0.5 / (j + 1) as f32);
+            Picture::from_fn(size, |i| noise[i].map(|e| base[i] * (1.0 + e)))
         };
         LevelStack {
-            width,
-            height,
+            size,
             levels: (0..levels).map(|j| level(self, j)).collect(),
-            variances: (0..levels).map(|_| self.rgb(n, 0.0, 0.1)).collect(),
-            albedo: self.rgb(n, 0.0, 1.0),
-            normal: self.rgb(n, -1.0, 1.0),
+            variances: (0..levels).map(|_| self.rgb(size, 0.0, 0.1)).collect(),
+            albedo: self.rgb(size, 0.0, 1.0),
+            normal: self.rgb(size, -1.0, 1.0),
             depth: self.fill(n, 1.0, 5.0),
         }
     }

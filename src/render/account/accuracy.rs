@@ -1,15 +1,15 @@
 //! What accuracy costs: the error of the picture as it would be delivered, how it falls, and when it will be small
 //! enough.
 //!
-//! Now and then pictures finished from half of the iterations are judged by the other half ([`Verdict`]). Their squared
+//! Now and then pictures finished from half of the iterations are judged by the other half ([`FinishedError`]). Their squared
 //! error falls as a power of the iterations, `e^2 = a n^(-2 s)`, and the whole picture's is that of twice as many
 //! iterations. Few moments tell `s` badly, so they are joined by what is usual: the square of a finished picture's error
-//! falls with the power 0.7 ([`USUAL`]), as if that had been measured with a spread of one in the logarithm of
+//! falls with the power 0.7 ([`DEFAULT_CONVERGENCE_RATE`]), as if that had been measured with a spread of one in the logarithm of
 //! iterations. Moments count by how sure they are. Bias that all quarters have in common is told by bandwidth levels,
 //! and added.
 
 use super::history::History;
-use crate::finish::{USUAL, Verdict};
+use crate::finish::{DEFAULT_CONVERGENCE_RATE, FinishedError};
 
 /// What a power may come out as: noise alone falls with a half, and nothing rises.
 const RANGE: (f64, f64) = (0.1, 0.55);
@@ -40,11 +40,11 @@ pub struct Accuracy {
     level: f64,
     /// Squared bias, which is taken to stay.
     pub squared_bias: f64,
-    /// Squared error by light that photons have not brought ([`Verdict::unseen`]).
+    /// Squared error by light that photons have not brought ([`FinishedError::unseen`]).
     pub squared_unseen: f64,
     /// Standard error of the logarithm of the latest squared error, of what judges add.
     doubt: f64,
-    /// Share of the noise that few bright samples hold ([`Verdict::rare`]).
+    /// Share of the noise that few bright samples hold ([`FinishedError::rare`]).
     pub rare: f64,
     /// Iterations at the last moment that was judged.
     pub judged: u64,
@@ -62,7 +62,7 @@ struct Moment {
 
 impl Moment {
     /// `None` where there was no noise at all.
-    fn of(iterations: u64, verdict: &Verdict) -> Option<Moment> {
+    fn of(iterations: u64, verdict: &FinishedError) -> Option<Moment> {
         // An error that the judges' noise hides is no larger than that, most likely.
         let squared = verdict.noise.max(verdict.deviation);
         let doubt = verdict.deviation / squared;
@@ -88,9 +88,9 @@ impl Accuracy {
         let spread: f64 = moments.iter().map(|m| m.weight * (m.iterations - middle).powi(2)).sum();
         let fall = |m: &Moment| -0.5 * m.weight * (m.iterations - middle) * (m.squared - average);
         let falls: f64 = moments.iter().map(fall).sum();
-        let exponent = ((falls + USUAL) / (spread + 1.0)).clamp(RANGE.0, RANGE.1);
+        let exponent = ((falls + DEFAULT_CONVERGENCE_RATE) / (spread + 1.0)).clamp(RANGE.0, RANGE.1);
         let level = mean(latest, &|m| m.squared + 2.0 * exponent * m.iterations);
-        let Verdict { bias: squared_bias, rare, unseen: squared_unseen, .. } = verdict;
+        let FinishedError { bias: squared_bias, rare, unseen: squared_unseen, .. } = verdict;
         Some(Accuracy { exponent, level, squared_bias, squared_unseen, doubt, rare, judged: last })
     }
 
@@ -135,7 +135,7 @@ mod tests {
             iterations,
             light_paths: 0,
             estimate: None,
-            finished: Some(Verdict {
+            finished: Some(FinishedError {
                 noise: squared(iterations as f64 / 2.0),
                 deviation: 1e-9,
                 bias,
@@ -148,9 +148,12 @@ mod tests {
 
     #[test]
     fn a_power_that_is_usual_is_found_from_one_moment_and_another_from_many() {
-        let usual = |n: f64| 0.01 * n.powf(-2.0 * USUAL);
+        let usual = |n: f64| 0.01 * n.powf(-2.0 * DEFAULT_CONVERGENCE_RATE);
         let one = Accuracy::of(&history(&[8], usual, 0.0)).expect("one moment");
-        assert!((one.exponent - USUAL).abs() < 1e-9 && (one.error(64) / usual(64.0).sqrt() - 1.0).abs() < 1e-9);
+        assert!(
+            (one.exponent - DEFAULT_CONVERGENCE_RATE).abs() < 1e-9
+                && (one.error(64) / usual(64.0).sqrt() - 1.0).abs() < 1e-9
+        );
         let steep = |n: f64| 0.01 / n;
         let many: Vec<u64> = (3..12).map(|power| 1 << power).collect();
         let many = Accuracy::of(&history(&many, steep, 0.0)).expect("nine moments");
@@ -175,7 +178,7 @@ mod tests {
     /// samples raise the upper end alone.
     #[test]
     fn doubt_is_told() {
-        let mut moments = history(&[8, 16, 32, 64], |n| 0.01 * n.powf(-2.0 * USUAL), 0.0);
+        let mut moments = history(&[8, 16, 32, 64], |n| 0.01 * n.powf(-2.0 * DEFAULT_CONVERGENCE_RATE), 0.0);
         let sure = Accuracy::of(&moments).expect("four moments");
         let [low, high] = sure.interval(64);
         let model = (1.645f64 * MODEL).exp();
@@ -183,11 +186,11 @@ mod tests {
             (high / sure.error(64) / model - 1.0).abs() < 1e-6
                 && (low * high / sure.error(64).powi(2) - 1.0).abs() < 1e-6
         );
-        moments[2].finished = Some(Verdict { noise: -1.0, deviation: 0.5, bias: 0.0, rare: 0.0, unseen: 0.0 });
+        moments[2].finished = Some(FinishedError { noise: -1.0, deviation: 0.5, bias: 0.0, rare: 0.0, unseen: 0.0 });
         let unsure = Accuracy::of(&moments).expect("four moments");
         // A weight of 1/26 for a squared error that is 350 times too large.
         assert!((unsure.error(64) / sure.error(64)).ln().abs() < 0.15, "{}", unsure.error(64) / sure.error(64));
-        moments[3].finished = Some(Verdict { noise: -1e-6, deviation: 1e-6, bias: 0.0, rare: 0.96, unseen: 0.0 });
+        moments[3].finished = Some(FinishedError { noise: -1e-6, deviation: 1e-6, bias: 0.0, rare: 0.96, unseen: 0.0 });
         let rare = Accuracy::of(&moments[3..]).expect("one moment");
         assert!((rare.error(32) - 1e-3).abs() < 1e-9, "{}", rare.error(32));
         let [low, high] = rare.interval(32);

@@ -1,7 +1,7 @@
 //! The estimated error of a render against time, and why the render stopped.
 
 use super::error_estimate::ErrorEstimate;
-use crate::finish::Verdict;
+use crate::finish::FinishedError;
 use serde::{Deserialize, Serialize};
 
 /// Why a render stopped.
@@ -32,5 +32,5 @@ pub struct History {
     /// Estimated squared relative error, when two iterations are done.
     pub estimate: Option<ErrorEstimate>,
     /// The error of the picture finished from half of these iterations, where it was judged.
-    pub finished: Option<Verdict>,
+    pub finished: Option<FinishedError>,
 }

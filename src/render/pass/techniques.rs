@@ -6,6 +6,7 @@
 
 use super::groups::{OfGroup, TileGroups};
 use super::tiles::{TILE_PIXELS, Tiles};
+use crate::film::Picture;
 use crate::light::Group;
 use crate::math::Rgb;
 use crate::plan::PathClass;
@@ -25,10 +26,10 @@ pub struct TechniquePicture {
     pub technique: Technique,
     /// Radiance per pixel, row by row from the top: its share of the method's picture. The shares of all techniques sum
     /// to it.
-    pub weighted: Vec<[f32; 3]>,
+    pub weighted: Picture,
     /// The same without weights: what the technique would give alone (merging: with the kernel of the method's own
     /// bandwidth).
-    pub unweighted: Vec<[f32; 3]>,
+    pub unweighted: Picture,
 }
 
 impl TechniquePicture {
@@ -211,7 +212,7 @@ fn collect(tiles: &Tiles, mut parts: Vec<TilePictures>, iterations: u64) -> Vec<
         if parts.iter().all(|part| part.pictures[index].is_none()) {
             continue;
         }
-        let black = vec![[0.0; 3]; tiles.pixels_of_all()];
+        let black = Picture::filled(tiles.size(), [0.0; 3]);
         let mut picture = TechniquePicture { technique: technique(index), weighted: black.clone(), unweighted: black };
         for (tile, part) in parts.iter_mut().enumerate() {
             // Taken and freed, so that the pictures are not in memory twice.
@@ -237,7 +238,11 @@ mod tests {
         let mut names = std::collections::HashSet::new();
         for at in 0..MAX_TECHNIQUES {
             assert_eq!(index(technique(at)), at);
-            let picture = TechniquePicture { technique: technique(at), weighted: vec![], unweighted: vec![] };
+            let picture = TechniquePicture {
+                technique: technique(at),
+                weighted: Picture::default(),
+                unweighted: Picture::default(),
+            };
             assert!(names.insert(picture.name()), "{}", picture.name());
         }
         assert!(names.contains("connect_s2_t7up") && names.contains("hit_s0_t2") && names.contains("camera_s7up_t1"));

@@ -1,6 +1,7 @@
 //! Tiles of constant size: the unit of work of the methods that add to a film.
 
 use crate::camera::{Camera, GROUP_SIZE, TilePixel};
+use crate::film::Size;
 
 /// Width and height of a tile in pixels.
 pub const TILE: u32 = 16;
@@ -63,9 +64,9 @@ impl Tiles {
         self.of_whole().filter(|tile| tile.tile.is_some())
     }
 
-    /// Number of pixels of the film.
-    pub fn pixels_of_all(&self) -> usize {
-        self.width as usize * self.height as usize
+    /// Width and height of the film.
+    pub fn size(&self) -> Size {
+        (self.width, self.height).into()
     }
 
     /// Index of a pixel, row by row.

@@ -12,8 +12,8 @@ use crate::camera::Camera;
 use crate::error::Result;
 use crate::estimator::bandwidth::initial_volume_bandwidths;
 use crate::estimator::{BandwidthState, PixelAccumulator};
-use crate::film::{self, LayerSet};
-use crate::finish::Verdict;
+use crate::film::{self, LayerSet, Picture};
+use crate::finish::FinishedError;
 use crate::light::Guide;
 use crate::photon::PhotonMap;
 use crate::render::account::ErrorEstimate;
@@ -225,13 +225,13 @@ impl<'a> Session<'a> {
     }
 
     /// Keeps what was told of the picture finished from half of the iterations so far ([`History::finished`]).
-    pub fn judged(&mut self, verdict: Option<Verdict>) {
+    pub fn judged(&mut self, verdict: Option<FinishedError>) {
         let unseen = self.unseen().squared;
         if !self.records() {
             self.push(self.estimate());
         }
         if let Some(moment) = self.history.last_mut() {
-            moment.finished = verdict.map(|verdict| Verdict { unseen, ..verdict });
+            moment.finished = verdict.map(|verdict| FinishedError { unseen, ..verdict });
         }
     }
 
@@ -327,9 +327,10 @@ impl<'a> Session<'a> {
     }
 
     /// The method's own image as it is, row by row from the top.
-    pub fn picture(&self) -> Vec<[f32; 3]> {
+    pub fn picture(&self) -> Picture {
         let own = self.stage.settings.levels.own();
-        self.pixels.iter().map(|pixel| pixel.mean(own).as_vec3().to_array()).collect()
+        let pixels = &self.pixels;
+        Picture::from_fn(self.stage.camera.size().into(), |i| pixels[i].mean(own).as_vec3().to_array())
     }
 
     /// Counts time that was spent on the render between its iterations as its own.

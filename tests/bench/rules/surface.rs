@@ -1,6 +1,7 @@
 //! Bandwidths on a curved surface: Figure 4 of \[CPPM 2020\].
 
 use crate::ground::{Ground, settings};
+use caustique::film::Size;
 use caustique::image::png;
 use caustique::image::tonemap::ToneMap;
 use caustique::math::{DVec3, Rgb, Vec3};
@@ -56,7 +57,7 @@ pub fn surface(ground: &Ground, photons: u32, iterations: u64, window: [usize; 4
         cut(&|p| colour((maps[1][p] / low).ln() / (high / low).ln())),
     ];
     let row = |y: usize| parts.iter().flat_map(move |part| part[y * w..(y + 1) * w].iter().copied());
-    png::write(file, 3 * w, h, (0..h).flat_map(row)).unwrap_or_else(|e| panic!("{e}"));
+    png::write(file, Size { width: 3 * w, height: h }, (0..h).flat_map(row)).unwrap_or_else(|e| panic!("{e}"));
     let quartiles = |map: &Vec<f32>| {
         let mut values: Vec<f32> = inside.iter().map(|p| map[*p]).collect();
         values.sort_by(f32::total_cmp);

@@ -1,24 +1,25 @@
 //! The finished picture stays where the bounds of the finish allow, whatever estimate it is made of.
 
+use caustique::film::{Picture, Size};
 use caustique::finish::bound::{LIMIT, REACH, spread};
-use caustique::finish::{Denoiser, DenoiserChoice, Estimate, Finish, Size, Windows, window};
+use caustique::finish::{Denoiser, DenoiserChoice, Estimate, Finish, Windows, window};
 use caustique::random::{Domain, Purpose, Stream};
 
 const NONE: f32 = f32::NAN;
 
 /// A picture whose channels differ, with standard errors of a tenth; the guides are those of a flat grey wall.
-fn estimate(size: Size, of: impl Fn(usize) -> f32) -> Estimate {
+fn estimate(size: Size, of: impl Fn(usize) -> f32 + Sync + Send) -> Estimate {
     let draw = |index: usize| Stream::new(31, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel);
-    let mean: Vec<[f32; 3]> = (0..size.pixels()).map(|i| [of(i), 0.5 * of(i), of(i) * (0.9 + 0.2 * draw(i))]).collect();
-    let deviation = mean.iter().map(|rgb| rgb.map(|value| 0.1 * value)).collect();
-    let (albedo, normal) = (vec![[0.5; 3]; size.pixels()], vec![[0.0, 0.0, 1.0]; size.pixels()]);
-    Estimate { size, mean, deviation, albedo: Some(albedo), normal: Some(normal), alpha: None }
+    let mean = Picture::from_fn(size, |i| [of(i), 0.5 * of(i), of(i) * (0.9 + 0.2 * draw(i))]);
+    let deviation = mean.map(|value| 0.1 * value);
+    let (albedo, normal) = (Picture::filled(size, [0.5; 3]), Picture::filled(size, [0.0, 0.0, 1.0]));
+    Estimate { mean, deviation, albedo: Some(albedo), normal: Some(normal), alpha: None }
 }
 
 /// Pixels of a picture that break a bound: each channel is a number, between zero and the brightest estimate around,
 /// and no further from its own estimate than the limit, where there is one.
-fn outside(estimate: &Estimate, picture: &[[f32; 3]]) -> Vec<usize> {
-    let (size, spread) = (estimate.size, spread(estimate));
+fn outside(estimate: &Estimate, picture: &Picture) -> Vec<usize> {
+    let (size, spread) = (picture.size(), spread(estimate));
     let breaks = |index: usize, c: usize| {
         let around = window(size, index, REACH).map(|other| estimate.mean[other][c]).filter(|value| value.is_finite());
         let (value, mean) = (picture[index][c], estimate.mean[index][c]);
@@ -37,7 +38,7 @@ fn no_denoiser_leaves_the_bounds() {
     let half = |i: usize| if i % 4 < 2 { 1e6 } else { 1.0 };
     let spark = |i: usize| if i % 13 == 5 { 1e6 } else { 1.0 };
     let broken = |i: usize| [1.0, f32::INFINITY, 2.0, NONE, 3.0, f32::NEG_INFINITY, 4.0][i % 7];
-    let pictures: [(&str, &dyn Fn(usize) -> f32); 8] = [
+    let pictures: [(&str, &(dyn Fn(usize) -> f32 + Sync)); 8] = [
         ("constant", &|_| 3.0),
         ("black", &|_| 0.0),
         ("edges", &half),
@@ -57,7 +58,7 @@ fn no_denoiser_leaves_the_bounds() {
                 let found = outside(&estimate, &picture);
                 assert!(found.is_empty(), "{choice:?}, {name}, {size:?}: pixels {found:?} of {picture:?}");
                 if *name == "constant" {
-                    let wrong: Vec<[f32; 3]> = picture.iter().map(|rgb| rgb.map(|value| 1.5 * value)).collect();
+                    let wrong = picture.map(|value| 1.5 * value);
                     assert_eq!(outside(&estimate, &wrong).len(), size.pixels(), "what is too bright goes unnoticed");
                 }
             }

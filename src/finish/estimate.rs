@@ -1,0 +1,94 @@
+//! The picture that the finish starts from, with its noise and the denoiser's guides.
+
+use crate::error::{Error, ErrorKind, Result};
+use crate::estimator::QUARTERS;
+use crate::film::{LayerSet, Picture, Role};
+
+/// Standard error over estimate that rounding of single-precision sums alone can produce.
+const ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// A picture, its noise and the guides of a denoiser, all of one size.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// Radiance.
+    pub mean: Picture,
+    /// Standard error of `mean`; infinite where it is unknown.
+    pub deviation: Picture,
+    /// Reflectance at the first rough hit, 0 to 1.
+    pub albedo: Option<Picture>,
+    /// World-space normal at that hit.
+    pub normal: Option<Picture>,
+    /// Coverage of each pixel, if the picture has it.
+    pub alpha: Option<Vec<f32>>,
+}
+
+impl Estimate {
+    /// The estimate in a picture of caustique (`Noisy`, `Variance1`, ...) or of another renderer: its beauty, and its
+    /// layer `Variance` (of the mean) or two independent halves, `Half1` and `Half2` or `HalfA` and `HalfB`. Albedo and
+    /// normal are found by the names of the common renderers.
+    ///
+    /// # Errors
+    /// There is no picture, or no layer for its noise.
+    pub fn of(set: &LayerSet) -> Result<Estimate> {
+        let mean = set.picture("Noisy").map_or_else(|| set.beauty(), Ok)?;
+        let variance = set.picture(&format!("Variance{}", own_level(set))).or_else(|| set.picture("Variance"));
+        let halves = [["Half1", "Half2"], ["HalfA", "HalfB"]].iter().find_map(|names| {
+            let [a, b] = names.map(|name| set.picture(name));
+            a.zip(b)
+        });
+        let deviation = match (variance, halves) {
+            (Some(variance), _) => variance.map(|v| if v >= 0.0 { v.sqrt() } else { f32::INFINITY }),
+            (None, Some((a, b))) => a.half_difference(&b),
+            (None, None) => {
+                let cause =
+                    "nothing tells how noisy the picture is: there is no layer Variance1, Variance, or Half1 and Half2";
+                let hint = "render with --layers all, or add the variance of the mean, or two independent halves";
+                return Err(Error::new(ErrorKind::Image, "", cause).hint(hint));
+            }
+        };
+        let guide = |role| set.find(role).filter(|layer| layer.planes.len() >= 3).map(|layer| set.picture_of(layer));
+        let (albedo, normal, alpha) = (guide(Role::Albedo), guide(Role::Normal), alpha(set));
+        Ok(Estimate { mean, deviation, albedo, normal, alpha })
+    }
+
+    /// Whether all samples of a pixel have been equal: a light seen without noise, or nothing at all. A black surface is
+    /// not exact, because rare light may have missed it.
+    pub(super) fn is_exact(&self, index: usize) -> bool {
+        let (mean, error) = (self.mean[index], self.deviation[index]);
+        let most = mean.into_iter().fold(0.0, f32::max);
+        let shows_nothing = most == 0.0 && self.alpha.as_ref().is_some_and(|alpha| alpha[index] == 0.0);
+        (most > 0.0 || shows_nothing) && error.into_iter().all(|error| error <= ROUNDING * most)
+    }
+
+    /// The estimate by the first two quarters of the iterations.
+    #[must_use]
+    pub fn first_half(&self, quarters: &[Picture; QUARTERS]) -> Estimate {
+        self.from_partial(quarters[0].average(&quarters[1]), 2.0)
+    }
+
+    /// The estimate by a part of the iterations, 1 / `divisor` of them, whose mean is given.
+    #[must_use]
+    pub fn from_partial(&self, mean: Picture, divisor: f32) -> Estimate {
+        let deviation = self.deviation.map(|error| error * divisor.sqrt());
+        let (albedo, normal, alpha) = (self.albedo.clone(), self.normal.clone(), self.alpha.clone());
+        Estimate { mean, deviation, albedo, normal, alpha }
+    }
+}
+
+/// Number, from 1, of the level that is the method's own image: the second largest.
+pub(super) fn own_level(set: &LayerSet) -> usize {
+    let count = (1..).take_while(|level| set.get(&format!("Variance{level}")).is_some()).count();
+    count.saturating_sub(1).max(1)
+}
+
+/// Coverage of each pixel, if the beauty has it.
+pub(super) fn alpha(set: &LayerSet) -> Option<Vec<f32>> {
+    set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone())
+}
+
+/// The pictures of the four quarters of the iterations; `None` if one is missing or black.
+pub fn quarters(set: &LayerSet) -> Option<[Picture; QUARTERS]> {
+    let pictures: Vec<Picture> = (1..=QUARTERS).filter_map(|k| set.picture(&format!("Quarter{k}"))).collect();
+    let quarters = <[Picture; QUARTERS]>::try_from(pictures).ok()?;
+    (!quarters.iter().any(Picture::is_black)).then_some(quarters)
+}
