@@ -1,4 +1,4 @@
-//! From a description to a scene: places and bakes meshes, makes lights, commits to Embree.
+//! Building a scene from a description: places and bakes meshes, makes lights, commits shapes to Embree.
 
 use super::description::{self, Description, EnvironmentSource, PunctualKind, PunctualLight};
 use super::nesting::ranks;
@@ -12,8 +12,8 @@ use crate::texture::Texture;
 use crate::trace::{CAMERA_RAY_BIT, HitFilter, Tracer};
 use std::sync::Arc;
 
-/// Farther from the origin than this many scene radii, coordinates are moved to the scene's centre: f32 would lose the
-/// digits.
+/// Distance of the scene's centre from the origin, in scene radii, from which on the scene is moved to the origin, because
+/// f32 coordinates would lose digits.
 const FAR_FROM_ORIGIN: f64 = 8.0;
 
 /// Builds the scene.
@@ -22,16 +22,9 @@ const FAR_FROM_ORIGIN: f64 = 8.0;
 /// Embree is missing, or out of memory.
 pub(super) fn build(mut description: Description, threads: usize) -> Result<Scene> {
     let mut warnings = std::mem::take(&mut description.warnings);
-    for placed in &description.instances {
-        let material = &description.materials[placed.material as usize];
-        let warning =
-            format!("material \"{}\": its dispersion is ignored: it is no solid that refracts", material.name);
-        if material.dispersion > 0.0 && !material.disperses() && !warnings.contains(&warning) {
-            warnings.push(warning);
-        }
-    }
-    let first_lamp = description.objects.len() as u32;
-    add_lamps(&mut description);
+    warn_of_dispersion(&description, &mut warnings);
+    let first_light_sphere = description.objects.len() as u32;
+    add_light_spheres(&mut description);
     let groups = light_groups(&description, &mut warnings);
     let (low, high) = bounds(&description);
     let (center, radius) =
@@ -39,15 +32,15 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let radius = radius.max(1e-6);
     let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
 
-    let shapes = Arc::new(place(&mut description, origin));
+    let shapes = Arc::new(place_instances(&mut description, origin));
     let mut materials = Materials { list: description.materials, textures: description.textures.into() };
-    dense::thin(&shapes, &mut materials, &mut description.medium, &mut warnings);
+    dense::limit_densities(&shapes, &mut materials, &mut description.medium, &mut warnings);
     let materials = Arc::new(materials);
     let (tracer, pass_through_lights) = tracers(&shapes, &materials, threads)?;
 
     let sky = Sky {
         center: (center - origin).as_vec3(),
-        // A little room, so that no light from infinity starts inside the geometry.
+        // Slightly larger, so that no light path from infinity starts inside the geometry.
         radius: radius as f32 * 1.001,
         hidden_from_camera: description.environment_hidden_from_camera || description.picture.film_transparent,
         environment: environment(description.environment),
@@ -62,12 +55,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     }
     let scattering = Scattering::new(&materials.list);
     let contacts = Arc::new(Contacts::new(&shapes, &materials));
-    for &(instance, within) in &contacts.thin {
-        warnings.push(format!(
-            "object \"{}\": it has walls thinner than positions are exact where it is ({within:.1e} m), which light passes as if they were one surface (make them thicker, or the scene smaller)",
-            shapes.instances[instance as usize].name
-        ));
-    }
+    warn_of_thin_walls(&shapes, &contacts, &mut warnings);
     let survey = Survey::new(&shapes, &materials, &lights, description.medium);
     let ranks = ranks(&shapes, &materials).into();
     Ok(Scene {
@@ -77,7 +65,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         shapes,
         materials,
         objects: description.objects,
-        first_lamp,
+        first_light_sphere,
         tracer,
         pass_through_lights,
         lights,
@@ -96,7 +84,29 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     })
 }
 
-/// The groups that lights are in, by names in order of appearance.
+/// Adds a warning for each material whose dispersion has no effect.
+fn warn_of_dispersion(description: &Description, warnings: &mut Vec<String>) {
+    for placed in &description.instances {
+        let material = &description.materials[placed.material as usize];
+        let warning =
+            format!("material \"{}\": its dispersion is ignored: it is no solid that refracts", material.name);
+        if material.dispersion > 0.0 && !material.disperses() && !warnings.contains(&warning) {
+            warnings.push(warning);
+        }
+    }
+}
+
+/// Adds a warning for each object with walls that are thinner than the rounding error of positions.
+fn warn_of_thin_walls(shapes: &Shapes, contacts: &Contacts, warnings: &mut Vec<String>) {
+    for &(instance, within) in &contacts.thin {
+        warnings.push(format!(
+            "object \"{}\": it has walls thinner than positions are exact where it is ({within:.1e} m), which light passes as if they were one surface (make them thicker, or the scene smaller)",
+            shapes.instances[instance as usize].name
+        ));
+    }
+}
+
+/// The light groups of the scene, in order of appearance, and the group of each light.
 fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups {
     let mut groups = Groups::default();
     let mut of = |name: &Option<String>| {
@@ -127,9 +137,9 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
     groups
 }
 
-/// Names solids whose alpha differs from place to place: where a ray enters them decides about its exit, too, so light
-/// and its way back may differ. And glowing ones with any alpha: each of their faces is there or not by itself, so that
-/// lamps and what is hit of them agree, and a ray may pass one wall of glass alone.
+/// Adds a warning for each glass solid whose alpha is only approximated. If alpha varies over the solid, the alpha where a
+/// ray enters also decides at its exit, so reversed paths may differ. If an emissive solid has alpha, each face decides by
+/// itself, so that light samples and hits agree, and a ray may pass one wall of the solid alone.
 fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
     let mut named = vec![false; materials.list.len()];
     for instance in &shapes.instances {
@@ -137,9 +147,9 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
         let colors = &shapes.meshes[instance.mesh as usize].colors;
         let texture = material.base_color_texture.map(|t| &materials.textures[t.texture as usize]);
         let varies = || texture.is_some_and(Texture::has_alpha) || colors.iter().any(|color| color.w < 1.0);
-        let least = if let Alpha::Mask(cutoff) = material.alpha { cutoff } else { 1.0 };
+        let opaque_from = if let Alpha::Mask(cutoff) = material.alpha { cutoff } else { 1.0 };
         let glows = material.is_solid_glass() && material.emits() && material.alpha != Alpha::Opaque;
-        let said = if glows && (varies() || material.base_color[3] < least) {
+        let problem = if glows && (varies() || material.base_color[3] < opaque_from) {
             "its alpha takes walls of solid glass that glows one by one, so light that passes two of them is not what it should be (give the glow to an object of its own, or set its alpha to opaque)"
         } else if material.has_alpha_per_entry() && varies() {
             "its alpha cuts holes into solid glass, and a ray that enters through one leaves through one (model the holes, or give it no thickness)"
@@ -147,12 +157,12 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
             continue;
         };
         if !std::mem::replace(&mut named[instance.material as usize], true) {
-            warnings.push(format!("material \"{}\": {said}", material.name));
+            warnings.push(format!("material \"{}\": {problem}", material.name));
         }
     }
 }
 
-/// Adds what is to be said of lights that give none; `punctual` is the number of lamps that the file has.
+/// Adds warnings about lights without effect; `punctual` is the number of punctual lights in the file.
 fn warn_of_lights(
     (shapes, materials): (&Shapes, &Materials),
     lights: &Lights,
@@ -186,7 +196,7 @@ fn warn_of_lights(
     }
 }
 
-/// Other materials on the shapes of a scene, another medium and environment around them.
+/// [`Scene::with_materials`].
 ///
 /// # Errors
 /// Embree is out of memory.
@@ -197,27 +207,27 @@ pub(super) fn rebuild_with_materials(
     environment: Option<Environment>,
 ) -> Result<Scene> {
     let (shapes, materials) = (Arc::clone(&scene.shapes), Arc::new(materials));
-    // Embree asks about cut-outs the materials that it was given.
-    let cut = |materials: &Materials| materials.list.iter().map(asks).collect::<Vec<_>>();
+    // Embree's filters keep the materials that they were built with.
+    let traced = |materials: &Materials| materials.list.iter().map(hit_behaviour).collect::<Vec<_>>();
     let passing = |materials: &Materials| materials.list.iter().map(Material::transmits).collect::<Vec<bool>>();
     let contacts = match passing(&materials) == passing(&scene.materials) {
         true => Arc::clone(&scene.contacts),
         false => Arc::new(Contacts::new(&shapes, &materials)),
     };
-    let (tracer, pass_through_lights) = match cut(&materials) == cut(&scene.materials) {
+    let (tracer, pass_through_lights) = match traced(&materials) == traced(&scene.materials) {
         true => (scene.tracer.clone(), scene.pass_through_lights.clone()),
         false => tracers(&shapes, &materials, rayon::current_num_threads())?,
     };
-    let lamps = scene.lights.emitters().iter();
-    let lamps = lamps.filter(|lamp| !matches!(lamp, Emitter::Triangle { .. } | Emitter::Environment)).cloned();
+    let others = scene.lights.emitters().iter();
+    let others = others.filter(|light| !matches!(light, Emitter::Triangle { .. } | Emitter::Environment)).cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
-    let lights = Lights::new(&shapes, &materials, lamps.collect(), sky).with_groups(scene.lights.groups().clone());
+    let lights = Lights::new(&shapes, &materials, others.collect(), sky).with_groups(scene.lights.groups().clone());
     Ok(Scene {
         source: scene.source.clone(),
         converted: scene.converted.clone(),
         origin: scene.origin,
         objects: scene.objects.clone(),
-        first_lamp: scene.first_lamp,
+        first_light_sphere: scene.first_light_sphere,
         tracer,
         pass_through_lights,
         light_names: scene.light_names.clone(),
@@ -238,7 +248,7 @@ pub(super) fn rebuild_with_materials(
     })
 }
 
-/// World bounds of all meshes in f64.
+/// World-space bounds of all meshes, in f64.
 fn bounds(description: &Description) -> (DVec3, DVec3) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for placed in &description.instances {
@@ -251,8 +261,8 @@ fn bounds(description: &Description) -> (DVec3, DVec3) {
     (low, high)
 }
 
-/// Bakes meshes that stand in one place into world space; shares the others.
-fn place(description: &mut Description, origin: DVec3) -> Shapes {
+/// Places the instances. A mesh with one instance is transformed to world space; other meshes are shared.
+fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
     let mut uses = vec![0u32; description.meshes.len()];
     for placed in &description.instances {
         uses[placed.mesh as usize] += 1;
@@ -277,8 +287,8 @@ fn place(description: &mut Description, origin: DVec3) -> Shapes {
     Shapes::new(meshes, instances)
 }
 
-/// Moves a mesh to world space. A mirroring transform turns the winding, so that the front stays the front, and the
-/// handedness of tangents.
+/// Transforms a mesh to world space. A mirroring transform also flips the winding, so that the front stays the front, and
+/// the handedness of the tangents.
 fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     let mirrored = to_world.matrix3.determinant() < 0.0;
     let normals = to_world.matrix3.inverse().transpose();
@@ -299,36 +309,39 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     }
 }
 
-/// What decides about a material where rays meet it.
-fn asks(material: &Material) -> (Alpha, bool) {
+/// The properties of a material that Embree's filters use: alpha, and whether rays pass through the light.
+fn hit_behaviour(material: &Material) -> (Alpha, bool) {
     (material.alpha_per_hit(), material.null_bsdf)
 }
 
-/// Commits shapes to Embree, with what rays pass of them: what has a body, and what glows without one, if anything
-/// does.
+/// Commits the shapes to Embree. Returns a scene of all shapes except pass-through lights, and one of the pass-through
+/// lights, if there are any.
 fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<(Tracer, Option<Tracer>)> {
-    let of = |instance: &Instance| &materials.list[instance.material as usize];
-    let asked = |null_bsdf: bool| {
-        let asked = |instance: &Instance| {
-            let asked = instance.hidden_from_camera || of(instance).alpha_per_hit() != Alpha::Opaque;
-            (of(instance).null_bsdf == null_bsdf).then_some(asked)
+    let material = |instance: &Instance| &materials.list[instance.material as usize];
+    // For each instance that belongs to the scene, whether its hits are filtered.
+    let filtered = |null_bsdf: bool| {
+        let filtered = |instance: &Instance| {
+            let filtered = instance.hidden_from_camera || material(instance).alpha_per_hit() != Alpha::Opaque;
+            (material(instance).null_bsdf == null_bsdf).then_some(filtered)
         };
-        shapes.instances.iter().map(asked).collect::<Vec<_>>()
+        shapes.instances.iter().map(filtered).collect::<Vec<_>>()
     };
-    let meets = meets_test(shapes, materials);
-    let tracer = Tracer::build(shapes, &asked(false), &meets, threads)?;
-    let pass_through_lights = shapes.instances.iter().any(|instance| of(instance).null_bsdf);
-    let glowing = pass_through_lights.then(|| Tracer::build(shapes, &asked(true), &meets, threads)).transpose()?;
-    Ok((tracer, glowing))
+    let filter = hit_filter(shapes, materials);
+    let tracer = Tracer::build(shapes, &filtered(false), &filter, threads)?;
+    let has_pass_through = shapes.instances.iter().any(|instance| material(instance).null_bsdf);
+    let pass_through =
+        has_pass_through.then(|| Tracer::build(shapes, &filtered(true), &filter, threads)).transpose()?;
+    Ok((tracer, pass_through))
 }
 
-/// A random number above 0 and at most 1, the same for the same ray, instance and `key`.
+/// A random number in (0, 1] that depends on ray, instance and `key` alone.
 pub(super) fn random_cutoff(token: u32, instance: u32, key: u32) -> f32 {
     let key = u64::from(token) << 32 ^ u64::from(instance).wrapping_mul(0x9e37_79b9) << 20 ^ u64::from(key);
     (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
 }
 
-fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
+/// Filter of hits: rejects hits of camera rays on instances hidden from cameras, and hits that pass by alpha.
+fn hit_filter(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
     Arc::new(move |instance, primitive, barycentric, token| {
         let placed = &shapes.instances[instance as usize];
@@ -339,7 +352,7 @@ fn meets_test(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
         let cutoff = match material.alpha_per_hit() {
             Alpha::Opaque => return true,
             Alpha::Mask(cutoff) => cutoff,
-            // One number per ray and triangle, whatever the order in which Embree asks.
+            // One number per ray and triangle, so that the order of Embree's calls does not matter.
             Alpha::Blend => random_cutoff(token, instance, primitive),
         };
         let Some(surface) = shapes.surface(instance, primitive, barycentric) else { return false };
@@ -368,7 +381,7 @@ fn axis(light: &PunctualLight) -> Vec3 {
     (light.to_world.matrix3 * DVec3::NEG_Z).normalize_or(DVec3::NEG_Y).as_vec3()
 }
 
-/// 1 - cos of an angle, with all its digits where it is small.
+/// 1 - cos of an angle (radians), exact for small angles.
 fn one_minus_cos(angle: f64) -> f64 {
     2.0 * (0.5 * angle).sin().powi(2)
 }
@@ -385,7 +398,7 @@ fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
                 frame: Frame::from_normal(axis(light)),
                 intensity: light.intensity,
                 inner: inner as f32,
-                // Greater than the inner one, so that the ramp has a width.
+                // Greater than `inner`, so that the ramp between them has a width.
                 outer: outer.max(inner * (1.0 + 1e-6)) as f32,
                 edge,
             }
@@ -399,8 +412,8 @@ fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
     }
 }
 
-/// Point lights with a radius become glowing spheres: they can be seen, reflected, and cast soft shadows.
-fn add_lamps(description: &mut Description) {
+/// Turns point lights with a radius into emissive spheres, which are visible and cast soft shadows.
+fn add_light_spheres(description: &mut Description) {
     for light in &description.lights {
         if !light.is_sphere() || light.intensity.max_element() <= 0.0 {
             continue;
@@ -414,7 +427,8 @@ fn add_lamps(description: &mut Description) {
                 0.5 * (b - a).cross(c - a).length()
             })
             .sum();
-        // A convex body of surface A shows a mean area of A / 4 (Cauchy): the mean intensity is exact.
+        // The mean projected area of a convex body is a quarter of its surface (Cauchy), so the mean intensity over all
+        // directions is exact.
         let emission: Rgb = light.intensity * (4.0 / area);
         let material = Material {
             name: light.name.clone(),
@@ -439,7 +453,7 @@ fn add_lamps(description: &mut Description) {
     }
 }
 
-/// A sphere of `20 * 4^subdivisions` triangles.
+/// A subdivided icosahedron of `20 * 4^subdivisions` triangles around the origin.
 fn icosphere(radius: f32, subdivisions: u32) -> Mesh {
     let t = (1.0 + 5f32.sqrt()) / 2.0;
     let mut positions: Vec<Vec3> = [

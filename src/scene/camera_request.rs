@@ -5,12 +5,13 @@ use super::description::{CameraDescription, Projection};
 use crate::camera::{self, Camera, Filter};
 use crate::error::{Error, ErrorKind, Result};
 use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2};
+use std::borrow::Cow;
 
-/// Width of a picture when nothing is asked for.
+/// Width of a picture in pixels, if neither the scene nor the user sets a size.
 const DEFAULT_WIDTH: u32 = 1280;
 /// Aspect ratio of a picture when neither the camera nor the user gives one.
 const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
-/// Largest width or height.
+/// Maximum width and height of a picture in pixels.
 pub const MAX_SIZE: u32 = 32_768;
 
 /// The camera, size, window and pixel filter that the user asks for.
@@ -22,7 +23,7 @@ pub struct CameraRequest {
     pub width: Option<u32>,
     /// Height in pixels.
     pub height: Option<u32>,
-    /// The window that is rendered; the scene's own, or all, otherwise.
+    /// The window to render; `None`: the window in the scene file, or the whole picture.
     pub crop: Option<Crop>,
     /// Pixel filter.
     pub filter: Filter,
@@ -38,8 +39,8 @@ pub enum Crop {
 }
 
 impl Crop {
-    /// The window in a picture of that size, in pixels: at least one, where shares are small. `None` where it is not
-    /// within the picture or empty.
+    /// The window in pixels, for a picture of `width` x `height` pixels. Windows in shares have at least one pixel per
+    /// side. `None` if the window is empty or not within the picture.
     pub fn window(self, (width, height): (u32, u32)) -> Option<[u32; 4]> {
         let [x, y, w, h] = match self {
             Crop::Pixels(window) => window,
@@ -71,10 +72,10 @@ impl Scene {
         Ok(self.window(request, whole.size())?.map_or(whole, |window| whole.crop(window)))
     }
 
-    /// The window that is rendered of a picture of that size, in pixels, if not all of it.
+    /// The window to render, in pixels, of a picture of `size` pixels; `None` for the whole picture.
     ///
     /// # Errors
-    /// It is not within the picture.
+    /// The window is not within the picture.
     pub fn window(&self, request: &CameraRequest, size: (u32, u32)) -> Result<Option<[u32; 4]>> {
         let Some(crop) = request.crop.or(self.picture.crop.map(Crop::Shares)) else { return Ok(None) };
         let window = crop.window(size).ok_or_else(|| {
@@ -92,27 +93,51 @@ impl Scene {
     /// # Errors
     /// No camera has the name, or the size is zero or too large.
     pub fn whole_camera(&self, request: &CameraRequest) -> Result<Camera> {
-        let default;
-        let described = match &request.camera {
-            Some(name) => self.cameras.iter().find(|c| &c.name == name).ok_or_else(|| {
-                let names: Vec<String> = self.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
-                let error =
-                    Error::new(ErrorKind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
-                error.hint(if names.is_empty() {
-                    "the scene has no camera".into()
-                } else {
-                    format!("it has {}", names.join(", "))
-                })
-            })?,
-            None => match self.cameras.first() {
-                Some(camera) => camera,
-                None => {
-                    default = self.default_camera();
-                    &default
-                }
-            },
+        let described = self.described_camera(request.camera.as_deref())?;
+        let (width, height) = self.picture_size(request, described.projection)?;
+        let film_aspect = width as f32 / height as f32;
+        let projection = match described.projection {
+            Projection::Perspective { yfov, .. } => {
+                let half = (0.5 * yfov).tan();
+                camera::Projection::Perspective(Vec2::new(half * film_aspect, half))
+            }
+            Projection::Orthographic { xmag, ymag } => {
+                // A picture of another aspect ratio shows at least the camera's whole view.
+                let ymag = ymag.abs().max(xmag.abs() / film_aspect);
+                camera::Projection::Orthographic(Vec2::new(ymag * film_aspect, ymag))
+            }
         };
-        let aspect = match (self.picture.resolution, described.projection) {
+        let lens = if described.aperture_radius > 0.0 && described.focus_distance > 0.0 {
+            (described.aperture_radius, described.focus_distance)
+        } else {
+            (0.0, 1.0)
+        };
+        let position = described.to_world.translation - self.origin;
+        let camera = Camera::new(position, rotation(&described.to_world), projection, lens, (width, height));
+        Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
+    }
+
+    /// The camera called `name`; without a name the first camera, or a default one.
+    fn described_camera(&self, name: Option<&str>) -> Result<Cow<'_, CameraDescription>> {
+        let Some(name) = name else {
+            return Ok(self.cameras.first().map_or_else(|| Cow::Owned(self.default_camera()), Cow::Borrowed));
+        };
+        self.cameras.iter().find(|camera| camera.name == name).map(Cow::Borrowed).ok_or_else(|| {
+            let names: Vec<String> = self.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
+            let error =
+                Error::new(ErrorKind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
+            error.hint(if names.is_empty() {
+                "the scene has no camera".into()
+            } else {
+                format!("it has {}", names.join(", "))
+            })
+        })
+    }
+
+    /// Width and height of the whole picture in pixels: from the request, else from the scene. The aspect ratio gives a
+    /// side that neither sets.
+    fn picture_size(&self, request: &CameraRequest, projection: Projection) -> Result<(u32, u32)> {
+        let aspect = match (self.picture.resolution, projection) {
             (Some([width, height]), _) => width as f32 / height as f32,
             (None, Projection::Perspective { aspect, .. }) => aspect.unwrap_or(DEFAULT_ASPECT),
             (None, Projection::Orthographic { xmag, ymag }) => (xmag / ymag).abs(),
@@ -133,29 +158,10 @@ impl Scene {
                 Error::new(ErrorKind::Usage, "", cause).hint(format!("--width and --height are from 1 to {MAX_SIZE}"))
             );
         }
-        let film_aspect = width as f32 / height as f32;
-        let projection = match described.projection {
-            Projection::Perspective { yfov, .. } => {
-                let half = (0.5 * yfov).tan();
-                camera::Projection::Perspective(Vec2::new(half * film_aspect, half))
-            }
-            Projection::Orthographic { xmag, ymag } => {
-                // A picture of another aspect shows all of the camera's view.
-                let ymag = ymag.abs().max(xmag.abs() / film_aspect);
-                camera::Projection::Orthographic(Vec2::new(ymag * film_aspect, ymag))
-            }
-        };
-        let lens = if described.aperture_radius > 0.0 && described.focus_distance > 0.0 {
-            (described.aperture_radius, described.focus_distance)
-        } else {
-            (0.0, 1.0)
-        };
-        let position = described.to_world.translation - self.origin;
-        let camera = Camera::new(position, rotation(&described.to_world), projection, lens, (width, height));
-        Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
+        Ok((width, height))
     }
 
-    /// A view of the whole scene from the front, a little from above.
+    /// A camera that sees the whole scene from the front, slightly from above.
     fn default_camera(&self) -> CameraDescription {
         let yfov = 40f32.to_radians();
         let sky = self.lights.sky();
@@ -175,7 +181,7 @@ impl Scene {
     }
 }
 
-/// Orthonormal axes of a node's transform; left-handed where that mirrors, so that +X stays to the right.
+/// Orthonormal axes of a node's transform. They are left-handed if the transform mirrors, so that +X stays to the right.
 fn rotation(to_world: &DAffine3) -> Mat3 {
     let back = to_world.matrix3.z_axis.normalize_or(DVec3::Z);
     let up = to_world.matrix3.y_axis;

@@ -1,26 +1,26 @@
-//! Surfaces that lie on each other: a glass on a table, a liquid in a glass, sheets in a stack.
+//! Surfaces that touch: a glass on a table, a liquid in a glass, a stack of sheets.
 //!
-//! A ray goes on a little past the surface it leaves ([`Surface::error`]), because rounding decides which of two surfaces
-//! within that distance is nearer. So everything within it has to be found by other means. Where triangles may touch
-//! ([`Contacts`](super::Contacts)), all surfaces at a place are collected and met in a stated order, whichever of them
-//! Embree finds first.
+//! A ray starts at a small offset from the surface it leaves ([`Surface::error`]). Rounding decides which of two surfaces
+//! within the offset is nearer, so rays cannot find the order of touching surfaces. Where triangles may touch
+//! ([`Contacts`](super::Contacts)), a query collects all surfaces at the point, and the ray crosses them in an order that
+//! does not depend on Embree's first hit.
 //!
-//! Surfaces that pass light, among themselves, are in optical contact:
+//! Transmitting surfaces are in optical contact with each other:
 //!
-//! - a solid is entered before another is left, so that solids overlap, and nested dielectrics
-//!   (`transport/interior.rs`) say what fills the space: liquid and glass meet without air between them;
-//! - a sheet, which has no inside, is behind solids that are in front of it.
+//! - The ray enters a solid before it leaves another one, so the solids overlap, and nested dielectrics
+//!   (`transport/interior.rs`) determine what fills the space. Liquid and glass meet without air between them.
+//! - A sheet, which has no inside, is behind the solids in front of it.
 //!
-//! Beside an opaque surface they stand off it by a film of air, as rigid bodies do, so that a picture does not change
-//! when a glass is lifted off its table by a hair:
+//! Transmitting surfaces are separated from an opaque surface by a film of air, as rigid bodies are. So a picture does not
+//! change when a glass is lifted off its table by a tiny distance:
 //!
-//! - solids are left before the opaque surface is met, and entered after it has been left;
-//! - a sheet lies on the side of the opaque surface that its front points to.
+//! - The ray leaves solids before it hits the opaque surface, and enters solids after it has left the opaque surface.
+//! - A sheet is on the side of the opaque surface that its front points to.
 //!
-//! A material in optical contact (`Material::optical_contact`: paint, a label, water on the floor of a pool) has no such
-//! film: where one of the two has it, a ray meets the opaque surface alone.
+//! A material with `Material::optical_contact` (paint, a label, water on the floor of a pool) has no such film: if one of
+//! the two materials has it, the ray hits the opaque surface alone.
 //!
-//! A ray in the other direction meets the surfaces in the reverse order, so light and importance take the same paths.
+//! A reversed ray crosses the surfaces in the reverse order, so light paths and camera paths are the same.
 
 use super::Scene;
 use super::contacts::face_each_other;
@@ -30,13 +30,13 @@ use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
 
-/// Whether rays may go on behind the surface.
+/// Whether rays may continue behind the surface.
 #[inline(always)]
 fn passes(scene: &Scene, surface: &Surface) -> bool {
     scene.materials.list[surface.material as usize].transmits()
 }
 
-/// A point of a surface, by what tells it from others there.
+/// A point on a surface that other surfaces may touch.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactPoint {
     p: Vec3,
@@ -48,7 +48,7 @@ pub struct ContactPoint {
 }
 
 impl ContactPoint {
-    /// Where the surface is, if others lie on it there.
+    /// The point of `surface`, if other surfaces touch it there.
     #[inline(always)]
     pub fn touching(surface: &Surface) -> Option<ContactPoint> {
         surface.touching.then(|| ContactPoint::of(surface))
@@ -60,7 +60,7 @@ impl ContactPoint {
         ContactPoint { p, ng, instance, primitive, material, error }
     }
 
-    /// The place on the triangle of light `index` that is nearest to `near`, if others may lie on that triangle.
+    /// The point on the triangle of light `index` that is nearest to `near`, if other surfaces may touch the triangle.
     #[inline]
     pub fn on_light(scene: &Scene, index: u32, near: Vec3) -> Option<ContactPoint> {
         if scene.contacts.is_empty() { None } else { ContactPoint::on_touched_light(scene, index, near) }
@@ -81,10 +81,11 @@ impl ContactPoint {
     }
 }
 
-/// Rank of a surface among those at one place, for a ray along `direction`; `film`: one of them is opaque.
-fn rank(scene: &Scene, place: &ContactPoint, direction: Vec3, film: bool) -> (u8, i64, i64) {
-    let front = direction.dot(place.ng) < 0.0;
-    let material = &scene.materials.list[place.material as usize];
+/// Sort key of a surface among touching ones, in the order in which a ray along `direction` crosses them. `film`: an
+/// opaque surface is among them.
+fn rank(scene: &Scene, point: &ContactPoint, direction: Vec3, film: bool) -> (u8, i64, i64) {
+    let front = direction.dot(point.ng) < 0.0;
+    let material = &scene.materials.list[point.material as usize];
     let rank = match (material.transmits(), material.thin, front) {
         (false, ..) => 2,
         (true, false, false) if film => 0,
@@ -97,13 +98,13 @@ fn rank(scene: &Scene, place: &ContactPoint, direction: Vec3, film: bool) -> (u8
         (true, true, true) => 4,
     };
     let reversed = |index: u32| if front { i64::from(index) } else { -i64::from(index) };
-    (rank, reversed(place.instance), reversed(place.primitive))
+    (rank, reversed(point.instance), reversed(point.primitive))
 }
 
-/// Surfaces at one place.
+/// Touching surfaces at one point.
 type Stack = SmallVec<[(ContactPoint, Hit); 4]>;
 
-/// The surfaces at a place besides `at`, in no order.
+/// The other surfaces that touch the surface at `at`, unordered.
 fn others(scene: &Scene, at: &ContactPoint, token: u32) -> Stack {
     let reach = at.error;
     let (origin, direction) = (at.p - at.ng * reach, at.ng);
@@ -113,8 +114,9 @@ fn others(scene: &Scene, at: &ContactPoint, token: u32) -> Stack {
             return;
         }
         let Some(other) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
-        let one = |place: &ContactPoint| place.instance == other.instance && !face_each_other(place.ng, other.ng);
-        if !one(at) && !others.iter().any(|(place, _)| one(place)) {
+        // Neighbouring triangles of one mesh are one surface.
+        let same = |point: &ContactPoint| point.instance == other.instance && !face_each_other(point.ng, other.ng);
+        if !same(at) && !others.iter().any(|(point, _)| same(point)) {
             others.push((ContactPoint { error: reach, ..ContactPoint::of(&other) }, hit));
         }
     };
@@ -122,71 +124,73 @@ fn others(scene: &Scene, at: &ContactPoint, token: u32) -> Stack {
     others
 }
 
-/// Leaves out what touches an opaque surface of `stack` without a film of air, and whether there is a film.
-fn without_wetted(scene: &Scene, stack: &mut Stack) -> bool {
-    let material = |place: &ContactPoint| &scene.materials.list[place.material as usize];
-    let opaque = |place: &ContactPoint| !material(place).transmits();
-    let film = stack.iter().any(|(place, _)| opaque(place));
+/// Removes transmitting surfaces that are in optical contact with an opaque surface. Returns whether an opaque surface is
+/// in the stack, so that a film of air separates the others from it.
+fn remove_optical_contacts(scene: &Scene, stack: &mut Stack) -> bool {
+    let material = |point: &ContactPoint| &scene.materials.list[point.material as usize];
+    let opaque = |point: &ContactPoint| !material(point).transmits();
+    let film = stack.iter().any(|(point, _)| opaque(point));
     if film {
-        let wets = stack.iter().any(|(place, _)| opaque(place) && material(place).optical_contact);
-        stack.retain(|(place, _)| opaque(place) || !(wets || material(place).optical_contact));
+        let contact = stack.iter().any(|(point, _)| opaque(point) && material(point).optical_contact);
+        stack.retain(|(point, _)| opaque(point) || !(contact || material(point).optical_contact));
     }
     film
 }
 
-/// The surfaces at the place where a ray along `direction` has met `met`, in order.
-fn stack(scene: &Scene, met: ContactPoint, hit: Hit, direction: Vec3, token: u32) -> Stack {
-    let mut stack = others(scene, &met, token);
+/// All surfaces at the point `hit_point`, in the order in which a ray along `direction` crosses them; empty if no other
+/// surface touches the one that was hit.
+fn stack(scene: &Scene, hit_point: ContactPoint, hit: Hit, direction: Vec3, token: u32) -> Stack {
+    let mut stack = others(scene, &hit_point, token);
     if !stack.is_empty() {
-        stack.push((met, hit));
-        let film = without_wetted(scene, &mut stack);
-        stack.sort_unstable_by_key(|(place, _)| rank(scene, place, direction, film));
+        stack.push((hit_point, hit));
+        let film = remove_optical_contacts(scene, &mut stack);
+        stack.sort_unstable_by_key(|(point, _)| rank(scene, point, direction, film));
     }
     stack
 }
 
-/// The surfaces at a place that come after the one there for a ray along `direction`, in order.
-fn following(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Stack {
-    let mut others = others(scene, place, token);
-    let passes = |place: &ContactPoint| scene.materials.list[place.material as usize].transmits();
-    // A ray that leaves an opaque surface does not meet another one that coincides with it.
-    others.retain(|(other, _)| passes(place) || passes(other));
-    let own = (*place, Hit { t: 0.0, instance: place.instance, primitive: place.primitive, barycentric: [0.0; 2] });
+/// The touching surfaces that a ray along `direction` crosses after the one at `point`, in order.
+fn following(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> Stack {
+    let mut others = others(scene, point, token);
+    let passes = |point: &ContactPoint| scene.materials.list[point.material as usize].transmits();
+    // A ray that leaves an opaque surface does not hit another opaque surface that coincides with it.
+    others.retain(|(other, _)| passes(point) || passes(other));
+    let own = (*point, Hit { t: 0.0, instance: point.instance, primitive: point.primitive, barycentric: [0.0; 2] });
     others.push(own);
-    let film = without_wetted(scene, &mut others);
-    let leaving = rank(scene, place, direction, film);
+    let film = remove_optical_contacts(scene, &mut others);
+    let leaving = rank(scene, point, direction, film);
     others.retain(|(other, _)| rank(scene, other, direction, film) > leaving);
     others.sort_unstable_by_key(|(other, _)| rank(scene, other, direction, film));
     others
 }
 
-/// What is met at a place, in order.
+/// The surfaces of a stack, in its order.
 fn surfaces<'a>(scene: &'a Scene, stack: &'a Stack) -> impl Iterator<Item = Surface> + 'a {
     stack.iter().filter_map(|(_, hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric))
 }
 
 #[cold]
 #[inline(never)]
-fn next(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Option<Hit> {
-    following(scene, place, direction, token).first().map(|(_, hit)| *hit)
+fn next(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> Option<Hit> {
+    following(scene, point, direction, token).first().map(|(_, hit)| *hit)
 }
 
-/// Surfaces at a place that a ray along `direction` meets after the one there, in order.
+/// The touching surfaces that a ray along `direction` crosses after the one at `point`, in order.
 #[cold]
 #[inline(never)]
-pub fn surfaces_after(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
-    surfaces(scene, &following(scene, place, direction, token)).collect()
+pub fn surfaces_after(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
+    surfaces(scene, &following(scene, point, direction, token)).collect()
 }
 
-/// Surfaces at a place that a ray along `direction` has to pass before it reaches the one there, in order.
-pub fn surfaces_before(scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
-    // They come after it for light on its way back.
-    let mut back = surfaces_after(scene, place, -direction, token);
+/// The touching surfaces that a ray along `direction` crosses before the one at `point`, in order.
+pub fn surfaces_before(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
+    // The reversed ray crosses them after the one at `point`.
+    let mut back = surfaces_after(scene, point, -direction, token);
     back.reverse();
     back
 }
 
-/// A surface that lies on one which a camera looks through along `direction`, and which it sees.
+/// A surface that touches the culled surface `culled`, and that a camera ray along `direction` does not cull.
 #[cold]
 #[inline(never)]
 pub fn visible_on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token: u32) -> Option<Surface> {
@@ -194,53 +198,53 @@ pub fn visible_on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token
     surfaces(scene, &others).find(|other| !scene.culls(other, direction))
 }
 
-/// The surfaces along a ray, one after the other.
+/// Iterates over the surfaces along a ray, touching ones included.
 #[derive(Clone, Copy)]
 pub struct RaySurfaces {
     ray: Ray,
-    /// Where the ray is, if there may be more.
+    /// Current point of the ray, if more surfaces may touch there.
     here: Option<ContactPoint>,
 }
 
 impl RaySurfaces {
-    /// Starts at the ray's origin; `leaving`: where on a surface that is, if others lie on it.
+    /// Starts at the ray's origin. `leaving` is the point of the surface that the ray leaves, if other surfaces touch it.
     #[inline(always)]
     pub fn new(ray: Ray, leaving: Option<ContactPoint>) -> RaySurfaces {
         RaySurfaces { ray, here: leaving }
     }
 
-    /// What is left of the ray.
+    /// The rest of the ray.
     #[inline(always)]
     pub fn ray(&self) -> &Ray {
         &self.ray
     }
 
-    /// The next surface and its distance from where the ray is now; `None` where there is none. `inside`: the ray is in
-    /// a solid, which it may have to leave before it meets an opaque surface.
+    /// The next surface and its distance from the current point; `None` at the end of the ray. `inside`: the ray is in a
+    /// solid, which it may leave before it hits an opaque surface.
     #[inline(always)]
     pub fn next(&mut self, scene: &Scene, inside: bool) -> Option<(Surface, f32)> {
-        if let Some(place) = self.here.take()
-            && let Some(hit) = next(scene, &place, self.ray.direction, self.ray.token)
+        if let Some(point) = self.here.take()
+            && let Some(hit) = next(scene, &point, self.ray.direction, self.ray.token)
         {
             let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
-            return Some((Surface { touching: true, error: place.error, ..surface }, 0.0));
+            return Some((Surface { touching: true, error: point.error, ..surface }, 0.0));
         }
         let hit = scene.tracer.intersect(&self.ray)?;
         self.surface_at(scene, &hit, inside)
     }
 
-    /// [`Along::next`] where it is known which triangle the ray hits.
+    /// [`RaySurfaces::next`] for a ray whose hit is known.
     #[inline(always)]
     pub fn surface_at(&self, scene: &Scene, hit: &Hit, inside: bool) -> Option<(Surface, f32)> {
         let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
-        // From outside of all solids nothing is left before an opaque surface, unless a sheet lies on it.
+        // Outside all solids, an opaque surface comes first, unless a sheet touches it.
         let alone = !passes(scene, &surface) && !inside && !scene.contacts.sheets;
         let reach = if alone { None } else { scene.contacts.reach(hit.instance, hit.primitive, surface.error) };
         let first = reach.and_then(|error| first(scene, &Surface { error, ..surface }, *hit, &self.ray));
         Some((first.unwrap_or(surface), hit.t))
     }
 
-    /// Goes on behind a surface.
+    /// Continues behind `surface`.
     #[inline(always)]
     pub fn pass(&mut self, surface: &Surface) {
         let next = surface.ray_origin(self.ray.direction);
@@ -250,11 +254,11 @@ impl RaySurfaces {
     }
 }
 
-/// The first of the surfaces at the place where a ray has met `met`; `None` where that is alone.
+/// The surface that a ray crosses first among those that touch the surface that was hit; `None` if no other touches it.
 #[inline(never)]
-fn first(scene: &Scene, met: &Surface, hit: Hit, ray: &Ray) -> Option<Surface> {
-    let stack = stack(scene, ContactPoint::of(met), hit, ray.direction, ray.token);
+fn first(scene: &Scene, surface: &Surface, hit: Hit, ray: &Ray) -> Option<Surface> {
+    let stack = stack(scene, ContactPoint::of(surface), hit, ray.direction, ray.token);
     let (_, first) = stack.first()?;
-    let surface = scene.shapes.surface(first.instance, first.primitive, first.barycentric)?;
-    Some(Surface { touching: stack.len() > 1, error: met.error, ..surface })
+    let first = scene.shapes.surface(first.instance, first.primitive, first.barycentric)?;
+    Some(Surface { touching: stack.len() > 1, error: surface.error, ..first })
 }

@@ -1,5 +1,4 @@
-//! Which triangles may lie on others where light passes one of the two: only there does a ray look for more than what
-//! it hits (`scene/contact.rs`).
+//! Finds triangles that may touch transmitting triangles. Only there do rays query touching surfaces (`scene/contact.rs`).
 
 use crate::geometry::{Extent, Shapes, coordinate_error};
 use crate::material::Materials;
@@ -8,20 +7,22 @@ use rayon::prelude::*;
 use rstar::{AABB, RTree, RTreeObject};
 use std::collections::BTreeMap;
 
-/// Surfaces lie on each other where they are as good as parallel: cosine of the angle between them, or more. Where they
-/// cross, they do along a line, which no ray meets.
-const PARALLEL: f32 = 0.99;
+/// Minimum cosine of the angle between touching surfaces. Surfaces that cross at larger angles share a line, which rays
+/// hit with probability zero.
+const MIN_PARALLEL_COSINE: f32 = 0.99;
 
-/// In a scene of more triangles than this, copies counted, any that light passes is taken to have others on it.
-const MOST: usize = 1 << 26;
-/// And in one where light passes more than this: a tree over them takes as long and as much memory as the scene itself
-/// (20,000 copies of a glass ball: minutes and gigabytes), a look beside each hit a tenth of a render's time.
-const MOST_PASSED: usize = 1 << 21;
+/// Maximum number of triangles of a scene, instances included, that are searched for contacts. In a larger scene, every
+/// hit queries touching surfaces.
+const MAX_TRIANGLES: usize = 1 << 26;
+/// Maximum number of transmitting triangles that are searched. A tree over more of them takes as long and as much memory
+/// as the scene itself (20,000 instances of a glass ball: minutes and gigabytes); queries at every hit take a tenth of the
+/// render time.
+const MAX_TRANSMITTING: usize = 1 << 21;
 
-/// Whether two surfaces of one mesh that are at one place lie on each other there. Those that do not are neighbours,
-/// one surface where they meet.
+/// Whether two triangles of one mesh at the same point are opposite walls that touch. Otherwise they are neighbours on one
+/// surface.
 pub(super) fn face_each_other(a: Vec3, b: Vec3) -> bool {
-    a.dot(b) < -PARALLEL
+    a.dot(b) < -MIN_PARALLEL_COSINE
 }
 
 /// A triangle in world space.
@@ -29,9 +30,9 @@ pub(super) fn face_each_other(a: Vec3, b: Vec3) -> bool {
 struct Triangle {
     corners: [Vec3; 3],
     normal: Vec3,
-    /// How far its positions may be off its plane.
+    /// Bound on the distance of rounded positions from the plane.
     error: f32,
-    /// Largest coordinate of its corners.
+    /// Largest absolute coordinate of the corners.
     largest: f32,
     instance: u32,
     primitive: u32,
@@ -46,28 +47,26 @@ impl Triangle {
         Some(Triangle { corners, normal, error, largest, instance, primitive })
     }
 
-    /// How far apart the two may be where one lies on the other: at points that are within both.
+    /// Maximum distance between two triangles that touch, at points in both.
     fn reach(&self, other: &Triangle) -> f32 {
         let nearest = self.largest.min(other.largest);
         self.error + other.error + 2.0 * coordinate_error(Vec3::splat(nearest))
     }
 
-    /// Whether another may lie on it: it is as good as parallel and reaches its plane.
+    /// Whether another triangle may touch this one: it is nearly parallel and reaches the plane of this one.
     fn may_touch(&self, other: &Triangle) -> bool {
         let parallel = match self.instance == other.instance {
             true => face_each_other(self.normal, other.normal),
-            false => self.normal.dot(other.normal).abs() > PARALLEL,
+            false => self.normal.dot(other.normal).abs() > MIN_PARALLEL_COSINE,
         };
         let heights = other.corners.map(|corner| (corner - self.corners[0]).dot(self.normal));
         let reach = 2.0 * self.reach(other);
         parallel && heights.iter().any(|height| *height >= -reach) && heights.iter().any(|height| *height <= reach)
     }
-}
 
-impl Triangle {
-    /// Whether another of the same mesh lies on it, all of it, facing it: two sides of a pane that positions cannot
-    /// tell apart.
-    fn is_one_with(&self, other: &Triangle) -> bool {
+    /// Whether all of another triangle of the same mesh touches this one: the sides of a pane that is thinner than the
+    /// rounding error of positions.
+    fn is_opposite_wall(&self, other: &Triangle) -> bool {
         let reach = self.reach(other);
         let within = |corner: Vec3| (corner - self.corners[0]).dot(self.normal).abs() <= reach;
         self.instance == other.instance && other.corners.into_iter().all(within)
@@ -85,46 +84,47 @@ impl RTreeObject for Triangle {
     }
 }
 
-/// Triangles that may lie on others, at least one of the two passing light.
+/// Triangles that may touch others, if at least one of the two transmits light.
 #[derive(Clone, Debug, Default)]
 pub struct Contacts {
-    /// By instance, then by triangle: how far apart two surfaces in contact there may be (metres), 0 where there is no
-    /// contact; empty where no triangle of an instance has any.
+    /// For each instance and triangle, the maximum distance of touching surfaces (metres), or 0 without contact. Empty for
+    /// an instance without contacts.
     reach: Vec<Box<[f32]>>,
-    /// They have not been looked for.
+    /// Contacts were not searched, so every hit queries them.
     unknown: bool,
-    /// A sheet of thin glass may lie on an opaque surface.
+    /// Whether a sheet of thin glass may touch an opaque surface.
     pub sheets: bool,
-    /// Instances with walls that are thinner than positions are exact there, and how exact those are (metres).
+    /// Instances with walls thinner than the rounding error of positions, and this error (metres).
     pub thin: Vec<(u32, f32)>,
 }
 
-/// What the triangles that light passes tell of a triangle that may lie on some of them.
+/// A triangle that another triangle may touch.
 #[derive(Clone, Copy, Default)]
-struct Touched {
+struct Contact {
     instance: u32,
     primitive: u32,
-    /// Largest distance of two surfaces in contact there.
+    /// Maximum distance of the touching surfaces (metres).
     reach: f32,
-    /// Thickness below which it is one with another of the same mesh, if it is.
+    /// If the other triangle is the opposite wall of the same mesh, `reach`; otherwise 0.
     thin: f32,
-    /// One of the two is thin glass, the other opaque.
+    /// Whether one of the two triangles is thin glass and the other opaque.
     sheet: bool,
 }
 
 impl Contacts {
-    /// Looks through a scene.
+    /// Finds the contacts of a scene.
     pub fn new(shapes: &Shapes, materials: &Materials) -> Contacts {
-        let passes = |instance: u32| materials.list[shapes.instances[instance as usize].material as usize].transmits();
+        let transmits =
+            |instance: u32| materials.list[shapes.instances[instance as usize].material as usize].transmits();
         let instances = 0..shapes.instances.len() as u32;
-        let passing: Vec<u32> = instances.clone().filter(|&instance| passes(instance)).collect();
-        if passing.is_empty() {
+        let transmitting: Vec<u32> = instances.clone().filter(|&instance| transmits(instance)).collect();
+        if transmitting.is_empty() {
             return Contacts::default();
         }
         let triangles =
             |instance: u32| shapes.meshes[shapes.instances[instance as usize].mesh as usize].triangles.len();
-        let passed: usize = passing.iter().map(|&instance| triangles(instance)).sum();
-        if shapes.triangles() > MOST || passed > MOST_PASSED {
+        let count: usize = transmitting.iter().map(|&instance| triangles(instance)).sum();
+        if shapes.triangles() > MAX_TRIANGLES || count > MAX_TRANSMITTING {
             return Contacts { unknown: true, ..Contacts::default() };
         }
         let triangle = |instance: u32, primitive: u32| {
@@ -135,36 +135,36 @@ impl Contacts {
             let mesh = &shapes.meshes[shapes.instances[instance as usize].mesh as usize];
             (0..mesh.triangles.len() as u32).filter_map(move |primitive| triangle(instance, primitive))
         };
-        let tree = RTree::bulk_load(passing.iter().flat_map(|&instance| of(instance)).collect());
+        let tree = RTree::bulk_load(transmitting.iter().flat_map(|&instance| of(instance)).collect());
         let is_thin = |instance: u32| materials.list[shapes.instances[instance as usize].material as usize].thin;
-        let touched_by = |instance: u32| -> Vec<Touched> {
-            let opaque = !passes(instance);
-            let met = |other: Triangle| {
+        let contacts_of_instance = |instance: u32| -> Vec<Contact> {
+            let opaque = !transmits(instance);
+            let contacts_with = |other: Triangle| {
                 let near = tree.locate_in_envelope_intersecting(other.envelope());
                 let pairs = near.filter(|triangle| triangle.may_touch(&other)).map(|triangle| {
                     let reach = triangle.reach(&other);
-                    let thin = if triangle.is_one_with(&other) { reach } else { 0.0 };
+                    let thin = if triangle.is_opposite_wall(&other) { reach } else { 0.0 };
                     let Triangle { instance, primitive, .. } = *triangle;
-                    Touched { instance, primitive, reach, thin, sheet: opaque && is_thin(instance) }
+                    Contact { instance, primitive, reach, thin, sheet: opaque && is_thin(instance) }
                 });
-                let mut touched: Vec<Touched> = pairs.collect();
-                if opaque && !touched.is_empty() {
-                    let reach = touched.iter().map(|touched| touched.reach).fold(0.0, f32::max);
+                let mut contacts: Vec<Contact> = pairs.collect();
+                if opaque && !contacts.is_empty() {
+                    let reach = contacts.iter().map(|contact| contact.reach).fold(0.0, f32::max);
                     let Triangle { instance, primitive, .. } = other;
-                    touched.push(Touched { instance, primitive, reach, ..Touched::default() });
+                    contacts.push(Contact { instance, primitive, reach, ..Contact::default() });
                 }
-                touched
+                contacts
             };
-            of(instance).flat_map(met).collect()
+            of(instance).flat_map(contacts_with).collect()
         };
-        let found: Vec<Touched> = instances.into_par_iter().flat_map_iter(touched_by).collect();
-        Contacts::from_pairs(shapes, &found)
+        let found: Vec<Contact> = instances.into_par_iter().flat_map_iter(contacts_of_instance).collect();
+        Contacts::collect(shapes, &found)
     }
 
-    fn from_pairs(shapes: &Shapes, found: &[Touched]) -> Contacts {
+    fn collect(shapes: &Shapes, found: &[Contact]) -> Contacts {
         let mut all: Vec<Box<[f32]>> = vec![Box::default(); shapes.instances.len()];
         let mut walls: BTreeMap<u32, f32> = BTreeMap::new();
-        for &Touched { instance, primitive, reach, thin, .. } in found {
+        for &Contact { instance, primitive, reach, thin, .. } in found {
             if thin > 0.0 {
                 let most = walls.entry(instance).or_default();
                 *most = most.max(thin);
@@ -180,18 +180,18 @@ impl Contacts {
         if all.iter().all(|of_instance| of_instance.is_empty()) {
             all.clear();
         }
-        let sheets = found.iter().any(|touched| touched.sheet);
+        let sheets = found.iter().any(|contact| contact.sheet);
         Contacts { reach: all, unknown: false, sheets, thin: walls.into_iter().collect() }
     }
 
-    /// No triangle is known to lie on another.
+    /// Whether no contact is known.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.reach.is_empty()
     }
 
-    /// How far apart (metres) surfaces may be that lie on a triangle, whose own positions may be off by `error`; `None`
-    /// where none does.
+    /// Maximum distance (metres) of surfaces that touch a triangle; `None` if there are none. `error` is the rounding
+    /// error of positions on the triangle.
     #[inline(always)]
     pub fn reach(&self, instance: u32, primitive: u32, error: f32) -> Option<f32> {
         if self.reach.is_empty() {
@@ -211,10 +211,10 @@ mod tests {
         Triangle { error: 1e-6, ..triangle }
     }
 
-    /// What lies on a triangle touches it, from either side; what stands above it, crosses it or goes on from it does
-    /// not.
+    /// A triangle on either side of another one touches it. Triangles above it, across it or next to it in the same
+    /// surface do not.
     #[test]
-    fn what_lies_on_a_triangle_touches_it() {
+    fn only_parallel_triangles_in_the_same_plane_touch() {
         let flat = triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 0);
         let at = |z: f32, instance: u32| triangle([[0.2, 0.2, z], [0.9, 0.1, z], [0.1, 0.9, z]], instance);
         let turned = |z: f32, instance: u32| triangle([[0.2, 0.2, z], [0.1, 0.9, z], [0.9, 0.1, z]], instance);

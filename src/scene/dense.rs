@@ -1,19 +1,21 @@
-//! Media that scatter within the way by which rays start off a surface ([`triangle_error`]): what happens in there would
-//! not be seen, and all that comes from so near to the surface would be missing.
+//! Media whose mean free path is shorter than the offset of ray origins from a surface ([`triangle_error`]). Scattering
+//! within the offset is skipped, so such media would look too dark.
 //!
-//! A medium so dense looks as one without end, and what that sends back depends on albedo and phase function alone, not
-//! on the density \[Chandrasekhar 1950, section 13: everything is told in optical depths\]. So it is taken to be as dense
-//! as positions resolve, channel by channel, with the albedo that it has.
+//! A medium this dense looks like a half-space of it. The reflectance of a half-space depends on albedo and phase function
+//! alone, not on the density \[Chandrasekhar 1950, section 13: all lengths are optical depths\]. So the density is reduced,
+//! channel by channel, to the highest that positions resolve; the albedo stays.
 
 use crate::geometry::{Shapes, triangle_error};
 use crate::material::{Materials, MediumParameters};
 use crate::math::Rgb;
 
-/// Most of a free path that may be skipped: a half-space of albedo 1/2 looks darker by twice as much.
-const SKIPPED: f32 = 0.005;
+/// Maximum share of the mean free path that ray offsets may skip. A half-space of albedo 1/2 gets darker by about twice
+/// this share.
+const MAX_SKIPPED_SHARE: f32 = 0.005;
 
-/// Thins what is denser than positions resolve; a warning for each object that has such a medium, and for the space.
-pub(super) fn thin(
+/// Reduces the density of media that positions do not resolve, with a warning for each object that contains one, and for
+/// the medium outside all solids.
+pub(super) fn limit_densities(
     shapes: &Shapes,
     materials: &mut Materials,
     space: &mut Option<MediumParameters>,
@@ -30,37 +32,37 @@ pub(super) fn thin(
         let medium = materials.list[instance.material as usize].medium;
         let Some(medium) = medium.filter(MediumParameters::scatters) else { continue };
         let skipped = skipped(i);
-        if thinned(medium, skipped).is_some() {
-            warnings.push(said(&format!("object \"{}\": its", instance.name), medium, skipped));
+        if limit_density(medium, skipped).is_some() {
+            warnings.push(warning(&format!("object \"{}\": its", instance.name), medium, skipped));
             let farthest = &mut farthest[instance.material as usize];
             *farthest = farthest.max(skipped);
         }
     }
     for (material, skipped) in materials.list.iter_mut().zip(farthest) {
-        material.medium = material.medium.map(|medium| thinned(medium, skipped).unwrap_or(medium));
+        material.medium = material.medium.map(|medium| limit_density(medium, skipped).unwrap_or(medium));
     }
     if let Some(medium) = space.as_mut().filter(|medium| medium.scatters()) {
         let skipped = (0..shapes.instances.len()).map(skipped).fold(0.0, f32::max);
-        if let Some(thin) = thinned(*medium, skipped) {
-            warnings.push(said("the scene's", *medium, skipped));
-            *medium = thin;
+        if let Some(limited) = limit_density(*medium, skipped) {
+            warnings.push(warning("the scene's", *medium, skipped));
+            *medium = limited;
         }
     }
 }
 
-fn said(whose: &str, medium: MediumParameters, skipped: f32) -> String {
+fn warning(owner: &str, medium: MediumParameters, skipped: f32) -> String {
     format!(
-        "{whose} medium scatters light within {:.1e} m, and positions where it is are exact to {skipped:.1e} m: it is \
+        "{owner} medium scatters light within {:.1e} m, and positions where it is are exact to {skipped:.1e} m: it is \
          taken to scatter within {:.1e} m, which looks the same where it is much thicker than that (make the scene \
          smaller otherwise)",
         1.0 / medium.sigma_t().max_element(),
-        skipped / SKIPPED
+        skipped / MAX_SKIPPED_SHARE
     )
 }
 
-/// A medium as dense as positions off by `skipped` allow, if it is denser.
-fn thinned(medium: MediumParameters, skipped: f32) -> Option<MediumParameters> {
-    let (most, sigma_t) = (SKIPPED / skipped, medium.sigma_t());
+/// The medium with the highest extinction that ray offsets of `skipped` metres allow; `None` if the medium is not denser.
+fn limit_density(medium: MediumParameters, skipped: f32) -> Option<MediumParameters> {
+    let (most, sigma_t) = (MAX_SKIPPED_SHARE / skipped, medium.sigma_t());
     if !medium.scatters() || sigma_t.max_element() <= most {
         return None;
     }
@@ -73,17 +75,18 @@ fn thinned(medium: MediumParameters, skipped: f32) -> Option<MediumParameters> {
 mod tests {
     use super::*;
 
-    /// Channels are as dense as they may be, or as they were, and no albedo changes; what does not scatter is left alone.
+    /// Each channel has the smaller of its own and the highest extinction, and keeps its albedo. A medium that does not
+    /// scatter does not change.
     #[test]
-    fn channels_keep_their_albedo() {
+    fn limited_densities_keep_the_albedo_of_each_channel() {
         let medium = MediumParameters { sigma_a: Rgb::new(1e20, 1.0, 0.0), sigma_s: Rgb::new(3e20, 1.0, 1e4), g: 0.5 };
-        let thin = thinned(medium, SKIPPED * 1e-3).expect("it is denser");
+        let thin = limit_density(medium, MAX_SKIPPED_SHARE * 1e-3).expect("it is denser");
         assert!((thin.sigma_t() - Rgb::new(1e3, 2.0, 1e3)).abs().max_element() < 1e-3);
         assert!((thin.sigma_s / thin.sigma_t() - Rgb::new(0.75, 0.5, 1.0)).abs().max_element() < 1e-6);
         assert_eq!(thin.g, 0.5);
-        assert!(thinned(medium, 0.0).is_none());
-        assert!(thinned(MediumParameters { sigma_s: Rgb::ZERO, ..medium }, 1.0).is_none());
-        let endless = MediumParameters { sigma_s: Rgb::splat(f32::MAX), sigma_a: Rgb::splat(f32::MAX), g: 0.0 };
-        assert!(thinned(endless, 1e-6).is_some_and(|thin| thin.scatters() && thin.sigma_t().is_finite()));
+        assert!(limit_density(medium, 0.0).is_none());
+        assert!(limit_density(MediumParameters { sigma_s: Rgb::ZERO, ..medium }, 1.0).is_none());
+        let overflowing = MediumParameters { sigma_s: Rgb::splat(f32::MAX), sigma_a: Rgb::splat(f32::MAX), g: 0.0 };
+        assert!(limit_density(overflowing, 1e-6).is_some_and(|thin| thin.scatters() && thin.sigma_t().is_finite()));
     }
 }

@@ -1,4 +1,4 @@
-//! What a scene file says, as plain data: what readers (glTF, USD) produce and `Scene::build` takes.
+//! The content of a scene file as plain data: readers (glTF, USD) produce it, and `Scene::build` consumes it.
 
 use crate::geometry::Mesh;
 use crate::light::SpotEdge;
@@ -8,16 +8,17 @@ use crate::texture::Texture;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Everything a reader found in a scene file. Indices are valid; numbers are finite; transforms can be inverted.
+/// The content of a scene file. All indices are valid, all numbers finite, all transforms invertible.
 #[derive(Clone, Debug, Default)]
 pub struct Description {
-    /// The file it was read from.
+    /// The scene file.
     pub source: PathBuf,
-    /// Hash of what a converter has made of it and of all files that it names.
+    /// Hash of the .glb that a converter has made of the scene file and of all files that the scene file names; `None`
+    /// for a file that is read without a converter.
     pub converted: Option<String>,
-    /// Meshes in local space, each once however often it stands in the scene.
+    /// Meshes in local space; each is listed once, even with several instances.
     pub meshes: Vec<Mesh>,
-    /// Where they stand.
+    /// Instances of the meshes.
     pub instances: Vec<PlacedMesh>,
     /// Names of objects (nodes that carry a mesh).
     pub objects: Vec<String>,
@@ -29,25 +30,26 @@ pub struct Description {
     pub cameras: Vec<CameraDescription>,
     /// Point, spot and directional lights.
     pub lights: Vec<PunctualLight>,
-    /// In what units the lights' numbers were taken, where that is a guess.
+    /// Units of `lights`, if they were guessed.
     pub guessed_units: Option<GuessedUnits>,
-    /// Light from infinity.
+    /// The environment.
     pub environment: Option<EnvironmentDescription>,
-    /// Cameras do not see it; it lights the scene all the same.
+    /// Whether cameras do not see the environment; it lights the scene anyway.
     pub environment_hidden_from_camera: bool,
-    /// Group of its light.
+    /// Light group of the environment.
     pub environment_light_group: Option<String>,
-    /// The file's writer leaves light from infinity out, and nothing in the file says that there is none.
+    /// Whether the original scene may have an environment that the file lacks: the exporter that wrote the file never
+    /// writes one.
     pub environment_unknown: bool,
-    /// The medium that fills the space.
+    /// The medium outside all solids.
     pub medium: Option<MediumParameters>,
-    /// The picture that the scene was made for.
+    /// Settings of the picture.
     pub picture: PictureDefaults,
-    /// Whatever was ignored or approximated, one sentence each: `material "glass": ...`.
+    /// Warnings about ignored or approximated features, one sentence each: `material "glass": ...`.
     pub warnings: Vec<String>,
 }
 
-/// A mesh placed in the scene.
+/// An instance of a mesh.
 #[derive(Clone, Debug)]
 pub struct PlacedMesh {
     /// Name of the node.
@@ -58,11 +60,11 @@ pub struct PlacedMesh {
     pub material: u32,
     /// Index into [`Description::objects`].
     pub object: u32,
-    /// Cameras look through it; all else meets it.
+    /// Whether camera rays pass through the instance; other rays hit it.
     pub hidden_from_camera: bool,
-    /// Group of its light, if it glows.
+    /// Light group of the instance, if it is emissive.
     pub light_group: Option<String>,
-    /// Local to world, composed in f64.
+    /// Transform from local to world space.
     pub to_world: DAffine3,
 }
 
@@ -71,7 +73,7 @@ pub struct PlacedMesh {
 pub struct CameraDescription {
     /// Name of the node.
     pub name: String,
-    /// Camera to world; orthonormal up to scale, which is ignored.
+    /// Transform from camera to world space; its scale is ignored.
     pub to_world: DAffine3,
     /// Projection.
     pub projection: Projection,
@@ -79,30 +81,30 @@ pub struct CameraDescription {
     pub aperture_radius: f32,
     /// Distance of the plane in focus (m).
     pub focus_distance: f32,
-    /// Where the middle of the picture is, in widths to the right and heights up of the camera's axis.
+    /// Offset of the picture's centre from the camera's axis: to the right in picture widths, up in picture heights.
     pub shift: [f32; 2],
 }
 
-/// The picture that a scene was made for: what is taken where the user asks for nothing else.
+/// Settings of the picture in a scene file; options of the user override them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PictureDefaults {
     /// Width and height in pixels.
     pub resolution: Option<[u32; 2]>,
-    /// Exposure in stops when it is looked at.
+    /// Exposure for display, in stops.
     pub exposure: Option<f32>,
-    /// From light to a display's colours.
+    /// Tone curve for display.
     pub tonemap: Option<ToneMap>,
-    /// Cameras see nothing where no surface is, and alpha tells how much of a pixel that is.
+    /// Whether the background is transparent: cameras do not see the environment, and alpha is the coverage of a pixel.
     pub film_transparent: bool,
-    /// The window that is rendered: left edge, top edge, width and height, in shares of the whole picture.
+    /// The window to render: left edge, top edge, width and height, in shares of the whole picture.
     pub crop: Option<[f64; 4]>,
-    /// Its number in a film.
+    /// Frame number of the picture.
     pub frame: Option<i32>,
-    /// Frames in a second, as a fraction of two numbers above zero.
+    /// Frames per second, as a fraction of two positive numbers.
     pub frame_rate: Option<[u32; 2]>,
 }
 
-/// The curve between scene-linear light and a display.
+/// Tone curve from scene-linear light to display colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -119,18 +121,18 @@ pub enum ToneMap {
 /// Projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// Vertical field of view (radians) and aspect ratio (width / height) if the file gives one.
+    /// Perspective projection.
     Perspective {
-        /// Vertical field of view, radians.
+        /// Vertical field of view (radians).
         yfov: f32,
-        /// Width over height.
+        /// Width over height, if the file gives it.
         aspect: Option<f32>,
     },
-    /// Half width and half height of the view (m).
+    /// Orthographic projection.
     Orthographic {
-        /// Half width.
+        /// Half the width of the view (m).
         xmag: f32,
-        /// Half height.
+        /// Half the height of the view (m).
         ymag: f32,
     },
 }
@@ -140,63 +142,63 @@ pub enum Projection {
 pub struct PunctualLight {
     /// Name of the node.
     pub name: String,
-    /// Light to world.
+    /// Transform from the light's space to world space.
     pub to_world: DAffine3,
     /// Radiant intensity (W/sr) of points and spots, irradiance (W/m2) of suns, per channel.
     pub intensity: Rgb,
-    /// Shape of the emission.
+    /// Kind of the light.
     pub kind: PunctualKind,
-    /// Radius of the lamp (m): a point light's sphere, the disc that a spot shines from; 0 is a mathematical point.
+    /// Radius (m) of a point light's sphere or of a spot's disc; 0 for a mathematical point.
     pub radius: f32,
-    /// Cameras do not see it.
+    /// Whether cameras do not see the light.
     pub hidden_from_camera: bool,
-    /// Group of its light.
+    /// Light group of the light.
     pub light_group: Option<String>,
 }
 
 impl PunctualLight {
-    /// Whether it becomes a glowing sphere.
+    /// Whether the scene has an emissive sphere in place of the light.
     pub fn is_sphere(&self) -> bool {
         self.kind == PunctualKind::Point && self.radius > 0.0
     }
 }
 
-/// Units of punctual lights that neither the file nor the user states.
+/// Units of punctual lights that were guessed, because neither the file nor the user states them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GuessedUnits {
-    /// Lumens, of which 683 were taken for a watt; watts otherwise.
+    /// Whether the numbers were taken for lumens, at 683 lumens per watt, or for watts.
     pub photometric: bool,
-    /// What the guess is from, in words.
+    /// The reason for the guess, as part of a message.
     pub from: String,
 }
 
 /// Kind of a punctual light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PunctualKind {
-    /// All directions alike.
+    /// Equal intensity in all directions.
     Point,
-    /// A cone with an edge between two half angles (radians).
+    /// Emission into a cone with a soft edge.
     Spot {
-        /// Half angle of full intensity.
+        /// Half angle of the cone of full intensity (radians).
         inner: f32,
-        /// Half angle of no intensity.
+        /// Half angle from which on the intensity is zero (radians).
         outer: f32,
-        /// How it falls off between them.
+        /// Falloff between `inner` and `outer`.
         edge: SpotEdge,
     },
-    /// From infinity, spread over a cone.
+    /// Light from infinity, from a cone of directions.
     Sun {
-        /// Angular diameter (radians); 0 is exactly parallel.
+        /// Angular diameter (radians); 0 is exactly parallel light.
         angle: f32,
     },
 }
 
-/// Light from infinity.
+/// An environment light.
 #[derive(Clone, Debug)]
 pub struct EnvironmentDescription {
-    /// Radiance.
+    /// Radiance, before `strength`.
     pub source: EnvironmentSource,
-    /// Counter-clockwise turn about +Y seen from above (degrees).
+    /// Counter-clockwise rotation about +Y seen from above (degrees).
     pub rotation_deg: f32,
     /// Factor on the radiance.
     pub strength: f32,
@@ -205,7 +207,7 @@ pub struct EnvironmentDescription {
 /// Radiance of an environment.
 #[derive(Clone, Debug)]
 pub enum EnvironmentSource {
-    /// The same from everywhere.
+    /// Equal radiance from all directions.
     Color(Rgb),
     /// A latitude-longitude image: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi from the top.
     Image {

@@ -1,4 +1,4 @@
-//! Environment images: OpenEXR and Radiance HDR files, latitude and longitude.
+//! Reading environment images: latitude-longitude OpenEXR and Radiance HDR files.
 
 use super::description::EnvironmentSource;
 use crate::error::{Error, ErrorKind, Result};
@@ -10,21 +10,21 @@ use std::io::BufReader;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Most texels that an environment may have: 16384 x 8192, 1.5 GiB.
-const MOST_TEXELS: u64 = 1 << 27;
-/// Bytes of a texel, and of the distribution that samples it.
+/// Maximum number of texels of an environment: 16384 x 8192, 1.5 GiB.
+const MAX_TEXELS: u64 = 1 << 27;
+/// Memory per texel in bytes, including its sampling distribution.
 const TEXEL_BYTES: u64 = 32;
-/// What a texel that is infinite is read as: the largest half float, beyond which files overflow.
-const BRIGHTEST: f32 = 65_504.0;
+/// Value of an infinite texel: the largest half float, where images overflow to infinity.
+const MAX_HALF: f32 = 65_504.0;
 
 /// Width, height and texels, top row first.
 type Pixels = (u32, u32, Vec<[f32; 3]>);
 
-/// Reads the radiance of an environment from an `.exr` or `.hdr` file (told apart by what they hold, not by their
-/// names). Texels that are negative or not finite are clamped, with a warning.
+/// Reads the radiance of an environment from an OpenEXR or Radiance HDR file, recognised by its first bytes. Texels that
+/// are negative or not finite are clamped, with a warning.
 ///
 /// # Errors
-/// The file cannot be opened, is neither, is damaged, or is absurdly large.
+/// The file cannot be opened, is in another format, is damaged, or is too large.
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<EnvironmentSource> {
     let io = |e: std::io::Error| Error::io(path, &e).hint("check the path of the environment image");
     let meta = std::fs::metadata(path).map_err(io)?;
@@ -42,7 +42,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<EnvironmentSource
         [b'#', b'?', ..] => read_hdr,
         _ => return Err(failed("it is neither OpenEXR nor Radiance HDR".into())),
     };
-    // A decoder's own fault must not end the program.
+    // A panic of a decoder must not end the program.
     let pixels = catch_unwind(AssertUnwindSafe(|| decode(path))).unwrap_or_else(|_| Err("the decoder failed".into()));
     let (width, height, mut texels) = pixels.map_err(|e| failed(format!("it cannot be read: {e}")))?;
     let clamped = clamp(&mut texels);
@@ -52,21 +52,21 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<EnvironmentSource
     Ok(EnvironmentSource::Image { width, height, texels })
 }
 
-/// Makes texels finite and not negative; how many were not.
+/// Makes texels finite and non-negative. Returns the number of texels that changed.
 fn clamp(texels: &mut [[f32; 3]]) -> usize {
     let mut count = 0;
     for texel in texels {
-        // NaN compares with nothing, so it becomes 0.
-        let fit = texel.map(|x| if x == f32::INFINITY { BRIGHTEST } else { x.max(0.0) });
-        count += usize::from(fit != *texel);
-        *texel = fit;
+        // `max` turns NaN into 0.
+        let clamped = texel.map(|x| if x == f32::INFINITY { MAX_HALF } else { x.max(0.0) });
+        count += usize::from(clamped != *texel);
+        *texel = clamped;
     }
     count
 }
 
 fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
     match width.checked_mul(height) {
-        Some(texels @ 1..=MOST_TEXELS) => memory::require(TEXEL_BYTES * texels, "its texels").map_err(|e| e.cause),
+        Some(texels @ 1..=MAX_TEXELS) => memory::require(TEXEL_BYTES * texels, "its texels").map_err(|e| e.cause),
         _ => Err(format!("{width} x {height} texels are none or too many")),
     }
 }
@@ -91,7 +91,7 @@ fn read_exr(path: &Path) -> std::result::Result<Pixels, String> {
         )
         .first_valid_layer()
         .all_attributes()
-        // Where threads of the decoder panic, the program ends, and nobody can catch that.
+        // A panic in a thread of the decoder could not be caught.
         .non_parallel()
         .from_file(path)
         .map_err(text)?;

@@ -1,7 +1,7 @@
-//! The folder of a scene file: what the file names is looked for there, and nowhere else unless the user says so.
+//! The folder of a scene file. Files that the scene names must be in this folder, unless the user allows others.
 //!
-//! A scene comes from anywhere, and its bytes end in a picture or in a message: one that names `../../.ssh/id_rsa` must
-//! not have it opened, not even to learn whether it is there.
+//! Scene files come from untrusted sources, and the files that they name end up in pictures or messages. A scene that
+//! names `../../.ssh/id_rsa` must not have it opened, nor learn whether it exists.
 
 use crate::error::{Error, ErrorKind, Result};
 use std::path::{Component, Path, PathBuf};
@@ -14,18 +14,18 @@ pub struct Folder<'a> {
 }
 
 impl<'a> Folder<'a> {
-    /// The folder of the scene file at `scene`; `allow_outside` lets it name files anywhere.
+    /// The folder of the scene file `scene`; `allow_outside` allows files anywhere.
     pub fn of(scene: &'a Path, allow_outside: bool) -> Folder<'a> {
         Folder { path: scene.parent().unwrap_or(Path::new("")), allow_outside }
     }
 
-    /// The file that the scene calls `name`.
+    /// The path of the file that the scene calls `name`.
     ///
     /// # Errors
-    /// It lies outside the folder: by its name, or because a link on the way leads there.
+    /// The file is outside the folder, by its name or because a symbolic link leads there.
     pub fn file(&self, name: &Path) -> Result<PathBuf> {
         let file = self.path.join(name);
-        let inside = || !is_of_windows(name) && resolved(&file).starts_with(resolved(self.path));
+        let inside = || !is_windows_path(name) && resolve(&file).starts_with(resolve(self.path));
         if self.allow_outside || inside() {
             return Ok(file);
         }
@@ -35,9 +35,9 @@ impl<'a> Folder<'a> {
     }
 }
 
-/// Whether a name is a path that Windows takes for one from a drive, of a share, or upwards: here its letters would
-/// name a file in the folder.
-fn is_of_windows(name: &Path) -> bool {
+/// Whether Windows takes a name for a path with a drive, on a share, or to a parent folder. On other systems such a name
+/// would be a plain file name.
+fn is_windows_path(name: &Path) -> bool {
     let bytes = name.as_os_str().as_encoded_bytes();
     let drive = matches!(bytes, [letter, b':', b'\\' | b'/', ..] if letter.is_ascii_alphabetic());
     drive
@@ -45,14 +45,14 @@ fn is_of_windows(name: &Path) -> bool {
         || bytes.split(|byte| matches!(byte, b'\\' | b'/')).any(|part| part == b".." && bytes.contains(&b'\\'))
 }
 
-/// Where a path leads, links followed. Of one that leads nowhere, what its letters say: whether a file outside exists
-/// is not told.
-fn resolved(path: &Path) -> PathBuf {
+/// The path with symbolic links resolved. A path that does not exist is resolved as far as it exists, then by its text, so
+/// that the result does not reveal whether a file outside the folder exists.
+fn resolve(path: &Path) -> PathBuf {
     let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     path.canonicalize().unwrap_or_else(|_| {
-        let there = existing(path);
+        let partly_resolved = resolve_existing(path);
         let mut out = PathBuf::new();
-        for part in there.components() {
+        for part in partly_resolved.components() {
             match part {
                 Component::ParentDir => drop(out.pop()),
                 Component::CurDir => {}
@@ -63,8 +63,8 @@ fn resolved(path: &Path) -> PathBuf {
     })
 }
 
-/// A path whose longest part that exists is without links.
-fn existing(path: &Path) -> PathBuf {
+/// The absolute path, with symbolic links resolved in its longest existing ancestor.
+fn resolve_existing(path: &Path) -> PathBuf {
     let Ok(path) = std::path::absolute(path) else { return path.to_owned() };
     for start in path.ancestors() {
         if let (Ok(real), Ok(rest)) = (start.canonicalize(), path.strip_prefix(start)) {

@@ -1,4 +1,4 @@
-//! The scene: read from a file into a plain [`Description`], then validated and committed into a [`Scene`].
+//! The scene: a reader turns a file into a plain [`Description`], which [`Scene::build`] turns into a [`Scene`].
 
 mod build;
 mod camera_request;
@@ -31,13 +31,13 @@ use description::{CameraDescription, GuessedUnits, PictureDefaults};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A validated, immutable scene; it owns everything a pass reads.
+/// A validated, immutable scene with all data that rendering reads.
 pub struct Scene {
-    /// The file it came from.
+    /// The scene file.
     pub source: PathBuf,
-    /// Hash of what a converter has made of it, see [`Description::converted`].
+    /// Hash of the converted file, see [`Description::converted`].
     pub converted: Option<String>,
-    /// What was subtracted from all world positions: not zero only for scenes far from the origin.
+    /// Offset that was subtracted from all world positions; zero except for scenes far from the origin.
     pub origin: DVec3,
     /// Meshes and instances.
     pub shapes: Arc<Shapes>,
@@ -45,44 +45,44 @@ pub struct Scene {
     pub materials: Arc<Materials>,
     /// Names of objects.
     pub objects: Vec<String>,
-    /// Objects from this one on are spheres, made for point lights that have a radius.
-    pub first_lamp: u32,
-    /// Geometry in Embree: all that has a body.
+    /// Index of the first object that is a sphere made for a point light with a radius. All later objects are, too.
+    pub first_light_sphere: u32,
+    /// Embree scene of all shapes except pass-through lights.
     pub tracer: Tracer,
-    /// What glows without a body ([`crate::material::Material::null_bsdf`]), if anything does.
+    /// Embree scene of the pass-through lights ([`crate::material::Material::null_bsdf`]), if there are any.
     pub pass_through_lights: Option<Tracer>,
     /// Lights.
     pub lights: Lights,
     /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].
     pub light_names: Vec<String>,
-    /// In what units the numbers of punctual lights were taken, where that is a guess.
+    /// Units of punctual lights, if they were guessed.
     pub guessed_units: Option<GuessedUnits>,
-    /// Light from infinity may be missing: the file's writer leaves it out, and nothing there says that there is none.
+    /// Whether an environment may be missing: see [`Description::environment_unknown`].
     pub environment_unknown: bool,
-    /// Cameras as described, in the file's order.
+    /// Cameras, in the file's order.
     pub cameras: Vec<CameraDescription>,
-    /// The picture that the scene was made for.
+    /// Settings of the picture in the scene file.
     pub picture: PictureDefaults,
-    /// The medium that fills the space.
+    /// The medium outside all solids.
     pub medium: Option<MediumParameters>,
-    /// How the materials scatter.
+    /// Precomputed scattering data of the materials.
     pub scattering: Scattering,
-    /// What is present.
+    /// Kinds of things that the scene contains.
     pub survey: Survey,
-    /// Triangles that others may lie on.
+    /// Triangles that other triangles may touch.
     pub contacts: Arc<Contacts>,
-    /// Ranks of the instances' solids, where several of one priority overlap: the highest fills the space.
+    /// Rank of the solid of each instance. Where solids of equal priority overlap, the highest rank fills the space.
     pub ranks: Arc<[u32]>,
-    /// Deep stacks of solids that paths have been in.
+    /// Deep stacks of solids that paths have entered.
     pub solid_stacks: SolidStacks,
-    /// Whatever was ignored or approximated, from the reader and from building.
+    /// Warnings about ignored or approximated features, from the reader and from [`Scene::build`].
     pub warnings: Vec<String>,
 }
 
 impl Scene {
-    /// Distance from the middle of the scene up to which paths from `origin` are as near as can be to all that they may
-    /// bring light from or to: that of the scene, of their first flight, or of where they start; infinite where no
-    /// medium scatters outside of solids.
+    /// Distance from the scene's centre beyond which paths from `origin` in an unbounded medium only move away: outside
+    /// the scene's bounding sphere plus one mean free path, and farther out than `origin`. Infinite if no medium scatters
+    /// outside solids.
     pub fn reach(&self, origin: Vec3) -> f32 {
         let Some(medium) = self.medium.filter(MediumParameters::scatters) else { return f32::INFINITY };
         let sky = self.lights.sky();
@@ -97,8 +97,8 @@ impl Scene {
         build::build(description, threads)
     }
 
-    /// The same shapes and lamps with other materials, in another medium and environment. The materials have indices of
-    /// refraction and coverings of those here.
+    /// A copy of the scene with other materials, medium and environment. The indices of refraction and the coatings of
+    /// the new materials must be among those of the old ones.
     ///
     /// # Errors
     /// Embree is out of memory.
@@ -111,25 +111,25 @@ impl Scene {
         build::rebuild_with_materials(self, materials, medium, environment)
     }
 
-    /// Whether a ray that enters a solid finds it there, where the solid's alpha decides about that.
+    /// Whether the solid exists for a ray that enters it, if the solid's alpha decides once per entry.
     pub fn solid_is_present(&self, surface: &Surface, token: u32) -> bool {
         let material = &self.materials.list[surface.material as usize];
         let chance = material.coverage(surface, &self.materials.textures);
         chance >= build::random_cutoff(token, surface.instance, u32::MAX)
     }
 
-    /// Whether a camera's ray along `direction` looks through a surface: the back of one that glTF culls.
+    /// Whether a camera ray along `direction` passes through the surface, because glTF culls its back face.
     #[inline(always)]
     pub fn culls(&self, surface: &Surface, direction: Vec3) -> bool {
         self.survey.culled && self.materials.list[surface.material as usize].culled && direction.dot(surface.ng) > 0.0
     }
 
-    /// A light by name, for messages: `light "Sun"`, `object "Panel"` for the triangles of one that glows.
+    /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle of the object.
     pub fn light_name(&self, index: usize) -> String {
         match &self.lights.emitters()[index] {
             Emitter::Triangle { instance, .. } => {
                 let instance = &self.shapes.instances[*instance as usize];
-                let kind = if instance.object < self.first_lamp { "object" } else { "light" };
+                let kind = if instance.object < self.first_light_sphere { "object" } else { "light" };
                 format!("{kind} \"{}\"", instance.name)
             }
             Emitter::Environment => "the environment".into(),

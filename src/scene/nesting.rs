@@ -1,8 +1,8 @@
-//! Solids inside each other, deeper than a path keeps them with it.
+//! Stacks of nested solids that are deeper than the array that a path carries.
 //!
-//! A stack is its last solid and the stack of those entered before, each kept once \[hash consing, Ershov 1958\]: a
-//! path needs one number for any of them. What number depends on the threads, what it stands for does not. Few scenes
-//! have such stacks, so that a lock is no cost.
+//! A stack is its last solid and the index of the stack of those entered before. Equal stacks are stored once \[hash
+//! consing, Ershov 1958\], so a path carries one index for a stack of any depth. The index depends on the order of the
+//! threads, the stack does not. Few scenes have such deep stacks, so the lock does not matter.
 
 use crate::geometry::{Mesh, Shapes};
 use crate::material::Materials;
@@ -12,23 +12,23 @@ use std::sync::{PoisonError, RwLock};
 /// The empty stack.
 pub const EMPTY_STACK: u32 = u32::MAX;
 
-/// More stacks are taken for those of open meshes, which are entered and never left.
-const MOST: usize = 1 << 20;
+/// Maximum number of stacks. More of them come from open meshes, which paths enter and never leave.
+const MAX_STACKS: usize = 1 << 20;
 
-/// A stack of solids, each told by the instance through whose surface it was entered.
+/// A stack of solids. Each solid is identified by the instance whose surface was crossed to enter it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SolidStack {
-    /// Those entered before the last: a stack, or [`EMPTY_STACK`].
+    /// Index of the stack of solids entered before the last one, or [`EMPTY_STACK`].
     pub outer: u32,
-    /// The last.
+    /// Instance of the solid entered last.
     pub last: u32,
-    /// The one of them that fills the space.
+    /// Instance of the solid in the stack that fills the space.
     pub host: u32,
 }
 
-/// Ranks of the instances' solids: of two that overlap and have the same priority the one of higher rank fills the space,
-/// whichever was entered first. It is the smaller one, which may lie within the other but not around it; all instances of
-/// an object are one solid.
+/// Rank of the solid of each instance. Where two solids of equal priority overlap, the one of higher rank fills the space,
+/// in any order of entry. Smaller solids have higher ranks, because a small solid may be inside a large one. All instances
+/// of an object are one solid.
 pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
     let mut of_mesh = HashMap::new();
     let mut volumes = BTreeMap::<u32, f64>::new();
@@ -43,7 +43,7 @@ pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
     shapes.instances.iter().map(|instance| rank.get(&instance.object).copied().unwrap_or(0)).collect()
 }
 
-/// Volume within a closed mesh, in its own space.
+/// Volume of a closed mesh, in local space.
 fn volume(mesh: &Mesh) -> f64 {
     let Some(&[first, ..]) = mesh.triangles.first() else { return 0.0 };
     let origin = mesh.positions[first as usize];
@@ -54,7 +54,7 @@ fn volume(mesh: &Mesh) -> f64 {
     mesh.triangles.iter().map(of).sum()
 }
 
-/// The stacks that have been met in a scene.
+/// The deep stacks that paths in a scene have entered so far.
 #[derive(Default)]
 pub struct SolidStacks {
     stacks: RwLock<Stacks>,
@@ -67,14 +67,14 @@ struct Stacks {
 }
 
 impl SolidStacks {
-    /// A stack that is not [`EMPTY_STACK`].
+    /// The stack at an index, which must not be [`EMPTY_STACK`].
     #[cold]
     #[inline(never)]
     pub fn get(&self, stack: u32) -> SolidStack {
         self.stacks.read().unwrap_or_else(PoisonError::into_inner).list[stack as usize]
     }
 
-    /// `stack.outer` with one more. `None` where there are too many.
+    /// The index of `stack`, added if it is new. `None` if there are too many stacks.
     #[cold]
     #[inline(never)]
     pub fn push(&self, stack: SolidStack) -> Option<u32> {
@@ -84,10 +84,10 @@ impl SolidStacks {
         }
         let mut stacks = self.stacks.write().unwrap_or_else(PoisonError::into_inner);
         let Stacks { list, index } = &mut *stacks;
-        if list.len() >= MOST {
+        if list.len() >= MAX_STACKS {
             return None;
         }
-        // Another thread may have been faster.
+        // Another thread may have added the stack since the lookup.
         Some(*index.entry(key).or_insert_with(|| {
             list.push(stack);
             list.len() as u32 - 1

@@ -1,44 +1,44 @@
-//! What a scene contains, from the scene alone.
+//! Kinds of things that a scene contains.
 
 use crate::geometry::Shapes;
 use crate::light::{Emitter, Lights};
 use crate::material::{Alpha, Materials, MediumParameters};
 
-/// Kinds of things present in a scene.
+/// Kinds of things that a scene contains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Survey {
     /// Some material has alpha cut-outs or blending.
     pub alpha: bool,
-    /// Something is hidden from cameras.
+    /// Some instance is hidden from cameras.
     pub hidden_from_camera: bool,
-    /// Cameras look through the back faces of something.
+    /// Cameras look through the back faces of some surface.
     pub culled: bool,
     /// Some mesh bounds a solid that light enters.
     pub solids: bool,
-    /// Rays may cross boundaries that do not scatter: index-matched solids, solids inside others or there in part.
+    /// Rays may cross boundaries that do not scatter: index-matched solids, solids inside others, solids with alpha.
     pub null_boundaries: bool,
-    /// Something absorbs or scatters between surfaces.
+    /// Some medium absorbs or scatters.
     pub media: bool,
-    /// Something scatters between surfaces.
+    /// Some medium scatters.
     pub scattering: bool,
-    /// Clear glass holds a medium that scatters.
+    /// Some solid of clear glass contains a medium that scatters.
     pub cloudy_glass: bool,
-    /// Some solid refracts colours differently.
+    /// Some solid refracts with dispersion.
     pub dispersion: bool,
-    /// Some surface may have narrow lobes: mirrors, glass, what shines.
+    /// Some surface may have narrow lobes: mirrors, glass, glossy materials.
     pub narrow_lobes: bool,
-    /// Sharp lobes may show lamps that have a size, by way of perfect mirrors or clear glass.
+    /// Sharp lobes may reflect lights of finite size by way of perfect mirrors or clear glass.
     pub glints: bool,
-    /// Some light cannot be hit by a ray.
+    /// No ray can hit some light.
     pub delta_lights: bool,
-    /// Light comes from infinity.
+    /// Some light is at infinity.
     pub infinite_lights: bool,
-    /// An environment shines that cameras see.
+    /// The scene has an environment that cameras see.
     pub environment: bool,
 }
 
 impl Survey {
-    /// Looks through the scene.
+    /// Inspects the scene.
     pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());
         let mut survey = Survey {
@@ -47,14 +47,14 @@ impl Survey {
             environment: lights.sky().environment.is_some() && !lights.sky().hidden_from_camera,
             ..Survey::default()
         };
-        let mut worn = vec![0usize; materials.list.len()];
+        let mut uses = vec![0usize; materials.list.len()];
         for instance in &shapes.instances {
-            worn[instance.material as usize] += 1;
+            uses[instance.material as usize] += 1;
             survey.hidden_from_camera |= instance.hidden_from_camera;
         }
         let (mut solids, mut perfect, mut sharp) = (0, false, false);
-        for (material, &worn) in materials.list.iter().zip(&worn) {
-            if worn == 0 {
+        for (material, &uses) in materials.list.iter().zip(&uses) {
+            if uses == 0 {
                 continue;
             }
             survey.culled |= material.culled;
@@ -63,7 +63,7 @@ impl Survey {
             let lobes = material.perfect_and_sharp();
             (perfect, sharp) = (perfect | lobes.0, sharp | lobes.1);
             if material.is_solid_glass() {
-                solids += worn;
+                solids += uses;
                 survey.media |= material.medium.is_some();
                 let scatters = scatters(&material.medium);
                 survey.scattering |= scatters;

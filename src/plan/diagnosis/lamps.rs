@@ -32,7 +32,7 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
     for emitter in scene.lights.emitters() {
         match emitter {
             Emitter::Triangle { instance, .. } => {
-                let own = scene.shapes.instances[*instance as usize].object < scene.first_lamp;
+                let own = scene.shapes.instances[*instance as usize].object < scene.first_light_sphere;
                 *if own { &mut surfaces } else { &mut lamps } += emitter.power(sky) as f32;
             }
             Emitter::Point { .. } | Emitter::Spot { .. } => lamps += emitter.power(sky) as f32,

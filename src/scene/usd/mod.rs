@@ -1,6 +1,5 @@
-//! Stages of USD (`.usd`, `.usda`, `.usdc`, `.usdz`), read by way of a .glb: a converter in Python (`scripts/usd`,
-//! which is part of the program) lets Pixar's own library compose the stage, and [`gltf`] reads what it writes, so that a
-//! scene means the same through either door.
+//! Reading USD stages (`.usd`, `.usda`, `.usdc`, `.usdz`). A converter in Python (`scripts/usd`, embedded in the program)
+//! composes the stage with Pixar's library and writes a .glb, which [`gltf`] reads. So both formats give the same scene.
 
 pub mod answer;
 mod python;
@@ -20,10 +19,10 @@ use std::process::{Child, Output, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Extensions of stages.
+/// File extensions of USD stages.
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
-/// The converter's files.
+/// Names and contents of the converter's files.
 const SOURCES: [(&str, &str); 20] = [
     ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
     ("convert.py", include_str!("../../../scripts/usd/convert.py")),
@@ -47,25 +46,25 @@ const SOURCES: [(&str, &str); 20] = [
     ("textures.py", include_str!("../../../scripts/usd/textures.py")),
 ];
 
-/// Whether a path is called as stages are.
+/// Whether a path has the extension of a USD stage.
 pub fn is_stage(path: &Path) -> bool {
     path.extension().is_some_and(|own| EXTENSIONS.iter().any(|known| own.eq_ignore_ascii_case(known)))
 }
 
-/// Reads the stage at `path`, at the frame that `options` ask for (a time code), else at its first.
+/// Reads the stage at `path`, at the frame in `options` (a time code) or at its first.
 ///
 /// # Errors
-/// No Python with `usd-core`; what the stage has wrong, by prim; [`gltf::read`] of what becomes of it; `stop` asks for
-/// an end.
+/// There is no Python with `usd-core`, the stage is invalid (the error names the prim), [`gltf::read`] of the converted
+/// file fails, or `stop` ends the conversion.
 pub fn read(path: &Path, options: &ReadOptions, stop: &Stop) -> Result<Description> {
     let converter = Converter::new(path)?;
     let glb = converter.folder.path().join("stage.glb");
-    let mut words: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
+    let mut arguments: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
     if let Some(frame) = options.frame {
-        words.extend(["--frame".into(), frame.number.to_string().into()]);
+        arguments.extend(["--frame".into(), frame.number.to_string().into()]);
     }
-    converter.run(&words, options.allow_outside, stop)?;
-    // The converter has looked at the frame, and put beside the .glb what it names.
+    converter.run(&arguments, options.allow_outside, stop)?;
+    // The converter has applied the frame, and has copied the files that the stage names beside the .glb.
     let frame = options.frame.map(|frame| FrameTime { of_sequence: true, ..frame });
     let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..*options });
     let mut description = read.map_err(|mut error| {
@@ -73,32 +72,32 @@ pub fn read(path: &Path, options: &ReadOptions, stop: &Stop) -> Result<Descripti
         error
     })?;
     description.source = path.to_owned();
-    // Layers, textures and all else that the stage is composed of are in what became of it.
+    // The converted file contains the layers, textures and other files of the stage.
     description.converted = Some(gltf::hash(&glb, false)?);
     Ok(description)
 }
 
-/// Options of `caustique render` that the stage's RenderSettings stand for.
+/// The stage's RenderSettings as options of `caustique render`.
 ///
 /// # Errors
-/// Those of the converter, as for [`read`].
+/// The converter fails, as in [`read`].
 pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
     let output = Converter::new(path)?.run(&["--arguments".into()], allow_outside, &Stop::default())?;
     answer::options(&output.stdout, path)
 }
 
-/// Environment variable: how long a conversion may take.
+/// Environment variable that limits the time of a conversion, in seconds.
 const SECONDS_VARIABLE: &str = "CAUSTIQUE_USD_SECONDS";
-/// Seconds that it may take otherwise: what takes longer is hardly meant to end.
-const MAX_SECONDS: u32 = 3600;
+/// Default time limit of a conversion, in seconds.
+const DEFAULT_MAX_SECONDS: u32 = 3600;
 
-/// Time between two looks at whether an end is asked for.
-const LOOK: Duration = Duration::from_millis(50);
+/// Time between two checks whether the user has asked to stop.
+const STOP_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Seconds that a conversion may take.
-fn seconds() -> Result<u32> {
-    let Some(said) = std::env::var_os(SECONDS_VARIABLE) else { return Ok(MAX_SECONDS) };
-    // poll(2) counts milliseconds in 31 bits.
+/// The time limit of a conversion, in seconds.
+fn max_seconds() -> Result<u32> {
+    let Some(said) = std::env::var_os(SECONDS_VARIABLE) else { return Ok(DEFAULT_MAX_SECONDS) };
+    // poll(2) takes milliseconds in 31 bits.
     let seconds = said.to_str().and_then(|said| said.parse().ok()).filter(|seconds| (1..=2_000_000).contains(seconds));
     seconds.ok_or_else(|| {
         let error =
@@ -107,7 +106,7 @@ fn seconds() -> Result<u32> {
     })
 }
 
-/// The converter, laid out in a folder that ends with it.
+/// The converter's files in a temporary folder, which is removed on drop.
 struct Converter<'p> {
     stage: &'p Path,
     interpreter: Interpreter,
@@ -127,19 +126,19 @@ impl<'p> Converter<'p> {
         Ok(Converter { stage, interpreter, folder })
     }
 
-    /// Runs the converter on the stage.
-    fn run(&self, words: &[OsString], allow_outside: bool, stop: &Stop) -> Result<Output> {
+    /// Runs the converter on the stage with these command-line arguments.
+    fn run(&self, arguments: &[OsString], allow_outside: bool, stop: &Stop) -> Result<Output> {
         let mut command = self.interpreter.command();
-        command.arg("-B").arg(self.folder.path().join("convert.py")).arg(self.stage).args(words);
+        command.arg("-B").arg(self.folder.path().join("convert.py")).arg(self.stage).args(arguments);
         if allow_outside {
             command.arg("--allow-outside");
         }
-        // Zero: nobody tells what is left.
+        // Zero: the free memory is unknown.
         let bytes = memory::available().map_or(0, |available| available.bytes);
-        command.arg("--guard").arg(seconds()?.to_string()).arg(bytes.to_string());
-        // A group of its own: Ctrl-C is for this program, and the pipe that closes then ends the converter.
+        command.arg("--guard").arg(max_seconds()?.to_string()).arg(bytes.to_string());
+        // In its own process group, so that Ctrl-C reaches only this program. The converter ends when its stdin closes.
         command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        let output = command.spawn().and_then(|child| output_unless(child, stop)).map_err(|cause| {
+        let output = command.spawn().and_then(|child| wait_or_stop(child, stop)).map_err(|cause| {
             Error::new(ErrorKind::Library, self.interpreter.path().display(), cause).hint(python::HINT)
         })?;
         if output.status.success() {
@@ -156,14 +155,14 @@ impl<'p> Converter<'p> {
     }
 }
 
-/// The output of the converter, which ends when its standard input does: as soon as `stop` asks for that.
-fn output_unless(mut child: Child, stop: &Stop) -> std::io::Result<Output> {
-    let open = child.stdin.take();
+/// Waits for the converter's output. When `stop` is requested, closes the converter's standard input, which ends it.
+fn wait_or_stop(mut child: Child, stop: &Stop) -> std::io::Result<Output> {
+    let stdin = child.stdin.take();
     let (over, ended) = channel::<()>();
     std::thread::scope(|scope| {
         std::thread::Builder::new().spawn_scoped(scope, move || {
-            while !stop.requested() && ended.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {}
-            drop(open);
+            while !stop.requested() && ended.recv_timeout(STOP_INTERVAL) == Err(RecvTimeoutError::Timeout) {}
+            drop(stdin);
         })?;
         let output = child.wait_with_output();
         drop(over);

@@ -5,33 +5,33 @@ use crate::installed;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Environment variable that names the Python.
+/// Environment variable with the path of the Python interpreter.
 pub const VARIABLE: &str = "CAUSTIQUE_USD_PYTHON";
 
-/// Where `scripts/setup.sh` installs, in the project's folder.
+/// Path of the Python that `scripts/setup.sh usd` installs, in the project's folder.
 const ENVIRONMENT: &str = ".venv-usd/bin/python";
 
-/// What to do where there is none.
+/// Hint of errors about a missing Python or module.
 pub(super) const HINT: &str = "run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip \
                                install usd-core numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to \
                                that Python";
 
-/// Imports all that the converter needs, and prints USD's version.
+/// Python code that imports the converter's dependencies, and prints the version of USD.
 const PROBE: &str = "import mapbox_earcut, numpy, OpenEXR, PIL\nfrom pxr import Usd, UsdLux, UsdShade\n\
                      print('.'.join(map(str, Usd.GetVersion()[1:])))";
 
-/// A Python that runs the converter.
+/// The Python interpreter that runs the converter.
 #[derive(Clone, Debug)]
 pub struct Interpreter {
     path: PathBuf,
 }
 
 impl Interpreter {
-    /// The Python that `CAUSTIQUE_USD_PYTHON` names, and then no other; that of `.venv-usd` where `scripts/setup.sh usd`
-    /// has installed it (see [`installed`]); `python3`.
+    /// Finds the interpreter: `CAUSTIQUE_USD_PYTHON` if it is set; otherwise the Python in `.venv-usd` if `scripts/setup.sh
+    /// usd` has installed it (see [`installed`]); otherwise `python3`.
     ///
     /// # Errors
-    /// [`ErrorKind::Library`] where the variable names no file.
+    /// [`ErrorKind::Library`]: the variable is set, but not to a file.
     pub fn find() -> Result<Interpreter> {
         if let Some(path) = installed::path_from_env(VARIABLE) {
             return if path.is_file() {
@@ -43,34 +43,35 @@ impl Interpreter {
         Ok(Interpreter { path: installed::find(ENVIRONMENT).unwrap_or_else(|| "python3".into()) })
     }
 
-    /// The file, or the name that the system looks up.
+    /// The path of the interpreter, or the name that the system searches for.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where it comes from.
+    /// How the interpreter was found, in words.
     pub fn origin(&self) -> &'static str {
         installed::origin(VARIABLE, ENVIRONMENT, &self.path)
     }
 
-    /// A command that runs this Python, isolated (`-I`), because modules in the current folder may be anybody's.
+    /// A command that runs the interpreter in isolated mode (`-I`), so that it does not import untrusted modules from the
+    /// current folder.
     pub(super) fn command(&self) -> Command {
         let mut command = Command::new(&self.path);
         command.arg("-I");
         command
     }
 
-    /// The version of USD, once all that the converter needs is there.
+    /// The version of USD, if all dependencies of the converter are installed.
     ///
     /// # Errors
-    /// [`ErrorKind::Library`]: it does not run, or lacks a module.
+    /// [`ErrorKind::Library`]: the interpreter does not run, or lacks a module.
     pub fn version(&self) -> Result<String> {
         let error = |cause: String| Error::new(ErrorKind::Library, self.path.display(), cause).hint(HINT);
         let output = self.command().args(["-c", PROBE]).output().map_err(|cause| error(cause.to_string()))?;
         if output.status.success() {
             return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
         }
-        let told = String::from_utf8_lossy(&output.stderr);
-        Err(error(told.lines().last().unwrap_or("it does not run").trim().to_owned()))
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        Err(error(stderr.lines().last().unwrap_or("it does not run").trim().to_owned()))
     }
 }
