@@ -1,38 +1,38 @@
-//! Pixel filters: how a pixel weighs the light that falls on and around it.
+//! Pixel reconstruction filters.
 //!
-//! Eye paths draw the point of the film by the filter itself, so that they all weigh the same (filter importance
-//! sampling \[Ernst, Stamminger, Greiner 2006\]). What a light path sends to a point of the film goes to one of the pixels
-//! that see the point, drawn by their filters there. Filters are products of one function per axis, `f(d)` with `d` from
-//! the middle of a pixel in pixels, `integral f = 1`.
+//! Camera paths sample the film point from the filter, so that all have the same weight (filter importance sampling
+//! \[Ernst, Stamminger, Greiner 2006\]). The contribution of a light path to a film point goes to one of the pixels whose
+//! filters cover the point, drawn in proportion to the filters there. A filter is the product of `f(dx)` and `f(dy)`, with
+//! distances from the centre of the pixel in pixels, and `integral f = 1`.
 
 use std::f64::consts::TAU;
 
-/// A pixel filter; widths are counted as Blender counts them.
+/// A pixel filter with its width in pixels, as Blender defines filter widths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Filter {
-    /// The same everywhere on a square of this side (pixels).
+    /// Constant on a square whose side is the width.
     Box(f32),
-    /// A bell `exp(-8 d^2 / width^2)`, cut off at 1.5 widths.
+    /// `exp(-8 d^2 / width^2)`, cut off at 1.5 widths from the centre.
     Gaussian(f32),
-    /// The window of Blackman and Harris, two widths wide.
+    /// The Blackman-Harris window, cut off at one width from the centre.
     BlackmanHarris(f32),
 }
 
-/// Widest filter, in pixels.
+/// Largest width of a filter (pixels).
 pub const MAX_FILTER_WIDTH: f32 = 8.0;
 
-/// Coefficients of the window of Blackman and Harris \[Harris 1978\], 4 terms, over their sum at the middle.
-const TERMS: [f64; 4] = [0.35875, 0.48829, 0.14128, 0.01168];
+/// Coefficients of the 4-term Blackman-Harris window \[Harris 1978\].
+const BLACKMAN_HARRIS: [f64; 4] = [0.35875, 0.48829, 0.14128, 0.01168];
 
 impl Default for Filter {
-    /// One pixel, no overlap.
+    /// A box of one pixel: filters of neighbouring pixels do not overlap.
     fn default() -> Filter {
         Filter::Box(1.0)
     }
 }
 
 impl Filter {
-    /// Pixels from the middle beyond which it is zero.
+    /// Distance from the centre (pixels) beyond which the filter is zero.
     pub fn radius(self) -> f32 {
         match self {
             Filter::Box(width) => 0.5 * width,
@@ -41,7 +41,7 @@ impl Filter {
         }
     }
 
-    /// `f(d)`, per pixel.
+    /// The filter `f(d)` along one axis (1/pixel).
     pub fn density(self, d: f32) -> f32 {
         let radius = self.radius();
         if d.abs() >= radius {
@@ -51,27 +51,27 @@ impl Filter {
             Filter::Box(width) => 1.0 / width,
             Filter::Gaussian(width) => {
                 let (d, width) = (f64::from(d), f64::from(width));
-                // Standard deviation of a quarter of the width; six of them lie within the cut.
+                // The standard deviation is a quarter of the width, so the cut-off is at six standard deviations.
                 let norm = statrs::function::erf::erf(6.0 / std::f64::consts::SQRT_2);
                 ((-8.0 * d * d / (width * width)).exp() * 4.0 / (width * TAU.sqrt() * norm)) as f32
             }
             Filter::BlackmanHarris(_) => {
                 let phase = TAU * (0.5 + 0.5 * f64::from(d / radius));
-                let [a, b, c, e] = TERMS;
+                let [a, b, c, e] = BLACKMAN_HARRIS;
                 let value = a - b * phase.cos() + c * (2.0 * phase).cos() - e * (3.0 * phase).cos();
                 (value / (a * 2.0 * f64::from(radius))) as f32
             }
         }
     }
 
-    /// The `d` below which a share `u` of the filter lies, for `u` in \[0, 1).
+    /// Inverse of the cumulative distribution of `f`, for `u` in \[0, 1).
     pub fn inverse(self, u: f32) -> f32 {
         let radius = self.radius();
         match self {
             Filter::Box(width) => (u - 0.5) * width,
             Filter::Gaussian(width) => {
-                let most = statrs::function::erf::erf(6.0 / std::f64::consts::SQRT_2);
-                let x = statrs::function::erf::erf_inv((2.0 * f64::from(u) - 1.0) * most);
+                let norm = statrs::function::erf::erf(6.0 / std::f64::consts::SQRT_2);
+                let x = statrs::function::erf::erf_inv((2.0 * f64::from(u) - 1.0) * norm);
                 ((0.25 * std::f64::consts::SQRT_2 * f64::from(width) * x) as f32).clamp(-radius, radius)
             }
             Filter::BlackmanHarris(_) => 2.0 * radius * (inverse_window(f64::from(u)) as f32 - 0.5),
@@ -79,10 +79,10 @@ impl Filter {
     }
 }
 
-/// The place in \[0, 1\] below which a share `u` of the window of Blackman and Harris lies: Newton's steps, kept between
-/// bounds that close in.
+/// Inverse of the cumulative distribution of the Blackman-Harris window on \[0, 1\], by Newton's method safeguarded by
+/// bisection.
 fn inverse_window(u: f64) -> f64 {
-    let [a, b, c, e] = TERMS;
+    let [a, b, c, e] = BLACKMAN_HARRIS;
     let below = |t: f64| {
         t - (b / a) * (TAU * t).sin() / TAU + (c / a) * (2.0 * TAU * t).sin() / (2.0 * TAU)
             - (e / a) * (3.0 * TAU * t).sin() / (3.0 * TAU)
@@ -107,9 +107,9 @@ fn inverse_window(u: f64) -> f64 {
     t
 }
 
-/// One of the pixels along an axis that see the point `x` (pixels; the middle of pixel `k` is at `k + 1/2`), drawn by `u`
-/// in \[0, 1) in proportion to their filters there, and the sum of these.
-pub fn choose(filter: Filter, x: f32, u: f32) -> (i64, f32) {
+/// Draws one of the pixels along an axis whose filters cover the point `x`, in proportion to their filters there. Pixel
+/// `k` has its centre at `k + 1/2`; `u` is in \[0, 1). Also returns the sum of the filters at `x`.
+pub fn sample_pixel(filter: Filter, x: f32, u: f32) -> (i64, f32) {
     let radius = filter.radius();
     let (first, last) = ((x - 0.5 - radius).ceil() as i64, (x - 0.5 + radius).floor() as i64);
     let weight = |k: i64| filter.density(x - 0.5 - k as f32);
@@ -136,9 +136,9 @@ mod tests {
         Filter::BlackmanHarris(4.0),
     ];
 
-    /// The integral is one, and the inverse is that of the integral.
+    /// The integral of the density is one, and `inverse` inverts its cumulative distribution.
     #[test]
-    fn densities_and_inverses_belong_together() {
+    fn inverses_match_densities() {
         for filter in ALL {
             let radius = filter.radius();
             let steps = 20_000;
@@ -155,15 +155,15 @@ mod tests {
         }
     }
 
-    /// Light on one point reaches every pixel as much as its filter says: the mean over draws of (chosen, sum).
+    /// The expected contribution of light at one point to each pixel is the pixel's filter there.
     #[test]
-    fn pixels_are_chosen_by_their_filters() {
+    fn pixels_are_sampled_in_proportion_to_their_filters() {
         for filter in ALL {
             let x = 3.3;
             let mut found = std::collections::HashMap::<i64, f64>::new();
             let draws = 10_000;
             for i in 0..draws {
-                let (k, sum) = choose(filter, x, (i as f32 + 0.5) / draws as f32);
+                let (k, sum) = sample_pixel(filter, x, (i as f32 + 0.5) / draws as f32);
                 *found.entry(k).or_default() += f64::from(sum) / f64::from(draws);
             }
             for k in -6..14 {
@@ -172,6 +172,6 @@ mod tests {
                 assert!((got - expected).abs() < 2e-3, "{filter:?}, pixel {k}: {got}, expected {expected}");
             }
         }
-        assert_eq!(choose(Filter::default(), 3.3, 0.9), (3, 1.0));
+        assert_eq!(sample_pixel(Filter::default(), 3.3, 0.9), (3, 1.0));
     }
 }

@@ -1,4 +1,4 @@
-//! Cameras: perspective and orthographic, with a thin lens; rays from the film and importance towards a point.
+//! Perspective and orthographic cameras with a thin lens: sampling of rays, and importance towards a point.
 
 mod filter;
 mod tiles;
@@ -9,29 +9,30 @@ pub use tiles::{GROUP_SIZE, TilePixel, par_pixels, pixels_per_band};
 use crate::math::{DMat3, DMat4, DVec3, DVec4, Mat3, Vec2, Vec3, warp};
 use std::f32::consts::PI;
 
-/// How the film maps to directions.
+/// The projection, with the size of the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// Half width and half height of the film at distance 1.
+    /// Half width and half height of the film in a plane at distance 1.
     Perspective(Vec2),
     /// Half width and half height of the film (m).
     Orthographic(Vec2),
 }
 
-/// The pixels of the whole picture, of which a film may be a window.
+/// The whole picture, of which the film may be a crop window.
 #[derive(Clone, Copy, Debug)]
 struct Whole {
-    /// Its size in the film's pixels.
+    /// Size of the whole picture, in pixels of the film.
     film: Vec2,
-    /// Where the film begins in it.
+    /// Top left corner of the film in the whole picture, in pixels of the film.
     corner: Vec2,
-    /// Its size and the film's beginning in whole pixels.
+    /// `film`, rounded to whole pixels.
     size: (u32, u32),
+    /// `corner`, rounded to whole pixels.
     at: (u32, u32),
 }
 
 impl Whole {
-    /// A film that is all of it.
+    /// A whole picture that equals the film.
     fn of(width: u32, height: u32) -> Whole {
         let film = Vec2::new(width as f32, height as f32);
         Whole { film, corner: Vec2::ZERO, size: (width, height), at: (0, 0) }
@@ -42,16 +43,16 @@ impl Whole {
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     position: Vec3,
-    /// Local to world, orthonormal, with a mirroring where the camera's node mirrors.
+    /// Orthonormal matrix from camera to world space. Contains a reflection if the camera's node does.
     rotation: Mat3,
     projection: Projection,
     lens_radius: f32,
     focus_distance: f32,
-    /// Middle of the film against the axis, in the lengths of the projection.
+    /// Centre of the film relative to the optical axis, in the unit of the projection.
     offset: Vec2,
     width: u32,
     height: u32,
-    /// Share of a pixel's side that its rays cover.
+    /// Share of a pixel's side that its rays cover. Below 1 for [`Camera::subsample`].
     covered: f32,
     filter: Filter,
     whole: Whole,
@@ -66,23 +67,24 @@ pub struct CameraRay {
     pub direction: Vec3,
 }
 
-/// What the camera measures from a point of the scene.
+/// A connection from a point of the scene to the lens.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraSample {
-    /// Point of the whole picture in pixels.
+    /// Film point in the whole picture (pixels).
     pub film: Vec2,
     /// Unit direction from the point towards the lens.
     pub wi: Vec3,
     /// Point on the lens.
     pub lens: Vec3,
-    /// Density per area of the point at which rays from the whole picture through this lens point, with all its pixels
-    /// together as one measurement of mean 1, arrive: of a perspective camera importance over the cosine there and the
-    /// distance squared. Multiply by the cosine at the point.
+    /// Importance of the whole picture, taken as one measurement of mean 1, per area perpendicular to the ray at the
+    /// point. For a perspective camera this is the importance at the lens times the cosine at the lens over the squared
+    /// distance. Multiply by the cosine at the point.
     pub importance: f32,
 }
 
 impl Camera {
-    /// A camera at `position`, local axes the columns of `rotation`.
+    /// A camera at `position` whose axes are the columns of `rotation`. `lens` is its radius and focus distance (m),
+    /// `size` the width and height of the film in pixels.
     pub fn new(position: DVec3, rotation: Mat3, projection: Projection, lens: (f32, f32), size: (u32, u32)) -> Camera {
         let position = position.as_vec3();
         Camera {
@@ -100,32 +102,32 @@ impl Camera {
         }
     }
 
-    /// The same with its film moved by `shift`, in widths to the right and heights up.
+    /// This camera with the film moved by `shift`, in widths to the right and heights upwards.
     pub fn with_shift(&self, shift: Vec2) -> Camera {
         let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
         Camera { offset: 2.0 * shift * half, ..*self }
     }
 
-    /// The same with another pixel filter.
+    /// This camera with another pixel filter.
     pub fn with_filter(&self, filter: Filter) -> Camera {
         Camera { filter, ..*self }
     }
 
-    /// A window of the picture: left edge, top edge, width and height in pixels. All but its size is as in the whole
-    /// picture, to the bit.
+    /// This camera with a crop window of the film: left edge, top edge, width and height in pixels. Rays and random
+    /// numbers of its pixels are those of the whole picture, to the bit.
     pub fn crop(&self, [x, y, width, height]: [u32; 4]) -> Camera {
         let Whole { corner, at, .. } = self.whole;
         let (corner, at) = (corner + Vec2::new(x as f32, y as f32), (at.0 + x, at.1 + y));
         Camera { width, height, whole: Whole { corner, at, ..self.whole }, ..*self }
     }
 
-    /// A sample of this camera's pixels, `factor` times as many a side, at least one, and spread evenly over the film:
-    /// each sees as much as a pixel does here. What light paths send to the film is taken from all around it: as much
-    /// noise as if there were all pixels and as many light paths.
+    /// This camera with `factor` times the pixels per side, at least one, spread evenly over the film. Each covers the
+    /// area of one pixel of this camera, so camera paths have the noise of single pixels. Light paths contribute from all
+    /// of the film, so with proportionally fewer light paths their noise is that of the full picture.
     pub fn subsample(&self, factor: f64) -> Camera {
         let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
         let (width, height, covered) = (scaled(self.width), scaled(self.height), self.covered * factor.min(1.0) as f32);
-        // Its pixels are none of those of the picture, and it is a window of no other.
+        // The new pixels are not pixels of the whole picture, so `size` and `at` are those of a film without a window.
         let mut whole = Whole::of(width, height);
         let size = Vec2::new(self.width as f32, self.height as f32);
         if self.whole.film != size {
@@ -135,64 +137,65 @@ impl Camera {
         Camera { width, height, covered, whole, ..*self }
     }
 
-    /// The whole view in a smaller picture, `factor` times as many pixels a side, at least one: each sees as much more.
+    /// This camera with `factor` times the pixels per side, at least one, that together cover the same view.
     pub fn downscale(&self, factor: f64) -> Camera {
         Camera { covered: self.covered, ..self.subsample(factor) }
     }
 
-    /// The same without its lens: all is sharp.
+    /// This camera as a pinhole camera: everything is in focus.
     pub fn without_lens(&self) -> Camera {
         Camera { lens_radius: 0.0, focus_distance: 1.0, ..*self }
     }
 
-    /// A point of the whole picture, in its pixels, that pixel `(x, y)` of the film sees, for a point of the unit square.
+    /// Samples the filter of pixel `(x, y)` of the film by a point of the unit square. Returns the film point in the
+    /// whole picture (pixels).
     #[inline]
-    pub fn film(&self, (x, y): (u32, u32), u: Vec2) -> Vec2 {
-        let from_middle = match self.filter {
+    pub fn film_point(&self, (x, y): (u32, u32), u: Vec2) -> Vec2 {
+        let from_centre = match self.filter {
             Filter::Box(width) => (u - 0.5) * width,
             filter => Vec2::new(filter.inverse(u.x), filter.inverse(u.y)),
         };
-        self.whole.corner + Vec2::new(x as f32, y as f32) + 0.5 + from_middle * self.covered
+        self.whole.corner + Vec2::new(x as f32, y as f32) + 0.5 + from_centre * self.covered
     }
 
-    /// One of the film's pixels that see a point of the whole picture, drawn by `u` in proportion to their filters there,
-    /// and the sum of these; `None` where it lies beyond the film.
+    /// Draws one of the pixels whose filters cover a film point of the whole picture, in proportion to their filters
+    /// there. Also returns the sum of the filters. `None` if the drawn pixel is outside of the film.
     #[inline]
-    pub fn pixel(&self, film: Vec2, u: impl FnOnce() -> Vec2) -> Option<((u32, u32), f32)> {
+    pub fn sample_pixel(&self, film: Vec2, u: impl FnOnce() -> Vec2) -> Option<((u32, u32), f32)> {
         let corner = self.whole.corner;
         if self.filter == Filter::Box(1.0) {
             let within = film - corner;
             return Some((((within.x as u32).min(self.width - 1), (within.y as u32).min(self.height - 1)), 1.0));
         }
-        // Of a sample of a window's pixels the first one may begin between two of the whole.
+        // After `subsample` of a window, the corner may be between two pixels.
         let (u, begin) = (u(), corner.floor());
         let film = film - (corner - begin);
         let [(x, along), (y, across)] = [(film.x, u.x, begin.x), (film.y, u.y, begin.y)].map(|(film, u, begin)| {
-            let (k, sum) = filter::choose(self.filter, film, u);
+            let (k, sum) = filter::sample_pixel(self.filter, film, u);
             (k - begin as i64, sum)
         });
         let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
         (x < self.width && y < self.height).then_some(((x, y), along * across))
     }
 
-    /// Width and height of the whole picture in pixels, and where this film begins in it.
+    /// Width and height of the whole picture, and the top left corner of this film in it (pixels).
     pub fn whole(&self) -> [(u32, u32); 2] {
         [self.whole.size, self.whole.at]
     }
 
-    /// Width and height in pixels, of the film and of the whole picture.
+    /// Width and height (pixels) of the film, and of the whole picture.
     pub fn sizes(&self) -> [(u32, u32); 2] {
         [self.size(), self.whole.size]
     }
 
-    /// Number of pixels of the whole picture, each as large as one of this film.
+    /// Area of the whole picture in pixels of this film.
     pub fn whole_pixels(&self) -> f32 {
         self.whole.film.x * self.whole.film.y
     }
 
-    /// Index of a pixel in the whole picture, row by row: what tells its random numbers from those of others.
+    /// Row-major index of a pixel of the film in the whole picture, the key of its random numbers.
     #[inline]
-    pub fn key(&self, (x, y): (u32, u32)) -> u64 {
+    pub fn pixel_key(&self, (x, y): (u32, u32)) -> u64 {
         let Whole { size, at, .. } = self.whole;
         u64::from(at.1 + y) * u64::from(size.0) + u64::from(at.0 + x)
     }
@@ -202,14 +205,14 @@ impl Camera {
         (self.width, self.height)
     }
 
-    /// Position of the lens' centre.
+    /// Centre of the lens.
     pub fn position(&self) -> Vec3 {
         self.position
     }
 
-    /// Corners of a plane that all rays start in.
+    /// Corners of a rectangle that contains the origins of all camera rays.
     pub fn origins(&self) -> [Vec3; 4] {
-        let (film, middle) = match self.projection {
+        let (film, centre) = match self.projection {
             Projection::Perspective(_) => (Vec2::ZERO, Vec2::ZERO),
             Projection::Orthographic(half) => {
                 let size = Vec2::new(self.width as f32, self.height as f32);
@@ -218,7 +221,7 @@ impl Camera {
         };
         let half = film + if self.has_lens() { self.lens_radius } else { 0.0 };
         [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
-            .map(|(x, y)| self.position + self.rotation * (middle + half * Vec2::new(x, y)).extend(0.0))
+            .map(|(x, y)| self.position + self.rotation * (centre + half * Vec2::new(x, y)).extend(0.0))
     }
 
     /// Unit viewing direction.
@@ -226,20 +229,21 @@ impl Camera {
         -self.rotation.z_axis
     }
 
-    /// Whether a lens blurs.
+    /// Whether the lens has a radius, so that the picture has depth of field.
     pub fn has_lens(&self) -> bool {
         self.lens_radius > 0.0
     }
 
-    /// Point of the whole picture in pixels (y down) to the film's plane: `[-1, 1]^2`, y up, times the half size, about the film's
-    /// middle.
+    /// Converts a point of the whole picture (pixels, y down) to a point of the film plane (y up) in the unit of the
+    /// projection, relative to the optical axis.
     #[inline]
     fn plane(&self, film: Vec2, half: Vec2) -> Vec2 {
         let ndc = film / self.whole.film * 2.0 - 1.0;
         Vec2::new(ndc.x, -ndc.y) * half + self.offset
     }
 
-    /// The ray through `film` (pixels) from lens point `lens` (uniform on the unit square).
+    /// The ray through the point `film` of the whole picture (pixels). `lens` is a point of the unit square that samples
+    /// the lens.
     #[inline]
     pub fn ray(&self, film: Vec2, lens: Vec2) -> CameraRay {
         let (mut origin, focus) = match self.projection {
@@ -258,9 +262,9 @@ impl Camera {
         }
     }
 
-    /// World to camera (x to the right, y up, z along the view) and world to the picture (x to the right and y down, from
-    /// 0 to 1, after division by w) as OpenEXR has them: row by row, for row vectors on their left. `origin` is the
-    /// world's point that positions here are counted from.
+    /// The matrices `worldToCamera` (x to the right, y up, z along the view) and `worldToNDC` (x to the right, y down,
+    /// from 0 to 1 after division by w) of OpenEXR: row-major, for row vectors. `origin` is the world position of this
+    /// scene's origin.
     pub fn matrices(&self, origin: DVec3) -> [[f32; 16]; 2] {
         let rotation = self.rotation.as_dmat3();
         let axes = DMat3::from_cols(rotation.x_axis, rotation.y_axis, -rotation.z_axis).transpose();
@@ -268,7 +272,7 @@ impl Camera {
         let to_camera = DMat4::from_mat3(axes) * DMat4::from_translation(-position);
         let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
         let (half, offset) = (half.as_dvec2(), self.offset.as_dvec2());
-        // x in the picture is (1 + (x - offset) / half) / 2, of points at distance 1 along the view.
+        // A point at distance 1 along the view has the NDC x coordinate (1 + (x - offset) / half) / 2.
         let (sx, sy) = (0.5 / half.x, -0.5 / half.y);
         let (ox, oy) = (0.5 - offset.x * sx, 0.5 - offset.y * sy);
         let film = match self.projection {
@@ -285,12 +289,13 @@ impl Camera {
                 DVec4::new(ox, oy, 0.0, 1.0),
             ),
         };
-        // For row vectors the transposed, row by row: the columns, one after the other.
+        // Row vectors need the transposed matrix. Its rows are the columns, which `to_cols_array` returns.
         [to_camera, film * to_camera].map(|m| m.to_cols_array().map(|x| x as f32))
     }
 
-    /// Width that the whole picture spans per metre of distance (perspective; 0 for an orthographic camera), and at distance
-    /// 0. However wide the film, a view spans less than half a circle.
+    /// Width of the view of the whole picture (m) as a linear function of distance: its slope, which is 0 for an
+    /// orthographic camera, and its value at distance 0, which is 0 for a perspective camera. The slope is at most pi,
+    /// because a wide film still sees less than half a circle.
     pub fn span(&self) -> (f32, f32) {
         match self.projection {
             Projection::Perspective(half) => ((2.0 * half.x).min(PI), 0.0),
@@ -308,10 +313,11 @@ impl Camera {
         (p - self.position).dot(self.forward())
     }
 
-    /// The camera seen from `p` through lens point `lens`; `None` when `p` is out of view.
+    /// Connects the point `p` to the lens; `lens` is a point of the unit square that samples it. `None` if `p` is out of
+    /// view.
     ///
-    /// The rays of an orthographic camera that belong to one lens point, taken from each film point's own lens, are
-    /// parallel: they fill a beam of the film's cross-section, and what they measure does not depend on the distance.
+    /// In an orthographic camera each film point has its own lens. The rays through one lens point of every lens are
+    /// parallel, so they form a beam with the cross-section of the film, and the importance does not depend on distance.
     #[inline]
     pub fn sample(&self, p: Vec3, lens: Vec2) -> Option<CameraSample> {
         let mut lens_local = Vec3::ZERO;
@@ -325,7 +331,7 @@ impl Camera {
             }
             Projection::Orthographic(half) => {
                 let local = self.rotation.transpose() * (p - self.position);
-                // The middle ray goes from the lens point through the point in focus on the axis.
+                // The ray of the central film point goes from the lens point to the focus point on the axis.
                 let ray = Vec3::new(0.0, 0.0, -self.focus_distance) - lens_local;
                 let to = ray * (-local.z / self.focus_distance);
                 let at = (local - to).truncate();
@@ -341,7 +347,7 @@ impl Camera {
         }
         let (on_film, importance) = match self.projection {
             Projection::Perspective(_) => {
-                // Where the ray crosses the plane in focus, as a film point at distance 1.
+                // The intersection with the focus plane, scaled to a film point at distance 1.
                 let focus = lens_local + local * (self.focus_distance / cos);
                 let importance = 1.0 / (4.0 * half.x * half.y * cos * cos * cos * distance2);
                 (focus.truncate() / self.focus_distance, importance)
@@ -350,7 +356,7 @@ impl Camera {
         };
         let plane = (on_film - self.offset) / half;
         let film = Vec2::new(plane.x + 1.0, 1.0 - plane.y) * 0.5 * self.whole.film;
-        // Pixels at the edge see a little beyond it.
+        // Filters of edge pixels reach beyond the film.
         let beyond = (self.filter.radius() - 0.5).max(0.0);
         let seen = |x: f32, from: f32, side: u32| x >= from - beyond && x < from + side as f32 + beyond;
         let corner = self.whole.corner;
@@ -360,9 +366,9 @@ impl Camera {
         Some(CameraSample { film, wi, lens: lens_world, importance })
     }
 
-    /// Density of the rays of the whole picture through a lens point, for a unit direction in view: of a perspective
-    /// camera per solid angle, of an orthographic one per area across the direction ([`Camera::is_orthographic`]). Film
-    /// points are uniform over an area of `4 half.x half.y`, at distance 1 or in the lens' plane.
+    /// Density of the camera rays of the whole picture through a lens point, at a unit direction in view. Per solid angle
+    /// for a perspective camera, per area perpendicular to the direction for an orthographic one. Film points are uniform
+    /// over an area of `4 half.x half.y`, at distance 1 or in the plane of the lens.
     #[inline]
     pub fn pdf_w(&self, direction: Vec3) -> f32 {
         let cos = direction.dot(self.forward());
@@ -373,7 +379,7 @@ impl Camera {
         }
     }
 
-    /// Whether the density of its rays is per area, the same at any distance.
+    /// Whether the camera is orthographic, so that [`Camera::pdf_w`] is per area and the same at any distance.
     #[inline]
     pub fn is_orthographic(&self) -> bool {
         matches!(self.projection, Projection::Orthographic(_))
@@ -385,7 +391,7 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// A ray and the connection back agree about the film point, with and without a lens and a shift.
+    /// A connection from a point on a camera ray returns the film point of the ray, with and without lens and shift.
     #[test]
     fn rays_and_connections_are_inverse() {
         let half = Vec2::new(0.8, 0.45);
@@ -417,9 +423,9 @@ mod tests {
             .with_shift(Vec2::new(0.1, -0.3))
     }
 
-    /// A window sees what the whole picture sees there, and light paths bring its pixels as much.
+    /// Rays, keys and light path contributions of a crop window are those of the whole picture, to the bit.
     #[test]
-    fn windows_are_parts_of_the_picture() {
+    fn crop_windows_are_parts_of_the_whole_picture() {
         for projection in
             [Projection::Perspective(Vec2::new(0.8, 0.45)), Projection::Orthographic(Vec2::new(0.8, 0.45))]
         {
@@ -438,26 +444,27 @@ mod tests {
                 let (film, lens) = (draws.two(Purpose::Pixel) * Vec2::new(20.0, 10.0), draws.two(Purpose::Lens));
                 let at = corner + Vec2::new(10.0, 5.0) + film;
                 let (a, place) = (whole.ray(at, lens), (film.x as u32, film.y as u32));
-                let of_whole = whole.film((50 + place.0, 35 + place.1), lens);
-                assert_eq!(of_whole, window.film((10 + place.0, 5 + place.1), lens));
-                assert_eq!(of_whole, deeper.film(place, lens));
-                assert_eq!(whole.key((50 + place.0, 35 + place.1)), deeper.key(place));
+                let of_whole = whole.film_point((50 + place.0, 35 + place.1), lens);
+                assert_eq!(of_whole, window.film_point((10 + place.0, 5 + place.1), lens));
+                assert_eq!(of_whole, deeper.film_point(place, lens));
+                assert_eq!(whole.pixel_key((50 + place.0, 35 + place.1)), deeper.pixel_key(place));
                 let p = a.origin + a.direction * 5.0;
                 let Some(of_whole) = whole.sample(p, lens) else { continue };
                 for camera in [window, deeper] {
-                    let sample = camera.sample(p, lens).expect("it is in the window");
+                    let sample = camera.sample(p, lens).expect("a point in the window");
                     assert_eq!((of_whole.film, of_whole.importance), (sample.film, sample.importance));
                 }
-                let pixel = |camera: &Camera| camera.pixel(of_whole.film, || lens).expect("it is seen").0;
+                let pixel =
+                    |camera: &Camera| camera.sample_pixel(of_whole.film, || lens).expect("a pixel of the film").0;
                 let (x, y) = pixel(&deeper);
                 assert_eq!((pixel(&whole), pixel(&window)), ((50 + x, 35 + y), (10 + x, 5 + y)));
             }
         }
     }
 
-    /// Where a point is in the picture the header's matrices say, too.
+    /// The matrices of the EXR header map a point on a camera ray to its film point.
     #[test]
-    fn matrices_lead_to_the_film() {
+    fn header_matrices_project_points_to_the_film() {
         for projection in
             [Projection::Perspective(Vec2::new(0.8, 0.45)), Projection::Orthographic(Vec2::new(0.8, 0.45))]
         {

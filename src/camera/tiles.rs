@@ -1,33 +1,33 @@
-//! Pixels in an order that keeps neighbours together.
+//! Visits pixels in an order that keeps neighbours together.
 
 use rayon::prelude::*;
 
-/// Rows of pixels per unit of work, and width of the tiles in which they are visited.
+/// Side of a tile in pixels. A band, the unit of work, is a row of tiles.
 const TILE: usize = 16;
 
-/// Pixels visited together.
+/// Number of pixels that are visited together.
 pub const GROUP_SIZE: usize = 8;
 
 /// A pixel of a group.
 #[derive(Clone, Copy, Debug)]
 pub struct TilePixel {
-    /// Column and row.
+    /// Column and row in the picture.
     pub pixel: (u32, u32),
-    /// Index, row by row.
+    /// Row-major index in the picture.
     pub index: u64,
-    /// Where it is in the band that comes with it.
+    /// Row-major index in the band.
     pub at: usize,
 }
 
-/// Pixels of a band, the unit of work of [`par_pixels`], in a picture so wide.
+/// Number of pixels in a band, the unit of work of [`par_pixels`], of a picture of this width.
 pub fn pixels_per_band(width: u32) -> usize {
     width as usize * TILE
 }
 
-/// Calls `f(scratch, band, places)` for all pixels of a picture stored row by row and cut into `bands` of [`pixels_per_band`]
-/// pixels, [`GROUP_SIZE`] of them at a time (fewer at edges), in tiles and within them along a Z-order curve: neighbours in
-/// time are neighbours in the picture, in both directions. Groups depend on the picture's size alone. `scratch` is made
-/// once per unit of work or less often, so nothing may depend on what is in it.
+/// Calls `f(scratch, band, group)` for all pixels of a row-major picture that is cut into `bands` of [`pixels_per_band`]
+/// pixels, in groups of [`GROUP_SIZE`] (`None` beyond the edges). Tiles are visited along a Z-order curve, so consecutive
+/// groups are neighbours in both directions. Groups depend only on the size of the picture. `scratch` is created once per
+/// band or less often, so results must not depend on its content.
 pub fn par_pixels<B: Send, S>(
     bands: impl IndexedParallelIterator<Item = B>,
     (width, height): (u32, u32),
@@ -40,15 +40,15 @@ pub fn par_pixels<B: Send, S>(
         let height = (height - band * TILE).min(TILE);
         for x0 in (0..width).step_by(TILE) {
             for first in (0..TILE * TILE).step_by(GROUP_SIZE) {
-                let places = std::array::from_fn(|k| {
+                let group = std::array::from_fn(|k| {
                     let (x, dy) = (x0 + even_bits(first + k), even_bits((first + k) >> 1));
                     let y = band * TILE + dy;
                     let place =
                         TilePixel { pixel: (x as u32, y as u32), index: (y * width + x) as u64, at: dy * width + x };
                     (x < width && dy < height).then_some(place)
                 });
-                if places.iter().any(Option::is_some) {
-                    f(scratch, &mut pixels, &places);
+                if group.iter().any(Option::is_some) {
+                    f(scratch, &mut pixels, &group);
                 }
             }
         }

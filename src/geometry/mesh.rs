@@ -1,44 +1,44 @@
-//! Triangle meshes and where they stand.
+//! Triangle meshes and their instances.
 
 use super::precision::{Extent, coordinate_error};
 use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
 
-/// One triangle mesh with one material: a glTF primitive. Vertex attributes are per vertex, or empty where the file has
-/// none.
+/// A triangle mesh with one material: a glTF primitive. An attribute has one value per vertex, or is empty if the file
+/// has none.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Name for messages.
     pub name: String,
-    /// Vertex positions: world space when the mesh stands in one place, local space when instances share it.
+    /// Vertex positions: in world space if the mesh has one instance, in local space if several instances share it.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals; empty: the geometric normal serves (flat shading).
+    /// Unit shading normals. Without them the geometric normal is used (flat shading).
     pub normals: Vec<Vec3>,
-    /// Unit tangents, w = handedness of the bitangent; empty when nothing needs them.
+    /// Unit tangents, w = handedness of the bitangent. Empty if the material needs none.
     pub tangents: Vec<Vec4>,
     /// Texture coordinate sets 0 and 1.
     pub uvs: [Vec<Vec2>; 2],
     /// Linear RGBA vertex colours.
     pub colors: Vec<Vec4>,
-    /// Vertex indices, counter-clockwise seen from the front; every index is below `positions.len()`.
+    /// Vertex indices, counter-clockwise seen from the front. Every index is below `positions.len()`.
     pub triangles: Vec<[u32; 3]>,
-    /// Every edge (vertices welded by position) is shared by exactly two triangles that run along it in opposite
-    /// directions.
+    /// Whether the mesh is closed and consistently oriented: every edge (with vertices welded by position) belongs to
+    /// exactly two triangles, which run along it in opposite directions.
     pub closed: bool,
 }
 
-/// What almost every hit needs of a vertex, in half a cache line.
+/// The vertex attributes that almost every hit reads, in half a cache line.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(32))]
 pub(super) struct Corner {
     pub p: Vec3,
-    /// Zero: the geometric normal serves.
+    /// Shading normal; zero if the geometric normal is used.
     pub n: Vec3,
     /// Texture coordinate set 0.
     pub uv: Vec2,
 }
 
 impl Corner {
-    /// The vertices of a mesh, out of which normals and the first texture coordinates move.
+    /// Packs the vertices of a mesh. Moves normals and texture coordinate set 0 out of `mesh`.
     pub fn pack(mesh: &mut Mesh) -> Vec<Corner> {
         let (normals, uvs) = (std::mem::take(&mut mesh.normals), std::mem::take(&mut mesh.uvs[0]));
         let corner = |(i, &p): (usize, &Vec3)| Corner {
@@ -50,7 +50,7 @@ impl Corner {
     }
 }
 
-/// A mesh standing in the scene.
+/// A mesh placed in the scene.
 #[derive(Clone, Debug)]
 pub struct Instance {
     /// Name of the object (the glTF node), for messages and cryptomatte.
@@ -59,29 +59,30 @@ pub struct Instance {
     pub mesh: u32,
     /// Index into the scene's materials.
     pub material: u32,
-    /// Index of the object: several instances (primitives) of one node share it.
+    /// Index of the object, which all primitives of one glTF node share.
     pub object: u32,
-    /// Cameras look through it; all else meets it.
+    /// Whether camera rays pass through it. All other rays hit it.
     pub hidden_from_camera: bool,
-    /// Local to world; `None` when the mesh is already in world space.
+    /// Transform from local to world space; `None` if the mesh is in world space.
     pub to_world: Option<Placement>,
 }
 
-/// A transform of points, and of normals (inverse transpose).
+/// An affine transform of points, and the matching transform of normals.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
-    /// Of points and directions.
+    /// Transform of points and directions.
     pub points: Affine3A,
-    /// Of normals, up to length: the inverse transpose. The front of a mirrored mesh stays its front, as glTF wants.
+    /// Transform of normals up to length: the inverse transpose. As glTF requires, the front of a mirrored mesh stays its
+    /// front.
     pub normals: Mat3A,
-    /// `points` with the absolute value of each number: bounds all terms of a transformed coordinate.
+    /// `points` with the absolute value of each number, which bounds the terms of a transformed coordinate.
     absolute: Affine3A,
-    /// -1 for a mirroring transform, which turns the handedness of tangents over; 1 for others.
+    /// -1 if the transform contains a reflection, which flips the handedness of tangents; else 1.
     handedness: f32,
 }
 
 impl Placement {
-    /// From an affine transform that can be inverted.
+    /// The placement by an invertible affine transform.
     pub fn new(points: Affine3A) -> Placement {
         let normals = points.matrix3.inverse().transpose();
         let absolute = Affine3A { matrix3: points.matrix3.abs(), translation: points.translation.abs() };
@@ -91,7 +92,7 @@ impl Placement {
 }
 
 impl Instance {
-    /// A point of the mesh in world space.
+    /// Transforms a point of the mesh to world space.
     #[inline]
     pub fn point(&self, p: Vec3) -> Vec3 {
         match &self.to_world {
@@ -100,21 +101,21 @@ impl Instance {
         }
     }
 
-    /// How far a point `p` in world space may be off the plane of its triangle, given by the largest coordinates of its
-    /// corners and two edges, in the mesh's own space.
+    /// Bound on the distance of the computed world position `p` from the plane of its triangle. `local` is the extent of
+    /// the triangle in the space of the mesh.
     #[inline]
-    pub(super) fn error(&self, own: Extent, p: Vec3) -> f32 {
+    pub(super) fn position_error(&self, local: Extent, p: Vec3) -> f32 {
         let extent = match &self.to_world {
-            None => own,
+            None => local,
             Some(placement) => Extent {
-                largest: placement.absolute.transform_point3(own.largest),
-                edges: own.edges.map(|edge| placement.points.transform_vector3(edge)),
+                largest: placement.absolute.transform_point3(local.largest),
+                edges: local.edges.map(|edge| placement.points.transform_vector3(edge)),
             },
         };
         extent.plane_error() + coordinate_error(p)
     }
 
-    /// A normal of the mesh in world space, not normalised.
+    /// Transforms a normal of the mesh to world space, without normalizing it.
     #[inline]
     pub fn normal(&self, n: Vec3) -> Vec3 {
         match &self.to_world {
@@ -123,7 +124,7 @@ impl Instance {
         }
     }
 
-    /// A tangent of the mesh with its handedness in world space, not normalised.
+    /// Transforms a tangent of the mesh and its handedness to world space, without normalizing it.
     #[inline]
     pub(super) fn tangent(&self, t: Vec4) -> Vec4 {
         match &self.to_world {

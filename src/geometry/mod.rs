@@ -1,4 +1,4 @@
-//! Meshes, their placements, and the surface point a ray has hit.
+//! Meshes and their instances, surface points of ray hits, and bounds on rounding errors.
 
 mod mesh;
 mod precision;

@@ -9,32 +9,32 @@ use crate::processor::prefetch;
 pub struct Shapes {
     /// Meshes.
     pub meshes: Vec<Mesh>,
-    /// Where they stand. Indices in them are valid.
+    /// Instances of the meshes. Their indices are valid.
     pub instances: Vec<Instance>,
-    /// Vertices of the meshes, as hits read them.
+    /// Packed vertices of each mesh.
     corners: Vec<Vec<Corner>>,
 }
 
 impl Shapes {
-    /// Instances standing in the scene; their indices must be valid.
+    /// The geometry of these meshes and instances. Indices in the instances must be valid.
     pub fn new(mut meshes: Vec<Mesh>, instances: Vec<Instance>) -> Shapes {
         let corners = meshes.iter_mut().map(Corner::pack).collect();
         Shapes { meshes, instances, corners }
     }
 
-    /// Number of triangles standing in the scene.
+    /// Number of triangles of all instances.
     pub fn triangles(&self) -> usize {
         self.instances.iter().map(|instance| self.meshes[instance.mesh as usize].triangles.len()).sum()
     }
 
-    /// Prefetches the triangles (instance, index) that [`Shapes::surface`] is about to be asked for.
+    /// Prefetches the triangles (instance, primitive) that the next calls of [`Shapes::surface`] read.
     #[inline]
     pub fn prefetch(&self, triangles: impl Iterator<Item = (u32, u32)> + Clone) {
         let corners = |(instance, primitive): (u32, u32)| {
             let mesh = self.instances[instance as usize].mesh as usize;
             (mesh, self.meshes[mesh].triangles[primitive as usize])
         };
-        // All indices before the first corner, because a corner's address waits for its index.
+        // All indices are read before the first corner, because the address of a corner depends on its index.
         prefetch(triangles.clone().map(|triangle| corners(triangle).1[0]));
         prefetch(triangles.flat_map(|triangle| {
             let (mesh, corners) = corners(triangle);
@@ -42,7 +42,7 @@ impl Shapes {
         }));
     }
 
-    /// The surface at barycentric coordinates of a triangle; `None` if it has no area.
+    /// The surface point at barycentric coordinates of a triangle; `None` if the triangle has no area.
     #[inline(always)]
     pub fn surface(&self, instance: u32, primitive: u32, barycentric: [f32; 2]) -> Option<Surface> {
         let placed = &self.instances[instance as usize];

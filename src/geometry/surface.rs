@@ -1,4 +1,4 @@
-//! The point of a surface that a ray has hit, with everything shading needs.
+//! The surface point of a ray hit, with the attributes that shading needs.
 
 use super::mesh::Corner;
 use super::precision::{Extent, offset_origin, shadow_end};
@@ -8,18 +8,18 @@ use crate::math::{Vec2, Vec3, Vec4};
 /// A point on a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
-    /// World position, from barycentric coordinates (more exact than along the ray).
+    /// World position, interpolated by barycentric coordinates, which is more precise than the point along the ray.
     pub p: Vec3,
-    /// Unit geometric normal; points to the front (counter-clockwise) side.
+    /// Unit geometric normal on the front side, from which the triangle is counter-clockwise.
     pub ng: Vec3,
     /// Unit shading normal, in the hemisphere of `ng`.
     pub ns: Vec3,
-    /// Direction of growing u in the surface (not orthonormalised; zero when the mesh has neither tangents nor uvs), w
-    /// = handedness.
+    /// Tangent, the direction of increasing u, with its handedness in w. Not orthonormalized. Zero if the mesh has neither
+    /// tangents nor texture coordinates.
     pub tangent: Vec4,
     /// Texture coordinates, sets 0 and 1.
     pub uv: [Vec2; 2],
-    /// Linear vertex colour; white when there is none.
+    /// Linear RGBA vertex colour; white if the mesh has none.
     pub color: Vec4,
     /// Index of the instance.
     pub instance: u32,
@@ -27,10 +27,9 @@ pub struct Surface {
     pub primitive: u32,
     /// Index of the material.
     pub material: u32,
-    /// How far from its triangle the position may be, and how far Embree's own arithmetic may see that triangle from
-    /// there (scene units).
+    /// Bound (scene units) on the distance of `p` from the triangle as Embree's arithmetic sees it.
     pub error: f32,
-    /// Others lie on it here, and it is known which comes first (`scene/contact.rs`).
+    /// Whether other surfaces coincide with this one here and their order is known (`scene/contact.rs`).
     pub touching: bool,
 }
 
@@ -53,7 +52,7 @@ impl Surface {
         let e2 = c2.p - c0.p;
         let p = instance.point(c0.p + e1 * b1 + e2 * b2);
         let ng = instance.normal(e1.cross(e2)).try_normalize()?;
-        // A file may carry normals that disagree with the winding: the winding decides which side is the front.
+        // Normals of a file may disagree with the winding. The winding determines the front.
         let ns = match instance.normal(c0.n * b0 + c1.n * b1 + c2.n * b2).try_normalize() {
             Some(n) if n.dot(ng) < 0.0 => -n,
             Some(n) => n,
@@ -84,19 +83,19 @@ impl Surface {
             instance: instance_index,
             primitive,
             material: instance.material,
-            error: instance.error(Extent { largest, edges: [e1, e2] }, p),
+            error: instance.position_error(Extent { largest, edges: [e1, e2] }, p),
             touching: false,
         })
     }
 
-    /// Where a ray towards `direction` starts: moved off the surface, to the side the direction points to, by the
-    /// error bound of the position, so that the ray does not hit the surface it leaves.
+    /// Origin of a ray that leaves the surface along `direction`: the position, moved by the error bound to the side that
+    /// the direction points to, so that the ray does not hit the surface again.
     #[inline]
     pub fn ray_origin(&self, direction: Vec3) -> Vec3 {
         offset_origin(self.p, self.ng, direction, self.error)
     }
 
-    /// Where a shadow ray of length `distance` ends that comes against `direction`.
+    /// End of a shadow ray of length `distance` that arrives here; `direction` points back along the ray.
     #[inline]
     pub fn shadow_end(&self, direction: Vec3, distance: f32) -> Vec3 {
         shadow_end(self.p, self.ng, direction, self.error, distance)

@@ -1,4 +1,4 @@
-//! Materials at a surface: textures looked up, in the order the glTF specification multiplies them.
+//! Evaluates materials at a surface point: factors times textures, as the glTF specification defines.
 
 use super::Material;
 use crate::bsdf::Parameters;
@@ -6,7 +6,7 @@ use crate::geometry::Surface;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, sqr};
 use crate::texture::{Texture, TextureRef};
 
-/// A texture at a surface; white where there is none or its index is past the list.
+/// Looks up a texture at a surface point. White if there is no texture, or if its index is past the list.
 #[inline]
 fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]) -> Vec4 {
     let Some(reference) = texture else { return Vec4::ONE };
@@ -16,26 +16,27 @@ fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]
     }
 }
 
-/// In `[0, 1]`; what is not a number is 0.
+/// Clamps to `[0, 1]`; NaN becomes 0.
 #[inline]
 fn unit(x: f32) -> f32 {
     if x > 0.0 { x.min(1.0) } else { 0.0 }
 }
 
+/// Clamps every channel to `[0, 1]`; NaN becomes 0.
 #[inline]
 pub(super) fn unit_color(c: Rgb) -> Rgb {
     Rgb::new(unit(c.x), unit(c.y), unit(c.z))
 }
 
 impl Material {
-    /// Base colour and alpha: factor, texture and vertex colour multiplied.
+    /// Base colour and alpha: the product of factor, texture and vertex colour.
     #[inline]
     fn base(&self, surface: &Surface, textures: &[Texture]) -> Vec4 {
         Vec4::from_array(self.base_color) * surface.color * look_up(&self.base_color_texture, surface, textures)
     }
 
-    /// What of the scattering model may change without a change of the interface: base colour, share of metal, share of
-    /// the dielectric that transmits. All in `[0, 1]`.
+    /// The parameters of the scattering model that are not part of the interface: base colour, metalness, and transmission
+    /// (share of the dielectric that transmits), all in `[0, 1]`.
     #[inline]
     pub fn base_and_shares(&self, surface: &Surface, textures: &[Texture]) -> (Rgb, f32, f32) {
         let base = unit_color(self.base(surface, textures).truncate());
@@ -49,8 +50,9 @@ impl Material {
         (base, metallic, transmission)
     }
 
-    /// The same without textures, the colour before vertex colours and bounds; `None` where there are any.
-    pub(super) fn plain_shares(&self) -> Option<(Vec4, f32, f32)> {
+    /// [`Material::base_and_shares`] of a material without textures for them, with a base colour that is neither
+    /// multiplied by the vertex colour nor clamped. `None` if there are such textures.
+    pub(super) fn untextured_shares(&self) -> Option<(Vec4, f32, f32)> {
         let (metallic, transmission) = (unit(self.metallic), unit(self.transmission));
         let textured = self.base_color_texture.is_some()
             || (metallic > 0.0 && self.metallic_roughness_texture.is_some())
@@ -58,12 +60,12 @@ impl Material {
         (!textured).then_some((Vec4::from_array(self.base_color), metallic, transmission))
     }
 
-    /// Whether shading frames are those of the interpolated normals.
+    /// Whether shading frames depend only on the interpolated normal: there is neither a normal map nor anisotropy.
     pub(super) fn has_plain_frame(&self) -> bool {
         self.normal_texture.is_none() && self.anisotropy == 0.0
     }
 
-    /// Whether no texture says anything about the interface, so that one serves all surfaces of the material.
+    /// Whether no texture affects the interface, so that all surfaces of the material can share one.
     pub fn has_plain_interface(&self) -> bool {
         let textures = [
             &self.metallic_roughness_texture,
@@ -78,8 +80,8 @@ impl Material {
         textures.iter().all(|texture| texture.is_none())
     }
 
-    /// The parameters of the scattering model; `eta` is the index of refraction behind the surface (its back) over the
-    /// one before it.
+    /// The parameters of the scattering model at a surface point. `eta` is the index of refraction behind the surface over
+    /// the index in front of it.
     #[inline]
     pub fn parameters(&self, surface: &Surface, textures: &[Texture], eta: f32) -> Parameters {
         if self.unlit {
@@ -103,7 +105,7 @@ impl Material {
         let alpha = sqr(roughness);
         (p.alpha_x, p.alpha_y) = (alpha, alpha);
         if self.anisotropy != 0.0 {
-            // KHR_materials_anisotropy: along the direction, alpha is drawn towards 1.
+            // KHR_materials_anisotropy: alpha along the direction is a mix of alpha and 1.
             let texel = look_up(&self.anisotropy_texture, surface, textures);
             p.alpha_x = alpha + (1.0 - alpha) * sqr(unit(self.anisotropy * texel.z));
         }
@@ -128,9 +130,8 @@ impl Material {
         p
     }
 
-    /// The shading frame: z the interpolated normal, turned by the normal map and kept on the side of the geometric
-    /// normal; x along the direction of anisotropy. Where the mesh has no tangents, a normal map has no frame to be
-    /// read in and is ignored.
+    /// The shading frame. Its z axis is the interpolated or mapped normal, which stays on the side of the geometric
+    /// normal. Its x axis is the direction of anisotropy. If the mesh has no tangents, a normal map is ignored.
     #[inline]
     pub fn shading_frame(&self, surface: &Surface, textures: &[Texture]) -> Frame {
         if self.has_plain_frame() {
@@ -144,7 +145,7 @@ impl Material {
             let texel = look_up(&Some(*texture), surface, textures).truncate() * 2.0 - Vec3::ONE;
             let local = Vec3::new(texel.x * scale, texel.y * scale * handedness, texel.z);
             if let Some(n) = frame.to_world(local).try_normalize() {
-                frame = Frame::from_normal_tangent(on_side_of(n, surface.ng), tangent);
+                frame = Frame::from_normal_tangent(move_to_side_of(n, surface.ng), tangent);
             }
         }
         if self.anisotropy != 0.0 {
@@ -160,7 +161,7 @@ impl Material {
         frame
     }
 
-    /// Alpha: of the base colour, its texture and the vertex colour.
+    /// Alpha: the product of the alphas of base colour, texture and vertex colour.
     #[inline]
     pub fn alpha(&self, surface: &Surface, textures: &[Texture]) -> f32 {
         self.base_color[3] * surface.color.w * look_up(&self.base_color_texture, surface, textures).w
@@ -172,7 +173,7 @@ impl Material {
         unit(self.clearcoat) * unit(look_up(&self.clearcoat_texture, surface, textures).x)
     }
 
-    /// Emitted radiance (W/sr/m2) of the front, below its clear coat; unlit materials give their base colour.
+    /// Emitted radiance (W/sr/m2), before the clear coat attenuates it. Unlit materials emit their base colour.
     #[inline]
     pub fn emitted(&self, surface: &Surface, textures: &[Texture]) -> Rgb {
         if self.unlit {
@@ -185,11 +186,11 @@ impl Material {
     }
 }
 
-/// `n` where it is at least a little on the side of `ng`, else moved there.
+/// Moves the mapped normal `n` to the side of the geometric normal `ng`, if it is not there.
 #[inline]
-fn on_side_of(n: Vec3, ng: Vec3) -> Vec3 {
-    /// Least cosine between a mapped normal and the geometric one.
-    const LEAST: f32 = 0.05;
+fn move_to_side_of(n: Vec3, ng: Vec3) -> Vec3 {
+    /// Smallest cosine between a mapped normal and the geometric one.
+    const MIN_COSINE: f32 = 0.05;
     let cos = n.dot(ng);
-    if cos >= LEAST { n } else { (n + ng * (LEAST - cos)).normalize() }
+    if cos >= MIN_COSINE { n } else { (n + ng * (MIN_COSINE - cos)).normalize() }
 }

@@ -7,47 +7,48 @@ use crate::math::Rgb;
 use crate::texture::{Texture, TextureRef};
 use std::sync::Arc;
 
-/// Wider lobes focus no light and show no reflections.
+/// Perceptual roughness from which a lobe is too wide to focus light into caustics or to show reflections.
 pub const MAX_FOCUSING_ROUGHNESS: f32 = 0.45;
 
-/// The scene's materials, and the textures they refer to.
+/// The materials of a scene, and their textures.
 #[derive(Clone, Debug, Default)]
 pub struct Materials {
-    /// Materials; texture indices in them are valid.
+    /// Materials. Their texture indices are valid.
     pub list: Vec<Material>,
-    /// Textures; another scene may share them.
+    /// Textures, which scenes may share.
     pub textures: Arc<[Texture]>,
 }
 
-/// Whether lobes of some roughness have no width.
+/// Whether a lobe of this perceptual roughness is a delta lobe.
 fn is_perfect(roughness: f32) -> bool {
     roughness * roughness < DELTA_ALPHA
 }
 
 impl Material {
-    /// Whether surfaces of this material give light of their own.
+    /// Whether surfaces of this material emit light.
     pub fn emits(&self) -> bool {
         self.unlit || self.emission.max_element() > 0.0
     }
 
-    /// No texel emits more than this, vertex colours aside.
+    /// Upper bound on the emitted radiance over all texels, without vertex colours.
     pub fn brightest_emission(&self) -> Rgb {
         if self.unlit { Rgb::from_slice(&self.base_color[..3]) } else { self.emission }
     }
 
-    /// How alpha acts on each ray that comes by. That of a solid decides once, where a ray enters it: a face that is
-    /// passed on the way in or out alone would leave light in glass that is not there.
+    /// How alpha acts at each hit. The alpha of a solid acts only where a ray enters it ([`Alpha::Opaque`] here): a ray
+    /// that passed only one of its two faces would travel in the wrong medium.
     pub fn alpha_per_hit(&self) -> Alpha {
         if self.has_alpha_per_entry() { Alpha::Opaque } else { self.alpha }
     }
 
-    /// Whether it fills a solid that a ray passes, or not, as a whole. One that gives light is hit or not, face by face.
+    /// Whether a ray passes or enters a solid of this material as a whole, by one decision at the entry. Solids that emit
+    /// light decide at each face instead.
     #[inline]
     pub fn has_alpha_per_entry(&self) -> bool {
         self.alpha != Alpha::Opaque && self.is_solid_glass() && !self.emits()
     }
 
-    /// Probability that a ray that comes by meets the surface: 1 but for cut-outs.
+    /// Probability that a ray hits the surface and does not pass through it because of alpha.
     pub fn coverage(&self, surface: &Surface, textures: &[Texture]) -> f32 {
         match self.alpha {
             Alpha::Opaque => 1.0,
@@ -56,29 +57,30 @@ impl Material {
         }
     }
 
-    /// Whether light may go on behind it.
+    /// Whether light may be transmitted.
     #[inline]
     pub fn transmits(&self) -> bool {
         self.transmission > 0.0
     }
 
-    /// Whether the mesh that wears it bounds a solid that light enters.
+    /// Whether a mesh of this material is the boundary of a solid that light enters.
     pub fn is_solid_glass(&self) -> bool {
         self.transmits() && !self.thin
     }
 
-    /// Whether its base (coatings aside) reflects or bends light into narrow lobes somewhere.
+    /// Whether the base, without coats, may have a narrow lobe.
     fn has_narrow_base(&self) -> bool {
         let width = if self.is_solid_glass() { refraction_width(self.ior) } else { 1.0 };
         self.roughness * width.sqrt() < MAX_FOCUSING_ROUGHNESS || self.metallic_roughness_texture.is_some()
     }
 
-    /// Whether it shows reflections: its base, or a coating, has a narrow lobe.
+    /// Whether the material shows reflections: the base or the clear coat may have a narrow lobe.
     pub fn is_glossy(&self) -> bool {
         self.has_narrow_base() || self.clearcoat > 0.0
     }
 
-    /// Whether its base or a coating may have a lobe without width, and whether one that is narrow and has a width.
+    /// Whether the base or the clear coat may have a delta lobe, and whether one of them may have a narrow lobe that is not
+    /// a delta lobe.
     pub fn perfect_and_sharp(&self) -> (bool, bool) {
         let base = (self.roughness, self.metallic_roughness_texture.is_some());
         let coat = (self.clearcoat_roughness, self.clearcoat_roughness_texture.is_some());
@@ -89,8 +91,8 @@ impl Material {
         (any(&is_perfect), sharp || (self.has_narrow_base() && !is_perfect(self.roughness)))
     }
 
-    /// Whether it is a perfect mirror or clear glass and nothing else, which shows what is behind it and has no light
-    /// of its own to show.
+    /// Whether the material is only a perfect mirror or clear glass, which shows other surfaces but no light that falls on
+    /// itself.
     pub fn is_clear(&self) -> bool {
         let perfect = is_perfect(self.roughness) && self.metallic_roughness_texture.is_none();
         let glass = self.transmission == 1.0 && self.transmission_texture.is_none() && self.metallic == 0.0;
@@ -98,12 +100,12 @@ impl Material {
         perfect && (glass || self.metallic == 1.0) && !covered
     }
 
-    /// Whether it makes caustics that count: mirrors and glass, narrow enough to focus light.
+    /// Whether the material makes visible caustics: a mirror or glass with a narrow lobe.
     pub fn focuses(&self) -> bool {
         self.has_narrow_base() && (self.transmission > 0.0 || self.metallic >= 0.5)
     }
 
-    /// The textures it reads.
+    /// The textures of the material.
     pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
         [
             self.base_color_texture,
@@ -123,14 +125,14 @@ impl Material {
         .flatten()
     }
 
-    /// Whether the index of refraction of the solid it fills depends on the wavelength.
+    /// Whether the material fills a solid whose index of refraction depends on the wavelength.
     #[inline]
     pub fn disperses(&self) -> bool {
         self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.is_solid_glass()
     }
 
-    /// Index of refraction at a wavelength (nm), where it disperses: Cauchy's equation with the Abbe number's lines of
-    /// 486.1, 587.6 and 656.3 nm \[KHR_materials_dispersion\].
+    /// Index of refraction of a dispersive material at a wavelength (nm): Cauchy's equation through the lines of the Abbe
+    /// number, 486.1, 587.6 and 656.3 nm \[KHR_materials_dispersion\].
     #[inline]
     pub fn ior_at(&self, nm: f32) -> f32 {
         let spread = (self.ior - 1.0) * self.dispersion * (1.0 / 20.0);

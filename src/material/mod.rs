@@ -1,4 +1,4 @@
-//! Materials as glTF and its extensions define them: parameters and textures, evaluated at a surface.
+//! Materials as glTF and its extensions define them, and their evaluation at surface points.
 
 mod evaluate;
 mod library;
@@ -12,15 +12,15 @@ use crate::math::Rgb;
 use crate::texture::TextureRef;
 use std::f32::consts::FRAC_PI_2;
 
-/// How alpha acts.
+/// The alpha mode.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Alpha {
-    /// Ignored.
+    /// Alpha is ignored.
     #[default]
     Opaque,
-    /// A hit counts where alpha is at least the cut-off.
+    /// Rays hit the surface where alpha is at least this cut-off.
     Mask(f32),
-    /// A hit counts with probability alpha.
+    /// Rays hit the surface with the probability alpha.
     Blend,
 }
 
@@ -43,70 +43,71 @@ pub struct Material {
     pub normal_texture: Option<(TextureRef, f32)>,
     /// Emitted radiance (W/sr/m2): factor times strength.
     pub emission: Rgb,
-    /// Half angle (rad) of the cone that it emits into, towards whose edge it falls off; a right angle: Lambertian.
+    /// Half angle (rad) of the cone into which the surface emits; emission falls off towards its edge. Pi / 2 means
+    /// Lambertian emission.
     pub spread: f32,
     /// Emission texture (sRGB).
     pub emission_texture: Option<TextureRef>,
     /// Alpha mode.
     pub alpha: Alpha,
-    /// Back faces emit too (and nothing else: scattering always has two sides).
+    /// Whether back faces emit. Scattering always has two sides.
     pub double_sided: bool,
-    /// Cameras look through its back faces; all light meets them.
+    /// Whether camera rays pass through back faces. Other rays hit them.
     pub culled: bool,
-    /// Light passes it as if nothing were there; what it emits it emits all the same.
+    /// Whether all rays pass through the surface. It may still emit.
     pub null_bsdf: bool,
-    /// KHR_materials_unlit: emits its base colour, scatters nothing.
+    /// Whether the surface only emits its base colour and scatters nothing (KHR_materials_unlit).
     pub unlit: bool,
     /// Index of refraction (KHR_materials_ior), at least 1; infinity for the extension's legacy 0.
     pub ior: f32,
-    /// KHR_materials_transmission.
+    /// Transmission (KHR_materials_transmission).
     pub transmission: f32,
     /// Transmission texture, R.
     pub transmission_texture: Option<TextureRef>,
-    /// The mesh is a thin wall (no refraction) rather than the boundary of a solid.
+    /// Whether the mesh is a thin wall without refraction. Else it is the boundary of a solid.
     pub thin: bool,
-    /// What fills the solid: absorption from KHR_materials_volume, or `extras.caustique.medium`.
+    /// Medium that fills the solid: absorption from KHR_materials_volume, or `extras.caustique.medium`.
     pub medium: Option<MediumParameters>,
-    /// Nested dielectrics: where solids overlap, the one of highest priority is there.
+    /// Priority of nested dielectrics: where solids overlap, the one with the highest priority counts.
     pub priority: i32,
-    /// It lies on opaque surfaces, or others on it, without a film of air: paint, a label, a liquid.
+    /// Whether the surface touches opaque surfaces without a film of air: paint, a label, a liquid.
     pub optical_contact: bool,
     /// KHR_materials_specular strength.
     pub specular: f32,
-    /// Its texture, A.
+    /// Texture of the specular strength, A.
     pub specular_texture: Option<TextureRef>,
     /// KHR_materials_specular colour.
     pub specular_color: Rgb,
-    /// Its texture (sRGB).
+    /// Texture of the specular colour (sRGB).
     pub specular_color_texture: Option<TextureRef>,
-    /// KHR_materials_clearcoat.
+    /// Strength of the clear coat (KHR_materials_clearcoat).
     pub clearcoat: f32,
-    /// Its texture, R.
+    /// Texture of the clear coat's strength, R.
     pub clearcoat_texture: Option<TextureRef>,
-    /// Clearcoat roughness.
+    /// Perceptual roughness of the clear coat.
     pub clearcoat_roughness: f32,
-    /// Its texture, G.
+    /// Texture of the clear coat's roughness, G.
     pub clearcoat_roughness_texture: Option<TextureRef>,
-    /// KHR_materials_sheen colour.
+    /// Sheen colour (KHR_materials_sheen).
     pub sheen_color: Rgb,
-    /// Its texture (sRGB).
+    /// Texture of the sheen colour (sRGB).
     pub sheen_color_texture: Option<TextureRef>,
-    /// Sheen roughness.
+    /// Perceptual roughness of the sheen.
     pub sheen_roughness: f32,
-    /// Its texture, A.
+    /// Texture of the sheen's roughness, A.
     pub sheen_roughness_texture: Option<TextureRef>,
-    /// KHR_materials_anisotropy strength.
+    /// Strength of the anisotropy (KHR_materials_anisotropy).
     pub anisotropy: f32,
-    /// Rotation of its direction against the tangent, radians counter-clockwise.
+    /// Rotation of the direction of anisotropy against the tangent (rad, counter-clockwise).
     pub anisotropy_rotation: f32,
-    /// Its texture: direction in RG, strength in B.
+    /// Texture of the anisotropy: direction in RG, strength in B.
     pub anisotropy_texture: Option<TextureRef>,
     /// KHR_materials_dispersion: 20 / Abbe number; 0 is none.
     pub dispersion: f32,
 }
 
 impl Default for Material {
-    /// glTF's default material: white, rough, fully metallic (the specification's own defaults).
+    /// The default material of the glTF specification: white, rough, fully metallic.
     fn default() -> Self {
         Material {
             name: String::new(),

@@ -1,4 +1,4 @@
-//! How the materials of a scene scatter: what of it can be made before the first path.
+//! The scattering of all materials of a scene, prepared as far as possible before the first path.
 
 use super::evaluate::unit_color;
 use super::{Material, Materials};
@@ -8,30 +8,30 @@ use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use bumpalo::Bump;
 use std::sync::{Arc, OnceLock};
 
-/// Energy compensation tables, and what of all materials no texture changes.
+/// Energy compensation tables, and the parts of all materials that do not depend on textures.
 pub struct Scattering {
     tables: Arc<EnergyTables>,
-    of_materials: Vec<Ready>,
+    materials: Vec<PreparedMaterial>,
 }
 
-/// A material as it is at every surface, on its own in memory: a [`Material`] is ten times as large.
-struct Ready {
+/// The part of a material that is the same at all surface points. Stored apart from [`Material`], which is ten times as
+/// large.
+struct PreparedMaterial {
     unlit: bool,
-    /// It has neither a normal map nor a direction.
+    /// Whether there is neither a normal map nor anisotropy.
     plain_frame: bool,
-    /// Base colour before vertex colours, share of metal, share of the dielectric that transmits; `None` where textures
-    /// say.
+    /// Base colour before the vertex colour, metalness and transmission; `None` if they have textures.
     shares: Option<(Vec4, f32, f32)>,
-    /// The interface with the open space and its relative index of refraction; none where textures change it.
+    /// Interface with empty space, and its relative index of refraction; `None` if textures affect the interface.
     open: Option<(f32, Interface<'static>)>,
-    /// The same with the solids around, by falling index: made when a path first meets it, for few pairs of materials
-    /// ever do.
+    /// Interfaces with the solids of the scene, by decreasing relative index. Each is created when a path first needs it,
+    /// because few pairs of materials ever touch.
     nested: Vec<(f32, OnceLock<Box<Interface<'static>>>)>,
 }
 
-impl Ready {
-    /// The interface of relative index `eta`, made by `make` where it is asked for the first time; none where it is not
-    /// to be kept.
+impl PreparedMaterial {
+    /// The cached interface of relative index `eta`, created by `make` at the first call. `None` if interfaces of this
+    /// material or index are not cached.
     #[inline(always)]
     fn interface(&self, eta: f32, make: impl FnOnce() -> Interface<'static>) -> Option<&Interface<'static>> {
         match &self.open {
@@ -44,7 +44,7 @@ impl Ready {
     }
 }
 
-/// The interface of a material whose textures do not change it: the same wherever it is made.
+/// The interface of a material whose textures do not affect it.
 fn plain_interface(material: &Material, eta: f32, tables: &EnergyTables) -> Interface<'static> {
     const ANYWHERE: Surface = Surface {
         p: Vec3::ZERO,
@@ -62,6 +62,7 @@ fn plain_interface(material: &Material, eta: f32, tables: &EnergyTables) -> Inte
     Interface::new(&material.parameters(&ANYWHERE, &[], eta), tables)
 }
 
+/// Sorts indices of refraction and removes duplicates.
 fn distinct(indices: impl Iterator<Item = f32>) -> Vec<f32> {
     let mut indices: Vec<f32> = indices.collect();
     indices.sort_by(f32::total_cmp);
@@ -69,13 +70,13 @@ fn distinct(indices: impl Iterator<Item = f32>) -> Vec<f32> {
     indices
 }
 
-/// Indices of refraction of the solids that may surround surfaces.
+/// Indices of refraction of the solids that may surround a surface.
 fn solids(materials: &[Material]) -> Vec<f32> {
     distinct(materials.iter().filter(|m| m.is_solid_glass() && m.ior.is_finite()).map(|m| m.ior))
 }
 
 impl EnergyTables {
-    /// Tables for all interfaces that surfaces of these materials make with the open space, and with each other's solids.
+    /// Tables for all interfaces of these materials with empty space and with the solids among them.
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
         let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
         let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));
@@ -84,13 +85,13 @@ impl EnergyTables {
 }
 
 impl Scattering {
-    /// For a scene with these materials.
+    /// The scattering of a scene with these materials.
     pub fn new(materials: &[Material]) -> Scattering {
         Scattering::with(Arc::new(EnergyTables::for_materials(materials)), materials)
     }
 
-    /// For the scene with other materials, which have no indices of refraction that the first ones lack: the tables are
-    /// shared.
+    /// The scattering of the scene with other materials, with the same tables. All indices of refraction of the new
+    /// materials must occur among the old ones.
     pub fn for_materials(&self, materials: &[Material]) -> Scattering {
         Scattering::with(Arc::clone(&self.tables), materials)
     }
@@ -101,20 +102,20 @@ impl Scattering {
             let plain = !material.unlit && material.has_plain_interface();
             let open = || (material.ior, plain_interface(material, material.ior, &tables));
             let nested = around.iter().filter(|_| plain).map(|n| (material.ior / n, OnceLock::new()));
-            Ready {
+            PreparedMaterial {
                 unlit: material.unlit,
                 plain_frame: material.has_plain_frame(),
-                shares: material.plain_shares(),
+                shares: material.untextured_shares(),
                 open: plain.then(open),
                 nested: nested.collect(),
             }
         };
-        let of_materials = materials.iter().map(ready).collect();
-        Scattering { tables, of_materials }
+        let materials = materials.iter().map(ready).collect();
+        Scattering { tables, materials }
     }
 
-    /// Scattering at a surface seen along the unit direction `wo`; `eta` is the index of refraction behind the surface
-    /// (its back) over the one before it. An interface that textures change is made in `arena`.
+    /// The scattering at a surface point seen along the unit direction `wo`. `eta` is the index of refraction behind the
+    /// surface over the index in front of it. If textures affect the interface, it is allocated in `arena`.
     #[inline(always)]
     pub fn shading<'a>(
         &'a self,
@@ -124,7 +125,7 @@ impl Scattering {
         wo: Vec3,
         arena: &'a Bump,
     ) -> Shading<'a> {
-        let ready = &self.of_materials[surface.material as usize];
+        let ready = &self.materials[surface.material as usize];
         let bsdf = self.bsdf(ready, materials, surface, eta, arena);
         if ready.plain_frame {
             return Shading::new(Frame::from_normal(surface.ns), surface.ng, bsdf, wo);
@@ -135,7 +136,7 @@ impl Scattering {
     #[inline(always)]
     fn bsdf<'a>(
         &'a self,
-        ready: &'a Ready,
+        ready: &'a PreparedMaterial,
         materials: &Materials,
         surface: &Surface,
         eta: f32,
@@ -159,7 +160,7 @@ impl Scattering {
     }
 }
 
-/// What textures say, out of the way of what needs none.
+/// Evaluation of textured materials. Not inlined, so that the code for untextured ones stays small.
 impl Materials {
     #[inline(never)]
     fn shading_frame(&self, surface: &Surface) -> Frame {

@@ -1,77 +1,78 @@
-//! Equiangular sampling: distances on a ray in proportion to the angle that they take up as seen from a lamp, so that
-//! the inverse square of the distance from it cancels \[Kulla and Fajardo 2012, "Importance sampling techniques for
-//! path tracing in participating media", section 4\].
+//! Equiangular sampling: points on a ray whose density is proportional to the angle that they subtend at a light, which
+//! cancels the inverse squared distance from the light \[Kulla and Fajardo 2012, "Importance sampling techniques for path
+//! tracing in participating media", section 4\].
 
 use crate::math::Vec3;
 
-/// Least distance of a lamp from a ray over that from its origin: where rounding would decide. A density that takes it
-/// to be further away is as right, and only as even as that.
-const LEAST_ASIDE: f32 = 1e-4;
+/// Lower bound on the distance of the light from the ray, relative to its distance from the start of the segment. Below
+/// it rounding errors dominate. The bound does not bias: sampling stays consistent, with a slightly worse density.
+const MIN_RELATIVE_OFFSET: f32 = 1e-4;
 
-/// A lamp at the distance D from the middle of a way of length L is near below this D / L. Of evenly drawn points the
-/// inverse square has a relative variance of about L / (2 pi D) - 1: here 0.3, less than other noise.
-const NEAR: f32 = 0.125;
+/// A light at the distance D from the ray is near a segment of length L if D / L is below this. With uniform distances,
+/// the inverse square has a relative variance of about L / (2 pi D) - 1, here 0.3, which is below other noise.
+const NEAR_RATIO: f32 = 0.125;
 
-/// Light on less than this of the way is worth points of its own, wherever it comes from.
-const SHORT: f32 = 0.5;
+/// A segment that is shorter than this share of the scattering length is worth its own samples.
+const SHORT_RATIO: f32 = 0.5;
 
-/// A part of a ray's way, as a lamp sees it.
+/// Equiangular sampling of a segment of a ray with respect to a point of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equiangular {
-    /// Where on the ray it starts and ends.
-    part: [f32; 2],
-    /// Where on the ray the lamp is nearest, maybe before the start or beyond the end; from the start.
+    /// Distances from the ray's origin to the start and the end of the segment.
+    segment: [f32; 2],
+    /// Signed distance from the start of the segment to the point of the ray that is nearest to the light.
     along: f32,
-    /// How far it is from there.
-    aside: f32,
-    /// Angle that the part takes up.
+    /// Distance of the light from the ray.
+    offset: f32,
+    /// Angle that the segment subtends at the light.
     angle: f32,
 }
 
 impl Equiangular {
-    /// The part of the ray from `origin` along the unit `direction` between two distances, the latter maybe infinite,
-    /// seen from `lamp`. `None` where that is no angle.
+    /// Sampling of the ray from `origin` along the unit `direction` between the two distances in `segment`, of which the
+    /// second may be infinite. `None` if the segment subtends no angle at `light`.
     #[inline]
-    pub fn new(origin: Vec3, direction: Vec3, part: [f32; 2], lamp: Vec3) -> Option<Equiangular> {
-        let to = lamp - (origin + direction * part[0]);
-        let distance = part[1] - part[0];
+    pub fn new(origin: Vec3, direction: Vec3, segment: [f32; 2], light: Vec3) -> Option<Equiangular> {
+        let to = light - (origin + direction * segment[0]);
+        let distance = segment[1] - segment[0];
         let along = to.dot(direction);
-        let aside = (to - direction * along).length().max(LEAST_ASIDE * to.length());
-        // Of the directions to both ends, sine over cosine: a difference of angles would lose the digits of small ones.
-        let angle = aside.atan2(aside * aside / distance - along * (1.0 - along / distance));
-        (aside > 0.0 && angle > 0.0).then_some(Equiangular { part, along, aside, angle })
+        let offset = (to - direction * along).length().max(MIN_RELATIVE_OFFSET * to.length());
+        // The angle between the directions to both ends, from its sine and cosine: a difference of two angles would lose
+        // the digits of small ones.
+        let angle = offset.atan2(offset * offset / distance - along * (1.0 - along / distance));
+        (offset > 0.0 && angle > 0.0).then_some(Equiangular { segment, along, offset, angle })
     }
 
-    /// Whether the lamp is so near that its inverse square varies far more than the light scattered over the next
-    /// `length` would.
+    /// Whether the light is so near that its inverse squared distance varies far more than the light scattered over the
+    /// distance `length`.
     #[inline]
     pub fn is_near(&self, length: f32) -> bool {
-        self.aside < NEAR * length
+        self.offset < NEAR_RATIO * length
     }
 
-    /// Whether it is so short that points on all of the next `length` would seldom be on it.
+    /// Whether the segment is so short that samples of the whole distance `length` would rarely be on it.
     #[inline]
     pub fn is_short(&self, length: f32) -> bool {
-        self.part[1] - self.part[0] < SHORT * length
+        self.segment[1] - self.segment[0] < SHORT_RATIO * length
     }
 
-    /// The distance that `u` draws.
+    /// Samples a distance from the ray's origin.
     #[inline]
     pub fn sample(&self, u: f32) -> f32 {
         let (sin, cos) = (u * self.angle).sin_cos();
-        let from = (self.aside * self.aside + self.along * self.along) * sin / (self.aside * cos + self.along * sin);
-        (self.part[0] + from).min(self.part[1])
+        let from = (self.offset * self.offset + self.along * self.along) * sin / (self.offset * cos + self.along * sin);
+        (self.segment[0] + from).min(self.segment[1])
     }
 
-    /// Density per length of drawing `distance`: equation (6) there.
+    /// Density per length with which [`Equiangular::sample`] draws `distance` \[equation (6)\].
     #[inline]
     pub fn pdf(&self, distance: f32) -> f32 {
-        let [start, end] = self.part;
+        let [start, end] = self.segment;
         if !(start..=end).contains(&distance) {
             return 0.0;
         }
         let from = distance - start - self.along;
-        self.aside / (self.angle * (self.aside * self.aside + from * from))
+        self.offset / (self.angle * (self.offset * self.offset + from * from))
     }
 }
 
@@ -79,39 +80,42 @@ impl Equiangular {
 mod tests {
     use super::*;
 
-    /// A part of a ray is the whole of another, which starts where the part does; outside of it nothing is drawn.
+    /// Sampling of a segment that starts at distance 2 agrees with sampling of a ray that starts there. The density is
+    /// zero outside of the segment.
     #[test]
-    fn parts_are_rays_of_their_own() {
-        let (lamp, part) = (Vec3::new(3.0, 0.5, 1.0), [2.0, 7.0]);
-        let seen = Equiangular::new(Vec3::ZERO, Vec3::X, part, lamp).expect("an angle");
-        let other = Equiangular::new(Vec3::X * 2.0, Vec3::X, [0.0, 5.0], lamp).expect("an angle");
+    fn a_segment_is_sampled_like_a_ray_that_starts_there() {
+        let (light, segment) = (Vec3::new(3.0, 0.5, 1.0), [2.0, 7.0]);
+        let sampling = Equiangular::new(Vec3::ZERO, Vec3::X, segment, light).expect("an angle");
+        let other = Equiangular::new(Vec3::X * 2.0, Vec3::X, [0.0, 5.0], light).expect("an angle");
         for k in 0..=100 {
             let (u, t) = (k as f32 / 100.0, k as f32 / 10.0);
-            assert!((seen.sample(u) - 2.0 - other.sample(u)).abs() < 1e-5);
-            let inside = (part[0]..=part[1]).contains(&t);
-            assert!((seen.pdf(t) - if inside { other.pdf(t - 2.0) } else { 0.0 }).abs() < 1e-6, "{t}");
+            assert!((sampling.sample(u) - 2.0 - other.sample(u)).abs() < 1e-5);
+            let inside = (segment[0]..=segment[1]).contains(&t);
+            assert!((sampling.pdf(t) - if inside { other.pdf(t - 2.0) } else { 0.0 }).abs() < 1e-6, "{t}");
         }
-        assert!(seen.is_short(10.1) && !seen.is_short(9.9));
+        assert!(sampling.is_short(10.1) && !sampling.is_short(9.9));
     }
 
-    /// Near and far lamps, beside the way, before and beyond it, ways without end: what is drawn is distributed as the
-    /// density says, by its closed form at quantiles of u, and lies on the way.
+    /// Samples are on the segment, and at quantiles of `u` they agree with the closed form of the cumulative
+    /// distribution, whose slope is the density. For near and far lights, beside, before and beyond the segment, and for
+    /// infinite segments.
     #[test]
     fn samples_follow_the_density() {
-        for lamp in [Vec3::new(1.0, 0.5, 0.0), Vec3::new(-20.0, 0.01, 0.0), Vec3::new(300.0, 1.0, 2.0), Vec3::X * 0.3] {
+        for light in [Vec3::new(1.0, 0.5, 0.0), Vec3::new(-20.0, 0.01, 0.0), Vec3::new(300.0, 1.0, 2.0), Vec3::X * 0.3]
+        {
             for distance in [1e-3f32, 2.0, 500.0, f32::INFINITY] {
-                let seen = Equiangular::new(Vec3::ZERO, Vec3::X, [0.0, distance], lamp).expect("an angle");
-                let (d, a) = (f64::from(seen.aside), f64::from(seen.along));
-                let below = |t: f64| (((t - a) / d).atan() - (-a / d).atan()) / f64::from(seen.angle);
-                assert!((below(f64::from(distance)) - 1.0).abs() < 1e-4, "{lamp}, {distance}");
+                let sampling = Equiangular::new(Vec3::ZERO, Vec3::X, [0.0, distance], light).expect("an angle");
+                let (d, a) = (f64::from(sampling.offset), f64::from(sampling.along));
+                let below = |t: f64| (((t - a) / d).atan() - (-a / d).atan()) / f64::from(sampling.angle);
+                assert!((below(f64::from(distance)) - 1.0).abs() < 1e-4, "{light}, {distance}");
                 for k in 1..200 {
                     let u = k as f32 / 200.0;
-                    let t = seen.sample(u);
-                    assert!(t > 0.0 && t <= distance * 1.0001, "{lamp}, {distance}: {t}");
-                    assert!((below(f64::from(t)) - f64::from(u)).abs() < 1e-3, "{lamp}, {distance}: {t} for {u}");
+                    let t = sampling.sample(u);
+                    assert!(t > 0.0 && t <= distance * 1.0001, "{light}, {distance}: {t}");
+                    assert!((below(f64::from(t)) - f64::from(u)).abs() < 1e-3, "{light}, {distance}: {t} for {u}");
                     let step = 1e-3 * (f64::from(t) - a).abs().max(d);
                     let slope = (below(f64::from(t) + step) - below(f64::from(t) - step)) / (2.0 * step);
-                    assert!((f64::from(seen.pdf(t)) / slope - 1.0).abs() < 1e-3, "{lamp}, {distance}: {t}");
+                    assert!((f64::from(sampling.pdf(t)) / slope - 1.0).abs() < 1e-3, "{light}, {distance}: {t}");
                 }
             }
         }

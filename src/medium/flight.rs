@@ -1,49 +1,46 @@
-//! Free flight: where on a ray a medium scatters, drawn with all three channels in mind.
+//! Free-flight sampling in media with three colour channels.
 //!
-//! One channel is drawn and its distance of flight sampled; the density is that of the mixture over the channels, so
-//! every channel has a share in every sample \[single-sample MIS with the balance heuristic, Veach 1997, 9.2.4;
-//! "spectral MIS"\]. Channels are drawn in proportion to what they have to lose: then no weight makes the sum over
-//! channels of a path's throughput grow, however often and however differently they scatter, and none can be starved,
-//! for a sample's density is at least the channel's own.
+//! One channel is drawn, and a distance is sampled from its extinction coefficient. The density of the sample is the
+//! mixture over all channels \[single-sample MIS with the balance heuristic, Veach 1997, 9.2.4; "spectral MIS"\]. Channels
+//! are drawn in proportion to their throughput. So the sum over channels of a path's throughput never grows, and no channel
+//! gets a large weight.
 //!
-//! MIS between whole paths must know the densities of paths it has not walked, and cannot ask for the throughput they
-//! would have had. It takes the even mixture of the channels in its place ([`FlightDensity`]): the weights still sum to one,
-//! which is all that they must.
+//! MIS weights of connected paths need the densities of paths that were not traced, whose throughput is unknown. They use
+//! the mixture with equal probabilities of the channels ([`FlightDensity`]) instead. The weights still sum to one.
 
 use super::{Equiangular, MediumParameters};
 use crate::math::{Rgb, Vec2, is_lit};
 
-/// A point on a ray at which a medium scatters.
+/// A sampled collision of a ray with a medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
-    /// Distance from the origin.
+    /// Distance from the origin of the ray.
     pub distance: f32,
-    /// Transmittance up to there, over the density per length of the point.
+    /// Transmittance up to the collision, over its density per length.
     pub weight: Rgb,
 }
 
-/// How a ray fares in a medium.
+/// The outcome of free-flight sampling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FlightOutcome {
-    /// It gets to the end, and what it carries is multiplied by this: transmittance over the probability of getting
-    /// there.
+    /// The ray reaches its end. The weight is the transmittance over the probability of this outcome.
     Passed(Rgb),
-    /// It collides.
+    /// The ray collides with the medium.
     Collided(Collision),
 }
 
-/// Least and strictly positive uniform number: no flight has length zero.
+/// Added to uniform numbers, which are multiples of 2^-24, so that no distance is zero.
 const HALF_STEP: f32 = 0.5 / 16_777_216.0;
 
 impl MediumParameters {
-    /// Draws how a ray of `throughput` fares on the next `distance` (maybe infinite). `u` is uniform on the unit
-    /// square.
+    /// Samples the free flight of a ray with `throughput` over at most `distance`, which may be infinite. `u` is uniform
+    /// on the unit square.
     #[inline]
     pub fn sample_flight(&self, throughput: Rgb, distance: f32, u: Vec2) -> FlightOutcome {
         let sigma = self.sigma_t();
         let share = shares(throughput);
-        let drawn = pick(sigma, share, u.x);
-        let t = if drawn > 0.0 { -(1.0 - (u.y + HALF_STEP)).ln() / drawn } else { f32::INFINITY };
+        let sampled = sample_channel(sigma, share, u.x);
+        let t = if sampled > 0.0 { -(1.0 - (u.y + HALF_STEP)).ln() / sampled } else { f32::INFINITY };
         if t < distance {
             let left = self.transmittance(t);
             FlightOutcome::Collided(Collision { distance: t, weight: left / (share * sigma * left).element_sum() })
@@ -53,48 +50,48 @@ impl MediumParameters {
         }
     }
 
-    /// The points of the next `distance` (maybe infinite) at which a ray of `throughput` is scattered, as if it had to
-    /// be. `None` where nothing is scattered.
+    /// The distribution of scattering points of a ray with `throughput` over `distance`, which may be infinite, given that
+    /// it scatters. `None` if the ray cannot scatter.
     #[inline]
     pub fn collision_distribution(&self, throughput: Rgb, distance: f32) -> Option<CollisionDistribution<'_>> {
         let sigma = self.sigma_t();
-        // Share of each channel that is scattered on the way; -expm1 keeps thin media exact.
-        let lost = -(-sigma * distance).map(exp_m1);
-        let lost = Rgb::select(sigma.cmpgt(Rgb::ZERO), lost, Rgb::ZERO);
+        // Probability of a collision per channel; -expm1 keeps thin media exact.
+        let collided = -(-sigma * distance).map(exp_m1);
+        let collided = Rgb::select(sigma.cmpgt(Rgb::ZERO), collided, Rgb::ZERO);
         let albedo = Rgb::select(sigma.cmpgt(Rgb::ZERO), self.sigma_s / sigma, Rgb::ZERO);
-        let scattered = throughput * albedo * lost;
-        is_lit(scattered).then(|| CollisionDistribution { medium: self, distance, lost, share: shares(scattered) })
+        let scattered = throughput * albedo * collided;
+        is_lit(scattered).then(|| CollisionDistribution { medium: self, distance, collided, share: shares(scattered) })
     }
 }
 
-/// Points of a ray at which a medium scatters it, distributed as the light is that is scattered there.
+/// The distribution of scattering points on a ray, with channels in proportion to the light that they scatter.
 #[derive(Clone, Copy, Debug)]
 pub struct CollisionDistribution<'m> {
     medium: &'m MediumParameters,
-    /// Length of the way.
+    /// Length of the ray.
     distance: f32,
-    /// Share of each channel that is taken on the way.
-    lost: Rgb,
+    /// Probability of a collision on the whole ray, per channel: one minus the transmittance.
+    collided: Rgb,
     /// Probabilities of the channels.
     share: Rgb,
 }
 
 impl CollisionDistribution<'_> {
-    /// Draws one.
+    /// Samples a scattering point; `u` is uniform on the unit square.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<Collision> {
-        let drawn = pick(self.medium.sigma_t(), self.share, u.x);
-        let within = pick(self.lost, self.share, u.x);
-        let t = -(-(u.y + HALF_STEP) * within).ln_1p() / drawn;
+        let sigma_t = sample_channel(self.medium.sigma_t(), self.share, u.x);
+        let collided = sample_channel(self.collided, self.share, u.x);
+        let t = -(-(u.y + HALF_STEP) * collided).ln_1p() / sigma_t;
         let t = t.min(self.distance);
         self.at(t, self.pdf(t))
     }
 
-    /// Draws one by the angle as seen from a lamp.
+    /// Samples a scattering point equiangularly with respect to a light.
     #[inline]
-    pub fn sample_equiangular(&self, lamp: &Equiangular, u: f32) -> Option<Collision> {
-        let t = lamp.sample(u + HALF_STEP).min(self.distance);
-        self.at(t, lamp.pdf(t))
+    pub fn sample_equiangular(&self, light: &Equiangular, u: f32) -> Option<Collision> {
+        let t = light.sample(u + HALF_STEP).min(self.distance);
+        self.at(t, light.pdf(t))
     }
 
     #[inline]
@@ -106,10 +103,10 @@ impl CollisionDistribution<'_> {
     /// Density per length with which [`CollisionDistribution::sample`] draws `distance`.
     #[inline]
     pub fn pdf(&self, distance: f32) -> f32 {
-        // Densities of the channels, each cut off at the end of the ray.
+        // Exponential densities of the channels, normalized on the length of the ray.
         let left = self.medium.transmittance(distance);
-        let density = self.medium.sigma_t() * left / self.lost;
-        let density = Rgb::select(self.lost.cmpgt(Rgb::ZERO), density, Rgb::ZERO);
+        let density = self.medium.sigma_t() * left / self.collided;
+        let density = Rgb::select(self.collided.cmpgt(Rgb::ZERO), density, Rgb::ZERO);
         (self.share * density).element_sum()
     }
 }
@@ -118,17 +115,17 @@ fn exp_m1(x: f32) -> f32 {
     x.exp_m1()
 }
 
-/// Probabilities of the channels in proportion to `of`; even where there is nothing to go by.
+/// Probabilities of the channels in proportion to `of`; equal if `of` is zero or not finite.
 #[inline]
 fn shares(of: Rgb) -> Rgb {
     let sum = of.element_sum();
     if sum > 0.0 && sum.is_finite() { of / sum } else { Rgb::splat(1.0 / 3.0) }
 }
 
-/// The channel's entry in `of` that `u` draws.
+/// The entry in `of` of the channel that `u` draws with the probabilities `share`.
 #[inline]
-fn pick(of: Rgb, share: Rgb, u: f32) -> f32 {
-    // The last channel that can be drawn takes what rounding leaves.
+fn sample_channel(of: Rgb, share: Rgb, u: f32) -> f32 {
+    // If rounding leaves a rest, the last channel with a probability above zero takes it.
     if u < share.x || share.y + share.z <= 0.0 {
         of.x
     } else if u < share.x + share.y || share.z <= 0.0 {
@@ -138,22 +135,22 @@ fn pick(of: Rgb, share: Rgb, u: f32) -> f32 {
     }
 }
 
-/// Densities of flight along one segment, both ways, with the even mixture of the channels: per length where the end it
-/// flies to lies in a scattering medium, else the probability of getting there.
+/// Free-flight densities of a path segment in both directions, with equal probabilities of the channels. A density is per
+/// length if the segment ends at a vertex of a scattering medium in that direction. Else it is the probability of passing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlightDensity {
-    /// From the start to the end.
+    /// Density from the start to the end.
     pub forward: f32,
-    /// From the end to the start.
+    /// Density from the end to the start.
     pub reverse: f32,
 }
 
 impl FlightDensity {
-    /// Nothing on the way scatters.
+    /// The densities of a segment without scattering media.
     pub const ONE: FlightDensity = FlightDensity { forward: 1.0, reverse: 1.0 };
 
-    /// Goes on through `distance` of `medium`. `starts`, `ends`: the segment starts or ends in here, at a vertex of the
-    /// medium.
+    /// The densities of the segment extended by `distance` in `medium`. `starts` and `ends`: the start or end of the
+    /// segment is a vertex of this medium.
     #[must_use]
     #[inline]
     pub fn through(self, medium: &MediumParameters, distance: f32, starts: bool, ends: bool) -> FlightDensity {
@@ -182,22 +179,22 @@ mod tests {
         let medium = |a: [f32; 3], s: [f32; 3]| MediumParameters { sigma_a: a.into(), sigma_s: s.into(), g: 0.0 };
         [
             medium([0.1; 3], [0.9; 3]),
-            // One channel flies freely, one is opaque.
+            // Three very different channels, one of them without scattering.
             medium([0.0, 0.0, 30.0], [0.3, 0.0, 10.0]),
             medium([0.5, 1e-3, 0.0], [4.0, 0.0, 1e-3]),
         ]
     }
 
-    /// Means over draws of both outcomes of a flight against their closed forms, per channel: passing gives the
-    /// transmittance, colliding (with `f(t) = t`, so that distances count) the integral of `t T(t)`, however points are
-    /// drawn, when both ways share it, and when one of them draws on a part of the ray only. Returns the largest
-    /// deviation in standard errors.
+    /// Compares means over draws with their closed forms, per channel. The weight of passing has the mean T(distance), and
+    /// a collision at t, weighted with t, has the mean `integral t T(t) dt`. The latter must hold for free flight, for
+    /// `CollisionDistribution::sample`, for equiangular sampling, and for MIS of the last two, also if the equiangular
+    /// samples cover only a part of the ray. Returns the largest deviation in standard errors.
     fn flight_error(bug: impl Fn(Collision, Rgb) -> Rgb) -> f64 {
         let mut worst = 0.0f64;
-        let lamp = Vec3::new(0.1, 0.4, 0.0);
+        let light = Vec3::new(0.1, 0.4, 0.0);
         for (at, medium) in media().into_iter().enumerate() {
             for (distance, throughput) in [(0.7f32, Rgb::ONE), (2.0, Rgb::new(1.0, 5.0, 0.2))] {
-                // By channel, and by kind of value: the sum, and that of squares.
+                // Sums of values and of squares, by channel and kind of value.
                 let mut sums = [[[0.0f64; 2]; 6]; 3];
                 for i in 0..DRAWS {
                     let draws = Stream::new(31, at as u64, Domain::Test, i).vertex(0);
@@ -212,19 +209,19 @@ mod tests {
                     let Some(collisions) = medium.collision_distribution(throughput, distance) else {
                         panic!("it scatters")
                     };
-                    let seen = |part| Equiangular::new(Vec3::ZERO, Vec3::X, part, lamp).expect("an angle");
-                    let ways = [seen([0.0, distance]), seen([0.3 * distance, 0.5 * distance])];
-                    let share = |lamp: &Equiangular, pdf: f32, at: f32| pdf / (collisions.pdf(at) + lamp.pdf(at));
+                    let angles = |segment| Equiangular::new(Vec3::ZERO, Vec3::X, segment, light).expect("an angle");
+                    let samplings = [angles([0.0, distance]), angles([0.3 * distance, 0.5 * distance])];
+                    let share = |other: &Equiangular, pdf: f32, at: f32| pdf / (collisions.pdf(at) + other.pdf(at));
                     if let Some(hit) = collisions.sample(draws.two(Purpose::Phase)) {
                         values[2] = bug(hit, medium.sigma_t()) * hit.distance;
-                        for (lamp, shared) in ways.iter().zip([4, 5]) {
-                            values[shared] += values[2] * share(lamp, collisions.pdf(hit.distance), hit.distance);
+                        for (angles, shared) in samplings.iter().zip([4, 5]) {
+                            values[shared] += values[2] * share(angles, collisions.pdf(hit.distance), hit.distance);
                         }
                     }
-                    for (lamp, shared) in ways.iter().zip([4, 5]) {
-                        if let Some(hit) = collisions.sample_equiangular(lamp, draws.one(Purpose::Equiangular)) {
+                    for (angles, shared) in samplings.iter().zip([4, 5]) {
+                        if let Some(hit) = collisions.sample_equiangular(angles, draws.one(Purpose::Equiangular)) {
                             let value = bug(hit, medium.sigma_t()) * hit.distance;
-                            values[shared] += value * share(lamp, lamp.pdf(hit.distance), hit.distance);
+                            values[shared] += value * share(angles, angles.pdf(hit.distance), hit.distance);
                             if shared == 4 {
                                 values[3] = value;
                             }
@@ -246,7 +243,7 @@ mod tests {
                     for (kind, (expected, sum)) in
                         [left, integral, integral, integral, integral, integral].into_iter().zip(sums).enumerate()
                     {
-                        // A channel that is not scattered need not be drawn: its weight is multiplied by zero.
+                        // The weight of a channel without scattering is multiplied by zero, so it need not be drawn.
                         if kind > 0 && !scatters {
                             continue;
                         }
@@ -261,7 +258,7 @@ mod tests {
         worst
     }
 
-    /// 5 sigma over 96 checks: false alarms below 6e-5. A density of the drawn channel alone is found.
+    /// All deviations are below 5 sigma (96 checks, false alarms below 6e-5). A wrong density is detected.
     #[test]
     fn flights_are_unbiased_in_every_channel() {
         let right = flight_error(|hit, _| hit.weight);
@@ -270,9 +267,10 @@ mod tests {
         assert!(wrong > 5.0, "{wrong}");
     }
 
-    /// However long a path and however different its channels, flights do not make the sum of its throughput grow.
+    /// Free flights do not increase the sum of the throughput over channels, even on long paths with very different
+    /// channels.
     #[test]
-    fn no_channel_runs_away() {
+    fn throughput_does_not_grow() {
         let medium = MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::new(0.5, 2.0, 8.0), g: 0.0 };
         for i in 0..200 {
             let mut throughput = Rgb::ONE;
@@ -293,7 +291,7 @@ mod tests {
         let whole = FlightDensity::ONE.through(&medium, 1.5, false, true);
         let parts = FlightDensity::ONE.through(&medium, 0.5, false, false).through(&medium, 1.0, false, true);
         assert!((whole.forward / parts.forward - 1.0).abs() < 1e-5);
-        // Grey: T to a surface, sigma T to a vertex of the medium.
+        // In a grey medium with sigma = 1, the density is T towards a surface and sigma T = T towards a medium vertex.
         assert!((whole.reverse - (-1.5f32).exp()).abs() < 1e-6 && (whole.forward - whole.reverse).abs() < 1e-6);
         let clear = MediumParameters { sigma_a: Rgb::ONE, ..MediumParameters::default() };
         assert_eq!(FlightDensity::ONE.through(&clear, 2.0, false, false), FlightDensity::ONE);

@@ -1,4 +1,4 @@
-//! Homogeneous participating media: how far light flies in them, and where it goes when they scatter it.
+//! Homogeneous participating media: free-flight sampling, equiangular sampling, and the phase function.
 
 mod equiangular;
 mod flight;
@@ -10,37 +10,37 @@ pub use phase::HenyeyGreenstein;
 
 use crate::math::Rgb;
 
-/// A homogeneous medium (1/m).
+/// The parameters of a homogeneous medium.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct MediumParameters {
-    /// Absorption coefficient.
+    /// Absorption coefficient (1/m).
     pub sigma_a: Rgb,
-    /// Scattering coefficient.
+    /// Scattering coefficient (1/m).
     pub sigma_s: Rgb,
     /// Henyey-Greenstein asymmetry, in (-1, 1).
     pub g: f32,
 }
 
 impl MediumParameters {
-    /// Extinction coefficient: what absorption and scattering together take from a ray.
+    /// Extinction coefficient (1/m): the sum of absorption and scattering.
     #[inline]
     pub fn sigma_t(&self) -> Rgb {
         self.sigma_a + self.sigma_s
     }
 
-    /// Whether it scatters any light.
+    /// Whether the medium scatters light in any channel.
     #[inline]
     pub fn scatters(&self) -> bool {
         self.sigma_s.max_element() > 0.0
     }
 
-    /// Where it scatters light to.
+    /// The phase function.
     #[inline]
     pub fn phase(&self) -> HenyeyGreenstein {
         HenyeyGreenstein { g: self.g }
     }
 
-    /// Share of light that is left after `distance` \[Beer-Lambert\]; an infinite way through anything leaves nothing.
+    /// Transmittance over `distance` \[Beer-Lambert\], which may be infinite.
     #[inline]
     pub fn transmittance(&self, distance: f32) -> Rgb {
         let through = |sigma: f32| if sigma > 0.0 { (-sigma * distance).exp() } else { 1.0 };

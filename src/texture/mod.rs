@@ -3,51 +3,52 @@
 use crate::math::{DVec4, Vec2, Vec4};
 use std::sync::{Arc, LazyLock};
 
-/// How a coordinate outside `[0, 1)` is folded back.
+/// Treatment of texture coordinates outside `[0, 1)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Wrap {
-    /// Repeat.
+    /// Repeats the image.
     #[default]
     Repeat,
-    /// Repeat, every second tile mirrored.
+    /// Repeats the image and mirrors every second copy.
     Mirror,
-    /// Clamp to the edge.
+    /// Extends the edge texels.
     Clamp,
 }
 
 /// Texels of an image, top row first.
 #[derive(Clone, Debug)]
 pub enum Texels {
-    /// Integers as their file has them, which textures of one image share.
+    /// The integers of the image file. Textures of one image share them.
     Integers {
-        /// `width * height * channels` of them.
+        /// `width * height * channels` integers.
         data: Arc<Integers>,
         /// 1: grey, 2: grey and alpha, 3: RGB, 4: RGBA.
         channels: u8,
-        /// What they stand for.
+        /// Meaning of the integers.
         encoding: Encoding,
     },
     /// Linear RGBA floats.
     Floats(Vec<[f32; 4]>),
 }
 
-/// Channels of texels.
+/// Integer channels of texels.
 #[derive(Clone, Debug)]
 pub enum Integers {
-    /// 8 bits a channel.
+    /// 8 bits per channel.
     Bytes(Vec<u8>),
-    /// 16 bits a channel.
+    /// 16 bits per channel.
     Words(Vec<u16>),
 }
 
-/// What integers of texels stand for.
+/// Meaning of the integers of a texel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Encoding {
-    /// Numbers from 0 to 1.
+    /// The largest integer means 1, and values are linear.
     Linear,
-    /// Colours encoded by sRGB; alpha is linear.
+    /// sRGB-encoded colours and linear alpha.
     Srgb,
-    /// Glossiness in the alpha channel, 8 bits of it, times a factor: G becomes the roughness, R 0, B and A 1.
+    /// Glossiness in alpha (8 bits), multiplied by this factor. A lookup returns 1 - glossiness in G, 0 in R, and 1 in B
+    /// and A.
     Glossiness(f32),
 }
 
@@ -64,11 +65,11 @@ pub struct Texture {
     pub texels: Texels,
     /// Wrap modes along u and v.
     pub wrap: [Wrap; 2],
-    /// Bilinear filtering; otherwise the nearest texel.
+    /// Whether lookups filter bilinearly. If not, they take the nearest texel.
     pub linear: bool,
 }
 
-/// A use of a texture: which image, which UV set, and KHR_texture_transform.
+/// A reference to a texture, with its UV set and KHR_texture_transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index into the scene's textures.
@@ -80,7 +81,7 @@ pub struct TextureRef {
 }
 
 impl TextureRef {
-    /// The transformed coordinates.
+    /// The transformed texture coordinates; `uv` has the coordinates of both sets.
     #[inline]
     pub fn coordinates(&self, uv: [Vec2; 2]) -> Vec2 {
         let p = uv[usize::from(self.set & 1)];
@@ -89,7 +90,7 @@ impl TextureRef {
     }
 }
 
-/// Linear values of the 256 bytes of sRGB (IEC 61966-2-1).
+/// Linear values of 8-bit sRGB values (IEC 61966-2-1).
 static SRGB_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|i| {
         let c = i as f64 / 255.0;
@@ -97,7 +98,7 @@ static SRGB_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| {
     })
 });
 
-/// Linear values of the 65,536 words of sRGB, in images of colours and of greys.
+/// Linear values of 16-bit sRGB values, in colour images and in grey images.
 static SRGB_WORDS: LazyLock<[Box<[f32]>; 2]> = LazyLock::new(|| {
     let linear = |i: u16, grey: bool| {
         let c = unit_word(i, grey);
@@ -106,13 +107,13 @@ static SRGB_WORDS: LazyLock<[Box<[f32]>; 2]> = LazyLock::new(|| {
     [false, true].map(|grey| (0..=u16::MAX).map(|i| linear(i, grey)).collect())
 });
 
-/// A word from 0 to 1; greys are rounded twice, as the `image` crate converts them.
+/// Converts a 16-bit value to `[0, 1]`. Values of grey images are rounded twice, as in the `image` crate.
 #[inline]
 fn unit_word(word: u16, grey: bool) -> f32 {
     if grey { f32::from(word) * (1.0 / 65535.0) } else { f32::from(word) / 65535.0 }
 }
 
-/// A texel's channels as RGBA.
+/// RGBA of a texel of 1 to 4 channels. `opaque` is the alpha of texels without one.
 #[inline]
 fn rgba<T: Copy>(texel: &[T], opaque: T) -> [T; 4] {
     match *texel {
@@ -125,7 +126,7 @@ fn rgba<T: Copy>(texel: &[T], opaque: T) -> [T; 4] {
 }
 
 impl Integers {
-    /// Linear RGBA of the texel at an index.
+    /// Linear RGBA of the texel at a row-major index.
     #[inline]
     fn decode(&self, index: usize, channels: u8, encoding: Encoding) -> Vec4 {
         let range = index * usize::from(channels)..(index + 1) * usize::from(channels);
@@ -152,12 +153,13 @@ impl Integers {
     }
 }
 
+/// The texel of [`Encoding::Glossiness`].
 fn roughness(gloss: u8, factor: f32) -> Vec4 {
     Vec4::new(0.0, (255.0 - factor * f32::from(gloss)) / 255.0, 1.0, 1.0)
 }
 
 impl Texels {
-    /// Linear RGBA of the texel at an index.
+    /// Linear RGBA of the texel at a row-major index.
     #[inline]
     pub fn at(&self, index: usize) -> Vec4 {
         match self {
@@ -168,6 +170,7 @@ impl Texels {
 }
 
 impl Wrap {
+    /// The texel index in `0..size` for an index outside of the image.
     #[inline]
     fn fold(self, i: i64, size: i64) -> usize {
         (match self {
@@ -182,7 +185,7 @@ impl Wrap {
 }
 
 impl Texture {
-    /// Whether some texel's alpha is below 1.
+    /// Whether any texel has an alpha below 1.
     pub fn has_alpha(&self) -> bool {
         (0..self.width as usize * self.height as usize).any(|index| self.texels.at(index).w < 1.0)
     }
@@ -202,8 +205,8 @@ impl Texture {
         (sum / (width * height) as f64).as_vec4()
     }
 
-    /// Linear RGBA at (u, v); v runs downwards from the top row, as in glTF. Coordinates that are not finite read texel
-    /// 0.
+    /// Linear RGBA at (u, v), where v = 0 is the top row, as in glTF. Coordinates that are not finite return the first
+    /// texel.
     #[inline]
     pub fn sample(&self, uv: Vec2) -> Vec4 {
         if !uv.is_finite() {

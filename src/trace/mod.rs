@@ -1,4 +1,4 @@
-//! Rays and what they hit: the scene's geometry committed to Embree.
+//! Ray tracing: the scene's geometry in Embree.
 
 mod tracer;
 

@@ -1,4 +1,4 @@
-//! The scene's triangles in Embree, addressed by our own indices.
+//! The scene's triangles in Embree, addressed by the indices of [`Shapes`].
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::Shapes;
@@ -7,21 +7,21 @@ use caustique_embree as embree;
 use embree::GeometryId;
 use std::sync::Arc;
 
-/// A segment to be traced: points `origin + t direction`, `0 <= t <= tmax`.
+/// A segment to trace: the points `origin + t direction` for `0 <= t <= tmax`.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// Where t = 0; already moved off the surface it leaves.
+    /// Point at t = 0, already moved off the surface that the ray leaves.
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
     /// Largest t; may be infinite.
     pub tmax: f32,
-    /// Random bits that decide about alpha cut-outs along this ray, and in scenes that hide something from cameras
-    /// whether this is a camera's ([`CAMERA_RAY_BIT`]).
+    /// Random bits for the alpha cut-outs along this ray. In scenes with objects that are hidden from cameras,
+    /// [`CAMERA_RAY_BIT`] is set in camera rays and cleared in others.
     pub token: u32,
 }
 
-/// The bit of a token by which a camera's own rays, and rays to its lens, pass what is hidden from cameras.
+/// Bit of [`Ray::token`] that marks rays from or to the camera. They pass objects that are hidden from cameras.
 pub const CAMERA_RAY_BIT: u32 = 1;
 
 /// The nearest triangle along a ray.
@@ -29,7 +29,7 @@ pub const CAMERA_RAY_BIT: u32 = 1;
 pub struct Hit {
     /// Distance along the ray.
     pub t: f32,
-    /// Barycentric coordinates of the second and third corner.
+    /// Barycentric weights of the second and third corner.
     pub barycentric: [f32; 2],
     /// Index of the instance.
     pub instance: u32,
@@ -49,13 +49,13 @@ impl From<embree::Hit> for Hit {
     }
 }
 
-/// Whether a ray with `token` meets triangle `primitive` of `instance` at barycentric `(u, v)`: alpha cut-outs, and
-/// what is hidden from cameras. A pure function.
+/// Decides whether a hit counts, for alpha cut-outs and objects that are hidden from cameras. Arguments: instance,
+/// primitive, barycentric weights of the second and third corner, token of the ray. Must be a pure function.
 pub type HitFilter = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
-/// Up to so many triangles of all the instances of a mesh together stand in the one tree of the scene, copied: rays are
-/// faster there than through an instance's own tree, whose box overlaps its neighbours'.
-const MOST_COPIED: usize = 1 << 17;
+/// If all instances of a mesh together have at most this number of triangles, they are copied into the BVH of the scene.
+/// Rays are faster there than through an instance's own BVH, whose box overlaps those of its neighbours.
+const MAX_COPIED_TRIANGLES: usize = 1 << 17;
 
 /// Geometry committed to Embree; clones share it.
 #[derive(Clone)]
@@ -76,18 +76,18 @@ fn column_major(m: &Affine3A) -> [f32; 12] {
 }
 
 impl Tracer {
-    /// Commits those of `shapes` for which there is an answer in `asked`, by instance: whether hits of it are put to
-    /// the test `meets`.
+    /// Builds Embree's BVH with `threads` threads. `filtered` has one entry per instance: `None` leaves the instance out,
+    /// `Some(true)` passes its hits to `filter`.
     ///
     /// # Errors
     /// Embree is missing or out of memory, or a coordinate is too large for it.
-    pub fn build(shapes: &Shapes, asked: &[Option<bool>], meets: &HitFilter, threads: usize) -> Result<Tracer> {
+    pub fn build(shapes: &Shapes, filtered: &[Option<bool>], filter: &HitFilter, threads: usize) -> Result<Tracer> {
         let library = embree::Library::load().map_err(convert)?;
         let device = embree::Device::new(&library, threads).map_err(convert)?;
-        // A mesh is filtered if any instance of it is: the test itself then accepts the opaque ones.
-        let mut filtered = vec![false; shapes.meshes.len()];
-        for (instance, &asked) in shapes.instances.iter().zip(asked) {
-            filtered[instance.mesh as usize] |= asked == Some(true);
+        // A mesh is filtered if any of its instances is. The filter accepts hits of the others.
+        let mut filtered_meshes = vec![false; shapes.meshes.len()];
+        for (instance, &filtered) in shapes.instances.iter().zip(filtered) {
+            filtered_meshes[instance.mesh as usize] |= filtered == Some(true);
         }
         let mut copies = vec![0; shapes.meshes.len()];
         for instance in &shapes.instances {
@@ -99,11 +99,11 @@ impl Tracer {
                 let named = |e: embree::Error| convert(e).within(format_args!("mesh \"{}\"", data.name));
                 let positions: Vec<[f32; 3]> = data.positions.iter().map(|&p| place(p).to_array()).collect();
                 builder.triangles(GeometryId(id), &positions, &data.triangles).map_err(named)?;
-                if filtered[mesh as usize] {
-                    let meets = Arc::clone(meets);
+                if filtered_meshes[mesh as usize] {
+                    let accepts = Arc::clone(filter);
                     let filter: embree::Filter = Arc::new(move |c: &embree::Candidate| {
                         let instance = c.instance.unwrap_or(c.geometry).0;
-                        meets(instance, c.primitive, [c.u, c.v], c.token)
+                        accepts(instance, c.primitive, [c.u, c.v], c.token)
                     });
                     builder.filter(GeometryId(id), filter).map_err(named)?;
                 }
@@ -111,10 +111,10 @@ impl Tracer {
             };
         let mut shared: Vec<Option<embree::Scene>> = vec![None; shapes.meshes.len()];
         let mut root = embree::SceneBuilder::new(&device).map_err(convert)?;
-        for (i, instance) in shapes.instances.iter().enumerate().filter(|(i, _)| asked[*i].is_some()) {
+        for (i, instance) in shapes.instances.iter().enumerate().filter(|(i, _)| filtered[*i].is_some()) {
             let id = i as u32;
             match &instance.to_world {
-                _ if copies[instance.mesh as usize] <= MOST_COPIED => {
+                _ if copies[instance.mesh as usize] <= MAX_COPIED_TRIANGLES => {
                     add_mesh(&mut root, id, instance.mesh, &|p| instance.point(p))?;
                 }
                 None => add_mesh(&mut root, id, instance.mesh, &|p| p)?,
@@ -148,25 +148,25 @@ impl Tracer {
         }
     }
 
-    /// The nearest hit, or none.
+    /// The nearest hit, if any.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.scene.intersect(&Self::ray(ray)).map(Hit::from)
     }
 
-    /// Calls `each` with the nearest hits of up to eight rays that go much the same way. Which rays are given together
-    /// may decide between triangles that share an edge.
+    /// Traces up to eight rays of similar directions and calls `each` with the number and nearest hit of every ray that
+    /// hits. For a hit on a shared edge, the choice of the triangle may depend on the other rays.
     #[inline]
     pub fn intersect8(&self, ray: impl Fn(usize) -> Option<Ray>, mut each: impl FnMut(usize, Hit)) {
         self.scene.intersect8(|k| ray(k).as_ref().map(Self::ray), |k, hit| each(k, hit.into()));
     }
 
-    /// Calls `each` with every hit on the segment, in no order. For few and short rays.
+    /// Calls `each` with every hit on the segment, in arbitrary order. Slow: meant for few and short rays.
     pub fn each_hit(&self, ray: &Ray, each: &mut dyn FnMut(Hit)) {
         self.scene.each_hit(&Self::ray(ray), &mut |hit| each(hit.into()));
     }
 
-    /// Whether anything lies on the segment.
+    /// Whether any hit is on the segment.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         self.scene.occluded(&Self::ray(ray))

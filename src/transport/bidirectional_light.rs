@@ -132,7 +132,7 @@ impl<R: Record> LightWalk<'_, '_, R> {
         let value = vertex.throughput() * f * (pdf_a / light_paths);
         // What is no number is the end of the sample that it would have come to, and costs no ray.
         if value.is_nan() {
-            if let Some(((x, y), _)) = camera_paths.camera.pixel(sample.film, || draws.two(Purpose::Splat)) {
+            if let Some(((x, y), _)) = camera_paths.camera.sample_pixel(sample.film, || draws.two(Purpose::Splat)) {
                 let (pixel, light, group) = (y * camera_paths.camera.size().0 + x, vertex.depth(), self.group);
                 let (class, ratios) = (PathClass::Indirect, Ratios::ALONE);
                 self.left.splats.push(Splat { pixel, light, class, group, value: Rgb::NAN, ratios });
@@ -157,7 +157,8 @@ impl<R: Record> LightWalk<'_, '_, R> {
         self.record.contribution(Technique::Camera { light: vertex.depth() }, value, sample.lens, ratios);
         let value = value * way.left;
         if value.max_element() > 0.0 {
-            let Some(((x, y), weight)) = camera_paths.camera.pixel(sample.film, || draws.two(Purpose::Splat)) else {
+            let Some(((x, y), weight)) = camera_paths.camera.sample_pixel(sample.film, || draws.two(Purpose::Splat))
+            else {
                 return;
             };
             let value = value * weight;

@@ -558,7 +558,7 @@ impl CameraPaths<'_> {
     #[inline]
     pub fn start_at(&self, pixel: (u32, u32), within: Vec2, stream: Stream) -> PathStart {
         let draws = stream.vertex(0);
-        let film = self.camera.film(pixel, within);
+        let film = self.camera.film_point(pixel, within);
         let ray = self.camera.ray(film, draws.two(Purpose::Lens));
         PathStart {
             origin: ray.origin,
@@ -593,7 +593,7 @@ impl CameraPaths<'_> {
         let mut starts = [const { None }; GROUP_SIZE];
         for (start, place) in starts.iter_mut().zip(places) {
             if let Some(place) = place {
-                let key = self.camera.key(place.pixel);
+                let key = self.camera.pixel_key(place.pixel);
                 let stream = streams.path(key);
                 let first = PrecomputedHit::Nothing;
                 let film = film.path(key);

@@ -48,7 +48,7 @@ fn sees_anything(scene: &Scene, camera: &Camera) -> bool {
     let (width, height) = camera.size();
     let at = |i: u32, size: u32| ((f64::from(i) + 0.5) / f64::from(EDGE) * f64::from(size)) as u32;
     (0..EDGE * EDGE).any(|i| {
-        let film = camera.film((at(i % EDGE, width), at(i / EDGE, height)), Vec2::splat(0.5));
+        let film = camera.film_point((at(i % EDGE, width), at(i / EDGE, height)), Vec2::splat(0.5));
         let ray = camera.ray(film, Vec2::splat(0.5));
         rays::first(scene, ray.origin, ray.direction, f32::INFINITY, i).is_some()
     })

@@ -152,7 +152,7 @@ mod tests {
                     keys.extend(group.keys.iter().flatten());
                     for (key, place) in group.keys.iter().zip(&group.places) {
                         let Some(place) = place else { continue };
-                        assert_eq!(*key, Some(camera.key(place.pixel)));
+                        assert_eq!(*key, Some(camera.pixel_key(place.pixel)));
                         assert_eq!(tiles.place(place.index as u32), (tile.tile.unwrap(), place.at));
                         on_film.push(place.index);
                     }
