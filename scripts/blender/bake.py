@@ -1,6 +1,6 @@
-"""Values of a material's graph baked to images on a mesh, with Cycles' own baker on a stage of its own.
+"""Bakes values of a material's node graph to images on a mesh, with Cycles' baker in a separate scene, the stage.
 
-A *pass* bakes three numbers at once: a colour, or three channels that have nothing else in common.
+A *pass* bakes three numbers per texel: a colour, or three unrelated channels.
 """
 
 import contextlib
@@ -13,15 +13,15 @@ import standin
 from graph import is_constant
 from shading import output_of
 
-SIZE = 1024  # texels a side
-_SAMPLES = 4  # a texel, against stairs
+SIZE = 1024  # texels per side
+_SAMPLES = 4  # per texel, against aliasing
 _NOISY = {"AMBIENT_OCCLUSION", "BEVEL"}
 _NOISY_SAMPLES = 64
-_MARGIN = 8  # texels that are repeated around an island
+_MARGIN = 8  # texels that extend each UV island
 
 
 class Baker:
-    """Bakes images of `size` texels a side; what it makes in Blender stays until `undo` closes."""
+    """Bakes images of `size` texels per side. `undo` removes the scene and materials that it makes in Blender."""
 
     def __init__(self, size, undo):
         self.size, self.undo = size, undo
@@ -29,7 +29,7 @@ class Baker:
 
     @property
     def stage(self):
-        """A scene of its own: the rest of the picture costs no time, and casts no shadow."""
+        """The scene that baking uses, so that other objects cost no time and cast no shadows."""
         if self._made is None:
             self._made = bpy.data.scenes.new("bake")
             self.undo.callback(bpy.data.scenes.remove, self._made)
@@ -60,7 +60,7 @@ class Baker:
             bpy.context.window.view_layer = kept
 
     def constants(self, graph, values):
-        """What values that vary nowhere are: colours or numbers, by baking a few texels of a square."""
+        """Colours or numbers of `values` that are equal everywhere, evaluated by baking a few texels of a square."""
         mesh = bpy.data.meshes.new("square")
         mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
         body = bpy.data.objects.new("square", mesh)
@@ -70,7 +70,7 @@ class Baker:
             found = []
             with self.on_stage(body):
                 for value in values:
-                    shader = _shine(graph, value)
+                    shader = _connect_emission(graph, value)
                     found.append(self._texels(body, {0: graph}, "EMIT", 4)[0][..., :3].mean((0, 1)))
                     graph.tree.nodes.remove(shader)
             return [tuple(map(float, f)) if g else float(f[0]) for f, g in zip(found, map(_has_three, values))]
@@ -79,9 +79,10 @@ class Baker:
             bpy.data.meshes.remove(mesh)
 
     def passes(self, body, wanted, of_object):
-        """Bake on `body`, whose mesh has the UV map: {(slot, pass): texels (size, size, 4), alpha where there are any}.
+        """Bake on `body`, whose mesh has the UV map. Returns {(slot, pass): texels (size, size, 4)}, alpha 0 where
+        empty.
 
-        `wanted`: {slot: (graph, {pass: value})}, the value of the pass "normal" a bent normal.
+        `wanted`: {slot: (graph, {pass: value})}. The value of the pass "normal" is a normal, or None.
         """
         found = {}
         shape = bake_cache.mesh_digest(body.data)
@@ -92,7 +93,8 @@ class Baker:
             for slot, (graph, values) in wanted.items():
                 if name not in values:
                     continue
-                shaders.append((graph, (_bend if name == "normal" else _shine)(graph, values[name])))
+                connect = _connect_normal if name == "normal" else _connect_emission
+                shaders.append((graph, connect(graph, values[name])))
                 keys[slot] = bake_cache.digest(shape, slot, bake_cache.tree_digest(graph.tree), self.size, name,
                                               place if of_object else None)
                 texels = bake_cache.load(keys[slot])
@@ -110,14 +112,14 @@ class Baker:
         return found
 
     def _texels(self, body, graphs, kind, size):
-        """One run of the baker: {slot: texels} for the slots of `graphs`."""
+        """Run the baker once. Returns {slot: texels} for the slots of `graphs`."""
         mesh = body.data
-        worn = list(mesh.materials)
+        materials = list(mesh.materials)
         noisy = any(n.type in _NOISY for graph in graphs.values() for tree in graph.trees() for n in tree.nodes)
         self.stage.cycles.samples = _NOISY_SAMPLES if noisy else _SAMPLES
         with contextlib.ExitStack() as undo:
             images = {}
-            for slot in range(max(len(worn), 1)):
+            for slot in range(max(len(materials), 1)):
                 graph = graphs.get(slot)
                 material = graph.material if graph is not None else self._nobody
                 side = size if graph is not None else 4
@@ -131,7 +133,7 @@ class Baker:
                     undo.callback(material.node_tree.nodes.remove, node)
                     node.image = image
                     material.node_tree.nodes.active = node
-                if slot < len(worn):
+                if slot < len(materials):
                     mesh.materials[slot] = material
             for other in bpy.context.view_layer.objects:
                 other.select_set(other == body)
@@ -145,7 +147,7 @@ class Baker:
                 texels = numpy.empty(size * size * 4, numpy.float32)
                 images[slot].pixels.foreach_get(texels)
                 found[slot] = texels.reshape(size, size, 4)
-        for slot, material in enumerate(worn):
+        for slot, material in enumerate(materials):
             mesh.materials[slot] = material
         return found
 
@@ -158,16 +160,16 @@ def _surface(graph):
     return output_of(graph.tree).inputs["Surface"]
 
 
-def _shine(graph, value):
-    """Let the material shine with a value; the shader's node."""
+def _connect_emission(graph, value):
+    """Make the material emit a value. Returns the shader's node."""
     node = graph.tree.nodes.new("ShaderNodeEmission")
     graph.connect(value, node.inputs["Color"])
     graph.tree.links.new(node.outputs[0], _surface(graph))
     return node
 
 
-def _bend(graph, normal):
-    """Let the material be a matt white one with this normal, or with the one that its displacement makes; its node."""
+def _connect_normal(graph, normal):
+    """Make the material diffuse with this normal, None for that of its displacement. Returns the shader's node."""
     node = graph.tree.nodes.new("ShaderNodeBsdfDiffuse")
     if normal is not None:
         graph.connect(normal, node.inputs["Normal"])

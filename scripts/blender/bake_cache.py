@@ -1,4 +1,4 @@
-"""Baked images kept between exports: by a hash of all that they depend on, in the user's cache folder."""
+"""A cache of baked images in the user's cache folder, by a hash of all inputs of the bake."""
 
 import hashlib
 import os
@@ -7,8 +7,8 @@ import time
 import bpy
 import numpy
 
-_KEPT_DAYS = 30
-_NOT_LOOKS = {  # of a node in the editor, or described otherwise
+_MAX_AGE_DAYS = 30
+_IGNORED_PROPERTIES = {  # layout of a node in the editor, or hashed separately
     "rna_type", "location", "location_absolute", "width", "height", "width_hidden", "select", "dimensions", "parent",
     "color", "use_custom_color", "label", "name", "inputs", "outputs", "internal_links", "id_data", "show_options",
     "show_preview", "show_texture", "warning_propagation", "hide", "bl_width_default", "bl_width_min", "bl_width_max",
@@ -18,13 +18,13 @@ _NOT_LOOKS = {  # of a node in the editor, or described otherwise
 
 
 def folder():
-    """Where images are kept: $XDG_CACHE_HOME or ~/.cache, and below it caustique/bake."""
+    """The cache's folder: caustique/bake in $XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     return os.path.join(base, "caustique", "bake")
 
 
 def load(key):
-    """The array that was stored under `key`, or None."""
+    """The array stored under `key`, or None."""
     path = os.path.join(folder(), key + ".npy")
     try:
         texels = numpy.load(path, allow_pickle=False)
@@ -35,9 +35,9 @@ def load(key):
 
 
 def store(key, texels):
-    """Store an array of halves under `key`, and drop what nobody has asked for in a month.
+    """Store an array of halves under `key`, and delete files that were not read for a month.
 
-    A folder that cannot be written costs time at the next export and nothing else.
+    An unwritable folder is no error: the next export bakes again.
     """
     try:
         os.makedirs(folder(), exist_ok=True)
@@ -46,14 +46,14 @@ def store(key, texels):
             numpy.save(file, texels.astype(numpy.float16))
         os.replace(file.name, path)
         for entry in os.scandir(folder()):
-            if time.time() - entry.stat().st_mtime > _KEPT_DAYS * 86400:
+            if time.time() - entry.stat().st_mtime > _MAX_AGE_DAYS * 86400:
                 os.remove(entry.path)
     except OSError:
         pass
 
 
 def digest(*parts):
-    """A key for texts, numbers, bytes and arrays."""
+    """A key made from texts, numbers, bytes and arrays."""
     total = hashlib.sha256()
     for part in parts:
         part = part.tobytes() if isinstance(part, numpy.ndarray) else part
@@ -63,7 +63,7 @@ def digest(*parts):
 
 
 def mesh_digest(mesh):
-    """A digest of shape, normals, materials by face, and every attribute of a mesh."""
+    """A digest of a mesh: shape, normals, material of each face, and all attributes."""
     parts = [bpy.app.version_string]
     for attribute in mesh.attributes:
         if len(attribute.data) == 0:
@@ -85,10 +85,10 @@ def mesh_digest(mesh):
 
 
 def tree_digest(tree):
-    """A digest of what a node tree computes: nodes, values, links, images, groups."""
+    """A digest of a node tree: nodes, values, links, images, groups."""
     parts = []
     for node in tree.nodes:
-        parts += [node.name, node.bl_idname, _described(node)]
+        parts += [node.name, node.bl_idname, _properties(node)]
         parts += [_plain(s.default_value) for s in node.inputs if hasattr(s, "default_value")]
         if not node.inputs:
             parts += [_plain(s.default_value) for s in node.outputs if hasattr(s, "default_value")]
@@ -103,11 +103,11 @@ def _plain(value):
     return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
 
 
-def _described(struct, depth=0):
-    """What the properties of a node, ramp or curve hold, as nested lists."""
+def _properties(struct, depth=0):
+    """The properties of a node, ramp or curve as nested lists."""
     found = []
     for name in struct.bl_rna.properties.keys():
-        if name in (_NOT_LOOKS if depth == 0 else {"rna_type", "id_data"}):
+        if name in (_IGNORED_PROPERTIES if depth == 0 else {"rna_type", "id_data"}):
             continue
         value = getattr(struct, name, None)
         if isinstance(value, bpy.types.Image):
@@ -117,9 +117,9 @@ def _described(struct, depth=0):
         elif isinstance(value, bpy.types.ID):
             value = value.name
         elif isinstance(value, bpy.types.bpy_struct):
-            value = _described(value, depth + 1) if depth < 4 else None
+            value = _properties(value, depth + 1) if depth < 4 else None
         elif isinstance(value, bpy.types.bpy_prop_collection):
-            value = [_described(item, depth + 1) for item in value] if depth < 4 else None
+            value = [_properties(item, depth + 1) for item in value] if depth < 4 else None
         elif hasattr(value, "__len__") and not isinstance(value, (str, set)):
             value = tuple(value)
         found.append((name, sorted(value) if isinstance(value, set) else value))
@@ -127,7 +127,7 @@ def _described(struct, depth=0):
 
 
 def _image(image):
-    """What identifies an image's texels: those of memory, or the file's place, size and time."""
+    """The identity of an image: its texels if changed in memory, else the file's path, size and time."""
     settings = (image.colorspace_settings.name, image.alpha_mode, tuple(image.size))
     if image.source == "FILE" and image.packed_file is None and not image.is_dirty:
         path = bpy.path.abspath(image.filepath, library=image.library)

@@ -1,9 +1,10 @@
-"""Helpers for the scripts that make the scenes in `scenes/`: materials, shapes, lights, a camera, and the end of it all.
+"""Helpers for the scripts that make the scenes in `scenes/`: materials, shapes, lights, camera, export.
 
-Lengths are metres, angles degrees, colours scene-linear Rec. 709; Blender's axes, so +Z is up and a scene faces -Y.
+Lengths are metres, angles degrees, colours scene-linear Rec. 709; Blender's axes: +Z is up, and the front of a scene
+faces -Y.
 
     python3 scenes/NAME.py                              write scenes/NAME.glb
-    python3 scenes/NAME.py --preview P.png [SAMPLES]    look at it through Cycles instead
+    python3 scenes/NAME.py --preview P.png [SAMPLES]    render it with Cycles instead
 """
 
 import math
@@ -13,7 +14,7 @@ import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-import bpy  # first: it brings the others
+import bpy  # first: it makes the others importable
 
 import bmesh
 import numpy
@@ -23,7 +24,7 @@ import export
 
 
 def start(width=1280, height=720):
-    """Begin an empty scene whose picture has this shape."""
+    """Begin an empty scene with this resolution in pixels."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     render = bpy.context.scene.render
     render.resolution_x, render.resolution_y = width, height
@@ -33,7 +34,8 @@ def start(width=1280, height=720):
 
 
 def principled(name, color=(0.8, 0.8, 0.8), roughness=0.5, texture=None, normal=None, one_sided=False, **inputs):
-    """A Principled material. `texture` and `normal` are images; `inputs` are socket names with _ for the spaces."""
+    """A Principled material. `texture` and `normal` are images; `inputs` are values by socket name, with _ for
+    spaces."""
     material = bpy.data.materials.new(name)
     if bpy.app.version < (5, 0, 0):
         material.use_nodes = True
@@ -79,7 +81,7 @@ def glass(name, ior=1.5, roughness=0.0, absorption=None, abbe=None):
 
 
 def emission(name, radiance):
-    """A black body that shines with this radiance (W/sr/m2) from the front of its faces."""
+    """A black surface that emits this radiance (W/sr/m2) from the front of its faces."""
     strength = max(radiance)
     return principled(name, (0, 0, 0), 1.0, one_sided=True, Specular_IOR_Level=0.0,
                       Emission_Color=(*(c / strength for c in radiance), 1), Emission_Strength=strength)
@@ -106,7 +108,8 @@ def image(name, pixels, data=False, quality=85):
 
 
 def noise(height, width, cells, octaves=5, seed=0, stretch=(1, 1)):
-    """Tileable value noise in [0, 1]: `octaves` layers, the first of `cells` cells, rows and columns by `stretch`."""
+    """Tileable value noise in [0, 1]: `octaves` layers, the first with `cells` cells times `stretch` (rows,
+    columns)."""
     random = numpy.random.default_rng(seed)
     total, weight = numpy.zeros((height, width)), 0.0
     for octave in range(octaves):
@@ -134,7 +137,7 @@ def blend(a, b, amount):
 
 
 def add_object(name, mesh, material, at=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 1)):
-    """Put a mesh into the scene; the same mesh may stand in several places."""
+    """Add an object with this mesh to the scene. Several objects may share a mesh."""
     body = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(body)
     body.location, body.scale = at, scale
@@ -145,7 +148,7 @@ def add_object(name, mesh, material, at=(0, 0, 0), turn=(0, 0, 0), scale=(1, 1, 
 
 
 def finish_mesh(name, shape, smooth=True, uv=None):
-    """Close a bmesh into a mesh; `uv` is the length of a texture's edge for box-mapped coordinates."""
+    """Convert a bmesh to a mesh. `uv`: edge length of a texture, for box-mapped coordinates."""
     bmesh.ops.recalc_face_normals(shape, faces=shape.faces)
     if uv:
         layer = shape.loops.layers.uv.verify()
@@ -176,7 +179,7 @@ def box(name, size, bevel=0.0, segments=3, uv=None):
 
 
 def _smooth_below(mesh, degrees):
-    """Smooth all edges, and weight corner normals by face area so that flat faces stay flat beside their bevels."""
+    """Smooth edges below this angle, with normals weighted by area so that faces beside bevels stay flat."""
     mesh.shade_smooth()
     normals = numpy.zeros((len(mesh.vertices), 3))
     for face in mesh.polygons:
@@ -199,7 +202,7 @@ def sphere(name, radius, subdivisions=7):
 
 
 def plane(name, width, depth, uv=None):
-    """A rectangle in the XY plane, seen from +Z."""
+    """A rectangle in the XY plane that faces +Z."""
     x, y = width / 2, depth / 2
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [], [(0, 1, 2, 3)])
@@ -211,7 +214,7 @@ def plane(name, width, depth, uv=None):
 
 
 def lathe(name, profile, sides=96, closed=False, sharp=30, uv=None):
-    """Turn a profile of (radius, height) about Z; radii of 0 at the ends close it, `closed` joins its ends."""
+    """A solid of revolution about Z of a profile of (radius, height). Radii of 0 cap the ends; `closed` joins them."""
     shape, rings = bmesh.new(), []
     for radius, height in profile:
         if radius <= 0:
@@ -233,7 +236,7 @@ def lathe(name, profile, sides=96, closed=False, sharp=30, uv=None):
 
 
 def rounded(points, radius, steps=6):
-    """A profile of (radius, height) points with its inner corners rounded."""
+    """A profile of (radius, height) points with rounded inner corners."""
     result = [points[0]]
     for before, corner, after in zip(points, points[1:], points[2:]):
         a, b, c = (Vector(p) for p in (before, corner, after))
@@ -246,7 +249,7 @@ def rounded(points, radius, steps=6):
 
 
 def polyhedron(name, planes, reach=4.0):
-    """The flat-faced convex body of all points x with normal . x <= offset for every (normal, offset)."""
+    """The convex polyhedron of all points x with normal . x <= offset for every (normal, offset)."""
     shape = bmesh.new()
     bmesh.ops.create_cube(shape, size=reach)
     for normal, offset in planes:
@@ -260,7 +263,7 @@ def polyhedron(name, planes, reach=4.0):
 
 
 def torus(name, major, minor, around=192, about=96):
-    """A ring about Z: `major` to the middle of the tube, `minor` the tube's radius."""
+    """A torus about Z: `major` is the radius of the ring, `minor` that of the tube."""
     shape = bmesh.new()
     rings = [[shape.verts.new(((major + minor * math.cos(b)) * math.cos(a), (major + minor * math.cos(b)) * math.sin(a),
                                minor * math.sin(b))) for b in numpy.linspace(0, 2 * math.pi, about, endpoint=False)]
@@ -273,7 +276,7 @@ def torus(name, major, minor, around=192, about=96):
 
 
 def tube(name, path, radius, sides=24, closed=False):
-    """A round tube along a path of points, its ends capped unless `closed`."""
+    """A round tube along a path of points, with capped ends, or a loop if `closed`."""
     points = [Vector(p) for p in path]
     shape, rings, across = bmesh.new(), [], None
     for i, here in enumerate(points):
@@ -298,7 +301,7 @@ def tube(name, path, radius, sides=24, closed=False):
 
 
 def arc(points, radius, steps=10):
-    """A path of points in space with its inner corners rounded."""
+    """A path of points in space with rounded inner corners."""
     result = [Vector(points[0])]
     for a, b, c in zip(*(map(Vector, points[i:]) for i in range(3))):
         reach = min(radius, (a - b).length * 0.49, (c - b).length * 0.49)
@@ -308,7 +311,7 @@ def arc(points, radius, steps=10):
 
 
 def sheet(name, columns, rows, position, bottom=None, uv=False):
-    """A smooth grid of `position(u, v)` -> (x, y, z), u and v in [0, 1]; `bottom` closes it down to that height."""
+    """A smooth grid of `position(u, v)` -> (x, y, z), u and v in [0, 1]. `bottom`: height of a base that closes it."""
     shape = bmesh.new()
     grid = [[shape.verts.new(position(i / columns, j / rows)) for i in range(columns + 1)] for j in range(rows + 1)]
     for j in range(rows):
@@ -341,7 +344,7 @@ def _raw(name, shape):
     return mesh
 
 
-# Light and eye
+# Lights and camera
 
 
 def _lamp(name, kind, color, energy):
@@ -353,7 +356,7 @@ def _lamp(name, kind, color, energy):
 
 
 def sun(name, toward, irradiance, color=(1, 1, 1), angle=0.53):
-    """Sunlight that travels along `toward`: W/m2 on a surface that faces it, `angle` the width of its disc."""
+    """A sun whose light travels along `toward`: W/m2 on a perpendicular surface, `angle` the diameter of its disc."""
     body = _lamp(name, "SUN", color, irradiance)
     body.rotation_euler = Vector(toward).to_track_quat("-Z", "Y").to_euler()
     body.data.angle = math.radians(angle)
@@ -361,15 +364,15 @@ def sun(name, toward, irradiance, color=(1, 1, 1), angle=0.53):
 
 
 def point(name, at, watts, color=(1, 1, 1), radius=0.01):
-    """A lamp that gives off `watts` all round."""
+    """A point lamp with a power of `watts`."""
     body = _lamp(name, "POINT", color, watts)
     body.location, body.data.shadow_soft_size = at, radius
-    body.data.use_soft_falloff = False  # a sphere that glows, to Cycles as to us
+    body.data.use_soft_falloff = False  # without it Cycles also renders an emissive sphere
     return body
 
 
 def spot(name, at, to, watts, angle, color=(1, 1, 1), blend=0.3, radius=0.01):
-    """A spotlight: `angle` is the whole cone; as in Blender `watts` is what the lamp would give off all round."""
+    """A spotlight. `angle`: full cone. `watts`: power without the cone, as in Blender."""
     body = point(name, at, watts, color, radius)
     body.data.type = "SPOT"
     light = bpy.data.lights[body.data.name]
@@ -379,7 +382,7 @@ def spot(name, at, to, watts, angle, color=(1, 1, 1), blend=0.3, radius=0.01):
 
 
 def sky(color=None, file=None, strength=1.0):
-    """The environment: one radiance, or a lat-long image."""
+    """Set the environment: one radiance, or a lat-long image."""
     world = bpy.data.worlds.new("World")
     if bpy.app.version < (5, 0, 0):
         world.use_nodes = True
@@ -396,13 +399,14 @@ def sky(color=None, file=None, strength=1.0):
 
 
 def dome(radiance, width=96):
-    """The environment as an image of `radiance(x, y, z)`: unit vectors (height, width) in, colours (height, width, 3) out."""
+    """Set the environment to an image of `radiance(x, y, z)`: unit vectors (height, width) to colours (height, width,
+    3)."""
     v, u = numpy.mgrid[0:width // 2, 0:width] + 0.5
     turn, lift = (0.5 - u / width) * 2 * math.pi, (v / (width // 2) - 0.5) * math.pi
     whole = numpy.ones((width // 2, width, 4), numpy.float32)
     whole[..., :3] = radiance(numpy.cos(lift) * numpy.cos(turn), numpy.cos(lift) * numpy.sin(turn), numpy.sin(lift))
     raw = bpy.data.images.new("dome", width, width // 2, float_buffer=True)
-    raw.colorspace_settings.name = "Non-Color"  # save the numbers as they are
+    raw.colorspace_settings.name = "Non-Color"  # no colour conversion
     raw.pixels.foreach_set(whole.ravel())
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "dome.exr")
@@ -415,7 +419,10 @@ def dome(radiance, width=96):
 
 
 def camera(at, to, lens=35.0, fstop=None, focus=None, name="Camera"):
-    """Look from `at` to `to` through a lens (mm on 36 mm film); `fstop` opens it, focused at the point `focus`. The first one is the scene's."""
+    """Add a camera at `at` that looks at `to`: `lens` in mm on 36 mm film, `fstop` with focus at the point `focus`.
+
+    The first camera is the scene's.
+    """
     eye = bpy.data.cameras.new(name)
     body = bpy.data.objects.new(name, eye)
     bpy.context.scene.collection.objects.link(body)
@@ -431,7 +438,7 @@ def camera(at, to, lens=35.0, fstop=None, focus=None, name="Camera"):
 
 
 def finish(script):
-    """Write the scene beside its script, or preview it; call it last, with __file__."""
+    """Write the .glb beside the scene's script, or render the preview. Scripts call it last, with __file__."""
     stem = os.path.splitext(os.path.abspath(script))[0]
     if "--preview" in sys.argv:
         rest = sys.argv[sys.argv.index("--preview") + 1:]
@@ -452,7 +459,7 @@ def _preview(path, samples, percentage):
     scene.cycles.transmission_bounces = scene.cycles.glossy_bounces = scene.cycles.diffuse_bounces = 16
     scene.cycles.sample_clamp_indirect = 0
     scene.cycles.blur_glossy = 0
-    for body in scene.objects:  # a path tracer finds few of these caustics: let clear things pass the light unbent
+    for body in scene.objects:  # a path tracer finds few caustics: shadow rays pass glass
         if body.type == "MESH" and any(export.may_transmit(m) for m in body.data.materials):
             body.visible_shadow = body.visible_diffuse = False
     scene.render.resolution_percentage = int(percentage)

@@ -1,4 +1,4 @@
-"""Cameras, and the picture that a scene was made for, in terms of `extras.caustique`."""
+"""Cameras, and the scene's picture settings, as keys of `extras.caustique`."""
 
 import fractions
 import itertools
@@ -7,7 +7,7 @@ import math
 import bpy
 
 _TONEMAPS = {"AgX": "agx", "Filmic": "filmic", "Standard": "srgb"}
-# Rays a side of the picture that look for what is clipped.
+# Rays along each side of the picture that search for clipped objects.
 _GRID = 16
 
 
@@ -23,7 +23,7 @@ def extras(thing, flat, warn):
         said["shift"] = [camera.shift_x * length / width, camera.shift_y * length / height]
     if not camera.dof.use_dof:
         return said
-    # Cycles: half of focal length over f-number; an orthographic camera counts as having a focal length of one unit.
+    # Cycles: half of focal length over f-number; an orthographic camera has a focal length of one unit.
     focal = camera.lens * 1e-3 if camera.type == "PERSP" else 1.0
     focus = camera.dof.focus_distance
     if camera.dof.focus_object is not None:
@@ -35,7 +35,7 @@ def extras(thing, flat, warn):
 
 
 def warn_of_clipping(thing, flat, warn):
-    """Names what the clipping planes of a camera cut away from the picture in Blender, as a grid of rays finds it."""
+    """Warn of objects that the camera's clipping planes hide in Blender, found by a grid of rays."""
     camera, found = thing.data, {}
     depsgraph = bpy.context.evaluated_depsgraph_get()
     corners = [thing.matrix_world @ corner for corner in camera.view_frame(scene=flat.scene)]
@@ -57,8 +57,8 @@ def warn_of_clipping(thing, flat, warn):
 
 
 def picture(scene, warn):
-    """Keys of the scene: `resolution` (pixels), `crop` (x, y from the top left, width, height; shares of the picture),
-    `exposure` (stops), `tonemap`, `film_transparent`, `frame` and `frame_rate` (numerator, denominator)."""
+    """Keys of the scene: `resolution` (pixels), `crop` (x, y from the top left, width, height, as shares of the
+    picture), `exposure` (stops), `tonemap`, `film_transparent`, `frame` and `frame_rate` (numerator, denominator)."""
     render, view, where = scene.render, scene.view_settings, f'scene "{scene.name}"'
     share = render.resolution_percentage / 100
     said = {"resolution": [max(round(n * share), 1) for n in (render.resolution_x, render.resolution_y)]}
@@ -81,7 +81,7 @@ def picture(scene, warn):
         warn(where, f'its view transform "{view.view_transform}" is not carried: the PNG is made with agx')
     if view.look not in {"None", ""} or view.gamma != 1 or view.use_curve_mapping:
         warn(where, "look, gamma and curves of its colour management are not carried: they concern the PNG alone")
-    # As decimals, for Blender keeps 1.001 in single precision.
+    # Through decimals, because Blender stores 1.001 in single precision.
     rate = fractions.Fraction(f"{render.fps:.6g}") / fractions.Fraction(f"{render.fps_base:.6g}")
     if rate > 0:
         said["frame_rate"] = [rate.numerator, rate.denominator]

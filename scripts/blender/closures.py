@@ -1,5 +1,5 @@
-"""A material's surface as weighted closures: mixes and sums of shaders, walked through groups, with the mean of what
-depends on the view."""
+"""A material's surface as weighted closures: mixes and sums of shaders, through groups. View-dependent values are
+replaced by their means."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,8 @@ _GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC"}
 
 @dataclass
 class Leaf:
-    """A shader node that scatters, emits or lets through. `ior`: a dielectric's facets lie on it, those of `coat`."""
+    """A shader node. `ior`: index of a dielectric layer above it, whose facets are those of the Glossy shader
+    `coat`."""
     node: bpy.types.Node
     path: tuple
     ior: object = None
@@ -25,7 +26,7 @@ class Leaf:
 
 @dataclass
 class Mix:
-    """Two surfaces in the shares 1 - f and f; `factor` is the input socket of f at `path`."""
+    """Two surfaces with weights 1 - f and f. `factor` is the input socket of f, at `path`."""
     factor: bpy.types.NodeSocket
     path: tuple
     first: object
@@ -34,13 +35,13 @@ class Mix:
 
 @dataclass
 class Sum:
-    """Two surfaces added."""
+    """The sum of two surfaces."""
     first: object
     second: object
 
 
 def read(socket, path=()):
-    """The shader tree under a shader socket: Leaf, Mix, Sum, or None for a black one."""
+    """The shader tree under a shader socket: Leaf, Mix, Sum, or None if black."""
     output, path = source_socket(socket, path)
     if output is None or not output.is_output:
         return None
@@ -54,7 +55,7 @@ def read(socket, path=()):
 
 
 def _faceted(mix):
-    """The same mix, or one leaf where Fresnel's equations mix a Glossy shader over another: that is a dielectric."""
+    """Turn a Fresnel mix of a Glossy shader over another into one leaf, a dielectric. Returns other mixes unchanged."""
     output, path = source_socket(mix.factor, mix.path)
     below, coat = mix.first, mix.second
     leaves = isinstance(below, Leaf) and isinstance(coat, Leaf) and below.coat is None
@@ -71,7 +72,7 @@ def _faceted(mix):
 
 
 def weigh(tree, graph, weight=1.0):
-    """Pairs of a leaf and its weight, a value of `graph`; what weighs nothing is left out."""
+    """Pairs of a leaf and its weight, a value of `graph`. Leaves of weight 0 are left out."""
     if tree is None or (is_constant(weight) and weight == 0):
         return []
     if isinstance(tree, Leaf):
@@ -84,23 +85,23 @@ def weigh(tree, graph, weight=1.0):
 
 
 def adds_up(tree):
-    """Whether the weights of all leaves sum to one: nothing is added, and nothing is missing."""
+    """Whether the weights of all leaves sum to one."""
     if isinstance(tree, Mix):
         return adds_up(tree.first) and adds_up(tree.second)
     return isinstance(tree, Leaf)
 
 
 def facets(tree):
-    """The leaves that Fresnel's equations cover with facets."""
+    """The leaves below a dielectric layer."""
     if isinstance(tree, Leaf):
         return [tree] if tree.coat is not None else []
     return facets(tree.first) + facets(tree.second) if tree is not None else []
 
 
 def fix_view_dependence(graph, surface, tree, say):
-    """Put a constant in the place of what depends on the view or the kind of ray; `say` names each.
+    """Replace values that depend on the view or the kind of ray by constants; `say` receives a warning for each.
 
-    `surface` is the shader socket of which `tree` was read.
+    `surface` is the shader socket that `tree` was read from.
     """
     known = {leaf.ior[0].node.as_pointer() for leaf in facets(tree)}
     for node, output in upstream(surface).values():
@@ -124,14 +125,14 @@ def _replace(output, value):
 
 
 def _typical(node, output):
-    """The mean of a node's output over directions, by the cosine, or what it is from straight above."""
+    """The cosine-weighted mean of a node's output over directions, or its value at normal incidence."""
     if node.type == "FRESNEL":
         return mean_reflectance(_held(node.inputs["IOR"]))
     if node.type == "LAYER_WEIGHT":
         blend = min(max(_held(node.inputs["Blend"]), 0.0), 1 - 1e-5)
         if output.name == "Fresnel":
             return mean_reflectance(1 / (1 - blend))
-        # Cycles: 1 - cos^b, whose mean by the cosine is b / (b + 2).
+        # Cycles: 1 - cos^b, with the cosine-weighted mean b / (b + 2).
         power = 2 * blend if blend < 0.5 else 0.5 / (1 - blend)
         return power / (power + 2) if blend != 0.5 else 1 / 3
     return 0.0 if output.type == "VALUE" else (0.5, 0.5, 0.5) if node.type == "TEX_COORD" else (0.0, 0.0, 1.0)
@@ -143,7 +144,7 @@ def _held(socket):
 
 
 def mean_reflectance(ior, steps=256):
-    """The share of diffuse light that a smooth dielectric of relative index `ior` reflects from outside."""
+    """Diffuse reflectance of a smooth dielectric of relative index `ior`, from outside."""
     total = 0.0
     for step in range(steps):
         cos = (step + 0.5) / steps
@@ -152,7 +153,7 @@ def mean_reflectance(ior, steps=256):
 
 
 def reflectance(cos, ior):
-    """Fresnel's equations for unpolarised light."""
+    """Fresnel reflectance for unpolarised light."""
     g2 = ior * ior - 1 + cos * cos
     if g2 <= 0:
         return 1.0

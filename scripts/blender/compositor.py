@@ -1,11 +1,11 @@
-"""Make a .blend whose compositor puts a rendered picture together from its parts, with a control for its caustics.
+"""Make a .blend whose compositor sums the parts of a rendered picture, with a control for its caustics.
 
     .venv-bpy/bin/python scripts/blender/compositor.py PICTURE.exr OUT.blend
     blender -b --python scripts/blender/compositor.py -- PICTURE.exr OUT.blend
-    import compositor; compositor.build("PICTURE.exr")                      a scene in the file that is open
+    import compositor; compositor.build("PICTURE.exr")                      adds a scene to the open file
 
-The node "Caustics" has two inputs that are made to be changed: `Caustics`, a factor (1 leaves the picture as it is, 0
-takes the caustics away), and `Caustics Tint`, a colour that they are multiplied by (white leaves them).
+The node "Caustics" has two inputs for the artist: `Caustics`, a factor (1: the picture is unchanged, 0: no caustics),
+and `Caustics Tint`, a colour that multiplies the caustics (white: unchanged).
 """
 
 import argparse
@@ -27,8 +27,10 @@ _MODERN = bpy.app.version >= (5, 0, 0)
 
 
 def build(path):
-    """A new scene that shows the multilayer EXR at `path` through the node "Caustics"; `SystemExit` if the file has no
-    finished parts."""
+    """A new scene that shows the multilayer EXR at `path` through the node "Caustics".
+
+    Raises `SystemExit` if the file has no finished parts.
+    """
     image = bpy.data.images.load(os.path.abspath(path))
     scene = bpy.data.scenes.new("caustique")
     scene.render.resolution_x, scene.render.resolution_y = _size(path)
@@ -53,8 +55,10 @@ def build(path):
 
 
 def _size(path):
-    """Width and height of the whole picture, by the file's header: Blender knows the size of an image of many layers only
-    once it has been shown."""
+    """Width and height of the whole picture from the file's header.
+
+    Blender knows the size of a multilayer image only after displaying it.
+    """
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         head = b"displayWindow\0box2i\0" + struct.pack("<i", 16)
         left, top, right, bottom = struct.unpack_from("<4i", data, data.find(head) + len(head))
@@ -62,7 +66,7 @@ def _size(path):
 
 
 def _tree(scene):
-    """The empty compositor of a scene, and the node that takes what it shows."""
+    """The empty compositor tree of a scene, and its output node."""
     if _MODERN:
         tree = scene.compositing_node_group = bpy.data.node_groups.new("caustique", "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -74,7 +78,7 @@ def _tree(scene):
 
 
 def _sum():
-    """The group: parts + `CombinedCaustic` x `Caustics Tint` x `Caustics`, under the alpha of `Combined`."""
+    """The node group: parts + `CombinedCaustic` x `Caustics Tint` x `Caustics`, with the alpha of `Combined`."""
     tree = bpy.data.node_groups.new("Caustics", "CompositorNodeTree")
     colours = {TINT: (1, 1, 1, 1), "Combined": (0, 0, 0, 1), CAUSTIC: (0, 0, 0, 1)}
     factor = tree.interface.new_socket(FACTOR, in_out="INPUT", socket_type="NodeSocketFloat")
@@ -104,7 +108,7 @@ def _sum():
 
 
 def _mix(tree, operation, first, second):
-    """The output of a node that multiplies or adds two sockets, without clamping."""
+    """Output of a new node that multiplies or adds two sockets without clamping."""
     if _MODERN:
         node = tree.nodes.new("ShaderNodeMix")
         node.data_type, node.clamp_result, node.clamp_factor = "RGBA", False, False
@@ -121,7 +125,7 @@ def _mix(tree, operation, first, second):
 
 
 def main(arguments):
-    """Command line: PICTURE.exr OUT.blend; the exit code."""
+    """Run the command line PICTURE.exr OUT.blend. Returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="compositor.py", usage="compositor.py PICTURE.exr OUT.blend\n       "
         "blender -b --python compositor.py -- PICTURE.exr OUT.blend")
@@ -134,7 +138,7 @@ def main(arguments):
         bpy.context.window.scene = build(given.picture)
         bpy.data.scenes.remove(before)
         bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(given.blend))
-    except Exception as error:  # whatever Blender raises: a message and a code, never a hanging process
+    except Exception as error:  # any error of Blender: a message and an exit code, never a hanging process
         print(f"error: {given.picture}: {error}".strip(), file=sys.stderr)
         return 1
     return 0
@@ -144,7 +148,7 @@ if __name__ == "__main__":
     given = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
     try:
         code = main(given)
-    except SystemExit as stopped:  # help, a command line that is wrong, or a picture without its parts
+    except SystemExit as stopped:  # help, a wrong command line, or a picture without parts
         if isinstance(stopped.code, str):
             print(stopped.code, file=sys.stderr)
         code = stopped.code if isinstance(stopped.code, int) else 1

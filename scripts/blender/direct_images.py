@@ -1,17 +1,18 @@
-"""Which values glTF can say as they are: an image on the mesh's own UV map, at most shifted, turned and scaled."""
+"""Finds values that glTF can express directly: an image on the mesh's UV map, at most translated, rotated and
+scaled."""
 
 import numpy
 
 from graph import source_socket
 
 _WRAPS = {"REPEAT", "EXTEND", "MIRROR"}
-_COARSE = 256  # texels
+_SMALL_IMAGE = 256  # texels
 
 
 def image_of(value, data):
-    """The Image Texture node whose Color `value` is, if glTF has a word for it, or None.
+    """The Image Texture node whose Color is `value`, or None if glTF cannot express it.
 
-    `data`: the image holds numbers rather than colours.
+    `data`: the image holds numbers, not colours.
     """
     node = value.node
     if node.type != "TEX_IMAGE" or value.name != "Color" or node.mute:
@@ -21,23 +22,23 @@ def image_of(value, data):
         return None
     if node.extension not in _WRAPS or image.colorspace_settings.name != ("Non-Color" if data else "sRGB"):
         return None
-    # Cycles blends neighbouring texels as they are stored, glTF as light: that shows where they are large.
-    if not data and node.interpolation != "Closest" and max(image.size) < _COARSE:
+    # Cycles filters encoded texels, glTF linear ones: the difference is visible in small images.
+    if not data and node.interpolation != "Closest" and max(image.size) < _SMALL_IMAGE:
         return None
-    if image.is_float or not _plain_coordinates(node.inputs["Vector"]):
+    if image.is_float or not _uses_render_uv(node.inputs["Vector"]):
         return None
     return node
 
 
 def is_opaque(image):
-    """Whether no texel is transparent: Cycles multiplies colours by alpha, glTF does not."""
+    """Whether no texel is transparent. Cycles multiplies colours by alpha, glTF does not."""
     if image.channels < 4 or image.alpha_mode in {"NONE", "CHANNEL_PACKED"}:
         return True
     return bool(_pixels(image)[..., 3].min() >= 1)
 
 
 def is_grey(image):
-    """Whether red, green and blue are the same everywhere."""
+    """Whether red, green and blue are equal in all texels."""
     if image.channels < 3:
         return True
     texels = _pixels(image)
@@ -51,7 +52,7 @@ def _pixels(image):
 
 
 def normal_map(value):
-    """The Normal Map node of full strength whose tangent-space image glTF can name, or None."""
+    """The Normal Map node of full strength with a tangent-space image that glTF can use, or None."""
     node = value.node
     if node.type != "NORMAL_MAP" or node.space != "TANGENT" or node.uv_map or node.mute:
         return None
@@ -64,13 +65,13 @@ def normal_map(value):
 
 
 def leaning_share(node, cosine):
-    """The share of a Normal Map node's texels whose normal is farther from the surface's than this cosine."""
+    """The share of texels whose normal leans from the surface normal by more than the angle with this cosine."""
     output, _ = source_socket(node.inputs["Color"])
     return float(numpy.mean(_pixels(output.node.image)[:, 2] * 2 - 1 < cosine))
 
 
-def _plain_coordinates(socket):
-    """Whether an image's coordinates are the UV map that the mesh shows in renders, moved by one Mapping at most."""
+def _uses_render_uv(socket):
+    """Whether an image's coordinates are the mesh's render UV map, transformed by at most one Mapping node."""
     if not socket.is_linked:
         return True
     output, path = source_socket(socket)
@@ -85,9 +86,9 @@ def _plain_coordinates(socket):
         return False
     values = [node.inputs[name] for name in ("Location", "Rotation", "Scale")]
     flat = not any(s.is_linked for s in values) and not any(node.inputs["Rotation"].default_value[:2])
-    return flat and _plain_coordinates(node.inputs["Vector"]) and not _moved(node.inputs["Vector"])
+    return flat and _uses_render_uv(node.inputs["Vector"]) and not _is_transformed(node.inputs["Vector"])
 
 
-def _moved(socket):
+def _is_transformed(socket):
     output, _ = source_socket(socket)
     return output is not None and output.is_output and output.node.type == "MAPPING"

@@ -1,22 +1,22 @@
-"""Turn a .blend into a .glb that caustique renders as Cycles would see it.
+"""Export a .blend to a .glb that caustique renders as Cycles would.
 
     .venv-bpy/bin/python scripts/blender/export.py IN.blend OUT.glb
     blender -b IN.blend --python scripts/blender/export.py -- OUT.glb
-    ... OUT.####.glb --frames 1-24                                  a file for each frame
-    import export; export.write("OUT.glb")                          the scene that is open in bpy
+    ... OUT.####.glb --frames 1-24                                  one file per frame
+    import export; export.write("OUT.glb")                          the scene open in bpy
 
-Blender's own glTF exporter writes the file, of a scene that `objects` has evaluated as a render would. Around it:
+`objects` evaluates the scene as a render would, and Blender's glTF exporter writes the file. Around the exporter:
 
-- `lighting`: area lamps become glowing meshes without a body, other lamps get size, edge and colour;
-- `surfaces`: shaders, mixes of them and node groups become the nearest glTF material, and what varies in ways that glTF
-  has no words for is baked into images (--bake-size N, --no-bake);
+- `lighting`: area lamps become emissive meshes that rays pass through; other lamps get size, edge and colour;
+- `surfaces`: shaders, mixes of shaders and node groups become the nearest glTF material. Variation that glTF cannot
+  express is baked to images (--bake-size N, --no-bake);
 - `shading`: transmissive materials on closed meshes become solid (KHR_materials_volume), so that they refract, with
   Cycles' coefficients; a custom property `abbe` (number V_d) or `dispersion` (20/V_d) becomes KHR_materials_dispersion;
-- `world` and `sky`: environment and medium, the sun of a sky texture as a lamp;
-- `cameras`: lens, shift, and the picture that the scene was made for.
+- `world` and `sky`: environment and medium; the sun of a sky texture becomes a lamp;
+- `camera_export`: lens, shift, and the scene's picture settings.
 
-What glTF cannot say stands in `extras.caustique` (docs/scene-format.md). Lights keep the exporter's standard units
-(lm/W 683). Whatever cannot be carried is named in a warning on stderr and in the file.
+`extras.caustique` holds features that glTF lacks (docs/scene-format.md). Lights keep the exporter's standard units
+(683 lm/W). A warning on stderr and in the file names each feature that is lost.
 """
 
 import argparse
@@ -28,7 +28,7 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 try:
-    import bpy  # first: it brings numpy
+    import bpy  # first: it makes numpy importable
 except ModuleNotFoundError as error:
     sys.exit(f"error: {error}\nhint: run this in Blender (blender -b IN.blend --python export.py -- OUT.glb), or in a "
              "Python that has bpy, such as the .venv-bpy/bin/python that 'scripts/setup.sh test' makes")
@@ -45,15 +45,16 @@ import sky
 import surfaces
 import world
 
-# Scales that differ by less count as even.
-_EVEN = 1.001
+# Largest ratio of two scale factors that counts as uniform.
+_MAX_EVEN_RATIO = 1.001
 
 
 def write(path, scene=None, bake_size=bake.SIZE):
-    """Export the open scene (or `scene`) at its current frame to the .glb at `path`; return the warnings, texts.
+    """Export the open scene (or `scene`) at its current frame to the .glb at `path`. Returns the warnings, a list of
+    texts.
 
-    `bake_size`: texels a side of the images into which materials are baked; 0 bakes none and names what is lost. The
-    warnings stand in the file, too, as the scene's `losses`. The scene is left as it was found.
+    `bake_size`: texels per side of baked images; 0 bakes nothing and warns of each loss instead. The file repeats the
+    warnings as the scene's `losses`. The scene is left unchanged.
     """
     path = os.path.abspath(path)
     scene = scene or bpy.context.scene
@@ -66,32 +67,32 @@ def write(path, scene=None, bake_size=bake.SIZE):
             print("warning: " + line, file=sys.stderr)
 
     with contextlib.ExitStack() as undo:
-        _look_at(scene, undo)
+        _open_scene(scene, undo)
         said, sun = world.extras(scene, path, warn)
         said.update(camera_export.picture(scene, warn))
         flat = objects.FlatScene(scene, undo, warn)
-        _look_at(flat.scene, undo)
+        _open_scene(flat.scene, undo)
         bpy.context.view_layer.update()
         for thing in flat.things:
             if thing.type == "CAMERA":
                 flat.add_extras(thing, **camera_export.extras(thing, flat, warn))
         if flat.scene.camera is not None:
             camera_export.warn_of_clipping(flat.scene.camera, flat, warn)
-        worn = surfaces.Surfaces(flat.things, _worn(flat.things), undo, warn, bake_size)
+        worn = surfaces.Surfaces(flat.things, _materials_of(flat.things), undo, warn, bake_size)
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.add_lamps(flat, warn)
         if sun is not None:
             environment = said["environment"]
             sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
-        bodies = _bodies(flat.things)
+        bodies = _solidity(flat.things)
         bpy.context.view_layer.update()
         _run_exporter(path)
     document, buffer = glb.read(path)
-    _finish_names(document, flat.names)
+    _restore_names(document, flat.names)
     buffer = worn.finish(document, buffer, bodies)
     _warn_of_stretched_normals(document, warn)
-    _finish_lamps(document)
-    _active_camera_first(document, scene)
+    _correct_lamps(document)
+    _put_active_camera_first(document, scene)
     said["losses"] = warnings
     document["scenes"][document.get("scene", 0)].setdefault("extras", {})["caustique"] = said
     used = {name for part in document.get("materials", []) for name in part.get("extensions", {})}
@@ -103,7 +104,8 @@ def write(path, scene=None, bake_size=bake.SIZE):
 
 
 def write_frames(path, first, last, bake_size=bake.SIZE):
-    """Export frames `first` to `last` of the open scene, a .glb each; `####` in `path` becomes the frame's number."""
+    """Export frames `first` to `last` of the open scene, one .glb each. The frame's number replaces `####` in
+    `path`."""
     scene, warnings = bpy.context.scene, []
     before = scene.frame_current, scene.frame_subframe
     try:
@@ -119,11 +121,12 @@ def _numbered(path, frame):
     return re.sub("#+", lambda run: str(frame).zfill(len(run.group())), path)
 
 
-def _look_at(scene, undo):
-    """Until `undo` closes, makes `scene` the one that is open."""
+def _open_scene(scene, undo):
+    """Make `scene` the open one until `undo` closes."""
     window = bpy.context.window
     if window.scene != scene:
-        undo.callback(setattr, window, "view_layer", window.view_layer)  # last, for a scene comes with its first
+        # Undone last, because setting a scene also sets its first view layer.
+        undo.callback(setattr, window, "view_layer", window.view_layer)
         undo.callback(setattr, window, "scene", window.scene)
         window.scene = scene
 
@@ -136,14 +139,14 @@ def _run_exporter(path):
         export_tangents=False, export_image_format="AUTO")
 
 
-def _worn(things):
-    """Materials that some of `things` wear."""
+def _materials_of(things):
+    """The materials of `things`."""
     found = {m.name: m for thing in things for m in surfaces.materials_of(thing) if m is not None}
     return list(found.values())
 
 
-def _bodies(things):
-    """For each worn material whether all its meshes are closed, and the least extent of their bounding boxes (m)."""
+def _solidity(things):
+    """For each material: whether all its meshes are closed, and the smallest extent of their bounding boxes (m)."""
     shapes, bodies = {}, {}
     for thing in things:
         materials = [slot.material for slot in thing.material_slots if slot.material is not None]
@@ -159,7 +162,7 @@ def _bodies(things):
 
 
 def may_transmit(material):
-    """Whether light may pass into what wears this material."""
+    """Whether light may enter an object with this material."""
     output = shading.output_of(shading.nodes_of(material))
     if output is None:
         return False
@@ -170,7 +173,7 @@ def may_transmit(material):
 
 
 def _closed(mesh):
-    """Whether every edge has two faces once vertices in the same place count as one."""
+    """Whether every edge has two faces, with vertices at equal positions merged."""
     if mesh is None or not mesh.polygons:
         return False
     places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
@@ -191,15 +194,15 @@ def _closed(mesh):
     return bool(numpy.all(uses % 2 == 0))
 
 
-def _finish_names(document, names):
-    """Gives things the names of what they stand for, whose own names are taken in Blender while both are there."""
+def _restore_names(document, names):
+    """Restore the names of the original objects and meshes, which Blender reserves while the originals exist."""
     for part in ("scenes", "nodes", "meshes"):
         for entry in document.get(part, []):
             entry["name"] = names.get(entry.get("name", ""), entry.get("name", ""))
 
 
-def _finish_lamps(document):
-    """The exporter takes an Emission node of a lamp for its power and colour, which it multiplies."""
+def _correct_lamps(document):
+    """Correct lamps with an Emission node: the exporter uses it instead of power and colour, Cycles multiplies both."""
     for entry in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
         light = bpy.data.lights.get(entry.get("name", ""))
         if light is not None:
@@ -207,18 +210,18 @@ def _finish_lamps(document):
 
 
 def _warn_of_stretched_normals(document, warn):
-    """Names objects whose normal maps Cycles stretches with them: it reads a map in the object's own space."""
+    """Warn of unevenly scaled objects with normal maps, which Cycles stretches: it reads maps in object space."""
     mapped = {i for i, material in enumerate(document.get("materials", [])) if "normalTexture" in material}
     for node in document.get("nodes", []):
         scale = [abs(s) for s in node.get("scale", (1, 1, 1))]
         parts = document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ()
-        if max(scale) > _EVEN * min(scale) and any(part.get("material") in mapped for part in parts):
+        if max(scale) > _MAX_EVEN_RATIO * min(scale) and any(part.get("material") in mapped for part in parts):
             warn(f'object "{node["name"]}"', "its scale is uneven, with which Cycles stretches normal maps: here they "
                  "keep their slopes; apply the scale (Object > Apply > Scale) to see the same in both")
 
 
-def _active_camera_first(document, scene):
-    """Readers take the first camera: make it the one that Blender renders through."""
+def _put_active_camera_first(document, scene):
+    """Put Blender's active camera first, because readers take the first camera."""
     nodes, roots = document.get("nodes", []), document["scenes"][document.get("scene", 0)].get("nodes", [])
     active = scene.camera.name if scene.camera is not None else None
     index = next((i for i, n in enumerate(nodes) if n.get("name") == active and "camera" in n), None)
@@ -237,16 +240,16 @@ def _active_camera_first(document, scene):
 
 
 def main(arguments):
-    """Command line: [IN.blend] OUT.glb; the exit code."""
+    """Run the command line [IN.blend] OUT.glb. Returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="export.py", usage="export.py [options] IN.blend OUT.glb\n       "
         "blender -b IN.blend --python export.py -- [options] OUT.glb")
     parser.add_argument("files", nargs="+", metavar="FILE", help="[IN.blend] OUT.glb")
     parser.add_argument("--frames", type=_frames, metavar="A-B",
-                        help="a file for each frame from A to B; #### in OUT.glb becomes its number")
+                        help="one file per frame from A to B; the frame's number replaces #### in OUT.glb")
     parser.add_argument("--bake-size", type=int, default=bake.SIZE, metavar="N",
-                        help=f"texels a side of the images into which materials are baked (default {bake.SIZE})")
-    parser.add_argument("--no-bake", action="store_true", help="bake no material; each loss is named")
+                        help=f"texels per side of baked images (default {bake.SIZE})")
+    parser.add_argument("--no-bake", action="store_true", help="bake nothing; warn of each loss instead")
     given = parser.parse_args(arguments)
     if len(given.files) > 2 or not given.files[-1].endswith(".glb"):
         parser.error("OUT.glb has to end in .glb, with at most one IN.blend before it")
@@ -263,14 +266,14 @@ def main(arguments):
             write_frames(given.files[-1], *given.frames, size)
         else:
             write(given.files[-1], bake_size=size)
-    except Exception as error:  # whatever Blender raises: a message and a code, never a hanging process
+    except Exception as error:  # any error of Blender: a message and an exit code, never a hanging process
         print(f"error: {given.files[0]}: {error}".strip(), file=sys.stderr)
         return 1
     return 0
 
 
 def _frames(text):
-    """The first and last frame of A-B."""
+    """The first and the last frame of the range A-B."""
     match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
     if match is None or int(match[1]) > int(match[2]):
         raise argparse.ArgumentTypeError("give the first and the last frame, as in 1-24")
@@ -281,7 +284,7 @@ if __name__ == "__main__":
     given = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
     try:
         code = main(given)
-    except SystemExit as stopped:  # help, or a command line that is wrong
+    except SystemExit as stopped:  # help, or a wrong command line
         code = stopped.code
     sys.stdout.flush()
     sys.stderr.flush()

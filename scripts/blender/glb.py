@@ -1,4 +1,4 @@
-"""Read and write the two chunks of a binary glTF file (glTF 2.0, section 4.4): a JSON document and a buffer."""
+"""Reads and writes the two chunks of a binary glTF file (glTF 2.0, section 4.4): a JSON document and a buffer."""
 
 import json
 import struct
@@ -7,7 +7,7 @@ _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 
 
 def read(path):
-    """Return (document, buffer) of the .glb at `path`; the buffer is b"" where the file has none."""
+    """Return (document, buffer) of the .glb at `path`; the buffer is b"" if the file has none."""
     with open(path, "rb") as file:
         data = file.read()
     magic, version, length = struct.unpack_from("<III", data)
@@ -28,7 +28,7 @@ def read(path):
 
 
 def write(path, document, buffer):
-    """Write `document` and `buffer` as one .glb; chunks are padded to four bytes as the format asks."""
+    """Write `document` and `buffer` as one .glb; the format requires chunks padded to four bytes."""
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     buffer += b"\0" * (-len(buffer) % 4)

@@ -1,4 +1,4 @@
-"""A matched surface written as a glTF material: factors, and images of what was baked."""
+"""Writes a matched surface as a glTF material: factors and baked images."""
 
 import os
 import tempfile
@@ -6,8 +6,8 @@ import tempfile
 import bpy
 import numpy
 
-PLAIN = "plain"  # a channel whose image the exporter has written
-_UNIFORM = 1.5e-3  # texels nearer to each other than this are one number
+PLAIN = "plain"  # marks a channel whose image Blender's exporter has written
+_UNIFORM = 1.5e-3  # largest difference of texels that count as equal
 
 
 class Writer:
@@ -17,7 +17,7 @@ class Writer:
         self.document, self.buffer = document, bytearray(buffer)
 
     def image(self, texels, name, texcoord):
-        """A texture of an array (size, size, 3 or 4) of numbers in [0, 1] as they are stored; its textureInfo."""
+        """Add a texture of an array (size, size, 3 or 4) of stored values in [0, 1]. Returns its textureInfo."""
         data = _png(texels)
         self.buffer += b"\0" * (-len(self.buffer) % 4)
         views = self.document.setdefault("bufferViews", [])
@@ -54,7 +54,7 @@ def _png(texels):
 
 
 def uniform(texels, covered):
-    """The one number or colour that an array is wherever it is `covered`, or None."""
+    """The number or colour that all `covered` texels of an array share, or None."""
     inside = texels[covered]
     if len(inside) == 0:
         return (0.0,) * 3 if texels.ndim == 3 else 0.0
@@ -66,13 +66,13 @@ def uniform(texels, covered):
 
 
 def srgb(x):
-    """Linear numbers encoded as IEC 61966-2-1 has it."""
+    """Linear values encoded as sRGB (IEC 61966-2-1)."""
     x = numpy.clip(x, 0, 1)
     return numpy.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
 def give_default(document):
-    """Let what wears no material be grey as in Cycles; glTF's own default is a rough white metal."""
+    """Give primitives without a material the grey default of Cycles; glTF's default is a rough white metal."""
     bare = [primitive for mesh in document.get("meshes", []) for primitive in mesh["primitives"]
             if "material" not in primitive]
     if bare:
@@ -85,10 +85,10 @@ def give_default(document):
 
 
 def write(entry, channels, writer, texcoord):
-    """Complete the material `entry` of the exporter by `channels`.
+    """Complete the exporter's material `entry` with `channels`.
 
-    A channel is a constant, PLAIN, or an array (size, size[, 3]) of linear numbers: one for each quantity of
-    lobes.Lobe, of matching.Matched, and `direction` (x, y) of the stretch. `texcoord` is the UV set of the arrays.
+    A channel is a constant, PLAIN, or an array (size, size[, 3]) of linear values. There is one for each quantity of
+    lobes.Lobe and matching.Matched, and `direction` (x, y) of the anisotropy. `texcoord`: UV set of the arrays.
     """
     _Entry(entry, channels, writer, texcoord).write()
 
@@ -102,7 +102,7 @@ class _Entry:
         return any(isinstance(self.channels[n], numpy.ndarray) for n in names)
 
     def factor(self, name, default=1.0):
-        """The constant that multiplies a texture, or stands alone."""
+        """The constant factor of a channel, with or without a texture."""
         value = self.channels[name]
         return default if isinstance(value, (numpy.ndarray, str)) else value
 
@@ -219,7 +219,7 @@ class _Entry:
             self.extension("sheen", content)
 
     def _emission(self):
-        """Numbers above one are split into a strength and what an image can hold."""
+        """Split emission above one into a strength and an image with values up to one."""
         emission, strength = self.channels["emission"], self.factor("strength")
         if emission is not PLAIN:
             self.entry.pop("emissiveTexture", None)

@@ -1,14 +1,14 @@
-"""Node trees read and computed with: a throw-away copy of a material in which any socket can be had at the top level.
+"""Arithmetic on node trees, in a temporary copy of a material where any socket is available at the top level.
 
-A *value* is a float, a colour of three floats, or an output socket at the top level of the copy. A *path* holds the
-group nodes around a socket, the outermost first. Arithmetic on values makes nodes only where something varies.
+A *value* is a float, a colour of three floats, or an output socket at the top level of the copy. A *path* lists the
+group nodes around a socket, outermost first. Arithmetic on values adds nodes only if an operand is not constant.
 """
 
 import bpy
 
 _SOCKETS = {"VALUE": "NodeSocketFloat", "INT": "NodeSocketFloat", "RGBA": "NodeSocketColor",
             "VECTOR": "NodeSocketVector"}
-# What these nodes give depends on nothing but their inputs.
+# Nodes whose outputs depend on their inputs alone.
 _FUNCTIONS = {
     "MATH", "VECT_MATH", "MIX", "MIX_RGB", "MAP_RANGE", "CLAMP", "GAMMA", "HUE_SAT", "INVERT", "BRIGHTCONTRAST",
     "VALTORGB", "CURVE_RGB", "CURVE_FLOAT", "CURVE_VEC", "BLACKBODY", "WAVELENGTH", "SEPARATE_COLOR", "COMBINE_COLOR",
@@ -16,15 +16,15 @@ _FUNCTIONS = {
 }
 
 
-def named(sockets, identifier):
-    """The socket of this identifier, or None: names repeat, identifiers do not."""
+def find_socket(sockets, identifier):
+    """The socket with this identifier, or None. Names may repeat, identifiers do not."""
     return next((s for s in sockets if s.identifier == identifier), None)
 
 
 def source_socket(socket, path=()):
-    """What gives an input socket its value, past reroutes, muted nodes and the borders of groups, and the path there.
+    """The socket that an input's value comes from, and its path, past reroutes, muted nodes and group borders.
 
-    An output socket; or the input socket that holds the value itself; or None where a muted node cuts the line.
+    The socket is an output, or the input that holds the value, or None if a muted node cuts the link.
     """
     while socket.is_linked and not socket.links[0].is_muted:
         output, node = socket.links[0].from_socket, socket.links[0].from_node
@@ -36,27 +36,27 @@ def source_socket(socket, path=()):
             if inner is None:
                 return None, path
         elif node.type == "GROUP" and node.node_tree is not None:
-            end = end_of(node.node_tree)
-            inner = named(end.inputs, output.identifier) if end is not None else None
+            end = group_output(node.node_tree)
+            inner = find_socket(end.inputs, output.identifier) if end is not None else None
             if inner is None:
                 return None, path
             path += (node,)
         elif node.type == "GROUP_INPUT" and path:
-            inner, path = named(path[-1].inputs, output.identifier), path[:-1]
+            inner, path = find_socket(path[-1].inputs, output.identifier), path[:-1]
         if inner is None:
             return output, path
         socket = inner
     return socket, path
 
 
-def end_of(tree):
-    """The node through which a group gives its outputs, or None."""
+def group_output(tree):
+    """The active output node of a group, or None."""
     ends = [n for n in tree.nodes if n.type == "GROUP_OUTPUT"]
     return next((n for n in ends if n.is_active_output), ends[0] if ends else None)
 
 
 def upstream(socket, path=(), seen=None):
-    """All nodes that an input socket's value comes from, with the output that is used of each."""
+    """All nodes that an input socket's value depends on, each with the output that is used."""
     seen = {} if seen is None else seen
     output, path = source_socket(socket, path)
     if output is None or not output.is_output:
@@ -70,7 +70,7 @@ def upstream(socket, path=(), seen=None):
 
 
 def is_constant(value):
-    """Whether a value is the same everywhere because it is a number or a colour."""
+    """Whether a value is a number or a colour, not a socket."""
     return not isinstance(value, bpy.types.NodeSocket)
 
 
@@ -80,7 +80,7 @@ def is_colour(value):
 
 
 class Graph:
-    """A copy of `material` until `undo` (a contextlib.ExitStack) closes, its groups copied too, one for each use."""
+    """A copy of `material` and, for each use, of its groups, until `undo` (a contextlib.ExitStack) closes."""
 
     def __init__(self, material, undo):
         self.original = material
@@ -99,7 +99,7 @@ class Graph:
                 self._own_groups(copy, undo)
 
     def trees(self):
-        """The copied node tree and those of its groups."""
+        """The copied node tree and the trees of its groups."""
         def below(tree):
             yield tree
             for node in tree.nodes:
@@ -108,7 +108,7 @@ class Graph:
         return list(below(self.tree))
 
     def value(self, socket, path=()):
-        """The value of an input socket of any depth."""
+        """The value of an input socket at any group depth."""
         output, path = source_socket(socket, path)
         if output is None:
             return (0.0,) * 3 if socket.type in {"RGBA", "VECTOR"} else 0.0
@@ -124,7 +124,7 @@ class Graph:
         return top if socket.type in {"RGBA", "VECTOR"} or top.type == "VALUE" else self.multiply(self.grey(top), 1.0)
 
     def grey(self, value):
-        """A value as one number, colours by their luminance as Cycles does."""
+        """A value as one number: colours become their luminance, as in Cycles."""
         if not is_colour(value):
             return value
         if is_constant(value):
@@ -134,7 +134,7 @@ class Graph:
         return node.outputs[0]
 
     def mean(self, value):
-        """The mean of a colour's three components."""
+        """The mean of the three components of a colour."""
         if not is_colour(value):
             return value
         if is_constant(value):
@@ -147,13 +147,13 @@ class Graph:
             for group in reversed(path):
                 inner = group.node_tree
                 item = inner.interface.new_socket("lifted", in_out="OUTPUT", socket_type=_SOCKETS[output.type])
-                inner.links.new(output, named(end_of(inner).inputs, item.identifier))
-                output = named(group.outputs, item.identifier)
+                inner.links.new(output, find_socket(group_output(inner).inputs, item.identifier))
+                output = find_socket(group.outputs, item.identifier)
             self._lifted[key] = output
         return self._lifted[key]
 
     def node(self, kind, operation, *values, output=0):
-        """An output of a new Math or Vector Math node at the top level, its inputs given."""
+        """An output of a new Math or Vector Math node at the top level with these inputs."""
         node = self.tree.nodes.new(kind)
         node.operation = operation
         for socket, value in zip(node.inputs, values):
@@ -161,7 +161,7 @@ class Graph:
         return node.outputs[output]
 
     def connect(self, value, socket):
-        """Give an input socket at the top level a value."""
+        """Set the value of an input socket at the top level, or link it."""
         if not is_constant(value):
             self.tree.links.new(value, socket)
         elif socket.type == "VALUE":
@@ -200,25 +200,25 @@ class Graph:
         return self.add(a, self.multiply(b, -1.0))
 
     def divide(self, a, b):
-        """The quotient of two values, 0 where the divisor is 0 as Blender's nodes have it."""
+        """The quotient of two values, 0 for a divisor of 0, as in Blender's nodes."""
         if is_constant(b) and b in (1.0, (1.0,) * 3):
             return a
         return self._binary("DIVIDE", lambda x, y: x / y if y else 0.0, a, b)
 
     def minimum(self, a, b):
-        """The smaller of two values, for each component."""
+        """The smaller of two values, per component."""
         return self._binary("MINIMUM", min, a, b)
 
     def maximum(self, a, b):
-        """The larger of two values, for each component."""
+        """The larger of two values, per component."""
         return self._binary("MAXIMUM", max, a, b)
 
     def power(self, a, exponent):
-        """A value to a power; what is negative counts as 0."""
+        """A value to a power; negative values count as 0."""
         return self._binary("POWER", lambda x, y: max(x, 0.0) ** y, a, exponent)
 
     def clamp(self, a):
-        """A value held within [0, 1]."""
+        """A value clamped to [0, 1]."""
         return self.minimum(self.maximum(a, 0.0), 1.0)
 
     def max_component(self, colour):
@@ -232,7 +232,7 @@ class Graph:
         return self.maximum(self.maximum(*split.outputs[:2]), split.outputs[2])
 
     def combine_channels(self, values):
-        """Three numbers as one colour."""
+        """A colour of three numbers."""
         if all(map(is_constant, values)):
             return tuple(map(float, values))
         node = self.tree.nodes.new("ShaderNodeCombineXYZ")
@@ -241,7 +241,7 @@ class Graph:
         return node.outputs[0]
 
     def varies(self, value):
-        """Whether a value differs from place to place: something upstream is no mere function of its inputs."""
+        """Whether a value varies over the surface: some node upstream depends on more than its inputs."""
         if is_constant(value):
             return False
         probe = self.tree.nodes.new("NodeReroute")

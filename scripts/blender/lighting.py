@@ -1,4 +1,4 @@
-"""Lamps in terms of what glTF and `extras.caustique` can say."""
+"""Blender's lamps as glTF lights and keys of `extras.caustique`."""
 
 import math
 
@@ -7,19 +7,19 @@ import bpy
 from shading import constant, nodes_of, output_of, source
 
 _DISC_SIDES = 64
-# Radii of a lamp within which soft falloff takes more than 2 % of its light: r^2 / (d^2 + r^2) at distance d.
-_SOFT = 7
+# Distance, in radii of a lamp, within which soft falloff removes more than 2 % of the light: r^2 / (d^2 + r^2) at d.
+_SOFT_RADII = 7
 
 
 def emission_node(light):
-    """The Emission node that shades a lamp, or None."""
+    """The Emission node of a lamp, or None."""
     output = output_of(nodes_of(light))
     shader = source(output.inputs["Surface"]) if output is not None else None
     return shader if shader is not None and shader.type == "EMISSION" else None
 
 
 def _power(light):
-    """What a lamp gives off, per channel: W, or W/m2 of the sun."""
+    """Power of a lamp per channel: W, or W/m2 for a sun."""
     power = light.energy * 2 ** getattr(light, "exposure", 0)
     tint = list(light.color)
     if getattr(light, "use_temperature", False):
@@ -32,7 +32,7 @@ def _power(light):
 
 
 def _colour(socket):
-    """The colour of a socket that is constant, or a blackbody of constant temperature; else None."""
+    """The colour of a constant socket or of a blackbody of constant temperature, else None."""
     node = source(socket)
     if node is None or node.type != "BLACKBODY":
         return constant(socket)
@@ -48,16 +48,16 @@ def _colour(socket):
 
 
 def area_radiance(light, scale=(1, 1)):
-    """Radiance (W/sr/m2) of an area light: a Lambertian emitter of area A gives off pi L A. `scale` is its object's."""
+    """Radiance L (W/sr/m2) of an area light, from its power pi L A. `scale`: the object's scale."""
     size_x, size_y = _size(light)
     area = size_x * scale[0] * size_y * scale[1] * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1)
     if not getattr(light, "normalize", True):
-        area = 1  # the energy is then per square metre
+        area = 1  # the energy is per square metre
     return [p / (math.pi * area) for p in _power(light)]
 
 
 def punctual(light):
-    """`color` and `intensity` (cd, or lx of the sun, 683 lm/W) of a point, spot or sun lamp, nodes counted."""
+    """`color` and `intensity` (cd, or lx for a sun, at 683 lm/W) of a point, spot or sun lamp, with its nodes."""
     power = _power(light)
     if light.type != "SUN" and not getattr(light, "normalize", True):
         power = [p * light.area() for p in power]
@@ -71,11 +71,11 @@ def _size(light):
 
 
 def add_lamps(flat, warn):
-    """Make the lamps of a flat scene ready for the glTF exporter: area lamps become meshes."""
+    """Prepare the lamps of a flat scene for the glTF exporter: area lamps become meshes, others get extras."""
     for thing in [t for t in flat.things if t.type == "LIGHT"]:
         light, where = thing.data, flat.where(thing)
         if light.type == "AREA" and getattr(light.cycles, "is_portal", False):
-            # It gives no light: it tells Cycles where the sky is.
+            # A portal emits no light: it guides the sampling of the sky in Cycles.
             flat.remove(thing)
             continue
         _warn_of(thing, where, warn)
@@ -91,7 +91,7 @@ def add_lamps(flat, warn):
 
 
 def _area_mesh(thing, flat):
-    """A glowing mesh that is seen from its front alone, where an area lamp shines from."""
+    """A one-sided emissive mesh in place of an area lamp."""
     light, scale = thing.data, thing.matrix_world.to_scale()
     size_x, size_y = _size(light)
     if light.shape in {"DISK", "ELLIPSE"}:
@@ -101,7 +101,7 @@ def _area_mesh(thing, flat):
         corners = [(x * size_x / 2, y * size_y / 2, 0) for x, y in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
     name = flat.names[thing.name] + " (area light)"
     mesh = flat.remove_later(bpy.data.meshes.new(name))
-    mesh.from_pydata(corners, [], [range(len(corners))])  # clockwise: the face looks down -Z, as the light does
+    mesh.from_pydata(corners, [], [range(len(corners))])  # clockwise: the face points along -Z, as the light does
     radiance = area_radiance(light, [abs(s) for s in scale[:2]])
     strength = max(max(radiance), 1e-30)
     material = flat.remove_later(bpy.data.materials.new(name))
@@ -118,12 +118,12 @@ def _area_mesh(thing, flat):
     emission.inputs["Strength"].default_value = strength
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     mesh.materials.append(material)
-    # A front stays the front where the place mirrors, as the lamp shines along its own -Z there.
+    # A mirrored transform keeps the front, because the lamp still emits along its local -Z.
     flat.add(name, mesh, thing.matrix_world.copy(), flat.hidden[thing.name], flat.groups[thing.name])
 
 
 def _warn_of(thing, where, warn):
-    """Names what is lost of a lamp."""
+    """Warn of a lamp's features that are lost."""
     light, scale = thing.data, [abs(s) for s in thing.matrix_world.to_scale()]
     if not getattr(light, "use_shadow", True):
         warn(where, "it casts no shadows in Cycles: here it does")
@@ -140,14 +140,14 @@ def _warn_of(thing, where, warn):
 
 
 def warn_of_soft_falloff(flat, warn):
-    """Names lamps whose soft falloff would show: it dims light within some radii of a lamp, which here is a sphere."""
+    """Warn of lamps with objects near enough for Blender's soft falloff to dim their light visibly."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     bodies = [thing for thing in flat.things if thing.type == "MESH"]
     for thing in flat.things:
         light = thing.data
         if thing.type != "LIGHT" or not getattr(light, "use_soft_falloff", False) or light.shadow_soft_size <= 0:
             continue
-        reach = _SOFT * light.shadow_soft_size
+        reach = _SOFT_RADII * light.shadow_soft_size
         near = next((body for body in bodies if _within(body, thing.matrix_world.translation, reach, depsgraph)), None)
         if near is not None:
             warn(flat.where(thing), f"its soft falloff is not carried: {flat.where(near)} is within {reach:.3g} m of "
@@ -155,7 +155,7 @@ def warn_of_soft_falloff(flat, warn):
 
 
 def _within(body, point, reach, depsgraph):
-    """Whether a mesh object comes as near to a point as this (m)."""
+    """Whether a mesh object comes within `reach` (m) of a point."""
     inverse = body.matrix_world.inverted_safe()
     found, at, _, _ = body.closest_point_on_mesh(inverse @ point, depsgraph=depsgraph)
     return found and (body.matrix_world @ at - point).length < reach

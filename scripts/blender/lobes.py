@@ -1,4 +1,4 @@
-"""Each shader node of Cycles as a lobe of the glTF material: the same quantities, and what is lost named."""
+"""Translates each shader node of Cycles to a lobe of the glTF material, with a warning for each loss."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,9 @@ WHITE, BLACK = (1.0,) * 3, (0.0,) * 3
 class Lobe:
     """Quantities of glTF's metallic-roughness model and its extensions, each a value of a graph.
 
-    `roughness` is perceptual (GGX alpha is its square), `ior` 0 stands for a reflectance that keeps to `specular` and
-    `specular_colour`, `anisotropy` is the extension's strength, `tangent` the direction of its larger alpha.
+    `roughness` is perceptual (GGX alpha is its square). With `ior` 0 the reflectance is `specular` times
+    `specular_colour` at all angles. `anisotropy` is the extension's strength, `tangent` the direction of the larger
+    alpha.
     """
     base: object = BLACK
     metallic: object = 0.0
@@ -31,17 +32,17 @@ class Lobe:
     emission: object = BLACK
     strength: object = 0.0
     thin: bool = False
-    faceted: bool = True  # roughness and anisotropy mean something
+    faceted: bool = True  # roughness and anisotropy have an effect
 
 
 class Reader:
-    """Translates leaves of a surface; `say` takes what is lost or approximated."""
+    """Translates leaves of a surface; `say` receives a warning for each loss or approximation."""
 
     def __init__(self, graph, say):
         self.graph, self.say = graph, say
 
     def lobe(self, leaf):
-        """The lobe of a leaf, or None for what is transparent or only shines."""
+        """The lobe of a leaf, or None for a transparent or emissive shader."""
         node = leaf.node
         if leaf.coat is not None:
             return self._dielectric(leaf)
@@ -52,18 +53,18 @@ class Reader:
         return read(self, leaf)
 
     def get(self, leaf, name):
-        """The value of an input of the leaf's node, or None where this version of Blender has no such input."""
+        """The value of an input of the leaf's node, or None if this version of Blender lacks the input."""
         socket = leaf.node.inputs.get(name)
         return None if socket is None else self.graph.value(socket, leaf.path)
 
-    def _named(self, leaf, name, text):
-        """Say `text` where an input is not zero."""
+    def _warn_unless_zero(self, leaf, name, text):
+        """Warn with `text` if an input is not zero."""
         value = self.get(leaf, name)
         if value is not None and not (is_constant(value) and value in (0.0, BLACK)):
             self.say(text)
 
     def normal(self, leaf, name="Normal"):
-        """The socket that bends the normal, or None."""
+        """The socket of the shading normal, or None if it is not linked."""
         value = self.get(leaf, name)
         return None if value is None or is_constant(value) else value
 
@@ -71,7 +72,8 @@ class Reader:
         node = leaf.node
         colour = self.get(leaf, "Color") or self.get(leaf, "Base Color") or BLACK
         if node.type == "BSDF_DIFFUSE":
-            self._named(leaf, "Roughness", "the Roughness of its Diffuse shader is not carried: it is Lambertian")
+            self._warn_unless_zero(
+                leaf, "Roughness", "the Roughness of its Diffuse shader is not carried: it is Lambertian")
         return Lobe(base=colour, normal=self.normal(leaf), faceted=False)
 
     def _subsurface(self, leaf):
@@ -83,7 +85,7 @@ class Reader:
         return Lobe(base=self.get(leaf, "Color"), transmission=1.0, thin=True, normal=self.normal(leaf), faceted=False)
 
     def _glossy(self, leaf):
-        """A constant reflectance as a metal's, whose own rises towards the rim: by 1/21 of the rest on average."""
+        """Glossy reflectance is constant; a metal's rises at grazing angles, by 1/21 of the remainder on average."""
         colour = self.get(leaf, "Color")
         if is_constant(colour) and max(colour) - min(colour) > 0.1:
             self.say("the reflectance of its tinted Glossy shader rises towards the rim")
@@ -108,11 +110,11 @@ class Reader:
         return g.divide(g.add(g.multiply(below, below), k2), g.add(g.multiply(above, above), k2))
 
     def _glass(self, leaf):
-        self._named(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
+        self._warn_unless_zero(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
         colour = self.get(leaf, "Color")
         lobe = Lobe(base=colour, roughness=self.get(leaf, "Roughness"), transmission=1.0, ior=self.get(leaf, "IOR"),
                     normal=self.normal(leaf))
-        if leaf.node.type == "BSDF_GLASS":  # its reflection is tinted, too
+        if leaf.node.type == "BSDF_GLASS":  # Cycles also tints its reflection
             lobe.specular = self.graph.minimum(self.graph.max_component(colour), 1.0)
             lobe.specular_colour = self.graph.divide(colour, self.graph.maximum(lobe.specular, 1e-6))
             if is_constant(colour) and max(colour) - min(colour) > 0.25:
@@ -121,7 +123,7 @@ class Reader:
         return lobe
 
     def _dielectric(self, leaf):
-        """Glossy facets over diffuse, refracting or transparent shaders, in the share of Fresnel's equations."""
+        """Glossy facets over a diffuse, refractive or transparent shader, mixed by Fresnel's equations."""
         socket, path = leaf.ior
         ior = self.graph.value(socket, path)
         if socket.node.type == "LAYER_WEIGHT":
@@ -134,7 +136,7 @@ class Reader:
         return self._facets(coat, lobe)
 
     def _facets(self, leaf, lobe):
-        """Roughness, anisotropy and normal of a shader with GGX facets."""
+        """Set roughness, anisotropy and normal of a shader with GGX facets."""
         lobe.roughness, lobe.normal = self.get(leaf, "Roughness"), self.normal(leaf)
         self._distribution(leaf, lobe)
         stretch = self.get(leaf, "Anisotropy") if "Anisotropy" in leaf.node.inputs else self.get(leaf, "Anisotropic")
@@ -147,8 +149,10 @@ class Reader:
             self.say(f"its {leaf.node.distribution.title()} facets are taken for GGX")
 
     def _stretched(self, leaf, lobe, stretch):
-        """Cycles stretches alpha to alpha / a along a tangent and alpha a across; a^2 = 1 - 0.9 s in Principled, else
-        a = 1 - s. glTF keeps alpha across, and moves the share of its squared strength of the way to 1 along.
+        """Set anisotropy and tangent from the stretch s.
+
+        Cycles: alpha / a along the tangent, alpha a across, with a^2 = 1 - 0.9 s in Principled, else a = 1 - s.
+        glTF: alpha across; along, alpha and 1 are interpolated by the squared strength.
         """
         g, turn = self.graph, self.get(leaf, "Anisotropic Rotation")
         alpha = g.multiply(lobe.roughness, lobe.roughness)
@@ -169,7 +173,8 @@ class Reader:
         return lobe
 
     def _tangent(self, leaf, turns):
-        """The direction of the highlight's stretch: the Tangent input, or Blender's about the object's axis, turned."""
+        """The rotated tangent of an anisotropic shader: the Tangent input, or Blender's default about the object's
+        axis."""
         g, tangent = self.graph, self.normal(leaf, "Tangent")
         geometry = g.tree.nodes.new("ShaderNodeNewGeometry")
         if tangent is None:
@@ -189,9 +194,10 @@ class Reader:
                     sheen_roughness=self._sheen_roughness(self.get(leaf, "Roughness")))
 
     def _sheen_roughness(self, roughness):
-        """The roughness at which glTF's sheen reflects about as much as Cycles' fibres do at this one."""
+        """The roughness at which glTF's sheen has about the albedo of Cycles' sheen at `roughness`."""
         g = self.graph
-        return g.minimum(g.add(g.multiply(roughness, 0.88), g.multiply(g.maximum(g.subtract(roughness, 0.5), 0.0), 1.0)), 1.0)
+        excess = g.maximum(g.subtract(roughness, 0.5), 0.0)
+        return g.minimum(g.add(g.multiply(roughness, 0.88), g.multiply(excess, 1.0)), 1.0)
 
     def _principled(self, leaf):
         g = self.graph
@@ -201,7 +207,7 @@ class Reader:
             specular_colour=self.get(leaf, "Specular Tint"), coat=g.clamp(self.get(leaf, "Coat Weight")),
             coat_roughness=self.get(leaf, "Coat Roughness"), emission=self.get(leaf, "Emission Color"),
             strength=self.get(leaf, "Emission Strength"))
-        # Principled glass takes the root of the colour at each of a body's two surfaces.
+        # Principled glass applies the square root of the colour at each of two surfaces.
         clear = g.multiply(lobe.transmission, g.subtract(1.0, lobe.metallic))
         lobe.base = g.add(g.multiply(lobe.base, g.subtract(1.0, clear)), g.multiply(g.power(lobe.base, 0.5), clear))
         both = is_constant(clear) and 0 < clear < 1
@@ -213,16 +219,17 @@ class Reader:
         if lobe.metallic != 0.0 and self.get(leaf, "Specular Tint") != WHITE:
             self.say("the tint of its metal's rim (Specular Tint) is not carried: the rim reflects white")
         if lobe.metallic != 1.0 and lobe.transmission != 1.0:
-            self._named(leaf, "Diffuse Roughness", "Diffuse Roughness is not carried: its diffuse part is Lambertian")
-            self._named(leaf, "Subsurface Weight",
-                        "Subsurface Weight is not carried: light leaves where it arrives")
-        self._named(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
+            self._warn_unless_zero(
+                leaf, "Diffuse Roughness", "Diffuse Roughness is not carried: its diffuse part is Lambertian")
+            self._warn_unless_zero(
+                leaf, "Subsurface Weight", "Subsurface Weight is not carried: light leaves where it arrives")
+        self._warn_unless_zero(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
         return lobe
 
     def _reflectance(self, leaf, lobe):
-        """Cycles scales the reflectance at normal incidence by twice the level, and takes the index that has it."""
+        """Set specular and index: Cycles scales the reflectance at normal incidence by twice the specular level."""
         g, level = self.graph, self.get(leaf, "Specular IOR Level")
-        if lobe.transmission == 1.0:  # of which the level says nothing
+        if lobe.transmission == 1.0:  # the level does not affect glass
             return
         if is_constant(level) and is_constant(lobe.ior) and 0 < level:
             if level != 0.5:
@@ -239,7 +246,7 @@ class Reader:
             tint = self.get(leaf, "Coat Tint")
             if tint != WHITE:
                 self.say("Coat Tint is approximated by a tint of what lies below the coat")
-                # Light is seen through 1 / cos of the coat's thickness: 1.146 on average at an index of 1.5.
+                # Path length through the coat is 1 / cos, 1.146 on average at an index of 1.5.
                 tint = g.power(tint, 1.146)
                 lobe.base = g.multiply(lobe.base, g.add(g.multiply(tint, lobe.coat), g.subtract(1.0, lobe.coat)))
             if self.normal(leaf, "Coat Normal") is not None:

@@ -1,5 +1,5 @@
-"""A material's surface matched to the glTF material: closures weighed, joined where the model can hold them, and
-approximated by their means, by name, where it cannot."""
+"""Matches a material's surface to the glTF material: weighted closures are merged where the model can represent the
+mix, and otherwise averaged, with a warning."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -13,14 +13,14 @@ _GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC"}
 
 @dataclass
 class Matched(Lobe):
-    """A lobe that stands for a whole surface, and how much of it is there."""
+    """A lobe that represents a whole surface, with its coverage and emission."""
     alpha: object = 1.0
 
 
 def match(material, output, undo, say):
-    """The graph of `material` and what its surface becomes; `say` names what is lost.
+    """The graph of `material` and its matched surface. `say` receives a warning for each loss.
 
-    A material without a surface is black, or bounds its medium.
+    A material without a surface shader is black, or the boundary of its medium.
     """
     graph = Graph(material, undo)
     socket = graph.tree.nodes[output.name].inputs["Surface"]
@@ -34,7 +34,7 @@ def match(material, output, undo, say):
 
 
 def _film(colour):
-    """What bends nothing and reflects nothing, of this transmittance."""
+    """A thin film of this transmittance, without refraction and reflection."""
     return Matched(base=colour, roughness=0.0, transmission=1.0, ior=1.0, thin=True)
 
 
@@ -44,7 +44,7 @@ class _Match:
         self.reader = Reader(graph, say)
 
     def surface(self, weighed, has_volume):
-        """What the pairs of leaf and weight become."""
+        """The matched surface of pairs of leaf and weight."""
         g, clear, lobes, shining, kinds = self.graph, [], [], [], []
         self.adds_up &= all(leaf.node.type not in {"EMISSION", "HOLDOUT", "BSDF_RAY_PORTAL"} for leaf, _ in weighed)
         for leaf, weight in weighed:
@@ -71,13 +71,13 @@ class _Match:
         if clear and any(lobe.transmission == 1.0 and not lobe.thin for lobe, _ in lobes):
             self.say("glass that is partly transparent is approximated: light that came in through its transparent "
                      "share is not within the glass")
-        found = self._joined([(lobe, within(part)) for lobe, part in lobes], kinds)
+        found = self._merge([(lobe, within(part)) for lobe, part in lobes], kinds)
         found = Matched(**{f.name: getattr(found, f.name) for f in fields(Lobe)}, alpha=alpha)
         found.emission, found.strength = self._emission([(within(w), c, s) for w, c, s in shining])
         return found
 
     def _through(self, clear, shining, has_volume):
-        """A surface that scatters nothing: a film where it tints, shines or bounds a medium, else a hole."""
+        """A surface without scattering: a film if it tints, emits or bounds a medium, else a hole (alpha 0)."""
         g = self.graph
         tint = BLACK
         for weight, colour in clear:
@@ -90,7 +90,7 @@ class _Match:
         return replace(_film(tint), emission=emission, strength=strength, thin=not has_volume)
 
     def _alpha(self, clear, lobes):
-        """Coverage, and a function that makes of a part of the whole a part of what is covered."""
+        """Coverage, and a function from a share of the whole surface to a share of the covered part."""
         g = self.graph
         if not clear:
             return 1.0, lambda part: part
@@ -121,8 +121,8 @@ class _Match:
             total = g.add(total, g.multiply(g.multiply(weight, strength), colour))
         return total, (1.0 if shining else 0.0)
 
-    def _joined(self, lobes, kinds):
-        """One lobe for several, each with its part of the whole."""
+    def _merge(self, lobes, kinds):
+        """One lobe that represents several, each with its share."""
         g = self.graph
         if len(lobes) == 1 and lobes[0][1] == 1.0 and not self._is_dark_gloss(lobes[0][0], kinds[0]):
             return lobes[0][0]
@@ -148,11 +148,11 @@ class _Match:
 
     @staticmethod
     def _is_dark_gloss(lobe, kind):
-        """Whether a metal, which reflects more towards grazing angles, would show that this shader does not."""
+        """Whether a shader is so dark a gloss that a metal's rise at grazing angles would show."""
         return kind in _GLOSSY and is_constant(lobe.base) and max(lobe.base) < 0.7
 
     def _sum(self, values, weights):
-        """The weighed mean of values, the same constant where all are; weights need not sum to one."""
+        """The weighted mean of values, exact if all are one constant. Weights need not sum to one."""
         g = self.graph
         if all(is_constant(v) and v == values[0] for v in values):
             return values[0]
@@ -169,15 +169,15 @@ class _Match:
         return g.divide(top, below if is_constant(below) else g.maximum(below, 1e-5))
 
     def _under_constant_gloss(self, lobes, parts, diffuse):
-        """Glossy shaders reflect the same at every angle: facets of that reflectance over what is diffuse.
+        """Glossy shaders as facets of constant reflectance over a diffuse base.
 
-        The facets keep 1 - r from the base, r their largest component; the colour below makes up for it.
+        The facets pass 1 - r to the base, with r their largest component; the base colour compensates for it.
         """
         g = self.graph
         under, gloss = BLACK, BLACK
         shiny = [(lobe, part) for lobe, part, matt in zip(lobes, parts, diffuse) if not matt]
         for lobe, part, matt in zip(lobes, parts, diffuse):
-            # Undo the metal's rise towards the rim.
+            # Undo the metal's rise at grazing angles.
             colour = lobe.base if matt else g.add(g.multiply(lobe.base, 20 / 21), 1 / 21)
             colour = g.multiply(colour, part)
             under, gloss = (g.add(under, colour), gloss) if matt else (under, g.add(gloss, colour))
@@ -197,7 +197,7 @@ class _Match:
         return any(value is not values[0] and value != values[0] for value in values)
 
     def _mean(self, lobes, parts):
-        """Every quantity averaged, each over the lobes in which it means something."""
+        """Each quantity averaged over the lobes that use it."""
         g = self.graph
         dull = [g.multiply(p, g.subtract(1.0, lobe.metallic)) for lobe, p in zip(lobes, parts)]
         shiny = [p if lobe.faceted else 0.0 for lobe, p in zip(lobes, parts)]

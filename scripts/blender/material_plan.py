@@ -1,5 +1,5 @@
-"""What becomes of one material: which of its quantities are numbers, which are images that glTF can say as they are,
-and which are baked."""
+"""Decides how to export each quantity of a material: as a constant, as an image that glTF can use directly, or
+baked."""
 
 from dataclasses import fields
 
@@ -20,31 +20,33 @@ _PASSES = {
     "specular_colour": ("specular_colour",), "sheen": ("sheen",), "emission": ("emission",),
     "stretch": ("direction", "anisotropy"), "normal": ("normal",),
 }
-_SPOKEN = {
+_DISPLAY_NAMES = {
     "base": "Base Color", "transmission": "Transmission", "roughness": "Roughness", "metallic": "Metallic",
     "alpha": "Alpha", "coat": "Coat", "coat_roughness": "Coat Roughness", "specular": "Specular", "ior": "IOR",
     "sheen_roughness": "Sheen Roughness", "specular_colour": "Specular Tint", "sheen": "Sheen", "emission": "Emission",
     "anisotropy": "Anisotropy", "direction": "the direction of Anisotropy", "normal": "Normal",
 }
-_WITHOUT = {  # what stands where nothing may be baked
+_UNBAKED_DEFAULTS = {  # values of varying quantities if nothing may be baked
     "base": (0.8,) * 3, "emission": (1.0,) * 3, "roughness": 0.5, "metallic": 0.0, "transmission": 0.0, "alpha": 1.0,
     "ior": 1.5, "specular": 1.0, "specular_colour": (1.0,) * 3, "coat": 0.0, "coat_roughness": 0.0,
     "sheen": (0.0,) * 3, "sheen_roughness": 0.5, "anisotropy": 0.0, "normal": None,
 }
-_STEEP = 0.75  # cosine
-_IS_STEEP = ("its normals lean by more than 40 degrees from the surface: its shine is brighter there than in Cycles, "
-             "which loses part of it; use a Displace modifier for relief that steep")
+_STEEP_COSINE = 0.75  # between the shading and the surface normal
+_STEEP_WARNING = (
+    "its normals lean by more than 40 degrees from the surface: its shine is brighter there than in Cycles, "
+    "which loses part of it; use a Displace modifier for relief that steep")
 
 
 def matt(colour):
-    """The channels of a Lambertian surface, which is what Cycles makes of a material without nodes."""
+    """The channels of a diffuse surface, as Cycles renders a material without nodes."""
     return {f.name: getattr(Matched(), f.name) for f in fields(Matched)} | {"base": tuple(colour), "direction": 0.0}
 
 
 class Plan:
-    """What becomes of one material: `channels` as gltfmaterial.write takes them, and `passes`, {name: value to bake}.
+    """How one material is exported: `channels` for gltfmaterial.write, and `passes`, {name: value to bake}.
 
-    `unbaked` are the channels where the baker cannot go. Without `may_bake` what would be baked is named instead.
+    `unbaked`: the channels for objects that cannot be baked. Without `may_bake` nothing is baked, and a warning names
+    each loss.
     """
 
     def __init__(self, material, baker, may_bake, undo, warn):
@@ -63,11 +65,11 @@ class Plan:
         del values["faceted"]
         tangent = values.pop("tangent")
         values["direction"] = self._direction(tangent) if tangent is not None else 0.0
-        self._fold(values)
+        self._fold_constants(values)
         if values["emission"] == (0.0,) * 3 or values["strength"] == 0.0:
             values["emission"], values["strength"] = (0.0,) * 3, 1.0
         self._displacement(output, values)
-        self._name_plain(values)
+        self._find_direct_images(values)
         if not (is_constant(values["strength"]) and (is_constant(values["emission"]) or "emission" in self.links)):
             values["emission"] = self.graph.multiply(values["emission"], values["strength"])
             values["strength"] = 1.0
@@ -75,26 +77,26 @@ class Plan:
         if self.bumped and "normal" not in varying:
             varying.append("normal")
         if not self.may_bake:
-            self._without(values, varying)
+            self._drop_varying(values, varying)
             varying = []
         self.channels = {n: PLAIN if n in self.links else v for n, v in values.items()}
-        self.unbaked = {n: _WITHOUT.get(n, 0.0) if n in varying else v for n, v in self.channels.items()}
+        self.unbaked = {n: _UNBAKED_DEFAULTS.get(n, 0.0) if n in varying else v for n, v in self.channels.items()}
         for name, parts in _PASSES.items():
             if any(part in varying for part in parts):
-                self.passes[name] = self._packed(name, parts, values)
+                self.passes[name] = self._pack(name, parts, values)
         if self.passes:
             if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
                 self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
             standin.read_generated(self.graph)
-            self.of_object = standin.of_object(self.graph)
-            names = [_SPOKEN[n] for n in varying if n not in {"direction"}]
+            self.of_object = standin.depends_on_object(self.graph)
+            names = [_DISPLAY_NAMES[n] for n in varying if n not in {"direction"}]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.baker.size} x "
                      f"{self.baker.size} texels")
             if "ior" in varying:
                 self.say("IOR varies: its mean is taken")
 
-    def _fold(self, values):
-        """Make numbers of what mere functions of numbers give."""
+    def _fold_constants(self, values):
+        """Replace values that depend on constants alone by numbers."""
         folded = [n for n, v in values.items() if not is_constant(v) and n != "normal" and not self.graph.varies(v)]
         if folded:
             found = self.baker.constants(self.graph, [values[n] for n in folded])
@@ -103,7 +105,7 @@ class Plan:
                 values[name] = (value,) * 3 if colour and isinstance(value, float) else value
 
     def _displacement(self, output, values):
-        """Displacement bends normals in Cycles unless it is told to move the surface."""
+        """Set `bumped`: in Cycles, displacement changes normals alone unless the material moves the surface."""
         self.bumped = output.inputs["Displacement"].is_linked
         method = getattr(self.material, "displacement_method", "BUMP")
         if self.bumped and method != "BUMP":
@@ -111,7 +113,8 @@ class Plan:
         self.bumped = self.bumped and method != "DISPLACEMENT"
 
     def _direction(self, tangent):
-        """The direction (x, y, 0) of a stretch against the tangents of the UV map that is baked."""
+        """Direction (x, y, 0) of the anisotropy in the tangent frame of the baked UV map, mapped from [-1, 1] to [0,
+        1]."""
         g = self.graph
         along, geometry = g.tree.nodes.new("ShaderNodeTangent"), g.tree.nodes.new("ShaderNodeNewGeometry")
         along.direction_type, along.uv_map = "UV_MAP", standin.UV
@@ -120,11 +123,11 @@ class Plan:
         x, y = (g.node("ShaderNodeVectorMath", "DOT_PRODUCT", tangent, axis, output="Value")
                 for axis in (along.outputs[0], across))
         long = g.power(g.add(g.multiply(x, x), g.multiply(y, y)), 0.5)
-        # As an image holds it, for a baked light is not negative.
+        # In [0, 1], because baked emission cannot be negative.
         return g.combine_channels([g.add(g.multiply(g.divide(part, long), 0.5), 0.5) for part in (x, y)] + [0.0])
 
-    def _name_plain(self, values):
-        """Find what the exporter carries as it is: `self.links` by channel, the socket that it reads."""
+    def _find_direct_images(self, values):
+        """Find images that Blender's exporter writes itself: `self.links`, {channel: socket to export}."""
         links, base, alpha = self.links, values["base"], values["alpha"]
         image = direct_images.image_of(base, data=False) if not is_constant(base) else None
         if image is not None:
@@ -133,7 +136,7 @@ class Plan:
                 links["base"] = base
                 if own:
                     links["alpha"] = alpha
-        found = {n: self._data(values[n], part) for n, part in (("roughness", "Green"), ("metallic", "Blue"))
+        found = {n: self._data_image(values[n], part) for n, part in (("roughness", "Green"), ("metallic", "Blue"))
                  if not is_constant(values[n])}
         if found and all(found.values()) and is_constant(values["transmission"]):
             if len({node.name for node, _ in found.values()}) == 1:
@@ -147,11 +150,11 @@ class Plan:
         stretched = not is_constant(values["direction"])
         if normal is not None and not self.bumped and not stretched and direct_images.normal_map(normal) is not None:
             links["normal"] = normal
-            if direct_images.leaning_share(normal.node, _STEEP) > 0.01:
-                self.say(_IS_STEEP)
+            if direct_images.leaning_share(normal.node, _STEEP_COSINE) > 0.01:
+                self.say(_STEEP_WARNING)
 
-    def _data(self, value, part):
-        """The Image Texture node of which a number is the `part`, or the grey, and the socket to read; or None."""
+    def _data_image(self, value, part):
+        """The Image Texture node whose channel `part` or grey value is `value`, and the socket to export; or None."""
         node = value.node
         grey = node.type == "RGBTOBW"
         if not grey and (node.type != "SEPARATE_COLOR" or node.mode != "RGB" or value.name != part):
@@ -164,7 +167,7 @@ class Plan:
             return None
         return image, output if grey else value
 
-    def _without(self, values, varying):
+    def _drop_varying(self, values, varying):
         for name in varying:
             value = values[name]
             if name == "direction":
@@ -172,10 +175,11 @@ class Plan:
                 values["anisotropy"] = 0.0
                 continue
             source = value.node.bl_label if isinstance(value, bpy.types.NodeSocket) else "Displacement"
-            self.say(f"{_SPOKEN[name]} comes from a {source} node and is not baked: leave out --no-bake to carry it")
-            values[name] = _WITHOUT.get(name)
+            self.say(f"{_DISPLAY_NAMES[name]} comes from a {source} node and is not baked: "
+                     "leave out --no-bake to carry it")
+            values[name] = _UNBAKED_DEFAULTS.get(name)
 
-    def _packed(self, name, parts, values):
+    def _pack(self, name, parts, values):
         if name == "normal":
             return values["normal"]
         if name == "stretch":
@@ -186,16 +190,17 @@ class Plan:
             return values[parts[0]]
         return self.graph.combine_channels([self.graph.grey(values[part]) for part in parts])
 
-    def resolved(self, baked):
-        """The channels, with texels in the place of what was baked: {pass: texels}."""
+    def resolve(self, baked):
+        """The channels with the baked texels filled in. `baked`: {pass: texels}."""
         channels = dict(self.channels)
         for name, texels in baked.items():
             covered = texels[..., 3] > 0
             parts = _PASSES[name]
             if name == "normal":
                 channels["normal"] = _normals(texels, covered)
-                if channels["normal"] is not None and numpy.mean(channels["normal"][covered][:, 2] < _STEEP) > 0.01:
-                    self.say(_IS_STEEP)
+                normals = channels["normal"]
+                if normals is not None and numpy.mean(normals[covered][:, 2] < _STEEP_COSINE) > 0.01:
+                    self.say(_STEEP_WARNING)
                 continue
             if name == "stretch":
                 channels["direction"] = texels[..., :2] * 2 - 1
@@ -210,8 +215,8 @@ class Plan:
                     channels[part] = float(one[covered].mean())
         return channels
 
-    def finished(self):
-        """A material that ends in a Principled shader, with the images that the exporter carries."""
+    def make_principled(self):
+        """A copy of the material with one Principled shader, linked to the images that the exporter writes."""
         graph, tree = self.graph, self.graph.tree
         node = tree.nodes.new("ShaderNodeBsdfPrincipled")
         sockets = {"base": "Base Color", "alpha": "Alpha", "roughness": "Roughness", "metallic": "Metallic",
@@ -230,7 +235,7 @@ class Plan:
 
 
 def _normals(texels, covered):
-    """Tangent-space normals (x, y, z), or None where none is bent."""
+    """Tangent-space normals (x, y, z), or None if all equal the surface normal."""
     bent = texels[..., :3] * 2 - 1
     if numpy.abs(bent[covered][:, :2]).max(initial=0.0) < 2e-3:
         return None

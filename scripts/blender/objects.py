@@ -1,7 +1,8 @@
-"""The scene as a render would evaluate it, flat: every visible thing once, in the world, without modifiers or parents.
+"""The scene as a render would evaluate it, flat: each visible object once, in world space, without modifiers or
+parents.
 
-`FlatScene` is a scene of its own that holds them while the exporter runs: meshes after all modifiers, shape keys, armatures
-and geometry nodes, shared by the instances of the same; lamps and cameras with their evaluated transforms.
+`FlatScene` is a temporary Blender scene for the exporter. Its meshes are evaluated (modifiers, shape keys, armatures,
+geometry nodes) and shared by instances; lamps and cameras have their evaluated transforms.
 """
 
 import bpy
@@ -11,8 +12,8 @@ import standin
 import visibility
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
-# What stands in a scene and is not seen.
-_UNSEEN = {"EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
+# Types of objects that are never visible in renders.
+_INVISIBLE = {"EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
 _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes that vary in space are not carried",
          "POINTCLOUD": "point clouds are not carried: convert them to meshes",
@@ -23,8 +24,8 @@ _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes 
 class FlatScene:
     """The evaluated scene until `undo` (a contextlib.ExitStack) closes.
 
-    `things` are its objects, `names` the names of the objects and meshes that they stand for, `hidden` the kinds of rays
-    that do not see each of `things`, and `groups` the group of lights that each is in, or None.
+    `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
+    of rays that do not hit it. `groups`: the light group of each, or None.
     """
 
     def __init__(self, scene, undo, warn):
@@ -37,15 +38,15 @@ class FlatScene:
         self.scene = bpy.data.scenes.new(scene.name)
         self.names[self.scene.name] = scene.name
         undo.callback(bpy.data.scenes.remove, self.scene)
-        # At once, for Blender looks through all there is for every removal.
+        # One call, because Blender searches all data for every removal.
         undo.callback(lambda: bpy.data.batch_remove(self._made))
         for name in ("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"):
             setattr(self.scene.render, name, getattr(scene.render, name))
         self.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        # All is taken before anything is put: new objects end the walk through the old ones.
+        # Collect all instances first: new objects invalidate the depsgraph's iterator.
         concerned = {thing for thing in scene.objects if thing.visible_get(view_layer=layer)}
-        # Curves, text and metaballs come twice: as they are, and as the mesh that they make.
+        # Curves, text and metaballs occur twice: as themselves, and as their evaluated mesh.
         meshed = {i.object.original for i in depsgraph.object_instances if i.object.type == "MESH"}
         found = []
         for instance in depsgraph.object_instances:
@@ -53,35 +54,36 @@ class FlatScene:
             if instance.object.type == "MESH" or instance.object.original not in meshed:
                 found.append(self._take(instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
-            # It is looked through, although it is not shown.
+            # The camera counts even if it is hidden.
             place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()
             found.append((scene.camera, scene.camera.data, place, [], None))
         for mesh, original in self._shapes:
-            standin.generate(original, mesh, lambda what, name=original.name: warn(f'object "{name}"', what))
+            standin.add_generated_coordinates(
+                original, mesh, lambda what, name=original.name: warn(f'object "{name}"', what))
         for taken in filter(None, found):
             self._put(*taken)
         for thing in sorted(concerned, key=lambda thing: thing.name):
             self._warn_of(thing)
 
     def add_extras(self, thing, **keys):
-        """Lets keys of `extras.caustique` stand on the node of one of `things`."""
+        """Set keys of `extras.caustique` on the node of one of `things`."""
         before = thing["caustique"].to_dict() if "caustique" in thing else {}
         thing["caustique"] = {**before, **keys}
 
     def where(self, thing):
-        """One of `things` in the words of a warning."""
+        """How warnings name one of `things`."""
         kind = {"LIGHT": "light", "CAMERA": "camera"}.get(thing.type, "object")
         return f'{kind} "{self.names[thing.name]}"'
 
     def remove_later(self, block):
-        """Removes a block of Blender's data with the flat scene; the block."""
+        """Remove a data block of Blender together with the flat scene. Returns the block."""
         self._made.append(block)
         return block
 
     def _take(self, instance, depsgraph):
-        """The object, data and place (world matrix) of an instance, and what does not see it; None if nothing does."""
+        """Object, data, world matrix, hidden rays and light group of an instance, or None if it is invisible."""
         thing = instance.object
-        if not (instance.is_instance or instance.show_self) or thing.type in _UNSEEN or _is_pattern(instance):
+        if not (instance.is_instance or instance.show_self) or thing.type in _INVISIBLE or _is_pattern(instance):
             return None
         if thing.type in _LOST:
             self._warn(f'object "{thing.name}"', _LOST[thing.type])
@@ -99,17 +101,17 @@ class FlatScene:
         return data and (thing.original, data, instance.matrix_world.copy(), hidden, group)
 
     def _mesh(self, instance, depsgraph):
-        """The evaluated mesh of an instance, made once for all that share it; None if it has no faces."""
+        """The evaluated mesh of an instance, shared with equal instances; None without faces."""
         thing = instance.object
         name = thing.original.data.name
         by_nodes = instance.is_instance and instance.instance_object.original == instance.parent.original
         key = (thing.original.name_full, thing.data.as_pointer())
-        if not by_nodes and _is_bare(thing.original):
+        if not by_nodes and _is_unmodified(thing.original):
             key = thing.original.data.name_full
         if key in self._meshes:
             return self._meshes[key]
         if by_nodes and thing.type == "MESH":
-            mesh = thing.data.copy()  # it is of no object
+            mesh = thing.data.copy()  # geometry nodes made it: it belongs to no object
         else:
             mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
             self._shapes.append((mesh, thing.original))
@@ -121,8 +123,8 @@ class FlatScene:
         return self._meshes[key]
 
     def _put(self, original, data, matrix, hidden, group):
-        if isinstance(data, bpy.types.Mesh) and not _is_plain(matrix):
-            # A sheared object has no place that location, rotation and scale could tell: its mesh gets it instead.
+        if isinstance(data, bpy.types.Mesh) and not _has_no_shear(matrix):
+            # Location, rotation and scale cannot express shear: transform a copy of the mesh instead.
             sheared = data.copy()
             self.names[self.remove_later(sheared).name] = self.names[data.name]
             sheared.transform(matrix)
@@ -140,7 +142,7 @@ class FlatScene:
             self._warn(self.where(body), f"it is hidden from {', '.join(rest)} rays in Cycles: here they meet it")
 
     def add(self, name, data, matrix, hidden=(), group=None):
-        """A thing of this name, data, place (world matrix), kinds of rays that do not see it, and group of lights."""
+        """Add an object with this world matrix, the kinds of rays that do not hit it, and its light group."""
         body = self.remove_later(bpy.data.objects.new(name, data))
         self.names[body.name] = name
         self.scene.collection.objects.link(body)
@@ -155,12 +157,12 @@ class FlatScene:
         return body
 
     def remove(self, thing):
-        """Takes one of `things` out of the scene."""
+        """Remove one of `things` from the scene."""
         self.things.remove(thing)
         self.scene.collection.objects.unlink(thing)
 
     def _warn_of(self, thing):
-        """Names what Cycles would show of an object and this does not."""
+        """Warn of an object's features that are visible in Cycles and lost here."""
         where = f'object "{thing.name}"'
         for system in getattr(thing, "particle_systems", ()):
             kind = system.settings.render_type
@@ -177,21 +179,21 @@ class FlatScene:
 
 
 def _is_pattern(instance):
-    """Whether renders do not show a child in its own place, because its parent puts it onto vertices or faces."""
+    """Whether renders show an object only as instances on the vertices or faces of its parent."""
     parent = instance.object.original.parent
     if parent is None or parent.instance_type not in {"VERTS", "FACES"}:
         return False
     return not instance.is_instance or instance.parent.original != parent
 
 
-def _is_bare(thing):
-    """Whether an object shows its mesh as it is, so that all objects that have it show the same."""
+def _is_unmodified(thing):
+    """Whether an object shows its mesh unmodified, so that objects with this mesh can share it."""
     plain = thing.type == "MESH" and not thing.modifiers and thing.data.shape_keys is None
     return plain and all(slot.link == "DATA" for slot in thing.material_slots)
 
 
-def _is_plain(matrix):
-    """Whether location, rotation and scale say all about a transform."""
+def _has_no_shear(matrix):
+    """Whether a matrix is a composition of location, rotation and scale (no shear)."""
     again = Matrix.LocRotScale(*matrix.decompose())
     size = max(abs(x) for row in matrix.to_3x3() for x in row)
     return all(abs(a - b) <= 1e-5 * size for x, y in zip(again.to_3x3(), matrix.to_3x3()) for a, b in zip(x, y))

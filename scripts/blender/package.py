@@ -1,8 +1,8 @@
-"""Build the add-on for Blender, one zip for all: 3.4 takes it as an add-on, 4.2 and newer as an extension.
+"""Build the zip of the Blender add-on: an add-on for Blender 3.4, an extension for 4.2 and newer.
 
     python3 scripts/blender/package.py OUT.zip
 
-The zip holds one folder: the add-on, the exporter that it runs in a Blender of its own, and the licences.
+The zip holds one folder: the add-on, the exporter that it runs in a second Blender process, and the licences.
 """
 
 import modulefinder
@@ -13,11 +13,11 @@ import zipfile
 _HERE = os.path.dirname(os.path.realpath(__file__))
 _ROOT = os.path.dirname(os.path.dirname(_HERE))
 _NAME = "caustique"
-_DAY = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can name: the same files give the same zip
+_DAY = (1980, 1, 1, 0, 0, 0)  # a constant time, so that equal files give equal zips; the earliest that zip supports
 
 
 def contents():
-    """What the zip holds: names in it, and the files they come from."""
+    """The contents of the zip: {name in the zip: source file}."""
     addon = os.path.join(_HERE, "caustique_addon")
     files = {name: os.path.join(addon, name) for name in os.listdir(addon) if name.endswith((".py", ".toml", ".json"))}
     files.update((f"exporter/{os.path.basename(source)}", source) for source in _exporter())
@@ -26,12 +26,12 @@ def contents():
 
 
 def _exporter():
-    """export.py and the scripts beside it that it imports, whether at once or later."""
+    """export.py and the scripts that it imports, at load time or later."""
     script = os.path.join(_HERE, "export.py")
     finder = modulefinder.ModuleFinder([_HERE])
     finder.run_script(script)
     beside = (found.__file__ for found in finder.modules.values())
-    return {script, *(source for source in beside if source is not None)}  # modules of Python itself have no file
+    return {script, *(source for source in beside if source is not None)}  # built-in modules have no file
 
 
 def build(path):

@@ -1,5 +1,5 @@
-"""Node trees of materials, lights and the world, and what fills bodies: solid glass (KHR_materials_volume), absorption
-and scattering of volume shaders, dispersion."""
+"""Node trees of materials, lights and the world, and interiors: solid glass (KHR_materials_volume), absorption and
+scattering of volume shaders, dispersion."""
 
 import math
 
@@ -7,7 +7,7 @@ import bpy
 
 
 def nodes_of(block):
-    """The node tree that shades a material, light or world, or None. Since Blender 5 `use_nodes` says nothing."""
+    """The node tree of a material, light or world, or None. Blender 5 ignores `use_nodes`."""
     return block.node_tree if bpy.app.version >= (5, 0, 0) or block.use_nodes else None
 
 
@@ -24,7 +24,7 @@ def output_of(tree, target="CYCLES"):
 
 
 def source(socket):
-    """The node that feeds a socket, reroutes skipped, or None."""
+    """The node linked to a socket, past reroutes, or None."""
     while socket is not None and socket.is_linked:
         node = socket.links[0].from_node
         if node.type != "REROUTE":
@@ -34,7 +34,7 @@ def source(socket):
 
 
 def constant(socket, fallback=None):
-    """The value of a socket that nothing varies: a float or a list of three. `fallback` where something does."""
+    """The value of an unlinked socket: a float or a list of three. `fallback` if it is linked."""
     node = source(socket)
     if node is None:
         value = socket.default_value
@@ -46,7 +46,7 @@ def constant(socket, fallback=None):
 
 
 def leaves(node):
-    """The shaders under the mixes and sums of a shader tree."""
+    """The shaders below the mixes and sums of a shader tree."""
     if node is None:
         return []
     if node.type in {"MIX_SHADER", "ADD_SHADER"}:
@@ -56,7 +56,7 @@ def leaves(node):
 
 
 def medium(volume, where, warn):
-    """Coefficients (sigma_a, sigma_s, g) in 1/m of a volume shader as Cycles defines them, or None for a void."""
+    """Coefficients (sigma_a, sigma_s, g) in 1/m of a volume shader, as Cycles defines them, or None if empty."""
     sigma_a, sigma_s, moment = [0.0] * 3, [0.0] * 3, 0.0
 
     def add(node, weight):
@@ -107,14 +107,14 @@ def medium(volume, where, warn):
 def finish(entry, material, closed, thickness, warn):
     """Complete the glTF material `entry` that the exporter wrote for `material`.
 
-    `closed` says whether every mesh that wears it is watertight, `thickness` is a length inside it in metres.
+    `closed`: whether every mesh with this material is closed. `thickness`: a length inside it (m).
     """
     where = f'material "{material.name}"'
     output = output_of(nodes_of(material))
     extensions = entry.setdefault("extensions", {})
     inside = medium(source(output.inputs["Volume"]), where, warn) if output is not None else None
     clear = extensions.get("KHR_materials_transmission")
-    if extensions.get("KHR_materials_volume") == {"thicknessFactor": 0}:  # a film, whatever wears it
+    if extensions.get("KHR_materials_volume") == {"thicknessFactor": 0}:  # a film, closed mesh or not
         if inside is not None:
             warn(where, "its volume shader lies behind a film: it is not carried")
         return
@@ -123,7 +123,7 @@ def finish(entry, material, closed, thickness, warn):
     if clear is not None and (closed or "KHR_materials_volume" in extensions):
         volume = extensions.setdefault("KHR_materials_volume", {})
         volume.setdefault("thicknessFactor", thickness)
-        # The exporter writes -ln(color) * density, Cycles absorbs (1 - color) * density: ours are Cycles' numbers.
+        # The exporter writes -ln(color) * density, Cycles absorbs (1 - color) * density: use that of Cycles.
         volume.pop("attenuationColor", None)
         volume.pop("attenuationDistance", None)
         if inside is not None and not any(inside["sigma_s"]):

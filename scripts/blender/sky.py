@@ -1,4 +1,4 @@
-"""Worlds that only Cycles can evaluate: baked to an image, and the sun in their sky to a lamp."""
+"""Bakes worlds that only Cycles can evaluate to an image, and turns the sun in their sky into a lamp."""
 
 import collections
 import contextlib
@@ -15,18 +15,18 @@ from shading import nodes_of
 # A sun in the sky: the direction towards it, its irradiance per channel (W/m2), and the angle of its disc (rad).
 Sun = collections.namedtuple("Sun", "toward irradiance angle")
 
-_WITHOUT_SUN = {"PREETHAM", "HOSEK_WILKIE"}
-# Pixels a side of the picture from which a sun's light is counted.
-_SIDE = 64
+_SKIES_WITHOUT_SUN = {"PREETHAM", "HOSEK_WILKIE"}
+# Pixels per side of the picture that measures a sun's irradiance.
+_SUN_PIXELS = 64
 
 
 def sun(scene, undo, where, warn):
-    """Until `undo` closes, takes the disc of the sun out of the world's sky texture; the `Sun` that it was, or None.
+    """Remove the sun's disc from the world's sky texture until `undo` closes. Returns it as a `Sun`, or None.
 
-    An image would smear the disc over its texels, and caustics of it with that.
+    In an image the disc would be blurred over its texels, and so would its caustics.
     """
     skies = [node for node in nodes_of(scene.world).nodes if node.type == "TEX_SKY" and node.outputs[0].is_linked]
-    discs = [node for node in skies if node.sky_type not in _WITHOUT_SUN and node.sun_disc]
+    discs = [node for node in skies if node.sky_type not in _SKIES_WITHOUT_SUN and node.sun_disc]
     if not discs:
         return None
     node = discs[0]
@@ -35,15 +35,15 @@ def sun(scene, undo, where, warn):
         return None
     up, turn = node.sun_elevation, node.sun_rotation
     toward = Vector((math.sin(turn) * math.cos(up), math.cos(turn) * math.cos(up), math.sin(up)))
-    with_disc = _light_from(scene, toward, node.sun_size)
+    with_disc = _irradiance(scene, toward, node.sun_size)
     undo.callback(setattr, node, "sun_disc", True)
     node.sun_disc = False
-    irradiance = with_disc - _light_from(scene, toward, node.sun_size)
+    irradiance = with_disc - _irradiance(scene, toward, node.sun_size)
     return Sun(toward, [max(float(x), 0.0) for x in irradiance], node.sun_size)
 
 
 def add_sun(found, flat, hidden, group):
-    """Puts a `Sun` into the flat scene as a lamp, `hidden` from kinds of rays, in a group of lights or none."""
+    """Add a `Sun` to the flat scene as a lamp, `hidden` from these kinds of rays, in a light group or None."""
     strongest = max(found.irradiance)
     if strongest <= 0:
         return
@@ -54,25 +54,25 @@ def add_sun(found, flat, hidden, group):
     flat.add_extras(body, angle_deg=math.degrees(found.angle))
 
 
-def _light_from(scene, toward, angle):
-    """Irradiance (numpy, per channel) of a facing surface by all in a square about a disc of the sky."""
+def _irradiance(scene, toward, angle):
+    """Irradiance (numpy, per channel) on a perpendicular surface from a square of the sky around the sun's disc."""
     width = 2 * math.tan(0.6 * angle)
-    with tempfile.TemporaryDirectory() as folder, _stage(scene) as (stage, eye):
-        eye.matrix_world = toward.to_track_quat("-Z", "Y").to_matrix().to_4x4()
-        eye.data.angle = 2 * math.atan(width / 2)
-        pixels = _render(stage, os.path.join(folder, "sun.exr"), _SIDE, _SIDE)
-    across = (numpy.arange(_SIDE) + 0.5) / _SIDE * width - width / 2
+    with tempfile.TemporaryDirectory() as folder, _stage(scene) as (stage, observer):
+        observer.matrix_world = toward.to_track_quat("-Z", "Y").to_matrix().to_4x4()
+        observer.data.angle = 2 * math.atan(width / 2)
+        pixels = _render(stage, os.path.join(folder, "sun.exr"), _SUN_PIXELS, _SUN_PIXELS)
+    across = (numpy.arange(_SUN_PIXELS) + 0.5) / _SUN_PIXELS * width - width / 2
     squared = 1 + across[:, None] ** 2 + across[None, :] ** 2
-    return (pixels * (width / _SIDE) ** 2 / squared[..., None] ** 2).sum((0, 1))
+    return (pixels * (width / _SUN_PIXELS) ** 2 / squared[..., None] ** 2).sum((0, 1))
 
 
-def baked(scene, path, width=1024):
-    """Renders the world alone with a panoramic Cycles camera to an .exr beside the .glb; its key `environment`."""
+def bake_world(scene, path, width=1024):
+    """Render the world with a panoramic Cycles camera to an .exr beside the .glb. Returns the key `environment`."""
     name = os.path.splitext(os.path.basename(path))[0] + ".environment.exr"
-    with _stage(scene) as (stage, eye):
-        # Looking along +X with +Z up puts the directions where an equirectangular texture expects them.
-        eye.matrix_world = Matrix(((0, 0, -1, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
-        camera = eye.data
+    with _stage(scene) as (stage, observer):
+        # A camera along +X with +Z up gives the layout of an equirectangular texture.
+        observer.matrix_world = Matrix(((0, 0, -1, 0), (-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
+        camera = observer.data
         camera.type = "PANO"
         (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
         _render(stage, os.path.join(os.path.dirname(path), name), width, width // 2)
@@ -81,24 +81,24 @@ def baked(scene, path, width=1024):
 
 @contextlib.contextmanager
 def _stage(scene):
-    """A scene of the world alone at the same moment, and its camera."""
+    """A scene with the world alone at the current frame, and its camera."""
     stage = bpy.data.scenes.new("world")
     camera = bpy.data.cameras.new("world")
-    eye = bpy.data.objects.new("world", camera)
+    observer = bpy.data.objects.new("world", camera)
     try:
         stage.world = scene.world
         stage.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-        stage.collection.objects.link(eye)
-        stage.camera = eye
-        yield stage, eye
+        stage.collection.objects.link(observer)
+        stage.camera = observer
+        yield stage, observer
     finally:
         bpy.data.scenes.remove(stage)
-        bpy.data.objects.remove(eye)
+        bpy.data.objects.remove(observer)
         bpy.data.cameras.remove(camera)
 
 
 def _render(stage, path, width, height):
-    """Renders a stage to an .exr; its pixels (numpy, height by width by 3)."""
+    """Render a stage to an .exr. Returns its pixels, a numpy array (height, width, 3)."""
     stage.render.engine = "CYCLES"
     stage.cycles.samples = 16
     stage.cycles.use_denoising = False

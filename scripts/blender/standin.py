@@ -1,4 +1,4 @@
-"""Stand-ins for meshes that are baked: the evaluated shape with a UV map of its own, in which nothing overlaps."""
+"""Stand-ins for baked meshes: the evaluated mesh with an additional UV map without overlaps."""
 
 import contextlib
 
@@ -6,7 +6,7 @@ import bpy
 import numpy
 
 UV, GENERATED = "caustique bake", "caustique generated"
-# Textures whose coordinates are Generated where nothing is linked.
+# Textures that use Generated coordinates if Vector is not linked.
 _BY_GENERATED = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
                  "TEX_GABOR", "TEX_MUSGRAVE"}
 _DEFORM = {
@@ -16,8 +16,8 @@ _DEFORM = {
 }
 
 
-def of_object(graph):
-    """Whether a material looks different on each object that wears it: it asks where, which or what colour that is."""
+def depends_on_object(graph):
+    """Whether a material depends on its object: on the object's position, index, colour or random number."""
     for tree in graph.trees():
         for node in tree.nodes:
             if node.type in {"OBJECT_INFO", "NEW_GEOMETRY", "PARTICLE_INFO"} or (
@@ -30,7 +30,7 @@ def of_object(graph):
 
 
 def read_generated(graph):
-    """Let a graph read Generated coordinates from an attribute, which `swap` makes: those of the shape undeformed."""
+    """Make a graph read Generated coordinates from the attribute that `swap` adds: those of the undeformed shape."""
     for tree in graph.trees():
         wanting = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
                    if s.name == "Vector" and not s.is_linked]
@@ -43,8 +43,8 @@ def read_generated(graph):
                 tree.links.new(node.outputs["Vector"], socket)
 
 
-def _places(thing):
-    """Where the vertices of an evaluated object are in its own space: (count, 3)."""
+def _positions(thing):
+    """Vertex positions of an evaluated object in object space: (count, 3)."""
     mesh = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
     mesh.vertices.foreach_get("co", places)
@@ -52,9 +52,12 @@ def _places(thing):
     return places.reshape(-1, 3)
 
 
-def generate(thing, mesh, say):
-    """Put Generated coordinates on the vertices of `mesh`, the evaluated shape of `thing`: those of the undeformed shape
-    in the box of the object's own mesh, or in its own box where the object is no mesh."""
+def add_generated_coordinates(thing, mesh, say):
+    """Add Generated coordinates to the vertices of `mesh`, the evaluated mesh of `thing`.
+
+    They are positions of the undeformed shape relative to the bounding box of the object's mesh, or of the shape itself
+    if the object is no mesh.
+    """
     if not mesh.vertices or GENERATED in mesh.attributes:
         return
     places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
@@ -66,7 +69,7 @@ def generate(thing, mesh, say):
             for modifier in deforming:
                 undo.callback(setattr, modifier, "show_viewport", True)
                 modifier.show_viewport = False
-            undeformed = _places(thing)
+            undeformed = _positions(thing)
         if len(undeformed) == len(places):
             places = undeformed
         else:
@@ -79,9 +82,9 @@ def generate(thing, mesh, say):
 
 
 def swap(thing, undo, say):
-    """Give `thing` its evaluated mesh until `undo` closes, and return the object that now stands for it.
+    """Give `thing` its evaluated mesh until `undo` closes. Returns the object that represents it.
 
-    Objects that are no meshes are hidden behind a new one. `say` takes what is lost.
+    An object that is no mesh is hidden, and a new mesh object replaces it. `say` receives warnings.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = thing.evaluated_get(depsgraph)
@@ -92,17 +95,17 @@ def swap(thing, undo, say):
         undo.callback(setattr, thing.data, "name", name)
         undo.callback(setattr, mesh, "name", name + " baked")
         thing.data.name, mesh.name = name + " unbaked", name
-    generate(thing, mesh, say)
+    add_generated_coordinates(thing, mesh, say)
     if thing.type == "MESH":
         body, before = thing, thing.data
         for modifier in thing.modifiers:
             for shown in ("show_viewport", "show_render"):
                 undo.callback(setattr, modifier, shown, getattr(modifier, shown))
                 setattr(modifier, shown, False)
-        worn = [(slot.link, slot.material) for slot in thing.material_slots]
+        slots = [(slot.link, slot.material) for slot in thing.material_slots]
         thing.data = mesh
-        undo.callback(restore, thing, before, worn)
-        for i, (link, material) in enumerate(worn):
+        undo.callback(restore, thing, before, slots)
+        for i, (link, material) in enumerate(slots):
             thing.material_slots[i].link = "DATA"
             mesh.materials[i] = material
     else:
@@ -116,16 +119,17 @@ def swap(thing, undo, say):
     return body
 
 
-def restore(thing, mesh, worn):
-    """Give an object back its mesh, and its slots where they hang and what they hold."""
+def restore(thing, mesh, slots):
+    """Restore an object's mesh, and the link and material of each of its slots."""
     thing.data = mesh
-    for slot, (link, material) in zip(thing.material_slots, worn):
+    for slot, (link, material) in zip(thing.material_slots, slots):
         slot.link = link
         slot.material = material
 
 
 def unwrap(body, size):
-    """Add the UV map for images of `size` texels a side to the mesh of `body`, which is in the current view layer."""
+    """Add the UV map for images of `size` texels per side to the mesh of `body`, an object of the current view
+    layer."""
     mesh = body.data
     mesh.uv_layers.active = mesh.uv_layers.new(name=UV)
     layer = bpy.context.view_layer
@@ -140,7 +144,8 @@ def unwrap(body, size):
 
 
 def keep_two_uv_maps(mesh):
-    """Leave the UV map that renders show and the one that is baked to: caustique reads two."""
+    """Keep the render UV map and the baked one alone, because caustique reads two. Returns the index of the baked
+    one."""
     shown = next((uv.name for uv in mesh.uv_layers if uv.active_render), UV)
     for name in [uv.name for uv in mesh.uv_layers if uv.name not in {shown, UV}]:
         mesh.uv_layers.remove(mesh.uv_layers[name])

@@ -1,5 +1,5 @@
-"""The materials of a scene on their way to glTF: matched, baked where glTF has no words for how they vary, and worn as
-plain Principled materials while the exporter runs."""
+"""Converts the materials of a scene to glTF: matches them, bakes what glTF cannot express, and assigns plain Principled
+materials to the objects while the exporter runs."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from material_plan import Plan, matt
 
 
 def materials_of(thing):
-    """The materials that an object's faces may wear, by slot, None where a slot is empty; with those of modifiers."""
+    """The materials of an object by slot, None for an empty slot, then those that its modifiers add."""
     worn = [slot.material for slot in thing.material_slots]
     if any(modifier.type == "NODES" for modifier in thing.modifiers):
         evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -24,22 +24,22 @@ def materials_of(thing):
 
 @dataclass
 class Surface:
-    """What a written material is made of: the material it stands for, and channels as gltfmaterial.write takes them."""
+    """The contents of a written material: the original material, and the channels for gltfmaterial.write."""
     material: bpy.types.Material
     channels: dict
     texcoord: int = 0
 
 
 class Surfaces:
-    """Matches the materials that `things` wear; until `undo` (a contextlib.ExitStack) closes, they wear stand-ins.
+    """Matches the materials of `things`, which have stand-ins until `undo` (a contextlib.ExitStack) closes.
 
-    `size`: texels a side of baked images, 0 bakes nothing and names what is lost. `warn(where, what)` takes losses.
+    `size`: texels per side of baked images; 0 bakes nothing. `warn(where, what)` receives a warning for each loss.
     """
 
     def __init__(self, things, materials, undo, warn, size=bake.SIZE):
         self.undo, self.warn, self.size = undo, warn, size
         self.baker = bake.Baker(size or bake.SIZE, undo)
-        self.found = {}  # by the name of the material that the exporter sees
+        self.found = {}  # {name of the material that the exporter writes: Surface}
         self.plans = {}
         for material in materials:
             if shading.nodes_of(material) is None:
@@ -49,22 +49,22 @@ class Surfaces:
         self._bake(things)
         for plan in self.plans.values():
             if not plan.passes:
-                self._wear_everywhere(plan)
+                self._replace_material(plan)
 
-    def _wear_everywhere(self, plan):
-        material = plan.finished()
+    def _replace_material(self, plan):
+        material = plan.make_principled()
         self.found[material.name] = Surface(plan.material, plan.channels)
         plan.material.user_remap(material)
         self.undo.callback(material.user_remap, plan.material)
 
     def finish(self, document, buffer, bodies):
-        """Complete the materials of a written document; its buffer, with the baked images.
+        """Complete the materials of a written document. Returns its buffer, with the baked images.
 
-        `bodies`: by material whether all that wear it is closed, and a length inside it in metres.
+        `bodies`: {material: (whether all its meshes are closed, a length inside them in metres)}.
         """
         writer = gltfmaterial.Writer(document, buffer)
         for entry in document.get("materials", []):
-            surface = self.found.get(entry.get("name")) or self._unreached(entry.get("name"))
+            surface = self.found.get(entry.get("name")) or self._unbaked_surface(entry.get("name"))
             if surface is not None:
                 closed, least = bodies.get(entry["name"], (False, 0.0))
                 entry["name"] = surface.material.name
@@ -73,36 +73,36 @@ class Surfaces:
         gltfmaterial.give_default(document)
         return bytes(writer.buffer)
 
-    def _unreached(self, name):
-        """The surface of a material that the exporter has met where nothing can stand in for it, or None."""
+    def _unbaked_surface(self, name):
+        """The surface of a material on an object that has no stand-in, or None."""
         plan = self.plans.get(name)
         if plan is None:
             return None
         if plan.passes:
-            plan.say("it is worn where nothing can be baked (objects linked from other files, instances that nodes make): "
-                     "there what would be baked is plain; make such objects local and real")
+            plan.say("it is used where nothing can be baked (objects linked from other files, instances that nodes "
+                     "make): the channels to bake are plain there; make such objects local and real")
         return Surface(plan.material, plan.unbaked)
 
     def _bake(self, things):
         made = {}
         for thing in things:
-            worn = materials_of(thing)
-            plans = {i: self.plans[m.name] for i, m in enumerate(worn)
+            materials = materials_of(thing)
+            plans = {i: self.plans[m.name] for i, m in enumerate(materials)
                      if m is not None and m.name in self.plans and self.plans[m.name].passes}
             if not plans or not thing.is_editable:
                 continue
             own = any(plan.of_object for plan in plans.values())
             alone = own or thing.type != "MESH" or thing.modifiers or thing.data.shape_keys is not None
-            key = thing.name if alone else (thing.data.as_pointer(), *(m and m.name for m in worn))
+            key = thing.name if alone else (thing.data.as_pointer(), *(m and m.name for m in materials))
             if key in made:
-                self._wear_again(thing, made[key])
+                self._share_baked_mesh(thing, made[key])
             else:
                 made[key] = self._bake_one(thing, plans, own)
 
-    def _wear_again(self, thing, mesh):
-        before, worn = thing.data, [(slot.link, slot.material) for slot in thing.material_slots]
+    def _share_baked_mesh(self, thing, mesh):
+        before, slots = thing.data, [(slot.link, slot.material) for slot in thing.material_slots]
         thing.data = mesh
-        self.undo.callback(standin.restore, thing, before, worn)
+        self.undo.callback(standin.restore, thing, before, slots)
         for slot in thing.material_slots:
             slot.link = "DATA"
 
@@ -117,8 +117,8 @@ class Surfaces:
             texels = self.baker.passes(body, wanted, own)
         texcoord = standin.keep_two_uv_maps(mesh)
         for slot, plan in plans.items():
-            material = plan.finished()
+            material = plan.make_principled()
             baked = {name: image for (at, name), image in texels.items() if at == slot}
-            self.found[material.name] = Surface(plan.material, plan.resolved(baked), texcoord)
+            self.found[material.name] = Surface(plan.material, plan.resolve(baked), texcoord)
             mesh.materials[slot] = material
         return mesh

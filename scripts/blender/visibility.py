@@ -1,13 +1,13 @@
-"""What a render would show, made what the viewport shows while the exporter evaluates the scene.
+"""Makes the viewport show what a render would show, while the exporter evaluates the scene.
 
-Blender evaluates geometry for Python as the viewport shows it. `as_rendered` puts the settings for renders in the place
-of those for the viewport: which objects, collections, instancers and modifiers are shown, and at which level of detail.
+Blender evaluates geometry for Python with the viewport's settings. `as_rendered` copies the render settings to them:
+which objects, collections, instancers and modifiers are shown, and their level of detail.
 """
 
 import bpy
 
 RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
-# Settings for the viewport by what they are called for renders.
+# {name of a render setting: name of the viewport setting}
 _MODIFIER = {"show_render": "show_viewport", "render_levels": "levels", "resolution": "viewport_resolution"}
 _CURVE = {"render_resolution_u": "resolution_u", "render_resolution_v": "resolution_v"}
 _PARTICLES = {"rendered_child_count": "child_percent", "render_step": "display_step"}
@@ -16,7 +16,7 @@ _SIMPLIFY = {"simplify_subdivision_render": "simplify_subdivision",
 
 
 def as_rendered(scene, undo, warn):
-    """Until `undo` (a contextlib.ExitStack) closes, let the viewport of `scene` show what a render would."""
+    """Make the viewport of `scene` show what a render would show, until `undo` (a contextlib.ExitStack) closes."""
 
     def put(thing, name, value):
         before = getattr(thing, name)
@@ -38,7 +38,7 @@ def as_rendered(scene, undo, warn):
         put(collection, "hide_viewport", collection.hide_render)
     _show_layers(layer.layer_collection, put, warn)
     for thing in bpy.data.objects:
-        # The scene's camera need not be shown to be looked through.
+        # The scene's camera works even if it is hidden.
         put(thing, "hide_viewport", thing.hide_render and thing.type != "CAMERA")
         put(thing, "show_instancer_for_viewport", thing.show_instancer_for_render)
         for modifier in thing.modifiers:
@@ -60,7 +60,7 @@ def as_rendered(scene, undo, warn):
 
 
 def _layer(scene, warn):
-    """The view layer that is rendered: of those that are switched on the current one, else the first."""
+    """The rendered view layer: the current one if it is enabled, else the first enabled one."""
     rendered = [layer for layer in scene.view_layers if layer.use] or [scene.view_layers[0]]
     current = bpy.context.window.view_layer
     layer = current if current in rendered else rendered[0]
@@ -74,7 +74,7 @@ def _layer(scene, warn):
 
 def _show_layers(branch, put, warn):
     for child in branch.children:
-        put(child, "hide_viewport", False)  # the eye in the outliner: renders do not look at it
+        put(child, "hide_viewport", False)  # the outliner's eye: renders ignore it
         if child.holdout and not child.exclude:
             warn(f'collection "{child.name}"', "it is a holdout, which is not carried: its objects are seen")
         _show_layers(child, put, warn)
@@ -95,7 +95,7 @@ def _asks_for_viewport(tree, seen):
 
 
 def indirect_only(layer):
-    """Names of objects that stand only in collections of the view layer which cameras do not see."""
+    """Names of objects that are only in collections with Indirect Only in the view layer."""
     seen, hidden = set(), set()
 
     def look(branch, indirect):
@@ -111,12 +111,12 @@ def indirect_only(layer):
 
 
 def hidden_rays(thing, instancer=None):
-    """Kinds of rays that do not see an object in Cycles, of which those of its instancer hide it, too."""
+    """Kinds of rays that do not hit an object in Cycles, by its own settings or its instancer's."""
     return [ray for ray in RAYS if not all(getattr(t, "visible_" + ray, True) for t in (thing, instancer) if t)]
 
 
 def light_group(thing, instancer, layer):
-    """The light group of an object, or of what instances it, if the view layer has it; else None."""
+    """The light group of an object, else of its instancer, if the view layer has the group; else None."""
     known = {group.name for group in getattr(layer, "lightgroups", ())}
     names = (getattr(each, "lightgroup", "") for each in (thing, instancer) if each)
     return next((name for name in names if name in known), None)

@@ -1,4 +1,4 @@
-"""The world in terms of `extras.caustique`: light from infinity, and the medium that fills the scene."""
+"""The world as keys of `extras.caustique`: the environment, and the medium that fills the scene."""
 
 import contextlib
 import math
@@ -12,9 +12,9 @@ from shading import constant, medium, nodes_of, output_of, source
 
 
 def extras(scene, path, warn):
-    """Keys of the scene, `environment` (also where it is black) and `medium`, and the `Sun` in its sky or None.
+    """The scene's keys `environment` (even if black) and `medium`, and the `Sun` in its sky or None.
 
-    Images are put beside the .glb at `path`.
+    Writes images beside the .glb at `path`.
     """
     world, said = scene.world, {"environment": {"color": [0.0, 0.0, 0.0]}}
     if world is None:
@@ -35,18 +35,18 @@ def extras(scene, path, warn):
     if said["environment"] is None:
         with contextlib.ExitStack() as undo:
             disc = sky.sun(scene, undo, where, warn)
-            said["environment"] = sky.baked(scene, path)
+            said["environment"] = sky.bake_world(scene, path)
         warn(where, f"its nodes are baked to {said['environment']['file']}")
         if any(n.type == "LIGHT_PATH" and any(s.is_linked for s in n.outputs) for n in output.id_data.nodes):
             warn(where, "it has a Light Path node, and is baked as cameras see it: so it lights the scene, too")
-    _say_visibility(world, said["environment"], where, warn)
+    _add_visibility(world, said["environment"], where, warn)
     group = visibility.light_group(world, None, bpy.context.view_layer)
     if group:
         said["environment"]["light_group"] = group
     return said, disc
 
 
-def _say_visibility(world, environment, where, warn):
+def _add_visibility(world, environment, where, warn):
     rays = {"camera": "camera", "diffuse": "diffuse", "glossy": "glossy", "transmission": "transmission",
             "scatter": "volume scatter"}
     shown = getattr(world, "cycles_visibility", None)
@@ -59,7 +59,7 @@ def _say_visibility(world, environment, where, warn):
 
 
 def _background(shader, path):
-    """What a plain Background shader says: one colour, or one environment texture turned about the vertical."""
+    """The environment of a Background shader with one colour or one rotated environment texture; None for others."""
     if shader.type not in {"BACKGROUND", "EMISSION"} or constant(shader.inputs["Strength"]) is None:
         return None
     strength = constant(shader.inputs["Strength"])
@@ -76,7 +76,7 @@ def _background(shader, path):
 
 
 def _turn(socket):
-    """Degrees by which the nodes before an environment texture turn it about the vertical, or None."""
+    """Rotation in degrees about the vertical by the nodes before an environment texture, or None if they do more."""
     node = source(socket)
     if node is None:
         return 0.0
@@ -91,12 +91,12 @@ def _turn(socket):
     if rotation is None or scale != [1, 1, 1] or any(rotation[:2]) or moved:
         return None
     before = _turn(node.inputs["Vector"])
-    # A point mapping turns the direction that looks the image up, so the image turns the other way.
+    # A point mapping rotates the lookup direction, so the image rotates by the negative angle.
     return None if before is None else before + math.degrees(rotation[2]) * (1 if node.vector_type == "TEXTURE" else -1)
 
 
 def _beside(image, path):
-    """Put an image beside the .glb at `path`, as Radiance or OpenEXR; its file name there."""
+    """Write an image beside the .glb at `path`, as Radiance or OpenEXR. Returns its file name."""
     stem = os.path.splitext(os.path.basename(path))[0]
     kind = {"HDR": ".hdr", "OPEN_EXR": ".exr", "OPEN_EXR_MULTILAYER": None}.get(image.file_format)
     data = None
@@ -116,7 +116,7 @@ def _beside(image, path):
         pixels = list(image.pixels)
         if image.colorspace_settings.name == "sRGB" and not image.is_float:
             pixels = [v if i % 4 == 3 else _linear(v) for i, v in enumerate(pixels)]
-        flat.colorspace_settings.name = "Non-Color"  # save the numbers as they are
+        flat.colorspace_settings.name = "Non-Color"  # no colour conversion
         flat.pixels = pixels
         flat.file_format = "OPEN_EXR"
         flat.filepath_raw = os.path.join(os.path.dirname(path), name)

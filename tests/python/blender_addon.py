@@ -239,9 +239,9 @@ class Stops(Installed):
                 pressed.append(time.monotonic())
             return bool(pressed)
 
-        with mock.patch.object(engine.run, "Run", watched), mock.patch.object(engine.Engine, "_stopped", esc):
+        with mock.patch.object(engine.run, "Run", watched), mock.patch.object(engine.Engine, "_is_cancelled", esc):
             found = self.render()
-        self.assertFalse(runs and runs[-1].working())
+        self.assertFalse(runs and runs[-1].is_running())
         return found, time.monotonic() - pressed[0]
 
     def test_in_the_middle_the_picture_so_far_is_kept(self):

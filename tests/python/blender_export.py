@@ -366,7 +366,7 @@ class Export(unittest.TestCase):
             self.assertEqual((said["file"], said["strength"]), ("scene.environment.exr", 2))
             numpy.testing.assert_allclose(pixels(os.path.join(self.folder.name, said["file"])), self.gradient()[..., :3], atol=1e-3)
             # What Cycles sees around it, in the layout of the interface: the image turned by rotation_deg about +Y.
-            sky.baked(bpy.context.scene, self.path, 64)
+            sky.bake_world(bpy.context.scene, self.path, 64)
             seen = pixels(os.path.join(self.folder.name, "scene.environment.exr")) / 2
             numpy.testing.assert_allclose(seen[1:-1], self.gradient(said["rotation_deg"])[1:-1, :, :3], atol=0.03, err_msg=f"{kind} {degrees}")
 

@@ -1,13 +1,13 @@
-"""caustique as a render engine of Blender: 3.4 as an add-on, 4.2 and newer as an extension.
+"""caustique as a render engine of Blender: an add-on for Blender 3.4, an extension for 4.2 and newer.
 
-A render writes a copy of the scene, exports it in a Blender of its own (`handoff`), runs the program on the export
-(`run`), shows the picture so far, and loads the layers as passes (`engine`, `passes`). The program does the rendering,
-and what it says of the scene is shown as it stands (`session`, `panels`).
+A render writes a copy of the scene, exports it in a second Blender process (`handoff`), runs the program on the export
+(`run`), shows the picture so far, and loads the layers as passes (`engine`, `passes`). The program renders; the panels
+show its messages unchanged (`session`, `panels`).
 """
 
 from . import blender_panels, diagnosis, engine, panels, preferences, properties
 
-# Blender before 4.2 reads this, newer ones blender_manifest.toml.
+# Blender before 4.2 reads this dictionary, later versions blender_manifest.toml.
 bl_info = {
     "name": "caustique",
     "author": "caustique",
@@ -18,17 +18,17 @@ bl_info = {
     "support": "COMMUNITY",
 }
 
-# In this order: the engine and the panels read the properties.
+# Order matters: the engine and the panels use the properties.
 _PARTS = (preferences, properties, engine, diagnosis, panels, blender_panels)
 
 
 def register():
-    """Blender calls this when the add-on is switched on."""
+    """Register the add-on's classes. Blender calls this when the user enables it."""
     for part in _PARTS:
         part.register()
 
 
 def unregister():
-    """Blender calls this when the add-on is switched off or removed: nothing of it stays."""
+    """Unregister all classes. Blender calls this when the user disables or removes the add-on."""
     for part in reversed(_PARTS):
         part.unregister()

@@ -1,8 +1,7 @@
-"""Blender's own panels that show what the exporter carries: materials, worlds, cameras, output.
+"""Enables Blender's own panels for settings that the exporter supports: materials, worlds, cameras, output.
 
-A panel of Blender lists the engines it is for. Those that Blender shows beside Cycles are for this engine, too, less
-those of features that are not rendered. Cycles' own panels have one list in common, so they cannot be had one by one;
-the panels of EEVEE for the same nodes and lenses stand in for them.
+Each panel of Blender lists its engines. This engine is added to the panels that Blender shows with Cycles, except for
+unsupported features. Cycles' own panels share one list, so the equivalent panels of EEVEE are used in their place.
 """
 
 import bpy
@@ -14,14 +13,14 @@ _LIKE_CYCLES = (
     "EEVEE_WORLD_PT_surface", "EEVEE_WORLD_PT_volume", "DATA_PT_camera_dof", "DATA_PT_camera_dof_aperture",
     "DATA_PT_spot", "RENDER_PT_post_processing",
 )
-#: Beginnings of names: what is not rendered, and Cycles' own.
+#: Prefixes of the names of excluded panels: unsupported features, and Cycles' own.
 _NOT = ("CYCLES_", "RENDER_PT_freestyle", "VIEWLAYER_PT_freestyle", "MATERIAL_PT_freestyle", "RENDER_PT_gpencil",
         "RENDER_PT_stereoscopy", "DATA_PT_camera_stereoscopy", "RENDER_PT_simplify", "RENDER_PT_hair",
         "EEVEE_MATERIAL_PT_viewport_settings", "DATA_PT_falloff_curve", "DATA_PT_lightprobe")
 
 
 def _panels():
-    """The panels, as far as this Blender has them, whose list of engines is their own."""
+    """The panels of this Blender version that have their own list of engines."""
     for panel in _subclasses(bpy.types.Panel):
         engines = panel.__dict__.get("COMPAT_ENGINES")
         name = panel.__name__
@@ -36,12 +35,12 @@ def _subclasses(kind):
 
 
 def register():
-    """Put the engine on the panels' lists."""
+    """Add the engine to the panels' lists."""
     for engines in _panels():
         engines.add(Engine.bl_idname)
 
 
 def unregister():
-    """Take it off all lists."""
+    """Remove the engine from the panels' lists."""
     for panel in _subclasses(bpy.types.Panel):
         getattr(panel, "COMPAT_ENGINES", set()).discard(Engine.bl_idname)

@@ -1,4 +1,4 @@
-"""The command line of the program for what a scene says."""
+"""Builds the program's command line from the settings of a scene."""
 
 import re
 import shlex
@@ -6,13 +6,14 @@ import shlex
 from . import definition, properties
 from .fault import Fault
 
-#: Options that a file's Arguments may give: those about the picture, and none that names a file, because a .blend may
-#: come from anybody.
+#: Options allowed in the Arguments of a .blend: about the picture, without file names, because a .blend may come from
+#: an untrusted source.
 OPTIONS = frozenset(name.replace("_", "-") for name in definition.FILES_MAY_GIVE) | {"no-finish", "light-units", "strict"}
 
 
 def method(settings):
-    """Options that `render` and `plan` share: method, seed, when to stop, effects, finish, and what the user adds."""
+    """Options that `render` and `plan` share: method, seed, stop conditions, effects, finish, and the user's
+    arguments."""
     words = ["--method", settings.method, "--seed", str(settings.seed)]
     stops = (("use_iterations", "--iterations", settings.iterations), ("use_time", "--time", settings.time),
              ("use_error", "--target-error", settings.error / 100))
@@ -30,7 +31,7 @@ def method(settings):
 
 
 def additional(text):
-    """The words of additional arguments."""
+    """Split the additional arguments into words, and check them."""
     try:
         words = shlex.split(text)
     except ValueError as error:
@@ -44,11 +45,11 @@ def additional(text):
     return words
 
 
-def size(width, height):
-    """Options for a picture of so many pixels."""
+def resolution(width, height):
+    """Options for the resolution in pixels."""
     return ["--width", str(width), "--height", str(height)]
 
 
 def threads(render):
-    """Options for the threads that Blender's settings allow."""
+    """Options for the number of threads in Blender's settings."""
     return ["--threads", str(render.threads)] if render.threads_mode == "FIXED" else []

@@ -1,4 +1,4 @@
-"""What the program would do with the scene, and why there is no caustic: `caustique plan`, read into the interface."""
+"""The operator that runs `caustique plan`: how the program would render the scene, and why there is no caustic."""
 
 import shutil
 import tempfile
@@ -10,15 +10,15 @@ import bpy
 from . import command, handoff, ignored_settings, preferences, program, program_plan, session
 from .fault import Cancelled, Fault, fault_from_error
 
-#: What a plan says: a headline about caustics, the plan's own object (see `caustique plan --json`), all warnings, and
-#: the fault in whose place all this would stand, or None.
+#: A plan: a headline about caustics, the object that `caustique plan --json` prints, all warnings, and the fault if
+#: there is no plan, else None.
 Plan = namedtuple("Plan", "headline said warnings fault")
 
-_LOOK_EVERY = 0.1  # seconds
+_POLL_SECONDS = 0.1
 
 
 class Diagnose(bpy.types.Operator):
-    """Ask the program what the scene calls for and what looks like a mistake in it; nothing is rendered"""
+    """Show how the program would render the scene, and likely mistakes in it. Nothing is rendered"""
 
     bl_idname = "caustique.diagnose"
     bl_label = "Why is there no caustic?"
@@ -26,15 +26,15 @@ class Diagnose(bpy.types.Operator):
     select: bpy.props.BoolProperty(name="Select", default=True, description="Select the objects that are named")
 
     def invoke(self, context, _event):
-        """From a button: the interface goes on meanwhile."""
+        """Start from a button: the interface stays responsive."""
         self._begin(context)
-        self._timer = context.window_manager.event_timer_add(_LOOK_EVERY, window=context.window)
+        self._timer = context.window_manager.event_timer_add(_POLL_SECONDS, window=context.window)
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set("caustique reads the scene. Esc: stop")
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        """Wait for the answer, or for the user to give up."""
+        """Wait until the plan is ready or the user presses Esc."""
         if event.type == "ESC":
             self._stopped = True
         if event.type != "TIMER" or self._worker.is_alive():
@@ -46,19 +46,19 @@ class Diagnose(bpy.types.Operator):
         return self._end(context)
 
     def execute(self, context):
-        """From a script: wait for the answer."""
+        """Run from a script: wait for the plan."""
         self._begin(context)
         self._worker.join()
         return self._end(context)
 
     def _begin(self, context):
-        self._stopped, self._plan = False, None  # the plan stays None where the user gives up
+        self._stopped, self._plan = False, None  # the plan stays None if the user cancels
         self._folder = tempfile.mkdtemp(prefix="caustique-", dir=bpy.app.tempdir)
-        self._worker = threading.Thread(target=self._ask, args=self._question(context), daemon=True)
+        self._worker = threading.Thread(target=self._run_plan, args=self._collect_input(context), daemon=True)
         self._worker.start()
 
-    def _question(self, context):
-        """All that Blender has to say, for a thread that must not ask it."""
+    def _collect_input(self, context):
+        """Collect the data from Blender that the thread needs, because threads must not access Blender."""
         scene, chosen = context.scene, preferences.get(context)
         try:
             path = program.find(chosen.program)
@@ -67,13 +67,13 @@ class Diagnose(bpy.types.Operator):
             warnings = ignored_settings.warnings(scene) + job.copy()
             scale = scene.render.resolution_percentage
             size = (side * scale // 100 for side in (scene.render.resolution_x, scene.render.resolution_y))
-            words = [path, "plan", handoff.GLB, "--json", *command.size(*size), *command.threads(scene.render),
+            words = [path, "plan", handoff.GLB, "--json", *command.resolution(*size), *command.threads(scene.render),
                      *command.method(scene.caustique_render)]
             return job, words, warnings, None
         except Fault as fault:
             return None, [], [], fault
 
-    def _ask(self, job, words, warnings, fault):
+    def _run_plan(self, job, words, warnings, fault):
         try:
             if fault is not None:
                 raise fault
@@ -82,7 +82,7 @@ class Diagnose(bpy.types.Operator):
             self._plan = Plan(program_plan.headline(said), said, list(dict.fromkeys(warnings + said["warnings"])), None)
         except Cancelled:
             pass
-        except Exception as error:  # in a thread, where it would be lost
+        except Exception as error:  # a thread would lose it
             self._plan = Plan("", None, [], fault_from_error(error))
 
     def _end(self, context):
@@ -100,7 +100,7 @@ class Diagnose(bpy.types.Operator):
 
 
 class Select(bpy.types.Operator):
-    """Select the objects that this line names"""
+    """Select the objects named in this message"""
 
     bl_idname = "caustique.select"
     bl_label = "Select"
@@ -109,7 +109,7 @@ class Select(bpy.types.Operator):
     line: bpy.props.StringProperty(options={"HIDDEN"})
 
     def execute(self, context):
-        """Select them, and nothing else."""
+        """Select these objects and deselect all others."""
         _select(context, program_plan.named_objects(context.scene, [self.line]))
         return {"FINISHED"}
 
@@ -125,12 +125,12 @@ def _select(context, things):
 
 
 def register():
-    """Offer the operators."""
+    """Register the operators."""
     for kind in (Diagnose, Select):
         bpy.utils.register_class(kind)
 
 
 def unregister():
-    """Withdraw them."""
+    """Unregister the operators."""
     for kind in (Select, Diagnose):
         bpy.utils.unregister_class(kind)

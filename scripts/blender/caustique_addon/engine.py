@@ -1,6 +1,6 @@
-"""The render engine: F12 and animations.
+"""The render engine, for F12 and animations.
 
-Blender calls `render` for every view layer of every frame, beside the interface, in a thread of its own.
+Blender calls `render` for each view layer of each frame, in a thread beside the interface.
 """
 
 import contextlib
@@ -15,12 +15,12 @@ import numpy
 from . import command, exr, handoff, ignored_settings, passes, preferences, program, run, session
 from .fault import Cancelled, fault_from_error
 
-_PAUSE = 0.1  # seconds between two looks at the program
+_POLL_SECONDS = 0.1  # between two checks of the program's progress
 _PREVIEW = "--preview"
 
 
 class Engine(bpy.types.RenderEngine):
-    """caustique among Blender's render engines."""
+    """Blender's interface to caustique as a render engine."""
 
     bl_idname = "CAUSTIQUE"
     bl_label = "caustique"
@@ -29,7 +29,7 @@ class Engine(bpy.types.RenderEngine):
     bl_use_shading_nodes_custom = False
 
     def update_render_passes(self, scene=None, renderlayer=None):
-        """Tell Blender of the passes that the view layer asks for."""
+        """Register the passes that the view layer enables."""
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
         for one in passes.wanted(renderlayer):
             self.register_pass(scene, renderlayer, one.name, len(one.components), one.components, one.kind)
@@ -44,7 +44,7 @@ class Engine(bpy.types.RenderEngine):
         except Exception as error:
             fault = fault_from_error(error)
             session.faults[depsgraph.scene.name] = fault
-            self.report({"ERROR"}, fault.message())  # which ends an animation, too; `error_set` would not
+            self.report({"ERROR"}, fault.message())  # ends an animation, too; `error_set` would not
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -52,20 +52,20 @@ class Engine(bpy.types.RenderEngine):
         scene, view_layer = depsgraph.scene_eval, depsgraph.view_layer_eval
         part = _part(scene.render, self.resolution_x, self.resolution_y)
         with self._result(view_layer.name, part):
-            pass  # black: Blender crashes where it writes a picture that nobody has begun
+            pass  # black: Blender crashes when it writes a picture that was never begun
         chosen = preferences.get(bpy.context)
         path = program.find(chosen.program)
         self._warn(scene, ignored_settings.warnings(scene))
         self.update_stats("", "Exporting")
         frame = scene.frame_current + scene.frame_subframe
         job = handoff.Job(depsgraph.scene, view_layer.name, frame, folder, chosen.exporter)
-        self._warn(scene, handoff.in_main_thread(job.copy, self._stopped))
-        self._warn(scene, job.run(self._stopped))
+        self._warn(scene, handoff.in_main_thread(job.copy, self._is_cancelled))
+        self._warn(scene, job.run(self._is_cancelled))
 
         output, preview = os.path.join(folder, "render.exr"), os.path.join(folder, "preview.exr")
         words = [path, "render", handoff.GLB, "-o", output, "--exr-naming", "blender", "--compression", "none",
                  "--layers", passes.layers(passes.wanted(view_layer)), "--progress", "json",
-                 *command.size(self.resolution_x, self.resolution_y), *command.threads(scene.render),
+                 *command.resolution(self.resolution_x, self.resolution_y), *command.threads(scene.render),
                  *command.method(scene.caustique_render)]
         if _PREVIEW in program.options(path):
             words += [_PREVIEW, preview]
@@ -80,15 +80,15 @@ class Engine(bpy.types.RenderEngine):
             raise Cancelled()
         self._deliver(exr.Picture(output), scene, view_layer.name, part)
 
-    def _stopped(self):
+    def _is_cancelled(self):
         """Whether the user has pressed Esc."""
         return self.test_break()
 
     def _watch(self, work, preview, layer, part):
-        """Show how far the program is, and its picture so far, until it ends."""
+        """Show the program's progress and its picture so far until it ends."""
         said, shown = None, None
-        while work.working():
-            if self._stopped():
+        while work.is_running():
+            if self._is_cancelled():
                 work.stop()
                 text = "Stopping after this iteration"
             elif work.progress is None:
@@ -103,11 +103,11 @@ class Engine(bpy.types.RenderEngine):
             if written != shown:
                 shown = written
                 self._show(exr.Picture(preview), layer, part)
-            time.sleep(_PAUSE)
+            time.sleep(_POLL_SECONDS)
 
     @contextlib.contextmanager
     def _result(self, layer, part):
-        """Blender's picture of a view layer, to be filled. Blender crashes where one is begun and not ended."""
+        """Blender's result of a view layer, to be filled. Blender crashes if one is begun and not ended."""
         _, _, width, height = part
         result = self.begin_result(0, 0, width, height, layer=layer)
         try:
@@ -116,15 +116,15 @@ class Engine(bpy.types.RenderEngine):
             self.end_result(result)
 
     def _show(self, picture, layer, part):
-        """Put the picture so far into Blender's."""
+        """Copy the picture so far to Blender's result."""
         with self._result(layer, part) as result:
             passes.fill_combined(result.layers[0], picture, part)
 
     def _deliver(self, picture, scene, layer, part):
-        """Hand the finished picture and its passes to Blender."""
+        """Copy the finished picture and its passes to Blender's result."""
         with self._result(layer, part) as result:
             black = passes.fill(result.layers[0], picture, part)
-        passes.stamp(self.get_result(), picture, layer)
+        passes.copy_manifests(self.get_result(), picture, layer)
         if black:
             self._warn(scene, [f"{', '.join(black)}: this method does not make these passes, and they are black: "
                                "choose another method, or switch them off"])
@@ -132,16 +132,16 @@ class Engine(bpy.types.RenderEngine):
     def _warn(self, scene, lines):
         known = session.warnings.setdefault(scene.name, [])
         for line in lines:
-            if line not in known:  # frames and view layers share most of them
+            if line not in known:  # frames and view layers repeat most warnings
                 known.append(line)
                 self.report({"WARNING"}, line)
 
 
 def _part(render, width, height):
-    """The part of a picture that Blender renders: x, y (from the top left), width and height, in pixels."""
+    """The render region: x, y (from the top left), width and height in pixels."""
     if not render.use_border:
         return 0, 0, width, height
-    # In single precision, and cut off as Blender does it.
+    # In single precision and truncated, as in Blender.
     left, right, bottom, top = (int(numpy.float32(share) * numpy.float32(side)) for share, side in (
         (render.border_min_x, width), (render.border_max_x, width), (render.border_min_y, height),
         (render.border_max_y, height)))
@@ -150,19 +150,19 @@ def _part(render, width, height):
 
 @bpy.app.handlers.persistent
 def _forget(scene, *_):
-    """What is shown is of the last render, which may be of many frames."""
+    """Clear the messages of the previous render when a new one begins, which may have many frames."""
     session.warnings.pop(scene.name, None)
     session.faults.pop(scene.name, None)
 
 
 def register():
-    """Offer the engine."""
+    """Register the engine."""
     bpy.utils.register_class(Engine)
     bpy.app.handlers.render_init.append(_forget)
 
 
 def unregister():
-    """Withdraw it, and forget what it has said."""
+    """Unregister the engine and clear its messages."""
     bpy.app.handlers.render_init.remove(_forget)
     bpy.utils.unregister_class(Engine)
     session.clear()

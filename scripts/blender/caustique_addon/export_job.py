@@ -1,8 +1,8 @@
-"""Export one frame of one scene, in a Blender of its own: `blender -b --python export_job.py -- JOB.json`.
+"""Exports one frame of a scene in a second Blender process: `blender -b --python export_job.py -- JOB.json`.
 
 The job is an object: `blend` (the file), `scene`, `view_layer`, `frame` (with its fraction), `scripts` (whether Python
-in the file may run), `exporter` (the folder of export.py), `glb` (the file to write) and `report` (the file for what is
-left to say: {"warnings": [..]}, or {"error": ".."}).
+in the file may run), `exporter` (the folder of export.py), `glb` (the file to write) and `report` (the file to write
+{"warnings": [..]} or {"error": ".."} to).
 """
 
 import json
@@ -13,29 +13,29 @@ import bpy
 
 
 def export(job):
-    """Do the job; the exporter's warnings."""
+    """Do the job. Returns the exporter's warnings."""
     bpy.ops.wm.open_mainfile(filepath=job["blend"], load_ui=False, use_scripts=job["scripts"])
     scene = bpy.data.scenes[job["scene"]]
     bpy.context.window.scene = scene
     for layer in [layer for layer in scene.view_layers if layer.name != job["view_layer"]]:
         scene.view_layers.remove(layer)
-    scene.render.engine = "CYCLES"  # the add-on is not here, and the exporter reads the scene as Cycles would
-    scene.render.use_border = False  # the add-on cuts the picture itself
+    scene.render.engine = "CYCLES"  # this Blender lacks the add-on, and the exporter reads the scene as Cycles would
+    scene.render.use_border = False  # the add-on crops the picture itself
     whole = int(job["frame"] // 1)
     scene.frame_set(whole, subframe=job["frame"] - whole)
     sys.path.insert(0, job["exporter"])
-    import export as exporter  # it needs its folder on the path, which concerns this process alone
+    import export as exporter  # its folder is on the search path of this process alone
 
     return exporter.write(job["glb"])
 
 
 def main(path):
-    """Do the job at `path` and report."""
+    """Do the job in the file `path` and write the report."""
     with open(path, encoding="utf-8") as file:
         job = json.load(file)
     try:
         report = {"warnings": export(job)}
-    except Exception as error:  # whatever Blender raises is told in the other Blender
+    except Exception as error:  # the first Blender shows any error of this one
         report = {"error": f"{type(error).__name__}: {error}"}
     with open(job["report"], "w", encoding="utf-8") as file:
         json.dump(report, file)

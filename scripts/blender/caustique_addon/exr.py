@@ -1,8 +1,8 @@
-"""Read the EXR files that caustique writes with `--compression none`: one part, scan lines, 32-bit floats.
+"""Reads the EXR files that caustique writes with `--compression none`: one part, scan lines, 32-bit floats.
 
-Blender's Python cannot read EXR files, and Blender's own loader of passes knows view layers of one name only and drops
-the header, which holds the names of cryptomattes. Uncompressed files are plain arrays (OpenEXR, File Layout), so numpy
-maps them without a copy.
+Blender's Python cannot read EXR files. Blender's loader of passes supports one view layer name only, and drops the
+header, which holds the names of cryptomattes. Uncompressed files are plain arrays (OpenEXR, File Layout), so numpy maps
+them without a copy.
 """
 
 import mmap
@@ -14,13 +14,14 @@ from .fault import Fault
 
 _MAGIC = b"\x76\x2f\x31\x01\x02\x00\x00\x00"
 _FLOAT = 2
-_HEAD_OF_LINE = 8  # bytes: the line's y, and the size of its data
+_LINE_HEADER_BYTES = 8  # the line's y, and the size of its data
 
 
 class Picture:
-    """`text`: the header's strings. `window`: x and y of the upper left pixel. `width`, `height`. `display`: the whole
-    picture's width and height, of which the window may be a part. `channels`: of each name an array (height, width),
-    the first row on top.
+    """An EXR file.
+
+    `text`: the header's strings. `window`: x and y of the upper left pixel. `width`, `height`: size of the data window.
+    `display`: width and height of the whole picture. `channels`: {name: array (height, width), top row first}.
     """
 
     def __init__(self, path):
@@ -38,22 +39,22 @@ class Picture:
         self.width, self.height = right - left + 1, bottom - top + 1
         names = _channels(attributes["channels"], path)
         row = 4 * self.width
-        line = _HEAD_OF_LINE + row * len(names)
-        start = end + 8 * self.height  # behind the table of the lines' places
+        line = _LINE_HEADER_BYTES + row * len(names)
+        start = end + 8 * self.height  # behind the table of line offsets
         if len(data) != start + line * self.height:
             raise Fault(f"{path} is not complete", "render again")
-        cube = numpy.ndarray((self.height, len(names), self.width), "<f4", data, start + _HEAD_OF_LINE, (line, row, 4))
+        cube = numpy.ndarray((self.height, len(names), self.width), "<f4", data, start + _LINE_HEADER_BYTES, (line, row, 4))
         self.channels = {name: cube[:, index] for index, name in enumerate(names)}
 
 
 def _header(data, path):
-    """The attributes by name, as bytes, and where the header ends."""
+    """The attributes, {name: bytes}, and the end of the header."""
     if data[:8] != _MAGIC:
         raise Fault(f"{path} is not an EXR file of one part", "render again")
     attributes, at = {}, 8
     while data[at] != 0:
         name = data.find(b"\0", at)
-        value = data.find(b"\0", name + 1) + 5  # behind the name of its type, and its size
+        value = data.find(b"\0", name + 1) + 5  # behind the attribute's type and size
         size = struct.unpack_from("<i", data, value - 4)[0]
         attributes[data[at:name].decode()] = data[value:value + size]
         at = value + size
@@ -61,7 +62,7 @@ def _header(data, path):
 
 
 def _channels(data, path):
-    """The names of the channels, in the order in which a line holds them."""
+    """The names of the channels, in file order."""
     names, at = [], 0
     while data[at] != 0:
         end = data.index(b"\0", at)

@@ -1,29 +1,29 @@
-"""What goes wrong, in the words that Blender shows."""
+"""Errors for the user, and their text in Blender's interface."""
 
 import textwrap
 import traceback
 
-_WIDTH = 100  # letters of a line of Blender's messages, which do not wrap by themselves
+_MAX_LINE_LETTERS = 100  # in Blender's messages, which do not wrap
 
 
 class Fault(Exception):
-    """A fault that the user can do something about: what it is, and the remedy."""
+    """An error that the user can fix: the fault and its remedy."""
 
     def __init__(self, what, remedy=""):
         self.what, self.remedy = what, remedy
         super().__init__(f"{what}\nRemedy: {remedy}" if remedy else what)
 
     def message(self):
-        """The text with lines short enough for a message of Blender's."""
-        return "\n".join(textwrap.fill(line, _WIDTH) for line in str(self).splitlines())
+        """The text, wrapped for Blender's messages."""
+        return "\n".join(textwrap.fill(line, _MAX_LINE_LETTERS) for line in str(self).splitlines())
 
 
 class Cancelled(Exception):
-    """The user has stopped the work."""
+    """The user has cancelled the work."""
 
 
 def fault_from_error(error):
-    """Any exception as a Fault. One that nobody foresaw is printed, too, for whoever mends it."""
+    """Convert any exception to a Fault. The traceback of an unexpected one is also printed, for the developer."""
     if isinstance(error, Fault):
         return error
     traceback.print_exception(type(error), error, error.__traceback__)
@@ -32,7 +32,8 @@ def fault_from_error(error):
 
 
 def fault_from_program(lines, code):
-    """The Fault that the program tells of: its lines on stderr (what, then `hint: ` and the remedy), its exit code."""
+    """The Fault of a failed program, from its lines on stderr (error, then `hint: ` and the remedy) and its exit
+    code."""
     what, remedy = [], []
     for line in lines:
         (remedy if line.startswith("hint: ") or remedy else what).append(line)

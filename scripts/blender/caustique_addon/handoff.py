@@ -1,8 +1,8 @@
-"""From the scene in this Blender to a .glb for the program.
+"""Exports the scene of this Blender to a .glb for the program, in a second Blender process.
 
-Exporting changes the scene for a while and runs operators. A render must do neither: it runs beside the interface, in a
-thread of its own. So the scene is copied to a file, and a second Blender exports the copy. That Blender sees nothing of
-the user's settings and starts in a second; this one stays responsive, and an export can be stopped.
+Exporting changes the scene temporarily and runs operators. A render must do neither, because it runs in a thread beside
+the interface. So the scene is copied to a file, and a second Blender exports the copy. It ignores the user's settings
+and starts in a second; the first Blender stays responsive, and an export can be cancelled.
 """
 
 import fnmatch
@@ -19,16 +19,17 @@ from .fault import Cancelled, Fault
 
 GLB = "scene.glb"
 _HERE = os.path.dirname(os.path.abspath(__file__))
-_OLDEST = (4, 2, 0)  # the first Blender whose materials and glTF exporter hold what export.py reads
+_OLDEST = (4, 2, 0)  # export.py needs the materials and the glTF exporter of this version
 _AUTOEXEC = {"-y": True, "--enable-autoexec": True, "-Y": False, "--disable-autoexec": False}
-_PAUSE = 0.02  # seconds between two looks at the other Blender
+_POLL_SECONDS = 0.02  # between two checks of the second Blender
 
 
 class Job:
-    """An export. After `run`, which may be called from any thread, the file `GLB` is in the folder."""
+    """An export to the file `GLB` in a folder. `run` may be called from any thread."""
 
     def __init__(self, scene, view_layer, frame, folder, blender):
-        """Of `scene` at `frame` (a float), into the empty `folder`; `blender` is another program to export with."""
+        """Prepare the export of `scene` at `frame` (a float) to the empty `folder`. `blender`: another exporting
+        program."""
         if not blender and bpy.app.version < _OLDEST:
             raise Fault(f"Blender {bpy.app.version_string} cannot export what caustique needs",
                         "choose in the add-on's preferences, as Exporter, a Blender of 4.2 or newer, or the Python of "
@@ -45,14 +46,14 @@ class Job:
         self._scene = scene
 
     def copy(self):
-        """Write the scene, and all it needs, to a file: in Blender's main thread. Returns warnings."""
-        # Not as the user saves a file: that would draw a picture of it and call handlers.
+        """Write the scene and its data to a file. Call it in Blender's main thread. Returns warnings."""
+        # Not bpy.ops.wm.save_as_mainfile, which would draw a thumbnail and call handlers.
         bpy.data.libraries.write(self._blend, {self._scene}, path_remap="ABSOLUTE")
         return [f'image "{image.name}": its changes are not saved, and the render does not see them: save or pack it'
                 for image in bpy.data.images if image.is_dirty and image.packed_file is None and image.users]
 
     def run(self, stopped):
-        """Export the copy; the exporter's warnings. `stopped` is asked now and then whether to give up."""
+        """Export the copy. Returns the exporter's warnings. `stopped()` is polled for cancellation."""
         path = os.path.join(self.folder, "job.json")
         with open(path, "w", encoding="utf-8") as file:
             json.dump(self._job, file)
@@ -69,7 +70,7 @@ class Job:
             while worker.poll() is None:
                 if stopped():
                     raise Cancelled()
-                time.sleep(_PAUSE)
+                time.sleep(_POLL_SECONDS)
         finally:
             worker.kill()
             worker.wait()
@@ -79,7 +80,7 @@ class Job:
         script = os.path.join(_HERE, "export_job.py")
         program = self._blender or bpy.app.binary_path
         if not program or os.path.basename(program).startswith("python"):  # Blender as a module of Python
-            # Isolated: modules in the current folder may be anybody's.
+            # Isolated, because modules in the current folder may come from an untrusted source.
             return [program or sys.executable, "-I", script, job]
         scripts = "--enable-autoexec" if self._job["scripts"] else "--disable-autoexec"
         return [program, "-b", "--factory-startup", scripts, "-noaudio", "--python", script, "--", job]
@@ -99,19 +100,21 @@ class Job:
 
 
 def scripts_allowed():
-    """Whether Python in the file may run in the second Blender: where the user allows it for files in general, by the
-    preferences or Blender's command line, and has not kept this one from it."""
+    """Whether Python in the file may run in the second Blender.
+
+    It may if the preferences or the command line allow scripts in general, and they were not blocked in this file.
+    """
     preferences = bpy.context.preferences
     allowed = preferences.filepaths.use_scripts_auto_execute
     for word in sys.argv[:sys.argv.index("--") if "--" in sys.argv else None]:
         if word in _AUTOEXEC:
             allowed = _AUTOEXEC[word]
-    # Blender sets this only once something was kept from running, which objects that are not shown never are.
+    # Blender sets autoexec_fail only after it blocked a script, which never happens for hidden objects.
     return allowed and not bpy.app.autoexec_fail and not any(map(_lies_in, preferences.autoexec_paths))
 
 
 def _lies_in(excluded):
-    """Whether the file lies where the preferences forbid its scripts."""
+    """Whether the file is in a folder that the preferences exclude from running scripts."""
     if not excluded.path or not bpy.data.filepath:
         return False
     if excluded.use_glob:
@@ -120,12 +123,12 @@ def _lies_in(excluded):
 
 
 def without_file(line):
-    """What the program says of the exported file, without its name: the user has never seen it."""
+    """Remove the exported file's name from a message of the program, because the user does not know the file."""
     return line.replace(f"{GLB}: ", "", 1)
 
 
 def in_main_thread(work, stopped):
-    """Call `work` in Blender's main thread and return what it returns; a render runs in another one."""
+    """Call `work` in Blender's main thread, from the thread of a render. Returns its result."""
     if threading.current_thread() is threading.main_thread():
         return work()
     done, outcome = threading.Event(), {}
@@ -134,13 +137,13 @@ def in_main_thread(work, stopped):
         if not stopped():
             try:
                 outcome["value"] = work()
-            except Exception as error:  # it belongs to the thread that waits
+            except Exception as error:  # the waiting thread raises it
                 outcome["error"] = error
         done.set()
 
     bpy.app.timers.register(task)
-    # Blender waits for a render that is being stopped, and its timers wait with it.
-    while not done.wait(_PAUSE):
+    # While Blender waits for a cancelled render, its timers do not run.
+    while not done.wait(_POLL_SECONDS):
         if stopped():
             raise Cancelled()
     if "error" in outcome:

@@ -1,10 +1,10 @@
-"""Settings of Blender that a render with caustique leaves aside, each with what to do instead."""
+"""Warns of Blender's settings that a render with caustique ignores, with a remedy for each."""
 
 _SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT"}
 
 
 def warnings(scene):
-    """A line for each such setting that is in use in `scene`."""
+    """A line for each setting of `scene` that is in use and ignored."""
     render = scene.render
     found = [
         (render.use_motion_blur, "motion blur is not rendered: add it in the compositor, or render with Cycles"),
@@ -16,7 +16,7 @@ def warnings(scene):
 
 
 def _simulations(scene):
-    """A line for each simulation: the copy of the scene that is exported has no caches, baked ones included."""
+    """A line for each simulation: the exported copy of the scene has no simulation caches."""
     world = scene.rigidbody_world
     if world is not None and world.enabled:
         yield f'scene "{scene.name}": its rigid bodies are not simulated for the render: bake them to keyframes'

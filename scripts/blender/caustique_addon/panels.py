@@ -1,4 +1,4 @@
-"""The panels: method, when to stop, effects with the plan's table, finish, messages, the diagnosis, lights, passes."""
+"""The panels: method, stop conditions, effects with the plan's table, finish, messages, diagnosis, lights, passes."""
 
 import bpy
 
@@ -10,7 +10,7 @@ _STOPS = ("iterations", "time", "error")
 
 
 class _Panel:
-    """What the panels have in common: they show only while caustique renders the scene."""
+    """Base of the panels: they are visible only if caustique is the scene's engine."""
 
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -26,7 +26,7 @@ class _Panel:
 
 
 class MethodPanel(_Panel, bpy.types.Panel):
-    """How light is found."""
+    """The render method."""
 
     bl_idname = "CAUSTIQUE_PT_method"
     bl_label = "Method"
@@ -38,7 +38,7 @@ class MethodPanel(_Panel, bpy.types.Panel):
 
 
 class StopPanel(_Panel, bpy.types.Panel):
-    """When a render ends."""
+    """The stop conditions of a render."""
 
     bl_idname = "CAUSTIQUE_PT_stop"
     bl_label = "Stop"
@@ -56,7 +56,7 @@ class StopPanel(_Panel, bpy.types.Panel):
 
 
 class EffectsPanel(_Panel, bpy.types.Panel):
-    """What is simulated, and what the plan says of it."""
+    """The simulated effects, with the plan's table."""
 
     bl_idname = "CAUSTIQUE_PT_effects"
     bl_label = "Effects"
@@ -92,7 +92,7 @@ class EffectsPanel(_Panel, bpy.types.Panel):
 
 
 def _cells(effect):
-    """A row of the plan's table: who simulates the effect, its share of the light, the error without it."""
+    """A row of the plan's table: which part simulates the effect, its share of the light, the error without it."""
     if not effect["present"]:
         return ("not in the scene",)
     shares = (effect.get("energy"), effect.get("error_if_off"))
@@ -100,7 +100,7 @@ def _cells(effect):
 
 
 class FinishPanel(_Panel, bpy.types.Panel):
-    """What cleans the picture."""
+    """Settings of the finish, which removes noise."""
 
     bl_idname = "CAUSTIQUE_PT_finish"
     bl_label = "Finish"
@@ -110,7 +110,7 @@ class FinishPanel(_Panel, bpy.types.Panel):
 
 
 class DiagnosisPanel(_Panel, bpy.types.Panel):
-    """Why there is no caustic, or what looks like a mistake."""
+    """The diagnosis: why there is no caustic, and likely mistakes."""
 
     bl_idname = "CAUSTIQUE_PT_diagnosis"
     bl_label = "Caustics"
@@ -131,7 +131,7 @@ class DiagnosisPanel(_Panel, bpy.types.Panel):
 
 
 class MessagesPanel(_Panel, bpy.types.Panel):
-    """What the last render has warned of, and the fault it has ended with."""
+    """Warnings of the last render, and the fault that ended it."""
 
     bl_idname = "CAUSTIQUE_PT_messages"
     bl_label = "Messages of the Last Render"
@@ -149,7 +149,7 @@ class MessagesPanel(_Panel, bpy.types.Panel):
 
 
 def _messages(layout, context, messages):
-    """Lines, each with a button that selects the objects it names."""
+    """Draw messages, each with a button that selects the objects it names."""
     for line in messages:
         row = layout.box().row()
         text_layout.draw(row, context, line, "ERROR")
@@ -182,7 +182,7 @@ class PassesPanel(_Panel, bpy.types.Panel):
 
 
 class LightPanel(_Panel, bpy.types.Panel):
-    """What of a light is carried: Cycles' own panel shows more."""
+    """The supported settings of a light; Cycles' own panel has more."""
 
     bl_idname = "CAUSTIQUE_PT_light"
     bl_label = "Light"
@@ -204,7 +204,7 @@ class LightPanel(_Panel, bpy.types.Panel):
         else:
             names.append("shadow_soft_size")
         for name in names:
-            if hasattr(light, name):  # some came with Blender 4.5
+            if hasattr(light, name):  # Blender 4.5 added some
                 column.prop(light, name)
 
 
@@ -212,12 +212,12 @@ _KINDS = (MethodPanel, StopPanel, FinishPanel, DiagnosisPanel, MessagesPanel, Ef
 
 
 def register():
-    """Show the panels."""
+    """Register the panels."""
     for kind in _KINDS:
         bpy.utils.register_class(kind)
 
 
 def unregister():
-    """Take them away."""
+    """Unregister the panels."""
     for kind in reversed(_KINDS):
         bpy.utils.unregister_class(kind)

@@ -1,4 +1,4 @@
-"""Which layers of the program become which passes of Blender, and how they get there."""
+"""Maps layers of the program to passes of Blender, and copies them."""
 
 import json
 import pathlib
@@ -7,17 +7,17 @@ from collections import namedtuple
 
 import numpy
 
-#: A pass: its name in Blender (and in the EXR under `--exr-naming blender`), its components, what Blender's compositor
-#: takes it for, its name in `--layers`, the switch of the view layer that asks for it, and whether every scene has it.
+#: A pass: its name in Blender (and in the EXR with `--exr-naming blender`), its components, its data type in Blender's
+#: compositor, its name in `--layers`, the view layer's switch for it, and whether every scene has it.
 Pass = namedtuple("Pass", "name components kind layer switch always")
 
 _COMBINED = "Combined"
-#: What no layer's name can have.
+#: Characters that layer names cannot contain.
 _NO_LETTER = re.compile("[^0-9A-Za-z]")
 #: The program's table of layers: tests/generated.rs writes the file.
 _TABLE = json.loads(pathlib.Path(__file__).with_name("layers.json").read_text("utf-8"))
 _PARTS, _GROUPS = _TABLE["parts"], tuple(_TABLE["groups"])
-#: What Blender's compositor takes other components than colours for.
+#: {components: data type in Blender's compositor}; all others are colours.
 _KINDS = {"X": "VALUE", "Z": "VALUE", "XYZ": "VECTOR"}
 
 
@@ -29,16 +29,16 @@ PASSES = tuple(_pass(**one) for one in _TABLE["passes"])
 
 
 def wanted(view_layer):
-    """The passes that a view layer asks for, besides the picture."""
-    def asked(switch):
-        # The others are in `properties.Passes`.
+    """The passes that a view layer enables, besides the picture."""
+    def is_enabled(switch):
+        # All other switches are in `properties.Passes`.
         return getattr(view_layer if switch.startswith("use_pass_") else view_layer.caustique, switch)
 
-    return [one for one in PASSES if asked(one.switch)] + _of_groups(view_layer)
+    return [one for one in PASSES if is_enabled(one.switch)] + _group_passes(view_layer)
 
 
-def _of_groups(view_layer):
-    """The finished light of each light group, and its caustics; the estimates too, where those of parts are asked for."""
+def _group_passes(view_layer):
+    """Passes of each light group: its finished light and caustics, and with Noisy Parts also the noisy estimates."""
     found = dict.fromkeys(_NO_LETTER.sub("_", group.name) for group in getattr(view_layer, "lightgroups", ()))
     beginnings = [_COMBINED, ""] if view_layer.caustique.noisy_parts else [_COMBINED]
     names = (f"{beginning}{kind}{group}" for group in found for beginning in beginnings for kind in _GROUPS)
@@ -46,19 +46,19 @@ def _of_groups(view_layer):
 
 
 def layers(chosen):
-    """What `--layers` has to say for these passes: the program refuses names that the scene cannot have."""
+    """The value of `--layers` for these passes. The program rejects names that the scene cannot have."""
     if not all(one.always for one in chosen):
         return "all"
     return ",".join(dict.fromkeys(["beauty", *(one.layer for one in chosen)]))
 
 
 def fill(render_layer, picture, frame=None):
-    """Put the channels of an `exr.Picture` into the passes of Blender's `render_layer`.
+    """Copy the channels of an `exr.Picture` to the passes of Blender's `render_layer`.
 
-    `frame` is x, y (from the top left), width and height of the part that Blender renders, in pixels of the whole
-    picture; without it everything. Returns the names of the passes that stay black because the program has not made
-    them. Parts and light groups are not among these: where one is absent, the scene has no such light, and black is
-    right; a method that does not tell lights apart says so itself.
+    `frame`: x, y (from the top left), width and height of the render region in pixels; None for the whole picture.
+    Returns the names of passes that stay black because the program did not write them. Missing parts and light groups
+    are not reported: black is right if the scene has no such light, and the program warns if a method cannot separate
+    lights.
     """
     missing = []
     for one in render_layer.passes:
@@ -68,19 +68,19 @@ def fill(render_layer, picture, frame=None):
             if plain not in _PARTS and not plain.startswith(_GROUPS):
                 missing.append(one.name)
             continue
-        put(one, planes, picture, frame)
+        copy_channels(one, planes, picture, frame)
     return missing
 
 
 def fill_combined(render_layer, picture, frame=None):
-    """Put the picture so far, with channels R G B A, into the pass that Blender shows."""
+    """Copy the picture so far, with channels R G B A, to the pass that Blender shows."""
     for one in render_layer.passes:
         if one.name == _COMBINED:
-            put(one, [picture.channels[name] for name in "RGBA"], picture, frame)
+            copy_channels(one, [picture.channels[name] for name in "RGBA"], picture, frame)
 
 
-def put(one, planes, picture, frame=None):
-    """Put planes (height, width), the first row on top, into a pass, whose first row is at the bottom."""
+def copy_channels(one, planes, picture, frame=None):
+    """Copy channels (height, width), top row first, to a pass, which has the bottom row first."""
     if frame is not None:
         x, y, width, height = frame
         left, top = x - picture.window[0], y - picture.window[1]
@@ -88,12 +88,12 @@ def put(one, planes, picture, frame=None):
     pixels = numpy.ascontiguousarray(numpy.stack(planes, -1)[::-1], numpy.float32).reshape(-1, len(planes))
     try:
         one.rect.foreach_set(pixels.ravel())
-    except TypeError:  # Blender 3 wants as many elements as there are pixels, and takes all their components
+    except TypeError:  # Blender 3 expects a list of pixels, each with all components
         one.rect.foreach_set(pixels)
 
 
 def _planes(picture, name, components):
-    """The channels of a pass, or None. Cryptomattes have components of lower case."""
+    """The channels of a pass, or None. Cryptomattes have lower-case components."""
     for spelt in (components, components.lower()):
         names = [f"ViewLayer.{name}.{component}" for component in spelt]
         if all(name in picture.channels for name in names):
@@ -101,8 +101,8 @@ def _planes(picture, name, components):
     return None
 
 
-def stamp(result, picture, view_layer):
-    """Give Blender's result the manifests of the cryptomattes, under the name of its own view layer."""
+def copy_manifests(result, picture, view_layer):
+    """Add the manifests of the cryptomattes to Blender's result, under the name of its view layer."""
     for name, value in picture.text.items():
         if name.startswith("cryptomatte/"):
             result.stamp_data_add_field(name, value.replace("ViewLayer.", f"{view_layer}.", 1)

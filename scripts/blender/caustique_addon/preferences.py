@@ -1,4 +1,4 @@
-"""Where the program is: the add-on's preferences, which also say what is wrong with it."""
+"""The add-on's preferences: the program's path, with the errors of the program there."""
 
 import bpy
 
@@ -12,15 +12,14 @@ class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
 
     program: bpy.props.StringProperty(
-        name="Program", subtype="FILE_PATH", update=lambda _self, _context: program.ask_again(),
-        description="The program caustique; where nothing is chosen, the one on the PATH")
+        name="Program", subtype="FILE_PATH", update=lambda _self, _context: program.clear_cache(),
+        description="The program caustique; if empty, the one on the PATH")
     exporter: bpy.props.StringProperty(
         name="Exporter", subtype="FILE_PATH",
-        description="Another Blender, or a Python that has bpy, to export the scene with; where nothing is chosen, "
-                    "this Blender")
+        description="Another Blender, or a Python that has bpy, to export the scene with; if empty, this Blender")
 
     def draw(self, context):
-        """The paths, and what was found there."""
+        """Draw the paths, and the program's version or fault."""
         layout = self.layout
         layout.prop(self, "program")
         try:
@@ -39,10 +38,10 @@ def get(context):
 
 
 def register():
-    """Show them."""
+    """Register the preferences."""
     bpy.utils.register_class(Preferences)
 
 
 def unregister():
-    """Take them away."""
+    """Unregister the preferences."""
     bpy.utils.unregister_class(Preferences)

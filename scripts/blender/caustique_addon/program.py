@@ -1,4 +1,4 @@
-"""The program: where it is, whether it is new enough, what it can do, and what it lacks."""
+"""Finds the program and asks for its version, its options and its missing libraries."""
 
 import functools
 import json
@@ -9,15 +9,16 @@ import subprocess
 
 from .fault import Fault
 
-#: The oldest version whose command line the add-on speaks.
+#: The oldest version whose command line is compatible with the add-on.
 OLDEST = (0, 1, 0)
 HOW_TO_GET_IT = ("clone the repository of caustique, run ./scripts/demo.sh there, "
                  "and choose target/release/caustique in the add-on's preferences")
-_PATIENCE = 60  # seconds; a program that says less in this time does not work
+_MAX_SECONDS = 60  # for an answer of the program
 
 
 def find(chosen):
-    """The path of the program: the one `chosen` in the preferences, else `caustique` on the PATH. It is new enough."""
+    """The path of the program: `chosen` in the preferences, else `caustique` on the PATH. Raises a Fault if it is too
+    old."""
     path = os.path.expanduser(chosen) if chosen else shutil.which("caustique")
     if path is None:
         raise Fault("the program caustique is not on the PATH", HOW_TO_GET_IT)
@@ -31,12 +32,12 @@ def find(chosen):
 
 
 def dotted(numbers):
-    """A version as people write it."""
+    """A version as text, such as 1.2.3."""
     return ".".join(map(str, numbers))
 
 
 def version(path):
-    """The version of the program at `path`, three numbers."""
+    """The version of the program at `path`: three numbers."""
     said = _ask(path, "--version").stdout
     numbers = re.fullmatch(r"caustique (\d+)\.(\d+)\.(\d+)\S*\s*", said)
     if numbers is None:
@@ -56,20 +57,20 @@ def missing_libraries(path):
             if isinstance(found, dict) and not found["found"]]
 
 
-def ask_again():
-    """Forget the answers: a library may have been installed since."""
+def clear_cache():
+    """Clear the cached answers, because a library may have been installed since."""
     _answer.cache_clear()
 
 
 def _ask(path, *arguments):
-    """The answer of the program; asked again only where the file has changed."""
+    """The program's answer to these arguments, cached until its file changes."""
     return _answer(path, os.stat(path).st_mtime_ns, arguments)
 
 
 @functools.lru_cache(maxsize=16)
 def _answer(path, _changed, arguments):
     try:
-        return subprocess.run([path, *arguments], capture_output=True, text=True, timeout=_PATIENCE, check=False,
+        return subprocess.run([path, *arguments], capture_output=True, text=True, timeout=_MAX_SECONDS, check=False,
                               stdin=subprocess.DEVNULL)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise Fault(f"{path} does not run: {error}", HOW_TO_GET_IT) from error

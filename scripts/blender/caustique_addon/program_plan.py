@@ -1,4 +1,4 @@
-"""What `caustique plan` says of a scene, and whom it names."""
+"""Runs `caustique plan` on a scene, and finds the objects that its messages name."""
 
 import json
 import re
@@ -6,17 +6,17 @@ import subprocess
 
 from . import fault, handoff
 
-_PATIENCE = 0.1  # seconds between two questions whether to give up
+_POLL_SECONDS = 0.1  # between two checks for cancellation
 _CAUSTICS = ("caustic", "sds")
 
 
 def read(words, folder, stopped):
-    """The object that a command line with --json prints in a folder. `stopped` is asked whether to give up."""
+    """Run a command line with --json in a folder. Returns the printed object. `stopped()` is true to cancel."""
     process = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True, errors="replace")
     while True:
         try:
-            said, told = process.communicate(timeout=_PATIENCE)
+            said, messages = process.communicate(timeout=_POLL_SECONDS)
             break
         except subprocess.TimeoutExpired:
             if stopped():
@@ -24,7 +24,7 @@ def read(words, folder, stopped):
                 process.communicate()
                 raise fault.Cancelled() from None
     if process.returncode != 0:
-        lines = [handoff.without_file(line) for line in told.splitlines() if not line.startswith("warning: ")]
+        lines = [handoff.without_file(line) for line in messages.splitlines() if not line.startswith("warning: ")]
         raise fault.fault_from_program(lines, process.returncode)
     try:
         return json.loads(said)
@@ -33,7 +33,7 @@ def read(words, folder, stopped):
 
 
 def headline(said):
-    """What a plan says of caustics, in a sentence."""
+    """One sentence about the caustics in a plan."""
     caustics = [effect for effect in said["effects"] if effect["name"] in _CAUSTICS]
     rendered = [effect for effect in caustics if effect["simulated"]]
     if rendered:
@@ -46,14 +46,14 @@ def headline(said):
 
 
 def reasons(said):
-    """Why the scene has caustics, a list of lines."""
+    """The reasons for caustics in the scene, a list of lines."""
     return [reason for effect in said["effects"] if effect["name"] in _CAUSTICS for reason in effect["because"]]
 
 
 def named_objects(scene, lines):
-    """The objects of a scene that lines like `object "A": ..` or `material "B" on "C": ..` name, each once.
+    """The objects of a scene named by lines such as `object "A": ..` or `material "B" on "C": ..`, each once.
 
-    A material stands for all that wear it, for lists of objects are cut where they are long.
+    A material stands for all objects that use it, because messages shorten long lists of objects.
     """
     found = {}
     for line in lines:

@@ -1,4 +1,4 @@
-"""The program at work: what it has said so far, how to stop it, and how it ended."""
+"""A running program: its progress, how to stop it, and its result."""
 
 import json
 import signal
@@ -8,69 +8,69 @@ import time
 
 from . import fault, handoff
 
-_INTERRUPTED = 130  # exit code of a program that was asked to stop and has written what was done
-_LEAST_GRACE = 20  # seconds: finishing a large picture takes some
+_INTERRUPTED = 130  # exit code of a program that was interrupted and has written its picture
+_MIN_GRACE_SECONDS = 20  # from the interrupt to killing the program; finishing a large picture takes time
 
 
 class Run:
-    """`command` (a list) as a process in a folder. `progress` is its last line of progress, or None."""
+    """A process of `command` (a list) in a folder. `progress`: the last progress object, or None."""
 
     def __init__(self, command, folder):
         self.progress, self.warnings = None, []
         self._rest = []
-        self._asked = None  # when it was asked to stop
-        self._longest = 0.0  # seconds, of all iterations so far
-        # In a group of its own, or a Ctrl-C at the terminal would reach it twice: from there and from us.
+        self._interrupted_at = None  # time of the interrupt
+        self._longest = 0.0  # seconds of the longest iteration so far
+        # In a separate process group, else a Ctrl-C would reach it twice: from the terminal and from here.
         self._process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                          stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
     def _listen(self):
-        with self._process.stderr as told:
-            for line in map(str.rstrip, told):
+        with self._process.stderr as messages:
+            for line in map(str.rstrip, messages):
                 if line.startswith("{"):
-                    self._heard(json.loads(line))
+                    self._update(json.loads(line))
                 elif line.startswith("warning: "):
                     self.warnings.append(handoff.without_file(line[len("warning: "):]))
                 elif line:
                     self._rest.append(handoff.without_file(line))
 
-    def _heard(self, progress):
+    def _update(self, progress):
         before = self.progress["seconds"] if self.progress else 0.0
         self._longest = max(self._longest, progress["seconds"] - before)
         self.progress = progress
 
-    def working(self):
-        """Whether it still runs."""
+    def is_running(self):
+        """Whether the program is running."""
         return self._process.poll() is None
 
     def stop(self):
-        """Ask it to finish the iteration and write what there is; insist where that takes long. Call it repeatedly."""
+        """Interrupt the program, which then writes its picture; kill it after a grace period. Call this repeatedly."""
         now = time.monotonic()
-        if self._asked is None:
-            self._asked = now
+        if self._interrupted_at is None:
+            self._interrupted_at = now
             self._process.send_signal(signal.SIGINT)
-        elif now - self._asked > _LEAST_GRACE + 2 * self._longest:
+        elif now - self._interrupted_at > _MIN_GRACE_SECONDS + 2 * self._longest:
             self._process.send_signal(signal.SIGINT)
-            self._asked = now
+            self._interrupted_at = now
 
     def kill(self):
-        """End it at once, if it still runs."""
+        """Kill the program if it is running."""
         self._process.kill()
         self._process.wait()
         self._listener.join()
 
     def finish(self):
-        """Raise a Fault if it has failed."""
+        """Wait for the end of the program. Raises a Fault if it failed."""
         code = self._process.wait()
-        self._listener.join()  # it may not have heard the last words yet
+        self._listener.join()  # it may not have read the last lines yet
         if code not in (0, _INTERRUPTED):
             raise fault.fault_from_program(self._rest, code)
 
 
 def fraction(progress):
-    """How much of a render is done, 0 to 1, by its line of progress."""
+    """The completed share of a render, 0 to 1, from its progress."""
     if progress["iterations"]:
         by_count = progress["iteration"] / progress["iterations"]
     else:
@@ -81,7 +81,7 @@ def fraction(progress):
 
 
 def sentence(progress):
-    """A line of progress in words."""
+    """Progress as a sentence."""
     if progress["iteration"] == progress["iterations"]:
         return "Finishing"
     text = f"Iteration {progress['iteration']}"
@@ -95,7 +95,7 @@ def sentence(progress):
 
 
 def duration(seconds):
-    """Seconds as people say them."""
+    """A duration in seconds as text."""
     minutes, hours = seconds / 60, seconds / 3600
     if hours >= 2:
         return f"{hours:.0f} h"

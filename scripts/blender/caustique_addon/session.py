@@ -1,17 +1,17 @@
-"""What the program has said last, for the panels to show. It is not kept in files."""
+"""The program's last messages, for the panels. Files do not store them."""
 
-#: Lines that the last render of each scene has warned of, by the scene's name.
+#: {scene's name: warnings of its last render}
 warnings = {}
 
-#: The fault that the last render of each scene has ended with, by the scene's name.
+#: {scene's name: fault that ended its last render}
 faults = {}
 
-#: The last plan of each scene, as `diagnosis` leaves it, by the scene's name.
+#: {scene's name: its last `diagnosis.Plan`}
 plans = {}
 
 
 def clear():
-    """Forget all."""
+    """Clear all messages."""
     warnings.clear()
     faults.clear()
     plans.clear()

@@ -1,15 +1,15 @@
-"""Text of many words in a panel: Blender's labels are one line each and cut what is longer."""
+"""Wraps long text in panels, because Blender's labels have one line and cut off the rest."""
 
 import textwrap
 
-_LETTER = 6.5  # pixels, a letter of the interface's font at scale 1, about
-_MARGIN = 70  # pixels beside the text: icon and borders of the panel
+_LETTER_PIXELS = 6.5  # average width of a letter of the interface's font at scale 1
+_MARGIN_PIXELS = 70  # beside the text: icon and borders of the panel
 
 
 def draw(layout, context, text, icon="NONE"):
-    """Write `text` into `layout` on as many lines as the region is narrow."""
+    """Add `text` to `layout`, wrapped to the width of the region."""
     scale = context.preferences.system.ui_scale
-    room = max(int((context.region.width / scale - _MARGIN) / _LETTER), 20)
+    room = max(int((context.region.width / scale - _MARGIN_PIXELS) / _LETTER_PIXELS), 20)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(text, room) or [""]):
@@ -17,7 +17,7 @@ def draw(layout, context, text, icon="NONE"):
 
 
 def draw_fault(layout, context, fault):
-    """Write what is wrong, and below it the remedy."""
+    """Add a fault to `layout`, with its remedy below."""
     box = layout.box()
     draw(box, context, fault.what, "ERROR")
     if fault.remedy:
