@@ -1,4 +1,4 @@
-"""Cameras: lens, frame and focus (UsdGeomCamera), fitted to the shape of the picture as UsdRender asks."""
+"""Converts cameras: lens, aperture and focus (UsdGeomCamera), conformed to the picture's aspect ratio (UsdRender)."""
 
 import math
 
@@ -7,14 +7,14 @@ from pxr import UsdGeom
 from faults import Fault
 from stage import custom_keys
 
-# Attributes that are read, and the schema's defaults, which one that is blocked (`= None`) does not have.
+# Attributes with the schema's defaults, which USD does not return for a blocked attribute (`= None`).
 _DEFAULTS = (("horizontalAperture", 20.955), ("verticalAperture", 15.2908), ("focalLength", 50.0))
 
 
 def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True):
-    """What a glTF node says to be this camera; `aspect`: width by height of the picture, if it is known."""
+    """The glTF node of a camera. `aspect`: width over height of the picture, None if unknown."""
     camera, where, get = UsdGeom.Camera(prim), prim.GetPath(), stage.get
-    # Tenths of the stage's unit.
+    # In tenths of the stage's unit.
     width, height, focal = (float(get(camera.GetPrim().GetAttribute(name), default)) for name, default in _DEFAULTS)
     if not all(math.isfinite(x) and x > 0 for x in (width, height, focal)):
         raise Fault(where, f"its apertures are {width:g} and {height:g}, its focal length {focal:g}",
@@ -22,7 +22,7 @@ def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True)
     offsets = [float(get(a, 0.0)) for a in (camera.GetHorizontalApertureOffsetAttr(),
                                             camera.GetVerticalApertureOffsetAttr())]
     if aspect is not None:
-        width, height = _fitted(width, height, aspect, policy)
+        width, height = _conform(width, height, aspect, policy)
     if aspect is None:
         aspect = width / height
     unit = stage.metres / 10
@@ -54,8 +54,8 @@ def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True)
     return {"camera": document.add("cameras", {"name": str(where), **entry})}
 
 
-def _fitted(width, height, aspect, policy):
-    """The aperture for a picture of another shape (UsdRenderSettingsBase, aspectRatioConformPolicy)."""
+def _conform(width, height, aspect, policy):
+    """The aperture conformed to the picture's aspect ratio (UsdRenderSettingsBase, aspectRatioConformPolicy)."""
     wide = aspect > width / height
     by_width = {"adjustApertureWidth": True, "expandAperture": wide, "cropAperture": not wide}
     if by_width.get(policy, False):
@@ -64,7 +64,7 @@ def _fitted(width, height, aspect, policy):
 
 
 def exposure(prim, stage):
-    """Stops by which a camera brightens its picture."""
+    """The exposure of a camera in stops."""
     camera = UsdGeom.Camera(prim)
     scale = camera.ComputeLinearExposureScale(stage.time)
     if not math.isfinite(scale):

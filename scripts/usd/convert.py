@@ -1,12 +1,12 @@
-"""Turn a stage of USD (.usd, .usda, .usdc, .usdz) into a .glb that caustique renders.
+"""Convert a USD stage (.usd, .usda, .usdc, .usdz) to a .glb that caustique renders.
 
     python3 scripts/usd/convert.py STAGE -o OUT.glb [--frame N] [--allow-outside]
-    python3 scripts/usd/convert.py STAGE --arguments     the options of `render` that its RenderSettings stand for
+    python3 scripts/usd/convert.py STAGE --arguments     print the options of `render` from its RenderSettings
 
-It needs `usd-core`, which composes the stage, and what else scripts/requirements-usd.txt lists. `caustique render
-STAGE` runs it by itself. What glTF cannot say stands in `extras.caustique` (docs/scene-format.md); an environment image
-lies beside OUT.glb. Whatever is ignored or approximated is named in the file's `losses`. An error is a line of JSON on
-stderr, {"prim": where, "fault": what, "hint": remedy or null}, and exit code 1.
+The script needs the packages in scripts/requirements-usd.txt, such as `usd-core`, which composes the stage. `caustique
+render STAGE` runs it. `extras.caustique` holds features that glTF lacks (docs/scene-format.md); an environment image is
+written beside OUT.glb. The file's `losses` list all ignored or approximated features. An error is a line of JSON on
+stderr, {"prim": path, "fault": text, "hint": remedy or null}, with exit code 1.
 """
 
 import argparse
@@ -22,8 +22,8 @@ from guard import run_guarded
 
 
 @contextlib.contextmanager
-def _texts():
-    """USD hands any name or text on as it stands in the file, and each may be the one that is not UTF-8."""
+def _checked_text():
+    """Convert errors about text that is not UTF-8 to a Fault, because USD passes names and texts on unchecked."""
     try:
         yield
     except UnicodeDecodeError as error:
@@ -31,9 +31,9 @@ def _texts():
                     "write the stage again, in UTF-8")
 
 
-@_texts()
+@_checked_text()
 def write(path, out, frame=None, allow_outside=False):
-    """Converts the stage at `path` at a time code to the .glb `out`; what is lost, texts."""
+    """Convert the stage at `path` at time code `frame` to the .glb `out`. Returns the losses, a list of texts."""
     from scene import Scene
     from stage import Stage
     stage = Stage(path, frame, allow_outside)
@@ -43,16 +43,16 @@ def write(path, out, frame=None, allow_outside=False):
     return stage.losses.lines
 
 
-@_texts()
+@_checked_text()
 def arguments(path, allow_outside=False):
-    """Options of `caustique render` by the RenderSettings of the stage at `path`, texts."""
+    """Options of `caustique render` from the RenderSettings of the stage at `path`, a list of texts."""
     from render_settings import Settings
     from stage import Stage
     return Settings(Stage(path, None, allow_outside)).arguments()
 
 
 def main(given):
-    """Command line; the exit code."""
+    """Run the command line. Returns the exit code."""
     parser = argparse.ArgumentParser(prog="convert.py")
     parser.add_argument("stage", help=".usd, .usda, .usdc or .usdz")
     parser.add_argument("-o", "--output", metavar="OUT.glb")
@@ -74,7 +74,7 @@ def main(given):
 
 
 def _convert(given):
-    """Does what the command line asks for; the exit code."""
+    """Convert, or print the arguments. Returns the exit code."""
     try:
         if given.arguments:
             print(json.dumps(arguments(given.stage, given.allow_outside)))
@@ -89,7 +89,7 @@ def _convert(given):
                 "numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to that Python")
     except MemoryError:
         where, what, hint = "", "the stage takes more memory than there is", "use a simpler stage or smaller textures"
-    except Exception as error:  # whatever USD raises about stages that come from anywhere
+    except Exception as error:  # USD raises many kinds of errors about invalid stages
         where, what, hint = "", f"USD says: {text_of(error)}", None
     return _print_error(where, what, hint)
 

@@ -1,4 +1,4 @@
-"""A binary glTF file in the making (glTF 2.0): a JSON document and a buffer."""
+"""Builds a binary glTF file (glTF 2.0): a JSON document and a buffer."""
 
 import json
 import math
@@ -13,7 +13,7 @@ _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 class Document:
-    """Parts are added, each once, and referred to by their index."""
+    """A glTF document under construction. Methods add a part and return its index, equal parts once."""
 
     def __init__(self):
         self.json = {"asset": {"version": "2.0", "generator": "caustique, from USD"}, "scene": 0,
@@ -23,36 +23,36 @@ class Document:
         self._shared = {}
 
     def add(self, kind, entry):
-        """Adds an entry to a list such as `meshes`; its index."""
+        """Add an entry to a list such as `meshes`. Returns its index."""
         entries = self.json.setdefault(kind, [])
         entries.append(entry)
         return len(entries) - 1
 
     def share(self, kind, entry):
-        """The index of an equal entry, which is added if there is none."""
+        """Add an entry unless an equal one exists. Returns its index."""
         key = kind, json.dumps(entry, sort_keys=True)
         if key not in self._shared:
             self._shared[key] = self.add(kind, entry)
         return self._shared[key]
 
     def use(self, extension):
-        """Says that the file uses an extension; its name."""
+        """Declare that the file uses an extension. Returns its name."""
         self._used.add(extension)
         return extension
 
     def light(self, entry):
-        """Adds a light of KHR_lights_punctual; what a node says to carry it."""
+        """Add a light of KHR_lights_punctual. Returns the node's properties that refer to it."""
         name = self.use("KHR_lights_punctual")
         lights = self.json.setdefault("extensions", {}).setdefault(name, {}).setdefault("lights", [])
         lights.append(entry)
         return {name: {"light": len(lights) - 1}}
 
     def node(self, entry):
-        """Adds a node to the scene."""
+        """Add a node to the scene."""
         self.json["scenes"][0]["nodes"].append(self.add("nodes", entry))
 
     def floats(self, array, bounds=False):
-        """An accessor of `array`, (count, width) numbers in single precision."""
+        """Add an accessor of `array` (count, width), in single precision."""
         array = numpy.ascontiguousarray(array, numpy.float32)
         entry = {"bufferView": self._view(array.tobytes()), "componentType": _FLOAT, "count": len(array),
                  "type": _TYPES[array.shape[1]]}
@@ -61,13 +61,13 @@ class Document:
         return self.add("accessors", entry)
 
     def indices(self, array):
-        """An accessor of vertex numbers."""
+        """Add an accessor of vertex indices."""
         array = numpy.ascontiguousarray(array, numpy.uint32)
         return self.add("accessors", {"bufferView": self._view(array.tobytes()), "componentType": _UINT,
                                       "count": len(array), "type": "SCALAR"})
 
     def image(self, data, mime, name):
-        """An image of the bytes of a file, held once."""
+        """Add an image from the bytes of a file, equal ones once."""
         key = "image", data
         if key not in self._shared:
             self._shared[key] = self.add("images", {"bufferView": self._view(data), "mimeType": mime, "name": name})
@@ -80,15 +80,15 @@ class Document:
         return view
 
     def write(self, path):
-        """Writes the .glb: chunks are padded to four bytes as the format asks."""
+        """Write the .glb; the format requires chunks padded to four bytes."""
         if not self.json["scenes"][0]["nodes"]:
-            del self.json["scenes"][0]["nodes"]  # the format has no empty lists
+            del self.json["scenes"][0]["nodes"]  # the format forbids empty lists
         self._buffer += b"\0" * (-len(self._buffer) % 4)
         if self._buffer:
             self.json["buffers"] = [{"byteLength": len(self._buffer)}]
         if self._used:
             self.json["extensionsUsed"] = sorted(self._used)
-        _check(self.json)
+        _check_finite(self.json)
         text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
         size = 12 + 8 + len(text) + (8 + len(self._buffer) if self._buffer else 0)
@@ -98,13 +98,13 @@ class Document:
                 file.write(struct.pack("<II", len(self._buffer), 0x004E4942) + self._buffer)
 
 
-def _check(entry, where="/", key=""):
-    """Raises where a number is not finite, as products of large numbers may come to be: the format has none such."""
+def _check_finite(entry, where="/", key=""):
+    """Raise a Fault if a number is not finite, such as an overflowing product: glTF cannot store it."""
     if isinstance(entry, float) and not math.isfinite(entry):
         raise Fault(where, f"its {key} comes to {entry}", "make its numbers smaller")
     if isinstance(entry, dict):
         for name, part in entry.items():
-            _check(part, entry.get("name", where), name)
+            _check_finite(part, entry.get("name", where), name)
     elif isinstance(entry, list):
         for part in entry:
-            _check(part, where, key)
+            _check_finite(part, where, key)

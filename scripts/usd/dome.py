@@ -1,4 +1,4 @@
-"""Dome lights as the scene's environment."""
+"""Converts dome lights to the scene's environment."""
 
 import math
 import os
@@ -14,14 +14,14 @@ from stage import custom_keys, kind_of
 
 
 class Dome:
-    """The first dome light of a stage, and what further ones add."""
+    """The environment from the first dome light of a stage, and the colours of further ones."""
 
     def __init__(self, stage, folder):
         self._stage, self._folder = stage, folder
         self.keys = None
 
-    def take(self, prim, matrix):
-        """Takes a dome light that stands at `matrix` (in glTF's axes)."""
+    def add(self, prim, matrix):
+        """Add a dome light with the transform `matrix` (in glTF's axes)."""
         light = Light(prim, self._stage)
         if light.cone() is not None:
             light.add_loss("shaping of a dome light is not carried: it shines from everywhere")
@@ -56,25 +56,25 @@ class Dome:
             light.add_loss("a tilted or coloured dome with a Radiance HDR is not carried so: save its image as OpenEXR")
             upright, grey = True, True
         if suffix in (".hdr", ".exr") and upright and grey:
-            # In USD the image's middle is at +Z, and turning about +Y takes +Z to +X.
+            # In USD the image's centre is at +Z; a positive rotation about +Y turns +Z to +X.
             degrees = math.degrees(math.atan2(turn[2, 0], turn[2, 2])) - 90
             return {"file": self._written("environment" + suffix, data), "rotation_deg": degrees,
                     "strength": max(emitted)}
         return {"file": self._baked(light, data, name, turn, emitted), "rotation_deg": 0.0}
 
     def _baked(self, light, data, name, turn, emitted):
-        """The image seen from the axes of glTF, its colour changed, as an OpenEXR file."""
+        """Write the image rotated to glTF's axes and tinted, as an OpenEXR file. Returns its name."""
         texels, bits = textures.read(data, name, light.where)
         texels = texels[:, :, :3] if texels.shape[2] >= 3 else numpy.repeat(texels[:, :, :1], 3, axis=2)
         texels = textures.from_srgb(texels) if bits == 8 else texels
         height, width = texels.shape[:2]
-        # Our own mapping: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi.
+        # Mapping of caustique: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi.
         phi = ((numpy.arange(width) + 0.5) / width - 0.5) * 2 * math.pi
         theta = (numpy.arange(height) + 0.5) / height * math.pi
         sin, cos = (f(theta)[:, None] for f in (numpy.sin, numpy.cos))
         out = numpy.stack([sin * numpy.cos(phi), numpy.repeat(cos, width, 1), sin * numpy.sin(phi)], axis=2)
         local = out @ turn.T
-        # OpenEXR's: the middle at +Z, longitude growing to the left.
+        # Mapping of OpenEXR: centre at +Z, longitude increases to the left.
         u = 0.5 - numpy.arctan2(local[:, :, 0], local[:, :, 2]) / (2 * math.pi)
         v = numpy.arccos(numpy.clip(local[:, :, 1], -1, 1)) / math.pi
         seen = _bilinear(texels, u * width - 0.5, v * height - 0.5) * numpy.array(emitted)
@@ -93,7 +93,7 @@ class Dome:
 
 
 def _bilinear(texels, x, y):
-    """Texels (height, width, 3) at places in them; across the left and right edge the image goes on."""
+    """Bilinear lookup of texels (height, width, 3) at pixel coordinates; the image repeats horizontally."""
     height, width = texels.shape[:2]
     left, top = numpy.floor(x).astype(int), numpy.floor(y).astype(int)
     a, b = (x - left)[:, :, None], (y - top)[:, :, None]
@@ -103,5 +103,5 @@ def _bilinear(texels, x, y):
 
 
 def is_dome(prim):
-    """Whether a prim is a dome light of either kind."""
+    """Whether a prim is a DomeLight or a DomeLight_1."""
     return prim.GetTypeName() in ("DomeLight", "DomeLight_1")

@@ -1,8 +1,8 @@
-"""What is wrong with a stage: an error that ends the conversion, and what is lost on the way."""
+"""Errors that end the conversion of a stage, and losses that do not."""
 
 
 class Fault(Exception):
-    """An error at a prim (or a file): what is wrong there, and what to do about it."""
+    """An error at a prim or a file: the fault and its remedy."""
 
     def __init__(self, where, fault, hint=None):
         super().__init__(f"{where}: {fault}")
@@ -10,7 +10,7 @@ class Fault(Exception):
 
 
 def text_of(error):
-    """What an error of USD's says, on one line; its words may hold bytes of the file that are no text."""
+    """The text of an error of USD on one line. It may contain bytes of the file that are not UTF-8."""
     try:
         return " ".join(str(error).split()) or type(error).__name__
     except UnicodeDecodeError:
@@ -18,13 +18,13 @@ def text_of(error):
 
 
 class Losses:
-    """What is ignored or approximated: a line each, once."""
+    """Features that are ignored or approximated, one line each, without duplicates."""
 
     def __init__(self):
         self.lines = []
 
     def add(self, where, what):
-        """`what` is lost of the prim at `where`."""
+        """Record that the prim at `where` loses `what`."""
         line = f"{where}: {what}"
         if line not in self.lines:
             self.lines.append(line)

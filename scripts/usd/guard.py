@@ -1,4 +1,4 @@
-"""Work in a process of its own, with limits, that ends with the program which asked for it."""
+"""Runs work in a child process with limits, which ends with the calling program."""
 
 import os
 import resource
@@ -11,10 +11,10 @@ from faults import Fault
 
 
 def run_guarded(work, folder, seconds, memory):
-    """Exit code of `work`, which a child does in at most so many seconds and bytes of memory.
+    """Run `work` in a child process with at most `seconds` and `memory` bytes. Returns its exit code.
 
-    The program that asked for it keeps the other end of standard input open. When that end closes, the program is gone:
-    the child is ended, and `folder` removed.
+    The calling program keeps its end of standard input open. When it closes, the program has ended: kill the child and
+    remove `folder`.
     """
     child = os.fork()
     if child == 0:
@@ -39,7 +39,7 @@ def run_guarded(work, folder, seconds, memory):
                         "use a simpler stage, or a machine with more memory")
         return code
     if events:
-        # Nothing but the folder that the program has made for this conversion.
+        # Remove only a folder that the program made for this conversion.
         if os.path.basename(folder).startswith("caustique-usd-"):
             shutil.rmtree(folder, ignore_errors=True)
         return 1

@@ -1,8 +1,8 @@
-"""UsdLux: what a light emits, by the reference implementation of OpenUSD (hdEmbree), in terms of glTF.
+"""Converts UsdLux lights to glTF; their emission follows OpenUSD's reference implementation (hdEmbree).
 
-The radiance of a light is color * intensity * 2^exposure, times the colour of its temperature, and with `normalize`
-over its area in units of the stage (a distant light: over pi sin^2 of half its angle). One nit is taken for one
-W/(sr m2), of lights, domes and glowing surfaces alike.
+Radiance is color * intensity * 2^exposure, times the colour of its temperature. With `normalize` it is divided by the
+light's area in stage units (distant lights: by pi sin^2 of half the angle). One nit is read as one W/(sr m2), for
+lights, domes and emissive surfaces.
 """
 
 import math
@@ -12,14 +12,14 @@ from pxr import Gf, UsdLux
 
 import shapes
 from faults import Fault
-from materials import glow
+from materials import set_emission
 from stage import custom_keys
 
-_SIDES = 64
+_DISC_SIDES = 64
 
 
 class Light:
-    """What all kinds of light have in common."""
+    """Common properties of all kinds of lights."""
 
     def __init__(self, prim, stage):
         self.prim, self.stage, self.api = prim, stage, UsdLux.LightAPI(prim)
@@ -37,25 +37,25 @@ class Light:
                 self.add_loss(f"{collection.GetName()} is not carried: it shines on everything, and all casts shadows")
 
     def get(self, name, default):
-        """The value of an input of this name."""
+        """The value of an input."""
         return self.stage.get(self.prim.GetAttribute("inputs:" + name), default)
 
     def add_loss(self, what):
-        """Names a loss of this light."""
+        """Record a loss of this light."""
         self.stage.losses.add(self.where, what)
 
     @property
     def normalized(self):
-        """Whether its power does not depend on its size."""
+        """Whether the light's power is independent of its size."""
         return self.get("normalize", False)
 
     def emitted(self):
-        """Colour times intensity, 3 numbers, before `normalize`."""
+        """Colour times intensity (3 numbers), without `normalize`."""
         default = 50000.0 if self.prim.GetTypeName() == "DistantLight" else 1.0
         stops = self.get("exposure", 0.0)
         power = self.get("intensity", default) * (2.0 ** stops if stops < 1024 else math.inf)
         color = Gf.Vec3f(*map(float, self.get("color", Gf.Vec3f(1))))
-        # Blender writes white lamps as 6500 K, which the reference tints.
+        # Blender writes white lamps with 6500 K, which hdEmbree tints.
         white = self.stage.by_blender and self.get("colorTemperature", 6500.0) == 6500.0
         if self.get("enableColorTemperature", False) and not white:
             color = Gf.CompMult(color, UsdLux.BlackbodyTemperatureAsRgb(self.get("colorTemperature", 6500.0)))
@@ -65,12 +65,13 @@ class Light:
         return emitted
 
     def radiance(self, area):
-        """Radiance of an emitter of an area in units of the stage."""
+        """Radiance (3 numbers) of a light with this area in stage units."""
         share = area if self.normalized and area > 0 else 1.0
         return tuple(c / share for c in self.emitted())
 
     def cone(self):
-        """Half the cone (radians) and softness of UsdLuxShapingAPI; None without. What else it says is named."""
+        """Half angle (radians) and softness of the cone of UsdLuxShapingAPI, or None. Records other shaping as
+        losses."""
         if not self.prim.HasAPI(UsdLux.ShapingAPI):
             return None
         if self.get("shaping:focus", 0.0) > 0:
@@ -86,7 +87,7 @@ class Light:
 
 
 def node(prim, stage, document, matrix):
-    """What a glTF node says to be the light of a prim that stands at `matrix` (in the stage's own units)."""
+    """The glTF node of a light prim with the transform `matrix` (in stage units)."""
     light = Light(prim, stage)
     kind = prim.GetTypeName()
     makers = {"SphereLight": _sphere, "RectLight": _rect, "DiskLight": _disk, "CylinderLight": _cylinder,
@@ -103,15 +104,15 @@ def node(prim, stage, document, matrix):
     return made
 
 
-def _lengths(matrix):
-    """Lengths of the axes after the transform."""
+def _axis_lengths(matrix):
+    """Lengths of the transformed axes."""
     return [matrix.TransformDir(Gf.Vec3d(*axis)).GetLength() for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
 
 
 def _sphere(light, document, matrix):
     as_point = light.stage.get(light.prim.GetAttribute("treatAsPoint"), False)
     radius = 0.0 if as_point and light.normalized else float(light.get("radius", 0.5))
-    a, b, c = (radius * length for length in _lengths(matrix))
+    a, b, c = (radius * length for length in _axis_lengths(matrix))
     if radius < 0 or not math.isfinite(a + b + c):
         raise Fault(light.where, f"its radius is {radius}", "give it a number that is not negative")
     if radius > 0 and max(a, b, c) > 1.001 * min(a, b, c):
@@ -121,7 +122,7 @@ def _sphere(light, document, matrix):
     if a == 0 and not light.normalized:
         light.add_loss("a sphere of radius 0 has no light unless it is normalized: its intensity is taken as if it were")
     emitted = light.emitted()
-    # A sphere of radiance L shines with L pi r^2 in every direction, and has an area of 4 pi r^2.
+    # A sphere of radiance L has intensity L pi r^2 and area 4 pi r^2.
     intensity = [e * (0.25 if light.normalized or a == 0 else math.pi * a * a) * light.stage.metres ** 2
                  for e in emitted]
     entry = {"name": str(light.where), "type": "point", **_strength(intensity)}
@@ -149,12 +150,12 @@ def _strength(values):
 
 def _ellipsoid(light, document, radius, axes):
     faces, normals = shapes.of_sphere(light.where, radius)
-    # Knud Thomsen's formula, as the reference has it.
+    # Knud Thomsen's formula for the area, as in hdEmbree.
     a, b, c = axes
     mean = (((a * b) ** 1.6 + (a * c) ** 1.6 + (b * c) ** 1.6) / 3) ** (1 / 1.6)
     if light.cone() is not None:
         light.add_loss("shaping of a stretched sphere is not carried: it shines in all directions")
-    return _glowing(light, document, faces, light.radiance(4 * math.pi * mean), normals)
+    return _emissive_mesh(light, document, faces, light.radiance(4 * math.pi * mean), normals)
 
 
 def _rect(light, document, matrix):
@@ -163,15 +164,15 @@ def _rect(light, document, matrix):
     image = light.get("texture:file", None)
     if image is not None and image.path:
         light.add_loss(f"its texture {image.path} is not carried: it shines with its colour alone")
-    # Clockwise seen from +Z: it shines along -Z.
+    # Clockwise seen from +Z, so the light emits along -Z.
     return _flat(light, document, [(-x, -y), (-x, y), (x, y), (x, -y)], Gf.Cross(u, v).GetLength())
 
 
 def _disk(light, document, matrix):
     radius = light.get("radius", 0.5)
-    # A polygon of the circle's area.
-    reach = radius * math.sqrt(2 * math.pi / _SIDES / math.sin(2 * math.pi / _SIDES))
-    turns = [-2 * math.pi * k / _SIDES for k in range(_SIDES)]
+    # A polygon with the area of the circle.
+    reach = radius * math.sqrt(2 * math.pi / _DISC_SIDES / math.sin(2 * math.pi / _DISC_SIDES))
+    turns = [-2 * math.pi * k / _DISC_SIDES for k in range(_DISC_SIDES)]
     u, v = (matrix.TransformDir(Gf.Vec3d(*axis)) for axis in ((radius, 0, 0), (0, radius, 0)))
     corners = [(reach * math.cos(t), reach * math.sin(t)) for t in turns]
     return _flat(light, document, corners, math.pi * Gf.Cross(u, v).GetLength())
@@ -186,11 +187,11 @@ def _flat(light, document, corners, area):
         keys["spread_deg"] = math.degrees(2 * angle)
         share = _cone_flux(angle, softness)
         radiance = tuple(r * share for r in radiance)
-    return _glowing(light, document, faces, radiance, None, keys)
+    return _emissive_mesh(light, document, faces, radiance, None, keys)
 
 
 def _cone_flux(angle, softness):
-    """Flux that a cone leaves of a Lambertian emitter's, by Simpson's rule: smoothstep in the angle at its edge."""
+    """Share of a Lambertian emitter's flux within a cone with a smoothstep edge in the angle, by Simpson's rule."""
     theta = numpy.linspace(0, angle, 2001)
     soft = (1 - softness) * angle
     t = numpy.clip((theta - soft) / max(angle - soft, 1e-12), 0, 1) if softness > 0 else numpy.zeros_like(theta)
@@ -204,12 +205,12 @@ def _cylinder(light, document, matrix):
         light.add_loss("treatAsLine is not carried: it stays a cylinder")
     if light.cone() is not None:
         light.add_loss("shaping of a cylinder is not carried: it shines in all directions")
-    a, b, c = (length * size for length, size in zip(_lengths(matrix), (2 * half, radius, radius)))
-    # Ramanujan's perimeter of an ellipse, as the reference has it; ends do not shine.
+    a, b, c = (length * size for length, size in zip(_axis_lengths(matrix), (2 * half, radius, radius)))
+    # Ramanujan's perimeter of an ellipse, as in hdEmbree; the caps do not emit.
     perimeter = math.pi * (3 * (b + c) - math.sqrt((3 * b + c) * (b + 3 * c)))
-    reach = radius * math.pi / (_SIDES * math.sin(math.pi / _SIDES))
-    faces, normals = shapes.revolved(light.where, [(reach, -half, 1.0, 0.0), (reach, half, 1.0, 0.0)], "X", _SIDES)
-    return _glowing(light, document, faces, light.radiance(perimeter * a), normals)
+    reach = radius * math.pi / (_DISC_SIDES * math.sin(math.pi / _DISC_SIDES))
+    faces, normals = shapes.revolved(light.where, [(reach, -half, 1.0, 0.0), (reach, half, 1.0, 0.0)], "X", _DISC_SIDES)
+    return _emissive_mesh(light, document, faces, light.radiance(perimeter * a), normals)
 
 
 def _distant(light, document, _matrix):
@@ -230,14 +231,14 @@ def _distant(light, document, _matrix):
     return {"extensions": document.light(entry), "caustique": {"angle_deg": angle}}
 
 
-def _glowing(light, document, faces, radiance, normals, keys=None):
-    """A mesh that shines from its front and takes no light away."""
+def _emissive_mesh(light, document, faces, radiance, normals, keys=None):
+    """Add a black mesh that emits from its front."""
     triangles, _ = faces.triangles()
     if not len(triangles):
         return light.add_loss("it has no surface: it gives no light")
     entry = {"name": str(light.where), "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
              "extras": {"caustique": {"null_bsdf": True, **(keys or {})}}}
-    glow(document, entry, radiance)
+    set_emission(document, entry, radiance)
     attributes = {"POSITION": document.floats(faces.points[faces.corners[triangles.reshape(-1)]], bounds=True)}
     if normals is not None:
         attributes["NORMAL"] = document.floats(normals[triangles.reshape(-1)])

@@ -1,4 +1,4 @@
-"""Bound materials as glTF materials, with `extras.caustique` for what that cannot say."""
+"""Converts bound materials to glTF materials, with `extras.caustique` for features that glTF lacks."""
 
 import copy
 import math
@@ -13,57 +13,58 @@ from faults import Fault
 from textures import Textures
 
 
-# Who reads a surface, by the identifier of its shader.
+# {identifier of a surface shader: function that reads it}
 _READ = {
     "UsdPreviewSurface": preview.surface, preview.MATERIALX: preview.surface, materialx.OPEN_PBR: materialx.surface,
     materialx.STANDARD: materialx.surface,
 }
 
 
-class Worn:
-    """A glTF material (`index`), and what its meshes bring: primvars of texture coordinates and of colour."""
+class MeshMaterial:
+    """A glTF material (`index`), and the primvars that it needs: texture coordinates (`sets`) and `color`."""
 
     def __init__(self, index, sets, color):
         self.index, self.sets, self.color = index, sets, color
 
 
 class Materials:
-    """Materials as meshes call for them; solid ones apart from those that open meshes wear."""
+    """Materials, converted when a mesh needs them. Closed and open meshes have separate transmissive materials."""
 
     def __init__(self, stage, document):
         self._stage, self._document = stage, document
         self._reader, self._textures = Reader(stage), Textures(stage, document)
-        self._worn, self._surfaces = {}, {}
+        self._mesh_materials, self._surfaces = {}, {}
 
     def bound(self, prim):
-        """The material that a prim or subset wears (UsdShade.Material), or None."""
+        """The material bound to a prim or subset (UsdShade.Material), or None."""
         material, relationship = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(UsdShade.Tokens.full)
         if not material and relationship and relationship.GetTargets():
             self._stage.losses.add(prim.GetPath(), f"the material {relationship.GetTargets()[0]} is not there")
         return material if material else None
 
-    def wear(self, material, closed, glow=None, fades=False):
-        """The `Worn` of a material, None for that of displayColor, on a mesh that is `closed` or not; `glow`: radiance
-        (3 numbers) that a light lends it; `fades`: displayOpacity counts."""
+    def for_mesh(self, material, closed, light_radiance=None, fades=False):
+        """The `MeshMaterial` of a material, or of displayColor if None. `closed`: whether the mesh is.
+        `light_radiance`: radiance (3 numbers) of a light on the mesh, or None. `fades`: whether the mesh has
+        displayOpacity."""
         where = material.GetPath() if material else None
         try:
             closed = closed or self._surface(material).transmission == 0
-            key = (where, closed, glow, fades)
-            if key not in self._worn:
-                self._worn[key] = self._made(material, closed, glow, fades)
+            key = (where, closed, light_radiance, fades)
+            if key not in self._mesh_materials:
+                self._mesh_materials[key] = self._convert(material, closed, light_radiance, fades)
         except Fault as fault:
             raise fault if fault.where else Fault(where, fault.fault, fault.hint)
-        return self._worn[key]
+        return self._mesh_materials[key]
 
-    def _made(self, material, closed, glow, fades):
+    def _convert(self, material, closed, light_radiance, fades):
         name = str(material.GetPath()) if material else "displayColor"
         surface = self._surface(material)
-        if glow is not None:
+        if light_radiance is not None:
             surface = copy.copy(surface)
-            surface.emission = glow
+            surface.emission = light_radiance
         entry, sets = {"name": name}, []
         color = surface.base.name if isinstance(surface.base, Primvar) else None
-        self._core(surface, entry, sets)
+        self._base_properties(surface, entry, sets)
         self._normal(surface, entry, sets)
         self._emission(surface, entry, sets)
         keys = custom_keys(material.GetPrim(), self._stage) if material else {}
@@ -72,8 +73,8 @@ class Materials:
             entry["extras"] = {"caustique": keys}
         if color == "displayColor" and fades:
             entry["alphaMode"] = "BLEND"
-        entry["doubleSided"] = glow is None
-        return Worn(self._document.add("materials", entry), sets, color)
+        entry["doubleSided"] = light_radiance is None
+        return MeshMaterial(self._document.add("materials", entry), sets, color)
 
     def _surface(self, material):
         if material is None:
@@ -100,7 +101,7 @@ class Materials:
         losses.add(where, f"{what} (UsdPreviewSurface, OpenPBR, Standard Surface are): displayColor takes its place")
         return Surface(base=Primvar("displayColor"), roughness=1.0, specular=0.0)
 
-    def _core(self, surface, entry, sets):
+    def _base_properties(self, surface, entry, sets):
         core = entry.setdefault("pbrMetallicRoughness", {})
         alpha = 1.0
         if isinstance(surface.presence, Texture):
@@ -116,35 +117,35 @@ class Materials:
             factor = (1.0,) * 3 if isinstance(surface.base, Primvar) else surface.base
             alpha = surface.presence
         if not isinstance(alpha, (int, float)):
-            self._lost(entry, "what feeds its opacity is not carried: it is opaque")
+            self._add_loss(entry, "what feeds its opacity is not carried: it is opaque")
             alpha = 1.0
         self._check(entry, "colour", tuple(factor))
-        core["baseColorFactor"] = [*self._unit(entry, "base colour", factor), alpha]
+        core["baseColorFactor"] = [*self._clip(entry, "base colour", factor), alpha]
         if isinstance(surface.presence, Texture) or alpha < 1:
             entry["alphaMode"] = "MASK" if surface.threshold > 0 else "BLEND"
             if surface.threshold > 0:
                 entry["alphaCutoff"] = surface.threshold
-        self._metal(surface, entry, core, sets)
+        self._roughness_metalness(surface, entry, core, sets)
 
-    def _metal(self, surface, entry, core, sets):
-        """Roughness and metalness, which share an image in glTF (green and blue)."""
+    def _roughness_metalness(self, surface, entry, core, sets):
+        """Set roughness and metalness, which share an image in glTF (green and blue)."""
         parts = {1: surface.roughness, 2: surface.metallic}
         for at, value in parts.items():
             if not isinstance(value, (int, float, Texture)):
-                self._lost(entry, "what feeds its roughness or metalness is not carried")
+                self._add_loss(entry, "what feeds its roughness or metalness is not carried")
                 parts[at] = {1: 0.5, 2: 0.0}[at]
         names = {1: "roughnessFactor", 2: "metallicFactor"}
         textured = {at: part for at, part in parts.items() if isinstance(part, Texture)}
         for at, part in parts.items():
-            core[names[at]] = 1.0 if at in textured else self._unit(entry, names[at], (part,))[0]
+            core[names[at]] = 1.0 if at in textured else self._clip(entry, names[at], (part,))[0]
         if not textured:
             return
         placed = {(t.uv, t.transform, t.wraps) for t in textured.values()}
         if len(placed) > 1:
-            self._lost(entry, "roughness and metalness are placed by different coordinates: roughness's place both")
+            self._add_loss(entry, "roughness and metalness are placed by different coordinates: roughness's place both")
         first = textured[min(textured)]
         images = {at: self._textures.data_as_is(part, at) for at, part in textured.items()}
-        # An image of roughness alone may hold anything in blue where nothing is metal, and one of metalness in green not.
+        # An image for roughness alone needs no blue channel if metalness is 0; one for metalness always needs green.
         fits = len(textured) == 2 or (1 in textured and core["metallicFactor"] == 0)
         image = images[min(images)] if fits and len(set(images.values())) == 1 else None
         if image is None:
@@ -165,9 +166,9 @@ class Materials:
             image, radiance = self._textures.emission(radiance)
             entry["emissiveTexture"] = self._textures.reference(surface.emission, sets, image)
         elif isinstance(radiance, Primvar):
-            return self._lost(entry, "emission by a primvar is not carried: it does not glow")
+            return self._add_loss(entry, "emission by a primvar is not carried: it does not emit light")
         self._check(entry, "emission", tuple(radiance))
-        glow(self._document, entry, radiance)
+        set_emission(self._document, entry, radiance)
 
     def _extensions(self, surface, entry, sets, closed, keys, name):
         def add(extension, value):
@@ -176,7 +177,7 @@ class Materials:
         if surface.ior != 1.5:
             add("KHR_materials_ior", {"ior": max(surface.ior, 1.0)})
         if surface.specular != 1 or surface.specular_color != (1.0,) * 3:
-            add("KHR_materials_specular", {"specularFactor": self._unit(entry, "specular", (surface.specular,))[0],
+            add("KHR_materials_specular", {"specularFactor": self._clip(entry, "specular", (surface.specular,))[0],
                                            "specularColorFactor": list(surface.specular_color)})
         if surface.anisotropy:
             add("KHR_materials_anisotropy", {"anisotropyStrength": surface.anisotropy})
@@ -191,7 +192,7 @@ class Materials:
         add("KHR_materials_transmission", self._textured(entry, sets, {"transmission": (surface.transmission, 0)}))
         thin = surface.thin or not closed
         if not closed and surface.thin is not True:
-            self._stage.losses.add(name, "it is worn by a mesh with holes, which has no inside: a thin pane there")
+            self._stage.losses.add(name, "a mesh with holes uses it, which has no inside: it is a thin pane there")
         volume = {"thicknessFactor": 0.0 if thin else 1.0}
         if surface.depth > 0 and not thin:
             volume.update(attenuationColor=list(surface.inside), attenuationDistance=surface.depth * self._stage.metres)
@@ -202,7 +203,7 @@ class Materials:
             keys["medium"] = _medium(surface, self._stage.metres)
 
     def _textured(self, entry, sets, parts):
-        """`NAMEFactor`, and `NAMETexture` where a texture gives it in that channel of an image."""
+        """Set `NAMEFactor`, and `NAMETexture` if a texture provides the value in the extension's channel."""
         out = {}
         for name, (value, at) in parts.items():
             if isinstance(value, Texture):
@@ -211,27 +212,27 @@ class Materials:
                 out[name + "Texture"] = self._textures.reference(value, sets, image)
                 value = 1.0
             elif not isinstance(value, (int, float)):
-                self._lost(entry, f"what feeds {name} is not carried")
+                self._add_loss(entry, f"what feeds {name} is not carried")
                 value = 0.0
-            out[name + "Factor"] = self._unit(entry, name, (value,))[0]
+            out[name + "Factor"] = self._clip(entry, name, (value,))[0]
         return out
 
-    def _unit(self, entry, what, values):
-        """Numbers within 0 and 1, with a loss where they are not."""
+    def _clip(self, entry, what, values):
+        """Values clipped to 0 to 1, with a loss if one was outside."""
         if any(not 0 <= x <= 1 for x in values):
-            self._lost(entry, f"{what} {', '.join(f'{x:g}' for x in values)} is clipped to 0 to 1")
+            self._add_loss(entry, f"{what} {', '.join(f'{x:g}' for x in values)} is clipped to 0 to 1")
         return [min(max(float(x), 0.0), 1.0) for x in values]
 
     def _check(self, entry, what, values):
         if not finite(values):
             raise Fault(entry["name"], f"its {what} is not finite", "give it numbers")
 
-    def _lost(self, entry, what):
+    def _add_loss(self, entry, what):
         self._stage.losses.add(entry["name"], what)
 
 
-def glow(document, entry, radiance):
-    """Lets a material emit (W/(sr m2)): glTF's factor is at most 1, and its strength tells the rest."""
+def set_emission(document, entry, radiance):
+    """Set a material's emission (W/(sr m2)) as glTF's factor, at most 1, and strength."""
     strongest = max(radiance)
     if strongest <= 0:
         return
@@ -243,8 +244,11 @@ def glow(document, entry, radiance):
 
 
 def _medium(surface, metres):
-    """Coefficients (1/m) of OpenPBR's scattering inside: extinction by the colour left after the depth, of which
-    `scatter` over the depth scatters; where that is more than all, absorption is raised to none below zero."""
+    """Coefficients (1/m) of OpenPBR's interior.
+
+    Extinction follows from the colour after the depth; scattering is scatter / depth. Absorption is their difference,
+    shifted so that no channel is negative.
+    """
     depth = surface.depth * metres
     extinction = [-math.log(max(c, 1e-6)) / depth for c in surface.inside]
     scatter = [s / depth for s in surface.scatter]

@@ -1,4 +1,4 @@
-"""OpenPBR and Autodesk's Standard Surface, as MaterialX nodes in a stage, as a `Surface` where they are simple."""
+"""Reads OpenPBR and Autodesk's Standard Surface (MaterialX nodes in a stage) as a `Surface`."""
 
 from network import Primvar, Texture
 from surface import Surface
@@ -6,7 +6,7 @@ from surface import Surface
 OPEN_PBR = "ND_open_pbr_surface_surfaceshader"
 STANDARD = "ND_standard_surface_surfaceshader"
 
-# Name of each input, and its default, by model.
+# {model: {quantity: (name of its input, default)}}
 _NAMES = {
     OPEN_PBR: {
         "base": ("base_color", (0.8,) * 3), "base_weight": ("base_weight", 1.0), "metal": ("base_metalness", 0.0),
@@ -46,20 +46,22 @@ _LOST = {
     "film": "a thin film is not carried",
     "diffuse_roughness": "diffuse roughness is not carried: the surface is Lambertian",
 }
-# What counts only where something else is not 0.
-_OF = {"inside": "transmission", "depth": "transmission", "scatter": "transmission", "scatter_g": "transmission",
-       "abbe": "transmission", "dispersed": "transmission", "coat_roughness": "coat", "coat_color": "coat",
-       "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission"}
+# {quantity: quantity that must not be 0 for it to have an effect}
+_DEPENDS_ON = {
+    "inside": "transmission", "depth": "transmission", "scatter": "transmission", "scatter_g": "transmission",
+    "abbe": "transmission", "dispersed": "transmission", "coat_roughness": "coat", "coat_color": "coat",
+    "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission",
+}
 _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence", "coat", "coat_roughness",
              "transmission"}
 
 
 def surface(shader, reader, losses):
-    """The surface of a shader of either model."""
+    """The `Surface` of a shader of either model."""
     where = shader.GetPath()
     given, names = {}, _NAMES[reader.identifier(shader)]
-    for key, (name, default) in sorted(names.items(), key=lambda item: item[0] in _OF):
-        if not given.get(_OF.get(key), True):
+    for key, (name, default) in sorted(names.items(), key=lambda item: item[0] in _DEPENDS_ON):
+        if not given.get(_DEPENDS_ON.get(key), True):
             given[key] = default
             continue
         value = _read(reader, shader, name, default, key) if name else default
@@ -86,12 +88,12 @@ def surface(shader, reader, losses):
         losses.add(where, "its fuzz is taken for the sheen of glTF, whose lobe differs a little")
         out.sheen = _scaled(given["sheen_color"], given["sheen"])
         out.sheen_roughness = given["sheen_roughness"]
-    _transmit(out, given, where, losses)
+    _set_interior(out, given, where, losses)
     return out
 
 
 def _read(reader, shader, name, default, key):
-    """What feeds an input; presence is a number of one model and a colour of the other, and either is taken."""
+    """The value of an input. Presence is a number in one model and a colour in the other; both are accepted."""
     if key == "presence":
         found = reader.read(shader, name)
         if isinstance(found, (int, float)) or isinstance(found, tuple) and len(found) >= 3:
@@ -99,8 +101,8 @@ def _read(reader, shader, name, default, key):
     return reader.read(shader, name, default)
 
 
-def _transmit(out, given, where, losses):
-    """What light meets inside."""
+def _set_interior(out, given, where, losses):
+    """Set the interior of a transmissive surface."""
     out.transmission = given["transmission"]
     if not out.transmission:
         return
@@ -119,7 +121,7 @@ def _transmit(out, given, where, losses):
 
 
 def _scaled(value, factor):
-    """A colour or a texture times a number."""
+    """A colour or a texture, multiplied by a number."""
     if isinstance(value, Texture):
         value.scale = tuple(s * factor for s in value.scale[:3]) + (value.scale[3],)
         value.bias = tuple(b * factor for b in value.bias[:3]) + (value.bias[3],)

@@ -1,4 +1,4 @@
-"""Meshes: faces of any number of corners and primvars of any interpolation become triangles with vertices."""
+"""Converts meshes: polygons and primvars of any interpolation to indexed triangles."""
 
 import mapbox_earcut
 import numpy
@@ -12,7 +12,7 @@ _GREY = (0.18, 0.18, 0.18)
 class Faces:
     """The polygons of a mesh.
 
-    `points`: (n, 3). `corners`: of each corner of each face the point it stands on. `counts`: corners of each face.
+    `points`: (n, 3). `corners`: point index of each corner of each face. `counts`: number of corners of each face.
     """
 
     def __init__(self, where, points, counts, corners, mirrored=False):
@@ -31,8 +31,8 @@ class Faces:
         self.face_of_corner = numpy.repeat(numpy.arange(len(self.counts)), self.counts)
         self._mirrored = mirrored
 
-    def spread(self, values, interpolation, name):
-        """The values (count, width) of a primvar at each corner."""
+    def expand(self, values, interpolation, name):
+        """The values (count, width) of a primvar, expanded to each corner."""
         sources = {
             UsdGeom.Tokens.constant: (1, lambda: numpy.zeros(len(self.corners), numpy.int64)),
             UsdGeom.Tokens.uniform: (len(self.counts), lambda: self.face_of_corner),
@@ -50,14 +50,14 @@ class Faces:
         return values[index()]
 
     def triangles(self, hidden=()):
-        """Corners of each triangle, (n, 3), and the face of each; faces in `hidden` have none."""
+        """Corner indices of each triangle (n, 3) and the face of each. Faces in `hidden` are left out."""
         starts = numpy.cumsum(self.counts) - self.counts
         shown = numpy.ones(len(self.counts), bool)
         shown[list(hidden)] = False
         made, faces = [], []
         for count in numpy.unique(self.counts[shown & (self.counts >= 3)]):
             these = numpy.flatnonzero(shown & (self.counts == count))
-            cut = self._cut(starts[these], count)
+            cut = self._triangulate(starts[these], count)
             made.append(cut.reshape(-1, 3))
             faces.append(numpy.repeat(these, count - 2))
         if not made:
@@ -67,9 +67,11 @@ class Faces:
         made = made[order, ::-1] if self._mirrored else made[order]
         return made, faces[order]
 
-    def _cut(self, starts, count):
-        """Triangles (faces, count - 2, 3) of faces that begin at `starts` and have `count` corners: fans, and where a
-        face is not convex what earcut finds."""
+    def _triangulate(self, starts, count):
+        """Triangles (faces, count - 2, 3) of faces with `count` corners that begin at `starts`.
+
+        Convex faces become fans; earcut cuts the others.
+        """
         fan = numpy.stack([numpy.zeros(count - 2, numpy.int64), numpy.arange(1, count - 1),
                            numpy.arange(2, count)], axis=1)
         cut = numpy.repeat(fan[None], len(starts), axis=0)
@@ -78,13 +80,13 @@ class Faces:
             normals = numpy.cross(at[:, fan[:, 1]] - at[:, :1], at[:, fan[:, 2]] - at[:, :1])
             total = normals.sum(axis=1, keepdims=True)
             for face in numpy.flatnonzero(((normals * total).sum(axis=2) <= 0).any(axis=1)):
-                found = _ears(at[face], total[face, 0])
+                found = _clip_ears(at[face], total[face, 0])
                 if len(found) == count - 2:
                     cut[face] = found
         return cut + starts[:, None, None]
 
     def smooth_normals(self, triangles):
-        """Normals at each corner: those of the triangles around its point, weighed by area."""
+        """Normals at each corner: the area-weighted mean of the triangles at its point."""
         at = self.points[self.corners[triangles]]
         normals = numpy.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
         sums = numpy.zeros_like(self.points)
@@ -93,7 +95,7 @@ class Faces:
         return sums[self.corners]
 
     def closed(self, triangles):
-        """Whether every edge has as many triangles on it one way as the other, points in one place counted as one."""
+        """Whether each edge has equally many triangles in both directions, with points at equal positions merged."""
         if not len(triangles):
             return False
         size = numpy.abs(self.points).max() or 1.0
@@ -105,8 +107,8 @@ class Faces:
         return bool((uses % 2 == 0).all())
 
 
-def _ears(at, normal):
-    """Triangles of one polygon, in the plane across its normal; corners in its own order."""
+def _clip_ears(at, normal):
+    """Triangles of one polygon by ear clipping in the plane across its normal. Indices are of the polygon's corners."""
     axis = int(numpy.argmax(numpy.abs(normal)))
     flat = numpy.ascontiguousarray(numpy.delete(at, axis, axis=1))
     cut = mapbox_earcut.triangulate_float64(flat, numpy.array([len(flat)], numpy.uint32)).reshape(-1, 3).astype(int)
@@ -117,7 +119,7 @@ def _ears(at, normal):
 
 
 def of_prim(prim, stage):
-    """The faces of a Mesh prim, its holes, and whether its normals count."""
+    """The faces of a Mesh prim and the indices of its holes."""
     mesh, where = UsdGeom.Mesh(prim), prim.GetPath()
     get = stage.get
     points = get(mesh.GetPointsAttr())
@@ -133,7 +135,7 @@ def of_prim(prim, stage):
 
 
 def primvar(prim, name, stage):
-    """Values (count, width) of a primvar with its indices resolved, and its interpolation; None if it has none."""
+    """Values (count, width) of a primvar with resolved indices, and its interpolation; None without values."""
     found = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     values = found.ComputeFlattened(stage.time) if found and found.HasValue() else None
     if values is None:
@@ -149,8 +151,7 @@ def primvar(prim, name, stage):
 
 
 def authored_normals(prim, faces, stage):
-    """Normals at each corner as the prim gives them, primvars:normals before normals; None without, or where they are
-    not as many as they should be."""
+    """Authored normals at each corner, from primvars:normals, else normals; None if absent or of the wrong length."""
     found = primvar(prim, "normals", stage)
     if found is None:
         mesh = UsdGeom.PointBased(prim)
@@ -163,28 +164,28 @@ def authored_normals(prim, faces, stage):
                           "its faces are flat")
         return None
     try:
-        return faces.spread(*found, "normals")
+        return faces.expand(*found, "normals")
     except Fault as fault:
         stage.losses.add(prim.GetPath(), f"{fault.fault}: they are left out, and its faces are flat")
         return None
 
 
 def colours(prim, name, faces, stage):
-    """Red, green, blue and opacity at each corner by a primvar of colour; grey where there is none."""
+    """Red, green, blue and opacity at each corner from a colour primvar; grey if it is absent."""
     found = primvar(prim, name, stage)
     if found is not None and found[0].shape[1] < 3:
         found = numpy.repeat(found[0][:, :1], 3, axis=1), found[1]
-    rgb = numpy.tile(_GREY, (len(faces.corners), 1)) if found is None else faces.spread(*found, name)[:, :3]
+    rgb = numpy.tile(_GREY, (len(faces.corners), 1)) if found is None else faces.expand(*found, name)[:, :3]
     opacity = primvar(prim, "displayOpacity", stage) if name == "displayColor" else None
-    alpha = numpy.ones((len(rgb), 1)) if opacity is None else faces.spread(*opacity, "displayOpacity")[:, :1]
+    alpha = numpy.ones((len(rgb), 1)) if opacity is None else faces.expand(*opacity, "displayOpacity")[:, :1]
     return numpy.concatenate([rgb, alpha], axis=1)
 
 
-def welded(faces, corners, attributes):
-    """Vertices for corners (of triangles, flat): those alike in all become one.
+def weld(faces, corners, attributes):
+    """Merge corners (of triangles, flat) with equal positions and attributes to one vertex.
 
-    `attributes`: arrays (corners of the mesh, width). Returns positions, the attributes of the vertices, and the
-    vertex of each corner, all in single precision.
+    `attributes`: arrays (corners of the mesh, width). Returns positions and attributes of the vertices in single
+    precision, and the vertex index of each corner.
     """
     rows = [faces.corners[corners].astype(numpy.float64)[:, None]]
     rows += [array[corners].astype(numpy.float32).astype(numpy.float64) for array in attributes]

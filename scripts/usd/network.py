@@ -1,4 +1,4 @@
-"""Networks of shaders: what feeds an input, as a constant, a texture or a primvar."""
+"""Reads shader networks: the value of an input as a constant, a texture or a primvar."""
 
 import dataclasses
 
@@ -8,18 +8,18 @@ from stage import kind_of
 
 _WRAPS = {"repeat": 10497, "useMetadata": 10497, "periodic": 10497, "clamp": 33071, "mirror": 33648}
 _CHANNELS = ("r", "g", "b", "a", "rgb")
-# Nodes of MaterialX that hand on what they get, and the input that they get it by.
-_PASSING = ("ND_convert_", "ND_dot_", "ND_normalmap", "ND_extract_", "ND_separate", "ND_swizzle_")
-# Nodes one behind the other that are gone through.
-_DEEPEST = 64
+# Prefixes of MaterialX nodes that pass their input on.
+_PASS_THROUGH = ("ND_convert_", "ND_dot_", "ND_normalmap", "ND_extract_", "ND_separate", "ND_swizzle_")
+# Longest chain of nodes that is followed.
+_MAX_DEPTH = 64
 
 
 @dataclasses.dataclass
 class Texture:
-    """An image as it feeds an input: value = scale * texel + bias, of one channel or of "rgb".
+    """A texture as the value of an input: scale * texel + bias, of one channel or of "rgb".
 
-    `asset` is the Sdf.AssetPath, `prim` the shader that names it; `transform` (scale, degrees, translation) acts on the
-    primvar `uv`; `space` is "auto", "raw" or "sRGB"; `wraps` are glTF's numbers.
+    `asset`: Sdf.AssetPath. `prim`: its shader. `transform`: (scale, degrees, translation) of the primvar `uv`.
+    `space`: "auto", "raw" or "sRGB". `wraps`: glTF's constants.
     """
 
     prim: object
@@ -35,21 +35,24 @@ class Texture:
 
 @dataclasses.dataclass
 class Primvar:
-    """A primvar of the mesh that feeds an input."""
+    """A primvar of the mesh as the value of an input."""
 
     name: str
 
 
 class Reader:
-    """Reads the inputs of a shader at a stage's moment."""
+    """Reads the inputs of shaders at the stage's time code."""
 
     def __init__(self, stage):
         self.stage = stage
-        self._open = []  # inputs that are being read, each for the one before it
+        self._open = []  # stack of inputs that are being read
 
     def read(self, shader, name, default=None):
-        """The constant, `Texture` or `Primvar` that feeds an input; `default` where nothing does, or a constant of
-        another kind than it, which is named. A default of None takes any kind."""
+        """The constant, `Texture` or `Primvar` of an input.
+
+        Returns `default` if the input is unset, or with a loss if its constant has another type than `default`. A
+        default of None accepts any type.
+        """
         shader_input = shader.GetInput(name)
         if not shader_input or not self._enter(shader_input):
             return default
@@ -63,10 +66,10 @@ class Reader:
         else:
             found = None
         self._open.pop()
-        return default if found is None else self._fitted(shader, name, _constant(found), default)
+        return default if found is None else self._convert(shader, name, _constant(found), default)
 
     def constant(self, shader, name, default):
-        """What `read` gives where it is a constant; else `default`, and a loss."""
+        """The constant of an input; for textures and primvars `default`, with a loss."""
         found = self.read(shader, name, default)
         if isinstance(found, (Texture, Primvar)):
             self.stage.losses.add(shader.GetPath(), f"what feeds {name} is not carried: it has its default")
@@ -74,21 +77,22 @@ class Reader:
         return found
 
     def identifier(self, shader):
-        """The identifier of a shader, "" without."""
+        """The identifier of a shader, or ""."""
         return self.stage.get(shader.GetIdAttr(), "")
 
     def _enter(self, shader_input):
-        """Begins to read an input, unless that is being done: then what feeds it is fed by it."""
+        """Push an input onto the stack. Returns false, with a loss, for cycles and networks that are too deep."""
         path = shader_input.GetAttr().GetPath()
-        if path in self._open or len(self._open) >= _DEEPEST:
-            what = "feeds itself" if path in self._open else f"is more than {_DEEPEST} nodes deep"
+        if path in self._open or len(self._open) >= _MAX_DEPTH:
+            what = "feeds itself" if path in self._open else f"is more than {_MAX_DEPTH} nodes deep"
             self.stage.losses.add(path, f"its network {what}: it has its default")
             return False
         self._open.append(path)
         return True
 
-    def _fitted(self, shader, name, found, default):
-        """A constant as the kind that the default is: longer vectors are cut, as a colour with opacity is."""
+    def _convert(self, shader, name, found, default):
+        """A constant converted to the type of `default`; longer vectors are truncated, such as a colour with
+        opacity."""
         if default is None or isinstance(found, (Texture, Primvar)) or kind_of(found) == kind_of(default) == "text":
             return found
         if isinstance(default, tuple) and isinstance(found, tuple):
@@ -104,7 +108,7 @@ class Reader:
         return default
 
     def _node(self, shader, output):
-        """What a node puts out; None where that is beyond us, which is named."""
+        """The value of a node's output; None, with a loss, if the node is not supported."""
         kind = self.identifier(shader) or shader.GetPrim().GetTypeName()
         if kind in ("UsdUVTexture", "ND_UsdUVTexture", "ND_UsdUVTexture_23"):
             return self._uv_texture(shader, output)
@@ -117,12 +121,12 @@ class Reader:
             return self._image(shader, output)
         if kind.startswith("ND_constant_"):
             return self.read(shader, "value")
-        if kind.startswith(_PASSING):
-            return self._passed(shader, kind, output)
+        if kind.startswith(_PASS_THROUGH):
+            return self._pass_through(shader, kind, output)
         self.stage.losses.add(shader.GetPath(), f"a node {kind} is not carried: what it feeds has its default")
         return None
 
-    def _passed(self, shader, kind, output):
+    def _pass_through(self, shader, kind, output):
         found = self.read(shader, "in")
         channel = output[-1] if kind.startswith("ND_separate") else self.constant(shader, "channels", "")
         if kind.startswith("ND_extract_"):
@@ -172,7 +176,7 @@ class Reader:
                        uv=uv, transform=transform)
 
     def _asset(self, shader):
-        """The Sdf.AssetPath of `inputs:file`, also where it comes from an interface; None if there is none."""
+        """The Sdf.AssetPath of `inputs:file`, also through an interface input; None if unset."""
         for attribute in shader.GetInput("file").GetValueProducingAttributes() if shader.GetInput("file") else ():
             asset = self.stage.get(attribute)
             if isinstance(asset, Sdf.AssetPath) and asset.path:
@@ -185,16 +189,16 @@ class Reader:
         return _WRAPS.get(mode, 33071)
 
     def _coordinates(self, shader, name):
-        """The primvar that places a texture, and what transforms it."""
+        """The primvar of a texture's coordinates, and its transform."""
         still = ((1.0, 1.0), 0.0, (0.0, 0.0))
         given = shader.GetInput(name)
         if not given or not self._enter(given):
             return "st", still
-        found = self._placed(given, still)
+        found = self._trace_coordinates(given, still)
         self._open.pop()
         return found
 
-    def _placed(self, given, still):
+    def _trace_coordinates(self, given, still):
         for attribute in given.GetValueProducingAttributes():
             source = UsdShade.Shader(attribute.GetPrim())
             kind = self.identifier(source)
@@ -217,7 +221,7 @@ class Reader:
 
 
 def _constant(value):
-    """Vectors as tuples of numbers, numbers and texts as they are."""
+    """Vectors as tuples of numbers; numbers and texts unchanged."""
     if isinstance(value, (Gf.Vec2f, Gf.Vec3f, Gf.Vec4f, Gf.Vec2d, Gf.Vec3d, Gf.Vec4d, Gf.Vec2h, Gf.Vec3h, Gf.Vec4h)):
         return tuple(float(x) for x in value)
     return value

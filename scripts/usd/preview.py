@@ -1,14 +1,14 @@
-"""UsdPreviewSurface, by its specification 2.6, as a `Surface`."""
+"""Reads UsdPreviewSurface (specification 2.6) as a `Surface`."""
 
 from network import Primvar, Texture
 from surface import Surface
 
-# The same surface as a node of MaterialX.
+# UsdPreviewSurface as a MaterialX node.
 MATERIALX = "ND_UsdPreviewSurface_surfaceshader"
 
 
 def surface(shader, reader, losses):
-    """The surface of a shader UsdPreviewSurface, under either name."""
+    """The `Surface` of a UsdPreviewSurface shader, under either name."""
     where, read, constant = shader.GetPath(), reader.read, reader.constant
     out = Surface(base=read(shader, "diffuseColor", (0.18, 0.18, 0.18)), metallic=read(shader, "metallic", 0.0),
                   roughness=read(shader, "roughness", 0.5), normal=read(shader, "normal"),
@@ -18,7 +18,7 @@ def surface(shader, reader, losses):
     if isinstance(out.normal, tuple):
         out.normal = None
     if constant(shader, "useSpecularWorkflow", 0):
-        _by_specular(out, read(shader, "specularColor", (0.0,) * 3), where, losses)
+        _set_specular(out, read(shader, "specularColor", (0.0,) * 3), where, losses)
     displacement = read(shader, "displacement", 0.0)
     if displacement != 0:
         losses.add(where, "displacement is not carried: displace the mesh before it is exported")
@@ -45,8 +45,8 @@ def _is_metal(metallic):
     return isinstance(metallic, (int, float)) and metallic >= 0.5
 
 
-def _by_specular(out, color, where, losses):
-    """The specular workflow: `color` is the reflectance at normal incidence, and there is no metal."""
+def _set_specular(out, color, where, losses):
+    """Set the specular workflow: `color` is the reflectance at normal incidence; metalness is 0."""
     out.metallic = 0.0
     if isinstance(color, (Texture, Primvar)):
         losses.add(where, "a texture of specularColor is not carried: use the metallic workflow")
@@ -55,7 +55,7 @@ def _by_specular(out, color, where, losses):
     if strongest <= 0:
         out.specular = 0.0
         return
-    # The index of refraction whose reflectance at normal incidence is the strongest of the three.
+    # The index of refraction whose reflectance at normal incidence equals the largest of the three channels.
     root = min(strongest, 0.999) ** 0.5
     out.ior = (1 + root) / (1 - root)
     out.specular_color = tuple(c / strongest for c in color)

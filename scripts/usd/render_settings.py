@@ -1,4 +1,4 @@
-"""UsdRender: the picture that a stage asks for, and what `caustique:*` says about the way to it."""
+"""Reads UsdRender settings: the picture, and options of `render` from `caustique:*` attributes."""
 
 import fractions
 import json
@@ -10,23 +10,23 @@ from pxr import UsdGeom, UsdRender
 from faults import Fault
 from stage import custom_keys
 
-# Keys of `extras.caustique` of a scene: what else stands in `caustique:` of the settings is an option of `render`.
+# Keys of the scene's `extras.caustique`. All other `caustique:` attributes of the settings are options of `render`.
 SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate"}
-# Options that a stage may give: those about the picture. Files and permissions are the command line's alone, for a
-# stage may come from anywhere. The program's definition of options gives the list: scripts/generate.sh.
+# Options allowed in a stage: about the picture, without files and permissions, because a stage may come from an
+# untrusted source. scripts/generate.sh writes the list from the program's definition of options.
 OPTIONS = frozenset(json.loads(pathlib.Path(__file__).with_name("options.json").read_text("utf-8"))["files_may_give"])
-# Layers by what a RenderVar's sourceName may say.
+# {sourceName of a RenderVar: layer}
 LAYERS = {
     "ci": "beauty", "color": "beauty", "rgba": "beauty", "beauty": "beauty", "lpe:c.*[<l.>o]": "beauty",
     "albedo": "albedo", "diffusealbedo": "albedo", "n": "normal", "normal": "normal", "nn": "normal",
     "depth": "depth", "z": "Z", "cameradepth": "Z", "p": "P", "position": "P",
 }
-# The program's table of layers: tests/generated.rs writes the file.
+# The program's table of layers; tests/generated.rs writes the file.
 TABLE = json.loads(pathlib.Path(__file__).with_name("layers.json").read_text("utf-8"))
 
 
 class Settings:
-    """The RenderSettings of a stage: the stage's own, or the only one that it has, and its first product."""
+    """The RenderSettings of a stage, from its metadata or else the first prim, and their first product."""
 
     def __init__(self, stage):
         self._stage, self.prim, self.product, self.products = stage, None, None, ()
@@ -47,7 +47,7 @@ class Settings:
         self._warn()
 
     def get(self, name, default=None):
-        """A value of the product, else of the settings."""
+        """A value of the product, or of the settings if the product has none."""
         for prim in (self.product, self.prim):
             attribute = prim.GetAttribute(name) if prim else None
             if attribute and attribute.HasAuthoredValue():
@@ -62,13 +62,13 @@ class Settings:
                 found = self._stage.stage.GetPrimAtPath(targets[0])
                 if found and found.IsA(UsdGeom.Camera):
                     return targets[0]
-                # Viewers leave settings behind with cameras of their own session.
+                # Viewers leave settings with cameras of their session layer behind.
                 self._stage.losses.add(prim.GetPath(), f"its camera {targets[0]} is not there: the first of the stage is "
                                         "taken")
         return None
 
     def purposes(self):
-        """The purposes that are rendered."""
+        """The purposes to render."""
         found = self.get("includedPurposes")
         return {"default", "render"} if found is None else {"default", *found}
 
@@ -77,7 +77,7 @@ class Settings:
         return not self.get("disableDepthOfField", False)
 
     def aspect(self):
-        """Width by height of the picture as it is seen, or None."""
+        """Aspect ratio of the displayed picture, or None."""
         resolution = self.get("resolution")
         if resolution is None:
             return None
@@ -87,11 +87,11 @@ class Settings:
         return resolution[0] / resolution[1] * pixel
 
     def policy(self):
-        """How a camera is fitted to the picture."""
+        """The policy that conforms a camera to the picture's aspect ratio."""
         return self.get("aspectRatioConformPolicy", "expandAperture")
 
     def keys(self):
-        """Keys of `extras.caustique` of the scene."""
+        """Keys for the scene's `extras.caustique`."""
         out = {"light_units": "radiometric"}
         resolution = self.get("resolution")
         if resolution is not None:
@@ -109,11 +109,11 @@ class Settings:
             out["frame_rate"] = [rate.numerator, rate.denominator]
         if not self._stage.time.IsEarliestTime() and not self._stage.time.IsDefault():
             out["frame"] = round(self._stage.time.GetValue())
-        out.update((key, value) for key, value in self._said().items() if key in SCENE_KEYS)
+        out.update((key, value) for key, value in self._attributes().items() if key in SCENE_KEYS)
         return out
 
     def _crop(self, window):
-        """Left, top, width and height of (xmin, ymin, xmax, ymax) from the bottom left."""
+        """Convert (xmin, ymin, xmax, ymax) from the bottom left to left, top, width and height."""
         left, low, right, high = window
         inside = [min(max(x, 0.0), 1.0) for x in (left, low, right, high)]
         if inside != [left, low, right, high]:
@@ -124,14 +124,17 @@ class Settings:
         return [left, 1 - high, right - left, high - low]
 
     def arguments(self):
-        """Options of `caustique render` that the settings stand for: an output for each product where any has a name
-        ("" for one without), then those of its RenderVars and of `caustique:*`."""
+        """Options of `caustique render` from the settings.
+
+        First an output for each product if any has a name ("" for one without), then the layers of the RenderVars and
+        the options of `caustique:*`.
+        """
         names = [self._stage.get(UsdRender.Product(p).GetProductNameAttr(), "") for p in self.products]
         out = [f"--output={name}" for name in names] if any(names) else []
         layers = self._layers()
         if layers:
             out.append("--layers=" + ",".join(layers))
-        for key, value in self._said().items():
+        for key, value in self._attributes().items():
             if key in SCENE_KEYS:
                 continue
             option = "--" + key.replace("_", "-")
@@ -144,11 +147,11 @@ class Settings:
             out.append(option if value is True else f"{option}={text}")
         return out
 
-    def _said(self):
+    def _attributes(self):
         return custom_keys(self.prim, self._stage) if self.prim else {}
 
     def _layers(self):
-        """Layers of the product's RenderVars, without what is not known, which is named."""
+        """Layers of the product's RenderVars. Unknown ones are losses."""
         targets = UsdRender.Product(self.product).GetOrderedVarsRel().GetTargets() if self.product else ()
         found = []
         for target in targets:

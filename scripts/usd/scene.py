@@ -1,4 +1,4 @@
-"""From a stage to a document: the walk over its prims, and what stands on each."""
+"""Converts a stage to a document: traverses its prims and adds a node for each visible one."""
 
 import numpy
 from pxr import Gf, UsdGeom, UsdLux, UsdShade
@@ -14,13 +14,13 @@ from materials import Materials
 from render_settings import Settings
 from stage import PREDICATE, custom_keys
 
-_UNSEEN = {"BasisCurves": "curves are", "NurbsCurves": "curves are", "HermiteCurves": "curves are",
+_UNSUPPORTED = {"BasisCurves": "curves are", "NurbsCurves": "curves are", "HermiteCurves": "curves are",
            "Points": "points are", "NurbsPatch": "a NURBS patch is", "TetMesh": "a tetrahedral mesh is",
            "Volume": "a volume is", "GeometryLight": "a GeometryLight is"}
 
 
 class Scene:
-    """Fills a `Document` with what a stage shows at its moment."""
+    """Fills a `Document` with the visible prims of a stage at its time code."""
 
     def __init__(self, stage, folder):
         self._stage, self.document = stage, Document()
@@ -29,17 +29,17 @@ class Scene:
         self._dome = Dome(stage, folder)
         self._meshes = {}
         self._cameras = []
-        self._within = []  # instancers whose prototypes are being visited
+        self._within = []  # stack of instancers whose prototypes are being visited
 
     def fill(self):
-        """Visits the whole stage."""
+        """Traverse the whole stage."""
         purposes = self._settings.purposes()
         for child in self._stage.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE):
             for make, matrix in self._walk(child, Gf.Matrix4d(1), True, "default", purposes):
                 self._place(make, matrix)
         keys = self._settings.keys()
         self._place_cameras(keys)
-        self._settings.arguments()  # they are the program's: here, what they lose is named
+        self._settings.arguments()  # the program reads these; here they record their losses
         if self._dome.keys is not None:
             keys["environment"] = self._dome.keys
         keys.setdefault("environment", {"color": [0.0] * 3})
@@ -53,7 +53,7 @@ class Scene:
             self.document.node({**made, "matrix": [float(x) for row in world for x in row]})
 
     def _place_cameras(self, keys):
-        """The camera that is asked for comes first: readers take the first."""
+        """Put the chosen camera first, because readers take the first."""
         asked, settings = self._settings.camera(), self._settings
         self._cameras.sort(key=lambda seen: seen[0].GetPath() != asked)
         for at, (prim, matrix) in enumerate(self._cameras):
@@ -64,15 +64,15 @@ class Scene:
                 keys.setdefault("exposure", stops)
 
     def _walk(self, prim, above, shown, purpose, purposes, own_transform=True):
-        """Yields for everything that is seen what makes its node of its matrix, and that matrix (the stage's units)."""
+        """Yield a function that makes a node from a matrix, and the matrix (in stage units), for each visible prim."""
         rest, get = [(prim, above, shown, purpose, own_transform)], self._stage.get
-        while rest:  # no recursion: Python's ends before the depth of a stage does
+        while rest:  # no recursion, because stages may be deeper than Python's limit
             prim, matrix, shown, purpose, own_transform = rest.pop()
             if own_transform and prim.IsA(UsdGeom.Xformable):
                 xformable = UsdGeom.Xformable(prim)
                 local = xformable.GetLocalTransformation(self._stage.time)
                 matrix = local if xformable.GetResetXformStack() else local * matrix
-                _check_place(prim.GetPath(), matrix, "look at its xformOps")
+                _check_matrix(prim.GetPath(), matrix, "look at its xformOps")
             if prim.IsA(UsdGeom.Imageable):
                 imageable = UsdGeom.Imageable(prim)
                 shown = shown and get(imageable.GetVisibilityAttr()) != UsdGeom.Tokens.invisible
@@ -81,30 +81,30 @@ class Scene:
             if prim.IsA(UsdGeom.Camera):
                 self._cameras.append((prim, matrix))
             elif shown and purpose in purposes:
-                yield from self._seen(prim, matrix, purposes)
+                yield from self._visible(prim, matrix, purposes)
             if not prim.IsA(UsdGeom.PointInstancer):
                 rest += [(child, matrix, shown, purpose, True) for child in prim.GetFilteredChildren(PREDICATE)][::-1]
 
-    def _seen(self, prim, matrix, purposes):
+    def _visible(self, prim, matrix, purposes):
         name, kind = str(prim.GetPath()), prim.GetTypeName()
         if prim.IsA(UsdGeom.PointInstancer):
             yield from self._instances(prim, matrix, purposes)
         elif is_dome(prim):
-            self._dome.take(prim, matrix * self._stage.to_world)
+            self._dome.add(prim, matrix * self._stage.to_world)
         elif prim.HasAPI(UsdLux.LightAPI) and not prim.IsA(UsdGeom.Gprim):
             if kind != "PortalLight":
                 yield (lambda at: _named(name, lights.node(prim, self._stage, self.document, at))), matrix
-        elif prim.IsA(UsdGeom.Mesh) or shapes.is_shape(prim) and kind not in _UNSEEN:
+        elif prim.IsA(UsdGeom.Mesh) or shapes.is_shape(prim) and kind not in _UNSUPPORTED:
             mesh, size = self._mesh(prim)
             if mesh is not None:
                 keys = custom_keys(prim, self._stage)
                 extras = {"extras": {"caustique": keys}} if keys else {}
                 yield (lambda _: {"name": name, "mesh": mesh, **extras}), Gf.Matrix4d().SetScale(size) * matrix
-        elif kind in _UNSEEN:
-            self._stage.losses.add(name, f"{_UNSEEN[kind]} not carried: convert to a mesh")
+        elif kind in _UNSUPPORTED:
+            self._stage.losses.add(name, f"{_UNSUPPORTED[kind]} not carried: convert to a mesh")
 
     def _instances(self, prim, matrix, purposes):
-        """Copies of a PointInstancer's prototypes: meshes are shared, and each copy is a node."""
+        """Yield the copies of a PointInstancer's prototypes. They share meshes, and each copy is a node."""
         instancer, where, stage = UsdGeom.PointInstancer(prim), prim.GetPath(), self._stage
         targets = instancer.GetPrototypesRel().GetForwardedTargets()
         indices = stage.get(instancer.GetProtoIndicesAttr(), ())
@@ -133,12 +133,14 @@ class Scene:
                 self._within.pop()
             for make, within in parts[index]:
                 at = within * place * matrix
-                _check_place(where, at, "look at its positions, orientations and scales")
+                _check_matrix(where, at, "look at its positions, orientations and scales")
                 yield make, at
 
     def _mesh(self, prim):
-        """The glTF mesh of a Mesh or another shape, None if it is empty, and the size that it is shown in: one mesh for all
-        instances, and for all shapes that differ in size alone, that wear the same."""
+        """The glTF mesh of a Mesh or another shape (None if empty), and its scale.
+
+        Instances, and shapes that differ only in size, share one mesh if their materials and primvars are equal.
+        """
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         material = self._materials.bound(prim)
         subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
@@ -146,26 +148,26 @@ class Scene:
         form, size = (source.GetPath(), self._inherited(prim) if prim.IsInstanceProxy() else ()), 1.0
         if shapes.is_shape(prim) and not parts and not prim.HasAPI(UsdLux.LightAPI):
             shape, size = shapes.shared_shape(prim, self._stage)
-            form = shape, self._worn_values(prim)
+            form = shape, self._primvars(prim)
         key = form, material and material.GetPath(), tuple(m and m.GetPath() for _, m in parts)
         if key not in self._meshes:
-            self._meshes[key] = self._made(prim, material, parts, size)
+            self._meshes[key] = self._convert_mesh(prim, material, parts, size)
         return self._meshes[key], size
 
-    def _worn_values(self, prim):
-        """All primvars that a shape has, or gets from above: names, values and what these are of."""
+    def _primvars(self, prim):
+        """All primvars of a shape, own and inherited: names, values and interpolations."""
         found = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
         moment = self._stage.time
         return tuple((primvar.GetName(), primvar.GetInterpolation(), str(primvar.Get(moment)),
                       str(primvar.GetIndices(moment))) for primvar in found)
 
     def _inherited(self, prim):
-        """Primvars that an instance gives its meshes from outside: their names and values."""
+        """Names and values of the primvars that meshes of an instance inherit from outside."""
         found = UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance()
         outside = [primvar for primvar in found if not primvar.GetAttr().GetPrim().IsInstanceProxy()]
         return tuple((primvar.GetName(), str(primvar.Get(self._stage.time))) for primvar in outside)
 
-    def _made(self, prim, material, parts, size):
+    def _convert_mesh(self, prim, material, parts, size):
         stage, where, holes = self._stage, prim.GetPath(), ()
         if prim.IsA(UsdGeom.Mesh):
             found = meshes.of_prim(prim, stage)
@@ -182,25 +184,25 @@ class Scene:
             faces, normals = found
         triangles, of_face = faces.triangles(holes)
         closed = faces.closed(triangles)
-        glow = self._glow(prim, faces, triangles)
+        light_radiance = self._mesh_light(prim, faces, triangles)
         if isinstance(normals, str):
             normals = faces.smooth_normals(triangles)
         primitives, rest = [], numpy.ones(len(faces.counts), bool)
-        for subset, worn in parts:
-            chosen = self._chosen(subset, len(faces.counts))
+        for subset, part in parts:
+            chosen = self._subset_faces(subset, len(faces.counts))
             taken = numpy.zeros(len(faces.counts), bool)
             taken[chosen] = True
-            primitives.append((triangles[taken[of_face]], worn))
+            primitives.append((triangles[taken[of_face]], part))
             rest[chosen] = False
         primitives.append((triangles[rest[of_face]], material))
         fades = meshes.primvar(prim, "displayOpacity", stage) is not None
         made = [self._primitive(prim, faces, normals, corners.reshape(-1),
-                                self._materials.wear(worn, closed, glow, fades))
-                for corners, worn in primitives if len(corners)]
+                                self._materials.for_mesh(part, closed, light_radiance, fades))
+                for corners, part in primitives if len(corners)]
         return self.document.add("meshes", {"name": str(where), "primitives": made}) if made else None
 
-    def _chosen(self, subset, count):
-        """The faces of a GeomSubset."""
+    def _subset_faces(self, subset, count):
+        """The face indices of a GeomSubset."""
         where = subset.GetPrim().GetPath()
         if self._stage.get(subset.GetElementTypeAttr(), "face") != "face":
             self._stage.losses.add(where, "a subset of anything but faces is not carried")
@@ -211,7 +213,7 @@ class Scene:
         return chosen
 
     def _normals(self, prim, faces):
-        """Normals at each corner; None for flat faces; "smooth" where the mesh stands for a smooth surface."""
+        """Normals at each corner; None for flat faces; "smooth" for a subdivision surface."""
         scheme = self._stage.get(UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr(), "catmullClark")
         if scheme == "none":
             return meshes.authored_normals(prim, faces, self._stage)
@@ -219,8 +221,8 @@ class Scene:
                                 "shaded smoothly (subdivide it before it is exported)")
         return "smooth"
 
-    def _glow(self, prim, faces, triangles):
-        """Radiance that UsdLuxMeshLightAPI lets a mesh emit, or None."""
+    def _mesh_light(self, prim, faces, triangles):
+        """Radiance of a mesh light (UsdLuxMeshLightAPI), or None."""
         if not prim.HasAPI(UsdLux.LightAPI):
             return None
         light = lights.Light(prim, self._stage)
@@ -229,31 +231,31 @@ class Scene:
         across = numpy.cross((at[:, 1] - at[:, 0]) @ matrix, (at[:, 2] - at[:, 0]) @ matrix)
         return light.radiance(float(numpy.linalg.norm(across, axis=1).sum() / 2))
 
-    def _primitive(self, prim, faces, normals, corners, worn):
+    def _primitive(self, prim, faces, normals, corners, material):
         stage, names, arrays = self._stage, [], []
         if normals is not None:
             names.append("NORMAL")
             arrays.append(normals)
-        for at, name in enumerate(worn.sets):
+        for at, name in enumerate(material.sets):
             found = meshes.primvar(prim, name, stage)
             if found is None:
                 stage.losses.add(prim.GetPath(), f"it has no primvar {name} for the textures of its material: they "
                                   "are one colour on it")
                 found = numpy.zeros((1, 2)), UsdGeom.Tokens.constant
-            values = faces.spread(*found, name)[:, :2] * (1, -1) + (0, 1)
+            values = faces.expand(*found, name)[:, :2] * (1, -1) + (0, 1)
             names.append(f"TEXCOORD_{at}")
             arrays.append(values)
-        if worn.color:
+        if material.color:
             names.append("COLOR_0")
-            arrays.append(meshes.colours(prim, worn.color, faces, stage))
-        positions, values, index = meshes.welded(faces, corners, arrays)
+            arrays.append(meshes.colours(prim, material.color, faces, stage))
+        positions, values, index = meshes.weld(faces, corners, arrays)
         attributes = {"POSITION": self.document.floats(positions, bounds=True)}
         attributes.update((name, self.document.floats(array)) for name, array in zip(names, values))
-        return {"attributes": attributes, "indices": self.document.indices(index), "material": worn.index}
+        return {"attributes": attributes, "indices": self.document.indices(index), "material": material.index}
 
 
-def _check_place(where, matrix, hint):
-    """Raises where a transform has a number that single precision does not hold: no file of glTF does."""
+def _check_matrix(where, matrix, hint):
+    """Raise a Fault if a transform overflows single precision, which glTF cannot store."""
     if not (numpy.abs(numpy.array(matrix)) <= numpy.finfo(numpy.float32).max).all():
         raise Fault(where, "its transform is not finite", hint)
 

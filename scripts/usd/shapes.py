@@ -1,4 +1,4 @@
-"""The shapes that UsdGeom has besides meshes, as faces and their normals."""
+"""Converts UsdGeom's shapes other than meshes to faces with normals."""
 
 import math
 
@@ -11,14 +11,14 @@ from meshes import Faces
 _SIDES, _RINGS = 64, 32
 
 
-# Of shapes that differ in size alone: the attribute that says it, and its usual value.
+# {shape whose instances differ only in size: (attribute of the size, its default)}
 _SIZES = {"Sphere": ("radius", 1.0), "Cube": ("size", 2.0)}
-# What else makes a shape.
+# Attributes that define a shape.
 _ATTRIBUTES = ("radius", "radiusTop", "radiusBottom", "height", "size", "width", "length", "axis")
 
 
 def shared_shape(prim, stage):
-    """What shapes that are copies of each other have in common, and the size of this one."""
+    """A key that is equal for shapes that differ only in size, and the size of this shape."""
     kind = prim.GetTypeName()
     if kind in _SIZES:
         name, usual = _SIZES[kind]
@@ -29,8 +29,10 @@ def shared_shape(prim, stage):
 
 
 def of_prim(prim, stage, size=1.0):
-    """Faces of a Sphere, Cube, Cylinder, Cone, Capsule or Plane, its lengths divided by a size, and their normals at each
-    corner; None of others."""
+    """Faces of a Sphere, Cube, Cylinder, Cone, Capsule or Plane divided by `size`, and normals at each corner.
+
+    Returns None for other prims.
+    """
     kind = prim.GetTypeName()
     get = lambda name, default: float(stage.get(prim.GetAttribute(name), default)) / size
     if kind == "Cube":
@@ -62,7 +64,7 @@ def _axis(prim, stage):
 
 
 def _arc(radius, at, low, high):
-    """A profile of (distance from the axis, place on it, and the normal's two parts) around a sphere."""
+    """A profile of a sphere: (distance from the axis, position along it, the normal's two components) for each ring."""
     steps = max(2, round(_RINGS * (high - low) / 180))
     turns = [math.radians(low + (high - low) * k / steps) for k in range(steps + 1)]
     return [(radius * max(math.cos(t), 0.0) if abs(abs(t) - math.pi / 2) > 1e-9 else 0.0, at + radius * math.sin(t),
@@ -70,7 +72,7 @@ def _arc(radius, at, low, high):
 
 
 def _cylinder(bottom, top, height):
-    """The profile of a frustum with its caps; where a normal changes a place comes twice."""
+    """The profile of a frustum with caps. Points at edges occur twice, with both normals."""
     half, slope = height / 2, math.hypot(height, bottom - top) or 1.0
     side = height / slope, (bottom - top) / slope
     return [(0.0, -half, 0.0, -1.0), (bottom, -half, 0.0, -1.0), (bottom, -half, *side), (top, half, *side),
@@ -78,7 +80,7 @@ def _cylinder(bottom, top, height):
 
 
 def revolved(where, profile, axis="Z", sides=_SIDES):
-    """Faces of a profile turned about an axis, outside to the right of its way up."""
+    """Faces of a surface of revolution about an axis. The outside is to the right of the upward profile."""
     turns = numpy.arange(sides) * 2 * math.pi / sides
     ring = numpy.stack([numpy.cos(turns), numpy.sin(turns)], axis=1)
     points, normals, corners = [], [], []
@@ -99,7 +101,7 @@ def revolved(where, profile, axis="Z", sides=_SIDES):
             corners.append(numpy.stack([a, b, c, d], axis=1))
     order = {"Z": [0, 1, 2], "X": [2, 0, 1], "Y": [1, 2, 0]}[axis]
     points, normals = (numpy.concatenate(part)[:, order] for part in (points, normals))
-    corners = corners or [numpy.empty((0, 3), numpy.int64)]  # a profile without length or reach
+    corners = corners or [numpy.empty((0, 3), numpy.int64)]  # a profile without length or radius
     counts = numpy.concatenate([numpy.full(len(part), part.shape[1]) for part in corners])
     faces = Faces(where, points, counts, numpy.concatenate([part.reshape(-1) for part in corners]))
     return faces, normals[faces.corners]
@@ -113,7 +115,7 @@ def _cube(where, half):
 
 
 def _plane(prim, half_width, half_length, stage):
-    """By its axis: width along X (along Z where the axis is X), length along Y (Z where the axis is Y)."""
+    """A plane across its axis: width along X (Z for axis X), length along Y (Z for axis Y)."""
     axis = _axis(prim, stage)
     flat = [(-half_width, -half_length), (half_width, -half_length), (half_width, half_length),
             (-half_width, half_length)]
@@ -123,7 +125,7 @@ def _plane(prim, half_width, half_length, stage):
 
 
 def of_sphere(where, radius):
-    """Faces of a sphere about the origin, and their normals at each corner."""
+    """Faces of a sphere about the origin, and normals at each corner."""
     return revolved(where, _arc(radius, 0.0, -90, 90))
 
 
@@ -133,7 +135,7 @@ def polygon(where, corners):
 
 
 def _flat(faces):
-    """At each corner the normal of its face."""
+    """The face normal at each corner."""
     triangles, of_face = faces.triangles()
     at = faces.points[faces.corners[triangles]]
     normals = numpy.zeros((len(faces.counts), 3))
@@ -143,5 +145,5 @@ def _flat(faces):
 
 
 def is_shape(prim):
-    """Whether this is a Gprim that has no points."""
+    """Whether a prim is a Gprim without points."""
     return prim.IsA(UsdGeom.Gprim) and not prim.IsA(UsdGeom.PointBased)

@@ -1,4 +1,4 @@
-"""The stage: opened, checked, and what all of its prims have in common."""
+"""Opens and checks a stage, and reads its attributes and assets."""
 
 import math
 import os
@@ -8,18 +8,19 @@ from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel
 
 from faults import Fault, Losses, text_of
 
-# Lengths and their squares stay numbers between these.
-_LEAST, _MOST = 1e-30, 1e30
-# Keys in keys that `caustique:*` may give.
-_DEEPEST = 64
+# Limits of metersPerUnit within which squared lengths neither underflow nor overflow.
+_MIN_METRES, _MAX_METRES = 1e-30, 1e30
+# Deepest nesting of `caustique:*` keys.
+_MAX_DEPTH = 64
 
 PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
 
 
 class Stage:
-    """A stage at a moment: `time`, `stage` (Usd.Stage), `losses`, and the way from its axes and units to glTF's.
+    """A stage at a time code: `time`, `stage` (Usd.Stage), `losses`, and the transform from its axes and units to
+    glTF's.
 
-    `by_blender`: Blender 4 wrote it, some of whose lights mean other than they say.
+    `by_blender`: whether Blender 4 wrote it, which exports some lights with wrong values.
     """
 
     def __init__(self, path, frame=None, allow_outside=False):
@@ -32,15 +33,15 @@ class Stage:
             raise Fault("", f"USD cannot read it: {_first_line(error)}", "export it again; usdchecker may say more")
         for layer in self.stage.GetUsedLayers():
             if layer.realPath:
-                self.check_place(layer.realPath, "the stage")
+                self.check_path(layer.realPath, "the stage")
         for error in self.stage.GetCompositionErrors():
             self.losses.add(getattr(error, "rootSite", None) and error.rootSite.path or "stage",
                              f"composition: {text_of(error)}")
-        self.time = self._moment(frame)
-        # USD's own function refuses a number that is no double.
+        self.time = self._time_code(frame)
+        # UsdGeom.GetStageMetersPerUnit fails for a value that is not a double.
         said = self.stage.HasAuthoredMetadata("metersPerUnit") and self.stage.GetMetadata("metersPerUnit")
         self.metres = said if isinstance(said, float) else UsdGeom.GetStageMetersPerUnit(self.stage)
-        if not _LEAST <= self.metres <= _MOST:
+        if not _MIN_METRES <= self.metres <= _MAX_METRES:
             raise Fault("/", f"metersPerUnit is {self.metres}", "it has to be a number above zero")
         self.by_blender = (self.stage.GetRootLayer().documentation or "").startswith("Blender v4.")
         axis = UsdGeom.GetStageUpAxis(self.stage)
@@ -50,7 +51,7 @@ class Stage:
         self.to_world = self._axes() * Gf.Matrix4d().SetScale(self.metres)
         self._bake_skins()
 
-    def _moment(self, frame):
+    def _time_code(self, frame):
         if frame is None and not self.stage.HasAuthoredTimeCodeRange():
             return Usd.TimeCode.EarliestTime()
         moment = self.stage.GetStartTimeCode() if frame is None else frame
@@ -59,20 +60,20 @@ class Stage:
         return Usd.TimeCode(moment)
 
     def _axes(self):
-        """From the stage's axes to right-handed ones with y up; row vectors."""
+        """The matrix from the stage's axes to right-handed axes with y up, for row vectors."""
         turn = Gf.Matrix4d(1)
         if self.z_up:
             turn = Gf.Matrix4d(1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1)
         return turn
 
     def _bake_skins(self):
-        """Puts what skeletons do to meshes at this moment into their points, in the session layer."""
+        """Bake skeletal deformation at the time code into the points of meshes, in the session layer."""
         roots = [p for p in Usd.PrimRange(self.stage.GetPseudoRoot(), PREDICATE) if p.IsA(UsdSkel.Root)]
         if not roots:
             return
         self.stage.SetEditTarget(self.stage.GetSessionLayer())
         moment = 0.0 if self.time.IsEarliestTime() else self.time.GetValue()
-        # What is baked is what has a sample at the moment.
+        # Baked meshes have a sample at the time code.
         for prim in Usd.PrimRange(self.stage.GetPseudoRoot()):
             for attribute in prim.GetAttributes() if prim.IsA(UsdSkel.Animation) else ():
                 value = attribute.Get(self.time)
@@ -84,15 +85,15 @@ class Stage:
             elif not UsdSkel.BakeSkinning(UsdSkel.Root(prim), Gf.Interval(moment, moment)):
                 self.losses.add(prim.GetPath(), "its skeleton could not be evaluated: it stands as it is bound")
 
-    def check_place(self, path, what):
-        """Raises where a file lies outside the stage's folder and may not."""
+    def check_path(self, path, what):
+        """Raise a Fault if a file is outside the stage's folder and this is not allowed."""
         if self._folder is None or os.path.commonpath([self._folder, os.path.realpath(path)]) == self._folder:
             return
         raise Fault(what, f"the file {path} is outside the scene's folder",
                     "put it beside the scene file and name it so, or allow such files with --allow-outside")
 
     def asset(self, prim, value):
-        """The bytes of the file that an asset-valued attribute names, also inside a package, and its name."""
+        """The bytes and the name of the file of an asset-valued attribute, also inside a package."""
         name = value.resolvedPath or value.path
         where = prim.GetPath()
         if not value.path:
@@ -100,10 +101,10 @@ class Stage:
         if "\0" in name:
             raise Fault(where, f"no file has a name as {value.path!r}", "give the texture's path in inputs:file")
         if not value.resolvedPath:
-            # Whether a file outside exists is not told.
-            self.check_place(os.path.join(os.path.dirname(self.path), value.path), where)
+            # Do not reveal whether a file outside the folder exists.
+            self.check_path(os.path.join(os.path.dirname(self.path), value.path), where)
             raise Fault(where, f"the file {value.path} is not found", "put it where the stage looks for it")
-        self.check_place(Ar.SplitPackageRelativePathOuter(name)[0], where)
+        self.check_path(Ar.SplitPackageRelativePathOuter(name)[0], where)
         opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(name))
         if opened is None:
             raise Fault(where, f"the file {value.path} cannot be read", "check your right to read it")
@@ -115,12 +116,14 @@ class Stage:
         return data, Ar.SplitPackageRelativePathInner(name)[1] or name
 
     def get(self, attribute, default=None):
-        """The value of an attribute at the moment; `default` where it has none. It is of the kind that the attribute's
-        schema says, and a number or a vector is finite."""
+        """The value of an attribute at the time code, or `default`.
+
+        Raises a Fault if the value is not of the schema's type, or not finite.
+        """
         value = attribute.Get(self.time) if attribute else None
         if value is None:
             return default
-        # USD hands on a value as the file says it, whatever the schema says.
+        # USD returns the file's value even if its type differs from the schema's.
         type_ = attribute.GetTypeName()
         if isinstance(value, Sdf.UnregisteredValue) or kind_of(value) != kind_of(type_.defaultValue):
             raise Fault(attribute.GetPrim().GetPath(), f"{attribute.GetName()} is a {_named(value)}, not a {type_}",
@@ -132,7 +135,7 @@ class Stage:
 
 
 def kind_of(value):
-    """What a value of USD is; numbers count as alike whatever their precision is."""
+    """The type of a USD value as text; numbers of all precisions are equal."""
     if isinstance(value, (bool, int, float)):
         return "number"
     name = re.sub(r"^(Vec\d|Matrix\d|Quat)[dfhi]", r"\1", type(value).__name__)
@@ -145,7 +148,7 @@ def _named(value):
 
 
 def finite(value):
-    """Whether a number, vector or matrix, or a tuple of numbers, is finite; true of anything else."""
+    """Whether a number, vector, matrix or tuple of numbers is finite; true for other types."""
     if isinstance(value, float):
         return math.isfinite(value)
     if kind_of(value) == "tuple" or re.fullmatch(r"(Vec|Matrix)\d", kind_of(value)):
@@ -162,7 +165,7 @@ def _first_line(error):
 
 
 def custom_keys(prim, stage):
-    """Keys of `extras.caustique` that a prim's attributes `caustique:KEY` give; a colon stands for what is nested."""
+    """Keys for `extras.caustique` from a prim's attributes `caustique:KEY`; colons separate nested keys."""
     found = {}
     for attribute in prim.GetAuthoredPropertiesInNamespace("caustique"):
         value = stage.get(attribute) if isinstance(attribute, Usd.Attribute) else None
@@ -170,8 +173,8 @@ def custom_keys(prim, stage):
             stage.losses.add(prim.GetPath(), f"{attribute.GetName()} has no value and is ignored")
             continue
         *above, key = attribute.GetName().split(":")[1:]
-        if len(above) > _DEEPEST:
-            stage.losses.add(prim.GetPath(), f"an attribute caustique:* has more than {_DEEPEST} colons: it is "
+        if len(above) > _MAX_DEPTH:
+            stage.losses.add(prim.GetPath(), f"an attribute caustique:* has more than {_MAX_DEPTH} colons: it is "
                               "ignored")
             continue
         at = found
@@ -189,9 +192,9 @@ def custom_keys(prim, stage):
 
 
 def plain(value):
-    """A value of USD in terms of JSON."""
+    """A USD value converted for JSON."""
     if isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, Sdf.AssetPath):
         return value.resolvedPath or value.path
-    return [plain(part) for part in value]  # what has no parts, such as a quaternion, raises a TypeError
+    return [plain(part) for part in value]  # values without components, such as quaternions, raise a TypeError

@@ -1,18 +1,18 @@
-"""A surface in the terms that UsdPreviewSurface, OpenPBR and glTF share, before it is written as a glTF material."""
+"""The common quantities of UsdPreviewSurface, OpenPBR and glTF, between reading a surface and writing a material."""
 
 import dataclasses
 
 
 @dataclasses.dataclass
 class Surface:
-    """Each value is a constant, a `network.Texture`, or, of `base`, a `network.Primvar`."""
+    """A surface. Each value is a constant or a `network.Texture`; `base` may be a `network.Primvar`."""
 
     base: object = (0.18, 0.18, 0.18)
     metallic: object = 0.0
     roughness: object = 0.5
     normal: object = None
     emission: object = (0.0, 0.0, 0.0)
-    # Share of the surface that is there at all, and below which value it is not (0: in shares).
+    # Coverage, and the threshold below which it counts as 0 (threshold 0: partial coverage).
     presence: object = 1.0
     threshold: float = 0.0
     ior: float = 1.5
@@ -24,7 +24,7 @@ class Surface:
     sheen: tuple = (0.0, 0.0, 0.0)
     sheen_roughness: float = 0.3
     transmission: object = 0.0
-    # Colour that is left after `depth` (stage units) inside; depth 0 tints at the surface, as `base` does.
+    # Transmittance after `depth` (stage units) inside; with depth 0 it tints at the surface, as `base` does.
     inside: tuple = (1.0, 1.0, 1.0)
     depth: float = 0.0
     scatter: tuple = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Images: as they are where glTF can say so, otherwise baked."""
+"""Adds textures to the document: files unchanged if glTF can use them, otherwise baked images."""
 
 import dataclasses
 import io
@@ -13,20 +13,20 @@ from PIL import Image, UnidentifiedImageError
 from faults import Fault
 
 _MIMES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
-# Of what Pillow reads, nothing that runs another program, as EPS does.
+# Formats of Pillow that run no other program, as EPS does.
 _FORMATS = ("PNG", "JPEG", "TIFF", "TGA", "BMP", "WEBP")
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3, "x": 0, "y": 1, "z": 2, "w": 3}
 
 
 class Textures:
-    """Puts the textures of materials into a document."""
+    """Adds the textures of materials to a document."""
 
     def __init__(self, stage, document):
         self._stage, self._document = stage, document
         self._data, self._texels = {}, {}
 
     def reference(self, texture, sets, image):
-        """What a glTF material says of an image; `sets`: the primvars that the mesh has for coordinates, added to."""
+        """The textureInfo of an image. `sets`: the mesh's primvars of texture coordinates, extended if necessary."""
         sampler = self._document.share("samplers", {"wrapS": texture.wraps[0], "wrapT": texture.wraps[1]})
         entry = {"index": self._document.share("textures", {"source": image, "sampler": sampler})}
         if texture.uv not in sets:
@@ -44,7 +44,7 @@ class Textures:
         return entry
 
     def color(self, texture):
-        """An image (index) that glTF decodes from sRGB, and the factor to it (3 numbers)."""
+        """Index of an image that glTF decodes from sRGB, and its factor (3 numbers)."""
         data, name = self._file(texture)
         scale, bias = texture.scale[:3], texture.bias[:3]
         srgb = self._is_srgb(texture)
@@ -59,7 +59,7 @@ class Textures:
         return self._png(_to_srgb(values), name), [1.0] * 3
 
     def emission(self, texture):
-        """An image as of `color`, and the radiance (3 numbers) to it."""
+        """Index of an sRGB image as in `color`, and the radiance (3 numbers) that multiplies it."""
         scale = texture.scale[:3]
         most = max(max(scale), 1e-30)
         image, factor = self.color(dataclasses.replace(texture, scale=tuple(s / most for s in scale) + (1.0,),
@@ -67,7 +67,7 @@ class Textures:
         return image, [f * most for f in factor]
 
     def normals(self, texture):
-        """An image of normals, and their strength."""
+        """Index of a normal map, and its strength."""
         data, name = self._file(texture)
         standard = texture.scale[:3] in ((1.0,) * 3, (2.0,) * 3)
         if texture.channel == "rgb" and _mime(data) and standard:
@@ -79,7 +79,7 @@ class Textures:
         return self._png(values * 0.5 + 0.5, name), 1.0
 
     def packed(self, parts):
-        """An image whose channels are given: {channel of glTF: texture or number}; the others are 1."""
+        """Index of an image with these channels: {channel of glTF: texture or number}; the others are 1."""
         arrays = {at: self.values(part) for at, part in parts.items() if not isinstance(part, (int, float))}
         shape = max((array.shape for array in arrays.values()), key=lambda s: s[0] * s[1])
         texels = numpy.ones((*shape, 4 if 3 in parts else 3))
@@ -89,7 +89,8 @@ class Textures:
         return self._png(texels, self._file(name)[1])
 
     def with_alpha(self, base, alpha):
-        """An image of colour (a texture, or 3 numbers) with a presence; the factor to its colour."""
+        """Index of an image of a colour (a texture, or 3 numbers) with an alpha channel, and the factor of the
+        colour."""
         data, name = self._file(alpha)
         same = not isinstance(base, tuple) and base.asset == alpha.asset and alpha.channel == "a"
         if same and self._is_srgb(alpha) and _mime(data) == "image/png" and base.channel == "rgb" and not any(base.bias) \
@@ -108,13 +109,13 @@ class Textures:
         return self._png(numpy.stack(planes, axis=2), name), factor
 
     def values(self, texture):
-        """The numbers (height, width) of one channel of a texture."""
+        """The values (height, width) of one channel of a texture."""
         values = self._channel(texture, self._linear(self._load(texture), self._is_srgb(texture)))[:, :, 0]
         self._clip(texture, values)
         return values
 
     def data_as_is(self, texture, at):
-        """The image itself where its channel `at` (glTF's) holds what the texture gives; else None."""
+        """Index of the unchanged image if its channel `at` (glTF's) holds the texture's values; else None."""
         data, name = self._file(texture)
         channel = 0 if texture.channel == "rgb" else _CHANNELS[texture.channel]
         plain = texture.scale[channel] == 1 and texture.bias[channel] == 0 and not self._is_srgb(texture)
@@ -145,7 +146,7 @@ class Textures:
         return self._data[path]
 
     def _load(self, texture):
-        """Texels (height, width, channels) as the file has them, 0 to 1 of integers."""
+        """Texels (height, width, channels) as stored in the file; integers are scaled to 0 to 1."""
         return _scaled(*self._decoded(texture))[0]
 
     def _decoded(self, texture):
@@ -155,8 +156,8 @@ class Textures:
         return self._texels[name]
 
     def _is_srgb(self, texture):
-        """Whether an image holds sRGB: with 8 bits and three channels or more, says the specification, unless it is said
-        to be raw."""
+        """Whether an image is sRGB: with `space` "auto" if it has 8 bits and at least three channels
+        (specification)."""
         if texture.space != "auto":
             return texture.space == "sRGB"
         channels = _channels_of_8_bits(self._file(texture)[0])
@@ -172,7 +173,7 @@ class Textures:
         return numpy.concatenate([from_srgb(texels[:, :, :colors]), texels[:, :, colors:]], axis=2)
 
     def _png(self, values, name):
-        """An image of 8 bits of values (height, width, 3 or 4)."""
+        """Add an 8-bit image of values (height, width, 3 or 4). Returns its index."""
         bytes_ = numpy.rint(numpy.clip(values, 0, 1) * 255).astype(numpy.uint8)
         file = io.BytesIO()
         Image.fromarray(bytes_).save(file, "PNG")
@@ -180,28 +181,29 @@ class Textures:
 
 
 def read(data, name, where):
-    """Texels (height, width, channels; grey, grey and alpha, or colours) of the bytes of a file, and bits a channel."""
+    """Decode the bytes of a file to texels (height, width, channels), grey or colour with or without alpha, and
+    bits."""
     return _scaled(*_decode(data, name, where))
 
 
 def _channels_of_8_bits(data):
-    """How many channels the header of an image of 8 bits tells; None of others."""
+    """The number of channels of an 8-bit image, from its header; None for others."""
     try:
         with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
             return {"L": 1, "LA": 2, "RGB": 3, "RGBA": 4}.get(image.mode)
-    except Exception:  # decoding it tells what is wrong
+    except Exception:  # decoding reports the error later
         return None
 
 
 def _scaled(texels, bits):
-    """Texels in double precision, integers from 0 to 1, with an axis of channels; and bits a channel."""
+    """Texels in double precision with a channel axis, integers scaled to 0 to 1, and bits per channel."""
     scale = 1.0 if texels.dtype.kind == "f" else 2.0 ** bits - 1
     texels = texels.astype(numpy.float64) / scale
     return (texels[:, :, None] if texels.ndim == 2 else texels), bits
 
 
 def _decode(data, name, where):
-    """Texels as the file has them, and bits a channel."""
+    """Texels as stored in the file."""
     if data[:4] == b"\x76\x2f\x31\x01":
         return _read_exr(data, where), 32
     try:
@@ -214,7 +216,7 @@ def _decode(data, name, where):
     except UnidentifiedImageError:
         raise Fault(where, f"the image {os.path.basename(name)} cannot be read: it is none of {', '.join(_FORMATS)}",
                     "save it as PNG, JPEG or OpenEXR")
-    except Exception as error:  # whatever Pillow raises about bytes that come from anywhere
+    except Exception as error:  # Pillow raises many kinds of errors about invalid files
         raise Fault(where, f"the image {os.path.basename(name)} cannot be read: {error}",
                     "save it as PNG, JPEG or OpenEXR")
     bits = 8 if texels.dtype == numpy.uint8 else 16
@@ -229,7 +231,7 @@ def _read_exr(data, where):
         file.flush()
         try:
             channels = OpenEXR.File(file.name).channels()
-        except Exception as error:  # whatever OpenEXR raises about bytes that come from anywhere
+        except Exception as error:  # OpenEXR raises many kinds of errors about invalid files
             raise Fault(where, f"the OpenEXR image cannot be read: {error}", "write it again")
         for name in ("RGBA", "RGB", "Y"):
             if name in channels:
@@ -238,7 +240,7 @@ def _read_exr(data, where):
 
 
 def from_srgb(values):
-    """Linear values of encoded ones (IEC 61966-2-1)."""
+    """Linear values of sRGB-encoded ones (IEC 61966-2-1)."""
     return numpy.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
@@ -255,7 +257,7 @@ def _resized(values, shape):
 
 
 def _transform(scale, degrees, translation):
-    """KHR_texture_transform of a UsdTransform2d: with v = 1 - t its matrix is mirrored."""
+    """KHR_texture_transform of a UsdTransform2d; v = 1 - t mirrors its matrix."""
     turn = math.radians(degrees)
     offset = [translation[0] - math.sin(turn) * scale[1], 1 - math.cos(turn) * scale[1] - translation[1]]
     said = {}
@@ -269,7 +271,7 @@ def _transform(scale, degrees, translation):
 
 
 def _colors(values):
-    """The colours of values, without their opacity; grey ones are three times the same."""
+    """The colour channels of values without opacity; grey is repeated three times."""
     return values[:, :, :3] if values.shape[2] >= 3 else numpy.repeat(values[:, :, :1], 3, axis=2)
 
 
