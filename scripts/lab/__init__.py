@@ -1,4 +1,4 @@
-"""What only measures: figures with their commits and machines, the tables of the documentation, training.
+"""The laboratory: figures (measurements, stored with commit and machine), tables of the documentation, and training.
 
-`scripts/lab.sh FIGURE` runs a figure; it puts the folders of the other scripts on the search path of modules.
+`scripts/lab.sh FIGURE` runs a figure, with the folders of the other scripts on the search path of modules.
 """

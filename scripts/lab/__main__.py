@@ -1,7 +1,7 @@
-"""Measures a figure: `scripts/lab.sh FIGURE [arguments]`. `--list` names them all, and `FIGURE --help` its arguments.
+"""Measures a figure: `scripts/lab.sh FIGURE [arguments]`. `--list` lists all figures, `FIGURE --help` the arguments.
 
-A figure is a module of lab/figures with a function `main`. VENV there names its environment, ARGUMENTS and
-`add_arguments` its arguments (options.py). A figure that is stored goes to results.jsonl (record.py).
+A figure is a module of lab/figures with a function `main`. VENV names its virtual environment; ARGUMENTS and
+`add_arguments` define its arguments (options.py). Stored figures are in results.jsonl (record.py).
 """
 
 import ast
@@ -14,30 +14,30 @@ from .options import parse
 from .record import ROOT
 
 FIGURES = {path.stem: path for path in sorted((Path(__file__).parent / "figures").glob("[!_]*.py"))}
-USUAL = ".venv"
+DEFAULT_VENV = ".venv"
 
 
 def summary(path):
-    """The first sentence of a figure's description, read without running it."""
+    """The first sentence of a figure's docstring, read without importing the figure."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
     return " ".join(text.split("\n\n")[0].split()).split(". ")[0].rstrip(".")
 
 
 def environment(path):
-    """The environment that a figure runs in."""
+    """The virtual environment of a figure."""
     for statement in ast.parse(path.read_text(encoding="utf-8")).body:
         if isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "VENV":
             return ast.literal_eval(statement.value)
-    return USUAL
+    return DEFAULT_VENV
 
 
 def interpreter(path):
-    """The Python of a figure's environment."""
+    """The Python of a figure's virtual environment."""
     venv = environment(path)
     python = ROOT / venv / "bin" / "python"
     if not python.exists():
         sys.exit(
-            f"lab: error: {path.stem} needs {venv}, which is not there\nhint: scripts/lab.sh makes it where it can"
+            f"lab: error: {path.stem} needs {venv}, which does not exist\nhint: run it by scripts/lab.sh, or create {venv}"
         )
     return python
 

@@ -1,8 +1,8 @@
-"""What renders tell of their error, and what is true of it.
+"""Errors that renders estimate, and their true errors.
 
-The truth is measured as renders tell it: the root of relMSE without the worst half per cent of the pixels, relative to
-what is above 0.01 times the squared mean of the reference without its brightest hundredth (src/stat/floor.rs), against
-two independent halves of a reference, whose own noise drops out.
+The true error is measured as renders define theirs: the root of relMSE without the worst half per cent of the pixels.
+The denominator adds 0.01 times the squared mean of the reference, without its brightest hundredth (src/stat/floor.rs).
+The reference consists of two independent halves, whose own noise cancels.
 """
 
 import json
@@ -12,44 +12,43 @@ import sys
 
 from . import references
 import numpy as np
-from .cache import BIN, CACHE, Failed, load, making, program, save, scene_key
+from .cache import CACHE, Failed, create, load, program, save, scene_key
+from .commands import command, read
 from .options import options
-from .reading import read
-from .picture_errors import Layers, Reference, best
+from .picture_errors import Layers, Reference, keep_best
 
 ARGUMENTS = references.ARGUMENTS | {"methods": ["auto"], "seeds": 3, "budgets": [2.0, 4.0, 8.0, 16.0]}
-# The share of the pixels that are brightest, and what of the squared mean of the others stands for darkness.
+# The brightest share of the pixels, which the mean leaves out, and the factor of the squared mean in the denominator.
 BRIGHTEST, DARK = 0.01, 0.01
 LAYERS = "beauty,Noisy,Error"
 PLACE = CACHE / "accuracy" / program()
 
 
 class Truth(Reference):
-    """A reference, with errors relative to what renders take them relative to."""
+    """A reference whose relative errors have the denominator that renders use."""
 
     def __init__(self, first, second):
         super().__init__(first, second)
         values = np.sort(self.mean.mean(-1)[self.finite])
         kept = values[: len(values) - int(BRIGHTEST * len(values))]
         self.weight = 1.0 / (self.mean.mean(-1) ** 2 + DARK * kept.mean() ** 2)
-        # What is left of the reference's own noise about a pixel: a window's mean of a quarter of the halves' squared
-        # difference.
+        # Variance of the reference's mean: a quarter of the squared difference of the halves, averaged over a window.
         self.noise = box(np.square(self.halves[0] - self.halves[1]) / 4)
 
     def distance(self, picture):
-        """The root of trimmed relMSE, zero where the reference's noise hides it."""
+        """The root of trimmed relMSE; zero if the reference's noise hides the error."""
         first, second = (picture - half for half in self.halves)
-        kept = best(np.square(picture - self.mean).mean(-1) * self.weight, self.finite)
-        told = ((first * second).mean(-1) * self.weight)[self.finite][kept]
-        return math.sqrt(max(told.mean(), 0.0))
+        kept = keep_best(np.square(picture - self.mean).mean(-1) * self.weight, self.finite)
+        squares = ((first * second).mean(-1) * self.weight)[self.finite][kept]
+        return math.sqrt(max(squares.mean(), 0.0))
 
-    def within(self, picture, error, times):
-        """Share of the pixels and channels where the truth lies within so many times the error told."""
-        return float((np.square(picture - self.mean) <= times**2 * (np.square(error) + self.noise)).mean())
+    def share_within(self, picture, error, factor):
+        """Share of the pixels and channels whose true error is at most `factor` times the estimated error."""
+        return float((np.square(picture - self.mean) <= factor**2 * (np.square(error) + self.noise)).mean())
 
 
 def truths():
-    """The scenes asked for that have a reference, each with its truth; what keeps others out is said."""
+    """The selected scenes that have a reference, each with its truth; prints why others have none."""
     for scene in references.scenes():
         try:
             halves, _ = references.reference(scene)
@@ -60,7 +59,7 @@ def truths():
 
 
 def box(values, reach=4):
-    """Means over square windows, smaller at the rim."""
+    """Means over square windows of 2 `reach` + 1 pixels, which are cut off at the rim of the picture."""
     for axis in (0, 1):
         count = values.shape[axis]
         sums = np.concatenate([np.zeros_like(np.take(values, [0], axis)), np.cumsum(values, axis)], axis)
@@ -71,51 +70,42 @@ def box(values, reach=4):
     return values
 
 
-def rendered(scene, method, stop, seed):
-    """Renders until a stop such as ("--time", 4), unless that is done; returns the folder: picture.exr, run.json and
-    progress.jsonl."""
+def render(scene, method, stop, seed):
+    """Renders until a stop such as ("--time", 4), unless the cache has the render; returns its folder, which holds
+    picture.exr, run.json and progress.jsonl."""
     name = f"{method}{'-'.join(map(str, stop))}-{options.threads}-seed{seed}-{options.width}"
     folder = PLACE / scene_key(scene) / name
     if not (folder / "run.json").exists():
-        with making(folder) as draft:
-            command = [BIN, "render", scene, "-o", draft / "picture.exr", "--method", method, "--seed", seed]
-            command += [
-                "--width",
-                options.width,
-                "--threads",
-                options.threads,
-                "--layers",
-                LAYERS,
-                "--progress",
-                "json",
-                *stop,
-            ]
+        with create(folder) as draft:
+            words = ["render", scene, "-o", draft / "picture.exr", *stop]
+            size = {"width": options.width, "threads": options.threads}
+            line = command(*words, method=method, seed=seed, **size, layers=LAYERS, progress="json")
             with open(draft / "progress.jsonl", "w", encoding="utf-8") as log:
-                subprocess.run(list(map(str, command)), check=True, stderr=log)
-            save(draft / "run.json", read("info", str(draft / "picture.exr")))
+                subprocess.run(line, check=True, stderr=log)
+            save(draft / "run.json", read("info", draft / "picture.exr"))
     return folder
 
 
 def progress(folder):
-    """What a render has said while it went on."""
+    """The progress reports of a render."""
     lines = (folder / "progress.jsonl").read_text(encoding="utf-8").splitlines()
     return [json.loads(line) for line in lines if line.startswith("{")]
 
 
-def judged(folder, truth):
-    """What a render has told of its error, and the truth."""
+def evaluate(folder, truth):
+    """The estimated errors of a render beside the true ones."""
     layers, run = Layers(folder / "picture.exr"), load(folder / "run.json")
     picture = layers.get("").astype(float)
-    said = run.get("accuracy") or {}
+    accuracy = run.get("accuracy") or {}
     finished = run.get("error_of") == "finished picture"
     return {
-        "told": run["error"] if finished else None,
-        "interval": said.get("interval"),
-        "rare": said.get("rare"),
+        "estimated": run["error"] if finished else None,
+        "interval": accuracy.get("interval"),
+        "rare": accuracy.get("rare"),
         "true": truth.distance(picture),
-        "told_noisy": run.get("error_noisy"),
+        "estimated_noisy": run.get("error_noisy"),
         "true_noisy": truth.distance(layers.get("Noisy").astype(float)),
-        "pixels_within_2": truth.within(picture, layers.get("Error").astype(float), 2) if finished else None,
+        "pixels_within_2": truth.share_within(picture, layers.get("Error").astype(float), 2) if finished else None,
         "seconds": run["history"][-1]["seconds"],
         "core_seconds": run["history"][-1]["cpu_seconds"],
         "iterations": run["iterations"],
@@ -124,7 +114,7 @@ def judged(folder, truth):
 
 
 def short(value):
-    """A figure for the record, to four digits; nothing for what is no number."""
+    """A number to four digits; None if it is not finite."""
     return float(f"{value:.4g}") if value is not None and math.isfinite(value) else None
 
 

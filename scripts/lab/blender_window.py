@@ -1,8 +1,8 @@
-"""Takes the pictures of `scripts/lab.sh screenshots`: runs within a Blender that has a window.
+"""Takes the pictures of `scripts/lab.sh screenshots`, inside a Blender that has a window.
 
     blender ... --python blender_window.py -- ADDON.zip FOLDER
 
-Blender draws only between two calls of its timer, so the story is a generator that yields how long to wait, in seconds.
+Blender draws only between two calls of its timer, so the steps are a generator that yields the seconds to wait.
 """
 
 import math
@@ -14,13 +14,13 @@ import traceback
 
 import bpy
 
-_WIDE = 0.6  # of the big area, what the picture keeps beside the panels
-_NOTCHES = 12  # of the wheel, to scroll past the diagnosis
-_PATIENCE = 120  # seconds for a picture to improve, or a render to end
+_PICTURE_SHARE = 0.6  # of the big area's width; the panels have the rest
+_NOTCHES = 12  # of the mouse wheel, to scroll past the diagnosis
+_TIMEOUT = 120  # seconds for a picture to improve, or a render to end
 
 
 def install(archive):
-    """Install the add-on as a user would, and tell it of the program."""
+    """Install the add-on as a user would, and set its program."""
     if hasattr(bpy.ops, "extensions") and bpy.app.version >= (4, 2, 0):
         bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
         name = "bl_ext.user_default.caustique"
@@ -36,7 +36,7 @@ def install(archive):
 
 
 def material(name, color, roughness, **inputs):
-    """A Principled material; `inputs` by the names of Blender 4, with _ for the spaces."""
+    """A Principled material; `inputs` has the names of Blender 4, with _ for spaces."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     sockets = made.node_tree.nodes["Principled BSDF"].inputs
@@ -48,14 +48,14 @@ def material(name, color, roughness, **inputs):
 
 
 def stage():
-    """A ball of glass, a ring of metal and a bowl that is not closed, on a table, under a small lamp."""
+    """Build the scene: a ball of glass, a ring of metal and a bowl that is not closed, on a table, under a small lamp."""
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
     glass = material("crystal", (1, 1, 1), 0, Transmission_Weight=1)
     pane = material("window glass", (0.9, 1, 0.95), 0, Transmission_Weight=1)
     gold = material("gold", (1, 0.75, 0.35), 0.05, Metallic=1)
 
-    def worn(name, made):
+    def finish(name, made):
         thing = bpy.context.object
         thing.name = name
         thing.data.materials.append(made)
@@ -64,15 +64,15 @@ def stage():
         return thing
 
     bpy.ops.mesh.primitive_plane_add(size=8)
-    worn("table", material("wood", (0.5, 0.4, 0.32), 0.6))
+    finish("table", material("wood", (0.5, 0.4, 0.32), 0.6))
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5, segments=96, ring_count=48, location=(-0.75, 0, 0.5))
-    worn("ball", glass)
+    finish("ball", glass)
     bpy.ops.mesh.primitive_cylinder_add(
         radius=0.55, depth=0.4, vertices=128, end_fill_type="NOTHING", location=(0.55, 0.45, 0.2)
     )
-    worn("ring", gold)
+    finish("ring", gold)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.45, segments=64, ring_count=32, location=(0.75, -0.75, 0.45))
-    bowl = worn("bowl", pane)
+    bowl = finish("bowl", pane)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.bisect(plane_co=(0.75, -0.75, 0.55), plane_no=(0, 0, 1), clear_outer=True)
@@ -89,8 +89,8 @@ def stage():
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 480, 360, 100
 
 
-def story(archive, folder):
-    """The pictures, one after another."""
+def steps_of(archive, folder):
+    """Takes the pictures one after another; yields the seconds to wait."""
     window = bpy.context.window_manager.windows[0]
     name, preferences = install(archive)
     stage()
@@ -141,8 +141,8 @@ def story(archive, folder):
 
 
 def wait(condition, otherwise):
-    """Wait until `condition()` holds; an error where it does not in time."""
-    end = time.monotonic() + _PATIENCE
+    """Wait until `condition()` holds; raises an error with the text `otherwise` after the timeout."""
+    end = time.monotonic() + _TIMEOUT
     while not condition():
         if time.monotonic() > end:
             raise RuntimeError(otherwise)
@@ -150,7 +150,7 @@ def wait(condition, otherwise):
 
 
 def count(engine):
-    """A list that grows with every picture that the engine shows while it renders."""
+    """A list that grows by one with every picture that the engine shows during a render."""
     shown, show = [], engine._show
 
     def counted(self, *arguments):
@@ -162,11 +162,11 @@ def count(engine):
 
 
 def split(window):
-    """Give the panels more of the window: the big area in two, the right one for properties."""
+    """Split the largest area of the window; the right part shows the properties. Returns both parts."""
     big = max(window.screen.areas, key=lambda area: area.width * area.height)
     known = set(window.screen.areas)
     with bpy.context.temp_override(window=window, area=big):
-        bpy.ops.screen.area_split(direction="VERTICAL", factor=_WIDE)
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=_PICTURE_SHARE)
     fresh = next(area for area in window.screen.areas if area not in known)
     left, right = sorted((big, fresh), key=lambda area: area.x)
     right.type = "PROPERTIES"
@@ -180,12 +180,12 @@ def render(window):
 
 
 def press_escape():
-    """As the user does: Blender stops a render for keys of the display, and not for simulated events."""
+    """Press Esc through the X server, because Blender ignores simulated events during a render."""
     subprocess.run("xdotool search --class Blender windowfocus mousemove 300 700 key Escape", shell=True, check=True)
 
 
 def scroll(window, area):
-    """Show what stands below in an area."""
+    """Scroll an area down."""
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window, area=area, region=region):
         for _ in range(_NOTCHES):
@@ -193,23 +193,23 @@ def scroll(window, area):
 
 
 def take(window, folder, name):
-    """Write what the window shows."""
+    """Write a screenshot of the window."""
     with bpy.context.temp_override(window=window):
         bpy.ops.screen.screenshot(filepath=os.path.join(folder, f"{name}.png"), check_existing=False)
 
 
 def main(archive, folder):
-    """Tell the story, and end Blender."""
+    """Take the pictures, and end Blender."""
     view = bpy.context.preferences.view
     view.show_splash, view.render_display_type, view.ui_scale = False, "NONE", 0.85
-    steps = story(archive, folder)
+    steps = steps_of(archive, folder)
 
     def step():
         try:
             return next(steps)
         except StopIteration:
             os._exit(0)
-        except Exception:  # without this Blender would stay open
+        except Exception:  # Blender must not stay open.
             traceback.print_exc()
             os._exit(1)
 

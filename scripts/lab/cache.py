@@ -1,7 +1,7 @@
-"""Where the figures of finished pictures keep what took long: a later run, or one that goes on, finds it again.
+"""The cache of renders: a later run, or one that continues an interrupted one, finds them there.
 
-A work is a folder of its own. It is made under another name and renamed when all of it is there, so that what is there
-is whole.
+Each render has a folder. It is created under a temporary name and renamed when it is complete, so a folder in the cache
+is always complete.
 """
 
 import contextlib
@@ -21,13 +21,13 @@ BIN = Path(os.environ.get("CAUSTIQUE_BIN", ROOT / "target/release/caustique")).r
 
 
 def installed(venv):
-    """The Python of an environment that scripts make, or nothing."""
+    """The Python of a virtual environment in the repository, or None."""
     python = ROOT / venv / "bin" / "python"
     return python if python.exists() else None
 
 
 def digest(*paths, length=8):
-    """The first digits of the SHA-256 of files, one after the other."""
+    """The first digits of the SHA-256 of the concatenated files."""
     state = hashlib.sha256()
     for path in paths:
         state.update(Path(path).read_bytes())
@@ -35,35 +35,24 @@ def digest(*paths, length=8):
 
 
 def program():
-    """The program by the last commit that touched its sources, and by its bytes: a tree may be ahead of the build."""
-    command = [
-        "git",
-        "-C",
-        ROOT,
-        "log",
-        "-1",
-        "--format=%h",
-        "--abbrev=10",
-        "--",
-        "src",
-        "ffi",
-        "Cargo.toml",
-        "Cargo.lock",
-    ]
+    """A key of the program: the last commit that touched its sources, and a digest of its bytes, because the build may
+    be older than the sources."""
+    command = ["git", "-C", ROOT, "log", "-1", "--format=%h", "--abbrev=10", "--"]
+    command += ["src", "ffi", "Cargo.toml", "Cargo.lock"]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     return f"{done.stdout.strip() or 'unknown'}-{digest(BIN)}"
 
 
 def scene_key(path):
-    """A scene's folder: its name, and the digest of its bytes, so that a scene drawn anew is another one."""
+    """The name of a scene's folder: the scene's name, and a digest of its bytes, which changes with the scene."""
     inside = path.is_relative_to(ROOT / "scenes")
     parts = path.relative_to(ROOT / "scenes").with_suffix("").parts if inside else ("twin", path.stem)
     return f"{'-'.join(parts)}-{digest(path)}"
 
 
 @contextlib.contextmanager
-def making(folder):
-    """A folder under another name to make a work in; renamed at the end, removed where that is not reached."""
+def create(folder):
+    """Creates a folder under a temporary name, renames it at the end, and removes it after an exception."""
     draft = folder.with_name(f"{folder.name}.{os.getpid()}.part")
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
@@ -76,28 +65,26 @@ def making(folder):
 
 
 def load(path):
-    """A JSON file, or nothing where there is none."""
+    """The value of a JSON file, or None if there is none."""
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
 
 
 def save(path, value):
-    """A JSON file, whole or not at all."""
+    """Writes a JSON file atomically."""
     draft = path.with_name(f"{path.name}.{os.getpid()}.part")
     draft.write_text(json.dumps(value, indent=1) + "\n", encoding="utf-8")
     draft.rename(path)
 
 
 class Failed(Exception):
-    """A program ended with an error; the text is what it said last."""
+    """A program has ended with an error; the text is the end of its output."""
 
 
-def timed(command, limit=None, env=None):
-    """Runs a program to its end; returns its stdout, the seconds, and the core-seconds of it and of what it started."""
+def run_timed(command, limit=None, env=None):
+    """Runs a program to its end; returns its stdout, the seconds, and the core-seconds, with its child processes."""
     before, start = os.times(), time.perf_counter()
     try:
-        done = subprocess.run(
-            list(map(str, command)), capture_output=True, text=True, timeout=limit, env=env
-        )
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=limit, env=env)
     except subprocess.TimeoutExpired as expired:
         raise Failed(f"took longer than {expired.timeout:g} s") from None
     after, seconds = os.times(), time.perf_counter() - start

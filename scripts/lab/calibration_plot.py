@@ -1,8 +1,8 @@
-"""Draws docs/lab/calibration.svg from the stored figure: told against true errors, one mark a picture."""
+"""Draws docs/lab/calibration.svg from the stored figure: estimated against true errors, one mark per picture."""
 
 from .plots import pyplot, rows, save
 
-# What counts as told right.
+# The largest ratio of estimated and true error that counts as correct.
 FACTOR = 1.5
 
 
@@ -18,7 +18,7 @@ def main():
     axes.plot(ends, ends, color="0.3", lw=1)
     for factor in (FACTOR, 1 / FACTOR):
         axes.plot(ends, [factor * end for end in ends], color="0.6", lw=1, ls="--")
-    axes.set(xscale="log", yscale="log", xlabel="true error of the finished picture", ylabel="error told by the render")
+    axes.set(xscale="log", yscale="log", xlabel="true error of the finished picture", ylabel="estimated error")
     axes.set(xlim=ends, ylim=ends)
     axes.legend(fontsize=7, ncol=2)
     save(figure, "calibration")

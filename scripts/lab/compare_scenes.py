@@ -1,9 +1,9 @@
-"""Makes the scenes of the comparison, as .glb files: small ones, in which a path tracer finds all light.
+"""Writes the small scenes of the comparison with Mitsuba as .glb files. A path tracer finds all of their light.
 
-glass     smooth glass, clear and absorbing, smooth matte, a mirror; a large lamp and a uniform environment
-frosted   rough glass: a sphere and a slab before a pattern; a lamp and a uniform environment
-metal     rough metals under an environment image that is turned; instances, scaled unevenly; a thin lens
-textures  colours, roughness and metalness from textures with every wrap mode and KHR_texture_transform; point, spot and sun
+glass     smooth glass, clear and absorbing, smooth matte, a mirror; a large light and a uniform environment
+frosted   rough glass: a sphere and a slab in front of a pattern; a light and a uniform environment
+metal     rough metals under a rotated environment image; instances with non-uniform scale; a thin lens
+textures  colours, roughness and metalness from textures, every wrap mode, KHR_texture_transform; point, spot and sun
 wide      metals and glass so rough that the models of the two renderers differ
 """
 
@@ -18,7 +18,7 @@ import tiles
 
 
 class Glb:
-    """A glTF document that grows."""
+    """A glTF document under construction."""
 
     def __init__(self):
         self.binary = bytearray()
@@ -38,12 +38,12 @@ class Glb:
         self.used = set()
 
     def add(self, key, part):
-        """Appends to a list of the document; the index."""
+        """Appends a part to a list of the document; returns its index."""
         self.document.setdefault(key, []).append(part)
         return len(self.document[key]) - 1
 
     def view(self, data):
-        """A buffer view of these bytes."""
+        """Adds a buffer view of bytes."""
         self.binary += b"\0" * (-len(self.binary) % 4)
         self.binary += data
         return self.add(
@@ -51,7 +51,7 @@ class Glb:
         )
 
     def accessor(self, values, kind, component):
-        """An accessor of an array."""
+        """Adds an accessor of an array."""
         part = {
             "bufferView": self.view(values.tobytes()),
             "componentType": component,
@@ -63,7 +63,7 @@ class Glb:
         return self.add("accessors", part)
 
     def mesh(self, shape, material):
-        """A mesh of one material; shape: positions, normals, uvs or None, triangles."""
+        """Adds a mesh of one material; `shape` is (positions, normals, uvs or None, triangles)."""
         positions, normals, uvs, triangles = shape
         attributes = {
             "POSITION": self.accessor(positions.astype("<f4"), "VEC3", 5126),
@@ -77,7 +77,7 @@ class Glb:
         )
 
     def node(self, parent=None, **node):
-        """A node, below another or the scene."""
+        """Adds a node below a parent node, or below the scene."""
         index = self.add("nodes", node)
         above = (
             self.document["scenes"][0]["nodes"]
@@ -90,7 +90,7 @@ class Glb:
     def material(
         self, name, color=(0.8, 0.8, 0.8), roughness=1.0, metallic=0.0, texture=None, surface=None, **extensions
     ):
-        """A material; extensions without their KHR_materials_."""
+        """Adds a material; extensions are named without KHR_materials_."""
         pbr = {"baseColorFactor": [*color, 1.0], "roughnessFactor": roughness, "metallicFactor": metallic}
         if texture is not None:
             pbr["baseColorTexture"] = texture
@@ -103,11 +103,11 @@ class Glb:
         return self.add("materials", part)
 
     def matte(self, name, color=(0.8, 0.8, 0.8), **more):
-        """Lambert's reflection without a Fresnel layer."""
+        """Adds a Lambertian material without a Fresnel layer."""
         return self.material(name, color, specular={"specularFactor": 0.0}, **more)
 
     def glass(self, name, roughness=0.0, ior=1.5, color=(1, 1, 1), **volume):
-        """Solid glass."""
+        """Adds a material of solid glass."""
         return self.material(
             name,
             color,
@@ -118,14 +118,14 @@ class Glb:
         )
 
     def lamp(self, name, radiance):
-        """A black emitter."""
+        """Adds a black emitter."""
         strength = max(radiance)
         index = self.matte(name, (0, 0, 0), emissive_strength={"emissiveStrength": strength})
         self.document["materials"][index]["emissiveFactor"] = [c / strength for c in radiance]
         return index
 
     def texture(self, pixels, wrap=10497, scale=None, offset=None, rotation=None):
-        """A use of an image of display values in [0, 1], top row first."""
+        """A texture reference to an image of display values in [0, 1], top row first."""
         encoded = tiles.png(pixels)
         image = self.add("images", {"bufferView": self.view(encoded), "mimeType": "image/png"})
         sampler = self.add("samplers", {"magFilter": 9729, "minFilter": 9729, "wrapS": wrap, "wrapT": wrap})
@@ -136,30 +136,30 @@ class Glb:
             info["extensions"] = {"KHR_texture_transform": transform}
         return info
 
-    def camera(self, at, to, yfov=0.6, aspect=4 / 3, **said):
-        """A camera; `said` goes to its extras."""
+    def camera(self, at, to, yfov=0.6, aspect=4 / 3, **extras):
+        """Adds a camera with its `extras.caustique`."""
         part = {"type": "perspective", "perspective": {"yfov": yfov, "aspectRatio": aspect, "znear": 0.01}}
-        if said:
-            part["extras"] = {"caustique": said}
+        if extras:
+            part["extras"] = {"caustique": extras}
         self.node(name="eye", camera=self.add("cameras", part), matrix=look(at, to))
 
     def light(self, kind, at, to, **light):
-        """A punctual light."""
-        said = {key: light.pop(key) for key in ("radius", "angle_deg") if key in light}
+        """Adds a punctual light."""
+        extras = {key: light.pop(key) for key in ("radius", "angle_deg") if key in light}
         extension = self.document.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})
         extension["lights"].append({"type": kind, **light})
         self.used.add("KHR_lights_punctual")
         node = {"extensions": {"KHR_lights_punctual": {"light": len(extension["lights"]) - 1}}, "matrix": look(at, to)}
-        if said:
-            node["extras"] = {"caustique": said}
+        if extras:
+            node["extras"] = {"caustique": extras}
         self.node(name=kind, **node)
 
-    def say(self, **said):
-        """`extras.caustique` of the scene."""
-        self.document["scenes"][0].setdefault("extras", {}).setdefault("caustique", {}).update(said)
+    def extras(self, **keys):
+        """Sets keys in `extras.caustique` of the scene."""
+        self.document["scenes"][0].setdefault("extras", {}).setdefault("caustique", {}).update(keys)
 
     def write(self, path):
-        """The file."""
+        """Writes the file."""
         self.document["extensionsUsed"] = sorted(self.used)
         self.document["buffers"] = [{"byteLength": len(self.binary)}]
         for key in [k for k, v in self.document.items() if v == []]:
@@ -172,7 +172,7 @@ class Glb:
 
 
 def look(at, to):
-    """A node's matrix, by columns, that looks from `at` to `to` along its -Z."""
+    """The matrix (column-major) of a node at `at` whose -Z points to `to`."""
     at, to = np.array(at, float), np.array(to, float)
     z = (at - to) / np.linalg.norm(at - to)
     x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.99 else [1.0, 0.0, 0.0], z)
@@ -183,7 +183,7 @@ def look(at, to):
 
 
 def quad(corner, u, v):
-    """A parallelogram; u x v is its front. Texture coordinates run from 0 to 1, v downwards from corner + v."""
+    """A parallelogram whose front normal is u x v. Texture coordinates run from 0 to 1, v downwards from corner + v."""
     corner, u, v = (np.array(a, float) for a in (corner, u, v))
     normal = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
     return (
@@ -263,7 +263,7 @@ def ball(g, name, material, at, radius, shape=None, **more):
 def glass(folder):
     """Smooth interfaces."""
     g = Glb()
-    g.say(environment={"color": [0.35, 0.4, 0.5]})
+    g.extras(environment={"color": [0.35, 0.4, 0.5]})
     white = g.matte("white", (0.7, 0.7, 0.68))
     room(
         g,
@@ -288,7 +288,7 @@ def glass(folder):
 def frosted(folder):
     """Rough glass."""
     g = Glb()
-    g.say(environment={"color": [0.5, 0.5, 0.55]})
+    g.extras(environment={"color": [0.5, 0.5, 0.55]})
     white = g.matte("white", (0.75, 0.73, 0.7))
     back = g.matte("pattern", (1, 1, 1), texture=g.texture(pattern(seed=5)))
     room(g, white, [back, g.matte("blue", (0.15, 0.25, 0.6)), g.matte("sand", (0.7, 0.55, 0.3))])
@@ -305,7 +305,7 @@ def frosted(folder):
 
 
 def sky(path):
-    """A soft sky as an environment image: horizon, ground and a glow, 64 x 32."""
+    """Writes a soft sky (horizon, ground and a glow) as an environment image of 64 x 32 pixels."""
     v, u = np.mgrid[0:32, 0:64]
     theta, phi = np.pi * (v + 0.5) / 32, 2 * np.pi * ((u + 0.5) / 64 - 0.5)
     d = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1)
@@ -320,10 +320,10 @@ def sky(path):
 
 
 def metal(folder):
-    """Rough metal under an image."""
+    """Rough metal under an environment image."""
     g = Glb()
     sky(folder / "metal.environment.exr")
-    g.say(environment={"file": "metal.environment.exr", "rotation_deg": 50.0, "strength": 1.2})
+    g.extras(environment={"file": "metal.environment.exr", "rotation_deg": 50.0, "strength": 1.2})
     floor = g.matte(
         "floor", (0.8, 0.8, 0.8), texture=g.texture(pattern(seed=3), scale=[2.0, 1.5], rotation=0.4, offset=[0.1, 0.3])
     )
@@ -345,9 +345,9 @@ def metal(folder):
 
 
 def textures(folder):
-    """Textures, and lights that are points."""
+    """Textures and point lights."""
     g = Glb()
-    g.say(light_units="photometric", environment={"color": [1.0, 1.05, 1.15]})
+    g.extras(light_units="photometric", environment={"color": [1.0, 1.05, 1.15]})
     mirrored = g.texture(pattern(seed=7), wrap=33648, scale=[3, 3])
     clamped = g.texture(pattern(seed=8), wrap=33071, scale=[1.6, 1.4], offset=[-0.3, -0.2])
     turned = g.texture(pattern(seed=9), scale=[2, 2], rotation=0.7)
@@ -391,7 +391,7 @@ def textures(folder):
 def wide(folder):
     """Rough metal and glass."""
     g = Glb()
-    g.say(environment={"color": [1.0, 1.0, 1.0]})
+    g.extras(environment={"color": [1.0, 1.0, 1.0]})
     g.node(name="floor", mesh=g.mesh(quad([-3, 0, 3], [6, 0, 0], [0, 0, -6]), g.matte("floor", (0.5, 0.5, 0.5))))
     for i, roughness in enumerate((0.5, 0.7, 1.0)):
         ball(

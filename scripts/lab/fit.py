@@ -1,12 +1,13 @@
-"""Exponents of what falls with iterations."""
+"""Fits of convergence exponents."""
 
 import math
 
 
 def fit(series, key):
-    """Exponent and its standard error, from 128 iterations on, by weighted least squares in the logarithms."""
+    """The exponent of the values `key` over iterations, and its standard error: weighted least squares of the logarithms,
+    from 128 iterations on."""
     points = [(math.log(s["iterations"]), *s[key]) for s in series if s["iterations"] >= 128 and s[key][0] > 0]
-    # The same bandwidths with every seed have no error: all points count alike.
+    # A value without noise (equal bandwidths with every seed) gets a nominal error of 0.1 %.
     weights = [(value / max(error, 1e-3 * value)) ** 2 for _, value, error in points]
     total = sum(weights)
     mean_x = sum(w * x for w, (x, _, _) in zip(weights, points)) / total

@@ -1,4 +1,4 @@
-"""Finished pictures beside what they are to beat: ratios of errors, smaller than 1 where ours is the better one."""
+"""Goals of finished pictures: ratios of our errors to others'. A ratio below 1 means that ours is smaller."""
 
 import math
 
@@ -6,12 +6,12 @@ FIGURES = ("relmse", "relmse_trimmed", "flip", "grain", "grain_trimmed")
 
 
 def ratio(ours, other, figure, floor):
-    """Ours over the other. `floor`: below that an error is not told from none."""
+    """Our error over the other one. Errors below `floor` count as `floor`, because noise hides them."""
     return max(ours[figure], floor) / max(other[figure], floor)
 
 
 def summary(ratios, limit=1.0):
-    """Geometric mean, worst, and how many are at most `limit`."""
+    """The geometric mean of ratios, the worst, and the number that are at most `limit`."""
     if not ratios:
         return None
     mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
@@ -24,19 +24,19 @@ def summary(ratios, limit=1.0):
 
 
 def best(candidates, figure):
-    """The one with the smallest error."""
+    """The candidate with the smallest error."""
     return min(candidates, key=lambda one: one[figure])
 
 
 def inputs(pictures):
-    """What a finish began with."""
+    """The figures of the pictures before the finish: the estimate and its levels."""
     return [figures for name, figures in pictures.items() if name == "noisy" or name.startswith("level")]
 
 
 def goals(cells, main):
-    """The counts of one set and budget. `main`: whose delivered picture it is about.
+    """The ratios of one set of scenes and one budget. `main` is the method whose finished picture is compared.
 
-    `cells`: a scene each, {"floor": .., "ours": {name: pictures}, "peers": {name: pictures}}.
+    `cells` has one entry per scene, {"floor": .., "ours": {name: pictures}, "peers": {name: pictures}}.
     """
     found = {}
     for figure in FIGURES:

@@ -1,5 +1,5 @@
-"""The arguments of the figures. A figure lists those it takes with its defaults as ARGUMENTS; `options` holds the values
-of this run, which the modules that figures share read, too."""
+"""The arguments of figures. A figure lists its arguments with their defaults as ARGUMENTS. `options` holds the values of
+this run, for the figure and for the modules that figures share."""
 
 import argparse
 import shlex
@@ -9,76 +9,74 @@ options = argparse.Namespace()
 
 
 class Argument(NamedTuple):
-    """How the text of an argument is read, and its help."""
+    """The parser of an argument's text, and its help."""
 
     read: object
     help: str
 
 
 def names(text):
-    """Names with commas between them."""
+    """A comma-separated list of names."""
     return [name for name in text.split(",") if name]
 
 
 def numbers(text):
-    """Numbers with commas between them."""
+    """A comma-separated list of numbers."""
     return [float(number) for number in names(text)]
 
 
 def integers(text):
-    """Integers with commas between them."""
+    """A comma-separated list of integers."""
     return [int(number) for number in names(text)]
 
 
 def budget(text):
-    """A number of seconds, or of anything else."""
+    """A number of seconds."""
     return float(text)
 
 
 KNOWN = {
-    "before": Argument(str, "a commit, which is built in a folder of the cache, or a program"),
-    "block": Argument(int, "side of the blocks that choose a level, pixels"),
-    "budgets": Argument(numbers, "seconds of a render, a render each"),
-    "clock": Argument(str, "wall, or cpu: budgets are core-seconds over threads"),
-    "denoise": Argument(names, "what --denoise is given, a render each; `default` gives none"),
-    "engines": Argument(names, "schedulers of farms"),
-    "height": Argument(int, "height of the pictures, pixels"),
+    "before": Argument(str, "a commit, which is built in the cache, or a program"),
+    "block": Argument(int, "side of the blocks that choose a level, in pixels"),
+    "budgets": Argument(numbers, "seconds of a render; one render for each number"),
+    "clock": Argument(str, "wall, or cpu: budgets are core-seconds divided by threads"),
+    "denoise": Argument(names, "values of --denoise; one render for each; `default` omits the option"),
+    "engines": Argument(names, "farm engines: slurm, openjd, ray"),
+    "height": Argument(int, "height of the pictures, in pixels"),
     "iterations": Argument(int, "iterations of a render"),
     "largest": Argument(int, "triangles of the largest scene"),
-    "levels": Argument(str, "bandwidth levels of our renders; `default` leaves them to the method"),
-    "methods": Argument(names, "methods that are measured"),
-    "moments": Argument(int, "kills of a method's render"),
-    "name": Argument(str, "a name for what is stored, beside what is stored without one"),
+    "levels": Argument(str, "bandwidth levels of our renders; `default` uses the default of the method"),
+    "methods": Argument(names, "methods to measure"),
+    "moments": Argument(int, "number of kills for each method"),
+    "name": Argument(str, "a name for the stored figure, so that it does not replace the unnamed one"),
     "peers": Argument(names, "other renderers with their modes"),
-    "photons": Argument(integers, "light paths of an iteration; more than one number: a render each"),
+    "photons": Argument(integers, "light paths of an iteration; one render for each number"),
     "places": Argument(str, "x,y,x,y: two pixels"),
     "reference_seconds": Argument(budget, "seconds or core-seconds of a reference, or of each of its halves"),
     "render_options": Argument(shlex.split, "more options of our renders, one argument in quotes"),
-    "rounds": Argument(int, "times that everything is measured; the least counts"),
-    "saves": Argument(int, "checkpoints that are timed"),
+    "rounds": Argument(int, "number of repetitions; the fastest counts"),
+    "saves": Argument(int, "number of checkpoints to time"),
     "scenes": Argument(names, "names below scenes/, such as pool,second/still,twin/pool"),
     "seconds": Argument(budget, "seconds or core-seconds of a render"),
-    "seed": Argument(int, "seed of the moments"),
-    "seeds": Argument(int, "renders of each kind"),
-    "set": Argument(str, "first, second, all, or twins: scenes as far as peers' drivers can translate them"),
+    "seed": Argument(int, "seed of the random moments"),
+    "seeds": Argument(int, "number of renders of each kind, with different seeds"),
+    "set": Argument(str, "first, second, all, or twins: scenes without features that other renderers' drivers lack"),
     "shards": Argument(int, "shards of a picture"),
     "spp": Argument(int, "samples per pixel"),
     "threads": Argument(int, "threads of a render"),
-    "width": Argument(int, "width of the pictures, pixels"),
+    "width": Argument(int, "width of the pictures, in pixels"),
 }
 
 
 def shown(value):
-    """A default as it would be typed."""
-    return (
-        ",".join(f"{one:g}" if isinstance(one, float) else str(one) for one in value)
-        if isinstance(value, list)
-        else value
-    )
+    """A default as a user would type it."""
+    if not isinstance(value, list):
+        return value
+    return ",".join(f"{one:g}" if isinstance(one, float) else str(one) for one in value)
 
 
 def parser(name, figure, short):
-    """The parser of a figure. `short`: whether the defaults are those of its short form."""
+    """The parser of a figure's arguments; `short` selects the defaults of its short form."""
     made = argparse.ArgumentParser(
         prog=f"scripts/lab.sh {name}", description=figure.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -88,8 +86,8 @@ def parser(name, figure, short):
         defaults = defaults | (figure.SHORT if short else {})
     for key, value in defaults.items():
         known, flag = KNOWN[key], f"--{key.replace('_', '-')}"
-        told = "" if value is None else f" [default: {shown(value)}]"
-        made.add_argument(flag, type=known.read, default=value, help=known.help + told, metavar=key.upper())
+        default = "" if value is None else f" [default: {shown(value)}]"
+        made.add_argument(flag, type=known.read, default=value, help=known.help + default, metavar=key.upper())
     if hasattr(figure, "add_arguments"):
         figure.add_arguments(made)
     return made

@@ -1,21 +1,22 @@
-"""Public renderers on our scenes, by their drivers in scripts/compare/peers.
+"""Renders of our scenes by other renderers, through their drivers in scripts/compare/peers.
 
-`scripts/compare/setup.sh peers` installs them. On the clock of core-seconds a budget is seconds times threads.
+`scripts/compare/setup.sh peers` installs the renderers. A budget in core-seconds is seconds times threads.
 """
 
 from pathlib import Path
 
 import caller
 
-from .cache import BIN, CACHE, Failed, digest, load, making, save, scene_key, timed
+from .cache import CACHE, Failed, create, digest, load, run_timed, save, scene_key
+from .commands import command
 from .options import options
 from .picture_errors import Layers, write
-from .renders import PYTHON, denoised
+from .renders import PYTHON, denoise_file
 
-# Iterations of the guides that all peers' pictures are denoised with.
-GUIDES = 64
-# A picture whose mean is so far from the reference's, its noise apart, is of another scene.
-SAME = 0.02
+# Iterations of the albedo and normal that guide the denoiser on all peers' pictures.
+GUIDE_ITERATIONS = 64
+# Largest relative difference of the means, besides noise, of two pictures of one scene.
+MAX_MEAN_DIFFERENCE = 0.02
 PEERS = {
     "mitsuba_path": ("mitsuba_driver.py", "path"),
     "lux_path": ("luxcore_driver.py", "path"),
@@ -26,22 +27,22 @@ PEERS = {
     "cycles_guiding": ("cycles_driver.py", "path_guiding"),
 }
 DEFAULT = ["mitsuba_path", "lux_bidir", "lux_path_caustic", "lux_bidirvm", "cycles_path"]
-INSTALL = "make it by scripts/compare/setup.sh peers"
+INSTALL = "scripts/compare/setup.sh peers creates it"
 
 
-def chosen():
-    """The peers asked for, and what keeps them out, if anything does."""
+def select():
+    """The selected peers, and why they cannot run, or None."""
     names = options.peers
     unknown = set(names) - set(PEERS)
     if unknown:
-        raise SystemExit(f"--peers: {', '.join(sorted(unknown))} is not among {', '.join(PEERS)}")
+        raise SystemExit(f"--peers: {', '.join(sorted(unknown))}: not one of {', '.join(PEERS)}")
     if names and not PYTHON:
-        return [], f"peers are left out: there is no .venv-peers; {INSTALL}"
+        return [], f"other renderers are left out: there is no .venv-peers; {INSTALL}"
     return names, None
 
 
 class Peers:
-    """The peers on one scene."""
+    """Renders of one scene by the peers."""
 
     def __init__(self, scene, height):
         tools = sorted(caller.DRIVERS.glob("*.py"))
@@ -49,37 +50,38 @@ class Peers:
         self.scene, self.height = scene, height
 
     def _drive(self, driver, target, **words):
-        """Runs a driver; returns its answer, with the core-seconds of the process."""
+        """Runs a driver; returns its answer with the core-seconds of the process."""
         size = {"width": options.width, "height": self.height, "threads": options.threads}
-        command = caller.command(driver, self.scene, target, **size, **words)
-        if not Path(command[0]).exists():
-            raise Failed(f"{command[0]} is not there; {INSTALL}")
-        text, _, spent = timed(command, 600 + 10 * float(words["budget"]), caller.environment(driver))
+        line = caller.command(driver, self.scene, target, **size, **words)
+        if not Path(line[0]).exists():
+            raise Failed(f"{line[0]} does not exist; {INSTALL}")
+        text, _, spent = run_timed(line, 600 + 10 * float(words["budget"]), caller.environment(driver))
         try:
             answer = caller.answer(text)
         except caller.CannotTranslate as cannot:
             return {"cannot": str(cannot), "process_core_seconds": round(spent, 2)}
         if answer is None:
-            raise Failed("the driver says nothing of what it did")
+            raise Failed("the driver has printed no answer")
         return {**answer, "process_core_seconds": round(spent, 2)}
 
     def guides(self):
-        """Albedo and normal, nearly without noise, made once by our path tracing and not counted."""
+        """Albedo and normal with little noise, rendered once by our path tracing; their time is not counted."""
         folder = self.place / "guides"
         if not (folder / "guides.exr").exists():
-            with making(folder) as draft:
-                command = [BIN, "render", self.scene, "-o", draft / "guides.exr", "--method", "path", "--no-combine"]
-                command += ["--iterations", GUIDES, "--width", options.width, "--layers", "albedo,normal"]
-                timed([*command, "--progress", "none"])
+            with create(folder) as draft:
+                words = ["render", self.scene, "-o", draft / "guides.exr"]
+                settings = {"method": "path", "no_combine": True, "iterations": GUIDE_ITERATIONS}
+                settings |= {"width": options.width, "layers": "albedo,normal", "progress": "none"}
+                run_timed(command(*words, **settings))
         layers = Layers(folder / "guides.exr")
         return {"albedo": layers.get("albedo"), "normal": layers.get("normal", "XYZ")}
 
     def render(self, peer, budget, seed):
-        """Renders by a peer, unless that is done; returns the folder."""
+        """Renders by a peer, unless the cache has the render; returns the folder."""
         folder = self.place / f"{peer}-{budget:g}s-{options.threads}-seed{seed}"
         known = load(folder / "run.json")
         if known is None:
-            with making(folder) as draft:
+            with create(folder) as draft:
                 driver, mode = PEERS[peer]
                 words = {"mode": mode, "budget": budget, "seed": seed, "clock": "cpu"}
                 known = self._drive(driver, draft / "picture.exr", **words)
@@ -90,20 +92,20 @@ class Peers:
         return folder
 
     def pictures(self, folder):
-        """A peer's picture, and the same with OIDN and the guides."""
+        """A peer's picture, and the picture denoised by OIDN with the guides."""
         found = {"noisy": Layers(folder / "picture.exr").get("")}
         if not (folder / "oidn.exr").exists():
             write(folder / "noisy.exr", picture=found["noisy"], **self.guides())
-        if denoised(folder, "noisy.exr", "oidn.exr"):
+        if denoise_file(folder, "noisy.exr", "oidn.exr"):
             found["oidn"] = Layers(folder / "oidn.exr").get("")
             (folder / "noisy.exr").unlink(missing_ok=True)
         return found
 
 
-def stranger(noisy):
-    """Why a peer's picture is not of the same scene, by its mean; nothing where it is."""
+def mean_mismatch(noisy):
+    """Why a picture does not show the reference's scene, by its mean; None if the means agree."""
     off = abs(noisy["mean_ratio"] - 1)
-    if off <= SAME + 2 * noisy["mean_ratio_error"]:
+    if off <= MAX_MEAN_DIFFERENCE + 2 * noisy["mean_ratio_error"]:
         return None
     ratio, noise = noisy["mean_ratio"], noisy["mean_ratio_error"]
     return f"not comparable: its mean is {ratio:.3f} of the reference's, of which {noise:.3f} may be noise"

@@ -1,22 +1,22 @@
-"""Pictures and their errors against two independent halves of a reference, whose own noise drops out."""
+"""Errors of pictures against two independent halves of a reference, whose own noise cancels."""
 
 import flip_evaluator
 import numpy as np
 import OpenEXR
 
-# The share of pixels that is left out, the worst ones.
+# The share of pixels, the worst ones, that trimmed errors leave out.
 TRIM = 0.005
 
 
 class Layers:
-    """The layers of an EXR file as arrays of rows, columns and three components."""
+    """The layers of an EXR file, as arrays of shape (rows, columns, 3)."""
 
     def __init__(self, path):
         with OpenEXR.File(str(path), separate_channels=True) as file:
             self.channels = {name: channel.pixels for name, channel in file.channels().items()}
 
     def get(self, name, components="RGB"):
-        """A layer, the picture itself where the name is empty; nothing where the file has none."""
+        """A layer by name, the picture itself by the empty name; None if the file does not have it."""
         names = [f"{name}.{component}" if name else component for component in components]
         if not all(name in self.channels for name in names):
             return None
@@ -24,7 +24,7 @@ class Layers:
 
 
 def write(path, **layers):
-    """Writes layers of three components: R G B, or X Y Z of normals; `picture` is the one without a name."""
+    """Writes an EXR file of layers with three components: X Y Z for `normal`, else R G B; `picture` is the root layer."""
     channels = {}
     for name, values in layers.items():
         for i, component in enumerate("XYZ" if name == "normal" else "RGB"):
@@ -34,8 +34,8 @@ def write(path, **layers):
     OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
 
 
-def around(values, counted):
-    """The mean over the 3 x 3 pixels about each, of those that are there and counted."""
+def window_means(values, counted):
+    """For each pixel, the mean over the counted ones of the 3 x 3 pixels around it."""
 
     def total(array):
         array = np.pad(array, [(1, 1), (1, 1)] + [(0, 0)] * (array.ndim - 2))
@@ -46,14 +46,14 @@ def around(values, counted):
     return total(np.where(counted[..., None], values, 0.0)) / np.maximum(count, 1.0)[..., None]
 
 
-def best(values, counted):
-    """Which of the pixels that count are not among the worst by some value, as places among those that count."""
+def keep_best(values, counted):
+    """Indices, among the counted pixels, of all but the share TRIM with the largest values."""
     values = values[counted]
     return np.sort(np.argsort(values, kind="stable")[: len(values) - int(TRIM * len(values))])
 
 
 class Reference:
-    """Two halves of a reference."""
+    """Two independent halves of a reference, and errors of pictures against them."""
 
     def __init__(self, first, second):
         self.halves = [half.astype(float) for half in (first, second)]
@@ -61,27 +61,27 @@ class Reference:
         self.finite = np.isfinite(self.mean).all(-1)
         self.weight = 1.0 / (np.where(self.finite, self.mean.mean(-1), 0.0) ** 2 + 0.01)
         difference = np.where(self.finite[..., None], self.halves[0] - self.halves[1], 0.0)
-        # A quarter of the halves' squared difference is the variance of their mean.
+        # The variance of the mean is a quarter of the squared difference of the halves.
         self.error = float((np.square(difference).mean(-1) * self.weight)[self.finite].mean() / 4)
 
     @classmethod
     def read(cls, folder):
-        """The halves in a folder that _references.py has made."""
+        """Reads the halves from a folder that references.py has written."""
         return cls(*(Layers(folder / f"half{half}.exr").get("") for half in (1, 2)))
 
     def measure(self, picture):
-        """The figures of a picture. Errors smaller than what the reference's noise lets see may be below zero."""
+        """The errors of a picture by name. Errors below the reference's noise may come out negative."""
         counted = np.isfinite(picture).all(-1) & self.finite
         picture = np.where(counted[..., None], picture, self.mean).astype(float)
         first, second = (picture - half for half in self.halves)
         error = (first * second).mean(-1) * self.weight
-        kept = best(np.square(picture - self.mean).mean(-1) * self.weight, counted)
-        first, second = (half - around(half, counted) for half in (first, second))
+        kept = keep_best(np.square(picture - self.mean).mean(-1) * self.weight, counted)
+        first, second = (half - window_means(half, counted) for half in (first, second))
         rough = ((first * second).mean(-1) * self.weight)[counted]
-        # Errors of bright pixels spread into dark neighbours, where a little counts for much: edges of lamps rule the
-        # grain of all pixels.
-        smooth = best(np.square((first + second) / 2).mean(-1) * self.weight, counted)
-        ratio, doubt = self._mean_ratio(picture, counted)
+        # Window means spread errors of bright pixels into dark neighbours, where relative errors are large: without
+        # trimming, the edges of lights dominate the grain.
+        smooth = keep_best(np.square((first + second) / 2).mean(-1) * self.weight, counted)
+        ratio, ratio_error = self._mean_ratio(picture, counted)
         return {
             "relmse": float(error[counted].mean()),
             "relmse_trimmed": float(error[counted][kept].mean()),
@@ -89,12 +89,12 @@ class Reference:
             "grain": float(rough.mean()),
             "grain_trimmed": float(rough[smooth].mean()),
             "mean_ratio": ratio,
-            "mean_ratio_error": doubt,
+            "mean_ratio_error": ratio_error,
             "pixels_not_finite": int((~counted).sum()),
         }
 
     def _mean_ratio(self, picture, counted):
-        """The picture's mean over the reference's, and its standard error if errors of pixels are independent."""
+        """The picture's mean over the reference's, and its standard error for independent errors of pixels."""
         whole = self.mean[counted].mean()
         if whole == 0:
             return None, None

@@ -1,4 +1,4 @@
-"""Plots of stored figures, which .venv-python draws (scripts/python.sh)."""
+"""Plots of stored figures, drawn by the Python of .venv-python (scripts/python.sh creates it)."""
 
 import subprocess
 import sys
@@ -7,21 +7,23 @@ from .record import ROOT, entries
 
 
 def rows(name):
-    """The rows that are stored of a figure."""
+    """The stored rows of a figure."""
     return [row for entry in entries() if entry["name"] == name for row in entry["values"]["rows"]]
 
 
 def draw(name):
-    """Draws docs/lab/NAME.svg by NAME_plot.py, if .venv-python is there."""
+    """Draws docs/lab/NAME.svg by NAME_plot.py, if .venv-python exists."""
     python = ROOT / ".venv-python" / "bin" / "python"
     if python.exists():
         subprocess.run([python, "-m", f"lab.{name}_plot"], check=True)
     else:
-        print(f"docs/lab/{name}.svg is as it was: scripts/python.sh makes what draws it", file=sys.stderr)
+        print(
+            f"docs/lab/{name}.svg is not drawn: scripts/python.sh creates .venv-python, which it needs", file=sys.stderr
+        )
 
 
 def pyplot(name):
-    """What draws a picture, with the same bytes each time."""
+    """matplotlib's pyplot, set up so that equal plots have equal bytes."""
     import matplotlib
 
     matplotlib.use("svg")

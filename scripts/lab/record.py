@@ -1,8 +1,7 @@
-"""Stores a figure in scripts/lab/results.jsonl, with the commit, the date and the machine it was measured on: in
-place of what was stored of the same figure before. A figure of a tree with changes that are not committed is of no
-commit, and is not stored.
+"""Stores a figure in scripts/lab/results.jsonl, with its commit, date and machine. It replaces the stored figure of the
+same name and subject. Figures of a tree with uncommitted changes are not stored, because no commit describes them.
 
-One line is one object:
+Each line is one object:
 {"name": .., "values": {..}, "commit": .., "date": .., "machine": {"cpu": .., "cores": .., "memory_gib": .., "system": ..}}
 """
 
@@ -16,13 +15,13 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = Path(__file__).resolve().parent / "results.jsonl"
-# Values that tell apart figures of one name.
-APART = ("scene", "rule", "parameters", "corrected", "set")
+# Values that distinguish figures of one name.
+SUBJECT_KEYS = ("scene", "rule", "parameters", "corrected", "set")
 
 
 def commit():
-    """The commit that is checked out, "-dirty" added if files other than the results and the documentation, which figures
-    fill, differ from it: tracked ones, and those of `scripts` and `src` that it does not have at all."""
+    """The checked-out commit, with "-dirty" if tracked files differ from it, or `scripts` or `src` have untracked files.
+    The results and the documentation, which figures write, do not count."""
     try:
         head = _git("rev-parse", "HEAD")
         own = [f":!{RESULTS.relative_to(ROOT)}", ":!docs"]
@@ -53,19 +52,19 @@ def machine():
 
 
 def same(one, other):
-    """Whether two entries are of the same figure."""
-    values = [[entry["values"].get(key) for key in APART] for entry in (one, other)]
+    """Whether two entries store the same figure."""
+    values = [[entry["values"].get(key) for key in SUBJECT_KEYS] for entry in (one, other)]
     return one["name"] == other["name"] and values[0] == values[1]
 
 
 def entries(file=RESULTS):
-    """All that is stored."""
+    """All stored entries."""
     file = Path(file)
     return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
 
 
 def record(name, values, file=RESULTS):
-    """Stores one line and returns the object. `values`: a dict of what JSON can say, without NaN."""
+    """Stores a figure and returns its entry. `values` is a dict for JSON, without NaN."""
     now = datetime.datetime.now(datetime.UTC)
     entry = {
         "name": name,

@@ -1,38 +1,39 @@
-"""Our own renders at a budget, and the pictures that each of them holds."""
+"""Our renders at a budget of time, and their pictures."""
 
 import functools
 import os
 import subprocess
 
-from .cache import BIN, CACHE, Failed, digest, installed, load, making, program, save, scene_key, timed
+from .cache import BIN, CACHE, Failed, create, digest, installed, load, program, run_timed, save, scene_key
+from .commands import command, read
 from .options import options
-from .reading import read
 from .picture_errors import Layers, write
 from .record import ROOT
 
 # The interpreter that has OIDN (scripts/compare/setup.sh peers).
 PYTHON = installed(".venv-peers")
 PLACE = CACHE / "renders" / program()
-# On the clock of core-seconds: a render that has spent so much more or less than the budget is made again, a few times.
-NEAR, TIMES = 0.05, 4
+# With --clock cpu, a render is repeated until its core-seconds are within this share of the budget, up to MAX_TRIES times.
+BUDGET_TOLERANCE, MAX_TRIES = 0.05, 4
 
 
 @functools.cache
-def knows(option):
-    """Whether the program has an option of `render`."""
+def has_option(option):
+    """Whether the program's command `render` has an option."""
     done = subprocess.run([BIN, "render", "--help"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     return f"{option} " in done.stdout
 
 
 def render(scene, method, denoise, budget, seed):
-    """Renders, unless that is done; returns the folder. What is refused raises Failed, and is not asked for again."""
+    """Renders, unless the cache has the render; returns the folder. Raises Failed if the program refuses the render,
+    which the cache also stores."""
     name = f"{method}-{denoise or 'default'}-{budget:g}s-{options.clock}-{options.threads}-seed{seed}-{options.width}"
     if options.render_options:
         name += "".join(c if c.isalnum() else "_" for c in " ".join(options.render_options))
     folder = PLACE / scene_key(scene) / name
     known = load(folder / "run.json")
     if known is None:
-        with making(folder) as draft:
+        with create(folder) as draft:
             known = _render(scene, method, denoise, budget, seed, draft / "picture.exr")
             save(draft / "run.json", known)
     if "refused" in known:
@@ -41,67 +42,55 @@ def render(scene, method, denoise, budget, seed):
 
 
 def _render(scene, method, denoise, budget, seed, file):
-    if denoise and not knows("--denoise"):
+    if denoise and not has_option("--denoise"):
         return {"refused": "not available: this program has no --denoise"}
-    command = [
-        BIN,
-        "render",
-        scene,
-        "-o",
-        file,
-        "--method",
-        method,
-        "--seed",
-        seed,
-        "--width",
-        options.width,
-        "--threads",
-        options.threads,
-    ]
-    command += ["--progress", "none", *(["--denoise", denoise] if denoise else []), *options.render_options]
+    settings = {"method": method, "seed": seed, "width": options.width, "threads": options.threads}
+    line = command("render", scene, "-o", file, **settings, progress="none", denoise=denoise or None)
+    line += options.render_options
     seconds, stop = budget, ["--time", f"{budget:.3f}"]
-    for _ in range(TIMES if options.clock == "cpu" else 1):
+    for _ in range(MAX_TRIES if options.clock == "cpu" else 1):
         try:
-            _, wall, spent = timed([*command, *stop], 600 + 20 * budget)
+            _, wall, spent = run_timed([*line, *stop], 600 + 20 * budget)
         except Failed as failed:
             if "photons in media" not in str(failed):
                 raise
             return {"refused": f"not available: {failed}"}
-        said = read("info", str(file))
-        last = said["history"][-1]
-        longer = budget * options.threads / max(last["cpu_seconds"], 1e-3)
-        if abs(1 / longer - 1) < NEAR:
+        header = read("info", file)
+        last = header["history"][-1]
+        factor = budget * options.threads / max(last["cpu_seconds"], 1e-3)
+        if abs(1 / factor - 1) < BUDGET_TOLERANCE:
             break
-        # auto chooses by the seconds it is given; the others take as many core-seconds for an iteration as before.
+        # The choice of auto depends on --time; other methods repeat with a corrected number of iterations.
         if method == "auto":
-            seconds *= min(max(longer, 0.5), 4)
+            seconds *= min(max(factor, 0.5), 4)
             stop = ["--time", f"{seconds:.3f}"]
         else:
-            wanted = max(round(last["iterations"] * longer), 1)
-            if wanted == last["iterations"]:
+            iterations = max(round(last["iterations"] * factor), 1)
+            if iterations == last["iterations"]:
                 break
-            stop = ["--iterations", wanted]
+            stop = ["--iterations", iterations]
     known = {key: last[key] for key in ("seconds", "cpu_seconds", "iterations")}
     return {
         **known,
         "process_seconds": round(wall, 2),
         "process_core_seconds": round(spent, 2),
-        "chosen": said.get("plan", {}).get("because"),
+        "chosen": header.get("plan", {}).get("because"),
     }
 
 
-def denoised(folder, source, target):
-    """OIDN alone on a file in a folder, once; whether there is a picture then."""
+def denoise_file(folder, source, target):
+    """Denoises a file of a folder by OIDN alone, unless the target exists; returns whether the target exists."""
     if not (folder / target).exists() and PYTHON:
         tool = ROOT / "scripts" / "compare" / "peers" / "oidn.py"
         part = folder / f"{os.getpid()}-{target}"
-        timed([PYTHON, tool, folder / source, part, options.threads])
+        run_timed([PYTHON, tool, folder / source, part, options.threads])
         part.rename(folder / target)
     return (folder / target).exists()
 
 
 def pictures(folder):
-    """The pictures of a render: delivered, noisy, level1 to level5, and oidn, which is OIDN alone on noisy."""
+    """The pictures of a render by name: delivered (finished), noisy (the estimate), level1 to level5, and oidn (noisy
+    denoised by OIDN alone)."""
     layers = Layers(folder / "picture.exr")
     found = {"delivered": layers.get(""), "noisy": layers.get("Noisy")}
     found.update({f"level{i}": layers.get(f"Level{i}") for i in range(1, 6)})
@@ -110,18 +99,19 @@ def pictures(folder):
     if PYTHON and "noisy" in found and all(guide is not None for guide in guides.values()):
         if not (folder / "oidn.exr").exists():
             write(folder / "noisy.exr", picture=found["noisy"], **guides)
-        if denoised(folder, "noisy.exr", "oidn.exr"):
+        if denoise_file(folder, "noisy.exr", "oidn.exr"):
             found["oidn"] = Layers(folder / "oidn.exr").get("")
             (folder / "noisy.exr").unlink(missing_ok=True)
     return found
 
 
-def figures(folder, reference, halves, shown):
-    """The figures of a folder's pictures, measured once against a reference. `shown`: what gives the pictures."""
+def figures(folder, reference, halves, pictures_of):
+    """The errors of a folder's pictures against a reference, from the cache if possible. `pictures_of(folder)` returns
+    the pictures."""
     file = folder / f"figures-{digest(halves / 'half1.exr', halves / 'half2.exr')}.json"
     known = load(file) or {}
     if "oidn" not in known and PYTHON or not known:
-        for name, picture in shown(folder).items():
+        for name, picture in pictures_of(folder).items():
             if name not in known:
                 known[name] = reference.measure(picture)
         save(file, known)

@@ -1,4 +1,4 @@
-"""Runs tests/bench/rules, which measures the progressive rules from within; used by the figures about them."""
+"""Runs tests/bench/rules, which measures the bandwidth rules inside the library, for the figures about them."""
 
 import functools
 import json
@@ -18,13 +18,13 @@ def executable():
 
 
 def run(figure, **options):
-    """The JSON object that a figure of the bench prints."""
+    """Runs a figure of the bench; returns the JSON object that it prints."""
     command = [executable(), figure, *(f"{key}={value}" for key, value in options.items())]
     return json.loads(subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout)
 
 
 def bench_options():
-    """What most figures of the bench take, from the arguments."""
+    """The options that most figures of the bench take, from the arguments."""
     return {
         "iterations": options.iterations,
         "seeds": options.seeds,

@@ -1,6 +1,7 @@
-"""Draws docs/lab/scaling.svg from the stored figure: core-seconds of an iteration, and of loading, along each axis."""
+"""Draws docs/lab/scaling.svg from the stored figure: core-seconds of an iteration, and of loading, by size."""
 
 from .plots import pyplot, rows, save
+from .tables.scaling_tables import AXES
 
 
 def main():
@@ -10,7 +11,7 @@ def main():
     for axis, place in zip(axes_of, places.flat):
         for row in (row for row in found if row["axis"] == axis):
             place.plot(row["sizes"], row["core_seconds"], "o-", ms=3, lw=1, label=row["method"])
-        place.set(xscale="log", yscale="log", xlabel=axis, ylabel="core-seconds")
+        place.set(xscale="log", yscale="log", xlabel=AXES.get(axis, axis), ylabel="core-seconds")
         place.legend(fontsize=7)
     save(figure, "scaling")
 

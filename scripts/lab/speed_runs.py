@@ -1,9 +1,9 @@
-"""Errors against core-seconds on one thread: what a method's own estimate takes, without a finish.
+"""Errors against core-seconds on one thread, for estimates without a finish.
 
-The merit of some renders is their squared error, trimmed relMSE, times their core-seconds: how long a method takes to
-an error, where the squared error falls as one over time. Programs render in turns, as many iterations as take
---seconds, and core-seconds are those of the process, the start and the reading of the scene left out. --levels is the
-number of bandwidth levels [1], or `default`.
+The cost of a method is its squared error (trimmed relMSE) times its core-seconds. It is constant if the squared error
+falls as one over time. Programs render alternately, with the number of iterations that takes --seconds. Core-seconds are
+those of the process, without its start and the reading of the scene. --levels is the number of bandwidth levels [1], or
+`default`.
 """
 
 import json
@@ -12,7 +12,8 @@ from pathlib import Path
 
 from . import references
 from .accuracy import geometric, short
-from .cache import CACHE, Failed, digest, load, making, save, scene_key, timed
+from .cache import CACHE, Failed, create, digest, load, run_timed, save, scene_key
+from .commands import command
 from .options import options
 from .picture_errors import Layers, Reference
 
@@ -27,48 +28,49 @@ ARGUMENTS = references.ARGUMENTS | {
     "levels": "1",
 }
 PLACE = CACHE / "speed"
-# The share of a render that tells how many iterations fill it.
-TRIAL = 0.25
-# Least iterations of it.
-SOME = 4
-# Squared errors are taken for no smaller.
-LEAST = 1e-9
+# The share of --seconds that a trial takes, which measures the time of an iteration.
+TRIAL_SHARE = 0.25
+MIN_TRIAL_ITERATIONS = 4
+# Smaller squared errors count as this.
+MIN_SQUARED_ERROR = 1e-9
 
 
 def settings():
-    """What the figures were measured with, for the record."""
+    """The arguments of the measurement, for the record."""
     return {key: getattr(options, key) for key in ("width", "threads", "seconds", "seeds", "levels")}
 
 
 class Program:
-    """A program to measure."""
+    """A build of the program, to measure."""
 
     def __init__(self, binary):
         self.binary = Path(binary)
         self.key = digest(self.binary)
 
-    def _render(self, scene, chosen, stop, seed, file):
-        """Renders; returns its history."""
-        command = [self.binary, "render", scene, "-o", file, *chosen, *stop, "--seed", seed, "--width", options.width]
-        command += ["--threads", options.threads, "--no-combine", "--progress", "none"]
-        command += [] if options.levels == "default" else ["--levels", options.levels]
-        timed(command, 600 + 50 * options.seconds)
-        said = subprocess.run([self.binary, "info", file, "--json"], check=True, capture_output=True, text=True)
-        return json.loads(said.stdout)["history"]
+    def _render(self, scene, method, stop, seed, file):
+        """Renders with the options `method` and `stop`; returns the history."""
+        levels = None if options.levels == "default" else options.levels
+        settings = {"seed": seed, "width": options.width, "threads": options.threads, "levels": levels}
+        words = ["render", scene, "-o", file, *method, *stop]
+        line = command(*words, program=self.binary, **settings, no_combine=True, progress="none")
+        run_timed(line, 600 + 50 * options.seconds)
+        info = subprocess.run([self.binary, "info", file, "--json"], check=True, capture_output=True, text=True)
+        return json.loads(info.stdout)["history"]
 
-    def _folder(self, scene, chosen):
-        name = "".join(c if c.isalnum() else "_" for c in " ".join(map(str, chosen))).strip("_")
+    def _folder(self, scene, method):
+        name = "".join(c if c.isalnum() else "_" for c in " ".join(map(str, method))).strip("_")
         return PLACE / self.key / scene_key(scene) / f"{name}-{options.levels}-{options.seconds:g}s-{options.width}"
 
-    def iterations(self, scene, chosen):
-        """How many iterations fill a render, by what a short one takes before its first and for each. A start that takes
-        longer than the trial leaves one iteration in it, which tells nothing of the others: a second trial has more."""
-        folder = self._folder(scene, chosen) / "trial"
+    def iterations(self, scene, method):
+        """The number of iterations that takes --seconds, from a trial that measures the start and an iteration. If the
+        start takes longer than the trial, a second trial has MIN_TRIAL_ITERATIONS."""
+        folder = self._folder(scene, method) / "trial"
         if not (folder / "run.json").exists():
-            with making(folder) as draft:
-                history = self._render(scene, chosen, ["--time", TRIAL * options.seconds], 0, draft / "picture.exr")
-                if history[-1]["iterations"] < SOME:
-                    history = self._render(scene, chosen, ["--iterations", SOME], 0, draft / "picture.exr")
+            with create(folder) as draft:
+                file, stop = draft / "picture.exr", ["--time", TRIAL_SHARE * options.seconds]
+                history = self._render(scene, method, stop, 0, file)
+                if history[-1]["iterations"] < MIN_TRIAL_ITERATIONS:
+                    history = self._render(scene, method, ["--iterations", MIN_TRIAL_ITERATIONS], 0, file)
                 save(draft / "run.json", history)
         history = load(folder / "run.json")
         first, last = history[0], history[-1]
@@ -76,29 +78,29 @@ class Program:
         fixed = max(first["cpu_seconds"] - first["iterations"] * each, 0)
         return max(1, round((options.seconds - fixed) / each))
 
-    def done(self, scene, chosen, seed):
-        """Renders a seed unless that is done; the folder of picture.exr and run.json."""
-        folder = self._folder(scene, chosen) / f"seed{seed}"
+    def render_folder(self, scene, method, seed):
+        """Renders with a seed, unless the cache has the render; returns the folder of picture.exr and run.json."""
+        folder = self._folder(scene, method) / f"seed{seed}"
         if not (folder / "run.json").exists():
-            with making(folder) as draft:
-                stop = ["--iterations", self.iterations(scene, chosen)]
-                save(draft / "run.json", self._render(scene, chosen, stop, seed, draft / "picture.exr")[-1])
+            with create(folder) as draft:
+                stop = ["--iterations", self.iterations(scene, method)]
+                save(draft / "run.json", self._render(scene, method, stop, seed, draft / "picture.exr")[-1])
         return folder
 
-    def render(self, scene, chosen, seed):
-        """A render of a seed; its picture and what it spent."""
-        folder = self.done(scene, chosen, seed)
+    def render(self, scene, method, seed):
+        """Renders with a seed; returns the picture and its core-seconds."""
+        folder = self.render_folder(scene, method, seed)
         return Layers(folder / "picture.exr").get(""), load(folder / "run.json")["cpu_seconds"]
 
 
 def merit(pairs, reference):
-    """The merit of some renders of one kind, pictures with core-seconds, and their mean over the reference's."""
+    """The cost of renders, given as pairs of picture and core-seconds, and their mean over the reference's."""
     found = [reference.measure(picture) for picture, _ in pairs]
 
     def mean(key):
         return sum(figures[key] for figures in found) / len(found)
 
-    error, spent = max(mean("relmse_trimmed"), LEAST), sum(seconds for _, seconds in pairs) / len(pairs)
+    error, spent = max(mean("relmse_trimmed"), MIN_SQUARED_ERROR), sum(seconds for _, seconds in pairs) / len(pairs)
     return {
         "merit": error * spent,
         "error": error,
@@ -108,8 +110,8 @@ def merit(pairs, reference):
     }
 
 
-def taking_turns(renders, reference):
-    """The merits of some kinds of renders by name, each a function of the seed, which take turns."""
+def measure_alternately(renders, reference):
+    """Costs by name. `renders` has a function of the seed for each name; the functions are called alternately."""
     found = {name: [] for name in renders}
     for seed in range(1, options.seeds + 1):
         for name, render in renders.items():
@@ -118,7 +120,7 @@ def taking_turns(renders, reference):
 
 
 def with_references():
-    """The scenes asked for, each with its name and its reference; what keeps others out is said."""
+    """The selected scenes that have a reference, each with its name and reference; prints why others have none."""
     for scene in references.scenes():
         try:
             yield scene, references.name(scene), Reference.read(references.reference(scene)[0])
@@ -126,24 +128,24 @@ def with_references():
             print(f"{references.name(scene)}: no reference: {failed}", flush=True)
 
 
-def stored(found):
-    """Merits for the record."""
+def rounded(found):
+    """Costs by name, with their numbers rounded for the record."""
     return {name: {key: short(value) for key, value in of.items()} for name, of in found.items()}
 
 
-def compared(found, first, second, strange):
-    """Merits for the record, that of the first over that of the second, and what keeps the row from counting: the
-    first word that `strange` has of a picture, if any."""
-    words = {of: strange(figures) for of, figures in found.items()}
+def compare(found, first, second, mismatch):
+    """A row for the record: the rounded costs, the ratio of the first and the second, and why the row does not count,
+    if `mismatch` finds a reason for one of the pictures."""
+    words = {of: mismatch(figures) for of, figures in found.items()}
     return {
-        **stored(found),
+        **rounded(found),
         "ratio": short(found[first]["merit"] / found[second]["merit"]),
         "strange": next(({"of": of, "why": why} for of, why in words.items() if why), None),
     }
 
 
 def summary(ratios):
-    """Geometric mean, the largest with its name, and how many there are; `ratios`: by name."""
+    """The geometric mean of ratios by name, the largest ratio with its name, and the number of ratios."""
     if not ratios:
         return None
     worst = max(ratios, key=ratios.get)

@@ -1,8 +1,8 @@
-"""Twins of scenes: without what the peers' drivers cannot say, so that they and we render the same.
+"""Twins of scenes: copies without the features that the drivers of other renderers cannot translate.
 
-Glass does not absorb and has one index; coats, sheen and the lens's opening are gone. What is neither metal nor glass
-is matte, for LuxCore's glossy coat is a darker one. What makes a scene another one stays: a twin that the drivers cannot
-take even so (media, spots, nested glass) is none.
+Glass does not absorb and has one index; coats, sheen and lens apertures are removed. Materials that are neither metal
+nor glass are matte, because LuxCore's glossy coat is darker. Media, spots and nested glass stay, because a scene without
+them would be another one; such scenes have no twin.
 """
 
 import json
@@ -15,7 +15,7 @@ from .cache import CACHE
 
 
 def without(document):
-    """Takes from a document what can go; returns whether there was any."""
+    """Removes untranslatable features from a document; returns whether it had any."""
     before = json.dumps(document, sort_keys=True)
     for material in document.get("materials", []):
         extensions = material.get("extensions", {})
@@ -43,7 +43,7 @@ def without(document):
 
 
 def twin(scene):
-    """The twin of a scene as a file of its own; nothing where that is the scene itself, or no scene for the drivers."""
+    """Writes the twin of a scene; returns its file, or None if it equals the scene or the drivers cannot translate it."""
     document, binary = gltf.chunks(scene.read_bytes())
     if not without(document):
         return None

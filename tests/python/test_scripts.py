@@ -236,7 +236,7 @@ class Tables(support.Scratch):
         lines = sorted(figures.source().replace("\n  ", " ").splitlines())
         self.assertEqual(len(lines), 2)
         self.assertRegex(lines[0], r"^- pool: commit a{10}, .* a system\.$")
-        self.assertRegex(lines[1], r"^- torus: commit b{10} with uncommitted changes, .*, carried over")
+        self.assertRegex(lines[1], r"^- torus: commit b{10} with uncommitted changes, .*, copied from printed output")
 
     def test_one_figure_is_one(self):
         figures = self.stored(({"scene": "pool"}, "a" * 40, {}), ({"scene": "torus"}, "a" * 40, {}))

@@ -1,4 +1,4 @@
-"""Features of relief by normal maps: a matt and a metal plane, each under ridges of two slopes, seen at two angles."""
+"""Features of relief by normal maps: a matt and a metal plane with ridges of two slopes, seen at two angles."""
 
 import math
 
@@ -8,13 +8,13 @@ from mathutils import Vector
 
 from .torture_stage import feature
 
-GENTLE, STEEP = 1.0, 3.0  # slopes of ridges
-SLANT, GRAZING = 45.0, 80.0  # degrees between the line of sight and the plane's normal
-WIDE = 40  # times the stage's plane, which then fills the view
+SLOPES = {"gentle": 1.0, "steep": 3.0}  # of the ridges
+ANGLES = {"": 45.0, "_grazing": 80.0}  # degrees between the line of sight and the plane's normal
+PLANE_SCALE = 40  # so that the plane fills the view
 
 
 def waves(stage, steep):
-    """A tangent-space normal map of ridges of this slope."""
+    """A tangent-space normal map of ridges with the slope `steep`."""
     v, u = numpy.mgrid[0:64, 0:64] / 64
     normal = numpy.stack([steep * numpy.sin(8 * numpy.pi * u), steep * numpy.cos(8 * numpy.pi * v), 0 * u + 1], 2)
     normal /= numpy.linalg.norm(normal, axis=2)[..., None]
@@ -22,16 +22,16 @@ def waves(stage, steep):
 
 
 def _plane(stage, steep, angle, **inputs):
-    """A plane that fills the view under an even white sky, its camera so many degrees off its normal."""
+    """A plane that fills the view, under a uniform white sky; the camera is `angle` degrees off the plane's normal."""
     stage.shape("plane")
     for thing in (stage.floor, stage.lamp):
         bpy.data.objects.remove(thing)
     stage.background.inputs["Color"].default_value = (1, 1, 1, 1)
     stage.body.rotation_euler, stage.body.location = (0, 0, 0.4), (0, 0, 0)
     for vertex in stage.body.data.vertices:
-        vertex.co *= WIDE
+        vertex.co *= PLANE_SCALE
     for corner in stage.body.data.uv_layers.active.data:
-        corner.uv *= WIDE
+        corner.uv *= PLANE_SCALE
     turned = math.radians(angle)
     stage.camera.location = Vector((0, -math.sin(turned), math.cos(turned))) * 4
     stage.camera.rotation_euler = (turned, 0, 0)
@@ -43,45 +43,19 @@ def _plane(stage, steep, angle, **inputs):
     stage.principled(Normal=node, **inputs)
 
 
-MATT = {"Base_Color": (0.7, 0.7, 0.7), "Specular_IOR_Level": 0.0}
-METAL = {"Base_Color": (0.9, 0.9, 0.9), "Metallic": 1.0, "Roughness": 0.3}
+MATERIALS = {
+    "matt": {"Base_Color": (0.7, 0.7, 0.7), "Specular_IOR_Level": 0.0},
+    "metal": {"Base_Color": (0.9, 0.9, 0.9), "Metallic": 1.0, "Roughness": 0.3},
+}
 
 
-@feature
-def relief_matt_gentle(stage):
-    _plane(stage, GENTLE, SLANT, **MATT)
+def _relief(slope, angle, inputs):
+    return lambda stage: _plane(stage, slope, angle, **inputs)
 
 
-@feature
-def relief_matt_gentle_grazing(stage):
-    _plane(stage, GENTLE, GRAZING, **MATT)
-
-
-@feature
-def relief_matt_steep(stage):
-    _plane(stage, STEEP, SLANT, **MATT)
-
-
-@feature
-def relief_matt_steep_grazing(stage):
-    _plane(stage, STEEP, GRAZING, **MATT)
-
-
-@feature
-def relief_metal_gentle(stage):
-    _plane(stage, GENTLE, SLANT, **METAL)
-
-
-@feature
-def relief_metal_gentle_grazing(stage):
-    _plane(stage, GENTLE, GRAZING, **METAL)
-
-
-@feature
-def relief_metal_steep(stage):
-    _plane(stage, STEEP, SLANT, **METAL)
-
-
-@feature
-def relief_metal_steep_grazing(stage):
-    _plane(stage, STEEP, GRAZING, **METAL)
+for _material, _inputs in MATERIALS.items():
+    for _steepness, _slope in SLOPES.items():
+        for _suffix, _angle in ANGLES.items():
+            _build = _relief(_slope, _angle, _inputs)
+            _build.__name__ = f"relief_{_material}_{_steepness}{_suffix}"
+            feature(_build)

@@ -1,6 +1,6 @@
-"""The stage on which one feature at a time is shown to Cycles and to caustique: a body, a floor, a lamp, a grey world.
+"""The scene in which Cycles and caustique render one feature at a time: a body, a floor, a lamp, a grey world.
 
-Lengths are metres. A feature is a function of a Stage, registered by `feature`.
+Lengths are in metres. A feature is a function that changes a Stage, registered by `feature`.
 """
 
 import math
@@ -15,13 +15,13 @@ FEATURES = {}
 
 
 def feature(function):
-    """Register a function that makes one feature on a Stage, under its name."""
+    """Register a function that builds a feature on a Stage, under the function's name."""
     FEATURES[function.__name__] = function
     return function
 
 
 class Stage:
-    """An empty scene with a floor, an area lamp, a grey world, and a camera on a body in the middle."""
+    """A scene with a floor, an area lamp, a grey world, and a camera that looks at a body in the middle."""
 
     def __init__(self, shape="sphere"):
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -32,7 +32,7 @@ class Stage:
         self.background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
         self.background.inputs["Color"].default_value = (0.5, 0.55, 0.6, 1)
         lamp = bpy.data.lights.new("lamp", "AREA")
-        lamp.size, lamp.energy = 1.2, 200  # small, for unlike Cycles' it stands in the world's light
+        lamp.size, lamp.energy = 1.2, 200  # Small, because it shadows the world's light, unlike in Cycles.
         self.lamp = self.place("lamp", lamp, (1.5, -2.5, 4), (0, 0, 0.5))
         self.lamp.visible_camera = True
         floor = bpy.data.meshes.new("floor")
@@ -47,7 +47,7 @@ class Stage:
         self.shape(shape)
 
     def place(self, name, data, at=(0, 0, 0), towards=None):
-        """Put an object into the scene, its -Z axis towards a point."""
+        """Add an object to the scene, with its -Z axis towards a point; returns the object."""
         thing = bpy.data.objects.new(name, data)
         self.scene.collection.objects.link(thing)
         thing.location = at
@@ -56,7 +56,7 @@ class Stage:
         return thing
 
     def shape(self, kind):
-        """Give the stage another body: "sphere", "cube" or "plane" (tilted towards the camera)."""
+        """Replace the body by a "sphere", a "cube" or a "plane" (tilted towards the camera)."""
         if self.body is not None:
             bpy.data.objects.remove(self.body)
         form = bmesh.new()
@@ -77,7 +77,7 @@ class Stage:
 
     @property
     def tree(self):
-        """The node tree of the body's material, empty but for its output at first."""
+        """The node tree of the body's material; at first it has only the output node."""
         if self.material is None:
             self.material = bpy.data.materials.new("tested")
             if bpy.app.version < (5, 0, 0):
@@ -88,14 +88,15 @@ class Stage:
         return self.material.node_tree
 
     def material_of(self, build):
-        """The material that `build()` gives the body, which has none afterwards."""
+        """The material that `build()` gives the body; the body has none afterwards."""
         build()
         made, self.material = self.material, None
         self.body.data.materials.clear()
         return made
 
     def node(self, kind, *inputs, tree=None, **named):
-        """A node "ShaderNode" + `kind`. Inputs by place or by name, _ for spaces; lower-case names are settings."""
+        """Add a node of the type "ShaderNode" + `kind`. Inputs are given by position, or by name with _ for spaces;
+        lower-case names are settings."""
         tree = tree or self.tree
         node = tree.nodes.new("ShaderNode" + kind)
         for key, value in named.items():
@@ -108,30 +109,46 @@ class Stage:
                 put(tree, value, socket)
         return node
 
+    def diffuse(self, color):
+        """Add a Diffuse BSDF."""
+        return self.node("BsdfDiffuse", Color=color)
+
+    def glossy(self, color, roughness):
+        """Add a Glossy BSDF."""
+        return self.node("BsdfGlossy", Color=color, Roughness=roughness)
+
+    def glass(self, ior):
+        """Add a white Glass BSDF."""
+        return self.node("BsdfGlass", Color=(1, 1, 1), IOR=ior)
+
+    def emission(self, color, strength):
+        """Add an Emission shader."""
+        return self.node("Emission", Color=color, Strength=strength)
+
     def surface(self, shader):
-        """Make a shader node the body's surface; the node."""
+        """Make a shader node the body's surface; returns the node."""
         output = next(n for n in self.tree.nodes if n.type == "OUTPUT_MATERIAL")
         self.tree.links.new(shader.outputs[0], output.inputs["Surface"])
         return shader
 
     def output(self, socket, value):
-        """Link a value to another input of the material's output."""
+        """Set another input of the material's output."""
         put(self.tree, value, next(n for n in self.tree.nodes if n.type == "OUTPUT_MATERIAL").inputs[socket])
 
     def principled(self, **inputs):
-        """A Principled surface of these inputs."""
+        """Make a Principled shader with these inputs the surface."""
         return self.surface(self.node("BsdfPrincipled", **inputs))
 
     def mix(self, factor, first, second):
-        """A Mix Shader as the surface."""
+        """Make a Mix Shader the surface."""
         return self.surface(self.node("MixShader", factor, first.outputs[0], second.outputs[0]))
 
     def add(self, first, second):
-        """An Add Shader as the surface."""
+        """Make an Add Shader the surface."""
         return self.surface(self.node("AddShader", first.outputs[0], second.outputs[0]))
 
     def group(self, build, **inputs):
-        """A node group with these colour or number inputs; `build(tree, its inputs)` gives its output."""
+        """Add a node group with these colour or number inputs; `build(tree, inputs)` returns the group's output."""
         inner = bpy.data.node_groups.new("group", "ShaderNodeTree")
         kinds = {
             name: "NodeSocketColor" if isinstance(value, tuple) else "NodeSocketFloat"
@@ -152,7 +169,7 @@ class Stage:
         return node
 
     def image(self, name, pixels, data=False):
-        """A packed image of an array (height, width, 3 or 4) of stored numbers, first row at the bottom."""
+        """A packed image of stored values, an array (height, width, 3 or 4) with the first row at the bottom."""
         height, width, depth = pixels.shape
         whole = numpy.ones((height, width, 4), numpy.float32)
         whole[..., :depth] = pixels
@@ -163,7 +180,7 @@ class Stage:
 
 
 def put(tree, value, socket):
-    """Give a socket a number, a colour, a vector, or a link."""
+    """Set a socket to a number, a colour or a vector, or link it to a node or socket."""
     if isinstance(value, bpy.types.Node):
         value = value.outputs[0]
     if isinstance(value, bpy.types.NodeSocket):

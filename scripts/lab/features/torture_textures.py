@@ -1,4 +1,4 @@
-"""Features of textures: where values vary, by which coordinates, through which nodes."""
+"""Features of textures: varying inputs, coordinates, and nodes between textures and shaders."""
 
 import bpy
 import numpy
@@ -8,13 +8,18 @@ from .torture_stage import feature, put
 
 
 def _checks(stage, data=False, colours=((0.9, 0.2, 0.1), (0.1, 0.3, 0.8)), cells=4, size=512, alpha=None):
-    """An image of squares in two stored colours, of which the second may be transparent."""
+    """An image of squares in two stored colours; the second one may be transparent."""
     rows, columns = numpy.mgrid[0:size, 0:size] * cells // size
     odd = ((rows + columns) % 2)[..., None]
     pixels = numpy.where(odd, colours[1], colours[0])
     if alpha is not None:
         pixels = numpy.concatenate([pixels, numpy.where(odd, alpha, 1.0)], axis=2)
     return stage.image("checks", pixels, data)
+
+
+def _image(stage, *arguments, **options):
+    """A texture node with an image of squares."""
+    return stage.node("TexImage", image=_checks(stage, *arguments, **options))
 
 
 def _noise(stage, **inputs):
@@ -26,19 +31,19 @@ def _coordinates(stage, output):
 
 
 def _by(stage, coordinates):
-    """A checker that lies by these coordinates, on a base colour."""
+    """A checker texture at these coordinates, as the base colour."""
     checker = stage.node("TexChecker", Vector=coordinates, Color1=(0.8, 0.7, 0.1), Color2=(0.1, 0.2, 0.5), Scale=3.0)
     stage.principled(Base_Color=checker.outputs["Color"], Roughness=0.5)
 
 
 @feature
 def image(stage):
-    stage.principled(Base_Color=stage.node("TexImage", image=_checks(stage)))
+    stage.principled(Base_Color=_image(stage))
 
 
 @feature
 def image_coarse(stage):
-    stage.principled(Base_Color=stage.node("TexImage", image=_checks(stage, size=32)))
+    stage.principled(Base_Color=_image(stage, size=32))
 
 
 @feature
@@ -121,45 +126,43 @@ def image_second_uv_map(stage):
 
 @feature
 def image_alpha(stage):
-    node = stage.node("TexImage", image=_checks(stage, alpha=0.0))
+    node = _image(stage, alpha=0.0)
     stage.principled(Base_Color=node.outputs["Color"], Alpha=node.outputs["Alpha"])
 
 
 @feature
 def image_alpha_unused(stage):
-    stage.principled(Base_Color=stage.node("TexImage", image=_checks(stage, alpha=0.2)).outputs["Color"])
+    stage.principled(Base_Color=_image(stage, alpha=0.2).outputs["Color"])
 
 
 @feature
 def image_roughness(stage):
     grey = ((0.1,) * 3, (0.7,) * 3)
-    stage.principled(Base_Color=(0.1, 0.1, 0.1), Roughness=stage.node("TexImage", image=_checks(stage, True, grey)))
+    stage.principled(Base_Color=(0.1, 0.1, 0.1), Roughness=_image(stage, True, grey))
 
 
 @feature
 def image_roughness_srgb(stage):
     grey = ((0.2,) * 3, (0.8,) * 3)
-    stage.principled(Base_Color=(0.1, 0.1, 0.1), Roughness=stage.node("TexImage", image=_checks(stage, False, grey)))
+    stage.principled(Base_Color=(0.1, 0.1, 0.1), Roughness=_image(stage, False, grey))
 
 
 @feature
 def image_packed_channels(stage):
-    packed = stage.node("TexImage", image=_checks(stage, True, ((1, 0.2, 0), (1, 0.6, 1))))
+    packed = _image(stage, True, ((1, 0.2, 0), (1, 0.6, 1)))
     split = stage.node("SeparateColor", packed)
     stage.principled(Base_Color=(0.8, 0.6, 0.3), Roughness=split.outputs[1], Metallic=split.outputs[2])
 
 
 @feature
 def image_metallic_alone(stage):
-    mask = stage.node("TexImage", image=_checks(stage, True, ((0,) * 3, (1,) * 3)))
+    mask = _image(stage, True, ((0,) * 3, (1,) * 3))
     stage.principled(Base_Color=(0.8, 0.6, 0.3), Roughness=0.3, Metallic=mask)
 
 
 @feature
 def image_emission(stage):
-    stage.principled(
-        Base_Color=(0, 0, 0), Emission_Color=stage.node("TexImage", image=_checks(stage)), Emission_Strength=2.5
-    )
+    stage.principled(Base_Color=(0, 0, 0), Emission_Color=_image(stage), Emission_Strength=2.5)
 
 
 @feature
@@ -324,15 +327,13 @@ def vertex_colours(stage):
 
 @feature
 def hue_saturation(stage):
-    node = stage.node(
-        "HueSaturation", Hue=0.7, Saturation=0.8, Value=0.9, Color=stage.node("TexImage", image=_checks(stage))
-    )
+    node = stage.node("HueSaturation", Hue=0.7, Saturation=0.8, Value=0.9, Color=_image(stage))
     stage.principled(Base_Color=node)
 
 
 @feature
 def rgb_curves(stage):
-    node = stage.node("RGBCurve", Color=stage.node("TexImage", image=_checks(stage)))
+    node = stage.node("RGBCurve", Color=_image(stage))
     node.mapping.curves[3].points.new(0.5, 0.8)
     node.mapping.update()
     stage.principled(Base_Color=node)
@@ -356,19 +357,19 @@ def colour_ramp_constant(stage):
 @feature
 def mix_colour(stage):
     node = stage.node("Mix", data_type="RGBA", blend_type="MULTIPLY")
-    for index, value in ((0, 1.0), (6, stage.node("TexImage", image=_checks(stage))), (7, (0.5, 0.9, 0.6))):
+    for index, value in ((0, 1.0), (6, _image(stage)), (7, (0.5, 0.9, 0.6))):
         put(stage.tree, value, node.inputs[index])
     stage.principled(Base_Color=node.outputs[2])
 
 
 @feature
 def brightness_contrast(stage):
-    stage.principled(Base_Color=stage.node("BrightContrast", stage.node("TexImage", image=_checks(stage)), 0.1, 0.2))
+    stage.principled(Base_Color=stage.node("BrightContrast", _image(stage), 0.1, 0.2))
 
 
 @feature
 def invert_gamma(stage):
-    inverted = stage.node("Invert", Color=stage.node("TexImage", image=_checks(stage)))
+    inverted = stage.node("Invert", Color=_image(stage))
     stage.principled(Base_Color=stage.node("Gamma", inverted, 1.8))
 
 
@@ -398,7 +399,7 @@ def bump(stage):
 
 @feature
 def bump_image(stage):
-    heights = stage.node("TexImage", image=_checks(stage, True, ((0,) * 3, (1,) * 3)))
+    heights = _image(stage, True, ((0,) * 3, (1,) * 3))
     stage.principled(
         Base_Color=(0.6, 0.6, 0.6),
         Roughness=0.4,

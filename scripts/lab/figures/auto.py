@@ -1,105 +1,94 @@
-"""`--method auto` against every fixed method at equal time, on all scenes: relMSE over that of the best fixed method, of all pixels and without the worst 0.5 %.
+"""`--method auto` against every fixed method at equal time, on all scenes: relMSE relative to the best fixed method, over
+all pixels and without the worst 0.5 %.
 
-One level, no combiner, no other option; methods that refuse a scene, for they have no photons in media, are left out there. All runs of a scene take turns in one `converge`; auto's pilot is in its time. They are compared at the largest
-number of core-seconds that all have spent. References are made by two halves of one long run, kept in out/auto, and their own squared error is taken off.
+The renders have one level, no finish and no other option. Methods that refuse a scene, because they have no photons in
+media, are left out there. All runs of a scene alternate in one `converge`; the time of auto includes its pilot. Runs are
+compared at the largest number of core-seconds that all have spent. References are the two halves of one long run, kept
+in out/auto, and their own squared error is subtracted.
 """
 
 import json
 import math
 import subprocess
 
-from ..cache import BIN
-from ..options import options as options
-from ..reading import read
+from ..commands import command, read
+from ..options import options
 from ..record import ROOT, record
 
 OUT = ROOT / "out" / "auto"
 ALL = sorted(path.stem for path in (ROOT / "scenes").glob("*.glb"))
 ARGUMENTS = {"scenes": ALL, "seconds": 10.0, "reference_seconds": 120.0, "width": 320, "seeds": 1}
 METHODS = ["auto", "path", "light", "bdpt", "vcm", "bpm", "sppm", "cppm", "appm", "ppm", "pm"]
-# Only guided light paths find the caustic of a ball of ten centimetres: a render of vcm, whose error a second one tells.
+# Scenes whose reference is guided vcm, because only guided light paths find the caustic of a small ball. The difference
+# from a second such render gives its error.
 GUIDED = ["stadium"]
-# What converges soonest: elsewhere a long run of vcm, which finds all light.
-SURELY = {"blocks": "bdpt", "fog": "sppm", "godrays": "sppm", "interior": "bdpt", "torus": "vcm", "slide": "sppm"}
-# Where that takes so many times as long: of the lamp's bulb, seen through its fluted glass, every method has a bright sample in hundreds.
-LONGER = {"lamp": 4}
+# The reference method that converges fastest; elsewhere vcm, which finds all light.
+REFERENCE_METHODS = {
+    "blocks": "bdpt",
+    "fog": "sppm",
+    "godrays": "sppm",
+    "interior": "bdpt",
+    "torus": "vcm",
+    "slide": "sppm",
+}
+# Factors of the reference's time. A bulb seen through fluted glass has one bright sample in hundreds with every method.
+TIME_FACTORS = {"lamp": 4}
 
 
 def guided(scene, reference, view=()):
-    """Makes a reference by guided vcm, if there is none, and another one; returns its error in relMSE. `view`: options of the camera."""
+    """Renders a reference by guided vcm, and a second one, unless they exist; returns the reference's relMSE. `view` has
+    the camera's options."""
     other = reference.with_name(f"{reference.stem}-other.exr")
     for seed, path in enumerate((reference, other), 77):
         if not path.exists():
-            command = [
-                BIN,
+            words = [
                 "render",
                 ROOT / "scenes" / f"{scene}.glb",
                 "-o",
                 path,
-                "--progress",
-                "none",
-                "--layers",
-                "beauty",
-            ]
-            command += [
-                "--method",
-                "vcm",
+                *fixed("vcm").split(),
                 "--guide",
                 "on",
-                "--levels",
-                "1",
-                "--no-combine",
-                "--width",
-                str(options.width),
+                *view,
             ]
-            subprocess.run(
-                command + [*view, "--time", str(options.reference_seconds), "--seed", str(seed)],
-                check=True,
-                stderr=subprocess.DEVNULL,
-            )
+            settings = {"layers": "beauty", "width": options.width, "time": options.reference_seconds, "seed": seed}
+            line = command(*words, **settings, progress="none")
+            subprocess.run(line, check=True, stderr=subprocess.DEVNULL)
     return read("compare", other, reference)["relmse"] / 2
 
 
 def fixed(method):
-    """A method with one image and no combiner."""
+    """The options of a method with one level and no finish."""
     return f"--method {method} --levels 1 --no-combine"
 
 
 def renders(scene, method):
     """Whether a method can render a scene: some have no photons in media."""
-    command = [BIN, "plan", ROOT / "scenes" / f"{scene}.glb", *fixed("sppm" if method == "auto" else method).split()]
-    return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+    line = command("plan", ROOT / "scenes" / f"{scene}.glb", *fixed("sppm" if method == "auto" else method).split())
+    return subprocess.run(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
 
 
 def measure(scene, runs, camera=None, seeds=1):
-    """Runs by name, with options, against a reference; returns what points.json says, and what auto has chosen. `camera`: another than the scene's first."""
+    """Measures runs (options by name) against a reference; returns the value of points.json, and the line with the choice
+    of auto. `camera` is a camera's name, or None for the scene's first."""
     view = ["--camera", camera] if camera else []
     stem = f"{scene}-{camera.lower().replace(' ', '-')}" if camera else scene
     folder = OUT / stem
     OUT.mkdir(parents=True, exist_ok=True)
-    reference_seconds = options.reference_seconds * LONGER.get(scene, 1)
+    reference_seconds = options.reference_seconds * TIME_FACTORS.get(scene, 1)
     reference = OUT / f"{stem}-{options.width}-{reference_seconds:g}s.exr"
-    command = [BIN, "converge", ROOT / "scenes" / f"{scene}.glb", "-o", folder, "--progress", "none"]
-    command += [
-        *view,
-        "--width",
-        str(options.width),
-        "--time",
-        str(options.seconds),
-        "--seed",
-        "1",
-        "--seeds",
-        str(seeds),
-    ]
+    words = ["converge", ROOT / "scenes" / f"{scene}.glb", "-o", folder, *view]
+    line = command(*words, progress="none", width=options.width, time=options.seconds, seed=1, seeds=seeds)
     for name, chosen in runs.items():
-        command += ["--run", f"{name}: {chosen}"]
+        line += ["--run", f"{name}: {chosen}"]
     if scene in GUIDED:
-        command += ["--reference", reference, "--reference-error", str(guided(scene, reference, view))]
+        line += ["--reference", reference, "--reference-error", str(guided(scene, reference, view))]
     elif reference.exists():
-        command += ["--reference", reference]
+        line += ["--reference", reference]
     else:
-        command += ["--reference-method", SURELY.get(scene, "vcm"), "--reference-time", str(reference_seconds)]
-    done = subprocess.run(command, check=True, stderr=subprocess.PIPE, text=True)
+        method = REFERENCE_METHODS.get(scene, "vcm")
+        line += ["--reference-method", method, "--reference-time", str(reference_seconds)]
+    done = subprocess.run(line, check=True, stderr=subprocess.PIPE, text=True)
     chosen = [line for line in done.stderr.splitlines() if 'run "auto"' in line]
     if not reference.exists():
         (folder / "reference.exr").rename(reference)
@@ -107,7 +96,7 @@ def measure(scene, runs, camera=None, seeds=1):
 
 
 def at(points, figure, seconds):
-    """A figure after so many core-seconds: a straight line in the logarithms."""
+    """A figure after a number of core-seconds, interpolated linearly in the logarithms."""
     for before, after in zip(points, points[1:]):
         if before["cpu_seconds"] <= seconds <= after["cpu_seconds"]:
             a, b = (math.log(p["cpu_seconds"]) for p in (before, after))
@@ -146,16 +135,7 @@ def main():
     for figure in figures:
         ratios = [row[figure]["ratio"] for row in rows]
         within, better = sum(ratio <= 1.1 for ratio in ratios), sum(ratio < 1.0 for ratio in ratios)
-        print(
-            f"{figure}: auto within 10 % of the best fixed method on {within} of {len(rows)} scenes, better than all on {better}"
-        )
-    record(
-        "auto",
-        {
-            "seconds": options.seconds,
-            "width": options.width,
-            "reference_seconds": options.reference_seconds,
-            "seeds": options.seeds,
-            "scenes": rows,
-        },
-    )
+        counts = f"on {within} of {len(rows)} scenes, better than all on {better}"
+        print(f"{figure}: auto within 10 % of the best fixed method {counts}")
+    settings = {key: getattr(options, key) for key in ("seconds", "width", "reference_seconds", "seeds")}
+    record("auto", {**settings, "scenes": rows})

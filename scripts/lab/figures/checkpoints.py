@@ -1,7 +1,7 @@
-"""Seconds and bytes of a checkpoint at 1280 x 720, by method, and the share of the time that the usual one every 300 s
-takes: from the report of an iteration to the moment when the new file has its name.
+"""Seconds and bytes of a checkpoint at 1280 x 720, by method, and the share of the time that checkpoints take every 300 s.
 
-The glass torus, one state after every iteration.
+The scene is the glass torus, with a checkpoint after every iteration. The time of a checkpoint runs from the report of
+the iteration to the moment when the new file has its final name.
 """
 
 import json
@@ -10,20 +10,20 @@ import statistics
 import subprocess
 import time
 
-from ..cache import BIN
+from ..commands import command
 from ..options import options
 from ..record import ROOT, record
 
 OUT = ROOT / "out" / "checkpoints"
 SCENE = ROOT / "scenes" / "torus.glb"
 ARGUMENTS = {"methods": ["path", "vcm", "sppm", "cppm"], "saves": 5, "width": 1280}
-# Seconds between two saves unless told otherwise.
+# Seconds between two checkpoints by default.
 EVERY = 300
 STATE = OUT / "state"
 
 
 def inode():
-    """Which file has the name of the state; none: 0."""
+    """The inode of the checkpoint, or 0 if there is none."""
     try:
         return STATE.stat().st_ino
     except FileNotFoundError:
@@ -31,39 +31,19 @@ def inode():
 
 
 def saves(method):
-    """Seconds of each save of a render."""
-    command = [
-        BIN,
-        "render",
-        SCENE,
-        "-o",
-        OUT / "a.exr",
-        "--width",
-        options.width,
-        "--height",
-        options.width * 9 // 16,
-        "--method",
-        method,
-    ]
-    command += [
-        "--iterations",
-        options.saves,
-        "--checkpoint",
-        STATE,
-        "--checkpoint-every",
-        "0.001",
-        "--layers",
-        "beauty",
-    ]
-    command += ["--no-combine", "--progress", "json"]
-    process = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True)
+    """The seconds of each checkpoint of a render."""
+    size = {"width": options.width, "height": options.width * 9 // 16}
+    settings = {"method": method, "iterations": options.saves, "checkpoint": STATE, "checkpoint_every": "0.001"}
+    settings |= {"layers": "beauty", "no_combine": True, "progress": "json"}
+    line = command("render", SCENE, "-o", OUT / "a.exr", **size, **settings)
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
     found, before = [], 0
     for line in process.stderr:
         if not line.startswith("{") or "iteration" not in json.loads(line):
             continue
         start = time.perf_counter()
         while inode() == before:
-            assert process.poll() is None, "the render has ended without a state"
+            assert process.poll() is None, "the render has ended without a checkpoint"
             time.sleep(0.002)
         found.append(time.perf_counter() - start)
         before = inode()

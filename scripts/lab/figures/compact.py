@@ -1,7 +1,7 @@
-"""Makes the shipped network from nothing: data, training, evaluation, export, fixture; three quarters of an hour of one
-core. Each step continues where it stopped.
+"""Trains the shipped network from scratch: data, training, evaluation, export, fixture. It takes three quarters of an hour
+on one core; each step continues where it stopped.
 
-Needs the environment that scripts/lab/train/README.md makes.
+It needs the virtual environment that scripts/lab/train/README.md describes.
 """
 
 import subprocess
@@ -15,13 +15,13 @@ from ..record import ROOT
 VENV = ".venv-train"
 ARGUMENTS = {"threads": 1}
 SEEN = ["cornell", "torus", "pool", "interior", "stadium", "fog"]
-# Two scenes that are never trained on, and two of the others from their own cameras.
+# Two scenes without training data, and two training scenes from their own cameras.
 HELD_OUT = ["gems", "lamp", "cornell", "pool"]
 NETWORK = ROOT / "src" / "combine" / "models" / "compact.onnx"
 
 
 def add_arguments(parser):
-    parser.add_argument("folder", type=Path, help="takes the data and the checkpoints, about 60 MB")
+    parser.add_argument("folder", type=Path, help="folder of the data and the checkpoints, about 60 MB")
 
 
 def step(module, *words):
@@ -30,18 +30,10 @@ def step(module, *words):
 
 
 def data(variants, renders, iterations, reference, scenes):
-    """Renders stacks and references of some scenes."""
+    """Renders stacks and references of scenes."""
     size = ["--width", 128, "--height", 72, "--side", 0, "-o", options.folder / "data"]
-    counts = [
-        "--variants",
-        variants,
-        "--renders",
-        renders,
-        "--iterations",
-        *iterations,
-        "--reference-iterations",
-        reference,
-    ]
+    counts = ["--variants", variants, "--renders", renders]
+    counts += ["--iterations", *iterations, "--reference-iterations", reference]
     files = [ROOT / "scenes" / f"{scene}.glb" for scene in scenes]
     step("data", "--caustique", BIN, "--threads", options.threads, *size, *counts, *files)
 
@@ -55,7 +47,7 @@ def main():
     synthetic, first, last = folder / "synthetic", folder / "pre", folder / "run"
     if not synthetic.is_dir():
         step("synthetic", "-o", synthetic, "--count", 240)
-    # On one core; a loaded one did the steps that src/combine/models/compact.txt describes in these minutes.
+    # These minutes gave the steps that src/combine/models/compact.txt lists, on one core with other work.
     rate = ["--batch", 4, "--rate", 1e-3, *threads]
     step("train", "--data", synthetic, "--out", first, "--side", 48, *rate, "--minutes", 12)
     both = ["--data", folder / "data", synthetic, "--init", first / "last.pt"]

@@ -1,7 +1,7 @@
 """The comparison scenes in caustique and in Mitsuba 3: ratios of means and of tiles.
 
-The last two lines hold what --correct is about: the scene of wide lobes with Mitsuba's own models, and with what they
-lack. Pictures of the differences land in out/compare.
+The last two runs show the effect of --correct: the scene of wide lobes with and without corrections of Mitsuba's models.
+Pictures of the differences are written to out/compare.
 """
 
 import json
@@ -9,6 +9,7 @@ import subprocess
 
 import tiles
 
+from ..commands import command
 from ..options import options
 from ..record import ROOT, record
 
@@ -31,9 +32,10 @@ def main():
     subprocess.run([python, "-m", "lab.compare_scenes", FOLDER], check=True)
     for scene, spp, more in RUNS:
         name = f"{scene}-corrected" if more else scene
-        command = [ROOT / "scripts" / "compare" / "mitsuba.py", FOLDER / f"{scene}.glb", "--width", options.width]
-        command += ["--seeds", options.seeds, "--spp", spp, "--png", FOLDER / f"{name}.png", "--json", *more]
-        done = subprocess.run(list(map(str, command)), check=True, stdout=subprocess.PIPE, text=True)
+        program = ROOT / "scripts" / "compare" / "mitsuba.py"
+        settings = {"width": options.width, "seeds": options.seeds, "spp": spp, "png": FOLDER / f"{name}.png"}
+        line = command(FOLDER / f"{scene}.glb", *more, program=program, **settings, json=True)
+        done = subprocess.run(line, check=True, stdout=subprocess.PIPE, text=True)
         values = json.loads(done.stdout)
         print(tiles.table(values), flush=True)
         record("mitsuba", values)

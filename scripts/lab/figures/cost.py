@@ -1,4 +1,4 @@
-"""What `--method auto` takes an iteration to cost beside what it costs, by scene and candidate."""
+"""The predicted cost of an iteration in `--method auto` beside the measured cost, by scene and candidate."""
 
 from ..bench import measure
 from ..record import ROOT

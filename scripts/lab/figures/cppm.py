@@ -1,5 +1,5 @@
-"""The chi-squared rule on its own: the size of its test by the number of photons, repeated looks at uniform light, and
-what it costs in time and memory."""
+"""The chi-squared rule on its own: the size of its test by number of photons, repeated tests of uniform light, and its
+cost in time and memory."""
 
 from ..bench import measure
 

@@ -1,4 +1,5 @@
-"""Errors of SPPM, APPM and CPPM by the number of neighbours that set the first bandwidth, and of APPM from one first bandwidth everywhere: Figure 11 of [CPPM 2020]. Draws docs/lab/neighbours.svg.
+"""Errors of SPPM, APPM and CPPM by the number of neighbours that set the first bandwidth, and of APPM with one first
+bandwidth for all pixels: figure 11 of [CPPM 2020]. Draws docs/lab/neighbours.svg.
 
 References are kept in out/rules.
 """
@@ -7,7 +8,7 @@ from ..options import options
 from ..rules_bench import bench_options, run
 from ..record import ROOT, record
 
-# Wide bandwidths meet their cap, a twentieth of the picture.
+# The widest bandwidths reach their limit, a twentieth of the picture.
 ARGUMENTS = {
     "scenes": ["pool", "blocks"],
     "iterations": 40,

@@ -1,4 +1,5 @@
-"""Bandwidth and error of photons' light against iterations, at a smooth place and at the edge of a caustic, by SPPM, APPM and CPPM: Figure 9 of [CPPM 2020]. Draws docs/lab/points.svg.
+"""Bandwidth and error of photons' light against iterations, in smooth light and at the edge of a caustic, by SPPM, APPM
+and CPPM: figure 9 of [CPPM 2020]. Draws docs/lab/points.svg.
 
 References are kept in out/rules.
 """
@@ -26,7 +27,6 @@ def main():
     ):
         print(f"{place}; the reference's own error is {100 * noise:.2g} %")
         for method, radius, error in zip(found["methods"], radii, errors):
-            print(
-                f"  {method}: bandwidth {radius[0]:.3g} m at first, {radius[-1]:.3g} m in the end; error {100 * error[-1]:.2g} %"
-            )
+            change = f"bandwidth {radius[0]:.3g} m at first, {radius[-1]:.3g} m in the end"
+            print(f"  {method}: {change}; error {100 * error[-1]:.2g} %")
     record("cppm-points", found)

@@ -1,16 +1,16 @@
-"""Every method on the same scenes for the same time: relMSE against a reference, and what paths cost.
+"""Every method on equal scenes for equal time: relMSE against a reference, and the cost of paths.
 
-The reference of a scene is the mean of two long renders by the method in REFERENCES that finds all its light soonest. Their difference tells the reference's own error, which is
-taken off every figure; a figure that is not well above it is marked. Seconds are wall clock, on all cores, the renderer's own start left out.
+The reference of a scene is the mean of two long renders by the method (REFERENCES) that finds all light soonest. Their
+difference gives the reference's own error, which is subtracted from every figure; figures that are not well above it are
+marked. Seconds are wall-clock seconds on all cores, without the start of the renderer.
 """
 
-import json
 import subprocess
 
 import numpy as np
 import OpenEXR
 
-from ..cache import BIN
+from ..commands import command, read
 from ..options import options
 from ..record import ROOT, record
 
@@ -23,10 +23,10 @@ ARGUMENTS = {
 }
 OUT = ROOT / "out" / "equal_time"
 
-#: By scene; the others' are by vertex connection and merging.
+#: Options of the reference by scene; others use vertex connection and merging.
 REFERENCES = {"interior": ["--method", "bdpt"]}
 
-#: Name, options, and the layer to judge ("" is the combined picture).
+#: Name, options, and the layer to compare ("" is the finished picture).
 METHODS = [
     ("path", ["--method", "path"], "Noisy"),
     ("light", ["--method", "light"], "Noisy"),
@@ -42,26 +42,14 @@ METHODS = [
 
 
 def render(scene, out, seconds, seed, words):
-    """Renders for a time and returns what `info` says."""
-    command = [
-        BIN,
-        "render",
-        scene,
-        "-o",
-        out,
-        "--width",
-        str(options.width),
-        "--time",
-        str(seconds),
-        "--seed",
-        str(seed),
-    ]
-    subprocess.run([*map(str, command), *words, "--progress", "plain"], check=True, stderr=subprocess.DEVNULL)
-    return json.loads(subprocess.run([BIN, "info", out, "--json"], check=True, capture_output=True).stdout)
+    """Renders for a time; returns the header."""
+    settings = {"width": options.width, "time": seconds, "seed": seed, "progress": "plain"}
+    subprocess.run(command("render", scene, "-o", out, *words, **settings), check=True, stderr=subprocess.DEVNULL)
+    return read("info", out)
 
 
 def picture(path, layer):
-    """A layer's colours as float64, (height, width, 3)."""
+    """The colours of a layer as float64 of shape (height, width, 3)."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
         channels = file.channels()
         names = [f"{layer}.{c}" if layer else c for c in "RGB"]
@@ -69,14 +57,14 @@ def picture(path, layer):
 
 
 def relmse(image, reference):
-    """As `caustique compare`: mean of squared difference over squared reference plus 0.01; and without the worst 0.5 % of pixels."""
+    """relMSE as `caustique compare` computes it, over all pixels and without the worst 0.5 %."""
     pixels = ((image - reference) ** 2 / (reference**2 + 0.01)).mean(axis=-1).ravel()
     keep = np.sort(pixels)[: len(pixels) - int(0.005 * len(pixels))]
     return np.array([pixels.mean(), keep.mean()])
 
 
 def add_arguments(parser):
-    parser.add_argument("--keep", action="store_true", help="take references that are there already")
+    parser.add_argument("--keep", action="store_true", help="use existing references")
 
 
 def main():
@@ -91,14 +79,12 @@ def main():
                 render(file, half, options.reference_seconds, seed, [*words, "--no-combine"])
             halves.append(picture(half, "Noisy"))
         reference = (halves[0] + halves[1]) / 2
-        # Of the mean: half the variance of one half, which is half of that of the difference.
+        # The variance of the mean is a quarter of the squared difference of the halves.
         own = relmse(halves[0], halves[1]) / 4
-        print(
-            f"{scene}, {reference.shape[1]} x {reference.shape[0]}, {options.seconds:g} s each; the reference's own relMSE is {own[0]:.2g}"
-        )
-        print(
-            f"{'':<18}{'iterations':>11}{'relMSE':>11}{'trimmed':>11}{'core-s per million light paths':>33}{'eye paths':>11}"
-        )
+        size = f"{reference.shape[1]} x {reference.shape[0]}"
+        print(f"{scene}, {size}, {options.seconds:g} s each; the reference's own relMSE is {own[0]:.2g}")
+        costs = f"{'core-s per million light paths':>33}{'camera paths':>14}"
+        print(f"{'':<18}{'iterations':>11}{'relMSE':>11}{'trimmed':>11}{costs}")
         rows = []
         for name, words, layer in METHODS:
             errors, infos = [], []
@@ -111,12 +97,12 @@ def main():
             error = np.mean(errors, axis=0) - own
             last = infos[-1]["history"][-1]
             pairs = 2 if infos[-1]["arguments"]["levels"] != 1 and name.split(",")[0] in ("sppm", "vcm") else 1
-            eye_paths = reference.shape[0] * reference.shape[1] * last["iterations"] * pairs
-            costs = [last["cpu_seconds"] / n * 1e6 if n else None for n in (last["light_paths"], eye_paths)]
+            camera_paths = reference.shape[0] * reference.shape[1] * last["iterations"] * pairs
+            costs = [last["cpu_seconds"] / n * 1e6 if n else None for n in (last["light_paths"], camera_paths)]
             marks = ["" if e > 3 * o else "*" for e, o in zip(error, own)]
             shown = "".join(f"{f'{e:.3g}{mark}':>11}" for e, mark in zip(error, marks))
-            light, eye = ("-" if c is None else f"{c:.2f}" for c in costs)
-            print(f"{name:<18}{last['iterations']:>11}{shown}{light:>33}{eye:>11}", flush=True)
+            light, camera = ("-" if c is None else f"{c:.2f}" for c in costs)
+            print(f"{name:<18}{last['iterations']:>11}{shown}{light:>33}{camera:>14}", flush=True)
             rows.append(
                 {
                     "method": name,
@@ -128,13 +114,5 @@ def main():
                 }
             )
         print("* not well above the reference's own error\n")
-        record(
-            "equal-time",
-            {
-                "scene": scene,
-                "seconds": options.seconds,
-                "width": options.width,
-                "reference_relmse": own[0],
-                "methods": rows,
-            },
-        )
+        settings = {"scene": scene, "seconds": options.seconds, "width": options.width}
+        record("equal-time", {**settings, "reference_relmse": own[0], "methods": rows})

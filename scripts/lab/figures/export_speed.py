@@ -1,5 +1,5 @@
-"""What scripts/blender/export.py takes for a scene of 1,000 balls of 1,280 triangles in ten materials, half of them glass:
-balls that share ten meshes, and balls with a mesh each. The least of --rounds, seconds and core-seconds.
+"""Seconds and core-seconds of scripts/blender/export.py for 1,000 balls of 1,280 triangles in ten materials, half of them
+glass: balls that share ten meshes, and balls with one mesh each. The fastest of --rounds counts.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ OBJECTS, KINDS, SIDE = 1000, 10, 10
 
 
 def material(index):
-    """A Principled material of its own colour, glass if the index is odd."""
+    """A Principled material whose colour depends on the index, and which is glass if the index is odd."""
     made = bpy.data.materials.new(f"kind {index}")
     if bpy.app.version < (5, 0, 0):
         made.use_nodes = True
@@ -33,8 +33,8 @@ def material(index):
     return made
 
 
-def ball(worn):
-    """A mesh of 1,280 triangles."""
+def ball(material):
+    """A ball's mesh of 1,280 triangles."""
     form = bmesh.new()
     form.loops.layers.uv.new("UVMap")
     bmesh.ops.create_icosphere(form, subdivisions=4, radius=0.4, calc_uvs=True)
@@ -42,12 +42,12 @@ def ball(worn):
     form.to_mesh(mesh)
     form.free()
     mesh.shade_smooth()
-    mesh.materials.append(worn)
+    mesh.materials.append(material)
     return mesh
 
 
 def build(meshes):
-    """A cube of balls that share so many meshes, a camera and a sun; the number of triangles."""
+    """Builds a cube of balls that share `meshes` meshes, a camera and a sun; returns the number of triangles."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
 

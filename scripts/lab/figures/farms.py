@@ -1,8 +1,8 @@
-"""Farms whose shards are killed in the middle: the channels of the picture against those of one render, by engine.
+"""Farms whose shards are killed during the render: compares the channels of the picture with those of one render.
 
-Slurm: two nodes on this machine; the render of one shard is killed, and the job of another one queued again. Open Job
-Description: the render of a shard is killed, and the same command given again. Ray: the worker of a shard is killed.
-Each shard that was killed goes on from its checkpoint.
+Slurm: two nodes on this machine; the render of one shard is killed, and the job of another one is requeued. Open Job
+Description: the render of a shard is killed, and the command repeated. Ray: the worker of a shard is killed. Each killed
+shard continues from its checkpoint.
 """
 
 import contextlib
@@ -24,34 +24,34 @@ FARM = ROOT / "scripts" / "farm"
 SCENE = ROOT / "scenes" / "torus.glb"
 ARGUMENTS = {"engines": ["slurm", "openjd", "ray"], "shards": 4, "width": 48, "iterations": 2400}
 PYTHON = ROOT / ".venv-farm" / "bin" / "python"
-LONGEST = 400
+TIMEOUT = 400  # seconds
 
 
 def render_options():
-    """The options of all renders."""
+    """The options that all renders share."""
     size = ["--width", str(options.width), "--iterations", str(options.iterations)]
     return [*size, "--method", "vcm", "--checkpoint-every", "0.2"]
 
 
 def channels(path):
-    """Name to bytes."""
+    """The bytes of each channel of an EXR file, by name."""
     found = OpenEXR.File(str(path), separate_channels=True).channels()
     return {name: channel.pixels.tobytes() for name, channel in found.items()}
 
 
-def until(what, seconds=LONGEST):
-    """Waits until a function gives something, and gives that."""
+def wait_for(function, seconds=TIMEOUT):
+    """Calls a function until its result is true; returns the result."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        found = what()
+        found = function()
         if found:
             return found
         time.sleep(0.05)
-    raise TimeoutError(f"{what.__name__}: nothing after {seconds:g} s")
+    raise TimeoutError(f"{function.__name__}: nothing after {seconds:g} s")
 
 
 def render_of(output, shard):
-    """The process that renders a shard and has saved its state, or 0."""
+    """The process that renders a shard and has saved a checkpoint, or 0."""
     part = output.with_suffix(".shards") / f"part-{shard}.exr"
     if not Path(f"{part}.checkpoint").exists():
         return 0
@@ -69,21 +69,21 @@ def parent(process):
 
 
 def kill_render(output, shard):
-    """Kills the render of a shard as soon as it has saved its state."""
-    os.kill(until(lambda: render_of(output, shard)), signal.SIGKILL)
+    """Kills the render of a shard as soon as it has saved a checkpoint."""
+    os.kill(wait_for(lambda: render_of(output, shard)), signal.SIGKILL)
 
 
-def goes_on(log, shard):
-    """Waits until a log says that a shard goes on from where it was."""
-    said = f"shard {shard}/{options.shards} goes on from"
-    until(lambda: log.exists() and said in log.read_text(encoding="utf-8"))
+def wait_for_resume(log, shard):
+    """Waits until a log reports that a shard continues from its checkpoint."""
+    message = f"shard {shard}/{options.shards} goes on from"
+    wait_for(lambda: log.exists() and message in log.read_text(encoding="utf-8"))
 
 
 def slurm(output):
-    """The render of one shard is killed, and the job of another one queued again while it runs."""
+    """Renders by Slurm: the render of one shard is killed, and the running job of another one is requeued."""
     environment = {**os.environ, "SLURM_CONF": str(ROOT / "out" / "slurm" / "slurm.conf")}
 
-    def ask(*words):
+    def query(*words):
         done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment)
         return done.stdout.split()
 
@@ -93,23 +93,23 @@ def slurm(output):
         run = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
         array = re.search(r"shards (\d+)", run.stdout.readline())[1]
         kill_render(output, 0)
-        until(lambda: render_of(output, 1))
-        ask("scontrol", "requeue", f"{array}_1")
+        wait_for(lambda: render_of(output, 1))
+        query("scontrol", "requeue", f"{array}_1")
 
         for shard in (0, 1):
             job = f"{array}_{shard}"
-            # Slurm lets two minutes pass before a job that was queued again.
-            until(lambda: job in ask("squeue", "-h", "-r", "-t", "PD", "-o", "%i"))
-            ask("scontrol", "update", f"JobId={job}", "StartTime=now")
-            goes_on(output.with_suffix(".shards") / f"{shard}.log", shard)
+            # Slurm would wait two minutes before it starts a requeued job.
+            wait_for(lambda: job in query("squeue", "-h", "-r", "-t", "PD", "-o", "%i"))
+            query("scontrol", "update", f"JobId={job}", "StartTime=now")
+            wait_for_resume(output.with_suffix(".shards") / f"{shard}.log", shard)
         assert run.wait() == 0, "slurm.sh --wait failed"
     finally:
         subprocess.run([FARM / "slurm_here.sh", "stop"], check=True)
-    return {"engine": "Slurm " + ask("sinfo", "-V")[1], "killed": "a render, and a job queued again"}
+    return {"engine": "Slurm " + query("sinfo", "-V")[1], "killed": "a render, and a job queued again"}
 
 
 def openjd(output):
-    """A kill ends the run; the same command goes on."""
+    """Renders by Open Job Description: a kill ends the run, and the repeated command continues it."""
     program = PYTHON.with_name("openjd")
     parameters = [
         f"Scene={SCENE}",
@@ -121,41 +121,31 @@ def openjd(output):
     with (OUT / "openjd.log").open("w", encoding="utf-8") as log:
         run = subprocess.Popen(command, stdout=log, stderr=log)
         kill_render(output, 1)
-        assert run.wait() != 0, "a task was killed, and its job ended well"
+        assert run.wait() != 0, "a task was killed, but its job reports success"
         subprocess.run(command, check=True, stdout=log, stderr=log)
-    goes_on(OUT / "openjd.log", 1)
+    wait_for_resume(OUT / "openjd.log", 1)
     return {"engine": f"Open Job Description, openjd-cli {version('openjd-cli')}", "killed": "a render"}
 
 
 def ray(output):
-    """A worker is killed, and its render dies with it."""
-    command = [
-        PYTHON,
-        FARM / "ray_render.py",
-        SCENE,
-        "-o",
-        output,
-        "--shards",
-        str(options.shards),
-        "--partial",
-        "0.5",
-        *render_options(),
-    ]
+    """Renders by Ray: a worker is killed, and its render with it."""
+    command = [PYTHON, FARM / "ray_render.py", SCENE, "-o", output, "--shards", str(options.shards)]
+    command += ["--partial", "0.5", *render_options()]
     with (OUT / "ray.log").open("w", encoding="utf-8") as log:
         run = subprocess.Popen(command, stdout=log, stderr=log)
-        render = until(lambda: render_of(output, 0))
+        render = wait_for(lambda: render_of(output, 0))
         os.kill(parent(parent(render)), signal.SIGKILL)
-        until(lambda: not Path(f"/proc/{render}").exists(), 10)
-        goes_on(output.with_suffix(".shards") / "0.log", 0)
-        until(lambda: output.with_suffix(".partial.exr").exists() or run.poll() is not None)
+        wait_for(lambda: not Path(f"/proc/{render}").exists(), 10)
+        wait_for_resume(output.with_suffix(".shards") / "0.log", 0)
+        wait_for(lambda: output.with_suffix(".partial.exr").exists() or run.poll() is not None)
         partial = output.with_suffix(".partial.exr").exists()
         assert run.wait() == 0, (OUT / "ray.log").read_text(encoding="utf-8")
-    assert partial, "no picture came before the last"
+    assert partial, "there was no preview before the final picture"
     return {"engine": f"Ray {version('ray')}", "killed": "a worker"}
 
 
 def version(package):
-    """The version of a package of .venv-farm."""
+    """The version of a package in .venv-farm."""
     words = [PYTHON, "-c", f"import importlib.metadata as m; print(m.version('{package}'))"]
     return subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout.strip()
 
@@ -188,5 +178,5 @@ def main():
             }
         )
         print(rows[-1], flush=True)
-        assert same == len(one), f"{engine}: other bytes"
+        assert same == len(one), f"{engine}: the bytes differ"
     record("farms", {"width": options.width, "iterations": options.iterations, "rows": rows})

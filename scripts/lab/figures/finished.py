@@ -1,15 +1,15 @@
-"""The finished picture at equal time: our methods as delivered, what they were finished from, Intel OIDN alone on that,
-and public renderers with OIDN.
+"""Finished pictures at equal time: our methods, their estimates, Intel OIDN alone on these estimates, and other renderers
+with OIDN.
 
-Every picture is measured against two independent halves of a reference, so that the reference's own noise drops out:
-relMSE of all pixels and without the worst 0.5 %, HDR-FLIP (which keeps the noise of the reference), and grain (see
-`caustique compare`) of all pixels and without the worst 0.5 %. All that takes long is kept: a run that was cut off
-goes on.
+Every picture is compared with two independent halves of a reference, so that the reference's own noise cancels: relMSE
+of all pixels and without the worst 0.5 %, HDR-FLIP (which includes the noise of the reference), and grain (see
+`caustique compare`) of all pixels and without the worst 0.5 %. Renders are cached, so an interrupted run continues.
 
-CAUSTIQUE_BIN names the program, CAUSTIQUE_CACHE where all is kept (caustique/finished in the cache of the user).
+CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache (by default caustique/finished in the user's cache).
 
-scripts/compare/setup.sh peers installs the peers, and OIDN; their drivers are scripts/compare/peers. Peers always have
-the budget in core-seconds (seconds times threads), ours on the wall clock at most as many: rows say what was spent.
+scripts/compare/setup.sh peers installs the other renderers and OIDN; their drivers are in scripts/compare/peers. Other
+renderers always have the budget in core-seconds (seconds times threads); with --clock wall, our renders have at most
+that. Rows give the core-seconds used.
 """
 
 import sys
@@ -31,19 +31,19 @@ ARGUMENTS = references.ARGUMENTS | {
     "peers": peer_runs.DEFAULT,
 }
 SHORT = {"width": 240, "budgets": [10.0], "methods": ["auto", "path", "bdpt", "sppm", "vcm"], "reference_seconds": 60.0}
-# A render on the wall clock that got a smaller share of its cores than this is told apart.
-LITTLE = 0.8
+# Renders with --clock wall that used a smaller share of their cores get a note.
+MIN_CORE_SHARE = 0.8
 KINDS = {"second": "second", "twin": "twins"}
 COLUMNS = f"{'':<36}{'core-s':>8}{'relMSE':>11}{'trimmed':>11}{'FLIP':>9}{'grain':>11}{'trimmed':>11}{'mean':>8}"
 
 
 def denoisers():
-    """What --denoise is given; nothing for the default."""
+    """The values of --denoise, with an empty text for the default."""
     return ["" if name == "default" else name for name in options.denoise]
 
 
 def mean(runs):
-    """The figures of some seeds' pictures, averaged."""
+    """The errors by picture, averaged over the seeds."""
     names = set.intersection(*(set(run) for run in runs))
     average = {}
     for name in sorted(names):
@@ -53,14 +53,14 @@ def mean(runs):
 
 
 def line(label, spent, figures, note=""):
-    """A row of the table."""
+    """Prints a row of the table."""
     values = "".join(f"{figures[key]:>9.4f}" if key == "flip" else f"{figures[key]:>11.3g}" for key in FIGURES)
     values += f"{figures.get('mean_ratio', 1):>8.3f}"
     print(f"    {label:<32}{spent:>8.1f}{values}{'  ' + note if note else ''}", flush=True)
 
 
 def seeds(make, figures):
-    """Renders every seed; returns the averaged figures by picture, the mean core-seconds, and what was approximated."""
+    """Renders with every seed; returns the mean errors by picture, the mean core-seconds, and the approximations."""
     runs, spent = [], []
     for seed in range(1, options.seeds + 1):
         folder = make(seed)
@@ -70,7 +70,7 @@ def seeds(make, figures):
 
 
 def ours(scene, budget, reference, halves, cell):
-    """Our renders of a scene at a budget."""
+    """Measures our renders of a scene at a budget, and adds them to a cell."""
     for denoise in denoisers():
         for method in options.methods:
             name = f"{method} {denoise}".strip()
@@ -84,7 +84,7 @@ def ours(scene, budget, reference, halves, cell):
                 print(f"    {name:<32}{failed}", flush=True)
                 continue
             cell["ours"][name], cell["core_seconds"][name] = pictures, spent
-            if spent < LITTLE * budget * options.threads:
+            if spent < MIN_CORE_SHARE * budget * options.threads:
                 cell["notes"][name] = f"spent {spent:.1f} of {budget * options.threads:g} core-seconds: try --clock cpu"
             line(name, spent, pictures["delivered"], cell["notes"].get(name, ""))
             line("  its input", spent, pictures["noisy"])
@@ -95,7 +95,7 @@ def ours(scene, budget, reference, halves, cell):
 
 
 def others(peers, names, budget, reference, halves, cell):
-    """The peers' renders of a scene at a budget."""
+    """Measures the peers' renders of a scene at a budget, and adds them to a cell."""
     for name in names:
         try:
             pictures, spent, approximated = seeds(
@@ -106,7 +106,7 @@ def others(peers, names, budget, reference, halves, cell):
             cell["notes"][name] = str(failed)
             print(f"    {name:<32}{failed}", flush=True)
             continue
-        note = peer_runs.stranger(pictures["noisy"])
+        note = peer_runs.mean_mismatch(pictures["noisy"])
         if note:
             cell["notes"][name] = note
         else:
@@ -120,7 +120,7 @@ def others(peers, names, budget, reference, halves, cell):
 
 
 def short(cell):
-    """A cell for the record: the figures of a picture, to four digits."""
+    """A cell for the record, with the errors to four digits."""
 
     def pictures(some):
         return {
@@ -133,14 +133,14 @@ def short(cell):
 
 
 def measure(scene, names):
-    """All of a scene: a cell for each budget, and what its reference is."""
+    """Measures a scene; returns a cell for each budget, and the facts of its reference."""
     halves, made = references.reference(scene)
     reference = Reference.read(halves)
     known = {"error": reference.error, **{key: made[key] for key in ("options", "core_seconds", "program")}}
     peers = peer_runs.Peers(scene, reference.mean.shape[0]) if names else None
     cells = []
     for budget in options.budgets:
-        # Errors below a fiftieth of the reference's own are taken for that.
+        # Errors below a fiftieth of the reference's own count as this.
         cell = {"scene": references.name(scene), "budget": budget, "floor": max(reference.error / 50, 1e-9)}
         cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes")})
         own = f"reference by {made['options'][1]}, its own relMSE {reference.error:.2g}"
@@ -153,7 +153,7 @@ def measure(scene, names):
 
 
 def count(cells):
-    """The goals of each set and budget, printed and returned."""
+    """Prints and returns the goals of each set and budget."""
     counts = {}
     delivered = f"{'auto' if 'auto' in options.methods else options.methods[0]} {denoisers()[0]}".strip()
     for kind in ("first", "second", "twins"):
@@ -173,14 +173,11 @@ def count(cells):
 
 def main():
     scenes = references.scenes()
-    names, reason = peer_runs.chosen()
+    names, reason = peer_runs.select()
     if reason:
         print(reason, file=sys.stderr)
     if not renders.PYTHON:
-        print(
-            "OIDN alone is left out: there is no .venv-peers; make it by scripts/compare/setup.sh peers",
-            file=sys.stderr,
-        )
+        print(f"OIDN alone is left out: there is no .venv-peers; {peer_runs.INSTALL}", file=sys.stderr)
     if not scenes:
         print(f"--set {options.set} has no scenes yet", file=sys.stderr)
         return
@@ -191,14 +188,8 @@ def main():
             cells += found
         except Failed as failed:
             print(f"\n{references.name(scene)}: no reference: {failed}", flush=True)
-    said = {
-        "program": program(),
-        "width": options.width,
-        "threads": options.threads,
-        "clock": options.clock,
-        "seeds": options.seeds,
-    }
-    said["set"] = ",".join(options.scenes or []) or options.set
-    said.update({"options": options.render_options, "figures": FIGURES, "counts": count(cells), "references": known})
-    save(CACHE / "last.json", {**said, "cells": cells})
-    record("finished", {**said, "cells": [short(cell) for cell in cells]})
+    settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "clock", "seeds")}}
+    settings |= {"set": ",".join(options.scenes or []) or options.set, "options": options.render_options}
+    values = {**settings, "figures": FIGURES, "counts": count(cells), "references": known}
+    save(CACHE / "last.json", {**values, "cells": cells})
+    record("finished", {**values, "cells": [short(cell) for cell in cells]})

@@ -1,19 +1,21 @@
-"""Guided light paths against unguided ones at equal time: relMSE of sppm whose photons bring caustics alone, of sppm and cppm whose photons bring all light, and of vcm, with and without, of all pixels and without the worst 0.5 %.
-On scenes whose caustics only guided light paths find, that of the layer Caustic too, by renders of their own: what guiding is for, without the noise of all other light.
+"""Guided light paths against unguided ones at equal time, by relMSE of all pixels and without the worst 0.5 %: sppm whose
+photons bring only caustics, sppm and cppm whose photons bring all light, and vcm.
 
-Arguments and references are those of auto.py; --methods chooses among the pairs. Each scene is stored on its own, with the pairs as its set.
+On scenes whose caustics only guided light paths find, separate renders also measure the layer Caustic, without the noise
+of other light. Arguments and references are those of auto.py; --methods selects among the pairs. Each scene is stored as
+a figure, with the pairs as its set.
 """
 
 import subprocess
 
 from . import auto
+from ..commands import command, read
 from ..options import options as given
-from ..reading import read
 from ..record import record
 
-# Photons of caustics alone do not do for media that scatter.
+# Scenes with scattering media, which photons of caustics alone do not support.
 SCATTERING = ["fog", "godrays"]
-# Other cameras to look through, where what only guided light paths find fills the picture.
+# More cameras, whose pictures show mostly light that only guided light paths find.
 CLOSE = {"stadium": ["Close up"]}
 PLAIN = {
     "sppm": auto.fixed("sppm") + " --indirect paths",
@@ -21,24 +23,25 @@ PLAIN = {
     "cppm": auto.fixed("cppm"),
     "vcm": auto.fixed("vcm"),
 }
-HOW = {"": "", " guided": " --guide on"}
+GUIDES = {"": "", " guided": " --guide on"}
 ARGUMENTS = auto.ARGUMENTS | {"methods": list(PLAIN)}
 
 
 def runs_of(plain):
-    """Runs by name, with their options: each of some methods without a guide and with one."""
-    return {name + how: PLAIN[name] + option for name in plain for how, option in HOW.items()}
+    """The options of runs by name: each of the given methods without and with a guide."""
+    return {name + suffix: PLAIN[name] + option for name in plain for suffix, option in GUIDES.items()}
 
 
 def caustics(scene):
-    """relMSE of the layer Caustic by run after --seconds, and half that of two references against each other; "all paths": as many light paths with a guide as without."""
+    """relMSE of the layer Caustic by run after --seconds, and the reference's own, from two references. The run "all paths"
+    has an unguided run's number of light paths, but guided."""
 
     def render(name, options, seconds, seed):
         path = auto.OUT / f"{scene}-{given.width}-{name.replace(' ', '-')}-{seconds:g}s-{seed}.exr"
         if not path.exists():
-            command = [auto.BIN, "render", auto.ROOT / "scenes" / f"{scene}.glb", "-o", path, "--progress", "none"]
-            command += [*options.split(), "--width", str(given.width), "--time", str(seconds), "--seed", str(seed)]
-            subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+            words = ["render", auto.ROOT / "scenes" / f"{scene}.glb", "-o", path, *options.split()]
+            line = command(*words, width=given.width, time=seconds, seed=seed, progress="none")
+            subprocess.run(line, check=True, stderr=subprocess.DEVNULL)
         return path
 
     def error(of, to):
@@ -58,10 +61,10 @@ def caustics(scene):
     return {"errors": found, "reference": own}
 
 
-def cells(figures, columns, how):
-    """A cell for every column, a dash where there is no figure."""
-    width = how[: how.index(".")]
-    return "".join(f"{figures[name]:{how}}" if name in figures else f"{'-':{width}}" for name in columns)
+def cells(figures, columns, form):
+    """A cell for every column, with a number in the format `form`, or a dash where there is no figure."""
+    width = form[: form.index(".")]
+    return "".join(f"{figures[name]:{form}}" if name in figures else f"{'-':{width}}" for name in columns)
 
 
 def main():
@@ -101,10 +104,5 @@ def main():
             line = f"{name:<18}{'layer Caustic':<16}" + cells(mean, columns, ">13.2g") + cells(gains, pairs, ">12.2f")
             rest = "".join(f"  {name} {error:.2g}" for name, error in mean.items() if name not in columns)
             print(line + f"  reference {row['caustics']['reference']:.2g}{rest}", flush=True)
-        said = {
-            "set": ",".join(pairs),
-            "seconds": given.seconds,
-            "width": given.width,
-            "reference_seconds": given.reference_seconds,
-        }
-        record("guide", {**said, **row})
+        settings = {key: getattr(given, key) for key in ("seconds", "width", "reference_seconds")}
+        record("guide", {"set": ",".join(pairs), **settings, **row})

@@ -1,5 +1,5 @@
-"""Core-seconds of one iteration with five levels on the interior scene, by phase, and what levels and the second camera
-path add."""
+"""Core-seconds of an iteration with five levels on the interior scene, by phase, and the cost of levels and of the second
+camera path."""
 
 from ..bench import measure
 from ..options import options

@@ -1,11 +1,8 @@
-"""What each knob of a render costs and gives: error and core-seconds at the same number of iterations, three scenes.
+"""The cost and benefit of render options: error and core-seconds at equal numbers of iterations, on three scenes.
 
-The scenes: caustics of glass, water in the sun, a room without any.
-
-Errors are those that renders tell (see accuracy.py), measured against the reference: of the estimate without its finish
-and of the finished picture, geometric means over the scenes, over those of the row that the others of its group vary.
-`gain` is what an equal time would make of that: squared error times core-seconds, over the same of that row; below one is
-better.
+The scenes are caustics of glass, water in the sun, and a room without caustics. Errors are defined as in accuracy.py and
+measured against a reference, for the estimate and for the finished picture, as geometric means over the scenes. `gain`
+compares at equal time: squared error times core-seconds, relative to the first row of the group; below 1 is better.
 """
 
 import os
@@ -15,9 +12,9 @@ import sys
 from .. import accuracy
 from .. import references
 from ..accuracy import geometric, short
-from ..cache import BIN, CACHE, Failed, load, making, program, save, scene_key
+from ..cache import CACHE, Failed, create, load, program, save, scene_key
+from ..commands import command, read
 from ..options import options as given
-from ..reading import read
 from ..picture_errors import Layers
 from ..record import record
 
@@ -25,7 +22,7 @@ ARGUMENTS = references.ARGUMENTS | {"scenes": ["torus", "pool", "second/still"],
 PLACE = CACHE / "knobs" / program()
 SPPM, VCM = ["--method", "sppm"], ["--method", "vcm"]
 ONE = [*SPPM, "--levels", "1"]
-# Groups: options that all have, and rows, the first of which the others are measured by.
+# By group: the options that all rows share, and the options of each row. The first row is the baseline of the others.
 GROUPS = {
     "levels of sppm": (SPPM, {"5 levels": [], **{f"{n} levels": ["--levels", str(n)] for n in (1, 2, 3, 4)}}),
     "photons of sppm": (
@@ -47,39 +44,27 @@ GROUPS = {
 
 
 def render(scene, options):
-    """Renders unless that is done; returns the folder."""
+    """Renders, unless the cache has the render; returns the folder."""
     name = "_".join(options).replace("/", "-")
     folder = PLACE / scene_key(scene) / f"{name}-{given.iterations}-{given.threads}-{given.width}"
     if not (folder / "run.json").exists():
-        with making(folder) as draft:
+        with create(folder) as draft:
             file = draft / "picture.exr"
-            layers = [] if "--layers" in options else ["--layers", "beauty,Noisy"]
-            command = [
-                BIN,
-                "render",
-                scene,
-                "-o",
-                file,
-                "--iterations",
-                given.iterations,
-                "--width",
-                given.width,
-                "--seed",
-                1,
-            ]
-            command += ["--threads", given.threads, "--progress", "none", *layers, *options]
+            settings = {"iterations": given.iterations, "width": given.width, "seed": 1, "threads": given.threads}
+            settings |= {"layers": None if "--layers" in options else "beauty,Noisy", "progress": "none"}
+            line = command("render", scene, "-o", file, *options, **settings)
             before = os.times()
-            done = subprocess.run(list(map(str, command)), stderr=subprocess.PIPE, text=True)
+            done = subprocess.run(line, stderr=subprocess.PIPE, text=True)
             after = os.times()
             if done.returncode:
                 raise Failed(done.stderr.strip().splitlines()[-1])
             spent = after.children_user + after.children_system - before.children_user - before.children_system
-            save(draft / "run.json", {"core_seconds": spent, "bytes": file.stat().st_size, **read("info", str(file))})
+            save(draft / "run.json", {"core_seconds": spent, "bytes": file.stat().st_size, **read("info", file)})
     return folder
 
 
-def measured(scene, options, truth):
-    """Core-seconds, errors of the estimate and of the finished picture, bytes."""
+def measure(scene, options, truth):
+    """The core-seconds, the errors of the estimate and of the finished picture, and the bytes of a render."""
     folder = render(scene, options)
     run, layers = load(folder / "run.json"), Layers(folder / "picture.exr")
     noisy = layers.get("Noisy")
@@ -96,7 +81,7 @@ def main():
         first = None
         for label, options in knobs.items():
             try:
-                found = [measured(scene, [*common, *options], truth) for scene, truth in truths.items()]
+                found = [measure(scene, [*common, *options], truth) for scene, truth in truths.items()]
             except Failed as failed:
                 print(f"  {label}: {failed}", file=sys.stderr)
                 continue
@@ -111,8 +96,5 @@ def main():
             )
             figures = [spent, estimate, picture, *gains, size / 1e6]
             rows.append([group, label, " ".join([*common, *options]), *map(short, figures)])
-    names = [references.name(scene) for scene in truths]
-    record(
-        "knobs",
-        {"program": program(), "width": given.width, "iterations": given.iterations, "scenes": names, "rows": rows},
-    )
+    settings = {"program": program(), "width": given.width, "iterations": given.iterations}
+    record("knobs", {**settings, "scenes": [references.name(scene) for scene in truths], "rows": rows})

@@ -1,10 +1,10 @@
-"""Makes the references that are missing: two independent halves a scene (references.py)."""
+"""Renders missing references: two independent halves per scene (references.py)."""
 
 import math
 
 from .. import references
 from ..cache import Failed
-from ..reading import read
+from ..commands import read
 
 ARGUMENTS = references.ARGUMENTS
 
@@ -13,7 +13,7 @@ def main():
     for scene in references.scenes():
         try:
             where, known = references.reference(scene)
-            error = read("compare", str(where / "half1.exr"), str(where / "half2.exr"))
+            error = read("compare", where / "half1.exr", where / "half2.exr")
         except Failed as failed:
             print(f"{references.name(scene):<20} {failed}", flush=True)
             continue

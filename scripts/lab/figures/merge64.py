@@ -1,15 +1,15 @@
-"""Seconds and peak memory of merging 64 shards, two iterations each, against one shard's.
+"""Seconds and peak memory of merging 64 shards of two iterations each, and of rendering one shard.
 
-Matte blocks at 1280 x 720 by `path` and by `vcm`.
-Shards hold the layers that a farm asks for; the merge makes all of them. A merge of one shard alone (--partial) tells
-what a merge costs whatever the number of shards.
+The scene is matte blocks at 1280 x 720, by `path` and by `vcm`. Shards are rendered with `--layers beauty`, as on a
+farm; the merge writes all layers. A merge of a single shard (--partial) gives the cost that does not depend on the number
+of shards.
 """
 
 import shutil
 
-from ..cache import BIN
+from ..commands import command
 from ..options import options as given
-from ..processes import spent
+from ..processes import measure_process
 from ..record import ROOT, record
 
 OUT = ROOT / "out" / "merge64"
@@ -17,48 +17,26 @@ SCENE = ROOT / "scenes" / "blocks.glb"
 ARGUMENTS = {"methods": ["path", "vcm"], "shards": 64, "width": 1280, "height": 720}
 
 
-def size():
-    """The size of all renders."""
-    return ["--width", given.width, "--height", given.height]
+def render(file, method, iterations, **options):
+    """Renders; returns the seconds, core-seconds and peak memory."""
+    settings = {"width": given.width, "height": given.height, "method": method, "iterations": iterations}
+    words = ["render", SCENE, "-o", OUT / file]
+    return measure_process(command(*words, **settings, **options, progress="none", no_checkpoint=True))
 
 
-def shard(method, index):
-    """Renders a shard; what that took."""
-    command = [BIN, "render", SCENE, "-o", OUT / f"{index}.exr", *size(), "--method", method, "--layers", "beauty"]
-    command += [
-        "--iterations",
-        2 * given.shards,
-        "--shard",
-        f"{index}/{given.shards}",
-        "--progress",
-        "none",
-        "--no-checkpoint",
-    ]
-    return spent(command)
+def shard(method, index, **options):
+    """Renders a shard of two iterations; returns its costs."""
+    return render(f"{index}.exr", method, 2 * given.shards, shard=f"{index}/{given.shards}", **options)
 
 
 def merge(shards, *options):
-    """Merges; what that took."""
-    return spent([BIN, "merge", *shards, "-o", OUT / "merged.exr", "--layers", "all", *options])
+    """Merges shards; returns the costs."""
+    return measure_process(command("merge", *shards, "-o", OUT / "merged.exr", *options, layers="all"))
 
 
 def alone(method):
-    """What a shard with all layers takes, and a whole render of as many iterations with its finish."""
-    words = [
-        BIN,
-        "render",
-        SCENE,
-        "-o",
-        OUT / "alone.exr",
-        *size(),
-        "--method",
-        method,
-        "--progress",
-        "none",
-        "--no-checkpoint",
-    ]
-    shard = spent([*words, "--iterations", 2 * given.shards, "--shard", f"0/{given.shards}"])
-    return {"layers": shard, "whole": spent([*words, "--iterations", 2])}
+    """The costs of a shard with all layers, and of a whole render of two iterations with its finish."""
+    return {"layers": shard(method, 0), "whole": render("whole.exr", method, 2)}
 
 
 def main():
@@ -66,7 +44,7 @@ def main():
         shutil.rmtree(OUT, ignore_errors=True)
         OUT.mkdir(parents=True)
         shards = [OUT / f"{index}.exr" for index in range(given.shards)]
-        runs = [shard(method, index) for index in range(given.shards)]
+        runs = [shard(method, index, layers="beauty") for index in range(given.shards)]
         middle = sorted(runs, key=lambda run: run["seconds"])[given.shards // 2]
         values = {"rule": method, "size": [given.width, given.height], "shards": given.shards, "shard": middle}
         values["shard"]["file_mib"] = round(shards[0].stat().st_size / 2**20, 1)

@@ -1,10 +1,8 @@
-"""Finished pictures at equal time beside Mitsuba, LuxCore and Cycles with OIDN, a scene at a time, in one run; and the
-pictures of docs/gallery.md: ours, the best of each renderer by trimmed relMSE, and the reference.
+"""Finished pictures at equal time beside Mitsuba, LuxCore and Cycles with OIDN, in one run, and the pictures of
+docs/gallery.md: ours, the best of each renderer by trimmed relMSE, and the reference.
 
-The first of the budgets counts.
-
-Start-up of the peers (reading, compiling kernels, caches) is not part of their budget. Ours is all of it but reading the
-scene, with the finish.
+Only the first of the budgets counts. The budget of other renderers excludes their start-up (reading, compiling kernels,
+building caches). Ours includes everything except reading the scene.
 """
 
 import sys
@@ -23,15 +21,15 @@ from . import finished
 
 ARGUMENTS = finished.ARGUMENTS | {"set": "all", "budgets": [6.0], "methods": ["auto"], "clock": "cpu"}
 GALLERY = ROOT / "docs" / "gallery"
-# The width of a picture in a strip, and the share of the pixels that are not brighter than white in it.
-SHOWN, BRIGHT = 240, 0.97
+# The width of a picture in a strip, and the quantile of its brightness that is shown as white.
+SHOWN, WHITE = 240, 0.97
 COMPARED = ("relmse_trimmed", "flip", "grain_trimmed")
 RENDERERS = {"mitsuba": "Mitsuba", "lux": "LuxCore", "cycles": "Cycles"}
 
 
 def strip(name, pictures):
-    """Pictures side by side, as bright as the last one asks for."""
-    white = max(float(np.quantile(pictures[-1].max(-1), BRIGHT)), 1e-9)
+    """Writes the pictures side by side, with the exposure of the last one."""
+    white = max(float(np.quantile(pictures[-1].max(-1), WHITE)), 1e-9)
     shown = []
     for picture in pictures:
         linear = np.clip(np.nan_to_num(picture) / white, 0, 1)
@@ -46,7 +44,7 @@ def strip(name, pictures):
 
 
 def pictures(scene, peers, cell, halves):
-    """Ours, the best of each renderer, and the reference; and their names."""
+    """The pictures of caustique, of the best method of each renderer, and of the reference, and their names."""
     found = [renders.pictures(renders.render(scene, "auto", "", options.budgets[0], 1))["delivered"]]
     names = ["caustique"]
     for prefix, renderer in RENDERERS.items():
@@ -58,8 +56,8 @@ def pictures(scene, peers, cell, halves):
     return [*found, halves.mean.astype(np.float32)], [*names, "reference"]
 
 
-def compared(scene, names):
-    """A scene's row, and its strip."""
+def compare(scene, names):
+    """Compares the renderers on a scene, and writes its strip; returns the row."""
     halves, made = references.reference(scene)
     reference = Reference.read(halves)
     peers = peer_runs.Peers(scene, reference.mean.shape[0])
@@ -89,7 +87,8 @@ def compared(scene, names):
 
 
 def summary(rows):
-    """Ours over each peer, and over the best of all in each figure: geometric mean, worst, and how many are better."""
+    """Our errors over those of each peer, and of the best peer: geometric mean, worst, number of scenes where ours is
+    better, number of scenes."""
     found = {}
     peers = list(dict.fromkeys(peer for row in rows for peer in row["ratios"]))
     for peer in [*peers, "best of all"]:
@@ -107,13 +106,13 @@ def summary(rows):
 
 
 def main():
-    names, reason = peer_runs.chosen()
+    names, reason = peer_runs.select()
     if reason:
         sys.exit(f"peers: error: {reason}")
     rows = []
     for scene in references.scenes():
         try:
-            rows.append(compared(scene, names))
+            rows.append(compare(scene, names))
         except Failed as failed:
             print(f"\n{references.name(scene)}: {failed}", flush=True)
     found = summary(rows)
@@ -121,11 +120,6 @@ def main():
     for peer, of in found.items():
         for key, (mean, worst, better, count) in of.items():
             print(f"{peer:<22}{key:<16}{mean:>15.3f}{worst:>8.2f}{better:>6}/{count}")
-    said = {
-        "program": program(),
-        "width": options.width,
-        "threads": options.threads,
-        "seconds": options.budgets[0],
-        "clock": options.clock,
-    }
-    record("peers", {**said, "compared": list(COMPARED), "all_figures": FIGURES, "summary": found, "rows": rows})
+    settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "clock")}}
+    settings["seconds"] = options.budgets[0]
+    record("peers", {**settings, "compared": list(COMPARED), "all_figures": FIGURES, "summary": found, "rows": rows})

@@ -1,4 +1,4 @@
-"""Range queries: our tree against a hash grid and a kd-tree, clustered photons and widely spread bandwidths."""
+"""Range queries in our tree, in a hash grid and in a kd-tree, for clustered photons and widely varying bandwidths."""
 
 from ..bench import lines
 from ..record import record

@@ -1,7 +1,7 @@
-"""Checks random scenes of new seeds for hours, on the lowest priority; see docs/lab/hard-cases.md. A run continues where
+"""Checks random scenes of new seeds for hours, at the lowest priority (see docs/lab/hard-cases.md). A run continues where
 the last one ended.
 
-The folder of the output holds state.json, and a folder for each failure. RAYON_NUM_THREADS limits the threads.
+The output folder has state.json, and a folder for each failure. RAYON_NUM_THREADS limits the threads.
 """
 
 import os
@@ -13,10 +13,10 @@ from ..record import ROOT
 
 def add_arguments(parser):
     parser.add_argument("--hours", type=float, default=4.0, help="hours to run [default: 4]")
-    parser.add_argument("--seed", type=int, help="the first seed, of a folder that has no state [default: 1000]")
+    parser.add_argument("--seed", type=int, help="the first seed, if the folder has no state.json [default: 1000]")
     parser.add_argument("--checks", type=int, help="checks of each scene by each of the four main methods [default: 4]")
     parser.add_argument("--output", metavar="FOLDER", help="folder of the state and of failures [default: out/random]")
-    parser.add_argument("--replay", metavar="FILE", help="check a saved scene again, and nothing else")
+    parser.add_argument("--replay", metavar="FILE", help="only check a saved scene again")
 
 
 def main():

@@ -1,4 +1,4 @@
-"""Makes the README's pictures again: docs/pool.png, and docs/scenes.png from six scenes."""
+"""Renders the README's pictures: docs/pool.png, and docs/scenes.png from six scenes."""
 
 import subprocess
 import tempfile
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from ..cache import BIN
+from ..commands import command
 from ..options import options
 from ..record import ROOT
 
@@ -15,11 +15,11 @@ SHEET = ["interior", "lamp", "cornell", "gems", "torus", "stadium"]
 
 
 def picture(folder, scene, width, height):
-    """Renders a scene; its PNG."""
+    """Renders a scene; returns the tone-mapped picture."""
     file = Path(folder) / f"{scene}.png"
-    command = [BIN, "render", ROOT / "scenes" / f"{scene}.glb", "-o", file.with_suffix(".exr"), "--png", file]
-    command += ["--width", width, "--height", height, "--layers", "beauty", "--time", options.seconds]
-    subprocess.run(list(map(str, [*command, "--progress", "plain"])), check=True)
+    settings = {"png": file, "width": width, "height": height, "layers": "beauty", "time": options.seconds}
+    words = ["render", ROOT / "scenes" / f"{scene}.glb", "-o", file.with_suffix(".exr")]
+    subprocess.run(command(*words, **settings, progress="plain"), check=True)
     return Image.open(file).convert("RGB")
 
 

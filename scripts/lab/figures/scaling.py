@@ -1,11 +1,11 @@
-"""How the cost of an iteration grows: core-seconds against triangles, lamps, pixels and light paths, seconds against
-threads, by `path`, `vcm` and `sppm`; and what loading takes, against triangles.
+"""Growth of costs by `path`, `vcm` and `sppm`: core-seconds of an iteration against triangles, lights, pixels and light
+paths, seconds against threads, and core-seconds of loading against triangles.
 
-A rough floor under triangles that shine, each a lamp of its own, with a ball of glass on it. Core-seconds are those of
-one thread, which other work on the machine changes little, of iterations after the first; the least of --rounds. An
-exponent is the slope of the least squares in logarithms; the steepest step is the largest exponent between neighbours.
-Draws docs/lab/scaling.svg, where there is .venv-python (scripts/python.sh). Fails if any step costs more than n log n
-would.
+The scene is a rough floor under emissive triangles, each a separate light, with a glass ball. Core-seconds are those of
+iterations after the first on one thread, which other work on the machine changes little; the least of --rounds counts.
+An exponent is the slope of a least-squares fit in the logarithms; the steepest step is the largest exponent between
+neighbouring sizes. Draws docs/lab/scaling.svg if .venv-python exists (scripts/python.sh). Fails if a step costs more
+than n log n.
 """
 
 import math
@@ -17,10 +17,11 @@ from tests.hard import scene as s
 from tests.hard import shapes
 
 from ..cache import BIN
+from ..commands import command
+from ..iteration_times import fastest, history, intervals
 from ..options import options as given
-from ..reading import fastest, history, stretches
 from ..plots import draw
-from ..processes import spent
+from ..processes import measure_process
 from ..record import ROOT, record
 
 
@@ -28,9 +29,9 @@ OUT = ROOT / "out" / "scaling"
 METHODS = ("path", "vcm", "sppm")
 ARGUMENTS = {"rounds": 2, "largest": 10_000_000}
 ITERATIONS = 4
-# What stands still while something else grows.
+# The sizes that stay constant while another one grows.
 TRIANGLES, LAMPS, WIDTH, PATHS = 10_000, 1, 128, 20_000
-# What grows, by axis, and the methods that know of it: `path` and `vcm` have one light path for each pixel, or none.
+# By axis: the sizes, and the methods that depend on them. `path` and `vcm` have no number of light paths.
 AXES = {
     "triangles": ([10**4, 10**5, 10**6, 10**7], METHODS),
     "lamps": ([1, 10, 100, 1000, 10**4, 10**5], METHODS),
@@ -40,7 +41,7 @@ AXES = {
 
 
 def floor(triangles):
-    """A floor of about so many triangles, none in the plane of its neighbour."""
+    """A floor of about `triangles` triangles, uneven so that no two neighbours are coplanar."""
     made = shapes.grid(1.5, round(math.sqrt(triangles / 2)))
     x, _, z = made.positions.T
     made.positions[:, 1] = 0.02 * np.sin(9 * x) * np.cos(7 * z)
@@ -48,7 +49,7 @@ def floor(triangles):
 
 
 def lamps(count):
-    """So many triangles that face down, which have one area together."""
+    """`count` triangles that face down, with a constant total area."""
     side = math.ceil(math.sqrt(count))
     row, column = np.divmod(np.arange(count), side)
     middle = np.stack([(column + 0.5) / side - 0.5, np.full(count, 1.5), (row + 0.5) / side - 0.5], axis=-1)
@@ -57,7 +58,7 @@ def lamps(count):
 
 
 def scene(triangles=TRIANGLES, lights=LAMPS):
-    """The file of a scene, without its ending."""
+    """Writes the file of a scene; returns its path without the suffix."""
     file = OUT / f"{triangles}-{lights}"
     if not file.with_suffix(".glb").exists():
         made = s.Scene().add(floor(triangles), s.diffuse(0.6)).add(lamps(lights), s.emitter(20))
@@ -67,23 +68,23 @@ def scene(triangles=TRIANGLES, lights=LAMPS):
 
 
 def options(method, pixels=WIDTH**2, paths=PATHS):
-    """Of a render."""
+    """The options of a render."""
     width = str(math.isqrt(pixels))
     of = ["--method", method, "--width", width, "--height", width, "--layers", "beauty"]
     return [*of, "--photons", str(paths)] if method == "sppm" else of
 
 
 def cost(axis, size, method):
-    """Core-seconds of an iteration."""
+    """The core-seconds of an iteration by a method, at a size along an axis."""
     scenes = {"triangles": {"triangles": size}, "lamps": {"lights": size}}
-    given = {"pixels": {"pixels": size}, "light paths": {"paths": size}}
-    file, of = scene(**scenes.get(axis, {})), options(method, **given.get(axis, {}))
-    runs = [stretches(BIN, file, of, ITERATIONS, OUT / "a.exr") for _ in range(given.rounds)]
+    settings = {"pixels": {"pixels": size}, "light paths": {"paths": size}}
+    file, words = scene(**scenes.get(axis, {})), options(method, **settings.get(axis, {}))
+    runs = [intervals(BIN, file, words, ITERATIONS, OUT / "a.exr") for _ in range(given.rounds)]
     return fastest(runs, ITERATIONS)
 
 
 def growth(sizes, costs):
-    """The exponent, the steepest step's, and whether no step costs more than n log n."""
+    """The exponent of costs over sizes, the exponent of the steepest step, and whether all steps stay within n log n."""
     steps = list(zip(zip(sizes, costs), zip(sizes[1:], costs[1:])))
     slopes = [math.log(after[1] / before[1]) / math.log(after[0] / before[0]) for before, after in steps]
     heavy = [after[0] * math.log(1 + after[0]) / (before[0] * math.log(1 + before[0])) for before, after in steps]
@@ -93,7 +94,7 @@ def growth(sizes, costs):
 
 
 def threads(method):
-    """Seconds of an iteration on one thread and on two."""
+    """The seconds of an iteration on one thread and on two."""
     found = []
     for count in (1, 2):
         of = [*options(method, pixels=256**2), "--threads", str(count)]
@@ -105,16 +106,15 @@ def threads(method):
 
 
 def load(triangles):
-    """Core-seconds of a render of one pixel, which are nearly all loading."""
-    command = [BIN, "render", scene(triangles) + ".glb", "-o", OUT / "a.exr", "--iterations", 1, "--no-combine"]
-    runs = [
-        spent([*command, "--width", 1, "--height", 1, "--method", "path", "--threads", 1]) for _ in range(given.rounds)
-    ]
+    """The core-seconds of a render of one pixel, most of which is loading."""
+    settings = {"iterations": 1, "width": 1, "height": 1, "method": "path", "threads": 1, "no_combine": True}
+    line = command("render", scene(triangles) + ".glb", "-o", OUT / "a.exr", **settings)
+    runs = [measure_process(line) for _ in range(given.rounds)]
     return min(run["core_seconds"] for run in runs)
 
 
 def main():
-    # An exponent of 1.5 is told from n log n, at its largest sizes too.
+    # `growth` distinguishes an exponent of 1.5 from n log n, also at large sizes.
     assert not growth([10**5, 10**6], [1, 10**1.5])["within"] and growth([10**5, 10**6], [1, 11])["within"]
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)

@@ -1,8 +1,8 @@
-"""Pictures of the add-on's interface in Debian's own Blender, on a display that nobody sees: docs/blender-render.png and
-docs/blender-diagnosis.png. Fails where a render cannot be stopped by Esc.
+"""Screenshots of the add-on in Debian's Blender on a virtual display: docs/blender-render.png and
+docs/blender-diagnosis.png. Fails if Esc does not stop a render.
 
-Needs what `scripts/setup.sh test` installs, and Debian's packages blender, python3-numpy, xvfb, xauth, xdotool and
-libgl1-mesa-dri.
+It needs the packages that `scripts/setup.sh test` installs, and Debian's packages blender, python3-numpy, xvfb, xauth,
+xdotool and libgl1-mesa-dri.
 """
 
 import os
@@ -18,7 +18,7 @@ from ..cache import BIN
 from ..options import options
 from ..record import ROOT
 
-#: The picture that is taken, and its name in docs.
+#: Names of the screenshots, and their names in docs.
 SHOTS = {"improves-4": "blender-render", "diagnosis": "blender-diagnosis"}
 DISPLAY = ["xvfb-run", "-a", "-s", "-screen 0 1280x800x24"]
 
@@ -30,14 +30,13 @@ def add_arguments(parser):
 def main():
     missing = [program for program in ("blender", "xvfb-run", "xdotool") if shutil.which(program) is None]
     if missing:
-        sys.exit(
-            f"screenshots: error: no {missing[0]}\nhint: apt-get install blender python3-numpy xvfb xauth xdotool libgl1-mesa-dri"
-        )
+        packages = "blender python3-numpy xvfb xauth xdotool libgl1-mesa-dri"
+        sys.exit(f"screenshots: error: no {missing[0]}\nhint: apt-get install {packages}")
     options.output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         archive = Path(folder) / "caustique.zip"
         subprocess.run([sys.executable, ROOT / "scripts" / "blender" / "package.py", archive], check=True)
-        # Settings of a user's own Blender are neither read nor written.
+        # The settings of the user's Blender are neither read nor written.
         own = {
             "BLENDER_USER_RESOURCES": str(Path(folder) / "user"),
             "LIBGL_ALWAYS_SOFTWARE": "1",
@@ -52,7 +51,7 @@ def main():
 
 
 def save(shot, path):
-    """Without the timeline and what stands beside the panels, in 256 colours."""
+    """Writes a screenshot in 256 colours, cropped to the picture and the panels."""
     picture = Image.open(shot).convert("RGB").crop((0, 24, 1057, 724))
     colours = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=3)
     picture.quantize(palette=colours, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)

@@ -1,5 +1,5 @@
-"""Bias and variance against iterations on a field in closed form: the memoryless rule beside its finite sums, CPPM whose
-test always rejects. Draws docs/lab/slopes.svg. About five minutes.
+"""Bias and variance against iterations on a light field in closed form: the memoryless rule beside its finite sums, and
+CPPM whose test always rejects. Draws docs/lab/slopes.svg. It takes about five minutes.
 
 Exponents are fitted from 128 iterations on by weighted least squares in the logarithms.
 """
@@ -18,12 +18,12 @@ def show(values):
     """Prints a rule's series and its exponents."""
     print(values["rule"], values["parameters"], f"{values['seeds']} seeds")
     for s in values["series"]:
-        told = [f"{s['iterations']:>8}  bias {s['bias'][0]:.4f} +- {s['bias'][1]:.4f}"]
-        told += [f", given bandwidths {s['bias_given'][0]:.4f} +- {s['bias_given'][1]:.4f}"]
-        told += [f"  variance {s['variance'][0]:.3e} +- {s['variance'][1]:.1e}  mse {s['mse'][0]:.3e}"]
+        text = [f"{s['iterations']:>8}  bias {s['bias'][0]:.4f} +- {s['bias'][1]:.4f}"]
+        text += [f", given bandwidths {s['bias_given'][0]:.4f} +- {s['bias_given'][1]:.4f}"]
+        text += [f"  variance {s['variance'][0]:.3e} +- {s['variance'][1]:.1e}  mse {s['mse'][0]:.3e}"]
         if "bias_sum" in s:
-            told += [f"  sums: {s['bias_sum']:.4f}, {s['variance_sum'][0]:.3e}"]
-        print("".join(told))
+            text += [f"  sums: {s['bias_sum']:.4f}, {s['variance_sum'][0]:.3e}"]
+        print("".join(text))
     for key in ("bias", "bias_given", "variance", "mse"):
         slope, error = fit(values["series"], key)
         print(f"  {key} N^{slope:.3f} +- {error:.3f}")

@@ -1,9 +1,8 @@
-"""Core-seconds to the same error, after over before: this program beside one of an older commit, scene by scene.
+"""Core-seconds to an equal error, after over before: this program and one of an older commit, scene by scene.
 
-The older one is by default that before points of a sequence, roulette and merge weights came in.
-
-A method counts where it finds the light: where its mean is the reference's, noise apart, in both programs. Stores the
-figure `speed`.
+The older commit is by default the last one without low-discrepancy points, late roulette and correlation-aware merge
+weights. A row counts if the means of both programs agree with the reference's within noise, so that both find the light.
+Stores the figure `speed`.
 """
 
 import os
@@ -15,15 +14,15 @@ from pathlib import Path
 from .. import speed_runs
 from ..cache import BIN, program
 from ..options import options
-from ..peer_runs import stranger
+from ..peer_runs import mean_mismatch
 from ..record import ROOT, record
 
-# The parent of what brought low-discrepancy points to paths of pixels.
+# The default is the parent of the commit that introduced low-discrepancy points.
 ARGUMENTS = speed_runs.ARGUMENTS | {"before": "250baf33979a^", "methods": ["path", "bdpt", "vcm", "sppm"]}
 
 
-def built(commit):
-    """The program of a commit, built in the cache once; and the commit in full."""
+def build(commit):
+    """Builds the program of a commit in the cache, unless it exists; returns the program and the full hash."""
     name = subprocess.run(
         ["git", "-C", ROOT, "rev-parse", "--verify", f"{commit}^{{commit}}"], capture_output=True, text=True
     ).stdout.strip()
@@ -42,14 +41,14 @@ def built(commit):
 
 
 def measure(scene, name, method, programs, reference):
-    """A row."""
+    """The row of a scene and a method."""
     renders = {of: partial(one.render, scene, ["--method", method]) for of, one in programs.items()}
-    found = speed_runs.taking_turns(renders, reference)
-    return {"scene": name, "method": method, **speed_runs.compared(found, "after", "before", stranger)}
+    found = speed_runs.measure_alternately(renders, reference)
+    return {"scene": name, "method": method, **speed_runs.compare(found, "after", "before", mean_mismatch)}
 
 
 def main():
-    before, commit = (Path(options.before), None) if Path(options.before).is_file() else built(options.before)
+    before, commit = (Path(options.before), None) if Path(options.before).is_file() else build(options.before)
     programs = {"before": speed_runs.Program(before), "after": speed_runs.Program(BIN)}
     rows = []
     print(f"{'':<20}{'':<6}{'before':>11}{'after':>11}{'ratio':>8}  (relMSE, trimmed, times core-seconds)")

@@ -1,8 +1,8 @@
-"""Path tracing beside Mitsuba and Cycles at equal error: our squared error times core-seconds over theirs, one thread.
+"""Path tracing beside Mitsuba and Cycles: our squared error times core-seconds over theirs, on one thread.
 
-Reading and converting the scene count for nobody. A short render comes first, after which Mitsuba finds its compiled
-kernels on the disk. A scene counts where its mean is the reference's, noise apart, for both. Stores the figure
-`speed-peers`. `scripts/compare/setup.sh peers` installs the others.
+Reading and converting the scene are not counted for any renderer. A short render runs first, so that Mitsuba finds its
+compiled kernels on the disk. A scene counts if both means agree with the reference's within noise. Stores the figure
+`speed-peers`. `scripts/compare/setup.sh peers` installs the other renderers.
 """
 
 import sys
@@ -15,38 +15,38 @@ from ..picture_errors import Layers
 from ..record import record
 
 ARGUMENTS = speed_runs.ARGUMENTS | {"peers": ["mitsuba_path", "cycles_path"], "seconds": 6.0}
-WARM = 0.5
+WARM_UP = 0.5  # seconds
 
 
-def theirs(peers, peer, seed):
-    """A peer's picture of a seed, and what it spent."""
+def render_peer(peers, peer, seed):
+    """Renders by a peer with a seed; returns the picture and its core-seconds."""
     folder = peers.render(peer, options.seconds, seed)
     return Layers(folder / "picture.exr").get(""), load(folder / "run.json")["cpu_seconds"]
 
 
-def compared(scene, name, peer, ours, reference):
-    """A row; raises Failed where the peer cannot say the scene."""
+def compare(scene, name, peer, ours, reference):
+    """The row of a scene and a peer; raises Failed if the peer cannot render the scene."""
     peers = peer_runs.Peers(scene, reference.mean.shape[0])
-    peers.render(peer, WARM, 0)
-    renders = {"ours": partial(ours.render, scene, ["--method", "path"]), "theirs": partial(theirs, peers, peer)}
-    found = speed_runs.taking_turns(renders, reference)
+    peers.render(peer, WARM_UP, 0)
+    renders = {"ours": partial(ours.render, scene, ["--method", "path"]), "theirs": partial(render_peer, peers, peer)}
+    found = speed_runs.measure_alternately(renders, reference)
     return {
         "scene": name,
         "peer": peer,
-        **speed_runs.compared(found, "ours", "theirs", peer_runs.stranger),
-        "version": load(peers.render(peer, WARM, 0) / "run.json").get("version"),
+        **speed_runs.compare(found, "ours", "theirs", peer_runs.mean_mismatch),
+        "version": load(peers.render(peer, WARM_UP, 0) / "run.json").get("version"),
     }
 
 
 def main():
-    names, reason = peer_runs.chosen()
+    names, reason = peer_runs.select()
     if reason:
         sys.exit(f"speed_peers: error: {reason}")
     ours, rows = speed_runs.Program(BIN), []
     for scene, name, reference in speed_runs.with_references():
         for peer in names:
             try:
-                row = compared(scene, name, peer, ours, reference)
+                row = compare(scene, name, peer, ours, reference)
             except speed_runs.Failed as failed:
                 print(f"{name:<20}{peer:<14}{failed}", flush=True)
                 continue

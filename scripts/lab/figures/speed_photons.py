@@ -1,10 +1,8 @@
-"""What more photons in an iteration of `sppm` gain at equal core-seconds: the merit of the usual number over that of
-more, so that more than 1 is a gain.
+"""The gain from more photons in an iteration of `sppm` at equal core-seconds: the cost of the default number over the cost
+of a larger number. Above 1 is a gain.
 
---photons has the usual number first; by default 100,000 and 400,000 in a picture that is 1280 pixels wide, and the same
-number per pixel in a smaller one.
-
-With as many light paths for a pixel, bandwidths are as many pixels and the shares of time are the same. Stores the
+--photons starts with the default number. Without it, the numbers are 100,000 and 400,000 for pictures 1280 pixels wide,
+and in proportion to the pixels for smaller ones, which keeps the bandwidths in pixels and the shares of time. Stores the
 figure `speed-photons`.
 """
 
@@ -15,13 +13,14 @@ from ..cache import BIN, program
 from ..options import options
 from ..record import record
 
-USUAL, FULL = [100_000, 400_000], 1280
+# Light paths of an iteration in a picture of this width.
+PHOTONS, FULL_WIDTH = [100_000, 400_000], 1280
 ARGUMENTS = speed_runs.ARGUMENTS | {"photons": None}
 
 
 def photons():
-    """Light paths of an iteration, the usual number first."""
-    return options.photons or [round(count * (options.width / FULL) ** 2) for count in USUAL]
+    """The numbers of light paths of an iteration, the default first."""
+    return options.photons or [round(count * (options.width / FULL_WIDTH) ** 2) for count in PHOTONS]
 
 
 def main():
@@ -30,10 +29,10 @@ def main():
     print(f"{'gain by photons':<20}" + "".join(f"{count:>10}" for count in counts[1:]))
     for scene, name, reference in speed_runs.with_references():
         kinds = {str(count): partial(ours.render, scene, ["--method", "sppm", "--photons", count]) for count in counts}
-        found = speed_runs.taking_turns(kinds, reference)
-        usual = found[str(counts[0])]["merit"]
-        gains = {str(count): speed_runs.short(usual / found[str(count)]["merit"]) for count in counts[1:]}
-        rows.append({"scene": name, "gains": gains, **speed_runs.stored(found)})
+        found = speed_runs.measure_alternately(kinds, reference)
+        default = found[str(counts[0])]["merit"]
+        gains = {str(count): speed_runs.short(default / found[str(count)]["merit"]) for count in counts[1:]}
+        rows.append({"scene": name, "gains": gains, **speed_runs.rounded(found)})
         print(f"{name:<20}" + "".join(f"{gain:>10.2f}" for gain in gains.values()), flush=True)
     found = {}
     for title, second in (("first", False), ("second", True)):

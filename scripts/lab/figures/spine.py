@@ -1,4 +1,4 @@
-"""Rays against bare Embree, the photon map, EXR writing: ratios in one run."""
+"""Speed of rays relative to Embree alone, of the photon map, and of writing EXRs, in one run."""
 
 from ..bench import measure
 

@@ -1,7 +1,7 @@
-"""Writes the tables of docs/ from what is stored (results.jsonl).
+"""Writes the tables of docs/ from the stored figures (results.jsonl).
 
-A table stands between a line `<!-- table: NAME -->`, or `<!-- table: NAME SET -->` where figures have sets, and the next
-`<!-- end -->`. Commit, date and machine stand above each table. lab/tables has the tables by name.
+A table is between a line `<!-- table: NAME -->`, or `<!-- table: NAME SET -->` for figures with sets, and the next
+`<!-- end -->`. Commit, date and machine are above each table. lab/tables has the tables by name.
 """
 
 import re
@@ -17,7 +17,7 @@ BLOCK = re.compile(r"^(<!-- table: (\S+)(?: (\S+))? -->\n).*?^(<!-- end -->)$", 
 
 
 def filled(text):
-    """A page with its tables made again."""
+    """The text of a page with its tables written anew."""
 
     def block(match):
         start, name, of, end = match.groups()
@@ -31,7 +31,11 @@ def filled(text):
 
 
 def add_arguments(parser):
-    parser.add_argument("--check", action="store_true", help="say which pages would change, and fail if any would")
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help="write nothing; list the pages that would change, and fail if there are any",
+    )
 
 
 def main():
@@ -47,4 +51,6 @@ def main():
             if not options.check:
                 page.write_text(new, encoding="utf-8")
     if options.check and changed:
-        sys.exit(f"tables: error: {', '.join(changed)}: not as the stored figures say\nhint: scripts/lab.sh tables")
+        sys.exit(
+            f"tables: error: {', '.join(changed)}: tables differ from the stored figures\nhint: scripts/lab.sh tables"
+        )

@@ -1,9 +1,9 @@
-"""What `--target-error` stops at: the truth over the error asked for, and the time over the shortest that would have
-done; and what the progress line and `caustique plan` have said of that time before.
+"""Renders with `--target-error`: the true error over the target, the time over the shortest possible time, and the times
+that the progress line and `caustique plan` predicted.
 
-The error asked for is the true one of calibration.py's pictures at the next to last of the budgets, their geometric
-mean. The shortest time follows from the true errors of all its budgets, by interpolation in the logarithms. Clocks
-count: the machine must be quiet. Stores the figures `target` and `prediction`.
+The target is the geometric mean of the true errors of calibration.py's pictures at the last budget but one. The shortest
+time follows from the true errors at all budgets, interpolated in the logarithms. Times are wall-clock times, so the
+machine must be idle. Stores the figures `target` and `prediction`.
 """
 
 import math
@@ -13,18 +13,20 @@ from .. import accuracy
 from .. import references
 from ..accuracy import geometric, short
 from ..cache import program
+from ..commands import read
 from ..options import options as given
-from ..reading import read
 from ..record import record
 
-# A prediction counts from this share of the time on, and should be so close to what comes true.
+# Predictions count from this share of the time on; a correct one is off by at most this share.
 FROM, WITHIN = 0.1, 0.3
 ARGUMENTS = accuracy.ARGUMENTS
+# The largest ratios of true error and target, and of time and shortest time, that count as good.
 FACTOR, LONGER = 1.5, 1.3
 
 
 def crossing(points, error):
-    """Seconds at which errors, falling as powers between points, are as small as one; from the nearest two outside."""
+    """The seconds at which the error falls to `error`, as a power law between two points; outside all points, the nearest
+    two are extrapolated."""
     points = sorted(points)
     pairs = list(zip(points, points[1:]))
     chosen = next((pair for pair in pairs if pair[0][1] >= error >= pair[1][1]), None)
@@ -35,44 +37,34 @@ def crossing(points, error):
 
 
 def predictions(folder, error, end):
-    """What was said of the end while the render went on: the time then over the time it took, and the end told over the
-    end."""
-    said = [(line["seconds"], line["expected"]) for line in accuracy.progress(folder) if line.get("expected")]
-    return [(now / end, (now + told["seconds"]) / end) for now, told in said if abs(told["error"] - error) < 1e-9]
+    """The predictions of a render's end by its progress reports: pairs of the time of the report and the predicted time of
+    the end, both relative to the real end."""
+    reports = [(line["seconds"], line["expected"]) for line in accuracy.progress(folder) if line.get("expected")]
+    found = [(now, expected["seconds"]) for now, expected in reports if abs(expected["error"] - error) < 1e-9]
+    return [(now / end, (now + more) / end) for now, more in found]
 
 
 def measure(scene, method, truth):
-    """A row for a scene."""
+    """The row of a scene."""
     points = []
     for budget in given.budgets:
-        judged = [
-            accuracy.judged(accuracy.rendered(scene, method, ["--time", budget], seed), truth)
-            for seed in range(1, given.seeds + 1)
-        ]
-        seconds = statistics.mean(one["seconds"] for one in judged)
-        points.append((seconds, geometric([max(one["true"], 1e-6) for one in judged])))
+        folders = [accuracy.render(scene, method, ["--time", budget], seed) for seed in range(1, given.seeds + 1)]
+        results = [accuracy.evaluate(folder, truth) for folder in folders]
+        seconds = statistics.mean(one["seconds"] for one in results)
+        points.append((seconds, geometric([max(one["true"], 1e-6) for one in results])))
     error = float(f"{points[-2][1]:.3g}")
     rows = []
     for seed in range(1, given.seeds + 1):
-        # As long again as ought to do ten times over.
+        # The time limit is far above the expected time.
         stop = ["--target-error", error, "--time", 10 * given.budgets[-1]]
-        folder = accuracy.rendered(scene, method, stop, 100 + seed)
+        folder = accuracy.render(scene, method, stop, 100 + seed)
         end = accuracy.progress(folder)[-1]["seconds"]
-        rows.append(accuracy.judged(folder, truth) | {"said": predictions(folder, error, end)})
+        rows.append(accuracy.evaluate(folder, truth) | {"predictions": predictions(folder, error, end)})
     shortest = crossing(points, error)
     taken = statistics.mean(row["seconds"] for row in rows)
-    late = [told for row in rows for share, told in row["said"] if share >= FROM]
-    options = [
-        "--target-error",
-        str(error),
-        "--method",
-        method,
-        "--width",
-        str(given.width),
-        "--threads",
-        str(given.threads),
-    ]
-    outlook = read("plan", str(scene), *options).get("outlook")
+    late = [predicted for row in rows for share, predicted in row["predictions"] if share >= FROM]
+    options = ["--target-error", error, "--method", method, "--width", given.width, "--threads", given.threads]
+    outlook = read("plan", scene, *options).get("outlook")
     return {
         "scene": references.name(scene),
         "method": method,
@@ -81,22 +73,15 @@ def measure(scene, method, truth):
         "seconds": taken,
         "longer": taken / shortest,
         "predicted": statistics.median(late) if late else None,
-        "right": sum(abs(told - 1) <= WITHIN for told in late) / len(late) if late else None,
+        "right": sum(abs(predicted - 1) <= WITHIN for predicted in late) / len(late) if late else None,
         "planned": outlook["seconds"] / taken if outlook else None,
     }
 
 
 def main():
     rows = []
-    columns = {
-        "error": 8,
-        "true over it": 14,
-        "seconds": 9,
-        "over shortest": 15,
-        "predicted": 11,
-        "in 30 %": 9,
-        "plan": 7,
-    }
+    columns = {"target": 8, "true over it": 14, "seconds": 9, "over shortest": 15, "predicted": 11, "in 30 %": 9}
+    columns["plan"] = 7
     print(" " * 22 + "".join(f"{name:>{width}}" for name, width in columns.items()))
     for scene, truth in accuracy.truths():
         for method in given.methods:
@@ -107,19 +92,13 @@ def main():
             text += f"{row['predicted']:>11.2f}{row['right']:>9.0%}" if row["predicted"] else f"{'-':>11}{'-':>9}"
             print(text + (f"{row['planned']:>7.2f}" if row["planned"] else f"{'-':>7}"), flush=True)
     known = [row for row in rows if row["predicted"]]
-    said = {
-        "program": program(),
-        "width": given.width,
-        "threads": given.threads,
-        "seeds": given.seeds,
-        "budgets": given.budgets,
-    }
+    settings = {"program": program(), **{key: getattr(given, key) for key in ("width", "threads", "seeds", "budgets")}}
     counts = {
         "scenes": len(rows),
         "true": sum(1 / FACTOR <= row["true"] <= FACTOR for row in rows),
         "longer": sum(row["longer"] <= LONGER for row in rows),
     }
-    foretold = {
+    predicted = {
         "scenes": len(rows),
         "told": len(known),
         "predicted": sum(abs(row["predicted"] - 1) <= WITHIN for row in known),
@@ -127,13 +106,13 @@ def main():
     }
     print(f"\ntrue within {FACTOR} of it: {counts['true']} of {counts['scenes']}")
     print(f"no more than {LONGER} of the shortest: {counts['longer']} of {counts['scenes']}")
-    print(f"predicted within 30 %: {foretold['predicted']} of {foretold['scenes']}")
-    print(f"planned within a factor of 2: {foretold['planned']} of {foretold['scenes']}")
+    print(f"predicted within 30 %: {predicted['predicted']} of {predicted['scenes']}")
+    print(f"planned within a factor of 2: {predicted['planned']} of {predicted['scenes']}")
 
     def stored(row, *keys):
         return {"scene": row["scene"], **{key: short(row[key]) for key in keys}}
 
     stops = [stored(row, "error", "true", "seconds", "longer") for row in rows]
-    record("target", said | counts | {"rows": stops})
+    record("target", settings | counts | {"rows": stops})
     predictions_of = [stored(row, "predicted", "right", "planned") for row in rows]
-    record("prediction", said | foretold | {"rows": predictions_of})
+    record("prediction", settings | predicted | {"rows": predictions_of})

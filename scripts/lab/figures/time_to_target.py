@@ -1,11 +1,13 @@
-"""Iterations and core-seconds that APPM and CPPM need to reach the error of SPPM after 1,000 iterations, on six scenes: Table 1 of [CPPM 2020].
+"""Iterations and core-seconds in which APPM and CPPM reach the error of SPPM after 1,000 iterations, on six scenes: table 1
+of [CPPM 2020].
 
-One level, bandwidths from ten neighbours, 2^16 light paths, the same seeds for all and so the same photon maps, pictures of 64 pixels across. Three
-errors are measured: mean squared error of all light; of photons' light alone, which is what the rules differ in; and of what a screen shows (sRGB, 0 to 255), which no single
-bright sample rules. References are two halves, by bidirectional path tracing or VCM where they converge and else by SPPM with four times the light paths in less than a quarter of the
-area, kept in out/rules; what is measured leaves their noise out.
+Renders have one level, bandwidths from ten neighbours, 2^16 light paths, a width of 64 pixels, and equal seeds, hence
+equal photon maps. Three mean squared errors are measured: of all light; of photons' light alone, in which the rules
+differ; and of screen values (sRGB, 0 to 255), which single bright samples do not dominate. References have two halves,
+so that their noise cancels, by bidirectional path tracing or VCM where these converge, else by SPPM with four times the
+light paths in less than a quarter of the area. They are kept in out/rules.
 
-Scenes that are done are kept in out/time_to_target: two hours of one core.
+Finished scenes are kept in out/time_to_target. All scenes take two hours of one core.
 """
 
 import json
@@ -15,7 +17,7 @@ from ..rules_bench import run
 from ..record import ROOT, record
 
 OUT = ROOT / "out" / "time_to_target"
-# Core-seconds of the references.
+# Core-seconds of the references, by scene.
 REFERENCES = {"torus": 200, "pool": 200, "cornell": 300, "gems": 200, "blocks": 200, "interior": 300}
 ARGUMENTS = {
     "scenes": list(REFERENCES),
@@ -29,31 +31,24 @@ ERRORS = ["all", "photons", "display"]
 
 
 def measure(scene):
-    """What the bench says of a scene."""
+    """The result of the bench for a scene."""
     reference = options.reference_seconds or REFERENCES.get(scene, 300)
     file = OUT / f"{scene}-{options.width}-{options.photons[0]}-{options.iterations}-{options.seeds}-{reference:g}.json"
     if not file.exists():
-        found = run(
-            "race",
-            scene=scene,
-            width=options.width,
-            photons=options.photons[0],
-            iterations=options.iterations,
-            seeds=options.seeds,
-            reference=f"{reference:g}",
-        )
+        settings = {"width": options.width, "photons": options.photons[0], "iterations": options.iterations}
+        found = run("race", scene=scene, **settings, seeds=options.seeds, reference=f"{reference:g}")
         file.write_text(json.dumps(found), encoding="utf-8")
     return json.loads(file.read_text(encoding="utf-8"))
 
 
 def curve(seeds, column):
-    """Mean over seeds: iterations, core-seconds, error."""
+    """The points (iterations, core-seconds, error) of a method, as means over the seeds."""
     return [tuple(sum(point[k] for point in points) / len(points) for k in (0, 1, column)) for points in zip(*seeds)]
 
 
 def crossing(points, target):
-    """Iterations and core-seconds at which the error falls to the target for good; None where it does not. An error that the reference's noise shifts is shifted for all methods alike, and
-    may be below zero: between moments, errors are straight lines against the logarithms of the others."""
+    """The iterations and core-seconds from which the error stays at or below the target, or None. Errors are interpolated
+    linearly against the logarithms of iterations and core-seconds, because the reference's noise can make them negative."""
     found = None
     for (n, seconds, error), (m, more, less) in zip(points, points[1:]):
         if error > target >= less:
@@ -64,9 +59,8 @@ def crossing(points, target):
 
 def main():
     OUT.mkdir(parents=True, exist_ok=True)
-    print(
-        f"{'scene':<10}{'error':<9}{'sppm':>10}   iterations and core-seconds in percent of sppm's, error after {options.iterations} in percent of its"
-    )
+    columns = f"iterations and core-seconds, and error after {options.iterations}, in percent of sppm's"
+    print(f"{'scene':<10}{'error':<9}{'sppm':>10}   {columns}")
     for scene in options.scenes:
         data = measure(scene)
         row = {
@@ -88,21 +82,11 @@ def main():
                 ]
                 left = curves[method][-1][2] / target
                 row[name][method] = {"reached": found, "by_seed": each, "error": left}
-                shown = (
-                    f"{100 * found[0] / options.iterations:.0f} % {100 * found[1] / seconds:.0f} %"
-                    if found
-                    else "not reached"
-                )
+                shown = "not reached"
+                if found:
+                    shown = f"{100 * found[0] / options.iterations:.0f} % {100 * found[1] / seconds:.0f} %"
                 spread = "/".join(f"{100 * e[0] / options.iterations:.0f}" if e else "-" for e in each)
                 line += f"   {method} {shown} ({spread}), {100 * left:.0f} %"
             print(line, flush=True)
-        record(
-            "time-to-target",
-            {
-                "iterations": options.iterations,
-                "width": options.width,
-                "light_paths": options.photons[0],
-                "seeds": options.seeds,
-                **row,
-            },
-        )
+        settings = {key: getattr(options, key) for key in ("iterations", "width", "seeds")}
+        record("time-to-target", {**settings, "light_paths": options.photons[0], **row})

@@ -1,8 +1,8 @@
-"""Renders one small scene for each feature of Blender's materials with Cycles and with caustique, and says where they
-agree. Writes docs/lab/blender-table.md, unless only some features are asked for.
+"""Renders one small scene for each feature of Blender's materials by Cycles and by caustique, and compares them. Writes
+docs/lab/blender-table.md, unless --only selects features.
 
-Pictures are kept in the cache folder under what they depend on, so that a run that was stopped goes on where it was.
-Fails where a feature is wrong without a word.
+Pictures are cached under a key of their inputs, so that an interrupted run continues. Fails if a feature differs without
+a warning.
 """
 
 import hashlib
@@ -18,25 +18,26 @@ import bpy  # First, because it brings the others.
 import export
 import numpy
 
+from ..commands import command
 from ..features import FEATURES, torture_stage
 from ..options import options
 from ..record import ROOT
 
 VENV = ".venv-bpy"
 TABLE = os.path.join(ROOT, "docs", "lab", "blender-table.md")
-SIZE, TILES = 32, 4  # pixels a side, tiles a side
-SAMPLES = 128  # a pixel, for each of two seeds
+SIZE, TILES = 32, 4  # pixels and tiles of a side of the picture
+SAMPLES = 128  # per pixel, for each of two seeds
 BAKE_SIZE = 256
 MEAN, TILE = 0.02, 0.06  # relative differences that count as agreement
-AGREES, BAKED, SAID, REFUSED, WRONG = "agrees", "agrees, baked", "approximated and said", "refused", "WRONG"
-RANK = [AGREES, BAKED, SAID, REFUSED, WRONG]
+AGREES, BAKED, WARNED, REFUSED, WRONG = "agrees", "agrees, baked", "approximated, warned", "refused", "WRONG"
+RANK = [AGREES, BAKED, WARNED, REFUSED, WRONG]
 
 
 @dataclass
 class Result:
-    """What became of a feature. `mean`: ours over Cycles', the channel that is farthest off; `tile`: the worst relative
-    difference of a tile; `noise`: three standard errors of the mean, relative; `flip`: ours against Cycles'; `floor`:
-    FLIP of Cycles' two renders, which differ by noise alone."""
+    """The comparison of a feature. `mean`: our mean over Cycles', of the channel with the largest difference; `tile`: the
+    largest relative difference of a tile; `noise`: three relative standard errors of the mean; `flip`: FLIP between the
+    pictures; `floor`: FLIP between Cycles' two renders, which differ only by noise."""
 
     name: str
     verdict: str
@@ -49,7 +50,7 @@ class Result:
 
 
 def cache():
-    """Where pictures are kept between runs."""
+    """The folder that keeps pictures between runs."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     folder = os.path.join(base, "caustique", "torture")
     os.makedirs(folder, exist_ok=True)
@@ -57,7 +58,7 @@ def cache():
 
 
 def program():
-    """The program: $CAUSTIQUE_BIN, or the release build."""
+    """The path of the program: $CAUSTIQUE_BIN, or the release build."""
     return os.environ.get("CAUSTIQUE_BIN", os.path.join(ROOT, "target", "release", "caustique"))
 
 
@@ -74,7 +75,7 @@ def _bytes(path):
 
 
 def pixels(path):
-    """An EXR's root R G B: (height, width, 3), first row at the bottom."""
+    """The root layer of an EXR, of shape (height, width, 3), with the first row at the bottom."""
     image = bpy.data.images.load(path)
     values = numpy.empty(len(image.pixels), numpy.float32)
     image.pixels.foreach_get(values)
@@ -85,12 +86,12 @@ def pixels(path):
 
 
 def flip(picture, truth):
-    """FLIP of a picture (height, width, 3) against another, by the program."""
+    """FLIP of a picture (height, width, 3) against another one, computed by the program."""
     with tempfile.TemporaryDirectory() as folder:
         paths = [os.path.join(folder, name) for name in ("picture.exr", "truth.exr")]
         for path, values in zip(paths, (picture, truth)):
             height, width, _ = values.shape
-            image = bpy.data.images.new("judged", width, height, float_buffer=True, is_data=True)
+            image = bpy.data.images.new("compared", width, height, float_buffer=True, is_data=True)
             image.pixels.foreach_set(numpy.dstack([values, numpy.ones((height, width))]).astype(numpy.float32).ravel())
             image.file_format = "OPEN_EXR"
             image.save(filepath=path)
@@ -100,7 +101,7 @@ def flip(picture, truth):
 
 
 def by_cycles(seed):
-    """The open scene rendered by Cycles without shortcuts."""
+    """Renders the open scene by Cycles, without clamping or limits on bounces below 64."""
     scene = bpy.context.scene
     scene.render.engine, cycles = "CYCLES", scene.cycles
     cycles.device, cycles.samples, cycles.seed = "CPU", SAMPLES, seed
@@ -122,45 +123,21 @@ def by_cycles(seed):
 
 
 def by_caustique(scene, seed):
-    """The .glb at `scene` path traced: the picture, and the warnings."""
+    """Renders the .glb at `scene` by path tracing; returns the picture and the warnings."""
     with tempfile.TemporaryDirectory() as folder:
         picture = os.path.join(folder, "ours.exr")
-        done = subprocess.run(
-            [
-                program(),
-                "render",
-                scene,
-                "-o",
-                picture,
-                "--method",
-                "path",
-                "--iterations",
-                str(SAMPLES),
-                "--no-combine",
-                "--width",
-                str(SIZE),
-                "--height",
-                str(SIZE),
-                "--seed",
-                str(seed),
-                "--layers",
-                "beauty",
-                "--progress",
-                "none",
-            ],
-            capture_output=True,
-            text=True,
-            timeout=600,
-            check=False,
-        )
+        settings = {"method": "path", "iterations": SAMPLES, "no_combine": True, "width": SIZE, "height": SIZE}
+        settings |= {"seed": seed, "layers": "beauty", "progress": "none"}
+        line = command("render", scene, "-o", picture, program=program(), **settings)
+        done = subprocess.run(line, capture_output=True, text=True, timeout=600, check=False)
         if done.returncode:
             raise RuntimeError(done.stderr.strip().splitlines()[-1])
         lines = [line.removeprefix("warning:") for line in done.stderr.splitlines() if line.startswith("warning:")]
         return pixels(picture), [line.replace(scene + ":", "").strip() for line in lines]
 
 
-def _kept(key, render):
-    """Two pictures of different seeds and the words of `render`, kept under a key."""
+def _cached(key, render):
+    """Two pictures of `render` with different seeds and its warnings, from the cache if it has the key."""
     path = os.path.join(cache(), key + ".npz")
     try:
         with numpy.load(path) as stored:
@@ -174,7 +151,7 @@ def _kept(key, render):
 
 
 def compare(ours, theirs):
-    """(mean ratio, worst tile difference beyond noise, relative noise of the mean, whether they agree)."""
+    """(mean ratio, largest tile difference beyond noise, relative noise of the mean, whether the pictures agree)."""
     (a, b), (c, d) = ours, theirs
     x, y = (a + b) / 2, (c + d) / 2
     variance = ((a - b) ** 2 + (c - d) ** 2) / 4
@@ -186,7 +163,7 @@ def compare(ours, theirs):
     def tiles(z):
         return z.mean(2).reshape(TILES, side, TILES, side).mean((1, 3))
 
-    spread = numpy.sqrt(tiles(variance) / side**2)  # channels are not independent: as if they were one
+    spread = numpy.sqrt(tiles(variance) / side**2)  # Channels are not independent, so they count as one.
     scale = numpy.maximum(tiles(y), 0.05 * y.mean())
     off = numpy.abs(tiles(x) - tiles(y)) / scale
     beyond = off - 3 * spread / scale
@@ -201,29 +178,29 @@ def run(name, look=None):
     bpy.context.view_layer.update()
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "scene.glb")
-        said = export.write(path, bake_size=BAKE_SIZE)
+        warnings = export.write(path, bake_size=BAKE_SIZE)
         beside = [_bytes(os.path.join(folder, file)) for file in sorted(os.listdir(folder))]
         settings = (SIZE, SAMPLES, bpy.app.version_string)
-        # What Cycles renders is the feature itself: its code, and the stage.
-        told = [inspect.getsource(part) for part in (inspect.getmodule(FEATURES[name]), torture_stage)]
-        theirs = _kept(_key("cycles", name, *told, settings), lambda seed: (by_cycles(seed), []))
+        # Cycles' picture depends on the code of the feature and of the stage.
+        sources = [inspect.getsource(part) for part in (inspect.getmodule(FEATURES[name]), torture_stage)]
+        theirs = _cached(_key("cycles", name, *sources, settings), lambda seed: (by_cycles(seed), []))
         try:
-            ours = _kept(_key("ours", settings, *beside, _bytes(program())), lambda seed: by_caustique(path, seed))
+            ours = _cached(_key("ours", settings, *beside, _bytes(program())), lambda seed: by_caustique(path, seed))
         except RuntimeError as error:
             return Result(name, REFUSED, 0.0, 0.0, 0.0, 0.0, 0.0, str(error))
-    said = said + ours[2]
+    warnings = warnings + ours[2]
     if look:
         _show(os.path.join(look, name + ".png"), stage, theirs, ours)
     mean, tile, noise, agrees = compare(ours[:2], theirs[:2])
-    baked = [line for line in said if "baked to" in line]
-    losses = [line for line in said if line not in baked]
-    verdict = (BAKED if baked else AGREES) if agrees else SAID if losses else WRONG
-    judged = flip((ours[0] + ours[1]) / 2, (theirs[0] + theirs[1]) / 2), flip(theirs[0], theirs[1])
-    return Result(name, verdict, mean, tile, noise, *judged, "; ".join(losses))
+    baked = [line for line in warnings if "baked to" in line]
+    losses = [line for line in warnings if line not in baked]
+    verdict = (BAKED if baked else AGREES) if agrees else WARNED if losses else WRONG
+    flips = flip((ours[0] + ours[1]) / 2, (theirs[0] + theirs[1]) / 2), flip(theirs[0], theirs[1])
+    return Result(name, verdict, mean, tile, noise, *flips, "; ".join(dict.fromkeys(losses)))
 
 
 def _show(path, stage, theirs, ours):
-    """Cycles' picture and ours side by side, and ten times their difference, each pixel as 6 x 6."""
+    """Writes Cycles' picture, ours and five times their difference side by side, each pixel enlarged to 6 x 6."""
     pair = [(p[0] + p[1]) / 2 for p in (theirs, ours)]
     pair = [p / max(1.0, float(numpy.percentile(pair[0], 98))) for p in pair]
     wide = numpy.concatenate([*pair, 0.2 + 5 * (pair[1] - pair[0])], axis=1).repeat(6, 0).repeat(6, 1)
@@ -234,20 +211,20 @@ def _show(path, stage, theirs, ours):
 
 
 def rows():
-    """The stored table: {feature: verdict}."""
+    """The verdicts of the stored table, by feature."""
     with open(TABLE, encoding="utf-8") as file:
         cells = [[c.strip() for c in line.split("|")[1:-1]] for line in file if line.startswith("| `")]
     return {row[0].strip("`"): row[1] for row in cells}
 
 
-def _summary(what, results):
-    """A sentence on the ratios of the means and on FLIP over some results."""
+def _summary(title, results):
+    """A list item with the ratios of the means and FLIP of some results."""
     ratios = numpy.array([r.mean for r in results])
     low, high = numpy.percentile(ratios, [5, 95])
     flips = numpy.array([r.flip for r in results])
     worst = results[int(flips.argmax())]
     return (
-        f"- {what} ({len(results)}): mean {numpy.exp(numpy.log(ratios).mean()):.3f} ({low:.3f} to {high:.3f}); "
+        f"- {title} ({len(results)}): mean {numpy.exp(numpy.log(ratios).mean()):.3f} ({low:.3f} to {high:.3f}); "
         f"FLIP {flips.mean():.3f},\n  median {numpy.median(flips):.3f}, worst {worst.flip:.3f} (`{worst.name}`)."
     )
 
@@ -256,33 +233,34 @@ def table(results):
     """The generated page."""
     counts = {verdict: sum(r.verdict == verdict for r in results) for verdict in RANK}
     lines = [
-        "# What comes across from Blender, feature by feature",
+        "# Features of Blender's materials, compared with Cycles",
         "",
         "<!-- Written by `scripts/lab.sh torture`; do not edit. -->",
         "",
-        "Each row is a small scene with one feature, rendered by Cycles and, exported, by caustique (`--method path`):",
-        f"{SIZE} x {SIZE} pixels, twice {SAMPLES} samples each. They agree where the mean of every channel is within "
-        f"{MEAN:.0%} and every",
-        f"tile of a sixteenth of the picture within {TILE:.0%}, three standard errors of noise allowed for. Images are "
-        f"baked at",
-        f"{BAKE_SIZE} x {BAKE_SIZE} texels.",
+        "Each row is a small scene with one feature, rendered by Cycles and, after the export, by caustique (`--method",
+        f"path`), at {SIZE} x {SIZE} pixels with two seeds of {SAMPLES} samples each. The pictures agree if, within three "
+        f"standard",
+        f"errors of noise, the mean of every channel differs by at most {MEAN:.0%} and every tile (a sixteenth of the "
+        f"picture) by at",
+        f"most {TILE:.0%}. Images are baked at {BAKE_SIZE} x {BAKE_SIZE} texels.",
         "",
         f"{len(results)} features: " + ", ".join(f"{n} {v}" for v, n in counts.items()) + ".",
         "",
-        "The mean is that of the channel that is farthest off; below it is the geometric mean of the features, with",
-        "the 5th to the 95th percentile. FLIP is the mean over the pixels of the difference that an eye sees, from 0 to",
-        f"1, noise included: two renders by Cycles of {SAMPLES} samples each differ by "
-        f"{numpy.mean([r.floor for r in results]):.3f} in the mean.",
+        "The mean is the ratio of the channel with the largest difference. FLIP is the visible difference from 0 to 1,",
+        f"averaged over the pixels, including noise: two renders by Cycles of {SAMPLES} samples each differ by "
+        f"{numpy.mean([r.floor for r in results]):.3f} on",
+        "average. Over the features, the lists below give the geometric mean of the ratios with its 5th and 95th",
+        "percentile, and FLIP.",
         "",
     ]
     rendered = [r for r in results if r.verdict != REFUSED]
     lines += [
-        _summary("all that is rendered", rendered),
-        _summary("what agrees", [r for r in rendered if r.verdict in (AGREES, BAKED)]),
+        _summary("all rendered features", rendered),
+        _summary("features that agree", [r for r in rendered if r.verdict in (AGREES, BAKED)]),
         "",
     ]
     lines += [
-        "| feature | verdict | mean, ours / Cycles | its noise | worst tile | FLIP | what the export and the render say |",
+        "| feature | verdict | mean, ours / Cycles | noise of the mean | worst tile | FLIP | warnings of export and render |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for r in results:
@@ -294,8 +272,10 @@ def table(results):
 
 
 def add_arguments(parser):
-    parser.add_argument("--only", nargs="+", metavar="NAME", choices=sorted(FEATURES), help="these features")
-    parser.add_argument("--look", metavar="FOLDER", help="also a PNG of both pictures beside each other")
+    parser.add_argument(
+        "--only", nargs="+", metavar="NAME", choices=sorted(FEATURES), help="compare only these features"
+    )
+    parser.add_argument("--look", metavar="FOLDER", help="also write a PNG of both pictures side by side")
 
 
 def main():

@@ -1,9 +1,9 @@
-"""What bandwidths of their own could bring to `vcm`, place by place: the most that any rule can gain by them.
+"""The largest possible gain of a rule that chooses local bandwidths for `vcm`.
 
-A render with five levels estimates the picture with five bandwidths from the same paths. Of each block of pixels the level with the least error is taken, by the reference: no rule knows that much. `gain` is the error of the
-one level that is best for the whole picture over that of these. Chosen by one seed and judged by another (`fair`), it is
-what a rule could hope for that tells errors as well as a render of this length lets one; chosen and judged by the same
-(`bound`), it flatters the choice.
+A render with five levels estimates the picture with five bandwidths from the same paths. For each block of pixels the
+level with the least error against the reference is chosen, which no rule knows. The gain is the error of the best single
+level over the error of these choices. `fair` chooses by one seed and evaluates by another, like a rule that knows the
+errors as well as a render of this length does. `bound` chooses and evaluates by one seed, which overestimates the gain.
 
 Stores the figure `vcm_bandwidths`.
 """
@@ -25,24 +25,24 @@ OPTIONS = ["--method", "vcm", "--levels", str(LEVELS)]
 
 
 def blocks(errors, kept):
-    """Sums of errors (level, row, column) over the kept pixels of each block: (level, block)."""
+    """Sums of errors (level, row, column) over the kept pixels of each block, of shape (level, block)."""
     levels, height, width = errors.shape
     rows, columns = -(-height // options.block), -(-width // options.block)
-    room = np.zeros((levels, rows * options.block, columns * options.block))
-    room[:, :height, :width] = np.where(kept, errors, 0)
-    return room.reshape(levels, rows, options.block, columns, options.block).sum((2, 4)).reshape(levels, -1)
+    padded = np.zeros((levels, rows * options.block, columns * options.block))
+    padded[:, :height, :width] = np.where(kept, errors, 0)
+    return padded.reshape(levels, rows, options.block, columns, options.block).sum((2, 4)).reshape(levels, -1)
 
 
 def errors(layers, reference):
-    """Squared errors of the levels (level, row, column), relative; the halves' noise drops out on average."""
+    """Relative squared errors of the levels, of shape (level, row, column); the noise of the halves cancels on average."""
     pictures = [layers.get(f"Level{level + 1}").astype(float) for level in range(LEVELS)]
     halves = reference.halves
     return np.stack([((one - halves[0]) * (one - halves[1])).mean(-1) * reference.weight for one in pictures])
 
 
 def measure(found):
-    """Gains by renders of some seeds, errors of the levels each."""
-    # The pixels with the largest errors of any are left out, of all alike.
+    """The gains, from the errors of the levels for each seed."""
+    # All renders leave out the same pixels, those with the largest errors of any level and seed.
     worst = sum(np.nan_to_num(one, nan=np.inf).max(0) for one in found)
     kept = worst <= np.quantile(worst, 1 - TRIM)
     sums = [blocks(one, kept) for one in found]
@@ -68,7 +68,9 @@ def main():
     for scene, name, reference in speed_runs.with_references():
         try:
             seeds = range(1, options.seeds + 1)
-            found = [errors(Layers(one.done(scene, OPTIONS, seed) / "picture.exr"), reference) for seed in seeds]
+            found = [
+                errors(Layers(one.render_folder(scene, OPTIONS, seed) / "picture.exr"), reference) for seed in seeds
+            ]
         except speed_runs.Failed as failed:
             print(f"{name:<20}{failed}", flush=True)
             continue

@@ -1,35 +1,15 @@
-"""Tables of the documentation from stored figures: KINDS has a function for each, by the name that stands in a page.
+"""Tables of the documentation from stored figures: KINDS has a function for each, by the table's name in a page.
 
-A function takes `Figures` and returns Markdown. What it asks `Figures` for stands above its table as the source.
+A function takes `Figures` and returns Markdown. The figures that it uses are named above the table.
 """
 
-from . import (
-    accuracy_tables,
-    blender_tables,
-    comparisons_tables,
-    farms_tables,
-    finished_tables,
-    gallery_tables,
-    merits_tables,
-    rules_tables,
-    scaling_tables,
-    sizes_tables,
-    speed_tables,
-)
+import importlib
+from pathlib import Path
+
 from .stored import Figures
 
 _MODULES = (
-    accuracy_tables,
-    blender_tables,
-    comparisons_tables,
-    farms_tables,
-    finished_tables,
-    gallery_tables,
-    merits_tables,
-    rules_tables,
-    scaling_tables,
-    sizes_tables,
-    speed_tables,
+    importlib.import_module(f".{path.stem}", __name__) for path in sorted(Path(__file__).parent.glob("*_tables.py"))
 )
 KINDS = {name: table for module in _MODULES for name, table in module.KINDS.items()}
 

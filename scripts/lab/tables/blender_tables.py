@@ -1,10 +1,10 @@
-"""What export from Blender takes."""
+"""Time and size of exports from Blender."""
 
 from .markdown import table
 
 
 def export(figures):
-    """Seconds for scenes of many objects, by whether they share meshes."""
+    """Seconds for scenes of many objects, with shared and with separate meshes."""
     rows = []
     for one in figures.all("export"):
         rows.append(

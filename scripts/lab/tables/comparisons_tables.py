@@ -1,8 +1,8 @@
-"""Tables of methods beside each other, of what guides and effects bring, and of Mitsuba beside us."""
+"""Tables that compare methods, guided and unguided light paths, effects, Mitsuba, and a smaller program."""
 
 from .markdown import digits, table
 
-# In the order of the columns.
+# Effects in the order of the columns.
 EFFECTS = "emission direct indirect glossy caustic sds volume".split()
 EFFECTS += "dispersion depth_of_field environment alpha textures".split()
 
@@ -22,7 +22,7 @@ def equal_time(figures):
     runs = figures.all("equal-time")
     head, names = ["method"], [one["method"] for one in runs[0]["methods"]]
     for run in runs:
-        head += [f"{run['scene']}: relMSE", "trimmed", "core-s per million light paths", "eye paths"]
+        head += [f"{run['scene']}: relMSE", "trimmed", "core-s per million light paths", "camera paths"]
     rows = []
     for name in names:
         row = [name]
@@ -35,7 +35,7 @@ def equal_time(figures):
 
 
 def guide(figures):
-    """Trimmed relMSE without and with a guide, of the pairs of runs that are the set."""
+    """Trimmed relMSE without and with a guide, for the pairs of runs that the set names."""
     pairs = figures.of.split(",")
     head, rows = ["scene"], []
     for pair in pairs:
@@ -50,8 +50,9 @@ def guide(figures):
 
 
 def guided_layer(figures):
-    """relMSE of the layer Caustic by photons of caustics alone, seed by seed."""
-    head, rows = ["scene", "unguided", "guided, one light path a pixel", "guided, as many light paths as unguided"], []
+    """relMSE of the layer Caustic, seed by seed, if photons bring only caustics."""
+    head = ["scene", "unguided", "guided, one light path per pixel", "guided, with the unguided number of light paths"]
+    rows = []
     for of in figures.all("guide", having="caustics"):
         errors = of["caustics"]["errors"]
         runs = ("sppm", "sppm guided", "sppm guided, all paths")
@@ -60,23 +61,23 @@ def guided_layer(figures):
 
 
 def effects(figures):
-    """Core-seconds of an iteration with everything and without each effect, and the error of that in percent."""
+    """Core-seconds of an iteration with all effects and without each effect, and the error without it in per cent."""
     runs = figures.all("effects")
     names = [name for name in EFFECTS if any(name in run["effects"] for run in runs)]
     rows = []
     for run in runs:
-        told = [run["effects"].get(name) for name in names]
-        cells = [f"{of['seconds_without']:.3f}, {100 * of['error']:.2g}" if of else "" for of in told]
+        found = [run["effects"].get(name) for name in names]
+        cells = [f"{of['seconds_without']:.3f}, {100 * of['error']:.2g}" if of else "" for of in found]
         rows.append([run["scene"], f"{run['seconds']:.3f}", *cells])
     return table(["scene", "all", *(f"`{name}`" for name in names)], rows)
 
 
 def mitsuba(figures):
-    """Mean ratios of ours over Mitsuba's, and tiles that count and that are off."""
+    """Ratios of our means to Mitsuba's, and the numbers of tiles that count and that are off."""
     rows = [
         [
             of["scene"],
-            "with what they lack" if of["corrected"] else "as they are",
+            "corrected" if of["corrected"] else "unchanged",
             f"{of['mean_ratio']:.4f}",
             f"{of['tiles_sure']} of {of['tiles']}",
             str(of["tiles_off"]),
@@ -87,7 +88,8 @@ def mitsuba(figures):
 
 
 def smaller_program(figures):
-    """Time of the whole program over that of one without some effects, by scene and method; by halves of the runs."""
+    """Time of the whole program over the time of a program without some effects, by scene and method; in brackets for
+    either half of the runs."""
     ratios = {}
     for of in figures.one("bare")["rows"]:
         text = "{:.3f} ({:.3f}, {:.3f})".format(of["ratio"], *of["halves"])

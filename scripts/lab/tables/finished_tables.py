@@ -1,5 +1,6 @@
-"""Tables of delivered pictures at equal time, of a set of scenes."""
+"""Tables of finished pictures at equal time, for a set of scenes."""
 
+from .gallery_tables import NAMES
 from .markdown import digits, table
 
 GOALS = {
@@ -12,8 +13,8 @@ FIGURES = {"relmse_trimmed": "relMSE, trimmed", "relmse": "relMSE, all pixels", 
 
 
 def finished(figures):
-    """Trimmed relMSE of delivered pictures by scene and method, the peers' with OIDN, and auto over the best other: of
-    ours, and where there is none of theirs."""
+    """Trimmed relMSE of finished pictures by scene and method, of the peers' with OIDN, and the ratio of auto to the best
+    other of our methods (or to the best peer, if there is no other)."""
     values = figures.one("finished")
     trimmed = values["figures"].index("relmse_trimmed")
     cells = values["cells"]
@@ -27,13 +28,18 @@ def finished(figures):
         ratio = mine["auto"] / min(others) if "auto" in mine and others else None
         shown = [*map(mine.get, ours), *map(theirs.get, peers), ratio]
         rows.append([cell["scene"].split("/")[-1], *map(digits, shown)])
-    head = [f"scene, {cells[0]['budget']:g} s", *(f"`{name}`" for name in ours), *peers, "auto / best"]
+    head = [
+        f"scene, {cells[0]['budget']:g} s",
+        *(f"`{name}`" for name in ours),
+        *(NAMES[peer] for peer in peers),
+        "auto / best",
+    ]
     return table(head, rows)
 
 
 def goals(figures):
-    """Ratios of errors over all scenes of a set: geometric mean, worst, and how many are within the limit (1 unless
-    named)."""
+    """Ratios of errors over all scenes of a set: geometric mean, worst, and the number of scenes within the limit (1 by
+    default)."""
     rows = []
     values = figures.one("finished")
     several = len({method for cell in values["cells"] for method in cell["ours"]}) > 1

@@ -1,4 +1,4 @@
-"""All scenes beside other renderers: pictures and figures."""
+"""The gallery: all scenes by caustique and by other renderers."""
 
 import textwrap
 
@@ -17,10 +17,17 @@ NAMES = {
     "cycles_path": "Cycles, path",
     "cycles_guiding": "Cycles, path guiding",
 }
+# Notes of stored figures, in the words that the drivers use today.
+NOTES = {
+    "what lies below a shine is coupled to it in another way": "gloss is coupled with the layer below it by another model",
+    "the sun as a few pixels of the environment": "the sun is a few pixels of the environment",
+    "metals reflect by another Fresnel term than Schlick's": "the Fresnel term of metals is not Schlick's",
+    "a sun of some size before an image has no size": "a sun with a size becomes a point in front of an environment image",
+}
 
 
 def peers(figures):
-    """Ours over the others."""
+    """Our errors over those of the other renderers."""
     values = figures.one("peers")
     rows = []
     for peer, of in values["summary"].items():
@@ -29,10 +36,17 @@ def peers(figures):
     return table(["caustique over", "of", "geometric mean", "worst", "better on"], rows)
 
 
-def told(key):
-    """The name of a renderer for people; a key may have a word behind it: "cycles_path approximates"."""
+def title(key):
+    """The name of a renderer; a key may have a second word, as in "cycles_path approximates"."""
     peer, _, word = key.partition(" ")
     return f"{NAMES.get(peer, peer)} {word}".strip()
+
+
+def plain(note):
+    """A stored note in today's words."""
+    for old, new in NOTES.items():
+        note = note.replace(old, new)
+    return note
 
 
 def gallery(figures):
@@ -50,8 +64,8 @@ def gallery(figures):
             for peer, of in row["figures"].items()
         ]
         parts.append("\n".join(lines) + "\n" + table(head, cells))
-        said = (f"- {told(of)}: {note}" for of, note in row["notes"].items())
-        notes = [textwrap.fill(note, WIDTH, subsequent_indent="  ") for note in said]
+        items = (f"- {title(of)}: {plain(note)}" for of, note in row["notes"].items())
+        notes = [textwrap.fill(item, WIDTH, subsequent_indent="  ") for item in items]
         parts += ["\n".join(notes) + "\n"] if notes else []
     return "\n".join(parts)
 

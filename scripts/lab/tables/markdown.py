@@ -2,11 +2,11 @@
 
 
 def table(head, rows):
-    """Markdown of a table. `rows`: cells of text."""
+    """A table in Markdown, from the cells of its head and its rows."""
     lines = [head, ["---"] * len(head), *rows]
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
 def digits(value):
-    """Two significant digits, zeros among them; a dash for nothing."""
+    """A number with two significant digits, including zeros, or a dash for None."""
     return "-" if value is None else f"{value:#.2g}".rstrip(".")

@@ -1,37 +1,43 @@
-"""Squared errors times core-seconds: of this program beside an older one, beside other path tracers, and by photons; and
-what bandwidths of their own could bring to `vcm`."""
+"""Tables of squared errors times core-seconds: this program beside an older one and beside other path tracers, the effect
+of more photons, and the possible gain from local bandwidths in `vcm`."""
 
+from .gallery_tables import NAMES
 from .markdown import table
 
 
 def _ratio(row):
-    """A ratio; in brackets where a picture is not of the scene."""
+    """A ratio, in brackets if the mean of one of the pictures is not the reference's."""
     return f"({row['ratio']:.2f})" if row["strange"] else f"{row['ratio']:.2f}"
 
 
+def _title(name):
+    """The title of a method or of another renderer."""
+    return NAMES.get(name, f"`{name}`")
+
+
 def _by_scene(rows, key):
-    """A column for each value of a key, a row for each scene."""
+    """A table with a column for each value of a key, and a row for each scene."""
     columns = list(dict.fromkeys(row[key] for row in rows))
     found = {}
     for row in rows:
         found.setdefault(row["scene"], {})[row[key]] = _ratio(row)
-    head = ["scene", *(f"`{column}`" for column in columns)]
+    head = ["scene", *map(_title, columns)]
     return table(head, [[scene, *(of.get(column, "-") for column in columns)] for scene, of in found.items()])
 
 
 def before(figures):
-    """After over before, by scene and method."""
+    """This program over the older one, by scene and method."""
     return _by_scene(figures.one("speed")["rows"], "method")
 
 
 def peers(figures):
-    """Ours over theirs, by scene and peer."""
+    """Our path tracing over another renderer's, by scene and renderer."""
     return _by_scene(figures.one("speed-peers")["rows"], "peer")
 
 
 def _summary(values, first):
     rows = [
-        [f"`{name}`", f"{of['geometric_mean']:.2f}", f"{of['worst']:.2f} ({of['where']})", str(of["of"])]
+        [_title(name), f"{of['geometric_mean']:.2f}", f"{of['worst']:.2f} ({of['where']})", str(of["of"])]
         for name, of in values["summary"].items()
         if of
     ]
@@ -39,17 +45,17 @@ def _summary(values, first):
 
 
 def before_summary(figures):
-    """Geometric means and worst ratios, by method."""
+    """The geometric mean and the worst ratio, by method."""
     return _summary(figures.one("speed"), "method")
 
 
 def peers_summary(figures):
-    """Geometric means and worst ratios, by peer."""
+    """The geometric mean and the worst ratio, by renderer."""
     return _summary(figures.one("speed-peers"), "ours over")
 
 
 def photons(figures):
-    """What more photons gain, by set of scenes."""
+    """The gain from more photons, by set of scenes."""
 
     def cells(gain):
         return [f"{gain['geometric_mean']:.2f}", f"{gain['least']:.2f} ({gain['where']})", str(gain["of"])]
@@ -63,7 +69,7 @@ def photons(figures):
 
 
 def photons_by_scene(figures):
-    """What more photons gain, by scene."""
+    """The gain from more photons, by scene."""
     rows = figures.one("speed-photons")["rows"]
     counts = list(rows[0]["gains"])
     head = ["scene", *(f"{int(count):,} light paths" for count in counts)]
@@ -71,7 +77,7 @@ def photons_by_scene(figures):
 
 
 def vcm_bandwidths(figures):
-    """What the best bandwidth of each block gains over the best one for the picture, by scene."""
+    """The gain from the best bandwidth of each block over the best one of the picture, by scene."""
     values = figures.one("vcm_bandwidths")
     rows = [
         [row["scene"], str(row["best"]), f"{row['fair']:.2f}", f"{row['bound']:.2f}", f"{row['levels'][-1]:.2f}"]

@@ -1,11 +1,11 @@
-"""Tables of the progressive rules: rates, the chi-squared test, CPPM beside its paper."""
+"""Tables of the bandwidth rules: convergence rates, the chi-squared test, CPPM beside its paper."""
 
 from pathlib import PurePath
 
 from ..fit import fit
 from .markdown import digits, table
 
-# What falls, by rule and parameters: the figure that is fitted, and the exponent of theory.
+# The title, rule and parameters of a quantity, the key of the values to fit, and the theoretical exponent.
 EXPONENTS = [
     ("CPPM's bias at k = 0.8, beta = 1.2", "cppm, forced", {"beta": 1.2, "k": 0.8}, "bias_given", -0.55),
     ("CPPM's bias at beta = 1/k^2", "cppm, forced", {"beta": 1.5625, "k": 0.8}, "bias_given", -0.33),
@@ -17,33 +17,33 @@ EXPONENTS = [
 
 
 def slopes(figures):
-    """Exponents of N that were measured, with standard errors, beside those of theory."""
+    """The measured exponents of N, with standard errors, and the theoretical ones."""
     rows = []
-    for what, rule, parameters, key, theory in EXPONENTS:
+    for quantity, rule, parameters, key, theory in EXPONENTS:
         series = figures.one("slopes", rule=rule, parameters=parameters)["series"]
         exponent, error = fit(series, key)
-        # Given its bandwidths an expectation is known: no error of measurement.
+        # An expectation for given bandwidths is computed, so it has no standard error.
         noise = "" if key == "bias_given" else f" +- {error:.3f}"
-        rows.append([what, f"{exponent:.3f}{noise}", f"{theory:.2f}"])
-    return table(["what falls", "measured", "theory"], rows)
+        rows.append([quantity, f"{exponent:.3f}{noise}", f"{theory:.2f}"])
+    return table(["quantity", "measured", "theory"], rows)
 
 
 def size(figures):
-    """Percentage of trials in which uniform photons are rejected, by their number."""
+    """The percentage of trials that reject uniform photons, by number of photons."""
     found = figures.one("cppm-rule")["size"]
     cells = [f"{100 * share:.1f}" for _, share, _ in found]
     return table(["photons", *(f"{count:,}" for count, *_ in found)], [["rejected, %", *cells]])
 
 
 def looks(figures):
-    """Percentage of uniform pixels that have shrunk at least once, by iterations."""
+    """The percentage of uniform pixels whose bandwidth has shrunk at least once, by number of iterations."""
     found = figures.one("cppm-rule")["looks"]["rejected"]
     cells = [f"{100 * share:.0f}" for _, share in found]
     return table(["iterations", *(f"{count:,}" for count, _ in found)], [["shrunk at least once, %", *cells]])
 
 
 def cost(figures):
-    """What the rule adds to an iteration, with intervals of 95 %."""
+    """The relative cost of the rule in an iteration, with 95 % intervals."""
     added = {}
     for one in figures.one("cppm-rule")["cost"]:
         low, high = one["rule_percent_95"]
@@ -53,7 +53,7 @@ def cost(figures):
 
 
 def race(figures):
-    """SPPM's errors, and iterations (core-seconds) that APPM and CPPM need to get there, in percent of SPPM's."""
+    """SPPM's errors, and the iterations (core-seconds) in which APPM and CPPM reach them, in per cent of SPPM's."""
 
     def needed(run, of, method):
         if not of[method]["reached"]:
@@ -73,7 +73,7 @@ def race(figures):
 
 
 def parameters(figures):
-    """Squared error on a screen by CPPM's parameters over that of the paper's, with standard errors."""
+    """The squared error on a screen by CPPM's parameters, relative to the paper's parameters, with standard errors."""
     runs = figures.all("cppm-parameters")
     shown = {run["scene"]: {} for run in runs}
     for run in runs:

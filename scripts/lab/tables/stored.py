@@ -1,4 +1,4 @@
-"""What lab/record.py has stored, and where it comes from."""
+"""The figures that lab/record.py has stored, and their commits and machines."""
 
 import json
 import textwrap
@@ -9,11 +9,11 @@ WIDTH = 120
 
 
 class Missing(Exception):
-    """A table asks for a figure that is not stored."""
+    """A table needs a figure that is not stored."""
 
 
 class Figures:
-    """The stored figures of one set, None where figures have no sets; keeps in mind which of them a table has used."""
+    """The stored figures of one set (None for figures without sets); remembers the figures that a table uses."""
 
     def __init__(self, of=None, file=RESULTS):
         self.of = of
@@ -21,10 +21,7 @@ class Figures:
         self.used = []
 
     def all(self, name, having=None, **known):
-        """Values of all figures of a name that agree with what is known of their values, sorted by scene.
-
-        `having`: a key that they must have.
-        """
+        """The values of all figures of a name whose values contain `known` and have the key `having`, sorted by scene."""
         known["set"] = self.of
         found = [row for row in self.rows if row["name"] == name and (having is None or having in row["values"])]
         found = [row for row in found if all(row["values"].get(key) == value for key, value in known.items())]
@@ -34,14 +31,14 @@ class Figures:
         return sorted((row["values"] for row in found), key=lambda values: values.get("scene", ""))
 
     def one(self, name, **known):
-        """Values of the figure that was stored last."""
+        """The values of the only figure of a name whose values contain `known`."""
         values = self.all(name, **known)
         if len(values) > 1:
             raise Missing(f"{len(values)} figures {name!r} with {known} are stored, not one")
         return values[0]
 
     def source(self):
-        """Commit, date and machine of what was used: one line, or where there are several a list with what is whose."""
+        """Commit, date and machine of the figures in use: one line, or a list of figures if they differ."""
         names = {}
         for row in self.used:
             of = names.setdefault(origin(row), [])
@@ -53,11 +50,11 @@ class Figures:
 
 
 def origin(row):
-    """Commit, date and machine of a figure."""
+    """Commit, date and machine of a stored figure."""
     commit, _, dirty = row["commit"].partition("-")
     machine = row["machine"]
     return (
         f"commit {commit[:10]}{' with uncommitted changes' if dirty else ''}, {row['date'][:10]}, "
         f"{machine['cores']} cores of {machine['cpu']}, {machine['memory_gib']:g} GiB, {machine['system']}"
-        f"{', carried over from what was printed' if row.get('carried') else ''}"
+        f"{', copied from printed output' if row.get('carried') else ''}"
     )

@@ -1,1 +1,1 @@
-"""Training of the network that combines the levels; see README.md."""
+"""Training of the network that combines the levels (README.md)."""

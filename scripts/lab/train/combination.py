@@ -1,4 +1,4 @@
-"""Equation (6) of [Choi and Moon 2021], differentiable; the twin of src/combine/{affinity,kernel}.rs.
+"""Equation (6) of [Choi and Moon 2021], differentiable; it must agree with src/combine/{affinity,kernel}.rs.
 
 y_c = 1/W sum_j sum_{i in window} w_i^j (y_i + z_c^j - z_i^j),   y = level 1, z^j = level j + 1
 """
@@ -10,7 +10,7 @@ from torch.utils.checkpoint import checkpoint
 # Largest exponent of an affinity, and bounds of the logarithms: they keep every weight positive in float32.
 MAX_DISTANCE = 60.0
 MAX_LOG_WEIGHT = 12.0
-# Falloff at most 1: a narrower window would be the centre alone, where the gradient vanishes and training ends.
+# The falloff is at most 1: with a larger one only the centre would count, and the gradient would vanish.
 LOG_FALLOFF = (-20.0, 0.0)
 
 
@@ -25,12 +25,12 @@ def combine(output, levels, kind, window, features=0):
     else:
         total = sums = 0
         for dy in range(window):
-            # A row of the window at a time, recomputed in the backward pass: 1444 weights a pixel do not fit otherwise.
+            # Rows of the window are recomputed in the backward pass, because 1444 weights per pixel do not fit in memory.
             w, s = checkpoint(
                 weight_rows, dy, window, difference, output, use_reentrant=False, preserve_rng_state=False
             )
             total, sums = total + w, sums + s
-    # sums: weighted y_i - z_i; the centre's z joins them with the pair's whole weight.
+    # The sums contain the weighted y_i - z_i; z_c is added with the total weight of its pair.
     value = (sums + levels[:, 1:] * total.unsqueeze(2)).sum(1)
     return value / total.sum(1, keepdim=True)
 
@@ -45,7 +45,7 @@ def split_features(output, pairs, features):
 
 
 def shifted(x, dy, dx, r):
-    """x at i = c + (dx - r, dy - r); the caller has padded x by r on the last two axes."""
+    """x at i = c + (dx - r, dy - r), where x is padded by r on the last two axes."""
     h, w = x.shape[-2] - 2 * r, x.shape[-1] - 2 * r
     return x[..., dy : dy + h, dx : dx + w]
 
@@ -53,8 +53,9 @@ def shifted(x, dy, dx, r):
 class AffinitySums(torch.autograd.Function):
     """Sums over the window of w_i and of w_i d_i, w_i = weight_i exp(-falloff_c |c - i|^2 - |phi_c - phi_i|^2).
 
-    phi [b, j, f, h, w]; weight, falloff [b, j, h, w]; difference d [b, j, 3, h, w], not differentiated. Derivatives by
-    hand, weights recomputed: automatic ones would keep 1444 weights a pixel, and are several times slower.
+    Shapes: phi [b, j, f, h, w]; weight, falloff [b, j, h, w]; difference d [b, j, 3, h, w], which is not
+    differentiated. The derivatives are explicit and recompute the weights: automatic differentiation would keep 1444
+    weights per pixel, and is several times slower.
     """
 
     @staticmethod
@@ -62,7 +63,7 @@ class AffinitySums(torch.autograd.Function):
         ctx.save_for_backward(phi, weight, falloff, difference)
         ctx.window = window
         r = window // 2
-        # Outside the image a source has no weight at all: windows are clipped.
+        # Sources outside the image have no weight, so windows are clipped.
         phi_p, weight_p, d_p = (pad(x, [r] * 4) for x in (phi, weight, difference))
         total, sums = torch.zeros_like(weight), torch.zeros_like(difference)
         for dy, dx in offsets(window):
@@ -81,7 +82,7 @@ class AffinitySums(torch.autograd.Function):
         for dy, dx in offsets(ctx.window):
             a, step, cut = affinity(phi, phi_p, falloff, dy, dx, r)
             w_grad = (sums_grad * shifted(d_p, dy, dx, r)).sum(2).add_(total_grad)
-            a_grad = w_grad.mul_(a)  # with respect to the source's weight; times that weight: to minus the distance
+            a_grad = w_grad.mul_(a)  # The gradient of the source's weight; times that weight, of minus the distance.
             shifted(weight_p_grad, dy, dx, r).add_(a_grad)
             minus = (a_grad * shifted(weight_p, dy, dx, r)).masked_fill_(cut, 0)
             falloff_grad.sub_(minus, alpha=squared_length(dy, dx, r))
@@ -101,7 +102,7 @@ def squared_length(dy, dx, r):
 
 
 def affinity(phi, phi_p, falloff, dy, dx, r):
-    """exp(-distance), phi_c - phi_i, and where the distance is cut at its maximum."""
+    """exp(-distance), phi_c - phi_i, and a mask of distances that are clamped to the maximum."""
     step = phi - shifted(phi_p, dy, dx, r)
     distance = step.square().sum(2).add_(falloff, alpha=squared_length(dy, dx, r))
     cut = distance > MAX_DISTANCE

@@ -1,8 +1,8 @@
-"""Training crops on disk: small, and free of light and scene units.
+"""Training crops on disk, independent of the units of light and length.
 
-Every crop is scaled by the exposure and the median depth of the whole image that it comes from, so that it can stand
-for its part of that image; variances are averaged over RGB and kept as deviations; all is float16 (relative error
-0.0005, far below the noise). Files are named SCENE--VARIANT-ANYTHING.npz.
+Crops are scaled by the exposure and the median depth of their whole image, as in inference. Variances are averaged over
+RGB and stored as standard deviations. All values are float16, whose relative error of 0.0005 is far below the noise.
+Files are named SCENE--VARIANT-ANYTHING.npz.
 """
 
 import pathlib
@@ -11,14 +11,15 @@ import numpy as np
 
 from . import normalise
 
-# Scenes never trained on.
+# Scenes without training data.
 HELD_OUT = ("gems", "lamp")
 
-LARGEST = 6e4  # float16 ends at 65504
+LARGEST = 6e4  # below float16's maximum, 65504
 
 
 def save(path, stack, box=None):
-    """Write the part `box` = (y0, x0, side) of a stack (see normalise.py) with its `reference`; False if it is unfit."""
+    """Write the part `box` = (y0, x0, side) of a stack (see normalise.py) with its `reference`; returns False if its values
+    are not finite or too large."""
     scale, middle = normalise.exposure(stack["levels"]), normalise.median_depth(stack["depth"])
     y, x, side = box or (0, 0, None)
     cut = np.s_[..., y : y + side, x : x + side] if side else np.s_[...]
@@ -50,7 +51,7 @@ def load(path):
 
 
 def files(folder):
-    """{scene: [files]} of SCENE--VARIANT-ANYTHING.npz, sorted."""
+    """The sorted crops of a folder, {scene: [files]}."""
     scenes = {}
     for file in sorted(pathlib.Path(folder).glob("*.npz")):
         scenes.setdefault(file.stem.split("--")[0], []).append(file)
@@ -58,7 +59,8 @@ def files(folder):
 
 
 def held_out(scenes, names):
-    """{scene: [files]} never to train on: all of the scenes `names`, and variant 0 (the scene as it is) of every other."""
+    """The crops that training must not use, {scene: [files]}: all of the scenes `names`, and variant 0 (the unchanged
+    scene) of every other scene."""
     chosen = {
         s: [f for f in files if s in names or f.stem.split("--")[1].split("-")[0] == "0"] for s, files in scenes.items()
     }

@@ -1,15 +1,17 @@
-"""Make training crops by rendering: noisy stacks of levels and their references.
+"""Render training crops: noisy stacks of levels and their references.
 
-  python data.py --caustique ../../target/release/caustique -o DIR ../../scenes/*.glb
+  python -m lab.train.data --caustique target/release/caustique -o DIR scenes/*.glb
 
-Each scene is varied (camera moved, turned and zoomed, materials and lights scaled), as [Choi and Moon 2021, 4.3] do; variant 0
-is the scene itself and held out from training. Each variant is rendered with many iterations for the reference and --renders
-times with few, each with a seed of its own. Photons an iteration are drawn per pixel, around the papers' 100,000 for
-1280 x 720, so that small pictures have the density of large ones; zoomed by z, as many more as a crop of a picture z times as
-wide would have. Run again to go on: finished variants are skipped.
+Each scene is varied as in [Choi and Moon 2021, 4.3]: the camera is moved, rotated and zoomed, materials and lights are
+scaled. Variant 0 is the unchanged scene, which training does not use. Each variant is rendered once with many iterations
+for the reference, and --renders times with few, with different seeds. The number of photons per iteration is random,
+around the papers' 100,000 for 1280 x 720, in proportion to the pixels, so that small pictures have the density of large
+ones. A zoom by z multiplies it by z^2, as for a crop of a picture z times as wide. A repeated command continues: finished
+variants are skipped.
 
-The reference is the mean of two renders with one small bandwidth (k = 5, six times the photons); half their difference is its noise,
-which references.jsonl keeps as a relMSE. Its bandwidth is not zero, so a part of Level1's small bias is in it too.
+The reference is the mean of two renders with a small bandwidth (k = 5, six times the photons). Half of their difference
+is its noise, which references.jsonl stores as a relMSE. Because its bandwidth is not zero, it has a part of the small
+bias of Level1.
 """
 
 import argparse
@@ -25,9 +27,10 @@ import OpenEXR
 
 from . import crops
 from . import normalise
+from ..commands import command
 
 PAPER_PHOTONS_PER_PIXEL = 100_000 / (1280 * 720)
-# Of references, times the papers' density.
+# Photons per pixel of references, relative to the papers.
 REFERENCE_DENSITY = 6
 REFERENCE_KNN = 5
 
@@ -70,7 +73,7 @@ def rotate(q, v):
 
 
 def vary(scene, rng, folder):
-    """Change a glTF scene in place: cameras, surfaces, and lights against each other; returns the zoom of the cameras."""
+    """Change the cameras, surfaces and relative light strengths of a glTF scene in place; returns the cameras' zoom."""
     zoom = float(np.exp(rng.uniform(0, np.log(3))))
     for camera in scene.get("cameras", []):
         if "perspective" in camera:
@@ -108,29 +111,19 @@ def vary(scene, rng, folder):
     return zoom
 
 
-def render(args, scene, out, *options):
-    size = ["--width", str(args.width), "--height", str(args.height)]
-    size += ["--threads", str(args.threads)] if args.threads else []
-    command = [
-        args.caustique,
-        "render",
-        str(scene),
-        "-o",
-        str(out),
-        "--no-combine",
-        "--progress",
-        "none",
-        *size,
-        *options,
-    ]
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+def render(args, scene, out, **options):
+    """Render by sppm without a finish; returns whether the program succeeded, and prints its error."""
+    size = {"width": args.width, "height": args.height, "threads": args.threads or None}
+    words = ["render", scene, "-o", out]
+    line = command(*words, program=args.caustique, method="sppm", **size, **options, no_combine=True, progress="none")
+    done = subprocess.run(line, capture_output=True, text=True)
     if done.returncode != 0:
         print(f"{scene.name}: {done.stderr.strip()}", file=sys.stderr)
     return done.returncode == 0
 
 
 def layers(path, names):
-    """{name: [h, w, channels]} of layers such as Level1.RGB; the beauty is RGB alone."""
+    """Layers of an EXR as {name: [h, w, channels]}, by names such as Level1.RGB; RGB is the beauty."""
     channels = OpenEXR.File(str(path), separate_channels=True).channels()
     get = lambda layer, c: channels[f"{layer}.{c}" if layer else c].pixels.astype(np.float32)
     return {
@@ -153,7 +146,7 @@ def read_stack(path, levels):
 
 
 def boxes(stack, side, count, rng):
-    """Crops where levels disagree or the reference has structure, more often than where all is smooth."""
+    """Random crops, with a higher probability where the levels differ."""
     _, h, w, _ = stack["levels"].shape
     side = min(side, h, w) // 4 * 4
     corners = [
@@ -176,44 +169,36 @@ def arguments():
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
     parser.add_argument("--caustique", default="caustique", help="the program")
     parser.add_argument(
-        "--variants", type=int, nargs="+", default=list(range(6)), help="numbers; 0 is the scene itself"
+        "--variants", type=int, nargs="+", default=list(range(6)), help="numbers of variants; 0 is the unchanged scene"
     )
-    parser.add_argument("--renders", type=int, default=6, help="noisy renders of each variant")
+    parser.add_argument("--renders", type=int, default=6, help="number of noisy renders per variant")
     parser.add_argument(
-        "--iterations", type=int, nargs="+", default=[16, 32, 64, 128, 256], help="of noisy renders, in turn"
+        "--iterations",
+        type=int,
+        nargs="+",
+        default=[16, 32, 64, 128, 256],
+        help="iterations of the noisy renders, in turn",
     )
-    parser.add_argument("--reference-iterations", type=int, default=4096, help="of both its renders together")
-    parser.add_argument("--threads", type=int, default=0, help="of the renderer; 0: all")
+    parser.add_argument(
+        "--reference-iterations", type=int, default=4096, help="total iterations of the two reference renders"
+    )
+    parser.add_argument("--threads", type=int, default=0, help="threads of the program; 0 uses all cores")
     parser.add_argument("--width", type=int, default=384)
     parser.add_argument("--height", type=int, default=256)
     parser.add_argument("--levels", type=int, default=5)
-    parser.add_argument("--side", type=int, default=128, help="of crops; 0: whole pictures")
-    parser.add_argument("--crops", type=int, default=3, help="of each noisy render")
+    parser.add_argument("--side", type=int, default=128, help="pixels of a crop's side; 0 stores whole pictures")
+    parser.add_argument("--crops", type=int, default=3, help="number of crops per noisy render")
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args()
 
 
 def varied_scene(args, path, varied, exr, rng, tries=8):
-    """Write a variant in which there is light to see (a camera may move into a wall); returns its zoom, or None."""
+    """Write a variant whose picture is not black (a camera may move into a wall); returns its zoom, or None."""
     for _ in range(tries):
         scene, rest = read_glb(path)
         zoom = vary(scene, rng, path.parent)
         write_glb(varied, scene, rest)
-        if render(
-            args,
-            varied,
-            exr,
-            "--method",
-            "sppm",
-            "--levels",
-            1,
-            "--layers",
-            "beauty",
-            "--iterations",
-            4,
-            "--photons",
-            2000,
-        ):
+        if render(args, varied, exr, levels=1, layers="beauty", iterations=4, photons=2000):
             if (layers(exr, ["RGB"])["RGB"] > 0).mean() > 0.6:
                 return zoom
     print(f"{path.stem}: {tries} variants were black", file=sys.stderr)
@@ -221,7 +206,7 @@ def varied_scene(args, path, varied, exr, rng, tries=8):
 
 
 def variant(args, path, index):
-    """Render one variant of a scene and write its crops; returns how many, or None without a reference."""
+    """Render a variant of a scene and write its crops; returns their number, or None if there is no reference."""
     rng = np.random.default_rng([args.seed, index, *path.stem.encode()])
     work = args.output / "work"
     work.mkdir(parents=True, exist_ok=True)
@@ -234,26 +219,10 @@ def variant(args, path, index):
             return None
     photons = lambda density: max(1000, round(density * PAPER_PHOTONS_PER_PIXEL * zoom**2 * args.width * args.height))
     halves = []
+    settings = {"levels": 1, "knn": REFERENCE_KNN, "layers": "beauty", "photons": photons(REFERENCE_DENSITY)}
+    settings["iterations"] = args.reference_iterations // 2
     for half in range(2):
-        if not render(
-            args,
-            varied,
-            exr,
-            "--method",
-            "sppm",
-            "--levels",
-            1,
-            "--knn",
-            REFERENCE_KNN,
-            "--layers",
-            "beauty",
-            "--iterations",
-            args.reference_iterations // 2,
-            "--photons",
-            photons(REFERENCE_DENSITY),
-            "--seed",
-            10_000 + 2 * index + half,
-        ):
+        if not render(args, varied, exr, **settings, seed=10_000 + 2 * index + half):
             return None
         halves.append(layers(exr, ["RGB"])["RGB"])
     reference = (halves[0] + halves[1]) / 2
@@ -270,23 +239,8 @@ def variant(args, path, index):
     for k in range(args.renders):
         density = np.exp(rng.uniform(np.log(0.5), np.log(2))) if index else 1.0
         iterations = args.iterations[k % len(args.iterations)]
-        if not render(
-            args,
-            varied,
-            exr,
-            "--method",
-            "sppm",
-            "--levels",
-            args.levels,
-            "--layers",
-            "all",
-            "--seed",
-            1000 * index + k + 1,
-            "--iterations",
-            iterations,
-            "--photons",
-            photons(density),
-        ):
+        settings = {"levels": args.levels, "layers": "all", "iterations": iterations, "photons": photons(density)}
+        if not render(args, varied, exr, **settings, seed=1000 * index + k + 1):
             continue
         stack = read_stack(exr, args.levels) | {"reference": reference}
         parts = boxes(stack, args.side, args.crops, rng) if args.side else [None]

@@ -1,8 +1,9 @@
-"""relMSE (and trimmed relMSE) of the combined image against every level, scene by scene.
+"""relMSE (and trimmed relMSE) of the combined image and of every level, scene by scene.
 
-  python evaluate.py --checkpoint RUN/last.pt --data DIR [--all]
+  python -m lab.train.evaluate --checkpoint RUN/last.pt --data DIR [--all]
 
-Without --all only what training held out, a row for each picture and number of iterations. Level4 of five is what `Noisy` shows: the usual single bandwidth.
+Without --all, only crops that training did not use, with a row for each picture and number of iterations. Level4 of five
+is the layer `Noisy`, the image of the default single bandwidth.
 """
 
 import argparse
@@ -16,7 +17,7 @@ from . import export_network
 
 
 def relmse(image, reference):
-    """Per pixel mean over RGB of (x - r)^2 / (mean_RGB(r)^2 + 0.01)."""
+    """For each pixel, the mean over RGB of (x - r)^2 / (mean_RGB(r)^2 + 0.01)."""
     return ((image - reference).square().mean(1) / (reference.mean(1).square() + 0.01)).flatten()
 
 
@@ -39,8 +40,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--checkpoint", required=True)
     parser.add_argument("--data", required=True)
-    parser.add_argument("--held-out", nargs="*", default=crops.HELD_OUT, help="as train.py was told")
-    parser.add_argument("--all", action="store_true", help="scenes that it was trained on too")
+    parser.add_argument("--held-out", nargs="*", default=crops.HELD_OUT, help="the value of train.py's --held-out")
+    parser.add_argument("--all", action="store_true", help="also evaluate crops that training used")
     args = parser.parse_args()
     net, _ = export_network.load(args.checkpoint)
     net.eval()
@@ -62,7 +63,7 @@ def main():
 
 
 def group(scenes):
-    """{what a row shows: [files]}: data.py's names begin SCENE--VARIANT-ITERATIONS."""
+    """The files of each row by its title, from names SCENE--VARIANT-ITERATIONS-... (data.py)."""
     rows = {}
     for name, files in scenes.items():
         for file in files:

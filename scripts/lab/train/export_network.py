@@ -1,7 +1,7 @@
 """Write a network as ONNX with the metadata that src/combine/model.rs reads.
 
-python export.py --checkpoint run/last.pt -o ../../src/combine/models/compact.onnx
-python export.py --arch compact --seed 1 -o untrained.onnx
+python -m lab.train.export_network --checkpoint RUN/last.pt -o src/combine/models/compact.onnx
+python -m lab.train.export_network --arch compact --seed 1 -o untrained.onnx
 """
 
 import argparse
@@ -55,7 +55,7 @@ def load(path):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--checkpoint", help="made by train.py; without it the network is untrained")
+    parser.add_argument("--checkpoint", help="checkpoint of train.py; without it the network is untrained")
     parser.add_argument("--arch", choices=["compact", "paper"], default="compact")
     parser.add_argument("--levels", type=int, default=5)
     parser.add_argument("--window", type=int, default=model.WINDOW)

@@ -1,8 +1,8 @@
-"""Write src/combine/testdata/contract.f32, which holds Rust and Python to the same combiner.
+"""Write src/combine/testdata/contract.f32, with which tests compare the combiners of Rust and Python.
 
-Little-endian float32: m, h, w, F, K; the stack (levels, variances, albedo, normal, depth); the network's input; random
-features and equation (6) with them (window 15); the shipped network's image; then, for the top left h/2 x w/2 pixels,
-random explicit weights of a window of K and equation (6) with them.
+Its content is little-endian float32: m, h, w, F, K; the stack (levels, variances, albedo, normal, depth); the network's
+input; random features and the result of equation (6) with them (window 15); the shipped network's image; then, for the
+top left h/2 x w/2 pixels, random explicit weights of a window of K and the result of equation (6) with them.
 """
 
 import argparse
@@ -24,7 +24,9 @@ H, W, K = 16, 22, 5
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--checkpoint", help="of the shipped network; without it the untrained one of export.py")
+    parser.add_argument(
+        "--checkpoint", help="checkpoint of the shipped network; without it, the untrained network of export_network.py"
+    )
     args = parser.parse_args()
     whole = synthetic.stack(7)
     crop = {

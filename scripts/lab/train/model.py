@@ -1,8 +1,8 @@
 """The networks that choose the weights of [Choi and Moon 2021, equation (6)].
 
-`Compact` gives per pixel and level pair a point phi in a small feature space and three scalars; combination.py makes the
-pairwise weights of equation (6) from them. `Paper` is the paper's own kernel-predicting network: ten 5x5 convolutions of
-50 filters and a weight for every pixel of the window and level pair.
+For each pixel and level pair, `Compact` computes a point phi in a small feature space and three scalars, from which
+combination.py computes the pairwise weights of equation (6). `Paper` is the paper's kernel-predicting network: ten 5x5
+convolutions of 50 filters, and a weight for every pixel of the window and level pair.
 """
 
 import torch
@@ -10,7 +10,7 @@ from torch import nn
 
 from . import normalise
 
-# The paper's is 19, at 1.6 times the cost.
+# The paper's window is 19, at 1.6 times the cost.
 WINDOW = 15
 FEATURES = 4
 # Bound of the logarithms of explicit weights: keeps every sum of weights well inside float32.
@@ -33,11 +33,10 @@ class Block(nn.Module):
 
 
 class Compact(nn.Module):
-    """A U-Net at full, half and quarter resolution, its skips added; 0.07 MFLOP a pixel.
+    """A U-Net at full, half and quarter resolution with added skips; 0.07 MFLOP per pixel.
 
-    Widths are multiples of 16, which ONNX Runtime's convolutions like.
-
-    Its output, [b, (levels - 1) (features + 3), h, w], holds for all pairs phi, then source, centre and log falloff.
+    Widths are multiples of 16, for which ONNX Runtime's convolutions are fast. The output, of shape
+    [b, (levels - 1) (features + 3), h, w], has phi of all pairs, then source, centre and log falloff.
     """
 
     kind, output = "features", "features"
@@ -56,11 +55,11 @@ class Compact(nn.Module):
             Block(quarter, quarter),
             Block(quarter, quarter),
         )
-        # Narrowed before it is enlarged: a 1x1 convolution commutes with nearest-neighbour enlargement.
+        # A 1x1 convolution commutes with nearest-neighbour enlargement, so it comes first.
         self.up1, self.dec1 = conv(quarter, half, 1), Block(half, half)
         self.up0, self.skip0, self.dec0 = conv(half, last, 1), conv(full, last, 1), conv(last, last)
         self.head = conv(last, (levels - 1) * (features + 3), 1)
-        # Begin as a filter of about a pixel: near the best level already, and wide enough to learn from.
+        # The initial filter is about a pixel wide: close to the best level, and wide enough for gradients.
         pairs = levels - 1
         with torch.no_grad():
             self.head.bias.zero_()
@@ -77,7 +76,7 @@ class Compact(nn.Module):
 
 
 class Paper(nn.Module):
-    """[Choi and Moon 2021, 4.3]: ten convolutions, 2.4 M parameters, 4.7 MFLOP a pixel."""
+    """[Choi and Moon 2021, 4.3]: ten convolutions, 2.4 M parameters, 4.7 MFLOP per pixel."""
 
     kind, output = "weights", "weights"
     stride = 1

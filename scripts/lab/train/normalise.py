@@ -1,19 +1,19 @@
-"""The network's input tensor, version 1: the Python twin of src/combine/tensor.rs.
+"""The network's input tensor, version 1; it must agree with src/combine/tensor.rs.
 
 A stack is a dict of float32 arrays, rows from the top:
   levels     [m, h, w, 3]  scene-linear radiance, smallest bandwidth first
   variances  [m, h, w, 3]  variance of the mean of each level
   albedo [h, w, 3], normal [h, w, 3], depth [h, w]
-Both files must agree: tests/data of src/combine/fixture holds them together.
+A test compares both files by the data of fixture.py.
 """
 
 import numpy as np
 
 VERSION = 1
 CHANNELS_WITHOUT_LEVELS = 7
-# Deviations below this, in tone-mapped units, are all "no noise".
+# Standard deviations below this, in tone-mapped units, count as no noise.
 DEVIATION_FLOOR = np.float32(1e-3)
-# Depth from here on is background (the EXR writes 1e10).
+# Larger depths are background (the EXR has 1e10 there).
 BACKGROUND_DEPTH = np.float32(1e9)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
@@ -27,10 +27,10 @@ def finite(x):
 
 
 def exposure(levels):
-    """Reciprocal of a robust mean luminance of the smoothest level, so that light units do not matter.
+    """The reciprocal of a robust mean luminance of the smoothest level, which makes the input independent of light units.
 
-    The mean leaves out black pixels (how much background a picture has should not matter) and the brightest
-    hundredth (a firefly should not either).
+    The mean leaves out black pixels, so that the amount of background does not matter, and the brightest hundredth,
+    which may be fireflies.
     """
     luminance = finite(levels[-1]).astype(np.float32) @ LUMINANCE
     lit = np.sort(luminance[(luminance > 0) & np.isfinite(luminance)], axis=None)
@@ -45,12 +45,12 @@ def median_depth(depth):
 
 
 def tensor(stack, scale=None, middle=None):
-    """[4 m + 7, h, w] float32. `scale` and `middle` come from the whole image when `stack` is a crop of it."""
+    """The input, float32 of shape [4 m + 7, h, w]. For a crop, `scale` and `middle` are those of the whole image."""
     levels = finite(stack["levels"]).astype(np.float32)
     scale = exposure(stack["levels"]) if scale is None else np.float32(scale)
     middle = median_depth(stack["depth"]) if middle is None else middle
     bright = np.maximum(levels, 0) * scale
-    # The deviation of log(1 + x): that of x over 1 + x, on a logarithmic scale.
+    # The standard deviation of log(1 + x) is the one of x over 1 + x; it is mapped to a logarithmic scale.
     variance = np.maximum(finite(stack["variances"]), 0).mean(axis=-1)
     deviation = np.sqrt(variance) * scale / (1 + bright.mean(axis=-1))
     floor = np.log(DEVIATION_FLOOR)

@@ -1,10 +1,10 @@
-"""Stacks of levels made without a renderer: photons in the image plane.
+"""Synthetic stacks of levels: photons in the image plane, without a renderer.
 
-A caustic is where a wavy surface sends photons: points of a plane, each moved along the slope of a random height field,
-counted per pixel. A picture is albedo x (caustic + smooth light) over a few flat regions; its levels are what progressive
-photon mapping would give: Poisson counts of a finite number of photons, averaged over discs whose radii differ by
-sqrt(2), with the noise of the eye paths drawn once for level 1 and once more for all other levels. No occlusion, no
-kernels cut by edges, no glossy transport: enough to exercise training and to start from, no substitute for renders.
+A caustic is the density of photons refracted by a wavy surface: points of a plane, displaced by the slope of a random
+height field and counted per pixel. A picture is albedo x (caustic + smooth light) over a few flat regions. Its levels
+imitate progressive photon mapping: Poisson counts of photons, averaged over discs whose radii differ by sqrt(2). The
+noise of the camera paths is drawn once for level 1 and once for all other levels. Occlusion, kernels cut off at edges
+and glossy transport are missing, so such data can only start a training.
 """
 
 import argparse
@@ -20,13 +20,13 @@ BATCHES = 8
 
 
 def smooth_noise(rng, size, cells):
-    """[size, size] of about unit deviation, varying over size / cells pixels."""
+    """Smooth noise [size, size] of about unit standard deviation, which varies over size / cells pixels."""
     coarse = torch.from_numpy(rng.standard_normal((1, 1, cells + 3, cells + 3)).astype(np.float32))
     return interpolate(coarse, (size, size), mode="bicubic", align_corners=True)[0, 0].numpy()
 
 
 def caustic(rng, size, per_pixel=256):
-    """Irradiance of a plane lit through a wavy surface, mean about 1."""
+    """The irradiance [size, size] of a plane lit through a wavy surface; its mean is about 1."""
     height = sum(smooth_noise(rng, size, int(c)) * w for c, w in zip(rng.integers(3, 14, 2), (1.0, 0.4)))
     slope_y, slope_x = np.gradient(height)
     strength = rng.uniform(5, 60)
@@ -44,7 +44,7 @@ def caustic(rng, size, per_pixel=256):
 
 
 def regions(rng, size):
-    """Labels of a few cells with straight edges."""
+    """The labels [size, size] of a few cells with straight edges, and their number."""
     centres = rng.uniform(0, size, (rng.integers(1, 8), 2))
     y, x = np.mgrid[:size, :size]
     return np.argmin([(x - cx) ** 2 + (y - cy) ** 2 for cx, cy in centres], axis=0), len(centres)
@@ -52,7 +52,7 @@ def regions(rng, size):
 
 def disc(radius):
     r = int(np.ceil(radius))
-    # Coverage of each pixel by the disc, from 5x5 points.
+    # The coverage of each pixel by the disc, from 5x5 points.
     p = (np.arange((2 * r + 1) * 5) + 0.5) / 5 - 0.5 - r
     inside = (p[:, None] ** 2 + p[None] ** 2 < radius**2).astype(np.float32)
     kernel = inside.reshape(2 * r + 1, 5, 2 * r + 1, 5).mean((1, 3))
@@ -67,7 +67,7 @@ def blur(images, radius):
 
 
 def stack(seed, size=128, levels=5):
-    """A stack as normalise.py describes it, and its `reference` [h, w, 3]."""
+    """A stack (see normalise.py) with its `reference` [h, w, 3]."""
     rng = np.random.default_rng(seed)
     label, count = regions(rng, size)
     pick = lambda low, high, *shape: rng.uniform(low, high, (count, *shape)).astype(np.float32)[label]
@@ -83,7 +83,7 @@ def stack(seed, size=128, levels=5):
     exposure = np.float32(10 ** rng.uniform(-3, 3))
     reference = albedo * photons[..., None] * tint * exposure
 
-    density = 10 ** rng.uniform(-2.2, 0.8)  # photons a pixel and batch at irradiance 1
+    density = 10 ** rng.uniform(-2.2, 0.8)  # photons per pixel and batch at irradiance 1
     largest = rng.uniform(1.5, 9)
     counts = [rng.poisson(np.maximum(photons, 0) * density) / density for _ in range(BATCHES)]
     eye = [1 + gloss * rng.standard_normal((2, size, size)).clip(-1, 3).astype(np.float32) for _ in range(BATCHES)]
@@ -105,7 +105,7 @@ def stack(seed, size=128, levels=5):
 
 
 def main():
-    """Write stacks for train.py, every tenth held out: python synthetic.py -o DIR --count 200."""
+    """Write stacks for train.py, every tenth of them for validation: python -m lab.train.synthetic -o DIR --count 200."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("-o", "--output", required=True)
     parser.add_argument("--count", type=int, default=200)

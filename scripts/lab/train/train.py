@@ -1,14 +1,14 @@
 """Train a network that chooses the weights of equation (6).
 
-The loss is that of [Choi and Moon 2021, equation (8)], which is of the first power: it asks for medians, and a picture of skewed
-noise comes out dark. --squared S adds S log(1 + relMSE) of every pixel, the reported error kept from fireflies' rule.
+The loss is equation (8) of [Choi and Moon 2021], an absolute error. Its minimum is a median, so pictures with skewed
+noise become too dark. --squared S adds S log(1 + relMSE) of every pixel; the logarithm limits the weight of fireflies.
 
-  python train.py --data DIR --out RUN --minutes 60
+  python -m lab.train.train --data DIR --out RUN --minutes 60
 
-DIRs hold crops of data.py or synthetic.py, and each gives as many to a batch; the scenes of --held-out, and variant 0 of
-every other, validate and are never trained on (with several DIRs: those of the first). Stops after --minutes or --steps,
-whichever comes first; run again with the same --out to go on, or with --init to start from another run's network. RUN/last.pt is what export.py takes. On a
-machine without a GPU it trains on the CPU with --threads threads.
+Each DIR has crops of data.py or synthetic.py, and provides an equal share of a batch. The scenes of --held-out, and
+variant 0 of every other scene, are only for validation (with several DIRs, those of the first). Training stops after
+--minutes or --steps, whichever comes first. A repeated command with the same --out continues; --init starts from another
+run's network. export_network.py reads RUN/last.pt. Without a GPU, training runs on the CPU with --threads threads.
 """
 
 import argparse
@@ -25,11 +25,11 @@ from . import crops
 from . import model
 from .evaluate import relmse
 
-DECAY = 0.999  # of the moving average of the weights, which is what is validated and exported
+DECAY = 0.999  # of the moving average of the weights, which is validated and exported
 
 
 def loss_of(image, reference):
-    """Equation (8): relative L1 of log(1 + x)."""
+    """Equation (8): the relative L1 error of log(1 + x)."""
     image, reference = (torch.log1p(x.clamp(min=0)) for x in (image, reference))
     return ((image - reference).abs() / (reference.mean(1, keepdim=True) + 0.01)).mean()
 
@@ -38,7 +38,7 @@ class Data:
     """All crops in memory."""
 
     def __init__(self, folders, held_out, levels):
-        self.train, self.valid, said = [], [], []
+        self.train, self.valid, counts = [], [], []
         for number, folder in enumerate(folders):
             scenes = crops.files(folder)
             valid = {file for files in crops.held_out(scenes, held_out).values() for file in files}
@@ -48,8 +48,8 @@ class Data:
             self.train.append(train)
             if number == 0:
                 self.valid = [read(file, levels) for file in sorted(valid)]
-            said.append(f"{len(train)} crops of {pathlib.Path(folder).name}")
-        self.said = " and ".join(said)
+            counts.append(f"{len(train)} crops of {pathlib.Path(folder).name}")
+        self.description = " and ".join(counts)
 
     def batch(self, rng, size, side, device):
         folders = [self.train[i % len(self.train)] for i in range(size)]
@@ -65,7 +65,7 @@ def read(file, levels):
 
 
 def augment(item, rng, side):
-    """A random crop, turned and mirrored, with colours permuted."""
+    """A random part of a crop, rotated and mirrored, with permuted colours."""
     h, w = item[0].shape[-2:]
     side = min(side, h, w)
     y, x = rng.integers(h - side + 1), rng.integers(w - side + 1)
@@ -73,7 +73,7 @@ def augment(item, rng, side):
     image, levels, reference = item
     m = levels.shape[0]
     channel = torch.cat([(torch.arange(m)[:, None] * 3 + order).flatten(), torch.arange(3 * m, 4 * m)])
-    # Albedo follows the colours; the axes of the normal are permuted alike, as good a rotation as any.
+    # Albedo is permuted like the colours; permuting the axes of the normal rotates or mirrors it.
     channel = torch.cat([channel, 4 * m + order, 4 * m + 3 + order, torch.tensor([4 * m + 6])])
     out = []
     for part in (image[channel], levels[:, order], reference[order]):
@@ -83,7 +83,7 @@ def augment(item, rng, side):
 
 
 def moving_average(average, new, count):
-    """Exponential, over fewer steps at the beginning: it must not remember the random start."""
+    """An exponential moving average, over fewer steps at first, so that it forgets the random initial weights."""
     return torch.lerp(average, new, 1 - min(DECAY, (1 + float(count)) / (10 + float(count))))
 
 
@@ -96,7 +96,7 @@ def forward(net, batch, squared):
 
 @torch.no_grad()
 def validate(net, items, device, most=64):
-    """Mean loss of the combination and of Level1, Level2, ... over at most `most` held-out crops."""
+    """The mean loss and relMSE of the combination and of Level1, Level2, ... over at most `most` validation crops."""
     net.eval()
     totals = []
     for item in items[:: max(1, len(items) // most)][:most]:
@@ -122,22 +122,22 @@ def validate(net, items, device, most=64):
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", required=True, nargs="+")
-    parser.add_argument("--held-out", nargs="*", default=crops.HELD_OUT, help="scenes never to train on")
-    parser.add_argument("--init", help="checkpoint whose network to start from")
+    parser.add_argument("--held-out", nargs="*", default=crops.HELD_OUT, help="scenes that are only for validation")
+    parser.add_argument("--init", help="checkpoint with the initial network")
     parser.add_argument("--out", required=True)
     parser.add_argument("--arch", choices=["compact", "paper"], default="compact")
     parser.add_argument("--levels", type=int, default=5)
     parser.add_argument("--window", type=int, default=model.WINDOW)
     parser.add_argument("--minutes", type=float, default=60)
     parser.add_argument(
-        "--steps", type=int, default=1_000_000, help="of the learning-rate schedule, if time allows them"
+        "--steps", type=int, default=1_000_000, help="steps of the learning-rate schedule, if --minutes allows them"
     )
     parser.add_argument("--batch", type=int, default=8)
-    parser.add_argument("--side", type=int, default=64, help="of training crops, pixels")
+    parser.add_argument("--side", type=int, default=64, help="pixels of a training crop's side")
     parser.add_argument("--squared", type=float, default=0.0, help="weight of log(1 + relMSE) in the loss")
     parser.add_argument("--rate", type=float, default=5e-4, help="largest learning rate (Adam)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--threads", type=int, default=0, help="0: all")
+    parser.add_argument("--threads", type=int, default=0, help="threads; 0 uses all cores")
     return parser.parse_args()
 
 
@@ -153,7 +153,7 @@ def main():
     average = torch.optim.swa_utils.AveragedModel(net, avg_fn=moving_average)
     optimiser = torch.optim.Adam(net.parameters(), lr=args.rate)
     data = Data(args.data, args.held_out, args.levels)
-    print(f"{device}; {data.said} to train, {len(data.valid)} to validate")
+    print(f"{device}; {data.description} to train, {len(data.valid)} to validate")
     step, seconds, before_that = 0, 0.0, ""
     if args.init:
         given = torch.load(args.init, map_location=device, weights_only=True)
@@ -181,7 +181,7 @@ def main():
             "steps": step,
             "seconds": seconds,
             "device": device,
-            "data": data.said + before_that,
+            "data": data.description + before_that,
         }
         torch.save(state, out / "last.tmp")
         (out / "last.tmp").replace(out / "last.pt")
@@ -193,7 +193,8 @@ def main():
             log.write(json.dumps(report) + "\n")
 
     while step < args.steps and seconds - before < args.minutes * 60:
-        # Cosine over whichever limit is nearer its end, after a short warm-up. Seeded by step: a resumed run repeats nothing.
+        # A cosine over the limit that is closer to its end, after a short warm-up. Random numbers depend on the step, so
+        # a resumed run does not repeat crops.
         progress = max(step / args.steps, (seconds - before) / (args.minutes * 60))
         for group in optimiser.param_groups:
             group["lr"] = args.rate * min(1, (step + 1) / 100) * (0.5 + 0.5 * math.cos(math.pi * progress)) + 1e-6
