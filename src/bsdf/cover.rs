@@ -76,7 +76,7 @@ impl Cover {
     /// Classes of lobes that are there.
     #[inline]
     pub fn lobes(&self) -> LobeSet {
-        let mut set = LobeSet::NONE;
+        let mut set = LobeSet::empty();
         if self.coat > 0.0 {
             set = set | self.coat_class;
         }

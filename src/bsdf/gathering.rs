@@ -38,7 +38,7 @@ impl<'a> Shading<'a> {
             Kind::Diffuse { factor, through }
         } else {
             match self.bsdf.reflecting_facets_only(&self.seen, set) {
-                Some(layered) => Kind::Facets(layered, set.has(LobeSet::BROAD)),
+                Some(layered) => Kind::Facets(layered, set.intersects(LobeSet::BROAD)),
                 None => Kind::Any,
             }
         };

@@ -170,7 +170,7 @@ impl<'a> Layered<'a> {
         }
         let diffuse_albedo = base * matte;
         let diffuse = diffuse_albedo * (FRAC_1_PI / interface.through.average.max(1e-9));
-        let mut lobes = LobeSet::NONE;
+        let mut lobes = LobeSet::empty();
         if has_facets {
             lobes = lobes | class;
         }
@@ -344,9 +344,9 @@ impl<'a> Layered<'a> {
     /// Which of [`Seen`]'s five groups of lobes are in the set.
     #[inline]
     fn groups(&self, set: LobeSet) -> [bool; 5] {
-        let coat = self.interface.cover.as_ref().is_some_and(|c| set.has(c.cover.coat_class));
-        let broad = set.has(LobeSet::BROAD);
-        [set.has(self.interface.class), broad, set.has(LobeSet::DELTA), coat, broad]
+        let coat = self.interface.cover.as_ref().is_some_and(|c| set.intersects(c.cover.coat_class));
+        let broad = set.intersects(LobeSet::BROAD);
+        [set.intersects(self.interface.class), broad, set.intersects(LobeSet::DELTA), coat, broad]
     }
 
     /// Albedo of the lobes of `set`.

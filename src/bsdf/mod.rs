@@ -27,56 +27,27 @@ pub use parameters::Parameters;
 pub use shading::Shading;
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
+use bitflags::bitflags;
 use layered::Seen;
 use profile::Profile;
 use std::f32::consts::FRAC_1_PI;
-use std::ops::{BitAnd, BitOr};
 
-/// A set of lobe classes. The classes decide who carries light that arrives at a surface: see [`LobeSet::BROAD`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct LobeSet(pub u8);
-
-impl LobeSet {
-    /// No lobe.
-    pub const NONE: LobeSet = LobeSet(0);
-    /// Perfect mirrors and clear interfaces: a path can only continue.
-    pub const DELTA: LobeSet = LobeSet(1);
-    /// Glossy lobes too narrow to gather photons well (GGX alpha below [`SHARP_ALPHA`], for solid glass as far as it
-    /// bends light): an eye path continues.
-    pub const SHARP: LobeSet = LobeSet(2);
-    /// Diffuse, sheen and wide glossy lobes: photons are gathered here.
-    pub const BROAD: LobeSet = LobeSet(4);
-    /// All of them.
-    pub const ALL: LobeSet = LobeSet(7);
-    /// Everything a light sample can be evaluated against.
-    pub const SMOOTH: LobeSet = LobeSet(6);
-
-    /// No class in the set.
-    #[inline]
-    pub fn is_empty(self) -> bool {
-        self.0 == 0
-    }
-
-    /// Shares a class with `other`.
-    #[inline]
-    pub fn has(self, other: LobeSet) -> bool {
-        self.0 & other.0 != 0
-    }
-}
-
-impl BitOr for LobeSet {
-    type Output = LobeSet;
-    #[inline]
-    fn bitor(self, other: LobeSet) -> LobeSet {
-        LobeSet(self.0 | other.0)
-    }
-}
-
-impl BitAnd for LobeSet {
-    type Output = LobeSet;
-    #[inline]
-    fn bitand(self, other: LobeSet) -> LobeSet {
-        LobeSet(self.0 & other.0)
+bitflags! {
+    /// A set of lobe classes. The class decides which technique carries light that arrives at a surface: see
+    /// [`LobeSet::BROAD`].
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+    pub struct LobeSet: u8 {
+        /// Perfect mirrors and clear interfaces: a path can only continue.
+        const DELTA = 1;
+        /// Glossy lobes too narrow to gather photons well (GGX alpha below [`SHARP_ALPHA`], for solid glass as far as
+        /// it bends light): a camera path continues.
+        const SHARP = 2;
+        /// Diffuse, sheen and wide glossy lobes: photons are gathered here.
+        const BROAD = 4;
+        /// Lobes that a light sample can be evaluated against.
+        const SMOOTH = 6;
+        /// Every class.
+        const ALL = 7;
     }
 }
 
@@ -137,7 +108,7 @@ pub enum Bsdf<'a> {
 /// surface is seen from.
 #[inline(always)]
 fn lambert(color: Rgb, seen: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
-    if seen > 0.0 && lit > 0.0 && set.has(LobeSet::BROAD) && color.max_element() > 0.0 {
+    if seen > 0.0 && lit > 0.0 && set.intersects(LobeSet::BROAD) && color.max_element() > 0.0 {
         (color * FRAC_1_PI, lit * FRAC_1_PI)
     } else {
         (Rgb::ZERO, 0.0)
@@ -171,7 +142,7 @@ impl<'a> Bsdf<'a> {
     pub fn lobes(&self) -> LobeSet {
         match self {
             Bsdf::Matte(color) if color.max_element() > 0.0 => LobeSet::BROAD,
-            Bsdf::Matte(_) => LobeSet::NONE,
+            Bsdf::Matte(_) => LobeSet::empty(),
             Bsdf::Layered(layered) => layered.lobes,
         }
     }
@@ -242,7 +213,7 @@ impl<'a> Bsdf<'a> {
     #[inline]
     fn diffuse_only(&self, seen: &Seen, set: LobeSet) -> Option<(Rgb, Option<&'a Profile>)> {
         match self {
-            Bsdf::Matte(color) if set.has(LobeSet::BROAD) => Some((*color * FRAC_1_PI, None)),
+            Bsdf::Matte(color) if set.intersects(LobeSet::BROAD) => Some((*color * FRAC_1_PI, None)),
             Bsdf::Matte(_) => None,
             Bsdf::Layered(layered) => {
                 layered.diffuse_only(seen, set).map(|factor| (factor, Some(&layered.interface.through)))
@@ -277,7 +248,7 @@ impl<'a> Bsdf<'a> {
         match self {
             Bsdf::Matte(color) => {
                 let mut wi = warp::hemisphere_cosine(u);
-                if !self.lobes().has(set) || wi.z <= 0.0 || seen.o.z == 0.0 {
+                if !self.lobes().intersects(set) || wi.z <= 0.0 || seen.o.z == 0.0 {
                     return None;
                 }
                 let pdf_w = wi.z * FRAC_1_PI;
@@ -301,7 +272,7 @@ impl<'a> Bsdf<'a> {
     #[inline]
     fn albedo_seen(&self, seen: &Seen, set: LobeSet) -> Rgb {
         match self {
-            Bsdf::Matte(color) if set.has(LobeSet::BROAD) => *color,
+            Bsdf::Matte(color) if set.intersects(LobeSet::BROAD) => *color,
             Bsdf::Matte(_) => Rgb::ZERO,
             Bsdf::Layered(layered) => layered.albedo(seen, set),
         }

@@ -32,7 +32,7 @@ impl Layered<'_> {
     /// The BSDF without cosine, and the density per solid angle of `wi`, over the lobes of `set` that are not delta.
     #[inline]
     pub(super) fn evaluate(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
-        if seen.o.z.min(wi.z.abs()) < LEAST_COSINE || !(set & LobeSet::SMOOTH).has(self.lobes) {
+        if seen.o.z.min(wi.z.abs()) < LEAST_COSINE || !(set & LobeSet::SMOOTH).intersects(self.lobes) {
             return (Rgb::ZERO, 0.0);
         }
         // Delta lobes take their share of the directions drawn from the set.
@@ -43,7 +43,7 @@ impl Layered<'_> {
     /// Where only diffuse reflection is in `set`: the BSDF over its dependence on `wi`, which is the profile `through`.
     #[inline]
     pub(super) fn diffuse_only(&self, seen: &Seen, set: LobeSet) -> Option<Rgb> {
-        let facets = self.has_facets && set.has(self.interface.class);
+        let facets = self.has_facets && set.intersects(self.interface.class);
         if facets || self.interface.cover.is_some() || seen.o.z < LEAST_COSINE {
             return None;
         }
@@ -54,7 +54,7 @@ impl Layered<'_> {
     #[inline]
     pub(super) fn has_plain_facets(&self, seen: &Seen, set: LobeSet) -> bool {
         let n = self.interface;
-        let facets = self.has_facets && n.class != LobeSet::DELTA && set.has(n.class);
+        let facets = self.has_facets && n.class != LobeSet::DELTA && set.intersects(n.class);
         facets && self.glass == 0.0 && n.cover.is_none() && n.smooth[0].is_from_thin() && seen.o.z >= LEAST_COSINE
     }
 
@@ -79,7 +79,7 @@ impl Layered<'_> {
         // As seen from the side of `wo`.
         let i = Vec3::new(wi.x, wi.y, if seen.side == 1 { -wi.z } else { wi.z });
         let n = self.interface;
-        let facets = self.has_facets && n.class != LobeSet::DELTA && set.has(n.class);
+        let facets = self.has_facets && n.class != LobeSet::DELTA && set.intersects(n.class);
         if i.z > 0.0 {
             self.evaluate_reflected::<PDF>(seen, i, set, facets, shares)
         } else if facets && self.glass > 0.0 {
@@ -122,7 +122,7 @@ impl Layered<'_> {
                 pdf += shares.facets * Self::reflect_probability(r, t) * visible + shares.returned * density;
             }
         }
-        if set.has(LobeSet::BROAD) {
+        if set.intersects(LobeSet::BROAD) {
             separable[2] = self.diffuse * (seen.through * n.through.at(at_i));
             pdf += shares.diffuse * i.z * FRAC_1_PI;
         }
@@ -138,12 +138,12 @@ impl Layered<'_> {
             }
             pdf += shares.below * i.z * FRAC_1_PI;
         }
-        if c.cover.has_coat() && self.coat_normal.is_none() && set.has(c.cover.coat_class & LobeSet::SMOOTH) {
+        if c.cover.has_coat() && self.coat_normal.is_none() && set.intersects(c.cover.coat_class & LobeSet::SMOOTH) {
             let (value, density) = c.cover.coat(seen.o, i);
             f += Rgb::splat(value);
             pdf += shares.coat * density;
         }
-        if c.cover.has_sheen() && set.has(LobeSet::BROAD) {
+        if c.cover.has_sheen() && set.intersects(LobeSet::BROAD) {
             f += c.cover.sheen(seen.o, i, from, to);
             pdf += shares.sheen * 0.5 * FRAC_1_PI;
         }

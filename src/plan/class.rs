@@ -62,11 +62,11 @@ impl Event {
     /// A surface with `lobes` scatters by one of them.
     #[inline]
     pub fn of(lobe: LobeSet, lobes: LobeSet) -> Event {
-        if lobe.has(LobeSet::BROAD) {
+        if lobe.intersects(LobeSet::BROAD) {
             Event::Broad
-        } else if lobe.has(LobeSet::SHARP) {
+        } else if lobe.intersects(LobeSet::SHARP) {
             Event::Sharp
-        } else if lobes.has(LobeSet::SMOOTH) {
+        } else if lobes.intersects(LobeSet::SMOOTH) {
             Event::Mirror
         } else {
             Event::Clear

@@ -65,7 +65,7 @@ pub(super) fn record_surface(
     }
     history.length += vertex.distance;
     let shading = vertex.shading;
-    if history.is_clear() && shading.bsdf.lobes().has(LobeSet::SMOOTH) {
+    if history.is_clear() && shading.bsdf.lobes().intersects(LobeSet::SMOOTH) {
         let n = shading.frame.n;
         sample.features = Features {
             albedo: shading.albedo(LobeSet::ALL),
@@ -267,7 +267,7 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
             let group = camera_paths.scene.lights.surface_group(vertex.surface);
             self.run_into((vertex.throughput * radiance, group), vertex.depth, vertex.surface.p, &density);
         }
-        let smooth = vertex.shading.bsdf.lobes().has(LobeSet::SMOOTH);
+        let smooth = vertex.shading.bsdf.lobes().intersects(LobeSet::SMOOTH);
         if smooth && vertex.depth < camera_paths.max_depth {
             if techniques.connect {
                 self.connect_all(vertex);

@@ -193,7 +193,8 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
             self.left.photons.push(MergePhoton::new(vertex, flux, (self.prefix, self.group), &self.mis));
         }
         let connected = self.shared.connects_light_vertex(vertex.depth);
-        if connected && lobes.has(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth {
+        if connected && lobes.intersects(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth
+        {
             if techniques.connect {
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Surface(*vertex.surface, *vertex.shading),

@@ -161,7 +161,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
         scattered: Option<Scattered>,
         density: impl FnOnce() -> Option<EmissionDensity>,
     ) {
-        if PATHS && self.broadly && scattered.is_some_and(|s| !s.lobe.has(LobeSet::BROAD)) {
+        if PATHS && self.broadly && scattered.is_some_and(|s| !s.lobe.intersects(LobeSet::BROAD)) {
             // A caustic.
             return;
         }
@@ -174,7 +174,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             return self.sample.reject(Cause::Emission);
         }
         let weighted = match scattered {
-            Some(s) if !s.lobe.has(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
+            Some(s) if !s.lobe.intersects(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
             // Behind a perfect mirror or clear glass next-event estimation cannot see it, but photons may.
             Some(_) if self.glints.shared() => {
                 for (level, weight) in density().iter().flat_map(|density| self.glints.weights(density)) {
@@ -203,7 +203,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
     fn lit_lobes(&self, broad: LobeSet, onward: LobeSet) -> (LobeSet, LobeSet) {
         let on =
             |event: Event| self.classes.is_all() || self.classes.has(self.suffix.then(event).class_at_light(false));
-        let only = |set: LobeSet, event: Event| if on(event) { set } else { LobeSet::NONE };
+        let only = |set: LobeSet, event: Event| if on(event) { set } else { LobeSet::empty() };
         (only(broad, Event::Broad), only(onward, Event::Sharp))
     }
 
@@ -244,9 +244,9 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
                 if chance > 0.0 { chance * vertex.survival_chosen(set, chance) } else { 0.0 }
             };
             // What narrow lobes send on to the last broad bounce is a caustic there.
-            let seen = if self.broadly { LobeSet::NONE } else { onward };
+            let seen = if self.broadly { LobeSet::empty() } else { onward };
             let lit = self.lit_lobes(broad, seen);
-            if lit != (LobeSet::NONE, LobeSet::NONE) {
+            if lit != (LobeSet::empty(), LobeSet::empty()) {
                 let sets = [(lit.0, tries(broad, chance)), (lit.1, tries(seen, 1.0 - chance))];
                 self.add_direct(vertex.throughput * next_event(self.scene, vertex, sets));
             }
@@ -274,7 +274,7 @@ impl<B: Bandwidths, K: Kernel, const PATHS: bool> Gather<'_, B, K, PATHS> {
             let class = suffix.class_with(prefix);
             let photons = &self.photons[kind as usize];
             // Where none has come this time, camera paths still leave photons their share.
-            let shares = onward.has(LobeSet::SHARP) && photons.paths() > 0;
+            let shares = onward.intersects(LobeSet::SHARP) && photons.paths() > 0;
             if (photons.photons().is_empty() && !shares) || !self.classes.has(class) {
                 continue;
             }
@@ -415,7 +415,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         if vertex.depth < self.max_depth {
             let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
             let lit = self.lit_lobes(broad, onward);
-            if lit != (LobeSet::NONE, LobeSet::NONE) {
+            if lit != (LobeSet::empty(), LobeSet::empty()) {
                 self.add_direct(vertex.throughput * direct_light(self.scene, vertex, lit.0, lit.1, survival));
             }
             self.gather(vertex, broad, onward, survival);
@@ -444,7 +444,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
             let suffix = self.arrived(scattered);
             let lit = self.lit_in_medium(suffix);
             let direct = if lit {
-                vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0)
+                vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::empty(), 0.0)
             } else {
                 Rgb::ZERO
             };
@@ -484,7 +484,7 @@ impl<'a, B: Bandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gather<'_,
         let suffix = self.arrived(scattered);
         if vertex.depth < self.max_depth && !self.scene.lights.is_empty() && self.lit_in_medium(suffix) {
             let light = vertex.throughput
-                * next_event(self.scene, vertex, [(LobeSet::BROAD, SECOND_STRATEGY), (LobeSet::NONE, 0.0)]);
+                * next_event(self.scene, vertex, [(LobeSet::BROAD, SECOND_STRATEGY), (LobeSet::empty(), 0.0)]);
             if !light.is_finite() {
                 self.sample.reject(Cause::DirectLight);
             }
@@ -667,7 +667,7 @@ impl CameraPaths<'_> {
             sample: PixelSample::default(),
             length: 0.0,
             suffix: CameraSuffix::START,
-            lobes: LobeSet::NONE,
+            lobes: LobeSet::empty(),
             classes: self.classes,
             broadly: false,
             glints: Glints::NONE,

@@ -62,7 +62,7 @@ pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f3
     for (set, tries) in sets {
         // Delta lobes scatter nothing towards a light sample, but they take their share of the directions drawn from
         // the set.
-        if !set.has(LobeSet::SMOOTH) {
+        if !set.intersects(LobeSet::SMOOTH) {
             continue;
         }
         let (f, pdf) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);

@@ -94,7 +94,7 @@ impl Glints {
     /// The path goes on from a vertex.
     #[inline]
     pub fn scatter(&mut self, ng: Vec3, sample: &BsdfSample) {
-        if sample.lobe.has(LobeSet::SHARP) {
+        if sample.lobe.intersects(LobeSet::SHARP) {
             self.at = self.here;
             self.onward = ng.dot(sample.wi).abs() / (sample.pdf_w * self.here.going);
         } else if sample.lobe != LobeSet::DELTA {

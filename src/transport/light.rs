@@ -302,7 +302,7 @@ impl<'a> Deposit<'a> {
             self.flags = PhotonFlags::default();
         }
         // A medium, which focuses nothing, is as broad as can be.
-        self.caustic &= !scattered.lobe.has(LobeSet::BROAD);
+        self.caustic &= !scattered.lobe.intersects(LobeSet::BROAD);
         if self.caustic || self.thinned || self.within {
             return true;
         }

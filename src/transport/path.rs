@@ -39,7 +39,7 @@ impl<R: Record> PathTracer<'_, R> {
     /// Weight of having run into an emitter: full where next-event estimation could not have found it.
     fn weight(scattered: Option<Scattered>, pdf_light: f32) -> f32 {
         match scattered {
-            Some(s) if !s.lobe.has(LobeSet::DELTA) => s.pdf_w / (s.pdf_w + pdf_light),
+            Some(s) if !s.lobe.intersects(LobeSet::DELTA) => s.pdf_w / (s.pdf_w + pdf_light),
             _ => 1.0,
         }
     }

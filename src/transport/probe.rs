@@ -46,7 +46,7 @@ impl<'a, T, F: FnMut(&Vertex<'_, '_>) -> T> Visitor<'a> for Find<F, T> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         self.length += vertex.distance;
         let lobes = vertex.shading.bsdf.lobes();
-        if lobes.has(LobeSet::BROAD) {
+        if lobes.intersects(LobeSet::BROAD) {
             let point = GatherPoint { p: vertex.surface.p, ng: vertex.surface.ng, length: self.length };
             self.found = Some((point, (self.look)(vertex)));
             return Next::Stop;
@@ -65,7 +65,7 @@ impl CameraPaths<'_> {
     pub fn probe(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<Probe> {
         let look = |vertex: &Vertex<'_, '_>| {
             let weight = vertex.throughput * vertex.shading.albedo(LobeSet::BROAD) * FRAC_1_PI;
-            let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::NONE, 0.0);
+            let direct = vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::empty(), 0.0);
             (weight, direct)
         };
         self.find(arena, start, look).map(|(point, (weight, direct))| Probe { point, weight, direct })
@@ -108,7 +108,7 @@ impl<'a> Visitor<'a> for FindVolumePoint {
             return Next::Stop;
         }
         let lobes = vertex.shading.bsdf.lobes();
-        if lobes.has(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
+        if lobes.intersects(LobeSet::BROAD) { Next::Stop } else { Next::Continue(lobes) }
     }
 
     fn medium(&mut self, vertex: &MediumVertex, _: Option<Scattered>) -> Next {

@@ -108,7 +108,7 @@ pub trait ScatterPoint {
 /// send most of what it gets along itself to the eye.
 #[inline]
 pub fn lit_side(shading: &Shading<'_>, ng: Vec3, wo: Vec3) -> Vec3 {
-    if shading.bsdf.transmits() || shading.bsdf.lobes().has(LobeSet::SHARP) {
+    if shading.bsdf.transmits() || shading.bsdf.lobes().intersects(LobeSet::SHARP) {
         Vec3::ZERO
     } else if ng.dot(wo) < 0.0 {
         -ng
@@ -253,7 +253,7 @@ impl ScatterPoint for MediumVertex {
 
     #[inline]
     fn evaluate_cos(&self, wi: Vec3, _: Transport, set: LobeSet) -> (Rgb, f32) {
-        if !set.has(LobeSet::BROAD) {
+        if !set.intersects(LobeSet::BROAD) {
             return (Rgb::ZERO, 0.0);
         }
         let f = self.phase().pdf_w(self.wo, wi);
@@ -297,7 +297,8 @@ impl ScatterPoint for MediumVertex {
 
     #[inline]
     fn survival(&self, set: LobeSet) -> f32 {
-        let expected = if set.has(LobeSet::BROAD) { self.throughput.max_element() * self.survival_scale } else { 0.0 };
+        let expected =
+            if set.intersects(LobeSet::BROAD) { self.throughput.max_element() * self.survival_scale } else { 0.0 };
         survival(expected, self.depth, || false)
     }
 }

@@ -78,7 +78,7 @@ pub(super) fn wanted<S: ScatterPoint>(vertex: &S, suffix: CameraSuffix, prefix: 
 pub(super) fn leads(suffix: CameraSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
     let ahead = |lobe: LobeSet| !(suffix.then(Event::of(lobe, lobes)).reachable_classes() & on).is_empty();
-    each.filter(|lobe| set.has(*lobe)).any(ahead)
+    each.filter(|lobe| set.intersects(*lobe)).any(ahead)
 }
 
 /// Share of broad lobes in `all` that lobes scatter.

@@ -119,7 +119,7 @@ impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
     }
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
-        self.narrow &= scattered.is_none_or(|s| !s.lobe.has(LobeSet::BROAD));
+        self.narrow &= scattered.is_none_or(|s| !s.lobe.intersects(LobeSet::BROAD));
         self.all += 1;
         self.to_broad += u32::from(self.narrow);
         self.textured += u32::from(self.is_textured(vertex.surface.material));

@@ -104,7 +104,7 @@ fn unlit_gives_its_base_colour_and_scatters_nothing() {
     let material = Material { unlit: true, base_color: [0.2, 0.4, 0.6, 1.0], ..Material::default() };
     assert_eq!(material.emitted(&surface(), &[]), Rgb::new(0.2, 0.4, 0.6));
     let tables = EnergyTables::for_materials(std::slice::from_ref(&material));
-    assert_eq!(support::bsdf(&material.parameters(&surface(), &[], 1.5), &tables).lobes(), LobeSet::NONE);
+    assert_eq!(support::bsdf(&material.parameters(&surface(), &[], 1.5), &tables).lobes(), LobeSet::empty());
 }
 
 #[test]
