@@ -1,7 +1,8 @@
 //! Finds the libraries (in `.deps`) and Pythons (in `.venv-*`) that `scripts/setup.sh` has installed.
 //!
 //! They are in the folder named by the environment variable [`HOME_VARIABLE`], or else in a folder above the program or
-//! the Python package. The current folder is never searched: it may hold files of other users, and what is found is run.
+//! the Python package. The current folder is never searched: it may hold files of other users, and what is found is
+//! run.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,8 @@
 //! A few numbers in a scene or on the command line (copies, vertices, pixels, light paths) can request any amount of
 //! memory. Rust and Embree abort the process if an allocation fails, and Linux kills it if memory is overcommitted. So
 //! large amounts are computed and compared with the free memory first: the least of the memory that the machine has
-//! left, that `ulimit -v` leaves, and that `memory.max` of the control groups (containers, batch systems, systemd) leaves.
+//! left, that `ulimit -v` leaves, and that `memory.max` of the control groups (containers, batch systems, systemd)
+//! leaves.
 
 use crate::error::{Error, ErrorKind, Result};
 use rustix::process::{Resource, getrlimit};

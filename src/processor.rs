@@ -17,8 +17,8 @@ pub fn prefetch<T>(values: impl IntoIterator<Item = T>) {
     }
 }
 
-/// Checks that the processor has all required instructions. Without one, the program would die by a signal when it first
-/// uses it.
+/// Checks that the processor has all required instructions. Without one, the program would die by a signal when it
+/// first uses it.
 ///
 /// # Errors
 /// An instruction is missing.

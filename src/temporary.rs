@@ -5,8 +5,8 @@ use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use tempfile::TempDir;
 
-/// Creates a temporary folder whose name begins with `prefix`. Dropping the result deletes it. Only the user has access,
-/// independent of the umask, because it may hold files of a private scene and programs to run.
+/// Creates a temporary folder whose name begins with `prefix`. Dropping the result deletes it. Only the user has
+/// access, independent of the umask, because it may hold files of a private scene and programs to run.
 ///
 /// # Errors
 /// The folder cannot be created.

@@ -1,9 +1,9 @@
-//! A clear coat on a surface under a normal map: the map is that of the base alone (KHR_materials_clearcoat), so the
-//! coat reflects in a frame of its own. What it leaves to the base is reckoned there, too ([`super::cover`]).
+//! A clear coat on a surface with a normal map. The map applies only to the base (KHR_materials_clearcoat), so the coat
+//! reflects in its own frame, and its transmittance to the base is computed there, too ([`super::cover`]).
 
 use super::cover::Cover;
 use super::facing::Facing;
-use super::layered::LEAST_COSINE;
+use super::layered::MIN_COSINE;
 use super::{BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 
@@ -12,20 +12,20 @@ use crate::math::{Frame, Rgb, Vec2, Vec3};
 pub(super) struct Coat<'a> {
     cover: &'a Cover,
     facing: Facing,
-    /// The direction, from the side it is on.
+    /// The viewing direction in the coat's frame, with z >= 0.
     o: Vec3,
-    /// That side: -1 below.
+    /// 1 if the viewer is above the surface, -1 below.
     side: f32,
 }
 
 impl<'a> Coat<'a> {
-    /// On a surface of interpolated normal `n` and geometric normal `ng`, seen along `wo`.
+    /// The coat of a surface of interpolated normal `n` and geometric normal `ng`, seen along `wo`.
     pub(super) fn new(cover: &'a Cover, n: Vec3, ng: Vec3, wo: Vec3) -> Coat<'a> {
         let (facing, o) = Facing::new(Frame::from_normal(n), ng, wo);
         Coat { cover, facing, o: Vec3::new(o.x, o.y, o.z.abs()), side: o.z.signum() }
     }
 
-    /// As [`super::Shading::evaluate_cos`].
+    /// Value and density of the coat, like [`super::Shading::evaluate_cos`].
     #[inline]
     pub(super) fn evaluate_cos(&self, wi: Vec3, transport: Transport) -> (f32, f32) {
         let Some((i, cos_ig)) = self.facing.local(wi, transport) else { return (0.0, 0.0) };
@@ -38,29 +38,29 @@ impl<'a> Coat<'a> {
         (f * cosine, pdf)
     }
 
-    /// `i` as seen from the viewer's side, where it is on that and the coat has a width.
+    /// `i` with z > 0, if it is on the viewer's side and the coat is not a delta lobe.
     #[inline]
     fn lit(&self, i: Vec3) -> Option<Vec3> {
         let i = Vec3::new(i.x, i.y, i.z * self.side);
-        (self.cover.coat_class != LobeSet::DELTA && i.z.min(self.o.z) >= LEAST_COSINE).then_some(i)
+        (self.cover.coat_class != LobeSet::DELTA && i.z.min(self.o.z) >= MIN_COSINE).then_some(i)
     }
 
-    /// Density with which a path that comes along `wi` would be sent along the direction the coat is seen along.
+    /// Density with which a path from `wi` samples the viewing direction.
     #[inline]
     pub(super) fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32 {
         let i = self.facing.local(wi, transport.reversed()).and_then(|(i, _)| self.lit(i));
         i.map_or(0.0, |i| self.cover.coat(i, self.o).1)
     }
 
-    /// A direction that the coat reflects to; the weight is that of a coat without width.
+    /// Samples a reflected direction. The weight is valid only for a delta coat.
     #[inline]
     pub(super) fn sample(&self, transport: Transport, u: Vec2) -> Option<BsdfSample> {
         let importance = transport == Transport::Importance;
-        if self.o.z < LEAST_COSINE || self.facing.cos_og == 0.0 || (importance && self.facing.opposite) {
+        if self.o.z < MIN_COSINE || self.facing.cos_og == 0.0 || (importance && self.facing.flipped) {
             return None;
         }
         let i = self.cover.sample_coat(self.o, u);
-        if i.z < LEAST_COSINE {
+        if i.z < MIN_COSINE {
             return None;
         }
         let mut wi = self.facing.frame.to_world(Vec3::new(i.x, i.y, i.z * self.side));

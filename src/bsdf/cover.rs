@@ -1,12 +1,12 @@
-//! What lies on top of the base: sheen, and a clear coat over it.
+//! The cover of the base: sheen, and a clear coat on top of it.
 //!
-//! Below a covering of albedo E, lobes with facets are seen through `1 - max(E(o), E(i))`, which is exact for mirrors;
-//! separable lobes through `(1 - E(o)) (1 - E(i))`, normalised to keep `1 - E(o)` of their albedo. Both keep the
-//! exchange of directions. Both sides of a surface are covered.
+//! A layer of albedo E attenuates microfacet lobes below it by `1 - max(E(o), E(i))`, which is exact for mirrors, and
+//! separable lobes by `(1 - E(o)) (1 - E(i))`, normalized so that their albedo is attenuated by `1 - E(o)`. Both
+//! factors are reciprocal. Both sides of a surface are covered.
 
 use super::energy::{COAT_ETA, EnergyTables};
 use super::fresnel::{dielectric, reflect};
-use super::microfacet::{Ggx, class_of, g1, g2_reflection};
+use super::microfacet::{Ggx, g1, g2_reflection, lobe_class};
 use super::profile::{Position, Profile};
 use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
 use crate::math::{Rgb, Vec2, Vec3};
@@ -17,18 +17,17 @@ pub fn coat_reflectance(cos: f32) -> f32 {
     dielectric(cos, COAT_ETA).0
 }
 
-/// Where the cosines of a direction lie: that with the coat's normal, and that with the normal of the sheen and the base
-/// below it.
+/// Table positions of the cosines of a direction with two normals, which differ under a normal map.
 #[derive(Clone, Copy, Debug)]
 pub struct Angles {
-    /// With the coat's.
+    /// Cosine with the normal of the coat.
     pub coat: Position,
-    /// With the base's.
+    /// Cosine with the normal of the sheen and the base.
     pub base: Position,
 }
 
 impl From<Position> for Angles {
-    /// Of one normal.
+    /// The angles if both normals are equal.
     #[inline]
     fn from(mu: Position) -> Angles {
         Angles { coat: mu, base: mu }
@@ -40,7 +39,7 @@ impl From<Position> for Angles {
 pub struct Cover {
     coat: f32,
     coat_ggx: Ggx,
-    /// Class of the coat's lobe.
+    /// Lobe class of the coat.
     pub coat_class: LobeSet,
     coat_albedo: Profile,
     sheen: Rgb,
@@ -49,19 +48,19 @@ pub struct Cover {
 }
 
 impl Cover {
-    /// `None` where nothing lies on top.
+    /// The cover that the parameters describe; `None` without coat and sheen.
     #[inline]
     pub fn new(p: &Parameters, tables: &EnergyTables) -> Option<Cover> {
         if !p.is_covered() {
             return None;
         }
-        let coat_class = class_of(p.clearcoat_alpha, p.clearcoat_alpha);
+        let coat_class = lobe_class(p.clearcoat_alpha, p.clearcoat_alpha);
         let alpha = if coat_class == LobeSet::DELTA { 0.0 } else { p.clearcoat_alpha };
-        // What is not there needs no tables.
-        let nothing = Profile::constant(0.0);
-        let coat_albedo = if p.clearcoat > 0.0 { tables.coat_albedo(Position::new(alpha)) } else { nothing };
+        // Tables of layers that are absent are not computed.
+        let absent = Profile::constant(0.0);
+        let coat_albedo = if p.clearcoat > 0.0 { tables.coat_albedo(Position::new(alpha)) } else { absent };
         let has_sheen = p.sheen_color.max_element() > 0.0;
-        let sheen_albedo = if has_sheen { tables.sheen_albedo(Position::new(p.sheen_alpha)) } else { nothing };
+        let sheen_albedo = if has_sheen { tables.sheen_albedo(Position::new(p.sheen_alpha)) } else { absent };
         Some(Cover {
             coat: p.clearcoat,
             coat_ggx: Ggx { alpha_x: alpha.max(DELTA_ALPHA), alpha_y: alpha.max(DELTA_ALPHA) },
@@ -73,7 +72,7 @@ impl Cover {
         })
     }
 
-    /// Classes of lobes that are there.
+    /// Lobe classes of the layers.
     #[inline]
     pub fn lobes(&self) -> LobeSet {
         let mut set = LobeSet::empty();
@@ -86,47 +85,46 @@ impl Cover {
         set
     }
 
-    /// There is a coat.
+    /// Whether there is a clear coat.
     #[inline]
     pub fn has_coat(&self) -> bool {
         self.coat > 0.0
     }
 
-    /// There is sheen.
+    /// Whether there is sheen.
     #[inline]
     pub fn has_sheen(&self) -> bool {
         self.sheen.max_element() > 0.0
     }
 
-    /// Strengths of the coverings, for what they keep from the base: coat, sheen.
+    /// Factors of the albedos of coat and sheen in the attenuation of the base.
     #[inline]
     pub fn strengths(&self) -> [f32; 2] {
         [self.coat, self.sheen.max_element()]
     }
 
-    /// Albedo of white sheen. The distribution's own exceeds 1 at grazing angles where it is narrow: see
-    /// [`Cover::sheen`].
+    /// Albedo of white sheen, at most 1. The lobe of narrow sheen exceeds 1 at grazing angles, see [`Cover::sheen`].
     #[inline]
     fn sheen_albedo(&self, mu: Position) -> f32 {
         self.sheen_albedo.at(mu).min(1.0)
     }
 
-    /// What the coverings leave of light in one direction.
+    /// Transmittance of the layers in one direction, for separable lobes.
     #[inline]
-    pub fn passes(&self, w: Angles) -> f32 {
+    pub fn transmittance(&self, w: Angles) -> f32 {
         let [coat, sheen] = self.strengths();
         (1.0 - coat * self.coat_albedo.at(w.coat)) * (1.0 - sheen * self.sheen_albedo(w.base))
     }
 
-    /// What they leave of light that facets below turn from one direction to another.
+    /// Attenuation of a microfacet lobe below the layers, for a pair of directions.
     #[inline]
-    pub fn passes_both(&self, o: Angles, i: Angles) -> f32 {
+    pub fn facet_transmittance(&self, o: Angles, i: Angles) -> f32 {
         let [coat, sheen] = self.strengths();
         (1.0 - coat * self.coat_albedo.at(o.coat).max(self.coat_albedo.at(i.coat)))
             * (1.0 - sheen * self.sheen_albedo(o.base).max(self.sheen_albedo(i.base)))
     }
 
-    /// Albedos of coat and sheen; `cos` is the cosine with the coat's normal.
+    /// Albedos of coat and sheen. `cos` is the cosine with the normal of the coat.
     #[inline]
     pub fn albedos(&self, cos: f32, w: Angles) -> [Rgb; 2] {
         let mut albedos = [Rgb::ZERO; 2];
@@ -141,14 +139,14 @@ impl Cover {
         albedos
     }
 
-    /// Reflectance of a coat without roughness.
+    /// Reflectance of the coat as a smooth interface.
     #[inline]
     pub fn coat_reflectance(&self, cos: f32) -> f32 {
         self.coat * coat_reflectance(cos)
     }
 
-    /// The coat's lobe without cosine, and the density of its facets' reflection; not for delta coats. Both directions
-    /// above.
+    /// Value of the coat's lobe, without cosine, and the density of sampling it. Not for delta coats. Both directions
+    /// are above the surface.
     #[inline]
     pub fn coat(&self, o: Vec3, i: Vec3) -> (f32, f32) {
         let Some(h) = (o + i).try_normalize() else { return (0.0, 0.0) };
@@ -158,14 +156,15 @@ impl Cover {
         (f * d * g2_reflection(lambda_o, lambda_i) / i.z, d * g1(lambda_o))
     }
 
-    /// A direction reflected by the coat; it may lie below.
+    /// Samples a direction that the coat reflects to. It may be below the surface.
     #[inline]
     pub fn sample_coat(&self, o: Vec3, u: Vec2) -> Vec3 {
         let smooth = self.coat_class == LobeSet::DELTA;
         reflect(o, if smooth { Vec3::Z } else { self.coat_ggx.sample_visible(o, u) })
     }
 
-    /// The sheen lobe without cosine, scaled down where its albedo would exceed 1. Both directions above.
+    /// Value of the sheen lobe, without cosine, scaled down where its albedo would exceed 1. Both directions are above
+    /// the surface.
     #[inline]
     pub fn sheen(&self, o: Vec3, i: Vec3, at_o: Angles, at_i: Angles) -> Rgb {
         let Some(h) = (o + i).try_normalize() else { return Rgb::ZERO };

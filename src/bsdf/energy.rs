@@ -1,75 +1,74 @@
-//! Directional albedos of the lobes, tabulated, so that what single scattering loses can be given back
-//! \[Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"\], and layers share light.
+//! Tables of directional albedos of the lobes. They serve to compensate the energy that single scattering loses \[Kulla
+//! and Conty 2017, "Revisiting Physically Based Shading at Imageworks"\], and to divide light among layers.
 
+use super::anisotropic::{AnisotropicProfile, AnisotropicTables};
 use super::fresnel::{Smooth, is_matched, reflect, refract};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
-use super::profile::{Between, Grid, NODES, Position, Profile, node, row};
+use super::profile::{AdjacentRows, Grid, NODES, Position, Profile, node, row};
 use super::sheen;
-use super::stretched::{Pairs, Stretched};
 use crate::math::{Vec2, Vec3, Vec4, sqr};
 use std::sync::OnceLock;
 
-/// Points of the quadrature over visible normals, and the generator of their lattice (Fibonacci numbers: the integrands
-/// have kinks along curves, at the horizon and the critical angle, where product rules converge slowly).
+/// Number of points and generator of the Fibonacci lattice for quadratures over visible normals. The integrands have
+/// kinks along curves, at the horizon and the critical angle, where product rules converge slowly.
 const LATTICE: (usize, usize) = (987, 610);
 
 /// Index of refraction of clear coats (KHR_materials_clearcoat).
 pub(super) const COAT_ETA: f32 = 1.5;
 
-/// Functions of [`SideTables`] for reflection: of a perfect reflector, of total reflection, of the rest per F0, per F90.
+/// Row group of [`SideTables`] for reflection. The four functions are the albedos of a perfect reflector, of total
+/// internal reflection, and of other reflection per F0 and per F90.
 const REFLECTED: usize = 0;
-/// For reflection and transmission: constant, per F0, per F90; the fourth is unused.
+/// Row group of [`SideTables`] for reflection plus transmission. The functions are the constant part of the albedo, the
+/// part per F0, and the part per F90; the fourth is unused.
 const SCATTERED: usize = 1;
 
-/// Albedos of single scattering at one side of a rough dielectric, split so that the reflectances F0 at normal and F90
-/// at grazing incidence can be chosen later: everything is linear in them.
+/// Single-scattering albedos on one side of a rough dielectric. They are linear in the reflectances F0 at normal and
+/// F90 at grazing incidence, so the tables hold the coefficients of both.
 #[derive(Clone, Debug)]
 pub(super) struct SideTables {
-    /// Index of the other side over this one's.
+    /// Index of refraction of the other side over the index of this side.
     eta: f32,
-    /// [`REFLECTED`] and [`SCATTERED`].
+    /// The row groups [`REFLECTED`] and [`SCATTERED`].
     albedos: Grid<2>,
-    /// The same of facets that are wider one way.
-    stretched: Pairs,
-    /// Cosine-weighted averages for a smooth interface: share of directions reflected in total, and of
-    /// [`Smooth::grazing_weight`].
+    /// Both row groups for anisotropic roughness.
+    anisotropic: AnisotropicTables,
+    /// Cosine-weighted share of directions with total internal reflection at the smooth interface.
     pub average_total: f32,
-    /// See `average_total`.
+    /// Cosine-weighted average of [`Smooth::grazing_weight`].
     pub average_grazing: f32,
 }
 
-/// Tables of one pair of media, seen from the thinner and from the denser one: made once, when they are first asked
-/// for.
+/// Tables of one pair of media, from the thinner and from the denser side. Created at first use.
 #[derive(Clone, Debug)]
 struct InterfaceTables {
-    /// Index of the denser medium over the thinner one.
+    /// Index of refraction of the denser medium over that of the thinner one.
     eta: f32,
     sides: OnceLock<Box<[SideTables; 2]>>,
 }
 
-/// What facets lose below a coat or a sheen, beyond its transmittance at `wo`: see [`EnergyTables::covered_loss`].
+/// Tables of [`EnergyTables::covered_loss`] for one kind of layer.
 #[derive(Clone, Debug)]
 struct CoverTables {
-    /// Albedos of the covering at the nodes of its roughness.
+    /// Albedos of the layer at the nodes of its roughness.
     covers: OnceLock<[Profile; COVER_NODES]>,
     losses: Grid<3>,
 }
 
-/// Nodes of a cover's roughness, four to a grid, the ends shared.
+/// Number of nodes of a layer's roughness. Each of the three row groups has four nodes, of which neighbours share one.
 const COVER_NODES: usize = 10;
 
-/// What may lie on top.
+/// The kind of a layer over the base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Covering {
+pub(super) enum CoverLayer {
     /// A clear coat.
     Coat,
     /// Sheen.
     Sheen,
 }
 
-/// Everything tabulated for a scene, each row when it is first asked for. What pairs of media there can be is known from
-/// the start, and which of them the nearest to an index is; so it makes no difference to what is looked up when, or by
-/// which thread, a row is tabulated.
+/// All tables of a scene. Rows are computed at first use, on any thread. The result does not depend on when or where,
+/// because the set of interfaces, and so the nearest one to an index, is fixed from the start.
 #[derive(Clone, Debug)]
 pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
@@ -78,12 +77,12 @@ pub struct EnergyTables {
     below_sheen: CoverTables,
 }
 
-/// Integrates over the facets that are seen from `wo`: `f` is given Lambda of it, a visible normal and its weight in
-/// the quadrature. `turn` is the share of the azimuth that is looked at, where the rest is its mirror image.
+/// Integrates over the normals of facets visible from `wo`. Calls `f` with Lambda(wo), a visible normal and its
+/// quadrature weight. `turn` is the range of the azimuth as a share of the circle, if the rest is a mirror image.
 fn over_facets(ggx: &Ggx, wo: Vec3, turn: f32, mut f: impl FnMut(f32, Vec3, f32)) {
     let lambda_o = ggx.lambda(wo);
     for k in 0..LATTICE.0 {
-        // Graded towards the steep facets, whose reflections are the ones that are lost.
+        // Points are denser at steep facets, whose reflections are lost.
         let phi = turn * (((k * LATTICE.1) % LATTICE.0) as f32 + 0.5) / LATTICE.0 as f32;
         let rest = 1.0 - (k as f32 + 0.5) / LATTICE.0 as f32;
         let weight = 2.0 * rest / LATTICE.0 as f32;
@@ -91,8 +90,9 @@ fn over_facets(ggx: &Ggx, wo: Vec3, turn: f32, mut f: impl FnMut(f32, Vec3, f32)
     }
 }
 
-/// Tabulates a function of the cosine at node `i` of alpha: `f` is given a lobe, the direction towards the viewer, Lambda
-/// of it, a visible normal and its weight in the quadrature.
+/// Tabulates an integral over visible normals at node `i` of alpha and all nodes of the cosine. `f` adds one term to
+/// the sum; its arguments are the sum, the distribution, the viewing direction wo, Lambda(wo), a visible normal and its
+/// quadrature weight.
 fn tabulate<T: Copy>(i: usize, zero: T, f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3, f32)) -> [T; NODES] {
     let ggx = Ggx { alpha_x: node(i), alpha_y: node(i) };
     std::array::from_fn(|j| {
@@ -104,14 +104,14 @@ fn tabulate<T: Copy>(i: usize, zero: T, f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3
     })
 }
 
-/// The reflected direction, and G2 over G1 of it; zero below the horizon.
+/// The direction reflected by a facet, and G2 / G1, which is zero below the horizon.
 fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> (Vec3, f32) {
     let wi = reflect(wo, h);
     (wi, if wi.z > 0.0 { g2_reflection(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 })
 }
 
-/// Adds a facet's share of: total reflection; the rest reflected, and weighted by the grazing weight; transmitted, and
-/// weighted.
+/// Adds the contribution of one facet to five sums: total internal reflection; other reflection without and with the
+/// grazing weight; transmission without and with the grazing weight.
 fn add_albedos(sums: &mut [f32; 5], smooth: &Smooth, ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3, weight: f32) {
     let cos = wo.dot(h).clamp(0.0, 1.0);
     let r = weight * reflected_share(ggx, wo, lambda_o, h).1;
@@ -126,12 +126,12 @@ fn add_albedos(sums: &mut [f32; 5], smooth: &Smooth, ggx: &Ggx, wo: Vec3, lambda
     }
 }
 
-/// [`REFLECTED`] from what [`add_albedos`] has added up.
+/// The functions [`REFLECTED`] from the sums of [`add_albedos`].
 fn reflected([total, r, rg, ..]: [f32; 5]) -> Vec4 {
     Vec4::new(total + r, total, r - rg, rg)
 }
 
-/// [`SCATTERED`] from what [`add_albedos`] has added up: transmitted is what F leaves, t (1 - F0) - tg (F90 - F0).
+/// The functions [`SCATTERED`] from the sums of [`add_albedos`]. The transmitted part is t (1 - F0) - tg (F90 - F0).
 fn scattered([total, r, rg, t, tg]: [f32; 5]) -> Vec4 {
     Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0)
 }
@@ -139,7 +139,7 @@ fn scattered([total, r, rg, t, tg]: [f32; 5]) -> Vec4 {
 impl SideTables {
     fn new(eta: f32) -> SideTables {
         let smooth = Smooth::new(eta);
-        // Midpoints in mu^2: the cosine-weighted measure.
+        // The midpoint rule in mu^2, which is the cosine-weighted measure.
         let n = 4096;
         let (mut total, mut grazing) = (0.0f64, 0.0f64);
         for i in 0..n {
@@ -152,15 +152,15 @@ impl SideTables {
         SideTables {
             eta,
             albedos: Grid::new(),
-            stretched: Pairs::default(),
+            anisotropic: AnisotropicTables::default(),
             average_total: (total / f64::from(n)) as f32,
             average_grazing: (grazing / f64::from(n)) as f32,
         }
     }
 
-    /// The albedos around an alpha.
+    /// The rows adjacent to an alpha.
     #[inline]
-    fn albedos(&self, alpha: Position) -> Between<'_, 2> {
+    fn albedos(&self, alpha: Position) -> AdjacentRows<'_, 2> {
         self.albedos.around(alpha, |i| {
             let smooth = Smooth::new(self.eta);
             let sums = tabulate(i, [0.0f32; 5], |sums, ggx, wo, lambda_o, h, weight| {
@@ -170,8 +170,7 @@ impl SideTables {
         })
     }
 
-    /// Share of what arrives that the facets of a perfect reflector scatter less than all of: what compensation gives
-    /// back.
+    /// Energy that single scattering loses at a perfect reflector: one minus its albedo.
     #[inline]
     pub fn white_loss(&self, alpha: Position) -> Profile {
         Profile::new(self.albedos(alpha), REFLECTED, 1.0, -Vec4::X)
@@ -183,31 +182,33 @@ impl SideTables {
         Profile::new(self.albedos(alpha), REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90))
     }
 
-    /// What neither reflection nor compensation by `multiple` of the white loss reflects.
+    /// Transmittance of the interface to the base: one minus the albedo of reflection and minus `multiple` times the
+    /// white loss, which is the albedo of the compensation.
     #[inline]
-    pub fn let_through(&self, alpha: Position, f0: f32, f90: f32, multiple: f32) -> Profile {
+    pub fn base_transmittance(&self, alpha: Position, f0: f32, f90: f32, multiple: f32) -> Profile {
         Profile::new(self.albedos(alpha), REFLECTED, 1.0 - multiple, Vec4::new(multiple, -1.0, -f0, -f90))
     }
 
-    /// What reflection and transmission together lose.
+    /// Energy that single scattering loses at glass: one minus the albedo of reflection and transmission.
     #[inline]
     pub fn glass_loss(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
         Profile::new(self.albedos(alpha), SCATTERED, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
     }
 
-    /// The same of facets that are wider one way.
-    pub fn stretched_glass_loss(&self, alphas: [Position; 2], f0: f32, f90: f32) -> Stretched {
-        self.stretched(alphas, (SCATTERED, 1.0, -Vec4::new(1.0, f0, f90, 0.0)))
+    /// [`SideTables::glass_loss`] for anisotropic roughness.
+    pub fn anisotropic_glass_loss(&self, alphas: [Position; 2], f0: f32, f90: f32) -> AnisotropicProfile {
+        self.anisotropic(alphas, (SCATTERED, 1.0, -Vec4::new(1.0, f0, f90, 0.0)))
     }
 
-    /// As [`SideTables::reflection`], of facets that are wider one way.
-    pub fn stretched_reflection(&self, alphas: [Position; 2], f0: f32, f90: f32) -> Stretched {
-        self.stretched(alphas, (REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90)))
+    /// [`SideTables::reflection`] for anisotropic roughness.
+    pub fn anisotropic_reflection(&self, alphas: [Position; 2], f0: f32, f90: f32) -> AnisotropicProfile {
+        self.anisotropic(alphas, (REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90)))
     }
 
-    fn stretched(&self, alphas: [Position; 2], functions: (usize, f32, Vec4)) -> Stretched {
+    /// See [`AnisotropicTables::around`] for `functions`.
+    fn anisotropic(&self, alphas: [Position; 2], functions: (usize, f32, Vec4)) -> AnisotropicProfile {
         let smooth = Smooth::new(self.eta);
-        self.stretched.around(alphas, functions, |alpha_x, alpha_y, wo| {
+        self.anisotropic.around(alphas, functions, |alpha_x, alpha_y, wo| {
             let ggx = Ggx { alpha_x, alpha_y };
             let mut sums = [0.0; 5];
             over_facets(&ggx, wo, 1.0, |lambda_o, h, weight| {
@@ -229,7 +230,7 @@ impl InterfaceTables {
         InterfaceTables { eta, sides: OnceLock::new() }
     }
 
-    /// From the thinner medium, from the denser one.
+    /// The tables of the thinner side and of the denser side.
     #[inline]
     fn sides(&self) -> &[SideTables; 2] {
         self.sides.get_or_init(|| Box::new([self.eta, 1.0 / self.eta].map(SideTables::new)))
@@ -241,7 +242,8 @@ impl CoverTables {
         CoverTables { covers: OnceLock::new(), losses: Grid::new() }
     }
 
-    /// `cover(alpha)` is the albedo of the covering of a roughness.
+    /// The loss at facets of roughness `alpha` below a layer of roughness `cover_alpha`. `cover` returns the albedo of
+    /// the layer at a roughness.
     fn profile(&self, alpha: Position, cover_alpha: f32, cover: impl Fn(Position) -> Profile) -> Profile {
         let losses = self.losses.around(alpha, |i| {
             let covers = self.covers.get_or_init(|| {
@@ -267,13 +269,13 @@ impl CoverTables {
 }
 
 impl EnergyTables {
-    /// Tables for interfaces of the relative indices `etas` (an index and its inverse share one), and for 1.5; others
-    /// use the nearest.
+    /// Tables for interfaces of the relative indices `etas` and for 1.5. An index and its inverse share tables.
+    /// Interfaces of other indices use the nearest tables.
     pub fn new(etas: impl IntoIterator<Item = f32>) -> EnergyTables {
         let etas = etas.into_iter().chain([COAT_ETA]).filter(|e| *e > 0.0);
         let mut etas: Vec<f32> = etas.map(|e| if e < 1.0 { 1.0 / e } else { e }).collect();
         etas.sort_by(f32::total_cmp);
-        // Nearer ones than this differ by less than the tables' own error.
+        // Indices within this tolerance differ by less than the error of the tables.
         etas.dedup_by(|a, b| *a - *b < 1e-3 * *b || (a.is_infinite() && b.is_infinite()));
         etas.retain(|e| !is_matched(*e));
         EnergyTables {
@@ -284,38 +286,37 @@ impl EnergyTables {
         }
     }
 
-    /// How many rows are tabulated by now, of all pairs of media: what making them has cost.
-    pub fn tabulated(&self) -> usize {
+    /// Number of rows computed so far, for all pairs of media.
+    pub fn row_count(&self) -> usize {
         let sides = self.interfaces.iter().filter_map(|pair| pair.sides.get()).flat_map(|sides| sides.iter());
-        sides.map(|side| side.albedos.made()).sum()
+        sides.map(|side| side.albedos.row_count()).sum()
     }
 
-    /// The pair of media nearest to an interface of relative index `eta`; `None` if the interface does nothing.
+    /// The tables nearest to the relative index `eta`; `None` for matched indices.
     #[inline]
     fn nearest(&self, eta: f32) -> Option<&InterfaceTables> {
         if is_matched(eta) {
             return None;
         }
-        let wanted = if eta < 1.0 { 1.0 / eta } else { eta };
-        let after = self.interfaces.partition_point(|t| t.eta < wanted);
+        let target = if eta < 1.0 { 1.0 / eta } else { eta };
+        let after = self.interfaces.partition_point(|t| t.eta < target);
         let before = after.checked_sub(1).and_then(|i| self.interfaces.get(i));
         match (before, self.interfaces.get(after)) {
-            (Some(a), Some(b)) if wanted - a.eta < b.eta - wanted => Some(a),
+            (Some(a), Some(b)) if target - a.eta < b.eta - target => Some(a),
             (_, Some(b)) => Some(b),
             (a, None) => a,
         }
     }
 
-    /// Tables of the sides of an interface of relative index `eta`: the one seen from above, the one seen from below.
-    /// `None` if the interface does nothing.
+    /// The tables of an interface of relative index `eta`, for directions above and below it. `None` for matched
+    /// indices.
     #[inline]
     pub(super) fn sides(&self, eta: f32) -> Option<[&SideTables; 2]> {
         let [thin, dense] = self.nearest(eta)?.sides();
         Some(if eta < 1.0 { [dense, thin] } else { [thin, dense] })
     }
 
-    /// Share of what arrives that facets lose even if they reflect perfectly: seen from the thinner medium it is the
-    /// same for every pair.
+    /// Energy that single scattering loses at a perfect reflector. From the thinner medium it is equal for all pairs.
     #[inline]
     pub(super) fn white_loss(&self, alpha: Position) -> Profile {
         self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.white_loss(alpha))
@@ -335,14 +336,13 @@ impl EnergyTables {
         Profile::new(self.sheen.around(alpha, made), 0, 0.0, Vec4::X)
     }
 
-    /// Facets below a covering of albedo E are seen through `1 - max(E(o), E(i))`, which is exact for mirrors and keeps
-    /// the exchange of directions. Rough ones then lose `integral f max(E(i) - E(o), 0) cos` of what `1 - E(o)` would
-    /// let them keep: this profile.
+    /// Energy that rough facets below a layer of albedo E lose because they are attenuated by `1 - max(E(o), E(i))` and
+    /// not by `1 - E(o)`: the profile `integral f max(E(i) - E(o), 0) cos`.
     #[inline]
-    pub(super) fn covered_loss(&self, covering: Covering, alpha: Position, cover_alpha: f32) -> Profile {
-        match covering {
-            Covering::Coat => self.below_coat.profile(alpha, cover_alpha, |alpha| self.coat_albedo(alpha)),
-            Covering::Sheen => self.below_sheen.profile(alpha, cover_alpha, |alpha| self.sheen_albedo(alpha)),
+    pub(super) fn covered_loss(&self, layer: CoverLayer, alpha: Position, cover_alpha: f32) -> Profile {
+        match layer {
+            CoverLayer::Coat => self.below_coat.profile(alpha, cover_alpha, |alpha| self.coat_albedo(alpha)),
+            CoverLayer::Sheen => self.below_sheen.profile(alpha, cover_alpha, |alpha| self.sheen_albedo(alpha)),
         }
     }
 }

@@ -1,24 +1,25 @@
-//! Reflectance of smooth interfaces, and the directions light takes there.
+//! Fresnel reflectance of smooth interfaces, and reflected and refracted directions.
 
 use crate::math::{Rgb, Vec3, sqr};
 use wide::f32x8;
 
-/// Ratios of refractive indices this near to 1 are taken for 1: the interface does nothing. Below it the half vector of
-/// refraction, a difference of nearly equal vectors, drowns in rounding.
+/// Relative indices of refraction that differ from 1 by less than this count as matched: the interface has no effect.
+/// For smaller differences, rounding errors dominate the half vector of refraction.
 pub const MATCHED: f32 = 2e-3;
 
-/// Above this ratio of refractive indices the interface reflects all light (glTF's legacy ior 0 arrives as infinity).
+/// Relative index of refraction above which the interface reflects all light. The legacy ior 0 of glTF is infinity
+/// here.
 const MIRROR_ETA: f32 = 1e3;
 
-/// Whether an interface of relative index `eta` bends and reflects nothing.
+/// Whether an interface of relative index `eta` has no effect.
 #[inline]
 pub fn is_matched(eta: f32) -> bool {
     (eta - 1.0).abs() < MATCHED
 }
 
-/// Fresnel's equations for unpolarised light that meets a smooth dielectric from a medium in which the ray makes the
-/// angle `cos_o` (in `[0, 1]`) with the normal; `eta` is the index on the far side over the index on the near side.
-/// Returns the reflectance and the cosine of the refracted ray; `(1, 0)` at total internal reflection.
+/// Fresnel's equations for unpolarised light at a smooth dielectric. `cos_o`, in `[0, 1]`, is the cosine of the
+/// incident ray with the normal, `eta` the index on the far side over the index on the near side. Returns the
+/// reflectance and the cosine of the refracted ray; `(1, 0)` at total internal reflection.
 #[inline]
 pub fn dielectric(cos_o: f32, eta: f32) -> (f32, f32) {
     if is_matched(eta) {
@@ -37,7 +38,7 @@ pub fn dielectric(cos_o: f32, eta: f32) -> (f32, f32) {
     (0.5 * (sqr(parallel) + sqr(perpendicular)), cos_t)
 }
 
-/// Reflectance of a dielectric at normal incidence; the same from both sides.
+/// Reflectance of a dielectric at normal incidence, which is equal from both sides.
 #[inline]
 pub fn normal_incidence(eta: f32) -> f32 {
     if is_matched(eta) {
@@ -56,27 +57,28 @@ pub fn schlick_weight(cos: f32) -> f32 {
     sqr(sqr(x)) * x
 }
 
-/// A smooth interface seen from one side, ready for many angles.
+/// A smooth interface seen from one side, with constants precomputed for many angles.
 #[derive(Clone, Copy, Debug)]
 pub struct Smooth {
-    /// Index on the far side over the index on the near side.
+    /// Index of refraction on the far side over the index on the near side.
     pub eta: f32,
     inverse_eta2: f32,
-    /// Reflectance at normal incidence, and one over the rest.
+    /// Reflectance at normal incidence.
     normal: f32,
+    /// 1 / (1 - `normal`).
     inverse_rest: f32,
 }
 
 impl Smooth {
-    /// From the relative index.
+    /// The interface of relative index `eta`.
     pub fn new(eta: f32) -> Smooth {
         let normal = normal_incidence(eta);
         Smooth { eta, inverse_eta2: 1.0 / (eta * eta), normal, inverse_rest: 1.0 / (1.0 - normal) }
     }
 
-    /// Where the exact reflectance lies between its value at normal incidence (0) and at grazing incidence (1): lets
-    /// KHR_materials_specular's F0 and F90 shape the exact curve, as they shape Schlick's in the extension's text.
-    /// Returns the weight of F90 and the cosine of the refracted ray; `None` at total internal reflection.
+    /// Weight of F90 for an interpolation between F0 (weight 0, normal incidence) and F90 (weight 1, grazing incidence)
+    /// that follows the exact Fresnel curve, where KHR_materials_specular has Schlick's. Also returns the cosine of the
+    /// refracted ray. `None` at total internal reflection.
     #[inline]
     pub fn grazing_weight(&self, cos_o: f32) -> Option<(f32, f32)> {
         let eta = self.eta;
@@ -87,12 +89,12 @@ impl Smooth {
             return Some((schlick_weight(cos_o), 1.0));
         }
         let sin2_t = (1.0 - cos_o * cos_o).max(0.0) * self.inverse_eta2;
-        // Not a number: from inside of what reflects all light.
+        // NaN inside of a medium whose interface reflects all light.
         if sin2_t >= 1.0 || sin2_t.is_nan() {
             return None;
         }
         let cos_t = (1.0 - sin2_t).sqrt();
-        // Fresnel's equations as in `dielectric`, over one denominator.
+        // Fresnel's equations as in `dielectric`, with a common denominator.
         let (near, far) = (eta * cos_o, eta * cos_t);
         let (a, b) = ((near - cos_t) * (cos_o + far), (near + cos_t) * (cos_o - far));
         let f = 0.5 * (sqr(a) + sqr(b)) / sqr((near + cos_t) * (cos_o + far));
@@ -101,7 +103,7 @@ impl Smooth {
 }
 
 impl Smooth {
-    /// [`Smooth::grazing_weight`] for eight angles at an interface to a denser medium, or to one that does not differ.
+    /// [`Smooth::grazing_weight`] of eight cosines, for an interface to a denser medium or of matched indices.
     #[inline]
     pub fn grazing_weight_from_thin(&self, cos_o: f32x8) -> f32x8 {
         if is_matched(self.eta) {
@@ -116,20 +118,20 @@ impl Smooth {
         ((f - self.normal) * self.inverse_rest).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
     }
 
-    /// Whether [`Smooth::grazing_weight_from_thin`] will do.
+    /// Whether [`Smooth::grazing_weight_from_thin`] applies.
     pub fn is_from_thin(&self) -> bool {
         self.eta >= 1.0 - MATCHED && self.eta <= MIRROR_ETA
     }
 }
 
-/// Mirror image of `w` about the unit vector `h`.
+/// The direction into which `w` is reflected at a facet with unit normal `h`.
 #[inline]
 pub fn reflect(w: Vec3, h: Vec3) -> Vec3 {
     h * (2.0 * w.dot(h)) - w
 }
 
-/// The direction into which `w` is refracted at a facet with normal `h` on the side of `w`; `cos_t` from
-/// [`dielectric`].
+/// The direction into which `w` is refracted at a facet with unit normal `h` on the side of `w`. `cos_t` is the cosine
+/// that [`dielectric`] returns.
 #[inline]
 pub fn refract(w: Vec3, h: Vec3, eta: f32, cos_t: f32) -> Vec3 {
     h * (w.dot(h) / eta - cos_t) - w / eta

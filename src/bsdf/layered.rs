@@ -1,142 +1,150 @@
-//! glTF's metallic-roughness model: metal, and a dielectric over a diffuse or transmitting base, sharing one rough
+//! The metallic-roughness model of glTF: a metal, and a dielectric over a diffuse or transmitting base, with one rough
 //! interface.
 //!
-//! Everything is a mixture of three surfaces, each reciprocal and free of loss for a white base:
+//! The BSDF is a mixture of three surfaces. Each is reciprocal, and conserves energy if its base colour is white:
 //! - *metal*: GGX with Schlick's Fresnel term;
-//! - *matte*: a rough dielectric interface over a diffuse base, coupled as in \[Kelemen and Szirmay-Kalos 2001\]:
-//!   diffuse light is what the interface lets in, (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)). Both sides of the surface
-//!   look like its front;
-//! - *glass*: a rough dielectric interface between two media \[Walter 2007\], or two equal ones (a thin wall, whose
-//!   transmitted lobe is the mirror image of the reflected one).
+//! - *matte*: a rough dielectric interface over a diffuse base, coupled as in \[Kelemen and Szirmay-Kalos 2001\]. The
+//!   diffuse lobe is (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)), with the albedo E of the interface. Both sides of the
+//!   surface look like its front;
+//! - *glass*: a rough dielectric interface between two media \[Walter 2007\], or a thin wall between equal media, whose
+//!   transmitted lobe is the mirror image of the reflected one.
 //!
-//! What single scattering between facets loses is given back by a separable lobe, for glass on both sides in the ratio
-//! that keeps it reciprocal \[Kulla and Conty 2017\]. The lobe belongs to the class of the lobe it completes.
+//! A separable lobe compensates the energy that single scattering between facets loses \[Kulla and Conty 2017\]. For
+//! glass it has a reflected and a transmitted part, in the ratio that makes it reciprocal. It has the lobe class of the
+//! facets.
 
 use super::LobeSet;
 use super::cover::Angles;
 use super::fresnel::schlick;
-use super::interface::{Interface, RoughGlass, again};
+use super::interface::{Interface, RoughGlass, multiple_scattering};
 use super::profile::Position;
 use crate::math::{Rgb, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// Directions nearer to the surface than this (cosine) are in it: nothing comes from there. Below it, products of
-/// cosines underflow.
-pub(super) const LEAST_COSINE: f32 = 1e-6;
+/// Directions whose absolute cosine is below this scatter no light, because products of smaller cosines underflow.
+pub(super) const MIN_COSINE: f32 = 1e-6;
 
-/// Mean of the channels: what lobes are chosen by.
+/// Mean of the channels. Lobes are sampled in proportion to it.
 #[inline]
 pub(super) fn mean(c: Rgb) -> f32 {
     c.element_sum() * (1.0 / 3.0)
 }
 
-/// See the module's documentation.
+/// The layered BSDF, see the module's documentation.
 #[derive(Clone, Copy, Debug)]
 pub struct Layered<'a> {
     pub(super) interface: &'a Interface<'a>,
-    /// Classes of lobes that are there.
+    /// Classes of the lobes that scatter light.
     pub(super) lobes: LobeSet,
     pub(super) has_facets: bool,
     pub(super) base: Rgb,
+    /// Weight of the metal in the mixture.
     pub(super) metal: f32,
+    /// Weight of the matte surface in the mixture.
     pub(super) matte: f32,
+    /// Weight of the glass in the mixture; zero if its indices are matched.
     pub(super) glass: f32,
-    /// Weight of the straight lobe.
+    /// Weight of the delta lobe straight through glass of matched indices.
     pub(super) straight: Rgb,
-    /// Diffuse: `diffuse * through(o) * through(i)`; `diffuse_albedo * through(o)` is its albedo.
+    /// Factor of the diffuse lobe `diffuse * through(o) * through(i)`.
     pub(super) diffuse: Rgb,
+    /// Factor of the albedo `diffuse_albedo * through(o)` of the diffuse lobe.
     pub(super) diffuse_albedo: Rgb,
-    /// Compensation for reflecting facets: `returned * loss(o) * loss(i)`, and for thin walls `passed` likewise on the
-    /// other side; times pi times the average of `loss` they are albedos.
-    pub(super) returned: Rgb,
-    pub(super) passed: Rgb,
-    /// Average reflectance of the facets below a covering.
-    pub(super) below: Rgb,
-    /// The normal of a clear coat whose reflection is left to [`super::coat::Coat`].
+    /// Factor of the reflected compensation `reflected_compensation * loss(o) * loss(i)` of metal, matte and thin
+    /// walls. Its albedo is `pi * average of loss * reflected_compensation * loss(o)`.
+    pub(super) reflected_compensation: Rgb,
+    /// Factor of the transmitted compensation of thin walls, likewise.
+    pub(super) transmitted_compensation: Rgb,
+    /// Average reflectance of the facets, if there is a cover.
+    pub(super) facet_average: Rgb,
+    /// Normal of a clear coat over a normal map, which [`super::coat::Coat`] evaluates.
     pub(super) coat_normal: Option<Vec3>,
 }
 
-/// Shares of the lobes among the directions drawn for one `wo` and one set of classes; they sum to 1.
+/// One weight per lobe, for one `wo`: estimated albedos, or, normalized to sum to 1, sampling probabilities.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Shares {
-    /// Facets: reflected or transmitted, as Fresnel says at the facet drawn.
+pub(super) struct LobeWeights {
+    /// Facets. Fresnel's equations then choose reflection or transmission.
     pub facets: f32,
-    /// Compensation on the side of `wo`.
-    pub returned: f32,
-    /// Compensation on the other side.
-    pub passed: f32,
+    /// Reflected compensation.
+    pub reflected_compensation: f32,
+    /// Transmitted compensation.
+    pub transmitted_compensation: f32,
     /// Diffuse reflection.
     pub diffuse: f32,
-    /// Straight through an index-matched boundary.
+    /// Delta lobe straight through glass of matched indices.
     pub straight: f32,
-    /// What facets lose below a covering, on the side of `wo`.
-    pub below: f32,
+    /// Compensation of the energy that facets lose below a cover.
+    pub covered_loss: f32,
     /// Clear coat.
     pub coat: f32,
     /// Sheen.
     pub sheen: f32,
 }
 
-impl Shares {
-    /// Scaled to sum to 1; `None` where nothing scatters.
+impl LobeWeights {
+    /// Scales the weights to sum to 1; `None` if they are all zero.
     #[inline]
-    fn normalised(mut self) -> Option<Shares> {
-        let own = self.facets + self.returned + self.passed + self.diffuse + self.straight;
-        let sum = own + self.below + self.coat + self.sheen;
-        // Written so that NaN scatters nothing.
+    fn normalized(mut self) -> Option<LobeWeights> {
+        let own =
+            self.facets + self.reflected_compensation + self.transmitted_compensation + self.diffuse + self.straight;
+        let sum = own + self.covered_loss + self.coat + self.sheen;
+        // This form returns `None` for NaN.
         let positive = sum > 0.0;
         if !positive {
             return None;
         }
         let scale = 1.0 / sum;
         self.facets *= scale;
-        self.returned *= scale;
-        self.passed *= scale;
+        self.reflected_compensation *= scale;
+        self.transmitted_compensation *= scale;
         self.diffuse *= scale;
         self.straight *= scale;
-        self.below *= scale;
+        self.covered_loss *= scale;
         self.coat *= scale;
         self.sheen *= scale;
         Some(self)
     }
 }
 
-/// A surface seen along one direction: what all directions of light have in common there.
+/// The terms of a BSDF that depend only on the viewing direction.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
-    /// The direction, from the side it is on.
+pub(super) struct ViewTerms {
+    /// The viewing direction, with z >= 0.
     pub o: Vec3,
-    /// 0: it is above; 1: below.
+    /// Side of the viewing direction: 0 above, 1 below.
     pub side: usize,
+    /// Table position of its cosine.
     pub at: Position,
-    /// [`super::microfacet::Ggx::root`] of it.
+    /// [`super::microfacet::Ggx::root`] of `o`.
     pub root: f32,
-    /// Profiles of the interface along it.
+    /// The profile `loss` of the interface at `o`.
     pub loss: f32,
+    /// The profile `through` of the interface at `o`.
     pub through: f32,
-    /// Estimates of the lobes' albedos, all classes of lobes: their means,
-    means: Shares,
-    /// and by class: facets with their compensation, diffuse, straight, coat, sheen.
+    /// Estimated albedos of all lobes, as means over the channels.
+    means: LobeWeights,
+    /// Estimated albedos of five groups of lobes: facets with their compensation, diffuse, straight, coat, sheen.
     albedos: [Rgb; 5],
 }
 
-impl Seen {
-    /// Where only the direction matters.
+impl ViewTerms {
+    /// The terms of a BSDF that needs only the direction.
     #[inline]
-    pub(super) fn plain(wo: Vec3) -> Seen {
-        Seen {
+    pub(super) fn plain(wo: Vec3) -> ViewTerms {
+        ViewTerms {
             o: Vec3::new(wo.x, wo.y, wo.z.abs()),
             side: usize::from(wo.z < 0.0),
             at: Position::default(),
             root: 0.0,
             loss: 0.0,
             through: 1.0,
-            means: Shares::default(),
+            means: LobeWeights::default(),
             albedos: [Rgb::ZERO; 5],
         }
     }
 
-    /// The direction itself.
+    /// The viewing direction in the shading frame.
     #[inline]
     pub(super) fn wo(&self) -> Vec3 {
         if self.side == 1 { Vec3::new(self.o.x, self.o.y, -self.o.z) } else { self.o }
@@ -144,7 +152,7 @@ impl Seen {
 }
 
 impl<'a> Layered<'a> {
-    /// The surface of `base` colour, `metallic` and transmitting in these shares, at `interface`.
+    /// The BSDF of a surface with this base colour, metalness, transmission and interface.
     #[inline(always)]
     pub(super) fn new(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Layered<'a> {
         let Interface { matched, class, thin, average, .. } = *interface;
@@ -154,18 +162,18 @@ impl<'a> Layered<'a> {
         let has_facets = metal > 0.0 || (!matched && (glass > 0.0 || (matte > 0.0 && interface.f90 > 0.0)));
         let straight = if matched { base * glass } else { Rgb::ZERO };
         let glass = if matched { 0.0 } else { glass };
-        let (mut returned, mut passed) = (Rgb::ZERO, Rgb::ZERO);
+        let (mut reflected_compensation, mut transmitted_compensation) = (Rgb::ZERO, Rgb::ZERO);
         let metal_average = base + (Rgb::ONE - base) * (1.0 / 21.0);
         if class != LobeSet::DELTA {
             let lost = interface.loss.average;
             let scale = FRAC_1_PI / lost.max(1e-9);
-            returned = interface.again * (matte * scale);
+            reflected_compensation = interface.multiple_scattering * (matte * scale);
             if metal > 0.0 {
-                returned += again(metal_average, 1.0 - lost) * (metal * scale);
+                reflected_compensation += multiple_scattering(metal_average, 1.0 - lost) * (metal * scale);
             }
             if thin {
-                returned += average * (glass * scale);
-                passed = base * ((1.0 - average.max_element()) * glass * scale);
+                reflected_compensation += average * (glass * scale);
+                transmitted_compensation = base * ((1.0 - average.max_element()) * glass * scale);
             }
         }
         let diffuse_albedo = base * matte;
@@ -180,10 +188,10 @@ impl<'a> Layered<'a> {
         if straight.max_element() > 0.0 {
             lobes = lobes | LobeSet::DELTA;
         }
-        let mut below = Rgb::ZERO;
+        let mut facet_average = Rgb::ZERO;
         if let Some(covered) = &interface.cover {
             lobes = lobes | covered.cover.lobes();
-            below = metal_average * metal + average * (1.0 - metal);
+            facet_average = metal_average * metal + average * (1.0 - metal);
         }
         Layered {
             interface,
@@ -196,15 +204,15 @@ impl<'a> Layered<'a> {
             straight,
             diffuse,
             diffuse_albedo,
-            returned,
-            passed,
-            below,
+            reflected_compensation,
+            transmitted_compensation,
+            facet_average,
             coat_normal: None,
         }
     }
 
-    /// Cosine of a direction, as seen from `side`, with the coat's normal, and where its cosines lie; `base` is that with
-    /// the base's.
+    /// Cosine of `w` with the normal of the coat, and the table positions of both cosines. `side` is the side of the
+    /// viewer, `base` the position of the cosine with the normal of the base.
     #[inline]
     pub(super) fn angles(&self, side: usize, w: Vec3, base: Position) -> (f32, Angles) {
         let Some(n) = self.coat_normal else { return (w.z.abs(), base.into()) };
@@ -213,19 +221,19 @@ impl<'a> Layered<'a> {
         (cos, Angles { coat: Position::new(cos), base })
     }
 
-    /// The probability of drawing a direction from a coat that has a normal of its own.
+    /// Probability of sampling the coat, for a coat over a normal map.
     #[inline]
-    pub(super) fn coat_share(&self, seen: &Seen, set: LobeSet) -> f32 {
-        self.all_shares(seen, set).normalised().map_or(0.0, |shares| shares.coat)
+    pub(super) fn coat_probability(&self, view: &ViewTerms, set: LobeSet) -> f32 {
+        self.lobe_weights(view, set).normalized().map_or(0.0, |probabilities| probabilities.coat)
     }
 
-    /// Compensation of solid glass, where there is any.
+    /// Energy compensation of solid rough glass, if the surface is glass.
     #[inline]
     pub(super) fn rough_glass(&self) -> Option<&'a RoughGlass<'a>> {
         if self.glass > 0.0 { self.interface.glass.as_ref() } else { None }
     }
 
-    /// Reflectance of metal and of the matte's interface at a facet.
+    /// Reflectance of metal and of the matte surface's interface at a facet.
     #[inline]
     fn opaque(&self, cos: f32) -> Rgb {
         let mut reflected = if self.metal > 0.0 { schlick(self.base, cos) * self.metal } else { Rgb::ZERO };
@@ -246,102 +254,103 @@ impl<'a> Layered<'a> {
         (opaque + f * self.glass, self.base * (self.glass * t), cos_t)
     }
 
-    /// The surface seen along `wo`.
+    /// The terms that depend only on the viewing direction `wo`.
     #[inline(always)]
-    pub(super) fn seen(&self, wo: Vec3) -> Seen {
+    pub(super) fn view_terms(&self, wo: Vec3) -> ViewTerms {
         let n = self.interface;
         let side = usize::from(wo.z < 0.0);
         let o = Vec3::new(wo.x, wo.y, wo.z.abs());
         let at = Position::new(o.z);
         let through = n.through.at(at);
-        let mut seen = Seen {
+        let mut view = ViewTerms {
             o,
             side,
             at,
             root: n.ggx.root(o),
             loss: n.loss.at(at),
             through,
-            means: Shares::default(),
+            means: LobeWeights::default(),
             albedos: [Rgb::ZERO, self.diffuse_albedo * through, self.straight, Rgb::ZERO, Rgb::ZERO],
         };
-        seen.means.diffuse = mean(seen.albedos[1]);
-        seen.means.straight = mean(self.straight);
+        view.means.diffuse = mean(view.albedos[1]);
+        view.means.straight = mean(self.straight);
         if self.has_facets {
-            let [single, returned, passed] = self.facet_albedos(&seen);
-            seen.albedos[0] = single + returned + passed;
-            seen.means.facets = mean(single);
-            seen.means.returned = mean(returned);
-            seen.means.passed = mean(passed);
+            let [single, reflected_compensation, transmitted_compensation] = self.facet_albedos(&view);
+            view.albedos[0] = single + reflected_compensation + transmitted_compensation;
+            view.means.facets = mean(single);
+            view.means.reflected_compensation = mean(reflected_compensation);
+            view.means.transmitted_compensation = mean(transmitted_compensation);
         }
-        self.cover_albedos(&mut seen);
-        // The estimate may vanish where the lobe does not: black metal at normal incidence.
+        self.cover_albedos(&mut view);
+        // The estimate may be zero where the lobe is not, for example for black metal at normal incidence.
         if self.has_facets && n.class != LobeSet::DELTA {
-            seen.means.facets += 0.01;
+            view.means.facets += 0.01;
         }
-        seen
+        view
     }
 
-    /// Estimates of the albedos of facets, their compensation on the same side, and on the other.
+    /// Estimated albedos of the facets, of their reflected compensation, and of their transmitted compensation.
     #[inline(always)]
-    fn facet_albedos(&self, seen: &Seen) -> [Rgb; 3] {
+    fn facet_albedos(&self, view: &ViewTerms) -> [Rgb; 3] {
         let n = self.interface;
-        let cos = n.effective_cosine(seen.o.z);
-        let own = PI * n.loss.average * seen.loss;
-        let (returned, passed) = (self.returned * own, self.passed * own);
+        let cos = n.effective_cosine(view.o.z);
+        let own = PI * n.loss.average * view.loss;
+        let (reflected_compensation, transmitted_compensation) =
+            (self.reflected_compensation * own, self.transmitted_compensation * own);
         match self.rough_glass() {
             Some(glass) => {
-                let (side, at) = (seen.side, seen.at);
-                let loss = glass.loss_along(side, at, seen.o);
-                let reflected = glass.reflected_along(side, at, seen.o);
+                let (side, at) = (view.side, view.at);
+                let loss = glass.loss_along(side, at, view.o);
+                let reflected = glass.reflected_along(side, at, view.o);
                 let transmitted = (1.0 - loss - reflected).max(0.0);
                 let smooth = n.dielectric(cos, side).0;
                 let tint = smooth / smooth.max_element().max(f32::MIN_POSITIVE);
                 let single =
-                    self.opaque(cos) * (1.0 - seen.loss) + (tint * reflected + self.base * transmitted) * self.glass;
-                let same = self.glass * glass.returned[side] * loss * glass.loss[side].average * PI;
+                    self.opaque(cos) * (1.0 - view.loss) + (tint * reflected + self.base * transmitted) * self.glass;
+                let same = self.glass * glass.reflected_compensation[side] * loss * glass.loss[side].average * PI;
                 let other = glass.loss[1 - side].average * n.index2(1 - side);
-                let across = self.base * (self.glass * glass.passed * loss * other * PI);
-                [single, returned + Rgb::splat(same), passed + across]
+                let across = self.base * (self.glass * glass.transmitted_compensation * loss * other * PI);
+                [single, reflected_compensation + Rgb::splat(same), transmitted_compensation + across]
             }
             None => {
-                let (r, t, _) = self.fresnel(cos, seen.side);
-                [(r + t) * (1.0 - seen.loss), returned, passed]
+                let (r, t, _) = self.fresnel(cos, view.side);
+                [(r + t) * (1.0 - view.loss), reflected_compensation, transmitted_compensation]
             }
         }
     }
 
-    /// What a covering scatters, and what it leaves of the rest.
+    /// Attenuates the albedo estimates by the cover, and adds those of the cover itself.
     #[inline]
-    fn cover_albedos(&self, seen: &mut Seen) {
+    fn cover_albedos(&self, view: &mut ViewTerms) {
         let Some(c) = &self.interface.cover else { return };
-        let (coat_cos, angles) = self.angles(seen.side, seen.o, seen.at);
-        let passes = c.cover.passes(angles);
-        for albedo in &mut seen.albedos {
-            *albedo *= passes;
+        let (coat_cos, angles) = self.angles(view.side, view.o, view.at);
+        let transmittance = c.cover.transmittance(angles);
+        for albedo in &mut view.albedos {
+            *albedo *= transmittance;
         }
         for share in [
-            &mut seen.means.facets,
-            &mut seen.means.returned,
-            &mut seen.means.passed,
-            &mut seen.means.diffuse,
-            &mut seen.means.straight,
+            &mut view.means.facets,
+            &mut view.means.reflected_compensation,
+            &mut view.means.transmitted_compensation,
+            &mut view.means.diffuse,
+            &mut view.means.straight,
         ] {
-            *share *= passes;
+            *share *= transmittance;
         }
         if self.has_facets {
             let mut lost = Rgb::ZERO;
-            for (below, profile) in c.below.iter().zip(&c.profiles) {
-                lost += self.below * (PI * below * profile.average * profile.at(seen.at));
+            for (scale, profile) in c.loss_scale.iter().zip(&c.loss_profiles) {
+                lost += self.facet_average * (PI * scale * profile.average * profile.at(view.at));
             }
-            seen.albedos[0] += lost;
-            seen.means.below = mean(lost);
+            view.albedos[0] += lost;
+            view.means.covered_loss = mean(lost);
         }
         let [coat, sheen] = c.cover.albedos(coat_cos, angles);
-        (seen.albedos[3], seen.albedos[4]) = (coat, sheen);
-        (seen.means.coat, seen.means.sheen) = (mean(coat), mean(sheen));
+        (view.albedos[3], view.albedos[4]) = (coat, sheen);
+        (view.means.coat, view.means.sheen) = (mean(coat), mean(sheen));
     }
 
-    /// Which of [`Seen`]'s five groups of lobes are in the set.
+    /// Whether each of the five groups of `ViewTerms::albedos` is in the set.
     #[inline]
     fn groups(&self, set: LobeSet) -> [bool; 5] {
         let coat = self.interface.cover.as_ref().is_some_and(|c| set.intersects(c.cover.coat_class));
@@ -349,11 +358,11 @@ impl<'a> Layered<'a> {
         [set.intersects(self.interface.class), broad, set.intersects(LobeSet::DELTA), coat, broad]
     }
 
-    /// Albedo of the lobes of `set`.
+    /// Estimated albedo of the lobes of `set`.
     #[inline]
-    pub(super) fn albedo(&self, seen: &Seen, set: LobeSet) -> Rgb {
+    pub(super) fn albedo(&self, view: &ViewTerms, set: LobeSet) -> Rgb {
         let mut sum = Rgb::ZERO;
-        for (albedo, counts) in seen.albedos.iter().zip(self.groups(set)) {
+        for (albedo, counts) in view.albedos.iter().zip(self.groups(set)) {
             if counts {
                 sum += *albedo;
             }
@@ -361,24 +370,24 @@ impl<'a> Layered<'a> {
         sum.min(Rgb::ONE)
     }
 
-    /// Shares of the lobes among the directions drawn here.
+    /// Sampling probabilities of the lobes of `set`, except a coat over a normal map.
     #[inline]
-    pub(super) fn shares(&self, seen: &Seen, set: LobeSet) -> Option<Shares> {
-        let all = self.all_shares(seen, set);
+    pub(super) fn lobe_probabilities(&self, view: &ViewTerms, set: LobeSet) -> Option<LobeWeights> {
+        let all = self.lobe_weights(view, set);
         let coat = if self.coat_normal.is_some() { 0.0 } else { all.coat };
-        Shares { coat, ..all }.normalised()
+        LobeWeights { coat, ..all }.normalized()
     }
 
-    /// Not normalised.
+    /// Albedo estimates of the lobes of `set`.
     #[inline]
-    fn all_shares(&self, seen: &Seen, set: LobeSet) -> Shares {
+    fn lobe_weights(&self, view: &ViewTerms, set: LobeSet) -> LobeWeights {
         let [facets, diffuse, straight, coat, sheen] = self.groups(set).map(|counts| f32::from(u8::from(counts)));
-        let means = &seen.means;
-        Shares {
+        let means = &view.means;
+        LobeWeights {
             facets: means.facets * facets,
-            returned: means.returned * facets,
-            passed: means.passed * facets,
-            below: means.below * facets,
+            reflected_compensation: means.reflected_compensation * facets,
+            transmitted_compensation: means.transmitted_compensation * facets,
+            covered_loss: means.covered_loss * facets,
             diffuse: means.diffuse * diffuse,
             straight: means.straight * straight,
             coat: means.coat * coat,

@@ -1,5 +1,6 @@
-//! The scattering model: one closed set of lobes that agrees with the glTF specification and conserves energy.
+//! The BSDF model: a fixed set of lobes that follows the glTF specification and conserves energy.
 
+mod anisotropic;
 mod coat;
 mod cover;
 mod energy;
@@ -15,7 +16,6 @@ mod relief;
 mod scatter;
 mod shading;
 mod sheen;
-mod stretched;
 
 pub use cover::coat_reflectance;
 pub use energy::EnergyTables;
@@ -28,25 +28,24 @@ pub use shading::Shading;
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use bitflags::bitflags;
-use layered::Seen;
+use layered::ViewTerms;
 use profile::Profile;
 use std::f32::consts::FRAC_1_PI;
 
 bitflags! {
-    /// A set of lobe classes. The class decides which technique carries light that arrives at a surface: see
-    /// [`LobeSet::BROAD`].
+    /// A set of lobe classes. The class of a lobe decides which technique carries the light that it scatters.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
     pub struct LobeSet: u8 {
-        /// Perfect mirrors and clear interfaces: a path can only continue.
+        /// Perfect mirrors and clear interfaces. A path can only continue there.
         const DELTA = 1;
-        /// Glossy lobes too narrow to gather photons well (GGX alpha below [`SHARP_ALPHA`], for solid glass as far as
-        /// it bends light): a camera path continues.
+        /// Glossy lobes that are too narrow to gather photons (GGX alpha below [`SHARP_ALPHA`], for solid glass scaled
+        /// by [`refraction_width`]). A camera path continues there.
         const SHARP = 2;
-        /// Diffuse, sheen and wide glossy lobes: photons are gathered here.
+        /// Diffuse lobes, sheen and wide glossy lobes. Photons are gathered there.
         const BROAD = 4;
-        /// Lobes that a light sample can be evaluated against.
+        /// All classes except delta lobes: those that can be evaluated for a given direction.
         const SMOOTH = 6;
-        /// Every class.
+        /// All classes.
         const ALL = 7;
     }
 }
@@ -57,17 +56,18 @@ pub const SHARP_ALPHA: f32 = 0.2;
 /// GGX alpha below which a lobe is a perfect mirror or a clear interface (perceptual roughness 0.03).
 pub const DELTA_ALPHA: f32 = 1e-3;
 
-/// Which quantity a walk carries; refraction compresses radiance by 1/eta^2 and leaves importance's adjoint alone.
+/// The quantity that a path transports (PBRT's `TransportMode`). Refraction scales radiance by the squared ratio of the
+/// indices, but not the flux of a light path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
-    /// Walking from the eye: BSDFs weight radiance.
+    /// The path starts at the camera, and BSDFs scale radiance.
     Radiance,
-    /// Walking from a light: the adjoint BSDF weights flux.
+    /// The path starts at a light, and adjoint BSDFs scale flux.
     Importance,
 }
 
 impl Transport {
-    /// That of a path the other way.
+    /// The mode of the reversed path.
     #[inline]
     fn reversed(self) -> Transport {
         match self {
@@ -80,35 +80,35 @@ impl Transport {
 /// A direction drawn from a BSDF.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample {
-    /// Unit direction, local frame.
+    /// Unit direction in the shading frame.
     pub wi: Vec3,
-    /// f |cos wi| / pdf over the set of lobes asked for (for a delta lobe, its weight over the probability of choosing
-    /// it).
+    /// f |cos wi| / pdf over the requested set of lobes. For a delta lobe, its weight over the probability of choosing
+    /// it.
     pub weight: Rgb,
-    /// Density per solid angle of `wi` over the non-delta lobes of the set; for a delta sample the probability of
-    /// choosing that lobe.
+    /// Density per solid angle of `wi` over the non-delta lobes of the set. For a delta lobe, the probability of
+    /// choosing it.
     pub pdf_w: f32,
-    /// Class of the lobe drawn (exactly one).
+    /// Class of the sampled lobe (exactly one).
     pub lobe: LobeSet,
-    /// The direction crosses to the other side of the surface.
+    /// Whether `wi` is on the other side of the surface than `wo`.
     pub transmitted: bool,
 }
 
-/// How a surface scatters at one point, in its shading frame: z is the shading normal, directions point away from the
-/// surface, z > 0 is its front.
+/// The BSDF of a surface point in its shading frame. The z axis is the shading normal on the front; directions point
+/// away from the surface.
 #[derive(Clone, Copy, Debug)]
 pub enum Bsdf<'a> {
-    /// Lambert's reflection of some colour on both sides.
+    /// Lambertian reflection of this colour on both sides.
     Matte(Rgb),
-    /// Everything else.
+    /// The layered model.
     Layered(Layered<'a>),
 }
 
-/// Lambert's BSDF and density over `set`, from the cosines of both directions with the normal on the side that the
-/// surface is seen from.
+/// Value and density over `set` of Lambertian reflection, from the cosines of both directions with the normal on the
+/// side of the viewer.
 #[inline(always)]
-fn lambert(color: Rgb, seen: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
-    if seen > 0.0 && lit > 0.0 && set.intersects(LobeSet::BROAD) && color.max_element() > 0.0 {
+fn lambert(color: Rgb, view: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
+    if view > 0.0 && lit > 0.0 && set.intersects(LobeSet::BROAD) && color.max_element() > 0.0 {
         (color * FRAC_1_PI, lit * FRAC_1_PI)
     } else {
         (Rgb::ZERO, 0.0)
@@ -116,28 +116,28 @@ fn lambert(color: Rgb, seen: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
 }
 
 impl<'a> Bsdf<'a> {
-    /// The BSDF of `parameters`, whose interface is `interface`.
+    /// The BSDF of `parameters`, with the interface made from them.
     pub fn new(parameters: &Parameters, interface: &'a Interface<'a>) -> Bsdf<'a> {
         Bsdf::of(parameters.base_color, parameters.metallic, parameters.transmission, interface)
     }
 
-    /// The BSDF of a surface of colour `base`, `metallic` and transmitting in these shares, at `interface`.
+    /// The BSDF of a surface with this base colour, metalness, transmission and interface.
     #[inline(always)]
     pub fn of(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Bsdf<'a> {
-        if metallic == 0.0 && transmission == 0.0 && interface.bare {
+        if metallic == 0.0 && transmission == 0.0 && interface.invisible {
             Bsdf::Matte(base)
         } else {
             Bsdf::Layered(Layered::new(base, metallic, transmission, interface))
         }
     }
 
-    /// Light from one side may leave on the other, not by a delta lobe.
+    /// Whether a lobe other than a delta lobe transmits light.
     #[inline]
     pub fn transmits(&self) -> bool {
         matches!(self, Bsdf::Layered(layered) if layered.glass > 0.0)
     }
 
-    /// Classes of lobes that are there.
+    /// Classes of the lobes that scatter light.
     #[inline]
     pub fn lobes(&self) -> LobeSet {
         match self {
@@ -147,134 +147,148 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The surface seen along `wo`.
+    /// The terms that depend only on the viewing direction `wo`.
     #[inline(always)]
-    fn seen(&self, wo: Vec3) -> Seen {
+    fn view_terms(&self, wo: Vec3) -> ViewTerms {
         match self {
-            Bsdf::Matte(_) => Seen::plain(wo),
-            Bsdf::Layered(layered) => layered.seen(wo),
+            Bsdf::Matte(_) => ViewTerms::plain(wo),
+            Bsdf::Layered(layered) => layered.view_terms(wo),
         }
     }
 
-    /// The BSDF (1/sr, without cosine) over the lobes of `set` that are not delta, and the density per solid angle with
-    /// which [`Bsdf::sample`] draws `wi` for `wo` and `set`.
+    /// Value (1/sr, without cosine) of the non-delta lobes of `set`, and the density per solid angle with which
+    /// [`Bsdf::sample`] draws `wi` for `wo` and `set`.
     ///
-    /// [`Transport::Radiance`]: light from `wi` is seen along `wo`; [`Transport::Importance`]: flux that came from `wo`
-    /// leaves along `wi`. They differ for refraction only: with n the index on the side of a direction,
-    /// `f_radiance(o, i) = f_importance(i, o) = f_importance(o, i) n_o^2 / n_i^2`.
+    /// With [`Transport::Radiance`], light from `wi` leaves along `wo` to the camera. With [`Transport::Importance`],
+    /// light from `wo` leaves along `wi`. The two differ only for refraction: with n the index on the side of a
+    /// direction, `f_radiance(o, i) = f_importance(i, o) = f_importance(o, i) n_o^2 / n_i^2`.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         match self {
             Bsdf::Matte(color) => lambert(*color, wo.z.abs(), if wo.z < 0.0 { -wi.z } else { wi.z }, set),
-            Bsdf::Layered(layered) => layered.evaluate(&layered.seen(wo), wi, transport, set),
+            Bsdf::Layered(layered) => layered.evaluate(&layered.view_terms(wo), wi, transport, set),
         }
     }
 
     #[inline]
-    fn evaluate_seen(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+    fn evaluate_view(&self, view: &ViewTerms, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         match self {
-            Bsdf::Matte(color) => lambert(*color, seen.o.z, if seen.side == 1 { -wi.z } else { wi.z }, set),
-            Bsdf::Layered(layered) => layered.evaluate(seen, wi, transport, set),
+            Bsdf::Matte(color) => lambert(*color, view.o.z, if view.side == 1 { -wi.z } else { wi.z }, set),
+            Bsdf::Layered(layered) => layered.evaluate(view, wi, transport, set),
         }
     }
 
-    /// [`Bsdf::evaluate_seen`] with a share of the diffuse reflection, the density being that of the whole.
+    /// [`Bsdf::evaluate_view`] with the diffuse reflection multiplied by `share`. The density is unchanged.
     #[inline]
-    fn evaluate_dimmed(&self, share: f32, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+    fn evaluate_dimmed(
+        &self,
+        share: f32,
+        view: &ViewTerms,
+        wi: Vec3,
+        transport: Transport,
+        set: LobeSet,
+    ) -> (Rgb, f32) {
         match self {
             Bsdf::Matte(_) => {
-                let (f, pdf) = self.evaluate_seen(seen, wi, transport, set);
+                let (f, pdf) = self.evaluate_view(view, wi, transport, set);
                 (f * share, pdf)
             }
             Bsdf::Layered(layered) => {
                 let mut layered = *layered;
                 layered.diffuse *= share;
-                layered.evaluate(seen, wi, transport, set)
+                layered.evaluate(view, wi, transport, set)
             }
         }
     }
 
-    /// The first part of [`Bsdf::evaluate`].
+    /// The value of [`Bsdf::evaluate`].
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
-        self.eval_seen(&self.seen(wo), wi, transport, set)
+        self.eval_view(&self.view_terms(wo), wi, transport, set)
     }
 
     #[inline]
-    fn eval_seen(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
+    fn eval_view(&self, view: &ViewTerms, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
         match self {
-            Bsdf::Matte(_) => self.evaluate_seen(seen, wi, transport, set).0,
-            Bsdf::Layered(layered) => layered.eval(seen, wi, transport, set),
+            Bsdf::Matte(_) => self.evaluate_view(view, wi, transport, set).0,
+            Bsdf::Layered(layered) => layered.eval(view, wi, transport, set),
         }
     }
 
-    /// Where only diffuse reflection is in `set`: the BSDF over its dependence on `wi`, and that dependence (`None`:
-    /// there is none).
+    /// If `set` contains only diffuse reflection: its constant factor, and the profile that is its dependence on the
+    /// cosine of `wi`, if it depends on it.
     #[inline]
-    fn diffuse_only(&self, seen: &Seen, set: LobeSet) -> Option<(Rgb, Option<&'a Profile>)> {
+    fn diffuse_only(&self, view: &ViewTerms, set: LobeSet) -> Option<(Rgb, Option<&'a Profile>)> {
         match self {
             Bsdf::Matte(color) if set.intersects(LobeSet::BROAD) => Some((*color * FRAC_1_PI, None)),
             Bsdf::Matte(_) => None,
             Bsdf::Layered(layered) => {
-                layered.diffuse_only(seen, set).map(|factor| (factor, Some(&layered.interface.through)))
+                layered.diffuse_only(view, set).map(|factor| (factor, Some(&layered.interface.through)))
             }
         }
     }
 
-    /// The layered model, where facets that only reflect are in `set`, and nothing lies on them.
+    /// The layered model, if it has reflecting facets in `set` that neither transmit nor have a cover.
     #[inline]
-    fn reflecting_facets_only(&self, seen: &Seen, set: LobeSet) -> Option<&Layered<'a>> {
+    fn reflecting_facets_only(&self, view: &ViewTerms, set: LobeSet) -> Option<&Layered<'a>> {
         match self {
-            Bsdf::Layered(layered) if layered.has_plain_facets(seen, set) => Some(layered),
+            Bsdf::Layered(layered) if layered.has_plain_facets(view, set) => Some(layered),
             _ => None,
         }
     }
 
-    /// The second part of [`Bsdf::evaluate`]. The density of the reverse direction is `pdf(wi, wo, ..)`.
+    /// The density of [`Bsdf::evaluate`]. The density of the reverse direction is `pdf(wi, wo, ..)`.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         self.evaluate(wo, wi, transport, set).1
     }
 
-    /// Draws a direction from the lobes of `set`; `u_lobe` chooses the lobe, `u` the direction. `None` where the lobes
-    /// scatter nothing, or the direction drawn is not one they scatter to.
+    /// Samples a direction from the lobes of `set`; `u_lobe` chooses the lobe, `u` the direction. `None` if the lobes
+    /// scatter nothing, or if the sampled direction is invalid (below the horizon, for example).
     #[inline]
     pub fn sample(&self, wo: Vec3, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        self.sample_seen(&self.seen(wo), transport, set, u_lobe, u)
+        self.sample_view(&self.view_terms(wo), transport, set, u_lobe, u)
     }
 
     #[inline]
-    fn sample_seen(&self, seen: &Seen, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+    fn sample_view(
+        &self,
+        view: &ViewTerms,
+        transport: Transport,
+        set: LobeSet,
+        u_lobe: f32,
+        u: Vec2,
+    ) -> Option<BsdfSample> {
         match self {
             Bsdf::Matte(color) => {
                 let mut wi = warp::hemisphere_cosine(u);
-                if !self.lobes().intersects(set) || wi.z <= 0.0 || seen.o.z == 0.0 {
+                if !self.lobes().intersects(set) || wi.z <= 0.0 || view.o.z == 0.0 {
                     return None;
                 }
                 let pdf_w = wi.z * FRAC_1_PI;
-                if seen.side == 1 {
+                if view.side == 1 {
                     wi.z = -wi.z;
                 }
                 Some(BsdfSample { wi, weight: *color, pdf_w, lobe: LobeSet::BROAD, transmitted: false })
             }
-            Bsdf::Layered(layered) => layered.sample(seen, transport, set, u_lobe, u),
+            Bsdf::Layered(layered) => layered.sample(view, transport, set, u_lobe, u),
         }
     }
 
-    /// Albedo of the lobes of `set`: the share of flux from `wo` that they scatter. Exact for delta and diffuse lobes,
-    /// an estimate for others, off by up to 0.15 where facets of glass are wider one way. It steers roulette, whose
-    /// chances are divided out, and the denoiser: no picture's mean depends on it.
+    /// Albedo of the lobes of `set` for `wo`. Exact for delta and diffuse lobes, an estimate for others, with errors of
+    /// up to 0.15 for anisotropic glass. Only Russian roulette and the denoiser use it, so it does not bias the
+    /// picture.
     #[inline]
     pub fn albedo(&self, wo: Vec3, set: LobeSet) -> Rgb {
-        self.albedo_seen(&self.seen(wo), set)
+        self.albedo_view(&self.view_terms(wo), set)
     }
 
     #[inline]
-    fn albedo_seen(&self, seen: &Seen, set: LobeSet) -> Rgb {
+    fn albedo_view(&self, view: &ViewTerms, set: LobeSet) -> Rgb {
         match self {
             Bsdf::Matte(color) if set.intersects(LobeSet::BROAD) => *color,
             Bsdf::Matte(_) => Rgb::ZERO,
-            Bsdf::Layered(layered) => layered.albedo(seen, set),
+            Bsdf::Layered(layered) => layered.albedo(view, set),
         }
     }
 }

@@ -1,24 +1,24 @@
-//! What a material says at one point, textures looked up.
+//! The parameters of the BSDF at one point, after texture lookups.
 
 use crate::math::Rgb;
 
-/// Parameters of the scattering model at one point: glTF's metallic-roughness model with its extensions.
-/// Colours and strengths are in `[0, 1]`.
+/// Parameters of the BSDF at one point: the metallic-roughness model of glTF with its extensions. Colours and strengths
+/// are in `[0, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// Colour of metal, of diffuse reflection and of transmission.
     pub base_color: Rgb,
-    /// Share of metal.
+    /// Metalness: weight of the metal in the mixture.
     pub metallic: f32,
-    /// GGX width along the frame's x axis (the square of perceptual roughness, widened by anisotropy).
+    /// GGX alpha along the x axis of the frame: the square of the perceptual roughness, increased by anisotropy.
     pub alpha_x: f32,
-    /// GGX width along the frame's y axis.
+    /// GGX alpha along the y axis of the frame.
     pub alpha_y: f32,
-    /// Index of refraction below the surface (local z < 0, the back) over the one above.
+    /// Index of refraction below the surface (z < 0, the back) over the index above.
     pub eta: f32,
-    /// Share of the dielectric that transmits instead of reflecting diffusely.
+    /// Share of the dielectric whose base transmits instead of reflecting diffusely.
     pub transmission: f32,
-    /// Transmits without refraction: a wall without thickness.
+    /// Whether the surface is a thin wall, which transmits without refraction.
     pub thin: bool,
     /// KHR_materials_specular strength.
     pub specular: f32,
@@ -26,16 +26,16 @@ pub struct Parameters {
     pub specular_color: Rgb,
     /// Strength of the clear coat.
     pub clearcoat: f32,
-    /// GGX width of the clear coat.
+    /// GGX alpha of the clear coat.
     pub clearcoat_alpha: f32,
     /// Sheen colour.
     pub sheen_color: Rgb,
-    /// Sheen's width (the square of its perceptual roughness).
+    /// Alpha of the sheen: the square of its perceptual roughness.
     pub sheen_alpha: f32,
 }
 
 impl Default for Parameters {
-    /// White matte, without a Fresnel layer.
+    /// White diffuse reflection without a specular interface.
     fn default() -> Self {
         Parameters {
             base_color: Rgb::ONE,
@@ -56,13 +56,13 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Something lies on top of the base.
+    /// Whether there is a clear coat or sheen.
     #[inline]
     pub(super) fn is_covered(&self) -> bool {
         self.clearcoat > 0.0 || self.sheen_color.max_element() > 0.0
     }
 
-    /// Where the indices match, light goes straight through it, tinted by the base colour, and does nothing else.
+    /// Whether the surface only transmits light straight, tinted by the base colour, if its indices are matched.
     #[inline]
     pub fn is_clear_if_matched(&self) -> bool {
         self.metallic == 0.0 && self.transmission == 1.0 && !self.is_covered()

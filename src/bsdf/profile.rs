@@ -1,18 +1,18 @@
-//! Tabulated functions of a cosine and a roughness, and the lobes whose angular profile they are.
+//! Tabulated functions of a cosine and of alpha, and lobes with such a function as their angular profile.
 //!
-//! A grid runs over the fourth roots of the cosine and of alpha, which puts nodes where albedos bend: at cosines near
-//! alpha, down to nearly smooth surfaces. Interpolation is linear; averages integrate the interpolant exactly, so that
-//! a lobe normalised by them gives back what the table says is missing, no more and no less.
+//! Nodes are uniform in the fourth roots of the cosine and of alpha. This puts more nodes where albedos have a high
+//! curvature: at cosines near alpha, down to nearly smooth surfaces. Interpolation is linear. Averages integrate the
+//! interpolated function exactly, so that a compensation lobe normalized by them has exactly the tabulated albedo.
 
 use crate::math::{Vec2, Vec3, Vec4};
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::sync::OnceLock;
 
-/// Nodes along each axis.
+/// Number of nodes along each axis.
 pub const NODES: usize = 32;
 
-/// Weights of the nodes in `2 integral f(mu) mu dmu` for `f` linear in the fourth root of mu, t, between them:
-/// `2 mu dmu = 8 t^7 dt`.
+/// Weights of the nodes in `2 integral f(mu) mu dmu`, for an `f` that is linear in t, the fourth root of mu, between
+/// nodes. `2 mu dmu = 8 t^7 dt`.
 const AVERAGE: [f32; NODES] = {
     let mut weights = [0.0f64; NODES];
     let h = 1.0 / (NODES - 1) as f64;
@@ -35,8 +35,8 @@ const AVERAGE: [f32; NODES] = {
     result
 };
 
-/// Weights of the nodes in the integral of `f 2 mu dmu` times two, `f` made constant between nodes: the mean of its two
-/// ends, doubled.
+/// Weights of the nodes in twice the integral of `f 2 mu dmu`, for an `f` that is constant between nodes and there
+/// equal to the mean of both nodes.
 const MASS: [f32; NODES] = {
     let mut weights = [0.0f32; NODES];
     let mut i = 0;
@@ -49,7 +49,7 @@ const MASS: [f32; NODES] = {
     weights
 };
 
-/// Squared cosines of the nodes: `t^8`. Uniform numbers between two of them are squares of cosines with density `2 mu`.
+/// Squared cosines of the nodes, `t^8`. The square of a cosine with density `2 mu` is uniform.
 const SQUARES: [f32; NODES] = {
     let mut squares = [0.0f32; NODES];
     let mut i = 0;
@@ -65,24 +65,26 @@ const fn eighth(x: f64) -> f64 {
     x2 * x2 * x2 * x2
 }
 
-/// Cosine or alpha of a node, kept off zero: the limit is approached, not reached.
+/// Cosine or alpha of node `i`. The first node is at 1e-6 instead of zero, where functions may be undefined.
 pub fn node(i: usize) -> f32 {
     let t = i as f32 / (NODES - 1) as f32;
     (t * t * t * t).max(1e-6)
 }
 
-/// A cosine or an alpha on its axis: index of the node below, and the fraction to the next.
+/// The position of a cosine or an alpha in a table.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Position {
+    /// Index of the node below.
     i: usize,
+    /// Fraction of the distance to the next node.
     t: f32,
 }
 
 impl Position {
-    /// Position of cosine 1.
+    /// Position of the value 1, in units of nodes.
     pub const SCALE: f32 = (NODES - 1) as f32;
 
-    /// Of a cosine or an alpha.
+    /// The position of a cosine or an alpha.
     #[inline]
     pub fn new(x: f32) -> Position {
         let x = x.clamp(0.0, 1.0).sqrt().sqrt() * (NODES - 1) as f32;
@@ -90,17 +92,17 @@ impl Position {
         Position { i, t: x - i as f32 }
     }
 
-    /// Up to a factor, the fourth root of what it is the position of.
+    /// The position in units of nodes. Larger values have larger positions.
     pub fn value(self) -> f32 {
         self.i as f32 + self.t
     }
 
-    /// The nodes around it, with their shares of an interpolation.
+    /// The two adjacent nodes with their interpolation weights.
     pub fn around(self) -> [(usize, f32); 2] {
         [(self.i, 1.0 - self.t), (self.i + 1, self.t)]
     }
 
-    /// Interpolated between values at the nodes.
+    /// Interpolates between values at the nodes.
     #[inline]
     pub fn between(self, nodes: &[f32; NODES]) -> f32 {
         let (a, b) = (nodes[self.i], nodes[self.i + 1]);
@@ -111,56 +113,57 @@ impl Position {
 /// Four functions of the cosine at one alpha.
 type Row = [[f32; NODES]; 4];
 
-/// Values of four functions at the nodes of the cosine.
+/// The row whose functions have these values at the nodes of the cosine.
 pub fn row(values: &[Vec4; NODES]) -> Row {
     std::array::from_fn(|k| values.map(|v| v[k]))
 }
 
-/// Rows of N times four functions of the cosine, at the nodes of alpha. A row is made when it is first asked for: most
-/// materials have one roughness, and look at two of them.
+/// N rows, so 4 N functions of the cosine, at each node of alpha. They are computed at first use, because most
+/// materials have one roughness and need only two nodes.
 #[derive(Clone, Debug)]
 pub struct Grid<const N: usize>([OnceLock<Box<[Row; N]>>; NODES]);
 
 impl<const N: usize> Grid<N> {
-    /// Without any row yet.
+    /// A grid without computed rows.
     pub const fn new() -> Grid<N> {
         Grid([const { OnceLock::new() }; NODES])
     }
 
-    /// How many rows there are by now.
-    pub fn made(&self) -> usize {
+    /// Number of nodes of alpha that have been computed.
+    pub fn row_count(&self) -> usize {
         self.0.iter().filter(|row| row.get().is_some()).count()
     }
 
-    /// The rows around `alpha`; `make` makes the one of a node. It runs on the thread that asks first, and must not
-    /// share its work with others: while it waited for them, it could be handed a path that needs the same row, and
-    /// wait for itself.
+    /// The rows at the nodes adjacent to `alpha`. `make` computes the rows of a node, on the first thread that needs
+    /// them. It must not use the thread pool: while it waited there, the thread could take up a path that needs the
+    /// same row, and so wait for itself.
     #[inline]
-    pub fn around(&self, alpha: Position, make: impl Fn(usize) -> [Row; N]) -> Between<'_, N> {
+    pub fn around(&self, alpha: Position, make: impl Fn(usize) -> [Row; N]) -> AdjacentRows<'_, N> {
         let at = |i: usize| &**self.0[i].get_or_init(|| Box::new(make(i)));
-        Between { low: at(alpha.i), high: at(alpha.i + 1), t: alpha.t }
+        AdjacentRows { low: at(alpha.i), high: at(alpha.i + 1), t: alpha.t }
     }
 }
 
-/// Two neighbouring rows of a grid, and a place between them.
+/// The rows at two adjacent nodes of alpha, and the fraction of an alpha between them.
 #[derive(Clone, Copy)]
-pub struct Between<'g, const N: usize> {
+pub struct AdjacentRows<'g, const N: usize> {
     low: &'g [Row; N],
     high: &'g [Row; N],
     t: f32,
 }
 
-/// A function of the cosine at one alpha, affine in the four of a grid: the angular profile of a lobe. Its nodes are
-/// kept, so that a photon costs one interpolation and no look at the grid.
+/// The angular profile of a lobe: a function of the cosine at one alpha, an affine combination of the four functions of
+/// a row. It stores its values at the nodes, so that a photon costs one interpolation and no access to the grid.
 #[derive(Clone, Copy, Debug)]
 pub struct Profile {
     nodes: [f32; NODES],
     /// Cosine-weighted average over the hemisphere.
     pub average: f32,
+    /// Normalization of the density of [`Profile::sample`].
     mass: f32,
 }
 
-/// Sum of products, in an order that vector instructions like.
+/// Dot product, with the terms summed in an order that can be vectorized.
 #[inline]
 fn dot(a: &[f32; NODES], b: &[f32; NODES]) -> f32 {
     let mut sums = [0.0f32; 8];
@@ -173,15 +176,15 @@ fn dot(a: &[f32; NODES], b: &[f32; NODES]) -> f32 {
 }
 
 impl Profile {
-    /// The same everywhere.
+    /// A constant profile.
     pub const fn constant(constant: f32) -> Profile {
         Profile { nodes: [constant; NODES], average: constant, mass: 2.0 * constant }
     }
 
-    /// `constant + factors . functions`, at least zero, with the functions of number `n` of a grid.
+    /// The profile `max(constant + factors . functions, 0)`, with the four functions of row number `n`.
     #[inline]
-    pub fn new<const N: usize>(grid: Between<'_, N>, n: usize, constant: f32, factors: Vec4) -> Profile {
-        let Between { low, high, t } = grid;
+    pub fn new<const N: usize>(grid: AdjacentRows<'_, N>, n: usize, constant: f32, factors: Vec4) -> Profile {
+        let AdjacentRows { low, high, t } = grid;
         let (low, high) = (&low[n], &high[n]);
         let mut nodes = [constant; NODES];
         for (k, factor) in factors.to_array().into_iter().enumerate() {
@@ -194,12 +197,12 @@ impl Profile {
         for node in &mut nodes {
             *node = node.max(0.0);
         }
-        Profile::of(nodes)
+        Profile::from_nodes(nodes)
     }
 
-    /// From its values at the nodes.
+    /// The profile with these values at the nodes.
     #[inline]
-    pub fn of(nodes: [f32; NODES]) -> Profile {
+    pub fn from_nodes(nodes: [f32; NODES]) -> Profile {
         Profile { nodes, average: dot(&nodes, &AVERAGE), mass: dot(&nodes, &MASS) }
     }
 
@@ -209,7 +212,7 @@ impl Profile {
         &self.nodes
     }
 
-    /// What [`Profile::sample`] draws is in proportion to, summed up.
+    /// Normalization of the density of [`Profile::sample`].
     #[inline]
     pub(super) fn mass(&self) -> f32 {
         self.mass
@@ -222,15 +225,15 @@ impl Profile {
     }
 
     /// The value at the cosine `mu`, whose position is `at`, and the density per solid angle with which
-    /// [`Profile::sample`] draws it.
+    /// [`Profile::sample`] draws a direction of that cosine.
     #[inline]
     pub fn at_with_pdf_w(&self, at: Position, mu: f32) -> (f32, f32) {
         let (a, b) = (self.nodes[at.i], self.nodes[at.i + 1]);
         (a + (b - a) * at.t, (a + b) / self.mass.max(f32::MIN_POSITIVE) * mu * FRAC_1_PI)
     }
 
-    /// A direction of the upper hemisphere, drawn as if the profile were constant between nodes; `None` where the
-    /// profile is nothing.
+    /// Samples a direction of the upper hemisphere in proportion to the profile times the cosine, with the profile
+    /// replaced by its mean between nodes. `None` if the profile is zero.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<Vec3> {
         let mut left = u.x * self.mass;

@@ -1,8 +1,8 @@
-//! Values, densities and directions of the layered model.
+//! Evaluation and sampling of the layered model.
 
 use super::fresnel::{reflect, refract};
-use super::interface::Covered;
-use super::layered::{LEAST_COSINE, Layered, Seen, Shares, mean};
+use super::interface::CoverEffect;
+use super::layered::{Layered, LobeWeights, MIN_COSINE, ViewTerms, mean};
 use super::microfacet::{g1, g2_transmission};
 use super::profile::Position;
 use super::{BsdfSample, LobeSet, Transport};
@@ -10,15 +10,14 @@ use crate::math::{Rgb, Vec2, Vec3, sqr, warp};
 use std::f32::consts::FRAC_1_PI;
 
 impl Layered<'_> {
-    /// Probability of reflecting at a facet.
+    /// Probability of sampling reflection at a facet.
     #[inline]
     fn reflect_probability(reflected: Rgb, transmitted: Rgb) -> f32 {
         let (r, t) = (mean(reflected), mean(transmitted));
         if t > 0.0 { r / (r + t) } else { 1.0 }
     }
 
-    /// What a transmitted path weighs more than the adjoint of this transport mode: radiance is denser where the index
-    /// is higher.
+    /// Factor of transmission relative to flux: radiance is scaled by the squared ratio of the indices.
     #[inline]
     fn radiance_scale(&self, side: usize, transport: Transport) -> f32 {
         match transport {
@@ -29,62 +28,62 @@ impl Layered<'_> {
         }
     }
 
-    /// The BSDF without cosine, and the density per solid angle of `wi`, over the lobes of `set` that are not delta.
+    /// Value without cosine, and density per solid angle of `wi`, of the non-delta lobes of `set`.
     #[inline]
-    pub(super) fn evaluate(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
-        if seen.o.z.min(wi.z.abs()) < LEAST_COSINE || !(set & LobeSet::SMOOTH).intersects(self.lobes) {
+    pub(super) fn evaluate(&self, view: &ViewTerms, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
+        if view.o.z.min(wi.z.abs()) < MIN_COSINE || !(set & LobeSet::SMOOTH).intersects(self.lobes) {
             return (Rgb::ZERO, 0.0);
         }
-        // Delta lobes take their share of the directions drawn from the set.
-        let Some(shares) = self.shares(seen, set) else { return (Rgb::ZERO, 0.0) };
-        self.evaluate_shares::<true>(seen, wi, transport, set, &shares)
+        // Delta lobes of the set reduce the probabilities of the others.
+        let Some(probabilities) = self.lobe_probabilities(view, set) else { return (Rgb::ZERO, 0.0) };
+        self.evaluate_with::<true>(view, wi, transport, set, &probabilities)
     }
 
-    /// Where only diffuse reflection is in `set`: the BSDF over its dependence on `wi`, which is the profile `through`.
+    /// If `set` contains only diffuse reflection: its factor without the profile `through` at `wi`.
     #[inline]
-    pub(super) fn diffuse_only(&self, seen: &Seen, set: LobeSet) -> Option<Rgb> {
+    pub(super) fn diffuse_only(&self, view: &ViewTerms, set: LobeSet) -> Option<Rgb> {
         let facets = self.has_facets && set.intersects(self.interface.class);
-        if facets || self.interface.cover.is_some() || seen.o.z < LEAST_COSINE {
+        if facets || self.interface.cover.is_some() || view.o.z < MIN_COSINE {
             return None;
         }
-        Some(self.diffuse * seen.through)
+        Some(self.diffuse * view.through)
     }
 
-    /// Facets that only reflect are in `set`, and nothing lies on them.
+    /// Whether the surface has reflecting facets in `set` that neither transmit nor have a cover.
     #[inline]
-    pub(super) fn has_plain_facets(&self, seen: &Seen, set: LobeSet) -> bool {
+    pub(super) fn has_plain_facets(&self, view: &ViewTerms, set: LobeSet) -> bool {
         let n = self.interface;
         let facets = self.has_facets && n.class != LobeSet::DELTA && set.intersects(n.class);
-        facets && self.glass == 0.0 && n.cover.is_none() && n.smooth[0].is_from_thin() && seen.o.z >= LEAST_COSINE
+        facets && self.glass == 0.0 && n.cover.is_none() && n.smooth[0].is_from_thin() && view.o.z >= MIN_COSINE
     }
 
-    /// The first part of [`Layered::evaluate`]: no densities, so no shares.
+    /// The value of [`Layered::evaluate`], without computing the density.
     #[inline]
-    pub(super) fn eval(&self, seen: &Seen, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
-        if seen.o.z.min(wi.z.abs()) < LEAST_COSINE {
+    pub(super) fn eval(&self, view: &ViewTerms, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
+        if view.o.z.min(wi.z.abs()) < MIN_COSINE {
             return Rgb::ZERO;
         }
-        self.evaluate_shares::<false>(seen, wi, transport, set, &Shares::default()).0
+        self.evaluate_with::<false>(view, wi, transport, set, &LobeWeights::default()).0
     }
 
     #[inline(always)]
-    fn evaluate_shares<const PDF: bool>(
+    fn evaluate_with<const PDF: bool>(
         &self,
-        seen: &Seen,
+        view: &ViewTerms,
         wi: Vec3,
         transport: Transport,
         set: LobeSet,
-        shares: &Shares,
+        probabilities: &LobeWeights,
     ) -> (Rgb, f32) {
-        // As seen from the side of `wo`.
-        let i = Vec3::new(wi.x, wi.y, if seen.side == 1 { -wi.z } else { wi.z });
+        // `wi` with z > 0 on the side of `wo`.
+        let i = Vec3::new(wi.x, wi.y, if view.side == 1 { -wi.z } else { wi.z });
         let n = self.interface;
         let facets = self.has_facets && n.class != LobeSet::DELTA && set.intersects(n.class);
         if i.z > 0.0 {
-            self.evaluate_reflected::<PDF>(seen, i, set, facets, shares)
+            self.evaluate_reflected::<PDF>(view, i, set, facets, probabilities)
         } else if facets && self.glass > 0.0 {
-            let (f, pdf) = self.evaluate_transmitted(seen, i, shares);
-            (f * self.radiance_scale(seen.side, transport), pdf)
+            let (f, pdf) = self.evaluate_transmitted(view, i, probabilities);
+            (f * self.radiance_scale(view.side, transport), pdf)
         } else {
             (Rgb::ZERO, 0.0)
         }
@@ -93,66 +92,67 @@ impl Layered<'_> {
     #[inline]
     fn evaluate_reflected<const PDF: bool>(
         &self,
-        seen: &Seen,
+        view: &ViewTerms,
         i: Vec3,
         set: LobeSet,
         facets: bool,
-        shares: &Shares,
+        probabilities: &LobeWeights,
     ) -> (Rgb, f32) {
         let n = self.interface;
         let at_i = Position::new(i.z);
         let mut pdf = 0.0;
-        // Facets and separable lobes pass a covering differently.
+        // A cover attenuates facets and separable lobes differently.
         let (mut single, mut separable) = (Rgb::ZERO, [Rgb::ZERO; 3]);
         if facets {
-            let (value, both, cos) = n.ggx.reflection(seen.o, seen.root, i);
-            let (r, t, _) = self.fresnel(cos, seen.side);
+            let (value, both, cos) = n.ggx.reflection(view.o, view.root, i);
+            let (r, t, _) = self.fresnel(cos, view.side);
             single = r * value;
             let (loss_i, mut density) = n.loss.at_with_pdf_w(at_i, i.z);
-            separable[0] = self.returned * (seen.loss * loss_i);
+            separable[0] = self.reflected_compensation * (view.loss * loss_i);
             if let Some(glass) = self.rough_glass() {
-                let side = seen.side;
+                let side = view.side;
                 let loss_i;
                 (loss_i, density) = glass.loss_with_pdf_w(side, at_i, i);
-                let lost = glass.loss_along(side, seen.at, seen.o) * loss_i;
-                separable[1] = Rgb::splat(self.glass * glass.returned[side] * lost);
+                let lost = glass.loss_along(side, view.at, view.o) * loss_i;
+                separable[1] = Rgb::splat(self.glass * glass.reflected_compensation[side] * lost);
             }
             if PDF {
-                let visible = value * both / (seen.o.z + seen.root);
-                pdf += shares.facets * Self::reflect_probability(r, t) * visible + shares.returned * density;
+                let visible = value * both / (view.o.z + view.root);
+                pdf += probabilities.facets * Self::reflect_probability(r, t) * visible
+                    + probabilities.reflected_compensation * density;
             }
         }
         if set.intersects(LobeSet::BROAD) {
-            separable[2] = self.diffuse * (seen.through * n.through.at(at_i));
-            pdf += shares.diffuse * i.z * FRAC_1_PI;
+            separable[2] = self.diffuse * (view.through * n.through.at(at_i));
+            pdf += probabilities.diffuse * i.z * FRAC_1_PI;
         }
         let Some(c) = &n.cover else { return (single + separable[0] + separable[1] + separable[2], pdf) };
-        let at_o = seen.at;
-        let [from, to] = [(seen.o, at_o), (i, at_i)].map(|(w, at)| self.angles(seen.side, w, at).1);
-        let passes = c.cover.passes(from) * c.cover.passes(to);
-        let sum = separable[0] * c.loss + separable[1] * c.glass_loss[seen.side] + separable[2] * c.through;
-        let mut f = single * c.cover.passes_both(from, to) + sum * passes;
+        let at_o = view.at;
+        let [from, to] = [(view.o, at_o), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at).1);
+        let transmittance = c.cover.transmittance(from) * c.cover.transmittance(to);
+        let sum = separable[0] * c.loss + separable[1] * c.glass_loss[view.side] + separable[2] * c.through;
+        let mut f = single * c.cover.facet_transmittance(from, to) + sum * transmittance;
         if facets {
-            for (below, profile) in c.below.iter().zip(&c.profiles) {
-                f += self.below * (below * profile.at(at_o) * profile.at(at_i));
+            for (scale, profile) in c.loss_scale.iter().zip(&c.loss_profiles) {
+                f += self.facet_average * (scale * profile.at(at_o) * profile.at(at_i));
             }
-            pdf += shares.below * i.z * FRAC_1_PI;
+            pdf += probabilities.covered_loss * i.z * FRAC_1_PI;
         }
         if c.cover.has_coat() && self.coat_normal.is_none() && set.intersects(c.cover.coat_class & LobeSet::SMOOTH) {
-            let (value, density) = c.cover.coat(seen.o, i);
+            let (value, density) = c.cover.coat(view.o, i);
             f += Rgb::splat(value);
-            pdf += shares.coat * density;
+            pdf += probabilities.coat * density;
         }
         if c.cover.has_sheen() && set.intersects(LobeSet::BROAD) {
-            f += c.cover.sheen(seen.o, i, from, to);
-            pdf += shares.sheen * 0.5 * FRAC_1_PI;
+            f += c.cover.sheen(view.o, i, from, to);
+            pdf += probabilities.sheen * 0.5 * FRAC_1_PI;
         }
         (f, pdf)
     }
 
-    /// Flux transmitted from `o` (above) to `i` (below).
+    /// Value for flux transmitted from `o` (above) to `i` (below), and the density of `i`.
     #[inline]
-    fn evaluate_transmitted(&self, seen: &Seen, i: Vec3, shares: &Shares) -> (Rgb, f32) {
+    fn evaluate_transmitted(&self, view: &ViewTerms, i: Vec3, probabilities: &LobeWeights) -> (Rgb, f32) {
         let n = self.interface;
         let at_i = Position::new(-i.z);
         let (mut single, mut pdf) = (Rgb::ZERO, 0.0);
@@ -160,52 +160,52 @@ impl Layered<'_> {
         match self.rough_glass() {
             None => {
                 // A thin wall.
-                let (value, both, cos) = n.ggx.reflection(seen.o, seen.root, Vec3::new(i.x, i.y, -i.z));
-                let (r, t, _) = self.fresnel(cos, seen.side);
+                let (value, both, cos) = n.ggx.reflection(view.o, view.root, Vec3::new(i.x, i.y, -i.z));
+                let (r, t, _) = self.fresnel(cos, view.side);
                 single += t * value;
-                let visible = value * both / (seen.o.z + seen.root);
-                pdf += shares.facets * (1.0 - Self::reflect_probability(r, t)) * visible;
+                let visible = value * both / (view.o.z + view.root);
+                pdf += probabilities.facets * (1.0 - Self::reflect_probability(r, t)) * visible;
                 let (loss_i, density) = n.loss.at_with_pdf_w(at_i, -i.z);
-                separable = self.passed * (seen.loss * loss_i);
-                pdf += shares.passed * density;
+                separable = self.transmitted_compensation * (view.loss * loss_i);
+                pdf += probabilities.transmitted_compensation * density;
                 norm = n.cover.as_ref().map_or(1.0, |c| c.loss);
             }
             Some(glass) => {
                 let density;
-                (single, density) = self.transmitting_facets(seen, i);
-                pdf += shares.facets * density;
-                let side = seen.side;
+                (single, density) = self.transmitting_facets(view, i);
+                pdf += probabilities.facets * density;
+                let side = view.side;
                 let (loss_i, density) = glass.loss_with_pdf_w(1 - side, at_i, i);
-                let scale = self.glass * glass.passed * glass.loss_along(side, seen.at, seen.o) * loss_i;
+                let scale =
+                    self.glass * glass.transmitted_compensation * glass.loss_along(side, view.at, view.o) * loss_i;
                 separable = self.base * (scale * n.index2(1 - side));
-                pdf += shares.passed * density;
+                pdf += probabilities.transmitted_compensation * density;
                 norm = n.cover.as_ref().map_or(1.0, |c| (c.glass_loss[0] * c.glass_loss[1]).sqrt());
             }
         }
         let f = match &n.cover {
             None => single + separable,
             Some(c) => {
-                let [from, to] = [(seen.o, seen.at), (i, at_i)].map(|(w, at)| self.angles(seen.side, w, at).1);
-                let passes = c.cover.passes(from) * c.cover.passes(to);
-                single * c.cover.passes_both(from, to) + separable * (norm * passes)
+                let [from, to] = [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at).1);
+                let transmittance = c.cover.transmittance(from) * c.cover.transmittance(to);
+                single * c.cover.facet_transmittance(from, to) + separable * (norm * transmittance)
             }
         };
         (f, pdf)
     }
 
-    /// Rough refraction \[Walter 2007 (17), (21)\] for flux that comes along `o` (above) and leaves along `i` (below),
-    /// and the density of `i`.
+    /// Rough refraction \[Walter 2007 (17), (21)\] of flux from `o` (above) to `i` (below), and the density of `i`.
     #[inline]
-    fn transmitting_facets(&self, seen: &Seen, i: Vec3) -> (Rgb, f32) {
-        let (o, ggx) = (seen.o, &self.interface.ggx);
-        let eta = self.interface.smooth[seen.side].eta;
+    fn transmitting_facets(&self, view: &ViewTerms, i: Vec3) -> (Rgb, f32) {
+        let (o, ggx) = (view.o, &self.interface.ggx);
+        let eta = self.interface.smooth[view.side].eta;
         let Some(h) = (o + i * eta).try_normalize() else { return (Rgb::ZERO, 0.0) };
         let h = if h.z < 0.0 { -h } else { h };
         let (cos_o, cos_i) = (o.dot(h), i.dot(h));
         if cos_o <= 0.0 || cos_i >= 0.0 {
             return (Rgb::ZERO, 0.0);
         }
-        let (r, t, _) = self.fresnel(cos_o.min(1.0), seen.side);
+        let (r, t, _) = self.fresnel(cos_o.min(1.0), view.side);
         let (lambda_o, lambda_i) = (ggx.lambda(o), ggx.lambda(-i));
         let jacobian = sqr(eta) * -cos_i / sqr(cos_o + eta * cos_i);
         let visible = ggx.d(h) * cos_o / o.z * jacobian;
@@ -213,21 +213,21 @@ impl Layered<'_> {
         (value, (1.0 - Self::reflect_probability(r, t)) * visible * g1(lambda_o))
     }
 
-    /// Draws a direction from the lobes of `set`.
+    /// Samples a direction from the lobes of `set`.
     #[inline]
     pub(super) fn sample(
         &self,
-        seen: &Seen,
+        view: &ViewTerms,
         transport: Transport,
         set: LobeSet,
         u_lobe: f32,
         u: Vec2,
     ) -> Option<BsdfSample> {
-        let Seen { o, side, .. } = *seen;
-        if o.z < LEAST_COSINE {
+        let ViewTerms { o, side, .. } = *view;
+        if o.z < MIN_COSINE {
             return None;
         }
-        let shares = self.shares(seen, set)?;
+        let probabilities = self.lobe_probabilities(view, set)?;
         let n = self.interface;
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let back = |w: Vec3| Vec3::new(w.x, w.y, sign * w.z);
@@ -237,31 +237,31 @@ impl Layered<'_> {
             rest = if hit { rest / share } else { rest - share };
             hit.then_some(rest)
         };
-        let drawn = if let Some(u_facet) = chosen(shares.facets) {
-            self.sample_facets(seen, transport, shares.facets, u_facet, u)?
-        } else if chosen(shares.diffuse).is_some() {
-            Drawn::Lobe(warp::hemisphere_cosine(u), LobeSet::BROAD)
-        } else if chosen(shares.returned).is_some() {
+        let drawn = if let Some(u_facet) = chosen(probabilities.facets) {
+            self.sample_facets(view, transport, probabilities.facets, u_facet, u)?
+        } else if chosen(probabilities.diffuse).is_some() {
+            SampledDirection::Lobe(warp::hemisphere_cosine(u), LobeSet::BROAD)
+        } else if chosen(probabilities.reflected_compensation).is_some() {
             let drawn = self.rough_glass().map_or_else(|| n.loss.sample(u), |glass| glass.sample(side, u));
-            Drawn::Lobe(drawn?, n.class)
-        } else if chosen(shares.passed).is_some() {
+            SampledDirection::Lobe(drawn?, n.class)
+        } else if chosen(probabilities.transmitted_compensation).is_some() {
             let drawn = self.rough_glass().map_or_else(|| n.loss.sample(u), |glass| glass.sample(1 - side, u));
-            Drawn::Lobe(-drawn?, n.class)
-        } else if chosen(shares.straight).is_some() {
-            Drawn::delta(-o, self.straight * self.passes(seen, -o), shares.straight)
-        } else if chosen(shares.below).is_some() {
-            Drawn::Lobe(warp::hemisphere_cosine(u), n.class)
-        } else if chosen(shares.coat).is_some() {
-            self.sample_coat(seen, shares.coat, u)?
-        } else if chosen(shares.sheen).is_some() {
+            SampledDirection::Lobe(-drawn?, n.class)
+        } else if chosen(probabilities.straight).is_some() {
+            SampledDirection::delta(-o, self.straight * self.cover_transmittance(view, -o), probabilities.straight)
+        } else if chosen(probabilities.covered_loss).is_some() {
+            SampledDirection::Lobe(warp::hemisphere_cosine(u), n.class)
+        } else if chosen(probabilities.coat).is_some() {
+            self.sample_coat(view, probabilities.coat, u)?
+        } else if chosen(probabilities.sheen).is_some() {
             let i = warp::sphere_uniform(u);
-            Drawn::Lobe(Vec3::new(i.x, i.y, i.z.abs()), LobeSet::BROAD)
+            SampledDirection::Lobe(Vec3::new(i.x, i.y, i.z.abs()), LobeSet::BROAD)
         } else {
             return None;
         };
         let (i, lobe) = match drawn {
-            Drawn::Lobe(i, lobe) => (i, lobe),
-            Drawn::Delta { i, weight, probability } => {
+            SampledDirection::Lobe(i, lobe) => (i, lobe),
+            SampledDirection::Delta { i, weight, probability } => {
                 return (probability > 0.0).then(|| BsdfSample {
                     wi: back(i),
                     weight: weight / probability,
@@ -272,29 +272,36 @@ impl Layered<'_> {
             }
         };
         let wi = back(i.normalize());
-        if wi.z.abs() < LEAST_COSINE {
+        if wi.z.abs() < MIN_COSINE {
             return None;
         }
-        let (f, pdf_w) = self.evaluate_shares::<true>(seen, wi, transport, set, &shares);
+        let (f, pdf_w) = self.evaluate_with::<true>(view, wi, transport, set, &probabilities);
         let sample = BsdfSample { wi, weight: f * (wi.z.abs() / pdf_w), pdf_w, lobe, transmitted: i.z < 0.0 };
         (pdf_w > 0.0).then_some(sample)
     }
 
-    /// What a covering leaves of a delta lobe along `wi`.
+    /// Attenuation of a delta lobe towards `wi` by the cover.
     #[inline]
-    fn passes(&self, seen: &Seen, wi: Vec3) -> f32 {
-        let passes = |c: &Covered| {
-            let [from, to] = [seen.o, wi].map(|w| self.angles(seen.side, w, Position::new(w.z.abs())).1);
-            c.cover.passes_both(from, to)
+    fn cover_transmittance(&self, view: &ViewTerms, wi: Vec3) -> f32 {
+        let transmittance = |c: &CoverEffect| {
+            let [from, to] = [view.o, wi].map(|w| self.angles(view.side, w, Position::new(w.z.abs())).1);
+            c.cover.facet_transmittance(from, to)
         };
-        self.interface.cover.as_ref().map_or(1.0, passes)
+        self.interface.cover.as_ref().map_or(1.0, transmittance)
     }
 
-    /// A direction by the facets, which are drawn with the probability `share`: reflected or transmitted, as `u_facet`
-    /// says.
+    /// Samples the facets, which have been chosen with the probability `share`; `u_facet` chooses reflection or
+    /// transmission.
     #[inline]
-    fn sample_facets(&self, seen: &Seen, transport: Transport, share: f32, u_facet: f32, u: Vec2) -> Option<Drawn> {
-        let (n, o, side) = (self.interface, seen.o, seen.side);
+    fn sample_facets(
+        &self,
+        view: &ViewTerms,
+        transport: Transport,
+        share: f32,
+        u_facet: f32,
+        u: Vec2,
+    ) -> Option<SampledDirection> {
+        let (n, o, side) = (self.interface, view.o, view.side);
         let smooth = n.class == LobeSet::DELTA;
         let h = if smooth { Vec3::Z } else { n.ggx.sample_visible(o, u) };
         let (r, t, cos_t) = self.fresnel(o.dot(h).clamp(0.0, 1.0), side);
@@ -302,9 +309,13 @@ impl Layered<'_> {
         let mirrored = reflect(o, h);
         if u_facet < p {
             if smooth {
-                return Some(Drawn::delta(mirrored, r * self.passes(seen, mirrored), share * p));
+                return Some(SampledDirection::delta(
+                    mirrored,
+                    r * self.cover_transmittance(view, mirrored),
+                    share * p,
+                ));
             }
-            return (mirrored.z > 0.0).then_some(Drawn::Lobe(mirrored, n.class));
+            return (mirrored.z > 0.0).then_some(SampledDirection::Lobe(mirrored, n.class));
         }
         let i = if n.thin {
             if mirrored.z <= 0.0 {
@@ -315,36 +326,36 @@ impl Layered<'_> {
             refract(o, h, n.smooth[side].eta, cos_t)
         };
         if smooth {
-            let weight = t * (self.radiance_scale(side, transport) * self.passes(seen, i));
-            return Some(Drawn::delta(i, weight, share * (1.0 - p)));
+            let weight = t * (self.radiance_scale(side, transport) * self.cover_transmittance(view, i));
+            return Some(SampledDirection::delta(i, weight, share * (1.0 - p)));
         }
-        (i.z < 0.0).then_some(Drawn::Lobe(i, n.class))
+        (i.z < 0.0).then_some(SampledDirection::Lobe(i, n.class))
     }
 
-    /// A direction by the coat, which is drawn with the probability `share`.
+    /// Samples the coat, which has been chosen with the probability `share`.
     #[inline]
-    fn sample_coat(&self, seen: &Seen, share: f32, u: Vec2) -> Option<Drawn> {
-        // Rounding can lead here without a covering.
+    fn sample_coat(&self, view: &ViewTerms, share: f32, u: Vec2) -> Option<SampledDirection> {
+        // Rounding errors can lead here without a cover.
         let cover = &self.interface.cover.as_ref()?.cover;
-        let i = cover.sample_coat(seen.o, u);
+        let i = cover.sample_coat(view.o, u);
         if cover.coat_class == LobeSet::DELTA {
-            return Some(Drawn::delta(i, Rgb::splat(cover.coat_reflectance(seen.o.z)), share));
+            return Some(SampledDirection::delta(i, Rgb::splat(cover.coat_reflectance(view.o.z)), share));
         }
-        (i.z > 0.0).then_some(Drawn::Lobe(i, cover.coat_class))
+        (i.z > 0.0).then_some(SampledDirection::Lobe(i, cover.coat_class))
     }
 }
 
-/// A direction as drawn, as seen from the side of `wo`.
-enum Drawn {
-    /// By a lobe that has a width.
+/// A sampled direction, with z > 0 on the side of `wo`.
+enum SampledDirection {
+    /// A direction from a lobe of this class, which is not a delta lobe.
     Lobe(Vec3, LobeSet),
-    /// By a delta lobe: flux over that of `wo`, and the probability of drawing it.
+    /// The direction of a delta lobe, the lobe's weight, and the probability of choosing it.
     Delta { i: Vec3, weight: Rgb, probability: f32 },
 }
 
-impl Drawn {
+impl SampledDirection {
     #[inline]
-    fn delta(i: Vec3, weight: Rgb, probability: f32) -> Drawn {
-        Drawn::Delta { i, weight, probability }
+    fn delta(i: Vec3, weight: Rgb, probability: f32) -> SampledDirection {
+        SampledDirection::Delta { i, weight, probability }
     }
 }

@@ -1,38 +1,36 @@
-//! Scattering in world space: shading normals, decided once.
+//! The BSDF in world space, with one treatment of shading normals for all methods.
 //!
-//! Light whose sides of the shading plane and of the geometric plane differ is not scattered: whether light is
-//! reflected or transmitted is then never in doubt, nothing leaks, and a surface is dark where its shading normal faces
-//! away from the lamp. A viewer whose sides differ, as on steep normal maps seen from the side, stands for the opposite
-//! direction: so there is no black, and since the directions that light is scattered to which are on the wrong side of
-//! the surface are just the opposites of those that it is not, each carries what its opposite would have, and all that
-//! is scattered leaves. Every algorithm sees the same function. Light carried the other way takes the adjoint of Veach
-//! \[1997, 5.3\]. Normal maps have a relief besides (`relief.rs`): there the directions that shine would be
-//! lost to, seen from the front, are mirrored out of the surface.
+//! Light that comes from different sides of the shading plane and of the geometric plane is not scattered. So it is
+//! always clear whether light is reflected or transmitted, no light leaks through, and a surface is dark where its
+//! shading normal faces away from the light. If the viewing direction is on different sides, which happens on steep
+//! normal maps seen from the side, its opposite replaces it. So there are no black spots. Energy is conserved, because
+//! scattered directions on the wrong side of the surface are exactly the opposites of the directions that are left out.
+//! Light paths use Veach's adjoint \[1997, 5.3\]. Normal maps have further corrections (`relief.rs`).
 
 use super::coat::Coat;
 use super::facing::Facing;
-use super::layered::Seen;
+use super::layered::ViewTerms;
 use super::relief::{Relief, mirrored};
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 
-/// A BSDF standing in the world, seen along one direction.
+/// A BSDF in world space, seen along one direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Shading<'a> {
     /// Shading frame.
     pub frame: Frame,
     /// Unit geometric normal.
     pub ng: Vec3,
-    /// Scattering in the frame.
+    /// The BSDF in the shading frame.
     pub bsdf: Bsdf<'a>,
-    pub(super) seen: Seen,
-    /// Cosine of the direction with the geometric normal.
+    pub(super) view: ViewTerms,
+    /// Absolute cosine of the viewing direction with the geometric normal.
     pub(super) cos_og: f32,
-    /// The two normals disagree about its side: `seen` is its opposite.
-    opposite: bool,
-    /// Under a normal map: the interpolated normal.
-    pub(super) smooth: Option<Vec3>,
-    /// A clear coat above the normal map.
+    /// Whether the opposite of the viewing direction replaces it, see [`Facing`].
+    flipped: bool,
+    /// The interpolated normal, if the frame is that of a normal map.
+    pub(super) interpolated_normal: Option<Vec3>,
+    /// The clear coat, if the surface has one over a normal map.
     coat: Option<Coat<'a>>,
 }
 
@@ -40,54 +38,54 @@ impl<'a> Shading<'a> {
     /// `bsdf` in `frame` on a surface with geometric normal `ng`, seen along the unit direction `wo`.
     #[inline(always)]
     pub fn new(frame: Frame, ng: Vec3, bsdf: Bsdf<'a>, wo: Vec3) -> Shading<'a> {
-        let (Facing { cos_og, opposite, .. }, o) = Facing::new(frame, ng, wo);
-        Shading { frame, ng, bsdf, seen: bsdf.seen(o), cos_og, opposite, smooth: None, coat: None }
+        let (Facing { cos_og, flipped, .. }, o) = Facing::new(frame, ng, wo);
+        Shading { frame, ng, bsdf, view: bsdf.view_terms(o), cos_og, flipped, interpolated_normal: None, coat: None }
     }
 
-    /// The same whose frame is that of a normal map on a surface of interpolated normal `smooth`, which a clear coat
-    /// keeps.
+    /// Marks the shading frame as that of a normal map. A clear coat keeps `interpolated_normal`, the normal without the
+    /// map.
     #[inline]
-    pub fn mapped(mut self, smooth: Vec3) -> Shading<'a> {
-        if smooth == self.frame.n {
+    pub fn with_normal_map(mut self, interpolated_normal: Vec3) -> Shading<'a> {
+        if interpolated_normal == self.frame.n {
             return self;
         }
-        self.smooth = Some(smooth);
+        self.interpolated_normal = Some(interpolated_normal);
         if let Bsdf::Layered(layered) = &mut self.bsdf
             && let Some(covered) = layered.interface.cover.as_ref().filter(|covered| covered.cover.has_coat())
         {
-            layered.coat_normal = Some(self.frame.to_local(smooth));
-            let o = self.seen.wo();
-            let wo = self.frame.to_world(if self.opposite { -o } else { o });
-            self.coat = Some(Coat::new(&covered.cover, smooth, self.ng, wo));
-            self.seen = layered.seen(o);
+            layered.coat_normal = Some(self.frame.to_local(interpolated_normal));
+            let o = self.view.wo();
+            let wo = self.frame.to_world(if self.flipped { -o } else { o });
+            self.coat = Some(Coat::new(&covered.cover, interpolated_normal, self.ng, wo));
+            self.view = layered.view_terms(o);
         }
         self
     }
 
     #[inline]
     fn facing(&self) -> Facing {
-        Facing { frame: self.frame, ng: self.ng, cos_og: self.cos_og, opposite: self.opposite }
+        Facing { frame: self.frame, ng: self.ng, cos_og: self.cos_og, flipped: self.flipped }
     }
 
-    /// How light along `l` (world) meets the facets of a normal map. What shines meets it a second time along the
-    /// direction in the frame that comes with it, if there is one; the first time is there whenever the second is.
+    /// Corrections of a normal map for light from `l` (world space), and the second direction, in the shading frame,
+    /// from which specular light reaches the facet, if any. `None` without a normal map.
     #[inline]
     fn relief(&self, l: Vec3) -> Option<(Relief, Option<Vec3>)> {
-        let relief = Relief::new(l, self.frame.n, self.smooth?, self.ng);
+        let relief = Relief::new(l, self.frame.n, self.interpolated_normal?, self.ng);
         let second = self.frame.to_local(relief.mirrored);
-        Some((relief, (self.shines() && second.z * l.dot(self.ng) > 0.0).then_some(second)))
+        Some((relief, (self.may_be_specular() && second.z * l.dot(self.ng) > 0.0).then_some(second)))
     }
 
-    /// Not all that is scattered is diffuse.
+    /// Whether the BSDF may have a specular lobe.
     #[inline]
-    fn shines(&self) -> bool {
+    fn may_be_specular(&self) -> bool {
         matches!(self.bsdf, Bsdf::Layered(_))
     }
 
-    /// The direction that light comes along where the surface is seen by light: the one it is seen along.
+    /// The viewing direction in world space. On a light path it points to the light.
     #[inline]
     fn own(&self) -> Vec3 {
-        self.frame.to_world(self.seen.wo())
+        self.frame.to_world(self.view.wo())
     }
 
     #[inline]
@@ -95,22 +93,22 @@ impl<'a> Shading<'a> {
         self.facing().local(w, transport)
     }
 
-    /// The coat above a normal map, and the probability of drawing a direction from it, seen along `seen`.
+    /// The coat over a normal map, and the probability of sampling it.
     #[inline]
-    fn coat(&self, seen: &Seen, set: LobeSet) -> Option<(&Coat<'a>, f32)> {
+    fn coat(&self, view: &ViewTerms, set: LobeSet) -> Option<(&Coat<'a>, f32)> {
         match (&self.coat, &self.bsdf) {
-            (Some(coat), Bsdf::Layered(layered)) => Some((coat, layered.coat_share(seen, set))),
+            (Some(coat), Bsdf::Layered(layered)) => Some((coat, layered.coat_probability(view, set))),
             _ => None,
         }
     }
 
-    /// The BSDF times the cosine that belongs to it: `f |wi.ns|` for radiance, and for importance
-    /// `f |wi.ns| (|wo.ns| |wi.ng|) / (|wo.ng| |wi.ns|)` \[Veach 1997 (5.17)\]; and the density per solid angle with
-    /// which [`Shading::sample`] draws `wi`.
+    /// The BSDF times the cosine, and the density per solid angle with which [`Shading::sample`] draws `wi`. The first
+    /// is `f |wi.ns|` for radiance, and `f |wi.ns| (|wo.ns| |wi.ng|) / (|wo.ng| |wi.ns|)` for importance \[Veach 1997
+    /// (5.17)\].
     #[inline]
     pub fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let (value, pdf) = self.evaluate_base(wi, transport, set);
-        match self.coat(&self.seen, set) {
+        match self.coat(&self.view, set) {
             Some((coat, share)) if share > 0.0 => {
                 let (coated, density) = coat.evaluate_cos(wi, transport);
                 (value + Rgb::splat(coated), pdf + (density - pdf) * share)
@@ -119,56 +117,55 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// The same but for a coat above a normal map.
+    /// [`Shading::evaluate_cos`] without a coat over a normal map.
     #[inline]
     fn evaluate_base(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
         let adjoint = cos_ig / self.cos_og;
-        if self.smooth.is_some() {
+        if self.interpolated_normal.is_some() {
             let (value, pdf) = self.evaluate_relief(wi, i, transport, set);
             return (if transport == Transport::Importance { value * adjoint } else { value }, pdf);
         }
-        let (f, pdf) = self.bsdf.evaluate_seen(&self.seen, i, transport, set);
+        let (f, pdf) = self.bsdf.evaluate_view(&self.view, i, transport, set);
         let cosine = match transport {
             Transport::Radiance => i.z.abs(),
-            Transport::Importance => self.seen.o.z * adjoint,
+            Transport::Importance => self.view.o.z * adjoint,
         };
         (f * cosine, pdf)
     }
 
-    /// Under a normal map: the BSDF times the cosine of light with the facet, summed over the ways on which light meets
-    /// it, and the density of `wi`, which is `i` in the frame.
+    /// With a normal map: the BSDF times the cosine of light with the facet, summed over the directions from which
+    /// light reaches it, and the density of `wi`, which is `i` in the shading frame.
     #[inline(never)]
     fn evaluate_relief(&self, wi: Vec3, i: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let radiance = transport == Transport::Radiance;
         let Some((relief, second)) = self.relief(if radiance { wi } else { self.own() }) else {
             return (Rgb::ZERO, 0.0);
         };
-        let (f, pdf) = self.bsdf.evaluate_dimmed(relief.diffuse, &self.seen, i, transport, set);
-        let first = f * if radiance { i.z.abs() } else { self.seen.o.z };
+        let (f, pdf) = self.bsdf.evaluate_dimmed(relief.diffuse, &self.view, i, transport, set);
+        let first = f * if radiance { i.z.abs() } else { self.view.o.z };
         let Some(second) = second else { return (first, pdf) };
         let (f, more) = if radiance {
-            self.bsdf.evaluate_dimmed(0.0, &self.seen, second, transport, set)
+            self.bsdf.evaluate_dimmed(0.0, &self.view, second, transport, set)
         } else {
-            self.bsdf.evaluate_dimmed(0.0, &self.bsdf.seen(second), i, transport, set)
+            self.bsdf.evaluate_dimmed(0.0, &self.bsdf.view_terms(second), i, transport, set)
         };
         (first + f * second.z.abs(), if radiance { pdf + more } else { 0.5 * (pdf + more) })
     }
 
-    /// The first part of [`Shading::evaluate_cos`].
+    /// The value of [`Shading::evaluate_cos`].
     #[inline]
     pub fn eval_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
         self.evaluate_cos(wi, transport, set).0
     }
 
-    /// The second part of [`Shading::evaluate_cos`].
+    /// The density of [`Shading::evaluate_cos`].
     #[inline]
     pub fn pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         self.evaluate_cos(wi, transport, set).1
     }
 
-    /// Density per solid angle with which a path that comes along `wi` would be sent along the direction the surface is
-    /// seen along.
+    /// Density per solid angle with which a path from `wi` samples the viewing direction.
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         let pdf = self.reverse_base_pdf(wi, transport, set);
@@ -176,17 +173,18 @@ impl<'a> Shading<'a> {
             return pdf;
         }
         let (_, o) = Facing::new(self.frame, self.ng, wi);
-        match self.coat(&self.bsdf.seen(o), set) {
+        match self.coat(&self.bsdf.view_terms(o), set) {
             Some((coat, share)) if share > 0.0 => pdf + (coat.reverse_pdf(wi, transport) - pdf) * share,
             _ => pdf,
         }
     }
 
+    /// [`Shading::reverse_pdf`] without a coat over a normal map.
     #[inline]
     fn reverse_base_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
-        // Whoever comes along `wi` looks for light if this path does not.
+        // The path from `wi` transports the other quantity.
         let Some((i, _)) = self.local(wi, transport.reversed()) else { return 0.0 };
-        let to = self.seen.wo();
+        let to = self.view.wo();
         let pdf = self.bsdf.pdf(i, to, transport, set);
         let light = if transport == Transport::Radiance { self.own() } else { wi };
         let Some((_, Some(second))) = self.relief(light) else { return pdf };
@@ -196,37 +194,37 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// What a photon from `wi` (unit, towards where it came from) adds to the radiance seen, per flux over kernel area:
-    /// photons measure irradiance on the geometric surface where they are, so `f |wi.ns| / cosine`, the latter that of
-    /// `wi` with the normal there. That of the normal here would not do: photons that graze it have met another facet
-    /// nearby, whose share of them does not vanish with their cosine here.
+    /// Radiance towards the viewer per flux over kernel area of a photon that arrived from the unit direction `wi`: `f
+    /// |wi.ns| / cosine`. Photons measure irradiance on the surface that they hit, so `cosine` is the cosine of `wi`
+    /// with the geometric normal there, not here: a photon on a neighbouring facet may graze this surface, and dividing
+    /// by its small cosine here would make it too bright.
     #[inline]
     pub fn gather(&self, wi: Vec3, cosine: f32, set: LobeSet) -> Rgb {
-        if self.smooth.is_some() && cosine > 0.0 {
+        if self.interpolated_normal.is_some() && cosine > 0.0 {
             return self.evaluate_cos(wi, Transport::Radiance, set).0 / cosine;
         }
         let (true, Some((i, _))) = (cosine > 0.0, self.local(wi, Transport::Radiance)) else {
             return Rgb::ZERO;
         };
-        self.bsdf.eval_seen(&self.seen, i, Transport::Radiance, set) * (i.z.abs() / cosine)
+        self.bsdf.eval_view(&self.view, i, Transport::Radiance, set) * (i.z.abs() / cosine)
     }
 
-    /// Albedo of the lobes of `set`, see [`Bsdf::albedo`].
+    /// Estimated albedo of the lobes of `set`, see [`Bsdf::albedo`].
     #[inline]
     pub fn albedo(&self, set: LobeSet) -> Rgb {
-        self.bsdf.albedo_seen(&self.seen, set)
+        self.bsdf.albedo_view(&self.view, set)
     }
 
-    /// Draws a direction, see [`Bsdf::sample`]; `wi` and the weight are those of the world.
+    /// Samples a direction, see [`Bsdf::sample`]. `wi` is in world space, and the weight includes the adjoint.
     #[inline]
     pub fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        match self.coat(&self.seen, set) {
+        match self.coat(&self.view, set) {
             Some((coat, share)) if share > 0.0 => self.sample_coated((coat, share), transport, set, u_lobe, u),
             _ => self.sample_base(transport, set, u_lobe, u),
         }
     }
 
-    /// From a coat above a normal map, which is chosen with the probability `share`, or from what lies below it.
+    /// Samples the coat over a normal map, with the probability `share`, or else the lobes below it.
     #[inline(never)]
     fn sample_coated(
         &self,
@@ -252,26 +250,27 @@ impl<'a> Shading<'a> {
         (pdf_w > 0.0).then_some(sample)
     }
 
+    /// [`Shading::sample`] without a coat over a normal map.
     #[inline]
     fn sample_base(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let importance = transport == Transport::Importance;
-        if self.cos_og == 0.0 || (importance && self.opposite) {
+        if self.cos_og == 0.0 || (importance && self.flipped) {
             return None;
         }
-        // Under a normal map light leaves by the one way on which it meets the facet or by the other.
+        // With a normal map, one of the two directions from which light reaches the facet is chosen.
         let second = if importance { self.relief(self.own()).and_then(|(_, second)| second) } else { None };
-        let Some(second) = second else { return self.sample_seen(&self.seen, 1.0, transport, set, u_lobe, u) };
+        let Some(second) = second else { return self.sample_view(&self.view, 1.0, transport, set, u_lobe, u) };
         if u_lobe < 0.5 {
-            return self.sample_seen(&self.seen, 0.5, transport, set, 2.0 * u_lobe, u);
+            return self.sample_view(&self.view, 0.5, transport, set, 2.0 * u_lobe, u);
         }
-        self.sample_seen(&self.bsdf.seen(second), 0.5, transport, set, 2.0 * u_lobe - 1.0, u)
+        self.sample_view(&self.bsdf.view_terms(second), 0.5, transport, set, 2.0 * u_lobe - 1.0, u)
     }
 
-    /// [`Shading::sample`] as seen along `seen`, which has been chosen with the probability `chance`.
+    /// [`Shading::sample`] for the viewing direction of `view`, which has been chosen with the probability `chance`.
     #[inline(always)]
-    fn sample_seen(
+    fn sample_view(
         &self,
-        seen: &Seen,
+        view: &ViewTerms,
         chance: f32,
         transport: Transport,
         set: LobeSet,
@@ -279,13 +278,13 @@ impl<'a> Shading<'a> {
         u: Vec2,
     ) -> Option<BsdfSample> {
         let importance = transport == Transport::Importance;
-        let mut sample = self.bsdf.sample_seen(seen, transport, set, u_lobe, u)?;
+        let mut sample = self.bsdf.sample_view(view, transport, set, u_lobe, u)?;
         let mut wi = self.frame.to_world(sample.wi);
         let mut cos_ig = wi.dot(self.ng);
         if sample.wi.z * cos_ig < 0.0 {
             if importance {
                 (wi, cos_ig) = (-wi, -cos_ig);
-            } else if self.smooth.is_some() && self.shines() {
+            } else if self.interpolated_normal.is_some() && self.may_be_specular() {
                 (wi, cos_ig) = (mirrored(wi, self.ng), -cos_ig);
             }
         }
@@ -293,13 +292,13 @@ impl<'a> Shading<'a> {
             return None;
         }
         let local = std::mem::replace(&mut sample.wi, wi);
-        if self.smooth.is_some() && sample.lobe != LobeSet::DELTA {
+        if self.interpolated_normal.is_some() && sample.lobe != LobeSet::DELTA {
             let (value, pdf_w) = self.evaluate_base(wi, transport, set);
             (sample.weight, sample.pdf_w) = (value / pdf_w, pdf_w);
             return (pdf_w > 0.0).then_some(sample);
         }
         if importance {
-            sample.weight *= seen.o.z * cos_ig.abs() / (self.cos_og * local.z.abs() * chance);
+            sample.weight *= view.o.z * cos_ig.abs() / (self.cos_og * local.z.abs() * chance);
             sample.pdf_w *= chance;
         }
         Some(sample)

@@ -4,8 +4,8 @@
 use crate::math::sqr;
 use std::f32::consts::FRAC_1_PI;
 
-/// Narrowest sheen: below it the distribution overflows at the horizon, and nothing is seen of it.
-pub const LEAST_ALPHA: f32 = 0.01;
+/// Smallest alpha of sheen. Below it the distribution overflows at the horizon, and the sheen is invisible.
+pub const MIN_ALPHA: f32 = 0.01;
 
 /// Fit of Lambda \[Estevez and Kulla 2017, section 3\].
 #[inline]
@@ -25,10 +25,11 @@ fn lambda(cos: f32, alpha: f32) -> f32 {
     if cos < 0.5 { l(cos).exp() } else { (2.0 * l(0.5) - l(1.0 - cos)).exp() }
 }
 
-/// The lobe of white sheen, without cosine. Cosines of the two directions and of the half vector with the normal.
+/// Value of the lobe of white sheen, without cosine, from the cosines of both directions and of the half vector with
+/// the normal.
 #[inline]
 pub fn eval(cos_o: f32, cos_i: f32, cos_h: f32, alpha: f32) -> f32 {
-    let alpha = alpha.max(LEAST_ALPHA);
+    let alpha = alpha.max(MIN_ALPHA);
     let sin_h = (1.0 - cos_h * cos_h).max(0.0).sqrt();
     let d = (2.0 + 1.0 / alpha) * sin_h.powf(1.0 / alpha) * (0.5 * FRAC_1_PI);
     let g = 1.0 / (1.0 + lambda(cos_o, alpha) + lambda(cos_i, alpha));
@@ -41,7 +42,7 @@ pub fn albedo(alpha: f32, cos_o: f32) -> f32 {
     let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();
     let mut sum = 0.0;
     for i in 0..rows {
-        // Cosines by midpoints of their square root: finer towards the horizon.
+        // The midpoint rule in the square root of the cosine, which is finer towards the horizon.
         let root = (i as f32 + 0.5) / rows as f32;
         let cos_i = root * root;
         let sin_i = (1.0 - cos_i * cos_i).max(0.0).sqrt();

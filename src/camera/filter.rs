@@ -1,9 +1,9 @@
 //! Pixel reconstruction filters.
 //!
 //! Camera paths sample the film point from the filter, so that all have the same weight (filter importance sampling
-//! \[Ernst, Stamminger, Greiner 2006\]). The contribution of a light path to a film point goes to one of the pixels whose
-//! filters cover the point, drawn in proportion to the filters there. A filter is the product of `f(dx)` and `f(dy)`, with
-//! distances from the centre of the pixel in pixels, and `integral f = 1`.
+//! \[Ernst, Stamminger, Greiner 2006\]). The contribution of a light path to a film point goes to one of the pixels
+//! whose filters cover the point, drawn in proportion to the filters there. A filter is the product of `f(dx)` and
+//! `f(dy)`, with distances from the centre of the pixel in pixels, and `integral f = 1`.
 
 use std::f64::consts::TAU;
 

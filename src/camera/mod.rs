@@ -122,8 +122,8 @@ impl Camera {
     }
 
     /// This camera with `factor` times the pixels per side, at least one, spread evenly over the film. Each covers the
-    /// area of one pixel of this camera, so camera paths have the noise of single pixels. Light paths contribute from all
-    /// of the film, so with proportionally fewer light paths their noise is that of the full picture.
+    /// area of one pixel of this camera, so camera paths have the noise of single pixels. Light paths contribute from
+    /// all of the film, so with proportionally fewer light paths their noise is that of the full picture.
     pub fn subsample(&self, factor: f64) -> Camera {
         let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
         let (width, height, covered) = (scaled(self.width), scaled(self.height), self.covered * factor.min(1.0) as f32);
@@ -242,8 +242,8 @@ impl Camera {
         Vec2::new(ndc.x, -ndc.y) * half + self.offset
     }
 
-    /// The ray through the point `film` of the whole picture (pixels). `lens` is a point of the unit square that samples
-    /// the lens.
+    /// The ray through the point `film` of the whole picture (pixels). `lens` is a point of the unit square that
+    /// samples the lens.
     #[inline]
     pub fn ray(&self, film: Vec2, lens: Vec2) -> CameraRay {
         let (mut origin, focus) = match self.projection {
@@ -313,11 +313,12 @@ impl Camera {
         (p - self.position).dot(self.forward())
     }
 
-    /// Connects the point `p` to the lens; `lens` is a point of the unit square that samples it. `None` if `p` is out of
-    /// view.
+    /// Connects the point `p` to the lens; `lens` is a point of the unit square that samples it. `None` if `p` is out
+    /// of view.
     ///
     /// In an orthographic camera each film point has its own lens. The rays through one lens point of every lens are
-    /// parallel, so they form a beam with the cross-section of the film, and the importance does not depend on distance.
+    /// parallel, so they form a beam with the cross-section of the film, and the importance does not depend on
+    /// distance.
     #[inline]
     pub fn sample(&self, p: Vec3, lens: Vec2) -> Option<CameraSample> {
         let mut lens_local = Vec3::ZERO;
@@ -366,9 +367,9 @@ impl Camera {
         Some(CameraSample { film, wi, lens: lens_world, importance })
     }
 
-    /// Density of the camera rays of the whole picture through a lens point, at a unit direction in view. Per solid angle
-    /// for a perspective camera, per area perpendicular to the direction for an orthographic one. Film points are uniform
-    /// over an area of `4 half.x half.y`, at distance 1 or in the plane of the lens.
+    /// Density of the camera rays of the whole picture through a lens point, at a unit direction in view. Per solid
+    /// angle for a perspective camera, per area perpendicular to the direction for an orthographic one. Film points are
+    /// uniform over an area of `4 half.x half.y`, at distance 1 or in the plane of the lens.
     #[inline]
     pub fn pdf_w(&self, direction: Vec3) -> f32 {
         let cos = direction.dot(self.forward());

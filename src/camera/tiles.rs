@@ -24,10 +24,10 @@ pub fn pixels_per_band(width: u32) -> usize {
     width as usize * TILE
 }
 
-/// Calls `f(scratch, band, group)` for all pixels of a row-major picture that is cut into `bands` of [`pixels_per_band`]
-/// pixels, in groups of [`GROUP_SIZE`] (`None` beyond the edges). Tiles are visited along a Z-order curve, so consecutive
-/// groups are neighbours in both directions. Groups depend only on the size of the picture. `scratch` is created once per
-/// band or less often, so results must not depend on its content.
+/// Calls `f(scratch, band, group)` for all pixels of a row-major picture that is cut into `bands` of
+/// [`pixels_per_band`] pixels, in groups of [`GROUP_SIZE`] (`None` beyond the edges). Tiles are visited along a Z-order
+/// curve, so consecutive groups are neighbours in both directions. Groups depend only on the size of the picture.
+/// `scratch` is created once per band or less often, so results must not depend on its content.
 pub fn par_pixels<B: Send, S>(
     bands: impl IndexedParallelIterator<Item = B>,
     (width, height): (u32, u32),

@@ -72,8 +72,8 @@ pub struct Instance {
 pub struct Placement {
     /// Transform of points and directions.
     pub points: Affine3A,
-    /// Transform of normals up to length: the inverse transpose. As glTF requires, the front of a mirrored mesh stays its
-    /// front.
+    /// Transform of normals up to length: the inverse transpose. As glTF requires, the front of a mirrored mesh stays
+    /// its front.
     pub normals: Mat3A,
     /// `points` with the absolute value of each number, which bounds the terms of a transformed coordinate.
     absolute: Affine3A,
@@ -101,8 +101,8 @@ impl Instance {
         }
     }
 
-    /// Bound on the distance of the computed world position `p` from the plane of its triangle. `local` is the extent of
-    /// the triangle in the space of the mesh.
+    /// Bound on the distance of the computed world position `p` from the plane of its triangle. `local` is the extent
+    /// of the triangle in the space of the mesh.
     #[inline]
     pub(super) fn position_error(&self, local: Extent, p: Vec3) -> f32 {
         let extent = match &self.to_world {

@@ -37,8 +37,8 @@ impl Extent {
     /// Bound on the distance of a computed position from the triangle's plane as Embree's arithmetic sees it. Errors
     /// within the plane do not matter, so a wide flat floor has the small error of its height.
     ///
-    /// The distance to a plane is the sum over axes of normal times coordinate, so each term contributes the error of its
-    /// normal and of its coordinate.
+    /// The distance to a plane is the sum over axes of normal times coordinate, so each term contributes the error of
+    /// its normal and of its coordinate.
     #[inline]
     pub fn plane_error(&self) -> f32 {
         let [a, b] = self.edges;
@@ -73,9 +73,9 @@ pub fn offset_origin(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
     p + ng * error.copysign(direction.dot(ng))
 }
 
-/// End of a shadow ray of length `distance` at a point `p`, with error bound `error`, of a triangle with unit normal `ng`.
-/// The end is moved off the triangle to the side that `direction` (back along the ray) points to, so that the triangle
-/// does not block the ray.
+/// End of a shadow ray of length `distance` at a point `p`, with error bound `error`, of a triangle with unit normal
+/// `ng`. The end is moved off the triangle to the side that `direction` (back along the ray) points to, so that the
+/// triangle does not block the ray.
 #[inline]
 pub fn shadow_end(p: Vec3, ng: Vec3, direction: Vec3, error: f32, distance: f32) -> Vec3 {
     offset_origin(p, ng, direction, error + RAY_ERROR * distance)

@@ -14,8 +14,8 @@ pub struct Surface {
     pub ng: Vec3,
     /// Unit shading normal, in the hemisphere of `ng`.
     pub ns: Vec3,
-    /// Tangent, the direction of increasing u, with its handedness in w. Not orthonormalized. Zero if the mesh has neither
-    /// tangents nor texture coordinates.
+    /// Tangent, the direction of increasing u, with its handedness in w. Not orthonormalized. Zero if the mesh has
+    /// neither tangents nor texture coordinates.
     pub tangent: Vec4,
     /// Texture coordinates, sets 0 and 1.
     pub uv: [Vec2; 2],
@@ -88,8 +88,8 @@ impl Surface {
         })
     }
 
-    /// Origin of a ray that leaves the surface along `direction`: the position, moved by the error bound to the side that
-    /// the direction points to, so that the ray does not hit the surface again.
+    /// Origin of a ray that leaves the surface along `direction`: the position, moved by the error bound to the side
+    /// that the direction points to, so that the ray does not hit the surface again.
     #[inline]
     pub fn ray_origin(&self, direction: Vec3) -> Vec3 {
         offset_origin(self.p, self.ng, direction, self.error)

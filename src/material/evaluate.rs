@@ -35,8 +35,8 @@ impl Material {
         Vec4::from_array(self.base_color) * surface.color * look_up(&self.base_color_texture, surface, textures)
     }
 
-    /// The parameters of the scattering model that are not part of the interface: base colour, metalness, and transmission
-    /// (share of the dielectric that transmits), all in `[0, 1]`.
+    /// The parameters of the scattering model that are not part of the interface: base colour, metalness, and
+    /// transmission (share of the dielectric that transmits), all in `[0, 1]`.
     #[inline]
     pub fn base_and_shares(&self, surface: &Surface, textures: &[Texture]) -> (Rgb, f32, f32) {
         let base = unit_color(self.base(surface, textures).truncate());
@@ -80,8 +80,8 @@ impl Material {
         textures.iter().all(|texture| texture.is_none())
     }
 
-    /// The parameters of the scattering model at a surface point. `eta` is the index of refraction behind the surface over
-    /// the index in front of it.
+    /// The parameters of the scattering model at a surface point. `eta` is the index of refraction behind the surface
+    /// over the index in front of it.
     #[inline]
     pub fn parameters(&self, surface: &Surface, textures: &[Texture], eta: f32) -> Parameters {
         if self.unlit {

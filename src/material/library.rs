@@ -41,8 +41,8 @@ impl Material {
         if self.has_alpha_per_entry() { Alpha::Opaque } else { self.alpha }
     }
 
-    /// Whether a ray passes or enters a solid of this material as a whole, by one decision at the entry. Solids that emit
-    /// light decide at each face instead.
+    /// Whether a ray passes or enters a solid of this material as a whole, by one decision at the entry. Solids that
+    /// emit light decide at each face instead.
     #[inline]
     pub fn has_alpha_per_entry(&self) -> bool {
         self.alpha != Alpha::Opaque && self.is_solid_glass() && !self.emits()
@@ -79,8 +79,8 @@ impl Material {
         self.has_narrow_base() || self.clearcoat > 0.0
     }
 
-    /// Whether the base or the clear coat may have a delta lobe, and whether one of them may have a narrow lobe that is not
-    /// a delta lobe.
+    /// Whether the base or the clear coat may have a delta lobe, and whether one of them may have a narrow lobe that is
+    /// not a delta lobe.
     pub fn perfect_and_sharp(&self) -> (bool, bool) {
         let base = (self.roughness, self.metallic_roughness_texture.is_some());
         let coat = (self.clearcoat_roughness, self.clearcoat_roughness_texture.is_some());
@@ -91,8 +91,8 @@ impl Material {
         (any(&is_perfect), sharp || (self.has_narrow_base() && !is_perfect(self.roughness)))
     }
 
-    /// Whether the material is only a perfect mirror or clear glass, which shows other surfaces but no light that falls on
-    /// itself.
+    /// Whether the material is only a perfect mirror or clear glass, which shows other surfaces but no light that falls
+    /// on itself.
     pub fn is_clear(&self) -> bool {
         let perfect = is_perfect(self.roughness) && self.metallic_roughness_texture.is_none();
         let glass = self.transmission == 1.0 && self.transmission_texture.is_none() && self.metallic == 0.0;
@@ -131,8 +131,8 @@ impl Material {
         self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.is_solid_glass()
     }
 
-    /// Index of refraction of a dispersive material at a wavelength (nm): Cauchy's equation through the lines of the Abbe
-    /// number, 486.1, 587.6 and 656.3 nm \[KHR_materials_dispersion\].
+    /// Index of refraction of a dispersive material at a wavelength (nm): Cauchy's equation through the lines of the
+    /// Abbe number, 486.1, 587.6 and 656.3 nm \[KHR_materials_dispersion\].
     #[inline]
     pub fn ior_at(&self, nm: f32) -> f32 {
         let spread = (self.ior - 1.0) * self.dispersion * (1.0 / 20.0);

@@ -24,8 +24,8 @@ struct PreparedMaterial {
     shares: Option<(Vec4, f32, f32)>,
     /// Interface with empty space, and its relative index of refraction; `None` if textures affect the interface.
     open: Option<(f32, Interface<'static>)>,
-    /// Interfaces with the solids of the scene, by decreasing relative index. Each is created when a path first needs it,
-    /// because few pairs of materials ever touch.
+    /// Interfaces with the solids of the scene, by decreasing relative index. Each is created when a path first needs
+    /// it, because few pairs of materials ever touch.
     nested: Vec<(f32, OnceLock<Box<Interface<'static>>>)>,
 }
 
@@ -114,8 +114,8 @@ impl Scattering {
         Scattering { tables, materials }
     }
 
-    /// The scattering at a surface point seen along the unit direction `wo`. `eta` is the index of refraction behind the
-    /// surface over the index in front of it. If textures affect the interface, it is allocated in `arena`.
+    /// The scattering at a surface point seen along the unit direction `wo`. `eta` is the index of refraction behind
+    /// the surface over the index in front of it. If textures affect the interface, it is allocated in `arena`.
     #[inline(always)]
     pub fn shading<'a>(
         &'a self,
@@ -130,7 +130,7 @@ impl Scattering {
         if ready.plain_frame {
             return Shading::new(Frame::from_normal(surface.ns), surface.ng, bsdf, wo);
         }
-        Shading::new(materials.shading_frame(surface), surface.ng, bsdf, wo).mapped(surface.ns)
+        Shading::new(materials.shading_frame(surface), surface.ng, bsdf, wo).with_normal_map(surface.ns)
     }
 
     #[inline(always)]

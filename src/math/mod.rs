@@ -14,8 +14,8 @@ pub fn sqr(x: f32) -> f32 {
     x * x
 }
 
-/// 1 - cos of the angle between two unit vectors. It is computed from the chord, because 1 minus a dot product loses all
-/// digits at small angles.
+/// 1 - cos of the angle between two unit vectors. It is computed from the chord, because 1 minus a dot product loses
+/// all digits at small angles.
 #[inline]
 pub fn one_minus_cos(a: Vec3, b: Vec3) -> f32 {
     0.5 * (a - b).length_squared()

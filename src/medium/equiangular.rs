@@ -1,6 +1,6 @@
 //! Equiangular sampling: points on a ray whose density is proportional to the angle that they subtend at a light, which
-//! cancels the inverse squared distance from the light \[Kulla and Fajardo 2012, "Importance sampling techniques for path
-//! tracing in participating media", section 4\].
+//! cancels the inverse squared distance from the light \[Kulla and Fajardo 2012, "Importance sampling techniques for
+//! path tracing in participating media", section 4\].
 
 use crate::math::Vec3;
 
@@ -29,16 +29,16 @@ pub struct Equiangular {
 }
 
 impl Equiangular {
-    /// Sampling of the ray from `origin` along the unit `direction` between the two distances in `segment`, of which the
-    /// second may be infinite. `None` if the segment subtends no angle at `light`.
+    /// Sampling of the ray from `origin` along the unit `direction` between the two distances in `segment`, of which
+    /// the second may be infinite. `None` if the segment subtends no angle at `light`.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3, segment: [f32; 2], light: Vec3) -> Option<Equiangular> {
         let to = light - (origin + direction * segment[0]);
         let distance = segment[1] - segment[0];
         let along = to.dot(direction);
         let offset = (to - direction * along).length().max(MIN_RELATIVE_OFFSET * to.length());
-        // The angle between the directions to both ends, from its sine and cosine: a difference of two angles would lose
-        // the digits of small ones.
+        // The angle between the directions to both ends, from its sine and cosine: a difference of two angles would
+        // lose the digits of small ones.
         let angle = offset.atan2(offset * offset / distance - along * (1.0 - along / distance));
         (offset > 0.0 && angle > 0.0).then_some(Equiangular { segment, along, offset, angle })
     }
@@ -97,8 +97,8 @@ mod tests {
     }
 
     /// Samples are on the segment, and at quantiles of `u` they agree with the closed form of the cumulative
-    /// distribution, whose slope is the density. For near and far lights, beside, before and beyond the segment, and for
-    /// infinite segments.
+    /// distribution, whose slope is the density. For near and far lights, beside, before and beyond the segment, and
+    /// for infinite segments.
     #[test]
     fn samples_follow_the_density() {
         for light in [Vec3::new(1.0, 0.5, 0.0), Vec3::new(-20.0, 0.01, 0.0), Vec3::new(300.0, 1.0, 2.0), Vec3::X * 0.3]

@@ -1,12 +1,12 @@
 //! Free-flight sampling in media with three colour channels.
 //!
 //! One channel is drawn, and a distance is sampled from its extinction coefficient. The density of the sample is the
-//! mixture over all channels \[single-sample MIS with the balance heuristic, Veach 1997, 9.2.4; "spectral MIS"\]. Channels
-//! are drawn in proportion to their throughput. So the sum over channels of a path's throughput never grows, and no channel
-//! gets a large weight.
+//! mixture over all channels \[single-sample MIS with the balance heuristic, Veach 1997, 9.2.4; "spectral MIS"\].
+//! Channels are drawn in proportion to their throughput. So the sum over channels of a path's throughput never grows,
+//! and no channel gets a large weight.
 //!
-//! MIS weights of connected paths need the densities of paths that were not traced, whose throughput is unknown. They use
-//! the mixture with equal probabilities of the channels ([`FlightDensity`]) instead. The weights still sum to one.
+//! MIS weights of connected paths need the densities of paths that were not traced, whose throughput is unknown. They
+//! use the mixture with equal probabilities of the channels ([`FlightDensity`]) instead. The weights still sum to one.
 
 use super::{Equiangular, MediumParameters};
 use crate::math::{Rgb, Vec2, is_lit};
@@ -33,8 +33,8 @@ pub enum FlightOutcome {
 const HALF_STEP: f32 = 0.5 / 16_777_216.0;
 
 impl MediumParameters {
-    /// Samples the free flight of a ray with `throughput` over at most `distance`, which may be infinite. `u` is uniform
-    /// on the unit square.
+    /// Samples the free flight of a ray with `throughput` over at most `distance`, which may be infinite. `u` is
+    /// uniform on the unit square.
     #[inline]
     pub fn sample_flight(&self, throughput: Rgb, distance: f32, u: Vec2) -> FlightOutcome {
         let sigma = self.sigma_t();
@@ -50,8 +50,8 @@ impl MediumParameters {
         }
     }
 
-    /// The distribution of scattering points of a ray with `throughput` over `distance`, which may be infinite, given that
-    /// it scatters. `None` if the ray cannot scatter.
+    /// The distribution of scattering points of a ray with `throughput` over `distance`, which may be infinite, given
+    /// that it scatters. `None` if the ray cannot scatter.
     #[inline]
     pub fn collision_distribution(&self, throughput: Rgb, distance: f32) -> Option<CollisionDistribution<'_>> {
         let sigma = self.sigma_t();
@@ -135,8 +135,9 @@ fn sample_channel(of: Rgb, share: Rgb, u: f32) -> f32 {
     }
 }
 
-/// Free-flight densities of a path segment in both directions, with equal probabilities of the channels. A density is per
-/// length if the segment ends at a vertex of a scattering medium in that direction. Else it is the probability of passing.
+/// Free-flight densities of a path segment in both directions, with equal probabilities of the channels. A density is
+/// per length if the segment ends at a vertex of a scattering medium in that direction. Else it is the probability of
+/// passing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlightDensity {
     /// Density from the start to the end.
@@ -185,10 +186,10 @@ mod tests {
         ]
     }
 
-    /// Compares means over draws with their closed forms, per channel. The weight of passing has the mean T(distance), and
-    /// a collision at t, weighted with t, has the mean `integral t T(t) dt`. The latter must hold for free flight, for
-    /// `CollisionDistribution::sample`, for equiangular sampling, and for MIS of the last two, also if the equiangular
-    /// samples cover only a part of the ray. Returns the largest deviation in standard errors.
+    /// Compares means over draws with their closed forms, per channel. The weight of passing has the mean T(distance),
+    /// and a collision at t, weighted with t, has the mean `integral t T(t) dt`. The latter must hold for free flight,
+    /// for `CollisionDistribution::sample`, for equiangular sampling, and for MIS of the last two, also if the
+    /// equiangular samples cover only a part of the ray. Returns the largest deviation in standard errors.
     fn flight_error(bug: impl Fn(Collision, Rgb) -> Rgb) -> f64 {
         let mut worst = 0.0f64;
         let light = Vec3::new(0.1, 0.4, 0.0);

@@ -15,8 +15,8 @@ pub struct HenyeyGreenstein {
 }
 
 impl HenyeyGreenstein {
-    /// Value of the phase function (1/sr), which is also the density with which [`HenyeyGreenstein::sample`] draws `wi`:
-    /// `(1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2))`, with the cosine between `-wo` and `wi`.
+    /// Value of the phase function (1/sr), which is also the density with which [`HenyeyGreenstein::sample`] draws
+    /// `wi`: `(1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2))`, with the cosine between `-wo` and `wi`.
     #[inline]
     pub fn pdf_w(&self, wo: Vec3, wi: Vec3) -> f32 {
         let (g, ahead) = self.forward(wo);
@@ -29,8 +29,8 @@ impl HenyeyGreenstein {
     #[inline]
     pub fn sample(&self, wo: Vec3, u: Vec2) -> Vec3 {
         let (g, ahead) = self.forward(wo);
-        // The inverse of the distribution is `cos = (1 + g^2 - s^2) / (2 g)` with `s = (1 - g^2) / (1 + g - 2 g u)`. This
-        // form computes 1 - cos, because the cosine rounds to 1 where g is near 1. It also holds for g = 0.
+        // The inverse of the distribution is `cos = (1 + g^2 - s^2) / (2 g)` with `s = (1 - g^2) / (1 + g - 2 g u)`.
+        // This form computes 1 - cos, because the cosine rounds to 1 where g is near 1. It also holds for g = 0.
         let rest = (1.0 - g) + 2.0 * g * (1.0 - u.x);
         let h = (u.x * (1.0 - g) * (1.0 - g) * (1.0 + (1.0 + g) / rest) / rest).min(2.0);
         let sin = (h * (2.0 - h)).sqrt();

@@ -6,8 +6,8 @@
 //! The function is a hash. In streams made by [`Streams::in_sequence`], it is a point of an Owen-scrambled Sobol'
 //! sequence for the first vertices of a path, because the error of such points falls faster than that of independent
 //! ones \[Owen 1997, "Scrambled net variance for integrals of smooth functions"\]. Each (path, vertex, purpose) has its
-//! own sequence, which advances by one point per iteration. Iterations are then not independent of each other. Variances
-//! are therefore estimated from [`QUARTERS`], groups of iterations with independent sequences.
+//! own sequence, which advances by one point per iteration. Iterations are then not independent of each other.
+//! Variances are therefore estimated from [`QUARTERS`], groups of iterations with independent sequences.
 
 mod chain;
 mod sobol;
@@ -510,8 +510,8 @@ mod tests {
         assert!(halves < -5.0, "halves of a sequence pass for independent: {halves}");
     }
 
-    /// Over 64 iterations and 4,000 pixels, the mean is unbiased and the variance between quarters is the true variance,
-    /// both within 5 sigma (error rate below 1e-5). Squared errors are below 0.4 times those of hashes.
+    /// Over 64 iterations and 4,000 pixels, the mean is unbiased and the variance between quarters is the true
+    /// variance, both within 5 sigma (error rate below 1e-5). Squared errors are below 0.4 times those of hashes.
     #[test]
     fn sequences_integrate_better_than_hashes() {
         let (pixels, iterations) = (4000u64, 64);

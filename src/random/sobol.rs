@@ -10,8 +10,8 @@
 use super::mix;
 use glam::{DVec2, Vec2};
 
-/// Laine-Karras style hash: a random binary-tree permutation of bit-reversed integers. The constants are those of Vegdahl
-/// 2021.
+/// Laine-Karras style hash: a random binary-tree permutation of bit-reversed integers. The constants are those of
+/// Vegdahl 2021.
 #[inline]
 fn tree_hash(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -25,8 +25,8 @@ fn tree_hash(mut x: u32, seed: u32) -> u32 {
 /// Second Sobol' dimension of `index`, bits least significant first.
 ///
 /// The generator matrix is Pascal's triangle modulo 2. The bit of weight 2^(-1-j) is the sum modulo 2 of the bits k of
-/// the index for which the binomial coefficient "k over j" is odd. By Lucas' theorem these are the k whose binary digits
-/// include those of j. The sums over all such k are accumulated digit by digit, five digits for 32 bits.
+/// the index for which the binomial coefficient "k over j" is odd. By Lucas' theorem these are the k whose binary
+/// digits include those of j. The sums over all such k are accumulated digit by digit, five digits for 32 bits.
 #[inline]
 fn sobol_second(index: u32) -> u32 {
     let mut x = index;

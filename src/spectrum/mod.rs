@@ -1,14 +1,14 @@
 //! Wavelengths, for paths through glass whose index of refraction depends on them.
 //!
 //! Scenes and paths are RGB. A path that meets dispersive glass takes one wavelength, which it keeps \[hero wavelength
-//! without companions, Wilkie et al. 2014\]. Its throughput is multiplied by the colour of the wavelength ([`observer`]).
-//! The mean of these colours is white, so light that is not dispersed keeps its colour.
+//! without companions, Wilkie et al. 2014\]. Its throughput is multiplied by the colour of the wavelength
+//! ([`observer`]). The mean of these colours is white, so light that is not dispersed keeps its colour.
 //!
 //! Two paths may only be connected or merged if they have the same wavelength, and its colour must count once. So the
 //! spectrum is divided into [`BANDS`] bands of equal probability. Paths of different bands are not connected, and
 //! contributions of equal bands are multiplied by [`BANDS`], because two independent paths have equal bands with the
-//! probability `1 / BANDS`. Within an iteration all paths of a band have the same wavelength ([`IterationWavelengths`]),
-//! so colours are not blurred.
+//! probability `1 / BANDS`. Within an iteration all paths of a band have the same wavelength
+//! ([`IterationWavelengths`]), so colours are not blurred.
 
 mod iteration_wavelengths;
 pub mod observer;

@@ -1,11 +1,11 @@
 //! The RGB colours of wavelengths.
 //!
 //! They are the CIE 1931 standard observer \[multi-lobe fits of Wyman, Sloan, Shirley 2013, "Simple Analytic
-//! Approximations to the CIE XYZ Color Matching Functions"\] in linear Rec. 709. Most wavelengths are outside the gamut:
-//! some channel is negative. Negative values are set to zero, and the three curves are scaled to the same integral. So a
-//! flat spectrum, the spectrum of white lights in an RGB scene, stays white. Photon fluxes stay positive, which Russian
-//! roulette and photon statistics need. Only saturation outside the gamut is lost. Wavelengths are drawn in proportion
-//! to the mean of the three curves, so no channel of a weight exceeds 3.
+//! Approximations to the CIE XYZ Color Matching Functions"\] in linear Rec. 709. Most wavelengths are outside the
+//! gamut: some channel is negative. Negative values are set to zero, and the three curves are scaled to the same
+//! integral. So a flat spectrum, the spectrum of white lights in an RGB scene, stays white. Photon fluxes stay
+//! positive, which Russian roulette and photon statistics need. Only saturation outside the gamut is lost. Wavelengths
+//! are drawn in proportion to the mean of the three curves, so no channel of a weight exceeds 3.
 
 use crate::math::Rgb;
 use std::sync::LazyLock;

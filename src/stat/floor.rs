@@ -1,8 +1,8 @@
 //! The constant that relative squared errors add to the denominator, so that dark pixels do not dominate.
 //!
-//! The relMSE of most papers adds 0.01, the square of a radiance of 0.1. That is little in their pictures, whose mean is
-//! about 1. In a picture with a mean of 0.01 the constant would hide all errors. An error estimate must not depend on the
-//! unit of radiance, so it adds 0.01 times the squared mean radiance, which is the same number if the mean is 1.
+//! The relMSE of most papers adds 0.01, the square of a radiance of 0.1. That is little in their pictures, whose mean
+//! is about 1. In a picture with a mean of 0.01 the constant would hide all errors. An error estimate must not depend
+//! on the unit of radiance, so it adds 0.01 times the squared mean radiance, which is the same number if the mean is 1.
 
 /// The constant of the papers' relMSE.
 pub const ABSOLUTE: f64 = 0.01;

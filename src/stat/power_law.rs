@@ -12,8 +12,8 @@ pub struct PowerLaw {
 }
 
 impl PowerLaw {
-    /// Fits points `(x, y)`. Points with a coordinate that is not finite and positive are ignored. `None` for fewer than
-    /// three points, or if all have the same `x`.
+    /// Fits points `(x, y)`. Points with a coordinate that is not finite and positive are ignored. `None` for fewer
+    /// than three points, or if all have the same `x`.
     pub fn fit(points: impl IntoIterator<Item = (f64, f64)>) -> Option<PowerLaw> {
         let usable = |v: f64| v.is_finite() && v > 0.0;
         let logs: Vec<(f64, f64)> =

@@ -2,10 +2,10 @@
 //! \[Demmel and Nguyen 2015, "Parallel Reproducible Summation"\].
 //!
 //! A grid is the set of multiples of a power of two; consecutive grids are 30 powers apart. A term is split in two: a
-//! multiple of the grid that fits the largest term so far, and the remainder, rounded to the next finer grid. Both parts
-//! are summed exactly, so the order does not matter. All terms lose the same low bits, less than 2^-30 of the largest
-//! term. When a larger term needs a coarser grid, the coarse sum becomes the fine sum, as if that grid had been used from
-//! the start.
+//! multiple of the grid that fits the largest term so far, and the remainder, rounded to the next finer grid. Both
+//! parts are summed exactly, so the order does not matter. All terms lose the same low bits, less than 2^-30 of the
+//! largest term. When a larger term needs a coarser grid, the coarse sum becomes the fine sum, as if that grid had been
+//! used from the start.
 
 use crate::math::DVec3;
 use serde::{Deserialize, Serialize};
@@ -63,8 +63,8 @@ impl Default for Grid {
 }
 
 impl Grid {
-    /// The finest grid for values in units of 2^`exponent`. If all terms are scaled by 2^k and `exponent` grows by k, sums
-    /// scale exactly by 2^k.
+    /// The finest grid for values in units of 2^`exponent`. If all terms are scaled by 2^k and `exponent` grows by k,
+    /// sums scale exactly by 2^k.
     pub fn new(exponent: i32) -> Grid {
         Grid(MIN_EXPONENT + exponent.rem_euclid(i32::from(STEP)) as i16)
     }

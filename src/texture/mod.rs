@@ -47,8 +47,8 @@ pub enum Encoding {
     Linear,
     /// sRGB-encoded colours and linear alpha.
     Srgb,
-    /// Glossiness in alpha (8 bits), multiplied by this factor. A lookup returns 1 - glossiness in G, 0 in R, and 1 in B
-    /// and A.
+    /// Glossiness in alpha (8 bits), multiplied by this factor. A lookup returns 1 - glossiness in G, 0 in R, and 1 in
+    /// B and A.
     Glossiness(f32),
 }
 

@@ -53,8 +53,8 @@ impl From<embree::Hit> for Hit {
 /// primitive, barycentric weights of the second and third corner, token of the ray. Must be a pure function.
 pub type HitFilter = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 
-/// If all instances of a mesh together have at most this number of triangles, they are copied into the BVH of the scene.
-/// Rays are faster there than through an instance's own BVH, whose box overlaps those of its neighbours.
+/// If all instances of a mesh together have at most this number of triangles, they are copied into the BVH of the
+/// scene. Rays are faster there than through an instance's own BVH, whose box overlaps those of its neighbours.
 const MAX_COPIED_TRIANGLES: usize = 1 << 17;
 
 /// Geometry committed to Embree; clones share it.
@@ -76,8 +76,8 @@ fn column_major(m: &Affine3A) -> [f32; 12] {
 }
 
 impl Tracer {
-    /// Builds Embree's BVH with `threads` threads. `filtered` has one entry per instance: `None` leaves the instance out,
-    /// `Some(true)` passes its hits to `filter`.
+    /// Builds Embree's BVH with `threads` threads. `filtered` has one entry per instance: `None` leaves the instance
+    /// out, `Some(true)` passes its hits to `filter`.
     ///
     /// # Errors
     /// Embree is missing or out of memory, or a coordinate is too large for it.

@@ -136,7 +136,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         let distance2 = there.blend(dot(&offset, &offset), f32x8::splat(f32::INFINITY));
         // Where none waits, what is left of another has no cosine, so that it brings nothing.
         let cosine = there & dot(&wi, &ng).abs();
-        let f = self.gathering.eight(wi, cosine);
+        let f = self.gathering.photons8(wi, cosine);
         let found = [f[0] * flux[0], f[1] * flux[1], f[2] * flux[2]];
         self.add::<C>(&found, distance2);
         if C::COUNTS {

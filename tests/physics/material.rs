@@ -183,14 +183,14 @@ fn rows_are_tabulated_when_they_are_asked_for() {
     let materials: Vec<Material> = (0..30).map(glass).collect();
     assert!(materials.iter().all(Material::is_solid_glass));
     let tables = EnergyTables::for_materials(&materials);
-    assert_eq!(tables.tabulated(), 0);
+    assert_eq!(tables.row_count(), 0);
     let eta = materials[3].ior / materials[21].ior;
     let p = materials[3].parameters(&surface(), &[], eta);
     let early = format!("{:?}", Interface::new(&p, &EnergyTables::new([eta])));
     let made = |_| format!("{:?}", Interface::new(&p, &tables));
     let all: Vec<String> = (0..16).into_par_iter().map(made).collect();
     assert!(all.iter().all(|late| *late == early));
-    assert_eq!(tables.tabulated(), 2 * 2 + 2);
+    assert_eq!(tables.row_count(), 2 * 2 + 2);
 }
 
 /// What makes the shading of a direction.
@@ -208,7 +208,7 @@ fn tilted_and_mapped(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3,
     tilted(p, tables, &check);
     let (n, smooth) = (Vec3::new(0.8, 0.1, 0.5).normalize(), Vec3::new(-0.1, 0.05, 1.0).normalize());
     let bsdf = support::bsdf(p, tables);
-    check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo).mapped(smooth));
+    check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo).with_normal_map(smooth));
 }
 
 fn direction(k: u64) -> Vec3 {
@@ -269,7 +269,7 @@ fn steep_metal_is_not_black() {
         mean_and_error(&weights)
     };
     for wo in [Vec3::Z, Vec3::new(0.0, 0.8, 0.6), Vec3::new(-0.28, 0.0, 0.96), Vec3::new(-0.96, 0.0, 0.28)] {
-        let (mean, error) = seen(shading(&metal, wo).mapped(Vec3::Z));
+        let (mean, error) = seen(shading(&metal, wo).with_normal_map(Vec3::Z));
         println!("{wo}: {mean} +- {error}");
         assert!((mean - 1.0).abs() < 5.0 * error + 5e-3, "{wo}: {mean} +- {error}");
     }
@@ -279,10 +279,11 @@ fn steep_metal_is_not_black() {
     let below = n * (2.0 * n.dot(wo)) - wo;
     let lamp = Vec3::new(below.x, below.y, -below.z);
     assert!(below.z < -0.2);
-    let to_lamp = shading(&mirror, wo).mapped(Vec3::Z).sample(Transport::Radiance, LobeSet::ALL, 0.5, Vec2::splat(0.5));
+    let to_lamp =
+        shading(&mirror, wo).with_normal_map(Vec3::Z).sample(Transport::Radiance, LobeSet::ALL, 0.5, Vec2::splat(0.5));
     let to_lamp = to_lamp.expect("a mirror's direction");
     assert!((to_lamp.wi - lamp).length() < 1e-5 && (to_lamp.weight.x - 1.0).abs() < 1e-5, "{to_lamp:?}");
-    let lit = shading(&mirror, lamp).mapped(Vec3::Z);
+    let lit = shading(&mirror, lamp).with_normal_map(Vec3::Z);
     let draw = |u| lit.sample(Transport::Importance, LobeSet::ALL, u, Vec2::splat(0.5));
     let to_eye = [0.25, 0.75].map(draw).into_iter().flatten().find(|s| (s.wi - wo).length() < 1e-5).expect("the eye");
     // Of two ways each is taken in half of the draws, and carries what it has per geometric cosine.
@@ -307,10 +308,10 @@ fn relief_shadows_its_own_diffuse_light() {
     let lit = |s: Shading<'_>| s.eval_cos(lamp, Transport::Radiance, LobeSet::ALL).x;
     assert!((lit(bare) - 0.5 / std::f32::consts::PI).abs() < 1e-5);
     let expected = 2.0 / (1.0 + (1.0 + 0.375 * 99.0f32).sqrt());
-    assert!((lit(bare.mapped(Vec3::Z)) / lit(bare) - expected).abs() < 1e-4);
+    assert!((lit(bare.with_normal_map(Vec3::Z)) / lit(bare) - expected).abs() < 1e-4);
     let u = |k: u64, salt: u64| (mix(mix(k) ^ salt) >> 40) as f32 / 16_777_216.0;
     for (lean, cycles) in [(20.0, 0.943), (45.0, 0.744), (60.0, 0.565), (70.0, 0.421)] {
-        let shading = leaning(lean).mapped(Vec3::Z);
+        let shading = leaning(lean).with_normal_map(Vec3::Z);
         let draw = |k| shading.sample(Transport::Radiance, LobeSet::ALL, u(k, 7), Vec2::new(u(k, 8), u(k, 9)));
         let drawn: Vec<f64> = (0..40_000).map(|k| draw(k).map_or(0.0, |s| f64::from(s.weight.x))).collect();
         let (mean, error) = mean_and_error(&drawn);
@@ -331,7 +332,7 @@ fn a_clear_coat_keeps_its_own_normal() {
         let white = Parameters { clearcoat: 1.0, clearcoat_alpha, ..Parameters::default() };
         let black = Parameters { base_color: Rgb::ZERO, ..white };
         let shading = |p: &Parameters, n: Vec3, wo| {
-            Shading::new(Frame::from_normal(n), Vec3::Z, support::bsdf(p, &tables), wo).mapped(Vec3::Z)
+            Shading::new(Frame::from_normal(n), Vec3::Z, support::bsdf(p, &tables), wo).with_normal_map(Vec3::Z)
         };
         for k in 0..200 {
             let (wo, wi, n) = (upper(3 * k), upper(3 * k + 1), upper(3 * k + 2));

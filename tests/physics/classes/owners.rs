@@ -68,7 +68,8 @@ impl<'a> Visitor<'a> for Scribe<'_> {
             self.found.insert((self.sofar.clone(), false));
         }
         let events = [(LobeSet::SHARP, Event::Sharp), (LobeSet::BROAD, Event::Broad)];
-        let events: Vec<Event> = events.into_iter().filter(|(lobe, _)| lobes.intersects(*lobe)).map(|(_, e)| e).collect();
+        let events: Vec<Event> =
+            events.into_iter().filter(|(lobe, _)| lobes.intersects(*lobe)).map(|(_, e)| e).collect();
         self.ends(&events);
         self.last = Some(lobes);
         Next::Continue(LobeSet::ALL)

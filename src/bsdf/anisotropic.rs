@@ -1,5 +1,5 @@
-//! What rough glass loses whose facets are wider one way than the other: it depends on the azimuth as much as on the
-//! cosine, so no isotropic profile serves.
+//! Albedos of anisotropic rough glass. They depend on the azimuth as much as on the cosine, so isotropic profiles are
+//! too inaccurate.
 
 use super::profile::{NODES, Position, Profile, node};
 use crate::math::{Vec2, Vec3, Vec4};
@@ -7,25 +7,25 @@ use std::array::from_fn;
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_2};
 use std::sync::OnceLock;
 
-/// Nodes of the azimuth in a quarter turn. The other quarters are its mirror images.
+/// Number of nodes of the azimuth in a quarter of the circle. The other quarters are mirror images.
 const AZIMUTHS: usize = 13;
 
-/// Twice four functions of the direction at a pair of alphas.
+/// Two groups of four functions of the direction, at a pair of alphas.
 pub(super) type Row = [[[Vec4; 2]; NODES]; AZIMUTHS];
 
-/// Rows at pairs of nodes of alpha, each made when it is first asked for.
+/// Rows at all pairs of nodes of alpha, computed at first use.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Pairs(OnceLock<Box<[OnceLock<Box<Row>>]>>);
+pub(super) struct AnisotropicTables(OnceLock<Box<[OnceLock<Box<Row>>]>>);
 
-impl Pairs {
-    /// `constant + factors . functions`, at least zero, of the functions of number `n` of facets of these alphas along x
-    /// and y. `make` makes all functions at an alpha along x, a smaller one along y, and a direction.
+impl AnisotropicTables {
+    /// The profile `max(constant + factors . functions, 0)`, with the four functions of group `n`, at the alphas along
+    /// x and y. `make` computes all functions from the alpha along x, a smaller one along y, and a direction.
     pub fn around(
         &self,
         [along_x, along_y]: [Position; 2],
         (n, constant, factors): (usize, f32, Vec4),
         make: impl Fn(f32, f32, Vec3) -> [Vec4; 2],
-    ) -> Stretched {
+    ) -> AnisotropicProfile {
         let pairs = self.0.get_or_init(|| (0..NODES * NODES).map(|_| OnceLock::new()).collect());
         let row = |wide: usize, narrow: usize| {
             pairs[wide * NODES + narrow].get_or_init(|| {
@@ -48,48 +48,48 @@ impl Pairs {
                 }
             }
         }
-        Stretched { azimuths: nodes.map(|nodes| Profile::of(nodes.map(|x| x.max(0.0)))), turned }
+        AnisotropicProfile { azimuths: nodes.map(|nodes| Profile::from_nodes(nodes.map(|x| x.max(0.0)))), turned }
     }
 }
 
-/// A function of the direction, symmetric about x and y: linear in the azimuth between profiles.
+/// A function of the direction that is symmetric about x and y: one profile per azimuth, with linear interpolation.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stretched {
+pub(super) struct AnisotropicProfile {
     azimuths: [Profile; AZIMUTHS],
-    /// The wider alpha is the one along y.
+    /// Whether the larger alpha is along y.
     turned: bool,
 }
 
-/// The functions of the two sides of an interface, kept away from what every interface has: they are large.
+/// The functions of both sides of an interface. They are large, so they are stored outside of the interface.
 #[derive(Debug)]
-pub(super) enum Sides<'a> {
-    /// By an interface that many vertices share.
-    Own(Box<[Stretched; 2]>),
-    /// In the memory of a path.
-    Lent(&'a [Stretched; 2]),
+pub(super) enum SideProfiles<'a> {
+    /// Functions of an interface that all surfaces of a material share.
+    Owned(Box<[AnisotropicProfile; 2]>),
+    /// Functions of the interface of one path vertex, in the arena of the path.
+    InArena(&'a [AnisotropicProfile; 2]),
 }
 
-impl std::ops::Deref for Sides<'_> {
-    type Target = [Stretched; 2];
+impl std::ops::Deref for SideProfiles<'_> {
+    type Target = [AnisotropicProfile; 2];
     #[inline]
-    fn deref(&self) -> &[Stretched; 2] {
+    fn deref(&self) -> &[AnisotropicProfile; 2] {
         match self {
-            Sides::Own(sides) => sides,
-            Sides::Lent(sides) => sides,
+            SideProfiles::Owned(sides) => sides,
+            SideProfiles::InArena(sides) => sides,
         }
     }
 }
 
-/// Share of the circle that belongs to a node.
+/// Share of the circle that belongs to node `k` of the azimuth.
 fn share(k: usize) -> f32 {
     if k == 0 || k == AZIMUTHS - 1 { 0.5 / LAST } else { 1.0 / LAST }
 }
 
-/// The last node, at a quarter turn.
+/// Index of the last node, at a quarter of the circle.
 const LAST: f32 = (AZIMUTHS - 1) as f32;
 
-impl Stretched {
-    /// The nodes around the azimuth of `w`: the first of two, and the fraction to the next.
+impl AnisotropicProfile {
+    /// Position of `w` on the axis of azimuths: the index of the node below, and the fraction to the next.
     #[inline]
     fn place(&self, w: Vec3) -> (usize, f32) {
         let (x, y) = (w.x.abs(), w.y.abs());
@@ -98,7 +98,7 @@ impl Stretched {
         (k, turn - k as f32)
     }
 
-    /// The value along `w`, the cosine of which has the position `mu`.
+    /// The value at the direction `w`; `mu` is the position of its cosine.
     #[inline]
     pub fn at(&self, mu: Position, w: Vec3) -> f32 {
         let (k, t) = self.place(w);
@@ -106,7 +106,7 @@ impl Stretched {
         low + (high - low) * t
     }
 
-    /// Density per solid angle with which [`Stretched::sample`] draws `w`.
+    /// Density per solid angle with which [`AnisotropicProfile::sample`] draws `w`.
     #[inline]
     pub fn pdf_w(&self, mu: Position, w: Vec3) -> f32 {
         let (k, t) = self.place(w);
@@ -118,7 +118,7 @@ impl Stretched {
         (0..AZIMUTHS).map(|k| share(k) * self.azimuths[k].mass()).sum()
     }
 
-    /// A direction of the upper hemisphere, as [`Profile::sample`]; `None` where there is nothing.
+    /// Samples a direction of the upper hemisphere, see [`Profile::sample`]. `None` if the function is zero.
     pub fn sample(&self, u: Vec2) -> Option<Vec3> {
         let mut left = u.x * self.mass();
         let mut chosen = 0;
@@ -129,7 +129,7 @@ impl Stretched {
         let profile = &self.azimuths[chosen];
         let rest = left / (share(chosen) * profile.mass());
         let mu = profile.sample(Vec2::new(rest, 0.0))?.z;
-        // One of the four mirror images, and a place under the node's hat.
+        // One of the four mirror images, and an azimuth from the triangular weight of the node.
         let quarter = (4.0 * u.y) as u32;
         let v = 2.0 * (4.0 * u.y - quarter as f32) - 1.0;
         let hat = v.signum() * (1.0 - (1.0 - v.abs()).max(0.0).sqrt());
@@ -140,8 +140,8 @@ impl Stretched {
         Some(Vec3::new(x * sign(1), y * sign(2), mu))
     }
 
-    /// Its mean over the azimuth.
+    /// Mean over the azimuth.
     pub fn mean(&self) -> Profile {
-        Profile::of(from_fn(|j| (0..AZIMUTHS).map(|k| share(k) * self.azimuths[k].nodes()[j]).sum()))
+        Profile::from_nodes(from_fn(|j| (0..AZIMUTHS).map(|k| share(k) * self.azimuths[k].nodes()[j]).sum()))
     }
 }
