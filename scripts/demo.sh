@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, renders a scene and combines its levels into out/demo.exr and out/demo.png.
-# Arguments go to `caustique render` and win over the settings here: scripts/demo.sh --width 1280 --iterations 256
+# Installs missing dependencies, builds the program, and renders a scene to out/demo.exr and out/demo.png.
+# Arguments are passed to `caustique render` and override the settings below:
+#     scripts/demo.sh --width 1280 --iterations 256
 
 set -euo pipefail
 
@@ -14,7 +15,7 @@ cd "$ROOT"
 cargo build --locked --release --bin caustique
 PROGRAM=${CARGO_TARGET_DIR:-target}/release/caustique
 
-# A minute or so on two cores; the time limit holds slower machines to two. Of an option given twice the last holds.
+# The render takes about a minute on two cores; the time limit is two minutes. The last of repeated options is used.
 settings=(-o out/demo.exr --png out/demo.png)
 [[ " $*" =~ ' --height' ]] || settings+=(--width 640)
 [[ " $*" =~ ' --'(iterations|time|target-error) ]] || settings+=(--iterations 128 --time 100)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Writes the files that are made from the program's own definitions: options and layers for the add-on and the USD converter,
-# stubs and docstrings of the Python package, and lists in the documentation. Tests compare them.
+# Writes the files generated from the program's definitions: options and layers for the add-on and the USD converter,
+# stubs and docstrings of the Python package, and lists in the documentation. Tests check that they are up to date.
 
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Pins what the requirement files (requirements-*.in, lab/train/requirements.in) name, and what that needs, by version and
-# hash in files of the same names that end in .txt, which are installed. Needs uv (pip install uv).
+# Pins the packages of requirements-*.in and lab/train/requirements.in, with their dependencies, by version and hash in
+# the .txt files beside them, which setup.sh installs. Needs uv (pip install uv).
 #
-#   scripts/lock.sh [NAME...]     some of them, such as test or lab/train/requirements
+#   scripts/lock.sh [NAME...]     only these files, such as test or lab/train/requirements
 
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"

@@ -1,29 +1,29 @@
 #!/usr/bin/env bash
-# Installs what is missing on Debian (12, 13, and relatives with apt) and leaves alone what is there.
+# Installs missing dependencies on Debian (12, 13, and derivatives with apt).
 #
-#   scripts/setup.sh render    what building and rendering need: Rust (checked), a C linker, Embree, ONNX Runtime; and
-#                              Open Image Denoise, where it can be had
+#   scripts/setup.sh render    for building and rendering: Rust (checked), a C linker, Embree, ONNX Runtime, and Open
+#                              Image Denoise if available
 #   scripts/setup.sh python    render, and the Python packages of the tests in .venv
-#   scripts/setup.sh wheel     render, and what builds and tests our own Python package in .venv-python
-#   scripts/setup.sh usd       render, and what reads stages of USD in .venv-usd
+#   scripts/setup.sh wheel     render, and packages to build and test the Python package in .venv-python
+#   scripts/setup.sh usd       render, and packages to read USD stages in .venv-usd
 #   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy
-#   scripts/setup.sh farm      python, and what scripts/farm needs in .venv-farm: Ray, Open Job Description
+#   scripts/setup.sh farm      python, and packages of scripts/farm in .venv-farm: Ray, Open Job Description
 #
-# Other scripts source this file and call `setup MODE`. Runs again in a second when nothing is missing.
+# Other scripts source this file and call `setup MODE`. If nothing is missing, it takes a second.
 # CAUSTIQUE_EMBREE, CAUSTIQUE_ONNXRUNTIME and CAUSTIQUE_OIDN name libraries to use instead; CAUSTIQUE_PYTHON names a
 # Python.
 
 set -euo pipefail
 
-# Every Python runs isolated (-I), because modules in the current folder may be anybody's.
+# Every Python runs isolated (-I), because modules in the current folder may come from an untrusted source.
 ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-# A program that is built into another folder finds what is installed here.
+# A program built in another folder finds the dependencies in this one.
 export CAUSTIQUE_HOME=$ROOT
 
-# Everything that Blender's module links to and a minimal system lacks.
+# Libraries that Blender's module links to and a minimal system lacks.
 BPY_LIBRARIES=(libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1)
 
-# Folders whose Python modules import each other by name; the laboratory and the hard cases import from all of them.
+# Folders of Python modules that import each other by name; scripts/lab and tests/hard import from all of them.
 MODULES=$ROOT/scripts/blender:$ROOT/scripts/compare/peers:$ROOT/scripts/farm
 
 say() { printf 'setup: %s\n' "$*" >&2; }
@@ -44,7 +44,7 @@ as_root() {
     fi
 }
 
-# The package lists are fetched once a run, before the first look at them.
+# Package lists are fetched once per run, before their first use.
 apt_updated=
 apt_update() {
     [ -z "$apt_updated" ] || return 0
@@ -60,7 +60,7 @@ apt_update() {
 apt_install() {
     apt_update
     say "installing $*"
-    # env: sudo drops variables of the caller. Only the log of a failure is of interest.
+    # `env`, because sudo drops the caller's variables. The log is shown only after a failure.
     local log
     log=$(mktemp)
     if ! as_root env DEBIAN_FRONTEND=noninteractive \
@@ -75,7 +75,8 @@ apt_install() {
 # apt_has PACKAGE: whether apt could install it
 apt_has() {
     apt_update
-    # No `grep -q` behind a pipe in these scripts: it leaves early, the writer dies of SIGPIPE, and pipefail sees that.
+    # No `grep -q` behind a pipe in these scripts: it exits early, the writer dies of SIGPIPE, and pipefail reports
+    # that.
     [ -n "$(LC_ALL=C apt-cache policy "$1" 2>/dev/null | sed -n '/Candidate: [^(]/p')" ]
 }
 
@@ -115,7 +116,7 @@ need_linker() {
     links || fail "cc cannot link a C program" "reinstall gcc and libc6-dev"
 }
 
-# loads LIBRARY: whether the dynamic loader takes it, by the same call that the program makes
+# loads LIBRARY: whether dlopen, which the program uses, loads it
 loads() { "$PYTHON" -I -c 'import ctypes, sys; ctypes.CDLL(sys.argv[1])' "$1" 2>/dev/null; }
 
 find_embree() {
@@ -144,7 +145,7 @@ need_embree() {
         "install Embree 4 and set CAUSTIQUE_EMBREE to its libembree4.so.4"
 }
 
-# A pip that needs no packages of the system beyond python3-venv.
+# Installs pip with no system package other than python3-venv.
 need_venv_module() {
     "$PYTHON" -I -c 'import ensurepip, venv' 2>/dev/null && return
     [ -z "${CAUSTIQUE_PYTHON:-}" ] || fail "$PYTHON has no venv module" "install it, or unset CAUSTIQUE_PYTHON"
@@ -156,8 +157,8 @@ need_venv_module() {
 # find_library NAME: prints version and path
 find_library() { "$PYTHON" "$ROOT/scripts/setup_library.py" "$1"; }
 
-# fetch_library NAME TEMPORARY. The libraries inside the wheels do not depend on the Python; naming one takes a wheel
-# whatever the Python here.
+# fetch_library NAME TEMPORARY. The libraries in the wheels do not depend on the Python version; naming a version makes
+# pip accept the wheel with any Python.
 fetch_library() {
     "$PYTHON" -I -m venv "$2/venv" &&
         "$2/venv/bin/python" -I -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
@@ -197,13 +198,13 @@ need_onnxruntime() {
 
 find_oidn() { OIDN=$(find_library oidn); }
 
-# Rendering does without, so only what the user named must be right.
+# Rendering works without this library, so only a library that the user named must load.
 need_oidn() {
     find_oidn && return
     [ -z "${CAUSTIQUE_OIDN:-}" ] ||
         fail "CAUSTIQUE_OIDN=$CAUSTIQUE_OIDN is no Open Image Denoise 2" "name its libOpenImageDenoise.so, or unset it"
     say "unpacking Open Image Denoise from a Python wheel into .deps/oidn"
-    # In a shell of its own, because what fails in there would end this one.
+    # In a subshell, because a failure would end this shell.
     if ! (unpack_library oidn) || ! find_oidn; then
         OIDN=none
         say "warning: Open Image Denoise could not be had here; rendering does without." \
@@ -226,7 +227,7 @@ need_venv() {
     printf '%s\n' "$stamp" >"$directory/.complete"
 }
 
-# Blender's module exists for some Pythons only.
+# Blender's module exists for some Python versions only.
 find_bpy_python() {
     local python
     for python in "$PYTHON" python3.13 python3.11; do
@@ -244,7 +245,7 @@ missing_libraries() { LC_ALL=C ldd "$1" | sed -n 's/^[[:space:]]*\([^ ]*\) => no
 need_bpy() {
     find_bpy_python
     need_venv .venv-bpy "$BPY_PYTHON" requirements-bpy.txt
-    # Asking the loader names what is missing; importing the module would start Blender and stop at the first.
+    # ldd names all missing libraries; importing the module would start Blender and stop at the first.
     local module
     for module in "$ROOT"/.venv-bpy/lib/python3*/site-packages/bpy/__init__*.so; do :; done
     [ -f "$module" ] || fail "$module is not there" "remove .venv-bpy, then run this script again"

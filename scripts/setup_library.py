@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""Finds a shared library that the program loads when it runs, or unpacks one from a wheel.
+"""Finds a shared library that the program loads at run time, or unpacks one from a wheel.
 
-Prints "VERSION PATH" and exits 0 when a usable library of at least the oldest version that serves loads; exits 1
-otherwise. The search order is the program's own: the environment variable, the loader's search path, the folder below
-.deps.
+Prints "VERSION PATH" and exits with 0 if a library of a supported version loads, else with 1. The search order is the
+program's: the environment variable, the loader's search path, the folder in .deps.
 
     setup_library.py onnxruntime|oidn                 find
-    setup_library.py onnxruntime|oidn unpack WHEEL    put what is needed of the wheel below .deps, then find
+    setup_library.py onnxruntime|oidn unpack WHEEL    copy the needed files of the wheel to .deps, then find
 """
 
 import ctypes
@@ -39,7 +38,7 @@ def onnxruntime_version(library):
 
 
 def oidn_version(library):
-    """Asks a device for the processor, which needs the library's other files, too."""
+    """The version from a CPU device, which also tests that the library's other files load."""
     new, get, release = library.oidnNewDevice, library.oidnGetDeviceInt, library.oidnReleaseDevice
     new.restype, new.argtypes = ctypes.c_void_p, [ctypes.c_int]
     get.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
@@ -49,7 +48,7 @@ def oidn_version(library):
         return None
     parts = [get(device, b"version" + part) for part in (b"Major", b"Minor", b"Patch")]
     release(device)
-    # A later one may have another interface.
+    # Major versions after 2 may have another interface.
     return ".".join(map(str, parts)) if parts[0] <= 2 else None
 
 
@@ -57,15 +56,15 @@ def oidn_version(library):
 class Library:
     title: str
     variable: str
-    # What the loader is asked for, best first.
+    # Names for the loader, best first.
     names: list[str]
-    # What the names of all files that are this library begin with.
+    # Prefix of the names of all files of this library.
     stem: str
     folder: Path
     oldest: tuple[int, int]
-    # The version that an open library reports.
+    # Returns the version that an open library reports.
     version: Callable[[ctypes.CDLL], str | None]
-    # What is needed of the wheel: names and what follows them there. The library comes first, then what it loads.
+    # Needed files of the wheel: (name, suffix of its path there). First the library, then the files that it loads.
     inside: list[tuple[str, str]]
 
 
@@ -76,7 +75,7 @@ LIBRARIES = {
         names=["libonnxruntime.so", "libonnxruntime.so.1"],
         stem="libonnxruntime.so",
         folder=ROOT / ".deps" / "onnxruntime",
-        # The interface that the program asks for (the crate's feature `api-17`).
+        # The program's interface version (the crate's feature `api-17`).
         oldest=(1, 17),
         version=onnxruntime_version,
         inside=[("libonnxruntime.so", r"\.[0-9.]+")],
@@ -86,7 +85,7 @@ LIBRARIES = {
         variable="CAUSTIQUE_OIDN",
         names=["libOpenImageDenoise.so.2", "libOpenImageDenoise.so"],
         stem="libOpenImageDenoise.so",
-        # Its files look for each other in ../lib, seen from their own folder, whose name therefore matters.
+        # Its files search for each other in ../lib relative to their folder, so the folder's name matters.
         folder=ROOT / ".deps" / "oidn" / "lib",
         oldest=(2, 0),
         version=oidn_version,
@@ -101,7 +100,7 @@ LIBRARIES = {
 
 
 def candidates(wanted):
-    """Paths and sonames to try, the program's order."""
+    """Paths and sonames to try, in the program's order."""
     named = os.environ.get(wanted.variable)
     if named:
         return [named]
@@ -136,7 +135,7 @@ def find(wanted):
 
 
 def unpack(wanted, wheel):
-    """Copies what is needed from the wheel, and links the library's names to its file."""
+    """Copy the needed files from the wheel, and link the library's names to its file."""
     with zipfile.ZipFile(wheel) as archive:
         members = []
         for name, number in wanted.inside:
@@ -146,7 +145,7 @@ def unpack(wanted, wheel):
             members += matching
         wanted.folder.mkdir(parents=True, exist_ok=True)
         partial = wanted.folder / ".partial"
-        # The library itself comes last: where it lies, all that it needs does.
+        # Copy the library last: if it exists, all files that it needs exist, too.
         for member in reversed(members):
             with archive.open(member) as source, open(partial, "wb") as sink:
                 shutil.copyfileobj(source, sink)

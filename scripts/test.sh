@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Installs what is missing and runs the tests. Stops at the first part that fails, but always ends with the slowest tests
-# and the summary; its last line counts the tests: "123 passed, 0 failed". A part that fails without a failed test of its
-# own (formatting, a lint, a build) counts as one.
+# Installs missing dependencies and runs the tests. Stops at the first failing part, then prints the slowest tests and a
+# summary; the last line counts the tests: "123 passed, 0 failed". A part that fails without a failed test (formatting,
+# a lint, a build) counts as one.
 #
-#   scripts/test.sh                     what a change must pass before others see it
+#   scripts/test.sh                     the tests that every change must pass
 #   scripts/test.sh --long              everything: also the tests marked long, and the hard cases by all methods
 #   scripts/test.sh --long-within 1300  also the tests marked long, if the others took fewer seconds than that
 
@@ -34,7 +34,7 @@ finish() {
         sort -rn "$TIMES" | sed -n 1,20p
     fi
     rm -f "$TIMES" ${LOG:+"$LOG"}
-    # An exit that no part accounts for, in the installation for example.
+    # An exit outside of the parts, during installation for example.
     if [ "$status" -ne 0 ] && [ "$failed" -eq 0 ]; then
         summary+=("FAILED   before all parts had run")
         failed=1
@@ -48,7 +48,7 @@ finish() {
 trap finish EXIT
 trap 'exit 130' INT TERM
 
-# part NAME COMMAND...: runs the command, shows and keeps its output, adds its tests to the counts
+# part NAME COMMAND...: runs the command, shows its output, and adds its tests to the counts
 part() {
     local name=$1 start=$SECONDS status=0 good bad skipped
     shift
@@ -59,7 +59,7 @@ part() {
     awk -f "$ROOT/tests/test_times.awk" "$LOG" >>"$TIMES"
     rm -f "$LOG"
     LOG=
-    # A test that is skipped tests nothing, and everything it could lack is installed.
+    # Skipped tests are errors, because everything that they need is installed.
     if [ "$skipped" -gt 0 ] && [ "$status" -eq 0 ]; then
         printf '%d tests were skipped or ignored\n' "$skipped"
         status=1
@@ -73,7 +73,7 @@ part() {
     [ "$bad" -eq 0 ] || exit 1
 }
 
-# tests PART COMMAND...: a part that must hold at least one test
+# tests PART COMMAND...: a part that must run at least one test
 tests() {
     local before=$passed name=$1
     part "$@"
@@ -103,8 +103,8 @@ else
     without 'cargo clippy' 'clippy is not installed: rustup component add clippy'
 fi
 RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --locked --release --workspace --no-deps
-# Stable Rust's test programs print the time of each test only if told that they may use unstable options. As the runner of
-# the programs alone, `env` does not change what is built.
+# Test programs of stable Rust print the time of each test only if unstable options are allowed, by a variable. The
+# runner `env` sets it for the test programs alone, so the build is unchanged.
 host=$(rustc -vV | sed -n 's/^host: //p' | tr 'a-z-' 'A-Z_')
 export "CARGO_TARGET_${host}_RUNNER=env RUSTC_BOOTSTRAP=1"
 rust=(cargo test --locked --release --workspace --no-fail-fast --lib --bins --tests -- -Z unstable-options --report-time)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Compares with Mitsuba, and translates scenes to it and from it: `scripts/compare/mitsuba.py --help`.
+"""Compares caustique with Mitsuba, and converts scenes between both: `scripts/compare/mitsuba.py --help`.
 
-Runs scripts/compare/peers in .venv-compare, which it makes (setup.sh).
+Runs scripts/compare/peers in .venv-compare, which setup.sh creates if necessary.
 """
 
 import os

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Installs other renderers to compare with. Runs again in a second when nothing is missing.
+# Installs other renderers for comparisons. If nothing is missing, it takes a second.
 #
 #   scripts/compare/setup.sh          Mitsuba in .venv-compare, for scripts/compare/mitsuba.py
 #   scripts/compare/setup.sh peers    Mitsuba, LuxCore and Intel OIDN in .venv-peers, Cycles in .venv-bpy (as
 #                                     scripts/setup.sh test makes it), for `caustique converge --with` and
 #                                     scripts/lab.sh finished
 #
-# Either also installs the LLVM that Mitsuba's vectorised variant loads. Without one Mitsuba takes its scalar variant, a
+# Both also install LLVM for Mitsuba's vectorised variant. Without LLVM Mitsuba uses its scalar variant, which is a
 # third as fast.
 
 set -euo pipefail
@@ -14,7 +14,7 @@ set -euo pipefail
 # shellcheck source=scripts/setup.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../setup.sh"
 
-# LLVM 15 and 16 abort on kernels of Mitsuba 3.9 (scripts/compare/variant.py).
+# LLVM 15 and 16 abort on kernels of Mitsuba 3.9 (scripts/compare/peers/variant.py).
 llvm_is_new() { at_least 17 "$1"; }
 
 find_llvm() {
@@ -40,7 +40,7 @@ need_llvm() {
     fi
 }
 
-# Blender's module does not come with OpenEXR; its environment stays as scripts/setup.sh makes it.
+# Blender's module lacks OpenEXR, which goes to a separate folder, so that .venv-bpy stays as scripts/setup.sh makes it.
 need_exr_for_bpy() {
     local directory=$ROOT/.venv-peers/bpy requirement stamp
     requirement=$(awk '/^[^ #]/ { wanted = /^openexr==/ } wanted' "$ROOT/scripts/requirements-peers.txt")

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Merges the shards of a picture that shard.sh has rendered, and removes them.
+# Merges the shards that shard.sh has rendered to the picture, and removes them.
 #
 #   scripts/farm/merge.sh OUT.exr [--frame F] [options of caustique merge]
 #
-# CAUSTIQUE_BIN is the program. Exit codes are the program's; where it fails all shards stay.
+# CAUSTIQUE_BIN is the program. The exit code is the program's; if it fails, all shards are kept.
 
 set -euo pipefail
 
@@ -17,13 +17,13 @@ if [ "${1:-}" = --frame ]; then
     out=$(numbered "$out" "$2")
     frame=$2
     shift 2
-    # A picture to look at has a number, too.
+    # The PNG's name also gets the frame's number.
     for argument; do
         set -- "${@:2}" "$(numbered "$argument" "$frame")"
     done
 fi
 folder=$(shards_of "$out")
-# A merge that is run again after its shards are removed is done, and so is that of a shard alone.
+# Nothing to do if an earlier merge removed the shards, or if a single shard is the picture.
 [ -d "$folder" ] || [ ! -s "$out" ] || exit 0
 [ -e "$folder/render" ] || fail "$folder: there are no shards" 'shard.sh renders them'
 "$CAUSTIQUE" merge "$folder"/shard-*.exr -o "$out" --layers all "$@"

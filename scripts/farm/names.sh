@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# What the scripts of farms share: the program, and names of files. To be sourced.
+# Common functions of the farm scripts: the program, and names of files. To be sourced.
 
 CAUSTIQUE=${CAUSTIQUE_BIN:-$(dirname "${BASH_SOURCE[0]}")/../../target/release/caustique}
 [ -x "$CAUSTIQUE" ] || CAUSTIQUE=caustique
@@ -10,7 +10,7 @@ fail() {
     exit 2
 }
 
-# numbered NAME FRAME: the name with the frame's number in place of a run of '#', so many digits at least
+# numbered NAME FRAME: the name with the frame's number in place of a run of '#', padded to the length of the run
 numbered() {
     local folder= name=$1
     [[ $name != */* ]] || folder=${name%/*}/ name=${name##*/}

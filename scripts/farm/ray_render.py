@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Renders a picture, or the frames of an animation, on a Ray cluster: a task a shard, and one that merges them.
+"""Renders a picture, or the frames of an animation, on a Ray cluster: one task per shard, and one that merges them.
 
   .venv-farm/bin/python scripts/farm/ray_render.py SCENE -o OUT.exr --shards N [--frames A-B[,STEP]] [--address A]
                         [--cores C] [options of caustique render] [-- options of caustique merge]
 
   .venv-farm/bin/python scripts/farm/ray_render.py scenes/pool.glb -o out/pool.exr --shards 16 --iterations 256
 
-`scripts/setup.sh farm` makes .venv-farm. Without --address this machine alone is the cluster. A shard whose worker dies
-or that fails is tried again and goes on from its checkpoint. Every --partial seconds the shards that are there make a
-picture so far, out/pool.partial.exr and .png. Frames come as a stream: at most twice as many shards as there is room for
-wait at a time, and a line of output tells of each picture when it is merged. Scene, output and program have to be where
-all nodes see them. The same command again goes on from what is there. CAUSTIQUE_BIN is the program.
+`scripts/setup.sh farm` makes .venv-farm. Without --address, this machine is the whole cluster. A shard that fails or
+whose worker dies is retried and continues from its checkpoint. Every --partial seconds the finished shards are merged
+to a picture so far, out/pool.partial.exr and .png. Frames are submitted as a stream: the queue holds at most twice the
+number of shards that can run. A line of output reports each merged picture. All nodes must have access to scene, output
+and program. Repeating the command continues from the existing shards. CAUSTIQUE_BIN is the program.
 """
 
 import argparse
@@ -26,21 +26,22 @@ from pathlib import Path
 import ray
 
 HERE = Path(__file__).resolve().parent
-# What is given once for all shards, or means nothing for one.
-OURS = ("--shard", "--resume", "--checkpoint", "--threads")
-PICTURES = ("--png", "--exposure", "--tonemap", "--preview", "--layers")
+# Options that the farm sets itself, or that have no meaning for a shard.
+RESERVED = ("--shard", "--resume", "--checkpoint", "--threads")
+# Options of a merge, because no shard is a picture.
+MERGE_OPTIONS = ("--png", "--exposure", "--tonemap", "--preview", "--layers")
 
 
 class Refused(Exception):
-    """The command line of a task is wrong: another try would end alike."""
+    """A task has a wrong command line: a retry would fail, too."""
 
 
 class Failed(Exception):
-    """A task ended with an error, or by a signal."""
+    """A task ended with an error or by a signal."""
 
 
 def run(words, log):
-    """Runs a script of this folder, which dies with the worker; what it says goes to a file."""
+    """Run a script of this folder, which dies with the worker. Its output goes to the file `log`."""
     log.parent.mkdir(parents=True, exist_ok=True)
     with log.open("a", encoding="utf-8") as out:
         done = subprocess.run(["setpriv", "--pdeathsig", "KILL", *map(str, words)], stdout=out, stderr=out, check=False)
@@ -50,41 +51,41 @@ def run(words, log):
         raise kind(f"{log}: exit code {done.returncode}: {last}")
 
 
-# Tries are counted by Ray: those of a worker that died, and those of a render that failed.
+# Ray counts the retries, after a worker dies or a render fails.
 task = ray.remote(retry_exceptions=[Failed])
 
 
 @task
 def shard(request, picture, index):
-    """Renders a shard."""
-    words = [HERE / "shard.sh", request.scene, request.output, f"{index}/{request.shards}", *picture.frame_words]
+    """Render a shard."""
+    words = [HERE / "shard.sh", request.scene, request.output, f"{index}/{request.shards}", *picture.frame_arguments]
     run([*words, "--threads", request.cores, *request.render], picture.folder / f"{index}.log")
 
 
 @task
 def merge(request, picture):
-    """Merges the shards of a picture, which then are gone."""
-    words = [HERE / "merge.sh", request.output, *picture.frame_words, "--threads", request.cores, *request.merge]
+    """Merge the shards of a picture and remove them."""
+    words = [HERE / "merge.sh", request.output, *picture.frame_arguments, "--threads", request.cores, *request.merge]
     run(words, picture.output.with_suffix(".log"))
 
 
 @task
 def partial(picture):
-    """Makes the picture so far."""
+    """Merge the finished shards to a picture so far."""
     so_far = picture.partial
     words = [program(), "merge", "--partial", *sorted(picture.folder.glob("shard-*.exr"))]
     run([*words, "-o", so_far, "--png", so_far.with_suffix(".png")], picture.folder / "partial.log")
 
 
 def program():
-    """The program, as names.sh finds it."""
+    """The path of the program, from names.sh."""
     words = ["bash", "-c", f'. "{HERE / "names.sh"}"; printf %s "$CAUSTIQUE"']
     return subprocess.run(words, stdout=subprocess.PIPE, check=True, text=True).stdout
 
 
 @dataclass
 class Picture:
-    """A picture and how far it is."""
+    """A picture and its progress: shards left, done, and in the last picture so far."""
 
     output: Path
     frame: int | None
@@ -95,27 +96,27 @@ class Picture:
 
     @property
     def folder(self):
-        """Where its shards are."""
+        """The folder of the picture's shards."""
         return self.output.with_suffix(".shards")
 
     @property
     def partial(self):
-        """The picture so far."""
+        """The file of the picture so far."""
         return self.output.with_suffix(".partial.exr")
 
     @property
-    def frame_words(self):
-        """What says the frame to the scripts."""
+    def frame_arguments(self):
+        """Arguments of the scripts for the frame."""
         return [] if self.frame is None else ["--frame", self.frame]
 
 
 def numbered(path, frame):
-    """The name with the frame's number in place of a run of '#', as names.sh has it."""
+    """The path with the frame's number in place of a run of '#', as in names.sh."""
     return path.with_name(re.sub("#+", lambda run: f"{frame:0{len(run[0])}}", path.name, count=1))
 
 
 def frames_of(text):
-    """The frames of A, A-B or A-B,STEP."""
+    """Parse the frames A, A-B or A-B,STEP."""
     match = re.fullmatch(r"(\d+)(?:-(\d+))?(?:,([1-9]\d*))?", text)
     if not match or (match[2] and int(match[2]) < int(match[1])):
         raise argparse.ArgumentTypeError(f"{text!r}: give A-B or A-B,STEP, such as 1-100")
@@ -123,14 +124,14 @@ def frames_of(text):
 
 
 def pictures(request):
-    """Renders; gives each picture when it is merged, and tells of its shards on the way."""
+    """Render. Yields each picture when it is merged, and shows pictures so far."""
     frames = [None] if request.frames is None else request.frames
     tasks = shards_in_order(request, frames)
-    room = math.ceil(2 * ray.cluster_resources().get("CPU", 1) / request.cores)
-    running, told = {}, time.monotonic()
+    capacity = math.ceil(2 * ray.cluster_resources().get("CPU", 1) / request.cores)
+    running, last_shown = {}, time.monotonic()
     more = True
     while more or running:
-        while more and len(running) < room:
+        while more and len(running) < capacity:
             ready = next(tasks, None)
             more = ready is not None
             if more:
@@ -145,15 +146,15 @@ def pictures(request):
             picture.left -= 1
             picture.done += 1
             if picture.left == 0:
-                running[merged(request, picture)] = picture
-        if request.partial and time.monotonic() - told > request.partial:
-            told = time.monotonic()
+                running[submit_merge(request, picture)] = picture
+        if request.partial and time.monotonic() - last_shown > request.partial:
+            last_shown = time.monotonic()
             for picture in {id(of): of for of in running.values()}.values():
                 show(picture)
 
 
 def shards_in_order(request, frames):
-    """Submits shards, one each time that it is asked; gives what stands for them, and their picture."""
+    """Submit one shard per iteration. Yields its Ray reference and its picture."""
     for frame in frames:
         output = request.output if frame is None else numbered(request.output, frame)
         picture = Picture(output, frame, request.shards)
@@ -162,8 +163,8 @@ def shards_in_order(request, frames):
             yield shard.options(**options).remote(request, picture, index), picture
 
 
-def merged(request, picture):
-    """Has a picture merged, once nobody reads its shards any more."""
+def submit_merge(request, picture):
+    """Submit the merge of a picture, after a picture so far no longer reads its shards."""
     if picture.showing is not None:
         ray.wait([picture.showing])
         picture.showing = None
@@ -171,17 +172,17 @@ def merged(request, picture):
 
 
 def show(picture):
-    """Has the picture so far made, where there is more to see than before and no other is being made."""
+    """Submit a picture so far, if there are new shards and none is being made."""
     busy = picture.showing is not None and not ray.wait([picture.showing], timeout=0)[0]
     if picture.left and picture.done > picture.shown and not busy:
         picture.shown = picture.done
-        # Beside the shards, and before those that wait.
+        # Without CPUs, so that it starts before waiting shards.
         picture.showing = partial.options(num_cpus=0, max_retries=0, retry_exceptions=False).remote(picture)
 
 
 @dataclass
 class Request:
-    """What is asked for."""
+    """The parsed command line."""
 
     scene: Path
     output: Path
@@ -196,29 +197,29 @@ class Request:
 
 
 def count(text):
-    """A count of 1 or more."""
+    """Parse a count of 1 or more."""
     if not re.fullmatch(r"[1-9]\d*", text):
         raise argparse.ArgumentTypeError(f"{text!r}: give 1 or more")
     return int(text)
 
 
 def parse_request(words):
-    """The command line, read."""
+    """Parse the command line."""
     mine, merges = (words[: words.index("--")], words[words.index("--") + 1 :]) if "--" in words else (words, [])
     parser = argparse.ArgumentParser(description="Renders on a Ray cluster.", allow_abbrev=False)
     parser.add_argument("scene", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.exr")
     parser.add_argument("--shards", type=count, required=True, metavar="N")
     parser.add_argument("--frames", type=frames_of, metavar="A-B[,STEP]")
-    parser.add_argument("--cores", type=count, default=1, help="cores of a task (1)")
-    parser.add_argument("--retries", type=int, default=3, help="tries after the first (3)")
-    parser.add_argument("--partial", type=float, default=60, help="seconds between pictures so far; 0: none (60)")
-    parser.add_argument("--address", help="the cluster, as ray.init takes it; else this machine alone")
+    parser.add_argument("--cores", type=count, default=1, help="cores per task (1)")
+    parser.add_argument("--retries", type=int, default=3, help="retries of a failed task (3)")
+    parser.add_argument("--partial", type=float, default=60, help="seconds between pictures so far, 0 for none (60)")
+    parser.add_argument("--address", help="address of the cluster for ray.init; default: this machine")
     known, render = parser.parse_known_args(mine)
     for option in render:
-        if option in OURS:
+        if option in RESERVED:
             parser.error(f"{option} is given by the farm")
-        if option in PICTURES:
+        if option in MERGE_OPTIONS:
             parser.error(f"{option}: no shard is a picture; give what the merge is to do behind --")
     if not known.scene.is_file():
         parser.error(f"{known.scene}: no such scene")
@@ -227,7 +228,7 @@ def parse_request(words):
     if known.frames is not None and "#" not in known.output.name:
         parser.error(f"{known.output}: all frames have the same name; put '####' where the frame's number belongs")
     places = {"scene": known.scene.resolve(), "output": known.output.resolve()}
-    # A shard alone is the picture.
+    # A single shard is the picture.
     render += merges if known.shards == 1 else []
     return Request(**{**vars(known), **places}, render=render, merge=merges)
 
@@ -245,7 +246,7 @@ def main():
             print(picture.output, flush=True)
     except (ray.exceptions.RayTaskError, ray.exceptions.WorkerCrashedError) as error:
         cause = getattr(error, "cause", None) or error
-        sys.exit(f"ray_render: error: {cause}\nhint: the same command again goes on from what is there")
+        sys.exit(f"ray_render: error: {cause}\nhint: repeat the command to continue from the existing shards")
 
 
 if __name__ == "__main__":

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""A model of scale: how long a picture, or a shot of many frames, takes on so many cores, and what the time goes to.
+"""A model of render farms: how long a picture or a shot takes on a number of cores, and where the time goes.
 
   .venv-farm/bin/python scripts/farm/scale.py --cores 1000 --frames 1 --iterations 256
   .venv-farm/bin/python scripts/farm/scale.py --draw docs/scale.svg
 
-Costs are those that `scripts/lab.sh farm_scale` has stored. The formula is `predict`; `simulate` plays the same farm task by
-task, and tests hold one to the other. What both take for granted: iterations of a picture cost alike, a task's own cores
-share all work evenly but for loading a scene and writing a shard, and files pass through one store, one after the other.
+`scripts/lab.sh farm_scale` stores the costs. `predict` is a formula; `simulate` simulates the farm task by task, and
+tests compare both. Assumptions: all iterations of a picture cost the same; the cores of a task share all work evenly,
+except for loading the scene and writing the shard; and all files pass through one store, one at a time.
 """
 
 import argparse
@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-RESULTS = ROOT / "scripts" / "figures" / "results.jsonl"
-# What the time of a picture goes to, in its order.
+RESULTS = ROOT / "scripts" / "lab" / "results.jsonl"
+# The parts of a picture's time, in order.
 PARTS = ("start", "load", "pilot", "iterations", "write", "merge", "finish")
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What a picture costs: core-seconds, but for `file`, which is bytes.
+    """Costs of a picture, in core-seconds except for `file`.
 
-    load: before the pilot, on one core. pilot: before the first iteration. iteration: one. write: a shard's file, on one
-    core. each: merging one shard. finish: what a merge costs besides. file: a shard's.
+    load: loading the scene, on one core. pilot: choosing the method. iteration: one iteration. write: writing a shard's
+    file, on one core. each: merging one shard. finish: the rest of a merge. file: bytes of a shard's file.
     """
 
     load: float
@@ -40,29 +40,29 @@ class Costs:
 
 @dataclass(frozen=True)
 class Farm:
-    """Cores, those of a task, bytes a second of the store, and seconds from a free place to a task that runs."""
+    """A farm: total cores, cores per task (`threads`), bytes per second of the store, seconds to start a task."""
 
     cores: int
     threads: int = 1
     store: float = 1e9
     start: float = 1.0
-    # Tasks at a time, where they are not as many as the cores have room for.
+    # Number of parallel tasks, if not the number that the cores allow.
     places: int | None = None
 
     @property
     def workers(self):
-        """Tasks at a time."""
+        """Number of parallel tasks."""
         return self.places or max(1, self.cores // self.threads)
 
     @property
     def slowness(self):
-        """Seconds of a task for a second of its cores, which it may share with others."""
+        """Slowdown of a task because its cores are shared with other tasks."""
         return max(1.0, self.workers * self.threads / self.cores)
 
 
 @dataclass(frozen=True)
 class Job:
-    """Frames, shards of each, and iterations of each; `fan`: a merge takes so many files at most, 0: all at once."""
+    """Number of frames, shards per frame, iterations per frame. `fan`: most files per merge, 0 for no limit."""
 
     frames: int
     shards: int
@@ -71,7 +71,7 @@ class Job:
 
 
 def shard_parts(costs, farm, job, iterations):
-    """Seconds of a shard by part, its transfer left out."""
+    """Seconds of a shard by part, without its transfer."""
     slow = farm.slowness
     return {
         "start": farm.start,
@@ -83,8 +83,10 @@ def shard_parts(costs, farm, job, iterations):
 
 
 def merge_parts(costs, farm, job):
-    """Seconds of a merge by part, from the last shard to the picture. In a tree each level merges `fan` files and writes
-    one like them; all merges of a level run at once."""
+    """Seconds of a merge by part, from the last shard to the picture.
+
+    In a tree each merge reads `fan` files and writes one of equal size; all merges of a level run in parallel.
+    """
     transfer = costs.file / farm.store
     if not job.fan or job.fan >= job.shards:
         levels, files, between = 1, job.shards, 0.0
@@ -92,7 +94,7 @@ def merge_parts(costs, farm, job):
         levels = math.ceil(math.log(job.shards, job.fan) - 1e-9)
         files = levels * job.fan
         between = (levels - 1) * (costs.write + transfer)
-    # The other merges of a tree's level want the store, too.
+    # The other merges of the level also use the store.
     queue = 0 if levels == 1 else (job.shards - job.fan) * transfer
     return {
         "start": levels * farm.start,
@@ -102,10 +104,10 @@ def merge_parts(costs, farm, job):
 
 
 def predict(costs, farm, job):
-    """Seconds of a job by part: those of one picture where there is one, else all of them in proportion.
+    """Seconds of a job by part: of its one picture, or of all its frames in proportion.
 
-    Where tasks are more than places, they come in rounds, or fill the places evenly with the merges between them; the
-    store bounds both from below.
+    If there are more tasks than can run in parallel, they run in rounds, or fill the places evenly with merges between
+    them. The store's throughput is a lower bound for both.
     """
     shard = shard_parts(costs, farm, job, math.ceil(job.iterations / job.shards))
     merge = merge_parts(costs, farm, job)
@@ -113,11 +115,11 @@ def predict(costs, farm, job):
     tasks = job.frames * job.shards
     one, last = sum(shard.values()), sum(merge.values())
     rounds = math.ceil(tasks / farm.workers)
-    # Files that are ready at once pass the store one after the other.
+    # Files that are ready at the same time pass the store one at a time.
     queue = min(tasks, farm.workers) * transfer
     mean = sum(shard_parts(costs, farm, job, job.iterations / job.shards).values()) + transfer
     busy = (tasks * mean + (job.frames - 1) * last) / farm.workers
-    # So do the merges of pictures whose shards end together.
+    # Merges of pictures whose shards end at the same time also queue.
     together = (min(tasks, max(job.shards, farm.workers)) - job.shards) * transfer
     total = max(rounds * one + queue, busy, one + (2 * tasks - job.shards) * transfer - together) + together + last
     parts = dict.fromkeys(PARTS, 0.0)
@@ -132,13 +134,15 @@ def predict(costs, farm, job):
 
 
 def seconds(costs, farm, job):
-    """Seconds of a job."""
+    """Predicted seconds of a job."""
     return sum(predict(costs, farm, job).values())
 
 
 def simulate(costs, farm, job):
-    """Seconds of a job, task by task: shards wait for places, in the order of frames and after merges; files wait for the
-    store."""
+    """Simulated seconds of a job, task by task.
+
+    Shards wait for places, in the order of frames and after merges; files wait for the store.
+    """
     import simpy
 
     world = simpy.Environment()
@@ -185,12 +189,12 @@ def simulate(costs, farm, job):
 
 
 def powers(most):
-    """1, 2, 4 ... and the most."""
+    """1, 2, 4 ... and `most`."""
     return sorted({2**i for i in range(most.bit_length()) if 2**i <= most} | {most})
 
 
 def best(costs, cores, frames, iterations, widest=64, **farm):
-    """The cores of a task (a machine has `widest`) and the shards of a picture that take the least time."""
+    """The farm and job with the least time: cores per task (at most `widest`) and shards per picture."""
     choices = []
     for threads in powers(min(cores, widest)):
         of = Farm(cores, threads, **farm)
@@ -201,33 +205,34 @@ def best(costs, cores, frames, iterations, widest=64, **farm):
 
 
 def stored(name="scale"):
-    """What `scripts/lab.sh` has stored under a name."""
+    """The figures that `scripts/lab.sh` stored under a name."""
     rows = [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
     return [row["values"] for row in rows if row["name"] == name][-1]
 
 
 def costs_of(values):
-    """Costs from a stored figure."""
+    """`Costs` from a stored figure."""
     return Costs(**{name: values[name] for name in Costs.__dataclass_fields__})
 
 
 def report(costs, cores, frames, iterations, fan=0):
-    """What to choose, what it takes, and where the time goes."""
+    """Text: the best choice, its time, and the shares of the parts."""
     farm, job = best(costs, cores, frames, iterations)
     job = replace(job, fan=fan)
     parts = predict(costs, farm, job)
     total = sum(parts.values())
     ideal = frames * iterations * costs.iteration / cores
     lines = [
-        f"{cores} cores, {frames} frames of {iterations} iterations: {total:.0f} s, {100 * ideal / total:.0f} % of it iterations'",
-        f"  {farm.threads} cores a task, {job.shards} shards a picture, {farm.workers} tasks at a time",
+        f"{cores} cores, {frames} frames of {iterations} iterations: {total:.0f} s, "
+        f"{100 * ideal / total:.0f} % in iterations",
+        f"  {farm.threads} cores per task, {job.shards} shards per picture, {farm.workers} parallel tasks",
         "  " + ", ".join(f"{name} {100 * value / total:.0f} %" for name, value in parts.items()),
     ]
     return "\n".join(lines)
 
 
 def draw(path, values):
-    """Draws the measured points beside the model, seconds against cores, and what the time of one picture goes to."""
+    """Plot measured and modelled seconds against cores, and the parts of a picture's time."""
     import matplotlib
 
     matplotlib.use("svg")
@@ -272,8 +277,8 @@ def main():
     parser.add_argument("--cores", type=int, nargs="+", default=[1, 4, 16, 64, 256, 1000, 4000, 10000])
     parser.add_argument("--frames", type=int, default=1)
     parser.add_argument("--iterations", type=int)
-    parser.add_argument("--pilot", type=float, help="core-seconds of a pilot, in place of the measured one")
-    parser.add_argument("--fan", type=int, default=0, help="files that a merge takes at most, were there trees of them")
+    parser.add_argument("--pilot", type=float, help="core-seconds of the pilot, instead of the measured value")
+    parser.add_argument("--fan", type=int, default=0, help="most files per merge, for a hypothetical tree of merges")
     parser.add_argument("--draw", type=Path, metavar="FILE.svg")
     arguments = parser.parse_args()
     values = stored()

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Renders one shard of a picture, or goes on with it: what every farm runs as a task.
+# Renders one shard of a picture, or continues it. Every farm runs this script as a task.
 #
 #   scripts/farm/shard.sh SCENE OUT.exr I/N [--frame F] [options of caustique render]
 #
-# The shard is out/pool.shards/shard-I.exr where the picture is to be out/pool.exr, once it is whole; its checkpoint lies
-# beside it until then. A task that is run again goes on from the checkpoint, and does nothing where the shard is whole.
-# A shard alone, 0/1, is the finished picture out/pool.exr, and may have the options of the merge that it does without.
-# CAUSTIQUE_BIN is the program. Exit codes are the program's.
+# For a picture out/pool.exr the finished shard is out/pool.shards/shard-I.exr, with its checkpoint beside it until
+# then. A repeated task continues from the checkpoint, and does nothing if the shard is finished. A single shard, 0/1,
+# is the finished picture out/pool.exr, and may have options of the merge, which is not needed.
+# CAUSTIQUE_BIN is the program. The exit code is the program's.
 
 set -euo pipefail
 
@@ -24,7 +24,7 @@ index=${shard%/*} count=${shard#*/} folder=$(shards_of "$out")
 part=$folder/part-$index.exr whole=$folder/shard-$index.exr
 mkdir -p "$folder"
 
-# All tasks of a folder belong to one render. The first one says which; `ln` has one winner.
+# All tasks of a folder must belong to one render. The first task records its arguments; `ln` is atomic.
 render=$(printf '%q ' "$(sha256sum <"$scene")" "$count" "$@")
 draft=$(mktemp "$folder/render.XXXXXX")
 printf '%s\n' "$render" >"$draft"
@@ -38,19 +38,19 @@ rm -f "$draft"
 resume=()
 if [ -e "$part.checkpoint" ]; then
     resume=(--resume "$part.checkpoint")
-    echo "shard $shard goes on from $part.checkpoint" >&2
+    echo "shard $shard continues from $part.checkpoint" >&2
 fi
 
-# The picture of a shard alone is not looked at: few layers halve what is written, and the sums behind it are whole.
+# Nobody views the picture of a shard: fewer layers halve the file, which still contains the complete sums.
 layers=(--layers beauty)
 [ "$count" -gt 1 ] || layers=()
-# Where this shell is killed, the render is as well: its farm starts another.
+# If this shell is killed, the render is killed, too: the farm starts another task.
 setpriv --pdeathsig KILL "$CAUSTIQUE" render "$scene" -o "$part" --shard "$shard" "${layers[@]}" "${resume[@]}" "$@" &
 child=$!
 trap 'kill -TERM "$child" 2>/dev/null || true' TERM INT
 status=0
 wait "$child" || status=$?
-# A signal ends `wait` before the render has written what there is.
+# A signal interrupts `wait` before the render has written its checkpoint: wait again.
 while kill -0 "$child" 2>/dev/null; do
     status=0
     wait "$child" || status=$?

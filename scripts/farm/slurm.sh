@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# Renders a picture, or the frames of an animation, on a Slurm cluster: for each picture an array of jobs, one a shard,
-# and a job that merges them when all are done.
+# Renders a picture, or the frames of an animation, on a Slurm cluster: for each picture an array of jobs, one per
+# shard, and a job that merges the shards afterwards.
 #
 #   scripts/farm/slurm.sh SCENE -o OUT.exr --shards N [--frames A-B[,STEP]] [--cores C] [--wait]
 #                         [options of caustique render] [-- options of caustique merge]
 #
 #   scripts/farm/slurm.sh scenes/pool.glb -o out/pool.exr --shards 16 --iterations 256 -- --png out/pool.png
 #
-# --cores C     cores of a job (1)
-# --retries R   times that a shard that fails or is killed is queued again (3)
-# --wait        wait for the pictures; fails where one is not made
+# --cores C     cores per job (1)
+# --retries R   retries of a shard that fails or is killed (3)
+# --wait        wait for the pictures; fails if one is missing
 # --dry-run     print what would be submitted
 #
-# Scene, output and program have to be where all nodes see them. The same command again goes on from what is there.
-# Slurm's own options go through its variables (SBATCH_PARTITION, SBATCH_TIMELIMIT, SBATCH_ACCOUNT ...).
+# All nodes must have access to scene, output and program. Repeating the command continues from the existing shards.
+# Slurm's options are set by its variables (SBATCH_PARTITION, SBATCH_TIMELIMIT, SBATCH_ACCOUNT ...).
 
 set -euo pipefail
 
@@ -53,13 +53,13 @@ if [ -n "$frames" ]; then
 else
     numbers=('')
 fi
-# A shard alone is the picture.
+# A single shard is the picture.
 [ "$shards" -gt 1 ] || render+=("${merge[@]}")
 scene=$(realpath "$scene")
 out=$(realpath -m "$out")
 mkdir -p "$(dirname "$out")"
 
-# submit OPTIONS... : a job of the script on stdin; prints its number
+# submit OPTIONS... : submits the script on stdin as a job; prints its number
 submit() {
     if [ -n "$dry" ]; then
         { printf '# sbatch %s\n' "$*" && cat; } >&2
@@ -69,7 +69,7 @@ submit() {
     fi
 }
 
-# words ARGUMENTS... : as a shell reads them
+# words ARGUMENTS... : the arguments, quoted for a shell
 words() { printf ' %q' "$@"; }
 
 if [ "$CAUSTIQUE" != caustique ]; then
@@ -81,7 +81,7 @@ for number in "${numbers[@]}"; do
     [ -z "$number" ] || of=(--frame "$number")
     folder=$(shards_of "$(numbered "$out" "${number:-0}")")
     [ -n "$dry" ] || mkdir -p "$folder"
-    # A job that fails queues itself again: --requeue alone does so only for nodes that fail and jobs that give way.
+    # A failed job requeues itself: --requeue does so only for failed nodes and preempted jobs.
     array=$(
         submit --requeue --array="0-$((shards - 1))" --job-name="shard${number:+-$number}" --output="$folder/%a.log" <<END
 #!/bin/bash
@@ -98,8 +98,8 @@ fi
 exit \$status
 END
     )
-    # Not afterok: that of an array minds a try that was killed even where the next one ends well (Slurm 22.05). A merge
-    # whose shards are not all there fails, and its log names them.
+    # Not afterok, which for arrays fails after a killed attempt even if the next one succeeds (Slurm 22.05). A merge
+    # with missing shards fails, and its log names them.
     merged=$(
         submit --requeue --dependency="afterany:$array" --job-name="merge${number:+-$number}" \
             --output="$folder/merge.log" <<END
@@ -112,7 +112,7 @@ END
     merges+=("$merged")
 done
 if [ -n "$wait" ] && [ -z "$dry" ]; then
-    # A job that waits for all merges is the one that is waited for.
+    # Wait for an additional job that depends on all merges.
     ids=$(IFS=: && echo "${merges[*]}")
     sbatch --parsable --wait --dependency="afterok:$ids" --kill-on-invalid-dep=yes --output=/dev/null --job-name=wait \
         --wrap=true >/dev/null || fail 'not all pictures are made' "the logs in $(shards_of "$out") say why"

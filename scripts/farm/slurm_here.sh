@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# A Slurm cluster of two nodes on this machine, to try slurm.sh: Debian's slurm-wlm and munge, two slurmd under two names.
+# Runs a Slurm cluster of two nodes on this machine, to try slurm.sh: Debian's slurm-wlm and munge, and two slurmd.
 #
-#   scripts/farm/slurm_here.sh start    installs what is missing and starts it
+#   scripts/farm/slurm_here.sh start    installs missing packages and starts it
 #   scripts/farm/slurm_here.sh stop     stops it
 #
-# It lives in out/slurm, as root, beside any cluster that this machine belongs to: a command sees it by
-# SLURM_CONF=out/slurm/slurm.conf. Without control groups, which containers often lack, Slurm finds the processes of a
-# job by their parents, and no job is kept to its cores or its memory.
+# It runs as root in out/slurm, independently of any other cluster of this machine: set SLURM_CONF=out/slurm/slurm.conf
+# to use it. It uses no control groups, which containers often lack, so Slurm tracks the processes of a job by their
+# parents and does not limit cores or memory.
 
 set -euo pipefail
 
@@ -49,7 +49,7 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 END
 }
 
-# running NAME: the process of a file NAME.pid, if it is there and that program
+# running NAME: the process in the file NAME.pid, if it exists and is that program
 running() {
     local pid
     pid=$(cat "$place/$1.pid" 2>/dev/null) && grep -qs -e slurm -e munge "/proc/$pid/comm" && echo "$pid"
@@ -59,7 +59,7 @@ start() {
     [ "$(id -u)" -eq 0 ] || fail 'a cluster starts jobs as other users' 'run it as root'
     command -v slurmctld slurmd munged >/dev/null || apt_install slurm-wlm munge
     configure
-    # A key of its own: the system's munge, if any, is another cluster's.
+    # A separate key, because munge of the system may belong to another cluster.
     [ -s "$place/munge/key" ] || (umask 077 && head -c 128 /dev/urandom >"$place/munge/key")
     running munged >/dev/null || munged --force --key-file="$place/munge/key" --socket="$place/munge/socket" \
         --pid-file="$place/munged.pid" --log-file="$place/munge/log" --seed-file="$place/munge/seed"

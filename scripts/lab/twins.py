@@ -19,7 +19,7 @@ def without(document):
     before = json.dumps(document, sort_keys=True)
     for material in document.get("materials", []):
         extensions = material.get("extensions", {})
-        for name in set(extensions) - plain_scene.PLAIN:
+        for name in set(extensions) - plain_scene.SUPPORTED:
             del extensions[name]
         for key in ("attenuationDistance", "attenuationColor"):
             extensions.get("KHR_materials_volume", {}).pop(key, None)

@@ -69,7 +69,7 @@ class Tasks(support.Scratch):
         for child in children:
             self.wait(lambda child=child: not self.alive(child))
         said = script("shard.sh", *words).stderr
-        self.assertIn("shard 0/2 goes on from", said)
+        self.assertIn("shard 0/2 continues from", said)
         script("shard.sh", *words[:2], "1/2", *words[3:])
         script("merge.sh", out)
         self.assertEqual(channels(out), self.whole("--iterations", iterations))

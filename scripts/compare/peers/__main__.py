@@ -1,17 +1,18 @@
-"""Renders a glTF scene with caustique and with Mitsuba 3, both from the same file, and says how far they differ.
+"""Renders one glTF file with caustique and with Mitsuba 3, and prints how far the pictures differ.
 
     scripts/compare/mitsuba.py SCENE.glb [--seeds 8] [--spp 256] [--method path] [--png DIFFERENCE.png] [--json]
     scripts/compare/mitsuba.py export SCENE.glb -o SCENE.xml [--strict]
     scripts/compare/mitsuba.py import SCENE.xml -o SCENE.glb
 
-The other two commands write a scene as Mitsuba's (to_xml.py), and read one of Mitsuba's (from_xml.py).
+`export` writes a Mitsuba scene (to_xml.py), `import` reads one (from_xml.py).
 
-Prints the ratio of the means (caustique over Mitsuba) with its standard error, relMSE, and statistics over tiles of 16x16 pixels.
-Standard errors come from the spread over independent seeds on both sides. Everything that Mitsuba cannot say is an error.
-`--correct` puts into Mitsuba what its rough surfaces lack of caustique's (see mitsuba_lobes.py). CAUSTIQUE_BIN is the program to compare.
+Prints the ratio of the means (caustique over Mitsuba) with its standard error, relMSE, and statistics over tiles of
+16x16 pixels. Standard errors come from the spread over independent seeds of both renderers. Features that Mitsuba lacks
+are errors. `--correct` adds the parts of caustique's rough lobes that Mitsuba lacks (mitsuba_lobes.py). CAUSTIQUE_BIN
+is the program to compare.
 
-The picture: caustique, Mitsuba; the relative difference by pixel and by tile, red where caustique is brighter, blue where it is
-darker, full colour at 10 %. Runs in .venv-compare (../mitsuba.py).
+The PNG shows caustique and Mitsuba above, and the relative difference by pixel and by tile below: red where caustique
+is brighter, blue where it is darker, full colour at 10 %. Runs in .venv-compare (../mitsuba.py).
 """
 
 import argparse
@@ -32,13 +33,13 @@ from pictures import read
 
 ROOT = Path(__file__).resolve().parents[3]
 
-#: Samples that Mitsuba takes at once: what a wave of them needs of memory stays below a gibibyte.
-WAVE = 1 << 22
+#: Largest number of samples in one wavefront of Mitsuba, which then needs less than 1 GiB.
+MAX_WAVE_SAMPLES = 1 << 22
 
 
 def render_mitsuba(world, size, spp, seeds):
-    """Renders by seed, (seeds, height, width, 3)."""
-    each = max(1, min(spp, WAVE // (size[0] * size[1])))
+    """Render with Mitsuba, once per seed: (seeds, height, width, 3)."""
+    each = max(1, min(spp, MAX_WAVE_SAMPLES // (size[0] * size[1])))
     pictures = []
     for seed in seeds:
         total, done = 0.0, 0
@@ -51,7 +52,7 @@ def render_mitsuba(world, size, spp, seeds):
 
 
 def render_caustique(arguments, seeds):
-    """Renders by seed, (seeds, height, width, 3)."""
+    """Render with caustique, once per seed: (seeds, height, width, 3)."""
     program = os.environ.get("CAUSTIQUE_BIN", str(ROOT / "target" / "release" / "caustique"))
     pictures = []
     with tempfile.TemporaryDirectory() as folder:
@@ -94,7 +95,7 @@ def render_caustique(arguments, seeds):
 
 
 class Warnings:
-    """Says on stderr what is approximated or left out, each once."""
+    """Prints a warning on stderr for each approximated or omitted feature, once."""
 
     def __init__(self, scene):
         self.scene, self.said = scene, set()
@@ -106,13 +107,13 @@ class Warnings:
 
 
 def exchange(command, words):
-    """Writes or reads a scene of Mitsuba's."""
+    """Run the commands `export` and `import`."""
     parser = argparse.ArgumentParser(prog=f"mitsuba.py {command}")
     parser.add_argument("scene", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True)
     if command == "export":
         parser.add_argument(
-            "--strict", action="store_true", help="make an error of whatever is approximated or left out"
+            "--strict", action="store_true", help="fail if a feature is approximated or left out"
         )
     arguments = parser.parse_args(words)
     mi.set_variant("scalar_rgb")
@@ -121,8 +122,8 @@ def exchange(command, words):
 
     try:
         if command == "export":
-            told = gltf.refuse if arguments.strict else Warnings(arguments.scene)
-            to_xml.write(arguments.scene, arguments.output, told)
+            lose = gltf.refuse if arguments.strict else Warnings(arguments.scene)
+            to_xml.write(arguments.scene, arguments.output, lose)
         else:
             from_xml.convert(arguments.scene, arguments.output)
     except (gltf.Unsupported, OSError) as error:
@@ -130,7 +131,7 @@ def exchange(command, words):
 
 
 def main():
-    """The command."""
+    """Run the command line."""
     if sys.argv[1:2] in (["export"], ["import"]):
         exchange(sys.argv[1], sys.argv[2:])
         return
@@ -139,26 +140,26 @@ def main():
     )
     parser.add_argument("scene")
     parser.add_argument("--width", type=int, default=256)
-    parser.add_argument("--height", type=int, help="default: the camera's aspect")
+    parser.add_argument("--height", type=int, help="default: from the camera's aspect ratio")
     parser.add_argument("--seeds", type=int, default=8, help="independent renders on each side")
     parser.add_argument("--spp", type=int, default=128, help="Mitsuba's samples per pixel and seed")
     parser.add_argument("--iterations", type=int, help="caustique's, per seed; default: --spp")
     parser.add_argument("--method", default="path", help="caustique's method")
     parser.add_argument("--glass", default="auto", choices=("auto", "solid", "thin"))
-    parser.add_argument("--option", action="append", default=[], help="one more argument for caustique")
+    parser.add_argument("--option", action="append", default=[], help="an additional argument for caustique")
     parser.add_argument(
         "--correct", action="store_true", help="give Mitsuba correlated masking and multiple scattering"
     )
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--png", type=Path, help="difference picture")
-    parser.add_argument("--save", type=Path, help="all pictures, as .npz")
-    parser.add_argument("--json", action="store_true", help="one object on stdout instead of the table")
-    parser.add_argument("--check", action="store_true", help="exit with 1 where the two do not agree")
+    parser.add_argument("--save", type=Path, help="save all pictures as .npz")
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
+    parser.add_argument("--check", action="store_true", help="exit with code 1 if the renderers disagree")
     arguments = parser.parse_args()
     arguments.iterations = arguments.iterations or arguments.spp
 
     name = variant.choose(arguments.threads)
-    # Its classes are made of the variant's.
+    # Import after the variant is set, because its classes derive from the variant's.
     import mitsuba_world
 
     try:

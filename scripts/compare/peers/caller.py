@@ -1,4 +1,4 @@
-"""Runs drivers of other renderers and reads their answers, for the scripts that compare; the program has its own
+"""Runs drivers of other renderers and reads their answers, for Python scripts. The program has its own version
 (src/peers)."""
 
 import json
@@ -7,10 +7,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
 DRIVERS = Path(__file__).resolve().parent
-#: OpenEXR for Blender's module lies apart.
+#: OpenEXR for Blender's Python module, in a separate folder.
 PACKAGES = ROOT / ".venv-peers" / "bpy"
-#: The line of a driver's answer begins so (driver.py).
-MARK = "PEER "
+#: Prefix of the line with a driver's answer (driver.py).
+ANSWER_PREFIX = "PEER "
 
 
 class CannotTranslate(Exception):
@@ -18,7 +18,7 @@ class CannotTranslate(Exception):
 
 
 def command(driver, scene, target, **options):
-    """The words that call a driver. `options`: its options, with _ for -."""
+    """The command line of a driver. `options`: its options, with _ for -."""
     venv = ".venv-bpy" if driver.startswith("cycles") else ".venv-peers"
     words = [ROOT / venv / "bin" / "python", DRIVERS / driver, scene, target]
     words += [word for key, value in options.items() for word in (f"--{key.replace('_', '-')}", value)]
@@ -26,16 +26,16 @@ def command(driver, scene, target, **options):
 
 
 def environment(driver):
-    """The variables of a driver's process."""
+    """The environment variables of a driver's process."""
     return {**os.environ, **({"PYTHONPATH": str(PACKAGES)} if driver.startswith("cycles") else {})}
 
 
 def answer(output):
-    """What a driver has answered, as a dict; None where it has not. A scene that it cannot translate is `CannotTranslate`."""
-    lines = [line for line in output.splitlines() if line.startswith(MARK)]
+    """The answer of a driver as a dict, or None if it printed none. Raises `CannotTranslate` for unsupported scenes."""
+    lines = [line for line in output.splitlines() if line.startswith(ANSWER_PREFIX)]
     if not lines:
         return None
-    facts = json.loads(lines[-1][len(MARK) :])
+    facts = json.loads(lines[-1][len(ANSWER_PREFIX) :])
     if "cannot" in facts:
         raise CannotTranslate("; ".join(facts["cannot"]))
     return facts

@@ -1,7 +1,6 @@
-"""Blender's Cycles as a peer (see driver.py), on the processor, its scene made by script: `path`, and `path_guiding`
-(Open PGL).
+"""Renders with Blender's Cycles on the CPU (see driver.py). Modes: `path`, and `path_guiding` (Open PGL).
 
-Runs in the Python of Blender's module (.venv-bpy), with OpenEXR from .venv-peers/bpy.
+Runs in .venv-bpy, which has Blender as a Python module, with OpenEXR from .venv-peers/bpy.
 """
 
 import os
@@ -17,14 +16,14 @@ import driver
 import pictures
 import plain_scene
 
-#: From +Y up to +Z up.
+#: Rotation from +Y up to +Z up.
 TURN = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-#: Cycles keeps images in half precision; this is near the largest number of that.
-HALF = 30000.0
-#: Width of the map that directions to the environment are drawn by.
-IMPORTANCE = 2048
-#: Samples that a render begins with where it is told by time when to stop.
-ENOUGH = 1 << 20
+#: Limit of environment texels, because Cycles stores images in half precision.
+MAX_TEXEL = 30000.0
+#: Width of the importance map of the environment in pixels.
+IMPORTANCE_WIDTH = 2048
+#: Sample limit of a render that stops by time.
+MAX_SAMPLES = 1 << 20
 
 
 class Nodes:
@@ -35,7 +34,7 @@ class Nodes:
         tree.nodes.clear()
 
     def add(self, kind, **inputs):
-        """A node, its inputs set by name (spaces for underscores)."""
+        """Add a node. `inputs`: values or sockets by name, with _ for spaces."""
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         for name, value in inputs.items():
             node.inputs[name.replace("_", " ")].default_value = value
@@ -46,7 +45,7 @@ class Nodes:
 
 
 def material(of, folder):
-    """A Blender material."""
+    """Make a Blender material."""
     made = bpy.data.materials.new(of.name)
     made.use_nodes = True
     nodes = Nodes(made.node_tree)
@@ -80,13 +79,13 @@ def material(of, folder):
         nodes.link(image.outputs["Color"], shader.inputs["Base Color" if of.kind in ("coated", "metal") else "Color"])
     surface = shader.outputs[0]
     if of.emission.any():
-        surface = shining(nodes, surface, of.emission)
+        surface = with_emission(nodes, surface, of.emission)
     nodes.link(surface, output.inputs["Surface"])
     return made
 
 
-def shining(nodes, surface, radiance):
-    """A surface that also shines, from its front."""
+def with_emission(nodes, surface, radiance):
+    """A surface shader plus emission from its front."""
     most = float(radiance.max())
     shine = nodes.add("Emission", Color=(*(radiance / most), 1.0), Strength=most)
     side, total = nodes.add("MixShader"), nodes.add("AddShader")
@@ -99,7 +98,7 @@ def shining(nodes, surface, radiance):
 
 
 def add(scene, data, to_world, name):
-    """An object in the scene."""
+    """Add an object to the scene."""
     made = bpy.data.objects.new(name, data)
     made.matrix_world = Matrix((TURN @ to_world).tolist())
     scene.collection.objects.link(made)
@@ -107,7 +106,7 @@ def add(scene, data, to_world, name):
 
 
 def mesh(of):
-    """A Blender mesh in Blender's axes."""
+    """Make a Blender mesh, in Blender's axes."""
     made = bpy.data.meshes.new(of.name)
     made.from_pydata((of.positions @ TURN[:3, :3].T).tolist(), [], of.triangles.tolist())
     if of.uvs is not None:
@@ -121,18 +120,18 @@ def mesh(of):
 
 
 def camera(scene, of):
-    """The scene's camera."""
+    """Set the scene's camera."""
     data = bpy.data.cameras.new("camera")
     data.sensor_fit, data.angle_y, data.clip_start, data.clip_end = "VERTICAL", of.yfov, 1e-3, 1e6
     if of.aperture_radius:
         data.dof.use_dof, data.dof.focus_distance = True, of.focus_distance
-        # Blender's focal length is in millimetres.
+        # Blender's focal length is in mm.
         data.dof.aperture_fstop = 1e-3 * data.lens / (2 * of.aperture_radius)
     scene.camera = add(scene, data, of.to_world, "camera")
 
 
 def world(scene, image, folder):
-    """The environment; black where there is none."""
+    """Set the environment; None is black."""
     made = scene.world = bpy.data.worlds.new("world")
     made.use_nodes = True
     nodes = Nodes(made.node_tree)
@@ -140,30 +139,30 @@ def world(scene, image, folder):
     nodes.link(background.outputs[0], nodes.add("OutputWorld").inputs["Surface"])
     if image is None:
         return
-    scale = max(float(image.max()) / HALF, 1.0)
+    scale = max(float(image.max()) / MAX_TEXEL, 1.0)
     file = os.path.join(folder, "environment.exr")
     pictures.write(file, image / scale)
     background.inputs["Strength"].default_value = scale
     texture = nodes.add("TexEnvironment")
     texture.image = bpy.data.images.load(file)
     texture.image.colorspace_settings.name = "Non-Color"
-    # Blender's u is 1/2 - atan2(y, x) / 2 pi, the scene's atan2(x, -z) / 2 pi: a quarter turn.
+    # Blender: u = 1/2 - atan2(y, x) / 2 pi. The scene: u = atan2(x, -z) / 2 pi. They differ by a quarter turn.
     turn = nodes.add("Mapping", Rotation=(0, 0, np.pi / 2))
     turn.vector_type = "POINT"
     nodes.link(nodes.add("TexCoord").outputs["Generated"], turn.inputs["Vector"])
     nodes.link(turn.outputs[0], texture.inputs["Vector"])
     nodes.link(texture.outputs[0], background.inputs["Color"])
-    made.cycles.sampling_method, made.cycles.sample_map_resolution = "MANUAL", IMPORTANCE
+    made.cycles.sampling_method, made.cycles.sample_map_resolution = "MANUAL", IMPORTANCE_WIDTH
 
 
 def lamp(scene, light):
-    """A lamp without a body."""
+    """Add a lamp without size."""
     most = float(light.intensity.max())
     if most == 0:
         return
     if light.kind == "point":
         data = bpy.data.lights.new("point", "POINT")
-        # From intensity to watts.
+        # Watts from intensity.
         data.energy, data.shadow_soft_size = 4 * np.pi * most, 0
     else:
         data = bpy.data.lights.new("sun", "SUN")
@@ -173,7 +172,7 @@ def lamp(scene, light):
 
 
 def build(of, folder):
-    """The Blender scene."""
+    """Build the Blender scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene, known = bpy.context.scene, {}
     for part, surface in of.meshes:
@@ -191,15 +190,15 @@ def build(of, folder):
 
 
 def approximations(scene):
-    """What Cycles says in another way."""
+    """Texts about features that Cycles approximates."""
     found = list(scene.approximations)
     if any(of.kind == "glass" and of.base.min() < 1 for _, of in scene.meshes):
         found.append("glass also tints what it reflects")
     return found
 
 
-def settle(scene, options):
-    """Settings of the render."""
+def set_render_settings(scene, options):
+    """Set the render settings."""
     render, cycles = scene.render, scene.cycles
     render.engine, cycles.device, render.threads_mode, render.threads = "CYCLES", "CPU", "FIXED", options.threads
     render.resolution_x, render.resolution_y, render.resolution_percentage = options.width, options.height, 100
@@ -209,13 +208,14 @@ def settle(scene, options):
     cycles.use_guiding, cycles.blur_glossy = options.mode == "path_guiding", 0
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
-    cycles.pixel_filter_type, cycles.samples = "BOX", ENOUGH
+    cycles.pixel_filter_type, cycles.samples = "BOX", MAX_SAMPLES
     render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
     render.use_persistent_data = render.film_transparent = False
 
 
 def render(scene, seconds, seed, folder):
-    """The picture after so many seconds, and its samples per pixel, which Cycles tells on its standard output alone."""
+    """Render for `seconds`. Returns the picture and its samples per pixel, which Cycles prints only on standard
+    output."""
     scene.cycles.time_limit, scene.cycles.seed = max(seconds, 0.05), seed
     scene.render.filepath = os.path.join(folder, "picture.exr")
     with tempfile.TemporaryFile() as log:
@@ -241,12 +241,12 @@ def main():
         return
     with tempfile.TemporaryDirectory(prefix="caustique-cycles-") as folder:
         scene = build(of, folder)
-        settle(scene, options)
+        set_render_settings(scene, options)
         watch, total = driver.Stopwatch(options), 0.0
 
         def one(number):
             nonlocal total
-            # Cycles knows the wall clock alone: on the other one it goes on with what is left.
+            # Cycles stops by the wall clock: with the CPU clock, repeat with the remaining budget.
             picture, samples = render(scene, watch.left(), options.seed + 7919 * number, folder)
             total = total + samples * picture
             return samples

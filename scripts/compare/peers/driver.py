@@ -1,19 +1,19 @@
-"""What the drivers of other renderers have in common: their command line, their clocks, and the line they answer with.
+"""Common parts of the drivers of other renderers: command line, clocks, and the answer.
 
     PYTHON NAME_driver.py SCENE.glb OUT.exr --mode MODE --width W --height H --budget SECONDS --threads T --seed S
                             [--camera NAME] [--clock wall|cpu] [--depth SEGMENTS]
 
-A driver renders for SECONDS, writes a linear picture, and says in its last line what it did:
+A driver renders for SECONDS, writes a linear picture, and prints its answer as the last line:
 
-    PEER {"seconds": of rendering, "core_seconds": likewise, "startup_seconds": before that,
-          "passes": samples per pixel, "version": of the renderer, "approximations": [of the scene, in words]}
+    PEER {"seconds": wall time of rendering, "core_seconds": CPU time of rendering, "startup_seconds": time before it,
+          "passes": samples per pixel, "version": of the renderer, "approximations": [texts about the scene]}
 
-or, where the renderer cannot say the scene, `PEER {"cannot": [why, in words]}` and writes nothing. Rendering is all
-that follows the scene's being read and converted: acceleration structures, kernels and photon maps are in it. With
-`--clock cpu` a budget is processor seconds over threads, for machines that others use too.
+If the renderer cannot represent the scene, the driver prints `PEER {"cannot": [reasons]}` and writes no picture.
+Rendering time begins after reading and converting the scene; it includes acceleration structures, kernels and photon
+maps. With `--clock cpu` the budget is CPU seconds divided by threads, for shared machines.
 
-Public settings alone: one sample a pixel from a box filter, paths of DEPTH segments, nothing clamped, no adaptive
-sampling, no denoiser, linear colours.
+Settings are public ones: box filter of one pixel, paths of at most DEPTH segments, no clamping, no adaptive sampling,
+no denoiser, linear colours.
 """
 
 import argparse
@@ -23,17 +23,17 @@ import site
 import time
 from pathlib import Path
 
-# The program names packages for a Python that lacks some.
+# The program passes a folder of packages that the chosen Python lacks.
 if "CAUSTIQUE_PEERS_PACKAGES" in os.environ:
     site.addsitedir(os.environ["CAUSTIQUE_PEERS_PACKAGES"])
 
-#: The longest path, in segments, where a renderer needs a limit; caustique has none.
+#: Longest path in segments, for renderers that need a limit; caustique has none.
 DEPTH = 32
 START = time.perf_counter()
 
 
 class Stopwatch:
-    """Times of rendering, and whether its budget is spent."""
+    """Measures the time of rendering against the budget."""
 
     def __init__(self, options):
         self.options, self.wall, self.cpu = options, time.perf_counter(), time.process_time()
@@ -46,7 +46,7 @@ class Stopwatch:
         return time.perf_counter() - self.wall
 
     def spent(self):
-        """Seconds on the clock that the budget is of."""
+        """Seconds since the start, on the budget's clock."""
         return self.seconds() if self.options.clock == "wall" else self.core_seconds() / self.options.threads
 
     def left(self):
@@ -54,7 +54,7 @@ class Stopwatch:
 
 
 def options(modes):
-    """The command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser()
     parser.add_argument("scene", type=Path)
     parser.add_argument("output", type=Path)
@@ -71,13 +71,15 @@ def options(modes):
 
 
 def print_answer(**facts):
-    """The line that the caller reads."""
+    """Print the answer for the caller."""
     print("PEER " + json.dumps(facts), flush=True)
 
 
 def run_passes(watch, render):
-    """Calls `render(number)`, which returns samples a pixel, until another call would leave the budget by more than half
-    of itself; returns all samples."""
+    """Call `render(number)`, which returns samples per pixel, until the time is nearest to the budget.
+
+    Returns the sum of samples. A call is expected to take as long as the last one.
+    """
     total = number = 0
     while True:
         before = watch.spent()
@@ -88,7 +90,7 @@ def run_passes(watch, render):
 
 
 def report(watch, samples, version, approximations):
-    """Says what was rendered; called before the picture is written."""
+    """Print the answer of a finished render. Call it before writing the picture, whose time does not count."""
     print_answer(
         seconds=round(watch.seconds(), 4),
         core_seconds=round(watch.core_seconds(), 4),

@@ -1,9 +1,10 @@
-"""A simple Mitsuba 3 scene as our glTF.
+"""Converts simple Mitsuba 3 scenes to glTF for caustique.
 
-Read are meshes and plain shapes; matte, plastic, principled, glass and metal; area, point, spot, directional and
-constant light, and environment maps.
+Supported are meshes and simple shapes; diffuse, plastic, principled, glass and metal; area, point, spot, directional
+and constant lights, and environment maps.
 
-Meshes are read by Mitsuba itself. Whatever is left out or approximated is named in the file, and caustique warns of it.
+Mitsuba itself reads the meshes. The file lists all features that are left out or approximated, and caustique warns of
+them.
 """
 
 import importlib
@@ -16,17 +17,17 @@ import mitsuba as mi
 import numpy as np
 from gltf import Unsupported
 
-# The package's files of plain Python, without its native part.
+# Import the package's pure Python modules without its native part.
 _pure = types.ModuleType("pure")
 _pure.__path__ = [str(Path(__file__).resolve().parents[3] / "ffi" / "python" / "caustique")]
 sys.modules["pure"] = _pure
 glb, meshes = (importlib.import_module(f"pure.{name}") for name in ("glb", "meshes"))
 
 #: Facets along a half circle.
-STEPS = 64
+HALF_CIRCLE_FACETS = 64
 SHAPES = ("obj", "ply", "cube", "rectangle")
 WRAPPERS = ("twosided", "bumpmap", "normalmap", "mask")
-#: Indices of refraction by Mitsuba's names.
+#: {Mitsuba's name of a dielectric: index of refraction}
 INDICES = {
     "vacuum": 1.0,
     "air": 1.000277,
@@ -45,12 +46,12 @@ INDICES = {
 }
 
 
-#: What Mitsuba, numpy and this file raise of an element whose values are others than its type has.
+#: Errors that Mitsuba, numpy and this file raise for elements with invalid values.
 FAULTS = (AttributeError, KeyError, OSError, RuntimeError, TypeError, ValueError)
 
 
 def convert(path, output):
-    """Reads the XML at `path` and writes a .glb, with the environment beside it."""
+    """Convert the XML at `path` to a .glb, with the environment's image beside it."""
     reader = Reader(path, output)
     reader.read(parse(path))
     data = reader.pack()
@@ -62,7 +63,7 @@ def convert(path, output):
 
 
 def parse(path):
-    """The root of an XML file."""
+    """Parse an XML file. Returns its root."""
     try:
         return ET.parse(path).getroot()
     except (ET.ParseError, UnicodeError, ValueError) as error:
@@ -70,12 +71,12 @@ def parse(path):
 
 
 def sky_file(output):
-    """The path of the environment's image beside a .glb."""
+    """Path of the environment's image, beside the .glb."""
     return output.with_suffix(".environment.exr")
 
 
 class Reader:
-    """What has been read."""
+    """Reads a Mitsuba scene and collects the parts of the glTF file."""
 
     def __init__(self, path, output):
         self.folder, self.output = path.parent, output
@@ -83,12 +84,12 @@ class Reader:
         self.named, self.defaults, self.said, self.sky = {}, {}, {}, None
 
     def lose(self, text):
-        """Names what is left out or approximated, once."""
+        """Record a feature that is left out or approximated, once."""
         if text not in self.losses:
             self.losses.append(text)
 
     def read(self, root):
-        """All elements of the scene."""
+        """Read all elements of the scene."""
         elements = list(self.included(root, ()))
         for element in elements:
             if element.get("id"):
@@ -105,7 +106,7 @@ class Reader:
                 self.lose(f"a {element.tag} ({element.get('type')}) is left out")
 
     def included(self, root, within):
-        """The elements of a file and of those that it includes, with `default` values in place of their names."""
+        """The elements of a file and of its included files, with `default` values substituted."""
         elements = [root] if root.tag != "scene" else [element for element in root if element.tag != "default"]
         for default in root.findall("default"):
             self.defaults.setdefault(default.get("name"), self.filled(default.get("value", "")))
@@ -126,13 +127,13 @@ class Reader:
             yield from self.included(parse(path), (*within, path))
 
     def filled(self, value):
-        """A value with those of `default` elements in place of their names."""
+        """A value with `default` values substituted."""
         for name in sorted(self.defaults, key=len, reverse=True):
             value = value.replace(f"${name}", self.defaults[name])
         return value
 
     def pack(self):
-        """The bytes of the file."""
+        """The bytes of the .glb."""
         lit = self.lights or "environment" in self.said or any(any(mesh.material.emission) for mesh in self.meshes)
         for what, there, kinds in (
             ("light", lit, "area, point, spot, directional, constant and envmap"),
@@ -147,7 +148,7 @@ class Reader:
     # --- values -------------------------------------------------------------------------------------------------------
 
     def child(self, element, *names, tag=None):
-        """The child of a name, or the first of a tag, references followed."""
+        """The child with one of the names, or the first with a tag; references are resolved."""
         for child in element:
             target = self.named.get(child.get("id")) if child.tag == "ref" else child
             if target is None:
@@ -157,7 +158,7 @@ class Reader:
         return None
 
     def number(self, element, name, usual):
-        """A number."""
+        """The value of a child as a number, or `usual` if absent."""
         found = self.child(element, name)
         if found is None:
             return usual
@@ -167,7 +168,7 @@ class Reader:
             raise Unsupported(f"{element.get('type')}: {name} is no number") from None
 
     def index(self, element, name, usual):
-        """An index of refraction, by number or name."""
+        """An index of refraction, from a number or a name; `usual` if absent."""
         found = self.child(element, name)
         text = usual if found is None else found.get("value", "")
         try:
@@ -177,7 +178,7 @@ class Reader:
             raise Unsupported(f'{element.get("type")}: {name}="{text}" is neither a number nor of {known}') from None
 
     def colour(self, element, name, usual, place):
-        """A colour; of a texture 1, with the texture: (colour, texture or None)."""
+        """(colour, texture): the colour is 1 if there is a texture, the texture is None without."""
         found = self.child(element, name)
         if found is None:
             return np.broadcast_to(np.array(usual, float), 3), None
@@ -193,7 +194,7 @@ class Reader:
             raise Unsupported(f"{place}: {name} is a spectrum, which this does not read: {text[:40]}") from None
 
     def file(self, element):
-        """The path of the file that an element names."""
+        """The path of an element's file."""
         found = self.child(element, "filename")
         name = "" if found is None else found.get("value", "")
         if not (self.folder / name).is_file():
@@ -201,7 +202,7 @@ class Reader:
         return self.folder / name
 
     def texture(self, element, place):
-        """A bitmap's bytes, (H, W, 3) in sRGB."""
+        """A bitmap's bytes (height, width, 3), in sRGB."""
         if element.get("type") != "bitmap":
             self.lose(f"{place}: a texture of type {element.get('type')} is taken as its mean, a half")
             return None
@@ -216,14 +217,14 @@ class Reader:
         return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, True))
 
     def transform(self, element, name="to_world"):
-        """A transform (4, 4); of several steps the last is outermost."""
+        """A transform (4, 4), composed of its steps, the last one outermost."""
         found, matrix = self.child(element, name), np.eye(4)
         for step in found if found is not None else ():
             matrix = self.step(step) @ matrix
         return matrix
 
     def step(self, step):
-        """One step of a transform."""
+        """The matrix of one step of a transform."""
         three = [float(step.get(axis, 1.0 if step.tag == "scale" else 0.0)) for axis in "xyz"]
         numbers = [float(x) for x in step.get("value", "").replace(",", " ").split()]
         if step.tag == "matrix":
@@ -248,7 +249,7 @@ class Reader:
     # --- shapes -------------------------------------------------------------------------------------------------------
 
     def shape(self, element):
-        """A shape with its material."""
+        """Add a shape with its material."""
         kind = element.get("type")
         place = f"shape {element.get('id') or element.get('name') or len(self.meshes)} ({kind})"
         matrix = self.transform(element)
@@ -258,7 +259,7 @@ class Reader:
             given = self.child(element, "center")
             center = 0.0 if given is None else [float(given.get(axis, 0.0)) for axis in "xyz"]
             made = ball(self.number(element, "radius", 1.0), center)
-            self.lose(f"{place}: a ball of {2 * STEPS * STEPS} facets stands in for the sphere")
+            self.lose(f"{place}: a ball of {2 * HALF_CIRCLE_FACETS * HALF_CIRCLE_FACETS} facets stands in for the sphere")
         elif kind == "disk":
             made = disk()
         else:
@@ -267,7 +268,7 @@ class Reader:
         flip = self.child(element, "flip_normals")
         inward = flip is not None and flip.get("value") == "true"
         if np.linalg.det(matrix[:3, :3]) < 0.0:
-            # glTF keeps the front of a mirrored mesh, Mitsuba turns it with the winding.
+            # glTF keeps the front of a mirrored mesh, Mitsuba flips it.
             inward = not inward
         if inward:
             made["triangles"] = made["triangles"][:, ::-1]
@@ -279,14 +280,14 @@ class Reader:
         if emitter is not None:
             radiance, texture = self.colour(emitter, "radiance", 1.0, place)
             material.emission = tuple(radiance)
-            # Light leaves the front of the facets.
+            # Facets emit from their geometric front.
             made["normals"] = None
             if texture is not None:
                 self.lose(f"{place}: the texture of its radiance is left out")
         self.meshes.append(meshes.Mesh(name=place, material=material, transform=matrix, **made))
 
     def mesh(self, element, kind):
-        """A shape that is a mesh to Mitsuba, in its own space."""
+        """A mesh shape, loaded by Mitsuba, in object space."""
         described = {"type": kind}
         if kind in ("obj", "ply"):
             described["filename"] = str(self.file(element))
@@ -304,7 +305,7 @@ class Reader:
     # --- materials ----------------------------------------------------------------------------------------------------
 
     def material(self, bsdf, place):
-        """A shape's material; Mitsuba's own default without one."""
+        """A shape's material, or Mitsuba's default if it has none."""
         if bsdf is None:
             return meshes.Material(name=place, base_color=(0.5,) * 3, specular=0.0)
         kind = bsdf.get("type")
@@ -326,7 +327,7 @@ class Reader:
         return material
 
     def base(self, bsdf, name, usual, material, place):
-        """Base colour and its texture."""
+        """Set base colour and its texture."""
         colour, material.base_color_texture = self.colour(bsdf, name, usual, place)
         material.base_color = tuple(float(x) for x in colour)
 
@@ -380,7 +381,7 @@ class Reader:
     # --- lights and cameras -------------------------------------------------------------------------------------------
 
     def emitter(self, element):
-        """A light without a shape."""
+        """Add a light that is not part of a shape."""
         kind, matrix = element.get("type"), self.transform(element)
         name = element.get("id") or element.get("name") or kind
         point = self.child(element, "position")
@@ -416,7 +417,8 @@ class Reader:
             self.lose(f"{name}: an emitter of type {kind} is left out")
 
     def environment(self, element, matrix):
-        """The image on our grid: Mitsuba's u is atan2(x, -z) / 2 pi, and its rows begin and end at the poles."""
+        """Resample an environment map to caustique's grid. Mitsuba: u = atan2(x, -z) / 2 pi, first and last row at the
+        poles."""
         source = mi.Bitmap(str(self.file(element)))
         texels = np.array(source.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
         height, width = texels.shape[:2]
@@ -436,7 +438,7 @@ class Reader:
         self.said["environment"] = {"file": sky_file(self.output).name, "strength": self.number(element, "scale", 1.0)}
 
     def sensor(self, element):
-        """A camera, and the size of its film."""
+        """Add a camera, with the size of its film."""
         kind, matrix = element.get("type"), self.transform(element)
         if kind not in ("perspective", "thinlens"):
             self.lose(f"a sensor of type {kind} is left out")
@@ -472,7 +474,7 @@ class Reader:
 
 
 def at_normal_incidence(described):
-    """What a conductor of Mitsuba's reflects straight back, RGB."""
+    """RGB reflectance of a Mitsuba conductor at normal incidence."""
     bsdf = mi.load_dict(described)
     surface = mi.SurfaceInteraction3f()
     surface.wi = [0.0, 0.0, 1.0]
@@ -481,9 +483,9 @@ def at_normal_incidence(described):
 
 
 def ball(radius, center):
-    """A sphere of facets."""
-    theta = np.linspace(0.0, np.pi, STEPS + 1)[1:-1, None]
-    phi = np.linspace(0.0, 2.0 * np.pi, 2 * STEPS, endpoint=False)[None, :]
+    """A sphere as a mesh."""
+    theta = np.linspace(0.0, np.pi, HALF_CIRCLE_FACETS + 1)[1:-1, None]
+    phi = np.linspace(0.0, 2.0 * np.pi, 2 * HALF_CIRCLE_FACETS, endpoint=False)[None, :]
     rings = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta) + 0.0 * phi, -np.sin(theta) * np.sin(phi)], -1)
     normals = np.concatenate([[[0.0, 1.0, 0.0]], rings.reshape(-1, 3), [[0.0, -1.0, 0.0]]])
     index = 1 + np.arange(rings.shape[0] * rings.shape[1]).reshape(rings.shape[:2])
@@ -499,9 +501,9 @@ def ball(radius, center):
 
 
 def disk():
-    """The unit disk, facing +Z."""
-    phi = np.linspace(0.0, 2.0 * np.pi, 2 * STEPS, endpoint=False)
+    """The unit disk as a mesh that faces +Z."""
+    phi = np.linspace(0.0, 2.0 * np.pi, 2 * HALF_CIRCLE_FACETS, endpoint=False)
     rim = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], -1)
-    first = np.arange(1, 2 * STEPS + 1)
+    first = np.arange(1, 2 * HALF_CIRCLE_FACETS + 1)
     triangles = np.stack([0 * first, first, np.roll(first, -1)], -1)
     return {"vertices": np.concatenate([[[0.0, 0.0, 0.0]], rim]), "triangles": triangles, "normals": None, "uvs": None}

@@ -1,6 +1,6 @@
-"""Reads glTF 2.0 for the comparison, on its own: nothing here is shared with the renderer that is compared.
+"""Reads glTF 2.0 for the comparison, independently of caustique's reader.
 
-Meshes come out in world space, transforms composed in double precision. What the reader does not know is an error.
+Meshes are in world space, with transforms composed in double precision. Unsupported features are errors.
 """
 
 import base64
@@ -23,22 +23,22 @@ EXTENSIONS = {
     "KHR_materials_volume",
     "KHR_texture_transform",
 }
-#: Lumens to the watt in what Blender's exporter writes.
+#: Lumens per watt in files of Blender's exporter.
 EFFICACY = 683.0
 
 
 class Unsupported(Exception):
-    """The scene holds something that the comparison cannot say in both renderers' terms."""
+    """The scene has a feature that one of the compared renderers cannot represent."""
 
 
 def refuse(what):
-    """What becomes of an approximation where pictures have to be the same."""
+    """Raise `Unsupported` for an approximation, if pictures have to agree."""
     raise Unsupported(what)
 
 
 @dataclass
 class Mesh:
-    """Triangles in world space that wear one material."""
+    """Triangles in world space with one material."""
 
     name: str
     material: int | None
@@ -50,7 +50,7 @@ class Mesh:
 
 @dataclass
 class Light:
-    """A punctual light in radiometric units: W/sr, or W/m2 for the sun."""
+    """A punctual light in radiometric units: W/sr, or W/m2 for a sun."""
 
     kind: str
     to_world: np.ndarray
@@ -75,7 +75,7 @@ class Camera:
 
 @dataclass
 class Scene:
-    """What stands in the file's scene."""
+    """The contents of the file's scene."""
 
     document: dict
     folder: Path
@@ -85,11 +85,11 @@ class Scene:
     cameras: list = field(default_factory=list)
     environment: dict | None = None
     medium: dict | None = None
-    #: Called with what is approximated or left out.
+    #: Called with a text for each feature that is approximated or left out.
     lose: Callable[[str], None] = refuse
 
     def image(self, texture):
-        """The encoded bytes of a texture's image, and its sampler."""
+        """The encoded image of a texture (bytes), and its sampler."""
         texture = self.document["textures"][texture]
         image = self.document["images"][texture["source"]]
         sampler = self.document["samplers"][texture["sampler"]] if "sampler" in texture else {}
@@ -109,7 +109,7 @@ def extension(part, name):
 
 
 def read(path, lose=refuse):
-    """The scene at `path` (.glb or .gltf). `lose` is called with what is approximated or left out."""
+    """Read the scene at `path` (.glb or .gltf). `lose` receives a text for each approximated or omitted feature."""
     path = Path(path)
     data = path.read_bytes()
     if data[:4] == b"glTF":
@@ -139,7 +139,7 @@ def read(path, lose=refuse):
 
 
 def chunks(data):
-    """The document and the binary buffer of a .glb file."""
+    """Split a .glb file into its document and its binary buffer."""
     document, binary, at = None, b"", 12
     while at < len(data):
         length, kind = struct.unpack_from("<I4s", data, at)
@@ -153,7 +153,7 @@ def chunks(data):
 
 
 def pack(path, document, binary):
-    """Writes a .glb file of a document and its binary buffer."""
+    """Write a .glb file from a document and its binary buffer."""
     document["buffers"][0]["byteLength"] = len(binary)
     text = json.dumps(document).encode()
     text, binary = text + b" " * (-len(text) % 4), bytes(binary) + bytes(-len(binary) % 4)
@@ -176,7 +176,7 @@ def _view(scene, index):
 
 
 def accessor(scene, index):
-    """An accessor as an array of floats (normalised where it says so) or integers, one row an element."""
+    """An accessor as an array of floats (normalised if flagged) or integers, one row per element."""
     raw = scene.document["accessors"][index]
     if "sparse" in raw or "bufferView" not in raw:
         raise Unsupported("sparse accessors")
@@ -191,7 +191,7 @@ def accessor(scene, index):
 
 
 def matrix(node):
-    """A node's own transform."""
+    """A node's local transform."""
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
     x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
@@ -286,7 +286,7 @@ def _light(scene, node, index, to_world, divisor):
 
 
 def is_closed(mesh):
-    """Whether every edge, vertices welded by position, is shared by two triangles that run along it in opposite ways."""
+    """Whether two triangles of opposite winding share each edge, with vertices merged by position."""
     _, ids = np.unique(mesh.positions.astype(np.float32) + np.float32(0), axis=0, return_inverse=True)
     corners = ids.ravel()[mesh.triangles]
     corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)].astype(np.int64)

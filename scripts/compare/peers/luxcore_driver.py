@@ -1,14 +1,15 @@
-"""LuxCore as a peer (see driver.py): `path`, `path_cache` (path tracing with the caustic cache of PhotonGI), `bidir`,
-and `bidirvm` (bidirectional with vertex merging).
+"""Renders with LuxCore (see driver.py). Modes: `path`, `path_cache` (path tracing with PhotonGI's caustic cache),
+`bidir`, and `bidirvm` (bidirectional with vertex merging).
 
-LuxCore's ways that this file minds, each measured against a closed form or against Mitsuba:
+The driver works around these properties of LuxCore, each measured against a closed form or against Mitsuba:
 
-- A film's rows are counted from below, which leaves the picture a row too low: the screen window is moved by a pixel.
-- `power = efficency = 0` makes an emission plain radiance; a point lamp's colour is divided by 4 pi even so.
-- Bidirectional paths are 2 to 7 % too bright with an early roulette of eye paths: it begins at depth 10.
-- An environment's texels are drawn as constants but looked up between four: a map four times as fine spares fireflies.
-- BIDIRVMCPU is slow with the sampler SOBOL, and with RANDOM begins with every sixteenth pixel unless told otherwise.
-- The caustic cache has 400,000 photons, and radii that begin at 0.5 % of the casters' size and shrink every 24 samples.
+- Film rows count from the bottom, so the picture is one row too low: the screen window is shifted by a pixel.
+- `power = efficency = 0` makes an emission a radiance, but a point lamp's colour is still divided by 4 pi.
+- Bidirectional paths are 2 to 7 % too bright if roulette begins early on camera paths: it begins at depth 10.
+- Environment texels are sampled as constants but interpolated: a map of four times the resolution avoids fireflies.
+- BIDIRVMCPU is slow with the sampler SOBOL. With RANDOM it renders every sixteenth pixel first, unless
+  the bucket size is 1.
+- The caustic cache has 400,000 photons; radii start at 0.5 % of the casters' size and shrink every 24 samples.
 """
 
 import os
@@ -17,7 +18,7 @@ import time
 
 import numpy as np
 
-# LuxCore brings an allocator of its own: what loads after it has two.
+# LuxCore has its own allocator: import all other native modules first.
 import driver
 import pictures
 import plain_scene
@@ -25,15 +26,16 @@ import plain_scene
 import pyluxcore as lux
 
 ENGINES = {"path": "PATHCPU", "path_cache": "PATHCPU", "bidir": "BIDIRCPU", "bidirvm": "BIDIRVMCPU"}
-#: From +Y up to +Z up.
+#: Rotation from +Y up to +Z up.
 TURN = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-#: LuxCore's u is atan2(y, x) / 2 pi, the scene's atan2(x, -z) / 2 pi: x and y change places.
+#: LuxCore: u = atan2(y, x) / 2 pi. The scene: u = atan2(x, -z) / 2 pi. This matrix exchanges x and y.
 ENVIRONMENT = "0 1 0 0 1 0 0 0 0 0 1 0 0 0 0 1"
-FINER = 4
+#: Factor of the environment's resolution.
+UPSAMPLING = 4
 
 
 def text(values):
-    """Numbers as LuxCore's properties hold them."""
+    """Numbers as text for LuxCore's properties."""
     return " ".join(f"{float(value):.9g}" for value in np.ravel(values))
 
 
@@ -42,10 +44,10 @@ def turned(points):
 
 
 def camera(of, width, height):
-    """Properties of the camera."""
+    """LuxCore's properties of the camera."""
     matrix = TURN @ of.to_world
     eye, ahead = matrix[:3, 3], -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-    # LuxCore's field of view is of the shorter side.
+    # LuxCore's field of view is that of the shorter side.
     half = np.tan(of.yfov / 2) * (min(width / height, 1))
     x, y = max(width / height, 1), max(height / width, 1)
     row = 2 * y / height
@@ -65,7 +67,7 @@ def camera(of, width, height):
 
 
 def material(of, name, folder):
-    """Properties of a material, its texture and its volume."""
+    """LuxCore's properties of a material, its texture and its volume."""
     found = {}
     own, base, alpha = f"scene.materials.{name}.", text(of.base), text(of.roughness**2)
     if of.texture:
@@ -85,7 +87,7 @@ def material(of, name, folder):
     if of.kind == "matte":
         found.update({own + "type": "matte", own + "kd": base})
     elif of.kind == "coated":
-        # The lobe called disney is a fifth darker.
+        # Not the material "disney", which is a fifth darker.
         shine = of.specular * ((of.ior - 1) / (of.ior + 1)) ** 2
         found.update(
             {
@@ -150,19 +152,19 @@ def material(of, name, folder):
 
 
 def approximations(scene):
-    """What LuxCore says in another way."""
+    """Texts about features that LuxCore approximates."""
     kinds = {of.kind: of for _, of in scene.meshes}
     found = list(scene.approximations)
     if "metal" in kinds:
-        found.append("metals reflect by another Fresnel term than Schlick's")
+        found.append("the Fresnel term of metals is not Schlick's")
     return found
 
 
 def build(scene, width, height, folder):
-    """The scene."""
+    """Build the LuxCore scene."""
     found = {f"scene.camera.{key}": value for key, value in camera(scene.camera, width, height).items()}
     if scene.environment is not None:
-        rows, columns = (np.arange(n * FINER) + 0.5 for n in scene.environment.shape[:2])
+        rows, columns = (np.arange(n * UPSAMPLING) + 0.5 for n in scene.environment.shape[:2])
         file = os.path.join(folder, "environment.exr")
         pictures.write(file, pictures.sample(scene.environment, columns / len(columns), rows / len(rows)))
         own = "scene.lights.environment."
@@ -220,7 +222,7 @@ def build(scene, width, height, folder):
 
 
 def properties(values):
-    """LuxCore's properties of a dictionary."""
+    """Convert a dictionary to LuxCore's properties."""
     made = lux.Properties()
     quoted = {key: f'"{value}"' if key.endswith(".file") else value for key, value in values.items()}
     made.SetFromString("".join(f"{key} = {value}\n" for key, value in quoted.items()))
@@ -228,7 +230,7 @@ def properties(values):
 
 
 def settings(scene, options):
-    """Properties of the render."""
+    """LuxCore's properties of the render."""
     depth, mode = options.depth, options.mode
     found = {
         "renderengine.type": ENGINES[mode],
@@ -285,7 +287,7 @@ def main():
         watch = driver.Stopwatch(options)
         session = lux.RenderSession(lux.RenderConfig(properties(settings(scene, options)), built))
         session.Start()
-        # Building the caustic cache is rendering, too, and may take all of the budget: one pass follows it at least.
+        # Building the caustic cache counts as rendering and may use the whole budget: take at least one pass after it.
         samples = 0.0
         while watch.left() > 0 or samples < 1:
             time.sleep(0.01)

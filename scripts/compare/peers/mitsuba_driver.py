@@ -1,7 +1,7 @@
-"""Mitsuba 3 as a peer (see driver.py): path tracing, its scene as mitsuba_world.py says it.
+"""Renders with Mitsuba 3's path tracer (see driver.py), with the scene from mitsuba_world.py.
 
-Its rough surfaces get what they lack of ours (mitsuba_lobes.py), so that materials mean the same. The vectorised variant where
-there is an LLVM that it takes, thrice as fast as the scalar one.
+Rough surfaces are corrected to caustique's model (mitsuba_lobes.py), so that materials are equal. The vectorised
+variant, used if a suitable LLVM exists, is three times as fast as the scalar one.
 """
 
 import mitsuba as mi
@@ -13,16 +13,16 @@ import pictures
 import gltf
 import variant
 
-#: Samples that a pass takes at most: what a wave of them needs of memory stays below a gibibyte.
-WAVE = 1 << 22
-#: A pass grows until it takes this share of the budget.
-SHARE = 1 / 16
+#: Largest number of samples in a pass, which then needs less than 1 GiB.
+MAX_PASS_SAMPLES = 1 << 22
+#: Passes grow until they take this share of the budget.
+PASS_SHARE = 1 / 16
 
 
 def main():
     options = driver.options(["path"])
     name = variant.choose(options.threads)
-    # Its classes are made of the variant's.
+    # Import after the variant is set, because its classes derive from the variant's.
     import mitsuba_world
 
     try:
@@ -35,15 +35,15 @@ def main():
         return
     watch = driver.Stopwatch(options)
     total, each = np.zeros((options.height, options.width, 3)), 1
-    most = max(1, WAVE // (options.width * options.height))
+    most = max(1, MAX_PASS_SAMPLES // (options.width * options.height))
 
     def render(number):
         nonlocal each, total
         before, samples = watch.spent(), each
         picture = np.array(mi.render(built, spp=samples, seed=options.seed * 65536 + number))
         total += samples * picture[..., :3]
-        # The first one compiles.
-        if number and watch.spent() - before < SHARE / 2 * options.budget:
+        # Ignore the first pass, which compiles kernels.
+        if number and watch.spent() - before < PASS_SHARE / 2 * options.budget:
             each = min(2 * each, most)
         return samples
 

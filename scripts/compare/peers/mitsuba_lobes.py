@@ -1,19 +1,20 @@
-"""What Mitsuba's rough BSDFs lack of caustique's, computed here from the papers.
+"""Corrections of Mitsuba's rough BSDFs to caustique's model, computed independently from the papers.
 
-Both use GGX with exact or Schlick's Fresnel terms and draw visible normals. Three things differ:
+Both renderers use GGX with exact or Schlick's Fresnel terms and sample visible normals. They differ in three points:
 
-- Masking on one side: Mitsuba multiplies G1(o) G1(i) [Walter et al. 2007, 23], caustique correlates heights [Heitz 2014, 99].
-- Light that facets scatter more than once: Mitsuba drops it, caustique gives it back by the separable lobe of Kulla and Conty
+- Masking-shadowing in reflection: Mitsuba multiplies G1(o) G1(i) [Walter et al. 2007, 23], caustique correlates heights
+[Heitz 2014, 99].
+- Multiple scattering between facets: Mitsuba loses this light, caustique adds the separable lobe of Kulla and Conty
   ["Revisiting Physically Based Shading at Imageworks", 2017], for glass on both sides.
-- Rough matte: Mitsuba's roughplastic takes the transmittances of its interface from facets that lose light, so that a white
-  one in a white furnace keeps 0.84 of the light at alpha 0.16 and 0.4 at 0.81. Only its reflecting facets are taken; the
-  diffuse base below is coupled as in Kelemen and Szirmay-Kalos [2001], (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)), which leaves
-  a white furnace white.
+- Rough matte: Mitsuba's roughplastic computes transmittances from facets that lose light; a white one in a white
+furnace
+  keeps 0.84 of the light at alpha 0.16 and 0.4 at 0.81. Only its reflecting facets are used here. The diffuse base is
+  coupled as in Kelemen and Szirmay-Kalos [2001], (1 - E(o)) (1 - E(i)) / (pi (1 - E_avg)), which conserves energy.
 
-Not corrected: metals whose roughness is a texture (their tables would change from point to point).
+Metals with a roughness texture are not corrected, because their tables would differ from point to point.
 
-`corrected` wraps one of Mitsuba's BSDFs, multiplies by the ratio of the maskings and adds the lobe. If the two renderers agree with
-it and not without, these are all the difference. The albedos come from a quadrature of this module's own.
+`corrected` wraps a BSDF of Mitsuba, multiplies it by the ratio of the masking terms and adds the lobe. If the renderers
+agree only with it, these three points are the whole difference. This module computes the albedos by quadrature.
 """
 
 import drjit as dr
@@ -21,22 +22,22 @@ import mitsuba as mi
 import numpy as np
 
 NODES = 128
-#: Points of the quadrature along each axis of the square of visible normals.
+#: Quadrature points along each axis of the visible-normal samples.
 POINTS = 96
-#: Share of directions drawn for the diffuse base of matte surfaces.
-DIFFUSE = 0.6
+#: Probability of sampling the diffuse base of matte surfaces.
+DIFFUSE_PROBABILITY = 0.6
 
 
 def _lambda(alpha, z):
-    """Smith's Lambda of an isotropic GGX for the cosine z."""
+    """Smith's Lambda of isotropic GGX for the cosine z."""
     slope2 = alpha**2 * (1 / np.maximum(z * z, 1e-12) - 1)
     return 0.5 * (np.sqrt(1 + slope2) - 1)
 
 
 def _visible_normals(alpha, mu):
-    """Facet normals seen along the cosine mu [Dupuy and Benyoub 2023], their weights, and the direction."""
+    """Visible facet normals for the cosine mu [Dupuy and Benyoub 2023], their weights, and the direction."""
     u, rest = np.meshgrid(*[(np.arange(POINTS) + 0.5) / POINTS] * 2)
-    # Graded towards steep facets, which are few and lose most of the light that they meet.
+    # More points for steep facets, which are rare and lose most of their light.
     v, weights = 1 - rest**2, 2 * rest / POINTS**2
     o = np.array([np.sqrt(1 - mu * mu), 0.0, mu])
     stretched = o * [alpha, alpha, 1.0]
@@ -49,7 +50,7 @@ def _visible_normals(alpha, mu):
 
 
 def _fresnel(cos, eta):
-    """Fresnel's equations for unpolarised light; and the refracted cosine."""
+    """Fresnel reflectance for unpolarised light, and the refracted cosine."""
     sin2 = (1 - cos * cos) / eta**2
     total = sin2 >= 1
     cos_t = np.sqrt(np.maximum(1 - sin2, 0))
@@ -58,8 +59,9 @@ def _fresnel(cos, eta):
     return np.where(total, 1.0, 0.5 * (s * s + p * p)), cos_t
 
 
-def _scattered(alpha, mu, eta=None):
-    """Shares of light along mu that facets reflect and transmit at once; of a perfect reflector, or of glass of the index eta."""
+def _single_scattering(alpha, mu, eta=None):
+    """Shares of light along mu that facets reflect and transmit in one bounce, for a perfect mirror or glass of index
+    eta."""
     h, weights, o = _visible_normals(alpha, mu)
     cos = np.clip(h @ o, 0, 1)
     mirrored = 2 * cos[..., None] * h - o
@@ -76,19 +78,19 @@ def _scattered(alpha, mu, eta=None):
 
 
 class Profile:
-    """A function of the cosine; nodes are even in its square root."""
+    """A tabulated function of the cosine, with nodes equidistant in its square root."""
 
     def __init__(self, function):
         roots = np.linspace(0, 1, NODES)
         values = np.array([max(function(max(t * t, 1e-4)), 0.0) for t in roots])
-        # The average over the hemisphere: 2 mu dmu = 4 t^3 dt.
+        # Cosine-weighted average over the hemisphere: 2 mu dmu = 4 t^3 dt.
         weighted = values * 4 * roots**3
         self.average = float(((weighted[1:] + weighted[:-1]) / 2).sum() / (NODES - 1))
         self.values = mi.Float(values.astype(np.float32))
         self.roots = mi.ContinuousDistribution(mi.ScalarVector2f(0, 1), mi.Float((weighted + 1e-6).astype(np.float32)))
 
     def draw(self, sample):
-        """A direction of the upper hemisphere, in proportion to the profile and the cosine."""
+        """Sample a direction of the upper hemisphere in proportion to profile times cosine."""
         mu = dr.square(self.roots.sample(sample.x))
         sine, (s, c) = dr.sqrt(dr.maximum(1 - mu * mu, 0)), dr.sincos(dr.two_pi * sample.y)
         return mi.Vector3f(sine * c, sine * s, mu)
@@ -99,7 +101,7 @@ class Profile:
         return self.roots.eval_pdf_normalized(t) / (4 * dr.pi * t)
 
     def at(self, mu):
-        """Interpolated."""
+        """The interpolated value at cosine mu."""
         x = dr.sqrt(dr.clip(mu, 0, 1)) * (NODES - 1)
         i = dr.minimum(mi.UInt32(x), NODES - 2)
         a, b = dr.gather(mi.Float, self.values, i), dr.gather(mi.Float, self.values, i + 1)
@@ -112,18 +114,19 @@ def _average_fresnel(eta):
     return _fresnel(mu, eta)[0].mean()
 
 
-def _loss(alpha, eta=None):
-    """What facets lose."""
-    return Profile(lambda mu: 1 - sum(_scattered(alpha, mu, eta)))
+def _lost_energy(alpha, eta=None):
+    """The share of light that single scattering loses, as a `Profile`."""
+    return Profile(lambda mu: 1 - sum(_single_scattering(alpha, mu, eta)))
 
 
-def _again(fresnel, kept):
-    """Light of average reflectance `fresnel` scattered more than once, as a share of what a perfect reflector's facets lose."""
+def _multiple_scattering(fresnel, kept):
+    """Multiply scattered light for average reflectance `fresnel`, relative to the energy that a perfect mirror
+    loses."""
     return fresnel * fresnel * kept / (1 - fresnel * (1 - kept))
 
 
 class Corrected(mi.BSDF):
-    """A rough `kind` (metal, glass, matte) of Mitsuba's with height-correlated masking and multiple scattering."""
+    """A rough BSDF of Mitsuba (`kind`: metal, glass, matte) with height-correlated masking and multiple scattering."""
 
     def __init__(self, properties):
         mi.BSDF.__init__(self, properties)
@@ -133,29 +136,31 @@ class Corrected(mi.BSDF):
         flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide
         if self.kind == "glass":
             flags = flags | mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.BackSide | mi.BSDFFlags.NonSymmetric
-            self.losses = [_loss(self.alpha, ior), _loss(self.alpha, 1 / ior)]
+            self.losses = [_lost_energy(self.alpha, ior), _lost_energy(self.alpha, 1 / ior)]
             averages, index2 = [loss.average for loss in self.losses], [1.0, ior**2]
-            # Reciprocity asks for shares that pass of k n^2 average, n and average those of the other side.
+            # Reciprocity requires transmitted shares of k n^2 average, with n and average of the other side.
             transmitted = [1 - _average_fresnel(ior), 1 - _average_fresnel(1 / ior)]
             self.passed = float(min(transmitted[0] / index2[1], transmitted[1]) / max(averages))
             self.passes = [float(self.passed * index2[1 - s] * averages[1 - s]) for s in (0, 1)]
             self.returned = [(1 - self.passes[s]) / averages[s] for s in (0, 1)]
         else:
-            self.loss = _loss(self.alpha)
+            self.loss = _lost_energy(self.alpha)
         if self.kind == "matte":
-            # KHR_materials_specular's strength scales Fresnel's term, F0 and F90 alike.
+            # KHR_materials_specular's strength scales F0 and F90.
             strength = properties.get("strength", 1.0)
-            again = self.again = float(_again(strength * _average_fresnel(ior), 1 - self.loss.average))
+            again = self.again = float(_multiple_scattering(strength * _average_fresnel(ior), 1 - self.loss.average))
             self.through = Profile(
                 lambda mu: (
-                    1 - strength * _scattered(self.alpha, mu, ior)[0] - again * (1 - _scattered(self.alpha, mu)[0])
+                    1
+                    - strength * _single_scattering(self.alpha, mu, ior)[0]
+                    - again * (1 - _single_scattering(self.alpha, mu)[0])
                 )
             )
         self.m_components = [flags]
         self.m_flags = flags
 
     def _ratio(self, wi, wo):
-        """Correlated over separable masking."""
+        """Ratio of correlated to separable masking."""
 
         def of(w):
             z2 = dr.maximum(w.z * w.z, 1e-12)
@@ -165,14 +170,14 @@ class Corrected(mi.BSDF):
         return dr.select(wi.z * wo.z > 0, (1 + a) * (1 + b) / (1 + a + b), 1)
 
     def _multiple(self, si, wo, active):
-        """The separable lobes times the cosine."""
+        """The separable multiple-scattering lobes times the cosine."""
         base = self.base.eval(si, active)
         mu_i, mu_o = dr.abs(si.wi.z), dr.abs(wo.z)
         if self.kind != "glass":
             loss = self.loss
             lost = loss.at(mu_i) * loss.at(mu_o) / loss.average
             if self.kind == "metal":
-                value = _again(base + (1 - base) / 21, 1 - loss.average) * lost
+                value = _multiple_scattering(base + (1 - base) / 21, 1 - loss.average) * lost
             else:
                 through = self.through
                 value = self.again * lost + base * (through.at(mu_i) * through.at(mu_o) / through.average)
@@ -181,14 +186,14 @@ class Corrected(mi.BSDF):
         own_i = dr.select(above, self.losses[0].at(mu_i), self.losses[1].at(mu_i))
         own_o = dr.select(wo.z > 0, self.losses[0].at(mu_o), self.losses[1].at(mu_o))
         back = dr.select(above, self.returned[0], self.returned[1])
-        # Radiance: times the squared index on the side it is seen from.
+        # Radiance scales with the squared index of the viewer's side.
         through = base * (self.passed * dr.select(above, 1.0, self.ior**2))
         return dr.select(si.wi.z * wo.z > 0, mi.Color3f(back), through) * (own_i * own_o * mu_o * dr.inv_pi)
 
-    def _share(self, wi):
-        """Share of directions drawn for the separable lobes: about their share of what is scattered."""
+    def _separable_probability(self, wi):
+        """Probability of sampling the separable lobes: about their share of the scattered light."""
         if self.kind == "matte":
-            return DIFFUSE
+            return DIFFUSE_PROBABILITY
         mu = dr.abs(wi.z)
         lost = (
             self.loss.at(mu)
@@ -198,7 +203,7 @@ class Corrected(mi.BSDF):
         return 0.01 + 0.98 * dr.clip(lost, 0, 1)
 
     def _separable_pdf(self, wi, wo):
-        """Density per solid angle of a direction drawn for the separable lobes."""
+        """Density per solid angle of a direction sampled from the separable lobes."""
         mu = dr.abs(wo.z)
         if self.kind == "glass":
             own = dr.select(wo.z > 0, self.losses[0].pdf(mu), self.losses[1].pdf(mu))
@@ -211,7 +216,7 @@ class Corrected(mi.BSDF):
         f = f * self._ratio(si.wi, wo) + self._multiple(si, wo, active)
         if self.kind != "glass":
             active = active & (si.wi.z > 0)
-        share = self._share(si.wi)
+        share = self._separable_probability(si.wi)
         pdf = (1 - share) * pdf + share * self._separable_pdf(si.wi, wo)
         return dr.select(active, f, 0), dr.select(active, pdf, 0)
 
@@ -222,7 +227,7 @@ class Corrected(mi.BSDF):
         return self.eval_pdf(ctx, si, wo, active)[1]
 
     def sample(self, ctx, si, sample1, sample2, active=True):
-        share = self._share(si.wi)
+        share = self._separable_probability(si.wi)
         separable = sample1 < share
         nested, weight = self.nested.sample(ctx, si, (sample1 - share) / (1 - share), sample2, active & ~separable)
         if self.kind == "glass":
@@ -237,7 +242,7 @@ class Corrected(mi.BSDF):
         drawn = mi.BSDFSample3f()
         drawn.wo = dr.select(separable, other, nested.wo)
         value, drawn.pdf = self.eval_pdf(ctx, si, drawn.wo, active)
-        # Facets also send light to sides that they do not scatter to; its density is no part of the sum.
+        # Facet samples may go to the wrong side; their density is not part of the sum.
         valid = active & (separable | (dr.max(weight) > 0)) & (drawn.pdf > 0)
         through = si.wi.z * drawn.wo.z < 0
         drawn.eta = 1.0
@@ -255,5 +260,5 @@ class Corrected(mi.BSDF):
 
 
 def register():
-    """Makes the type `corrected` known, for the variant that is set."""
+    """Register the BSDF type `corrected` for the current variant."""
     mi.register_bsdf("corrected", Corrected)

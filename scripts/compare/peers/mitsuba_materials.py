@@ -1,16 +1,18 @@
-"""glTF materials as Mitsuba's: each of caustique's lobes by the plug-in that computes the same.
+"""Converts glTF materials to Mitsuba: for each lobe of caustique, the plug-in that computes the equal function.
 
-Exactly the same function, up to rounding:
+Equal up to rounding:
 
     matte without a Fresnel layer   diffuse
-    smooth matte                    plastic, linear: its diffuse base T(o) T(i) / ((1 - F_in) eta^2) is the coupling of Kelemen and
-                                    Szirmay-Kalos, since (1 - F_in) eta^2 = 1 - F_out, the average transmittance from outside
+    smooth matte                    plastic, linear: its diffuse base T(o) T(i) / ((1 - F_in) eta^2) is the coupling of
+    Kelemen and
+                                    Szirmay-Kalos, since (1 - F_in) eta^2 = 1 - F_out, the average transmittance from
+                                    outside
     smooth glass                    dielectric
     absorption in it                a homogeneous medium of albedo 0
     any mixture of the above        blendbsdf
 
-The same but for masking (Mitsuba's is separable, caustique's height-correlated for reflection), the light that facets scatter
-more than once (Mitsuba drops it) and what lies below rough facets; see `mitsuba_lobes.py`:
+Equal except for masking (separable in Mitsuba, height-correlated in caustique), multiple scattering between facets
+(Mitsuba loses it) and the base below rough facets; `mitsuba_lobes.py` corrects these:
 
     metal                           principled, metallic 1: GGX with Schlick's reflectance
     rough glass                     roughdielectric
@@ -22,25 +24,25 @@ import mitsuba_lobes
 import numpy as np
 from gltf import extension, extras, is_closed
 
-#: GGX alpha below which the renderer takes a surface for perfectly smooth.
+#: GGX alpha below which caustique treats a surface as perfectly smooth.
 SMOOTH = 1e-3
 WRAPS = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
 
 
 class Materials:
-    """The materials of a scene. `correct` adds to rough lobes what Mitsuba's lack (see `mitsuba_lobes.py`)."""
+    """The materials of a scene. `correct`: whether to correct Mitsuba's rough lobes (`mitsuba_lobes.py`)."""
 
     def __init__(self, scene, correct, glass="auto"):
         self.scene, self.correct, self.glass = scene, correct, glass
         self.known, self.textures = {}, {}
 
     def raw(self, index):
-        """A material's JSON; the specification's default for none."""
+        """A material's JSON, or glTF's default material for None."""
         return {} if index is None else self.scene.document["materials"][index]
 
     def emission(self, index):
-        """Emitted radiance, as a texture or a colour; None for none."""
+        """Emitted radiance as a texture or a colour, or None."""
         raw = self.raw(index)
         strength = (extension(raw, "KHR_materials_emissive_strength") or {}).get("emissiveStrength", 1.0)
         factor = np.array(raw.get("emissiveFactor", [0, 0, 0]), float) * strength
@@ -51,7 +53,7 @@ class Materials:
         return self.color(raw, raw.get("emissiveTexture"), factor)
 
     def is_solid(self, mesh):
-        """Whether a transmitting mesh bounds a solid."""
+        """Whether a transmissive mesh is a solid, not a thin sheet."""
         raw = self.raw(mesh.material)
         if extras(raw).get("medium"):
             return True
@@ -61,7 +63,7 @@ class Materials:
         return self.glass == "solid" or (self.glass == "auto" and is_closed(mesh))
 
     def medium(self, index):
-        """The medium inside, or None."""
+        """The medium inside a material, or None."""
         raw = self.raw(index)
         if extras(raw).get("priority") is not None:
             self.scene.lose(f"material {raw.get('name')}: its priority over other glass is left out")
@@ -73,13 +75,13 @@ class Materials:
         return medium(said)
 
     def bsdf(self, mesh):
-        """The BSDF that a mesh wears, made once a material."""
+        """The BSDF of a mesh, cached by material."""
         if mesh.material not in self.known:
             self.known[mesh.material] = mi.load_dict(self.describe(mesh))
         return self.known[mesh.material]
 
     def describe(self, mesh):
-        """The BSDF that a mesh wears, as a dictionary."""
+        """The BSDF of a mesh, as a dictionary."""
         raw = self.raw(mesh.material)
         name = raw.get("name", "default")
         if "normalTexture" in raw:
@@ -133,7 +135,7 @@ class Materials:
         rough = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, **common}
         if not self.correct:
             return {"diffuse_reflectance": base, **rough}
-        # Its facets alone.
+        # Only the reflecting facets.
         facets = {
             "specular_reflectance": {"type": "rgb", "value": strength},
             "diffuse_reflectance": {"type": "rgb", "value": 0.0},
@@ -151,7 +153,7 @@ class Materials:
     def _metal(self, base, roughness):
         nested = {"type": "principled", "base_color": base, "metallic": 1.0, "roughness": roughness, "specular": 0.5}
         if not self.correct or not isinstance(roughness, float) or roughness**2 < SMOOTH:
-            # A smooth mirror: principled's narrowest lobe, a thousandth of a radian wide.
+            # A smooth mirror is principled's narrowest lobe, 0.001 radians wide.
             return nested
         return {"type": "corrected", "kind": "metal", "nested": nested, "alpha": roughness**2, "base": base}
 
@@ -172,13 +174,13 @@ class Materials:
         return {"type": "corrected", "kind": "glass", "nested": nested, "alpha": alpha, "base": base, "ior": float(ior)}
 
     def color(self, raw, info, factor):
-        """A colour: factor times texture (sRGB)."""
+        """Colour factor times an sRGB texture."""
         if info is None:
             return {"type": "rgb", "value": [float(x) for x in factor]}
         return self._bitmap(info, lambda texels: _linear(texels[..., :3]) * np.asarray(factor, np.float32))
 
     def channel(self, info, channel, factor):
-        """One channel of a data texture times a factor; a number where the factor makes it one."""
+        """One channel of a data texture times a factor; a number without a texture or with factor 0."""
         if factor == 0.0:
             return 0.0
         texels = self._texels(info)[..., channel]
@@ -193,7 +195,7 @@ class Materials:
         return float(np.mean(np.array(roughness["data"])))
 
     def _texels(self, info):
-        """The bytes of a texture, RGBA."""
+        """The RGBA bytes of a texture."""
         if info["index"] not in self.textures:
             stream = mi.MemoryStream()
             stream.write(self.scene.image(info["index"])[0])
@@ -230,12 +232,12 @@ class Materials:
 
 
 def _linear(x):
-    """IEC 61966-2-1 decoded."""
+    """Linear values of sRGB-encoded ones (IEC 61966-2-1)."""
     return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def medium(said):
-    """The medium of coefficients (1/m), or None."""
+    """A Mitsuba medium from coefficients (1/m), or None."""
     absorbs, scatters = (np.array((said or {}).get(key, [0, 0, 0]), float) for key in ("sigma_a", "sigma_s"))
     sigma = absorbs + scatters
     if not sigma.any():

@@ -1,22 +1,24 @@
-"""A glTF scene as Mitsuba's: shapes, lights, environment, camera."""
+"""Converts a glTF scene to Mitsuba: shapes, lights, environment, camera."""
 
 import mitsuba as mi
 import numpy as np
 from gltf import Unsupported
 from mitsuba_materials import BLACK, Materials, medium
 
-#: The sun's disc stands this many scene radii away.
-FAR = 1000.0
+#: Distance of the sun's disc in scene radii.
+SUN_DISTANCE = 1000.0
 
 
 def build(scene, width, height, correct=False, glass="auto"):
-    """The Mitsuba scene, with its first camera and a film of this size."""
+    """Build the Mitsuba scene with its first camera and a film of this size."""
     return mi.load_dict(describe(scene, width, height, Materials(scene, correct, glass), make_mesh))
 
 
 def describe(scene, width, height, materials, make):
-    """What `mi.load_dict` takes, with its first camera and a film of this size. `make(mesh, materials, inside)` makes shapes;
-    `inside` is a medium or None."""
+    """The scene as a dictionary for `mi.load_dict`, with its first camera and a film of this size.
+
+    `make(mesh, materials, inside)` makes a shape; `inside` is its medium or None.
+    """
     if not scene.cameras:
         raise Unsupported("a file without a camera")
     world = {"type": "scene"}
@@ -38,7 +40,7 @@ def describe(scene, width, height, materials, make):
             world[f"light{i}"] = _light(light, center, radius, scene)
     if scene.environment:
         world["environment"] = _environment(scene)
-    # Absorption apart, both compute the same; the path integrator is faster.
+    # Without media the path integrator gives equal results faster.
     world["integrator"] = {"type": "volpathmis" if has_media else "path", "max_depth": -1, "rr_depth": 5}
     world["sensor"] = _camera(scene.cameras[0], width, height)
     if space is not None:
@@ -60,11 +62,11 @@ def make_mesh(mesh, materials, inside):
     if inside is not None:
         properties["interior"] = mi.load_dict(inside)
     smooth, textured = mesh.normals is not None and emission is None, mesh.uvs is not None
-    # Light leaves the front, which the winding decides: a shape that emits keeps no normals of its own.
+    # The winding decides the emitting front: an emissive shape has no vertex normals.
     properties["face_normals"] = not smooth
     shape = mi.Mesh(mesh.name, len(mesh.positions), len(mesh.triangles), properties, smooth, textured)
     values = mi.traverse(shape)
-    # Of the type that they have, which differs from variant to variant.
+    # Convert to the parameters' types, which depend on the variant.
     given = {
         "vertex_positions": mesh.positions,
         "vertex_normals": mesh.normals if smooth else None,
@@ -114,16 +116,16 @@ def _light(light, center, radius, scene):
         scene.lose("a sun of some size before an image has no size")
     if light.angle == 0.0 or before_image:
         return {"type": "directional", "direction": axis.tolist(), "irradiance": strength}
-    # A disc so far away that it is seen alike from everywhere. It hides the environment, so it shines as that does, too.
+    # A disc far away, in nearly the same direction from everywhere. It hides the environment, so its radiance is added.
     half = light.angle / 2
     radiance = light.intensity / (np.pi * np.sin(half) ** 2) + np.array(
         environment["color"] if environment else [0, 0, 0]
     )
     radiance = [float(x) for x in radiance]
-    away = _look(center - axis * FAR * radius, axis)
+    away = _look(center - axis * SUN_DISTANCE * radius, axis)
     return {
         "type": "disk",
-        "to_world": away @ mi.ScalarTransform4f().scale(float(FAR * radius * np.tan(half))),
+        "to_world": away @ mi.ScalarTransform4f().scale(float(SUN_DISTANCE * radius * np.tan(half))),
         "bsdf": BLACK,
         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
     }
@@ -141,8 +143,8 @@ def _environment(scene):
     texels = np.array(
         mi.Bitmap(str(scene.folder / said["file"])).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
     ) * np.float32(said.get("strength", 1.0))
-    # Mitsuba's rows begin and end at the poles, a file's rows half a row away from them. Twice the rows (and one) hold the same
-    # bilinear function exactly: all its knots are among them.
+    # Mitsuba's first and last rows are at the poles, a file's half a row away. 2n + 1 rows contain all knots of the
+    # file's bilinear function and so represent it exactly.
     height = len(texels)
     at = np.clip(np.arange(2 * height + 1) / 2 - 0.5, 0, height - 1)
     low = np.minimum(at.astype(int), height - 2)

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
-"""Intel OIDN alone on one picture: oidn.py IN.exr OUT.exr THREADS. Needs pyoidn (scripts/compare/setup.sh peers).
+"""Denoises one picture with Intel OIDN: oidn.py IN.exr OUT.exr THREADS. Needs pyoidn (scripts/compare/setup.sh peers).
 
-IN.exr holds R G B and, where there are guides, albedo and normal, which are taken to be free of noise. Prints the
-seconds of the filter.
+IN.exr has R G B and optionally albedo and normal, which are treated as noise-free. Prints the seconds of the filter.
 """
 
 import sys
@@ -13,19 +12,19 @@ import OpenEXR
 import pyoidn
 
 
-def plane(channels, names):
-    """Three channels side by side as OIDN takes them."""
+def interleave(channels, names):
+    """Three channels interleaved, as OIDN expects."""
     return np.ascontiguousarray(
         np.stack([np.nan_to_num(channels[name].pixels, posinf=0, neginf=0) for name in names], -1), np.float32
     )
 
 
 def denoise(channels, threads):
-    """The denoised picture, and the seconds it took."""
-    images = {"color": plane(channels, "RGB")}
+    """The denoised picture, and the seconds of the filter."""
+    images = {"color": interleave(channels, "RGB")}
     if "albedo.R" in channels and "normal.X" in channels:
-        images["albedo"] = plane(channels, ["albedo.R", "albedo.G", "albedo.B"])
-        images["normal"] = plane(channels, ["normal.X", "normal.Y", "normal.Z"])
+        images["albedo"] = interleave(channels, ["albedo.R", "albedo.G", "albedo.B"])
+        images["normal"] = interleave(channels, ["normal.X", "normal.Y", "normal.Z"])
     height, width, _ = images["color"].shape
     images["output"] = np.zeros_like(images["color"])
     start = time.perf_counter()

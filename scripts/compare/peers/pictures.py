@@ -1,26 +1,26 @@
-"""Pictures of the comparison in and out: linear RGB, rows from the top."""
+"""Reads and writes EXR pictures for the comparison: linear RGB, top row first."""
 
 import numpy as np
 import OpenEXR
 
 
 def read(path):
-    """The picture of an EXR, (height, width, 3), 32-bit floats."""
+    """The RGB picture of an EXR: (height, width, 3), 32-bit floats."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
         channels = file.channels()
-        # A picture may be a layer with a name.
+        # The picture may be in a named layer.
         prefix = "" if "R" in channels else next(name for name in channels if name.endswith(".R"))[:-1]
         return np.stack([channels[prefix + c].pixels for c in "RGB"], axis=-1).astype(np.float32)
 
 
 def write(path, picture):
-    """Writes a picture (height, width, 3)."""
+    """Write a picture (height, width, 3)."""
     channels = {c: np.ascontiguousarray(picture[..., i], np.float32) for i, c in enumerate("RGB")}
     OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
 
 
 def sample(image, u, v):
-    """A latitude-longitude image at columns `u` and rows `v` (shares of its width and height), bilinear."""
+    """Bilinear lookup of a latitude-longitude image at `u` and `v` (shares of width and height)."""
     height, width, _ = image.shape
     for axis, size, at in ((0, height, v * height - 0.5), (1, width, u * width - 0.5)):
         low = np.floor(at).astype(int)

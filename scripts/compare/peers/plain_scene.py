@@ -1,7 +1,8 @@
-"""A scene as LuxCore and Cycles take it: few kinds of materials, lamps with a body as meshes, suns in the environment.
+"""Simplifies a scene for LuxCore and Cycles: four kinds of materials, lamps with size as meshes, suns as pixels of the
+environment.
 
-What they cannot say is named: `blockers` make a comparison worthless, `approximations` are judged by the mean of the
-picture. Mitsuba needs none of this: world.py says our scenes in its own terms.
+Unsupported features are listed: `blockers` make a comparison meaningless; for `approximations` the mean of the picture
+shows how much they matter. Mitsuba does not need this module: mitsuba_world.py converts scenes directly.
 """
 
 from dataclasses import dataclass, field
@@ -12,10 +13,10 @@ import numpy as np
 import gltf
 import pictures
 
-#: How wide an environment with a sun's disc in it is made: half a degree is three pixels.
-WIDE = 2048
-#: Extensions of materials that the kinds cover.
-PLAIN = {
+#: Width in pixels of an environment with a sun's disc: half a degree is three pixels.
+SUN_MAP_WIDTH = 2048
+#: Extensions of materials that the four kinds support.
+SUPPORTED = {
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
@@ -26,27 +27,27 @@ PLAIN = {
 
 @dataclass
 class Material:
-    """A surface. `kind` is glass, metal, matte (Lambert's), or coated (a matte base under a dielectric interface)."""
+    """A surface. `kind` is glass, metal, matte (Lambertian), or coated (a matte base below a dielectric interface)."""
 
     name: str
     kind: str
     base: np.ndarray
     roughness: float
     ior: float = 1.5
-    #: Of the interface: a share of what its index reflects.
+    #: Scale of the interface's reflectance.
     specular: float = 1.0
-    #: Radiance from the front.
+    #: Radiance that the front emits.
     emission: np.ndarray = field(default_factory=lambda: np.zeros(3))
     #: Absorption inside, per unit of length.
     absorption: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    #: An encoded image in place of `base`.
+    #: An encoded image that replaces `base`.
     texture: bytes | None = None
 
 
 class Scene:
-    """A glTF file in these terms.
+    """A simplified glTF file.
 
-    meshes: pairs of a gltf.Mesh and a Material; lights: points and suns without size; camera: a gltf.Camera;
+    meshes: pairs of a gltf.Mesh and a Material; lights: point lights and suns without size; camera: a gltf.Camera;
     environment: (height, width, 3), rows from the top, u = atan2(x, -z) / 2 pi, or None.
     """
 
@@ -71,7 +72,7 @@ class Scene:
         suns = self._lights(scene)
         self.environment = self._environment(scene, suns)
 
-    def _say(self, where, text):
+    def _note(self, where, text):
         if text not in where:
             where.append(text)
 
@@ -92,7 +93,7 @@ class Scene:
         specular = extensions.get("KHR_materials_specular", {})
         strength = specular.get("specularFactor", 1.0)
         if transmission not in (0, 1) or metallic not in (0, 1):
-            self._say(self.blockers, f"{name}: partly metal or glass")
+            self._note(self.blockers, f"{name}: partly metal or glass")
         kind = "metal" if metallic else "glass" if transmission else "coated" if strength else "matte"
         made = Material(
             name,
@@ -106,19 +107,19 @@ class Scene:
         if kind == "coated":
             made.specular = strength
             if list(specular.get("specularColorFactor", [1, 1, 1])) != [1, 1, 1]:
-                self._say(self.approximations, f"{name}: its shine without a colour")
-            self._say(self.approximations, "what lies below a shine is coupled to it in another way")
+                self._note(self.approximations, f"{name}: its shine without a colour")
+            self._note(self.approximations, "gloss is coupled with the layer below it by another model")
         if kind == "glass":
             made.absorption = self._absorption(mesh, raw, name)
         if made.emission.any() and raw.get("doubleSided"):
-            self._say(self.approximations, f"{name} shines from its front only")
+            self._note(self.approximations, f"{name} shines from its front only")
         if "baseColorTexture" in surface:
             made.texture = scene.image(surface["baseColorTexture"]["index"])[0]
         return made
 
     def _faults(self, raw, surface, extensions, name):
-        """What of a material no kind covers."""
-        strange = sorted(set(extensions) - PLAIN)
+        """Features of a material that no kind supports."""
+        strange = sorted(set(extensions) - SUPPORTED)
         textures = [key for key in ("normalTexture", "emissiveTexture") if key in raw]
         textures += [key for key in ("metallicRoughnessTexture",) if key in surface]
         for extension in extensions.values():
@@ -132,22 +133,22 @@ class Scene:
         if base and surface.get("baseColorFactor", [1, 1, 1])[:3] != [1, 1, 1]:
             faults.append("a texture with a factor")
         if faults:
-            self._say(self.blockers, f"{name}: {', '.join(faults)}")
+            self._note(self.blockers, f"{name}: {', '.join(faults)}")
 
     def _absorption(self, mesh, raw, name):
         volume = gltf.extension(raw, "KHR_materials_volume")
         solid = gltf.is_closed(mesh) if volume is None else volume.get("thicknessFactor", 0.0) > 0.0
         if not solid:
-            self._say(self.blockers, f"{name}: thin panes")
+            self._note(self.blockers, f"{name}: thin panes")
         color = np.array((volume or {}).get("attenuationColor", [1, 1, 1]), float)
         return -np.log(np.maximum(color, 1e-6)) / (volume or {}).get("attenuationDistance", np.inf)
 
     def _lights(self, scene):
-        """Keeps lamps without a body, makes balls of those that have one, and returns the suns with a disc."""
+        """Keep lamps without size, convert those with a size to balls, and return the suns with a disc."""
         suns = []
         for light in scene.lights:
             if light.kind == "spot":
-                self._say(self.blockers, "spots")
+                self._note(self.blockers, "spots")
             elif light.kind == "point" and light.radius:
                 self.meshes.append(ball(light))
             elif light.kind == "directional" and light.angle:
@@ -161,7 +162,7 @@ class Scene:
         if "file" in said:
             file = self.path.parent / said["file"]
             if file.suffix != ".exr":
-                self._say(self.blockers, f"an environment that is no EXR: {file.name}")
+                self._note(self.blockers, f"an environment that is no EXR: {file.name}")
                 return None
             image = pictures.read(file) * np.float32(said.get("strength", 1.0))
         elif max(said.get("color", [0])) > 0:
@@ -170,20 +171,21 @@ class Scene:
             return None
         if image is None:
             image = np.zeros((32, 64, 3), np.float32)
-        height, width = (max(WIDE // 2, image.shape[0]), max(WIDE, image.shape[1])) if suns else image.shape[:2]
-        # Ours has u = 1/2 + atan2(z, x) / 2 pi, a quarter turn on. Turned counter-clockwise, it shows what was to the
-        # right.
+        height, width = image.shape[:2]
+        if suns:
+            height, width = max(SUN_MAP_WIDTH // 2, height), max(SUN_MAP_WIDTH, width)
+        # caustique: u = 1/2 + atan2(z, x) / 2 pi, a quarter turn further. A counter-clockwise rotation increases u.
         u = (np.arange(width) + 0.5) / width + 0.25 + said.get("rotation_deg", 0.0) / 360
         image = pictures.sample(image, u, (np.arange(height) + 0.5) / height)
         for sun in suns:
             toward = sun.to_world[:3, 2] / np.linalg.norm(sun.to_world[:3, 2])
             image += disc(toward, sun.angle / 2, sun.intensity, height, width)
-            self._say(self.approximations, "the sun as a few pixels of the environment")
+            self._note(self.approximations, "the sun is a few pixels of the environment")
         return image
 
 
 def ball(light):
-    """A lamp's body as a mesh of facets that shines alike. A convex body shows a quarter of its surface on average."""
+    """A lamp's sphere as a mesh with the lamp's power. A convex body shows a quarter of its surface on average."""
     points, triangles = icosphere(3)
     corners = points[triangles] * light.radius
     surface = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
@@ -192,7 +194,7 @@ def ball(light):
 
 
 def disc(toward, radius, irradiance, height, width, fine=8):
-    """A sun of so many radians about a direction, on the grid of `Scene.environment`: its pixels have its irradiance."""
+    """A sun's disc of angular `radius` around a direction, on the grid of `Scene.environment`, with its irradiance."""
     v = (np.arange(height * fine) + 0.5) / (height * fine) * np.pi
     rows = np.abs(v - np.arccos(np.clip(toward[1], -1, 1))) < radius + np.pi / height
     rows = np.repeat(rows.reshape(height, fine).any(1), fine)
@@ -206,7 +208,7 @@ def disc(toward, radius, irradiance, height, width, fine=8):
 
 
 def icosphere(times):
-    """Points of the unit sphere and triangles, an icosahedron's split into four so many times."""
+    """Points and triangles of the unit sphere: an icosahedron, with each triangle split into four, `times` times."""
     golden = (1 + 5**0.5) / 2
     points = [[0, s, t * golden] for s in (-1, 1) for t in (-1, 1)]
     points = np.array([np.roll(p, k) for k in range(3) for p in points], float)

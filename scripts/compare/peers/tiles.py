@@ -1,4 +1,4 @@
-"""Statistics of two sets of renders, by tiles of 16x16 pixels, and a picture of the difference."""
+"""Statistics of two sets of renders over tiles of 16x16 pixels, and a picture of the difference."""
 
 import io
 
@@ -6,16 +6,16 @@ import numpy as np
 from PIL import Image
 
 TILE = 16
-#: A tile counts if the standard error of its ratio is below this; it agrees if the ratio is this near to 1.
-SURE, NEAR = 0.01, 0.03
-#: Share of the tiles that must count, and how near to 1 the ratio of the means must be.
-COUNT, MEAN = 0.95, 0.01
-#: Relative difference of full colour in the picture.
-FULL = 0.1
+#: A tile counts if the standard error of its ratio is below MAX_ERROR; it agrees if the ratio is 1 within MAX_TILE_OFF.
+MAX_ERROR, MAX_TILE_OFF = 0.01, 0.03
+#: Smallest share of the tiles that must count, and largest deviation of the ratio of the means from 1.
+MIN_COUNTED, MAX_MEAN_OFF = 0.95, 0.01
+#: Relative difference with full colour in the picture.
+FULL_COLOUR = 0.1
 
 
 def tiled(pictures):
-    """Means over channels and tiles, (renders, rows, columns); pixels past the last whole tile join none."""
+    """Means over channels and tiles (renders, rows, columns). Pixels beyond the last whole tile are left out."""
     n, height, width, _ = pictures.shape
     rows, columns = height // TILE, width // TILE
     whole = pictures[:, : rows * TILE, : columns * TILE].mean(axis=-1)
@@ -23,31 +23,31 @@ def tiled(pictures):
 
 
 def ratio(ours, theirs):
-    """Ratio of the means over the first axis, and its standard error from the spread along it."""
+    """Ratio of the means over the first axis, and its standard error."""
     n, m = len(ours), len(theirs)
     a, b = ours.mean(axis=0), theirs.mean(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         r = a / b
         error = r * np.sqrt(ours.var(axis=0, ddof=1) / n / a**2 + theirs.var(axis=0, ddof=1) / m / b**2)
-    # Black in both is equal.
+    # Two black tiles are equal.
     black = (a == 0) & (b == 0)
     return np.where(black, 1.0, r), np.where(black, 0.0, error)
 
 
 def compare(ours, theirs):
-    """Figures of two sets of renders (renders, height, width, 3): ours against theirs."""
+    """Statistics of two sets of renders (renders, height, width, 3)."""
     not_finite = int(np.sum(~np.isfinite(ours)) + np.sum(~np.isfinite(theirs)))
     mean, mean_error = ratio(ours.mean(axis=(1, 2, 3)), theirs.mean(axis=(1, 2, 3)))
     r, error = ratio(tiled(ours), tiled(theirs))
-    sure = error < SURE
-    near = np.abs(r - 1) < NEAR
+    sure = error < MAX_ERROR
+    near = np.abs(r - 1) < MAX_TILE_OFF
     a, b = ours.mean(axis=0), theirs.mean(axis=0)
     relative = ((a - b) ** 2 / (b.mean(axis=-1, keepdims=True) ** 2 + 0.01)).mean()
-    # What noise alone would make of it.
+    # The part of relMSE that noise explains.
     variance = ours.var(axis=0, ddof=1) / len(ours) + theirs.var(axis=0, ddof=1) / len(theirs)
     noise = (variance / (b.mean(axis=-1, keepdims=True) ** 2 + 0.01)).mean()
     off = np.argwhere(sure & ~near)
-    # Single precision rounds; where there is no noise that would be all there is.
+    # Without noise, rounding to single precision is the only difference: at least 1e-5.
     z = (r - 1) / np.maximum(error, 1e-5)
     return {
         "mean_ratio": float(mean),
@@ -63,19 +63,23 @@ def compare(ours, theirs):
         "chi2_per_tile": float(np.mean(z**2)),
         "off": [[int(x) * TILE, int(y) * TILE, float(r[y, x]), float(error[y, x])] for y, x in off[:12]],
         "not_finite": not_finite,
-        "agrees": bool(abs(mean - 1) <= MEAN and not len(off) and sure.mean() >= COUNT and not not_finite),
+        "agrees": bool(
+            abs(mean - 1) <= MAX_MEAN_OFF and not len(off) and sure.mean() >= MIN_COUNTED and not not_finite
+        ),
     }
 
 
 def table(v):
-    """The figures in words."""
+    """The statistics as text."""
     lines = [
         f"{v['scene']}: caustique {v['method']}, {v['seeds']} x {v['iterations']} iterations; Mitsuba {v['mitsuba']}, "
         f"{v['seeds']} x {v['spp']} samples{', corrected' if v['corrected'] else ''}; {v['width']} x {v['height']}",
         f"  mean ratio      {v['mean_ratio']:.5f} +- {v['mean_ratio_error']:.5f}",
         f"  relMSE          {v['relmse']:.3e} ({v['relmse_noise']:.3e} of it is noise)",
-        f"  tiles           {v['tiles']}, {v['tiles_sure']} with a standard error below {SURE:.0%}; median {v['error_median']:.2%}",
-        f"  ratios of them  {v['ratio_least']:.4f} to {v['ratio_most']:.4f}; {v['tiles_off']} differ by {NEAR:.0%} or more",
+        f"  tiles           {v['tiles']}, {v['tiles_sure']} with a standard error below {MAX_ERROR:.0%}; "
+        f"median {v['error_median']:.2%}",
+        f"  tile ratios     {v['ratio_least']:.4f} to {v['ratio_most']:.4f}; "
+        f"{v['tiles_off']} differ by {MAX_TILE_OFF:.0%} or more",
         f"  chi2 per tile   {v['chi2_per_tile']:.2f}",
         f"  seconds         caustique {v['seconds_caustique']}, Mitsuba {v['seconds_mitsuba']}",
         f"  agrees          {'yes' if v['agrees'] else 'NO'}",
@@ -91,13 +95,13 @@ def _display(linear, scale):
 
 
 def _diverging(relative):
-    t = np.clip(relative / FULL, -1, 1)[..., None]
+    t = np.clip(relative / FULL_COLOUR, -1, 1)[..., None]
     grey, red, blue = np.array([0.95, 0.95, 0.95]), np.array([0.75, 0.05, 0.1]), np.array([0.1, 0.2, 0.75])
     return grey + np.maximum(t, 0) * (red - grey) + np.maximum(-t, 0) * (blue - grey)
 
 
 def picture(ours, theirs, path):
-    """Both pictures above, the relative difference by pixel and by tile below; tiles that do not count are hatched."""
+    """Write a PNG: both pictures above, the relative difference by pixel and by tile below, uncounted tiles hatched."""
     a, b = ours.mean(axis=0), theirs.mean(axis=0)
     scale = 0.5 / max(np.median(b.mean(axis=-1)), 1e-9)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -105,7 +109,7 @@ def picture(ours, theirs, path):
     r, error = ratio(tiled(ours), tiled(theirs))
     by_tile = np.full(b.shape, 0.5)
     blocks = np.kron(np.nan_to_num(r - 1), np.ones((TILE, TILE)))
-    hatched = np.kron(error >= SURE, np.ones((TILE, TILE))) > 0
+    hatched = np.kron(error >= MAX_ERROR, np.ones((TILE, TILE))) > 0
     hatched &= np.add.outer(np.arange(hatched.shape[0]), np.arange(hatched.shape[1])) % 6 == 0
     by_tile[: blocks.shape[0], : blocks.shape[1]] = np.where(hatched[..., None], 0.3, _diverging(blocks))
     above, below = (_display(a, scale), _display(b, scale)), (_diverging(by_pixel), by_tile)

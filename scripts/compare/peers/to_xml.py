@@ -1,4 +1,4 @@
-"""A glTF scene as a Mitsuba 3 file: the XML, and beside it a folder with meshes as PLY and images as EXR."""
+"""Converts a glTF scene to a Mitsuba 3 scene: an XML file, and a folder with meshes as PLY and images as EXR."""
 
 import xml.etree.ElementTree as ET
 
@@ -8,7 +8,7 @@ import mitsuba_world
 import numpy as np
 from mitsuba_materials import Materials
 
-#: Elements by the plug-ins that `world` and `materials` name.
+#: {XML element: plug-ins that `mitsuba_world` and `mitsuba_materials` use}
 TAGS = {
     "bsdf": "diffuse twosided plastic roughplastic dielectric roughdielectric thindielectric principled blendbsdf",
     "shape": "ply sphere disk",
@@ -23,23 +23,23 @@ TAGS = {
     "sampler": "independent",
 }
 TAG = {plugin: tag for tag, plugins in TAGS.items() for plugin in plugins.split()}
-#: Width of a picture whose scene asks for none.
-WIDTH = 640
+#: Default width in pixels, if the scene has none.
+DEFAULT_WIDTH = 640
 
 
-#: Rough ones: their function is not ours.
+#: Rough plug-ins, whose functions differ from caustique's.
 ROUGH = {"roughplastic": "rough matte surfaces", "roughdielectric": "rough glass", "principled": "metals"}
 
 
 def write(path, output, lose=gltf.refuse):
-    """Writes the scene at `path` with its first camera. `lose` is called with what is approximated or left out."""
+    """Convert the scene at `path` with its first camera. `lose` receives a text for each approximation or omission."""
     scene = gltf.read(path, lose)
     folder = output.with_suffix(".files")
     folder.mkdir(parents=True, exist_ok=True)
     writer = Writer(folder)
     root = gltf.extras(scene.document["scenes"][scene.document.get("scene", 0)])
     aspect = scene.cameras[0].aspect if scene.cameras else 1.0
-    width, height = root.get("resolution", [WIDTH, round(WIDTH / aspect)])
+    width, height = root.get("resolution", [DEFAULT_WIDTH, round(DEFAULT_WIDTH / aspect)])
     described = mitsuba_world.describe(scene, width, height, Materials(scene, False), writer.shape)
     kinds = set(_types(described))
     if kinds & {"point", "spot", "directional"} and kinds & {"dielectric", "thindielectric", "principled"}:
@@ -47,8 +47,7 @@ def write(path, output, lose=gltf.refuse):
     rough = sorted(ROUGH[kind] for kind in kinds & set(ROUGH))
     if rough:
         lose(
-            f"{', '.join(rough)}: Mitsuba's facets mask each other in another way, and light that they scatter more than once "
-            "is lost"
+            f"{', '.join(rough)}: Mitsuba's masking of facets differs, and light that they scatter more than once is lost"
         )
     element = ET.Element("scene", version="3.0.0")
     for name, value in described.items():
@@ -59,7 +58,7 @@ def write(path, output, lose=gltf.refuse):
 
 
 def _types(described):
-    """The plug-ins of all that is described."""
+    """The plug-ins in a description."""
     if isinstance(described, dict):
         yield described["type"]
         for part in described.values():
@@ -67,19 +66,19 @@ def _types(described):
 
 
 class Writer:
-    """Elements of values, and the files that they name."""
+    """Writes XML elements, and the files that they refer to."""
 
     def __init__(self, folder):
         self.folder, self.files = folder, 0
 
     def file(self, extension):
-        """The next file's path, and its name in the XML."""
+        """Path of the next file, and its name in the XML."""
         self.files += 1
         path = self.folder / f"{self.files}.{extension}"
         return path, f"{self.folder.name}/{path.name}"
 
     def shape(self, mesh, materials, inside):
-        """A mesh, its triangles in a file."""
+        """Write a mesh to a file. Returns its element's description."""
         path, name = self.file("ply")
         shape = mitsuba_world.make_mesh(mesh, materials, None)
         shape.write_ply(str(path))
@@ -95,13 +94,13 @@ class Writer:
         return described if inside is None else {**described, "interior": inside}
 
     def image(self, array):
-        """An image of scene-linear floats in a file; its name."""
+        """Write an image of scene-linear floats to a file. Returns its name."""
         path, name = self.file("exr")
         mi.Bitmap(np.ascontiguousarray(np.array(array), np.float32)).write(str(path))
         return name
 
     def add(self, parent, name, value):
-        """Adds a named value."""
+        """Add a named value to an element."""
         if isinstance(value, dict) and value["type"] == "rgb":
             colour = np.broadcast_to(value["value"], 3)
             ET.SubElement(parent, "rgb", name=name, value=" ".join(repr(float(x)) for x in colour))

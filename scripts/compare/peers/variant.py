@@ -1,4 +1,4 @@
-"""Which of Mitsuba's variants runs here: the vectorised one where there is an LLVM for it, the scalar one otherwise."""
+"""Chooses Mitsuba's variant: vectorised if a suitable LLVM is installed, else scalar."""
 
 import os
 import re
@@ -7,12 +7,12 @@ from pathlib import Path
 
 import mitsuba as mi
 
-#: LLVM 15 and 16 abort on kernels of Mitsuba 3.9.
+#: Oldest usable LLVM: 15 and 16 abort on kernels of Mitsuba 3.9.
 OLDEST = 17
 
 
 def choose(threads=0):
-    """Sets the variant, with so many threads (0: all), and returns its name."""
+    """Set the variant with `threads` threads (0: all). Returns its name."""
     patterns = ("libLLVM*.so.[0-9]*", "libLLVM-[0-9]*.so")
     libraries = [path for pattern in patterns for path in Path("/usr/lib").glob(f"*-linux-gnu/{pattern}")]
     known = {path: [int(n) for n in re.findall("[0-9]+", path.name)] for path in libraries}
@@ -25,7 +25,7 @@ def choose(threads=0):
             import drjit as dr
 
             dr.eval(dr.arange(mi.Float, 2) + 1)
-        except Exception as error:  # whatever Dr.Jit raises without LLVM
+        except Exception as error:  # Dr.Jit raises various errors without LLVM
             print(f"mitsuba: no LLVM ({error}); the scalar variant", file=sys.stderr)
             mi.set_variant("scalar_rgb")
     else:

@@ -75,7 +75,7 @@ def kill_render(output, shard):
 
 def wait_for_resume(log, shard):
     """Waits until a log reports that a shard continues from its checkpoint."""
-    message = f"shard {shard}/{options.shards} goes on from"
+    message = f"shard {shard}/{options.shards} continues from"
     wait_for(lambda: log.exists() and message in log.read_text(encoding="utf-8"))
 
 
