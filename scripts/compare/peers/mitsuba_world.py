@@ -113,7 +113,7 @@ def _light(light, center, radius, scene):
         }
     before_image = light.angle > 0.0 and environment and "color" not in environment
     if before_image:
-        scene.lose("a sun of some size before an image has no size")
+        scene.lose("a sun with a size becomes a point in front of an environment image")
     if light.angle == 0.0 or before_image:
         return {"type": "directional", "direction": axis.tolist(), "irradiance": strength}
     # A disc far away, in nearly the same direction from everywhere. It hides the environment, so its radiance is added.
