@@ -43,6 +43,8 @@ pub struct Shot {
     pub window: Option<[u32; 4]>,
     /// Factor on the iterations.
     pub effort: f64,
+    /// Factor on the photons of an iteration, of methods that take their number.
+    pub photons: u32,
     /// Longest path in segments.
     pub max_depth: u32,
     /// The scene is read as a stage of USD.
@@ -51,7 +53,7 @@ pub struct Shot {
 
 impl Shot {
     pub fn new(method: Method, camera: &str) -> Shot {
-        Shot { method, camera: camera.into(), window: None, effort: 1.0, max_depth: u32::MAX, usd: false }
+        Shot { method, camera: camera.into(), window: None, effort: 1.0, photons: 1, max_depth: u32::MAX, usd: false }
     }
 
     pub fn settings(&self, seed: u64) -> Settings {
@@ -67,7 +69,7 @@ impl Shot {
         Settings {
             method: self.method,
             seed,
-            photons,
+            photons: photons * self.photons,
             levels: Levels::new(1),
             iterations: Some((f64::from(iterations) * self.effort).ceil() as u64),
             alpha: self.method.alpha(),
