@@ -83,7 +83,7 @@ fn python_knows_all_layers() {
 
 #[test]
 fn scripts_know_all_methods() {
-    let method = |method: &Method| json!({"name": method.name(), "photons": method.counts_photons()});
+    let method = |method: &Method| json!({"name": method.name(), "photons": method.takes_photon_count()});
     let all: Vec<Value> = Method::ALL.iter().map(method).collect();
     compare("tests/methods.json", &format!("{:#}\n", Value::from(all)));
 }

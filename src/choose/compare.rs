@@ -10,7 +10,7 @@ use super::pilot_settings::WORST;
 use crate::film::{Picture, channel_mean};
 use crate::finish::cross_product::{PixelError, squared_errors};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
-use crate::render::{Candidate, Session, Stage};
+use crate::render::{Candidate, RenderInput, Session};
 use rayon::prelude::*;
 
 /// Iterations of a candidate: one for each quarter, and as many as its share of the pilot allows.
@@ -25,7 +25,7 @@ const TOLD: f64 = 2.0;
 
 /// A candidate and how it did.
 #[derive(Clone, Copy, Debug)]
-pub struct Trial {
+pub struct PilotResult {
     /// The candidate.
     pub candidate: Candidate,
     /// relMSE without the worst pixels that the finished picture is expected to have; infinite where nothing was seen.
@@ -58,8 +58,8 @@ struct Shown {
     noise: f64,
 }
 
-impl Trial {
-    /// The relative error: the root of [`Trial::squared_error`].
+impl PilotResult {
+    /// The relative error: the root of [`PilotResult::squared_error`].
     pub fn error(&self) -> f64 {
         self.squared_error.sqrt()
     }
@@ -68,7 +68,7 @@ impl Trial {
 impl<'a> CandidateRun<'a> {
     /// Nothing done yet but what comes before iterations, of which one costs so much in the small picture and the whole
     /// one.
-    pub fn new(stage: &'a Stage<'a>, candidate: Candidate, [once, whole]: [f64; 2]) -> CandidateRun<'a> {
+    pub fn new(stage: &'a RenderInput<'a>, candidate: Candidate, [once, whole]: [f64; 2]) -> CandidateRun<'a> {
         CandidateRun { candidate, session: Session::new(stage), once, whole, spent: 0.0 }
     }
 
@@ -206,7 +206,7 @@ pub(super) fn hold(
     finish: &mut Finish,
     (allowed, budget): (f64, f64),
     stop: &dyn Fn() -> bool,
-) -> Vec<Trial> {
+) -> Vec<PilotResult> {
     let all = candidates.len();
     let least = |left: &[Expected], open: &[bool]| {
         let open = (0..all).filter(|&k| open[k]);
@@ -230,13 +230,13 @@ pub(super) fn hold(
         left = both.map(|((first, second), open)| if *open { second } else { first }).collect();
     }
     let best = least(&left, &open);
-    let usual = candidates.iter().position(|candidate| candidate.candidate == Candidate::USUAL);
+    let usual = candidates.iter().position(|candidate| candidate.candidate == Candidate::DEFAULT);
     let usual = usual.filter(|&usual| open[usual] && !left[usual].is_clearly_worse(&left[best]));
     let chosen = usual.unwrap_or(best);
     let trial = |(index, (candidate, left)): (usize, (&CandidateRun<'_>, &Expected))| {
         let CandidateRun { candidate, whole, .. } = *candidate;
         let squared_error = left.squared_error();
-        Trial { candidate, squared_error, seconds_per_iteration: whole, chosen: index == chosen }
+        PilotResult { candidate, squared_error, seconds_per_iteration: whole, chosen: index == chosen }
     };
     candidates.iter().zip(&left).enumerate().map(trial).collect()
 }

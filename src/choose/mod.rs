@@ -13,13 +13,13 @@ mod pilot;
 mod pilot_settings;
 mod weights;
 
-pub use compare::Trial;
-pub use pilot_settings::settings as small;
-pub use weights::Weight;
+pub use compare::PilotResult;
+pub use pilot_settings::pilot_settings;
+pub use weights::EffectWeight;
 
 use crate::camera::Camera;
 use crate::finish::Finish;
-use crate::render::{Candidate, Clock, Cost, Session, Settings, Spent, Stage, cpu_seconds};
+use crate::render::{Candidate, Clock, Cost, RenderInput, Session, Settings, TimeSpent, cpu_seconds};
 use crate::scene::{Scene, View};
 use pilot::Pilot;
 use weights::Weighed;
@@ -31,21 +31,21 @@ pub struct Choice {
     /// The way.
     pub candidate: Candidate,
     /// All that were tried; none where the render is too short.
-    pub trials: Vec<Trial>,
+    pub pilots: Vec<PilotResult>,
     /// What effects of light mean to the picture; none where the render is too short.
-    pub weights: Vec<Weight>,
+    pub weights: Vec<EffectWeight>,
     /// Why nothing was tried.
-    pub because: Option<&'static str>,
+    pub reason: Option<&'static str>,
     /// Counted core-seconds of an iteration.
     pub seconds_per_iteration: f64,
     /// Time that it took.
-    pub spent: Spent,
+    pub spent: TimeSpent,
 }
 
 impl Choice {
     /// The trial of what was chosen.
-    pub fn trial(&self) -> Option<&Trial> {
-        self.trials.iter().find(|trial| trial.chosen)
+    pub fn chosen_pilot(&self) -> Option<&PilotResult> {
+        self.pilots.iter().find(|trial| trial.chosen)
     }
 }
 
@@ -61,10 +61,10 @@ pub fn choose(
     let gathering = make(Candidate::GATHERING)?;
     let pilot = Pilot::new(scene, camera, &gathering);
     let (weighed, weighing) = pilot.weigh();
-    let (trials, because) = pilot.try_all(weighing, finish, &make, &stop);
-    let chosen = trials.iter().find(|trial| trial.chosen);
+    let (pilots, reason) = pilot.try_all(weighing, finish, &make, &stop);
+    let chosen = pilots.iter().find(|pilot| pilot.chosen);
     let untried = || {
-        let candidates = pilot::focused(scene).iter().chain(&[Candidate::USUAL]);
+        let candidates = pilot::focused(scene).iter().chain(&[Candidate::DEFAULT]);
         candidates.copied().find(|candidate| make(*candidate).is_some()).unwrap_or(Candidate::GATHERING)
     };
     let candidate = chosen.map_or_else(untried, |chosen| chosen.candidate);
@@ -72,24 +72,24 @@ pub fn choose(
     let saving = |weighed: Weighed| weighed.saving(&pilot.cost, candidate, &settings, pilot.pixels);
     let weights = weighed.into_iter().map(saving).collect();
     let seconds_per_iteration = pilot.cost.of_film(candidate, &settings, camera);
-    let spent = Spent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
-    Some(Choice { settings, candidate, trials, weights, because, seconds_per_iteration, spent })
+    let spent = TimeSpent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
+    Some(Choice { settings, candidate, pilots, weights, reason, seconds_per_iteration, spent })
 }
 
 /// Core-seconds that an iteration is taken to cost, by counted work.
 pub fn counted_cost(scene: &Scene, camera: &Camera, candidate: Candidate, settings: &Settings) -> f64 {
-    let stage = Stage::new(scene, camera, settings);
+    let stage = RenderInput::new(scene, camera, settings);
     let session = Session::new(&stage);
     Cost::count(scene, camera, settings, session.guide()).of_film(candidate, settings, camera)
 }
 
 /// What an iteration of a film costs, by counted work, over what it would cost if the film were the whole picture.
-pub fn window_factor(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
+pub fn window_cost_ratio(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
     let [film, whole] = camera.sizes();
     if film == whole || !settings.method.walks_whole_picture() {
         return 1.0;
     }
-    let candidate = Candidate::plain(settings.method);
+    let candidate = Candidate::unguided(settings.method);
     let cost = Cost::count(scene, camera, settings, None);
     cost.of_film(candidate, settings, camera) / cost.of(candidate, settings, f64::from(film.0) * f64::from(film.1))
 }

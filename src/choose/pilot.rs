@@ -1,12 +1,12 @@
 //! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
 
-use super::compare::{self, CandidateRun, Trial};
-use super::pilot_settings;
+use super::compare::{self, CandidateRun, PilotResult};
+use super::pilot_settings::{self, pilot_settings};
 use super::weights::{self, Weighed};
 use crate::camera::Camera;
 use crate::finish::Finish;
 use crate::plan::{Effect, Presence};
-use crate::render::{Candidate, Cost, Method, Settings, Stage};
+use crate::render::{Candidate, Cost, Method, RenderInput, Settings};
 use crate::scene::Scene;
 
 /// Share of the render's cost that the pilot may take.
@@ -33,9 +33,9 @@ pub(super) fn focused(scene: &Scene) -> &'static [Candidate] {
     if scene.lights.targets().spheres().is_empty() {
         &[]
     } else if Method::Vcm.search().finds(Effect::Sds, &scene.survey) {
-        &[Candidate::FOCUSED, Candidate::USUAL]
+        &[Candidate::GUIDED, Candidate::DEFAULT]
     } else {
-        &[Candidate::FOCUSED_GATHERING, Candidate::GATHERING, Candidate::FOCUSED, Candidate::USUAL]
+        &[Candidate::GUIDED_GATHERING, Candidate::GATHERING, Candidate::GUIDED, Candidate::DEFAULT]
     }
 }
 
@@ -48,7 +48,7 @@ fn candidates(scene: &Scene, make: &impl Fn(Candidate) -> Option<Settings>) -> V
     if !focused.is_empty() {
         return focused.iter().find_map(with_settings).into_iter().collect();
     }
-    [Candidate::USUAL, Candidate::plain(Method::Path), Candidate::plain(Method::Bdpt)]
+    [Candidate::DEFAULT, Candidate::unguided(Method::Path), Candidate::unguided(Method::Bdpt)]
         .iter()
         .filter_map(with_settings)
         .collect()
@@ -119,7 +119,7 @@ impl<'a> Pilot<'a> {
         finish: &mut Finish,
         make: &impl Fn(Candidate) -> Option<Settings>,
         stop: &dyn Fn() -> bool,
-    ) -> (Vec<Trial>, Option<&'static str>) {
+    ) -> (Vec<PilotResult>, Option<&'static str>) {
         let Pilot { scene, camera, cost, pixels, budget, .. } = *self;
         let (candidates, focuses) = (candidates(scene, make), !focused(scene).is_empty());
         if candidates.len() < 2 {
@@ -141,9 +141,9 @@ impl<'a> Pilot<'a> {
         let (width, height) = small.size();
         let few = f64::from(width) * f64::from(height);
         // As many light paths for a pixel as in the render.
-        let stages: Vec<Stage<'_>> = candidates
+        let stages: Vec<RenderInput<'_>> = candidates
             .iter()
-            .map(|(_, settings)| Stage::new(scene, &small, &pilot_settings::settings(settings, few / pixels)))
+            .map(|(_, settings)| RenderInput::new(scene, &small, &pilot_settings(settings, few / pixels)))
             .collect();
         let mut candidates: Vec<CandidateRun<'_>> = stages
             .iter()
@@ -160,7 +160,7 @@ impl<'a> Pilot<'a> {
     /// little for the smallest picture; `None` where even that takes more than `most`.
     fn size(&self, candidates: &[(Candidate, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
         let once = |candidate: &Candidate, settings: &Settings, pixels: f64| {
-            self.cost.of(*candidate, &pilot_settings::settings(settings, pixels / self.pixels), pixels)
+            self.cost.of(*candidate, &pilot_settings(settings, pixels / self.pixels), pixels)
         };
         let dearest = |pixels: f64| {
             candidates.iter().map(|(candidate, settings)| once(candidate, settings, pixels)).fold(0.0, f64::max)

@@ -17,7 +17,7 @@ pub(super) const WORST: f64 = 0.01;
 
 /// Settings of a small render: those of the large one with a share of its light paths, in bandwidths as much wider as
 /// the same number of neighbours asks for.
-pub fn settings(of: &Settings, photons: f64) -> Settings {
+pub fn pilot_settings(of: &Settings, photons: f64) -> Settings {
     widened(of, photons, 1.0 / photons as f32)
 }
 
@@ -25,7 +25,7 @@ pub fn settings(of: &Settings, photons: f64) -> Settings {
 fn widened(of: &Settings, photons: f64, area: f32) -> Settings {
     Settings {
         photons: ((f64::from(of.photons) * photons) as u32).max(1),
-        widest: [of.widest[0] * area.sqrt(), of.widest[1] * area.cbrt()],
+        max_initial_bandwidth: [of.max_initial_bandwidth[0] * area.sqrt(), of.max_initial_bandwidth[1] * area.cbrt()],
         iterations: None,
         time: None,
         target_error: None,
@@ -38,15 +38,15 @@ fn widened(of: &Settings, photons: f64, area: f32) -> Settings {
 /// The same with all levels, level 1 by an eye path of its own, which [`values`] asks for.
 pub(super) fn with_levels(of: &Settings, photons: f64) -> Settings {
     // Bandwidths that follow counts shrink on their own.
-    let method = of.method.pilot();
+    let method = of.method.pilot_method();
     // One level alone is what of several is the second largest, of half the area.
     let larger = if of.levels.count == 1 { 2 } else { 1 };
-    let initial = match of.initial {
+    let initial_bandwidth = match of.initial_bandwidth {
         InitialBandwidth::Nearest(k) => InitialBandwidth::Nearest((larger * k).min(MAX_NEIGHBOURS)),
         other => other,
     };
     let levels = Levels::decorrelated(if method.has_levels() { MAX_LEVELS } else { 1 });
-    Settings { method, levels, initial, ..widened(of, photons, larger as f32 / photons as f32) }
+    Settings { method, levels, initial_bandwidth, ..widened(of, photons, larger as f32 / photons as f32) }
 }
 
 pub(super) fn mean(v: DVec3) -> f64 {

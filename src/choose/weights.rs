@@ -11,7 +11,7 @@ use crate::camera::Camera;
 use crate::estimator::PixelAccumulator;
 use crate::math::DVec3;
 use crate::plan::{ClassSet, Effect, Presence, switch};
-use crate::render::{Candidate, Cost, Session, Settings, Stage};
+use crate::render::{Candidate, Cost, RenderInput, Session, Settings};
 use crate::scene::Scene;
 use crate::stat::floor;
 
@@ -29,7 +29,7 @@ const TRIANGLE: f64 = 1e-6;
 
 /// What an effect means to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Weight {
+pub struct EffectWeight {
     /// The effect.
     pub effect: Effect,
     /// Its share of the picture's light; `None` where it has none of its own, but changes that of others.
@@ -42,7 +42,7 @@ pub struct Weight {
 
 /// A weight, and what an iteration of the scene without the effect is counted to cost, where it is another scene.
 pub(super) struct Weighed {
-    pub weight: Weight,
+    pub weight: EffectWeight,
     without: Option<Cost>,
 }
 
@@ -64,7 +64,7 @@ type Halves = [Vec<[DVec3; 5]>; 2];
 
 /// The pixels of a picture, and their parts.
 fn picture(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<PixelAccumulator>, Halves) {
-    let stage = Stage::new(scene, camera, settings);
+    let stage = RenderInput::new(scene, camera, settings);
     let mut session = Session::new(&stage);
     let mut advance = || {
         for _ in 0..HALF {
@@ -158,7 +158,7 @@ pub(super) fn weigh(
     let of_light = |effect: Effect, light: &[Vec<DVec3>; 2]| {
         let error_if_off = Some(scale.relmse(light).0.max(0.0).sqrt());
         Weighed {
-            weight: Weight { effect, energy: Some(scale.energy(light)), error_if_off, saved: None },
+            weight: EffectWeight { effect, energy: Some(scale.energy(light)), error_if_off, saved: None },
             without: None,
         }
     };
@@ -196,7 +196,7 @@ pub(super) fn weigh(
             None => (effect == Effect::Environment).then(|| scale.energy(&lost)),
         };
         let error_if_off = (relmse > TOLD * noise).then(|| relmse.sqrt());
-        let weight = Weight { effect, energy, error_if_off, saved: None };
+        let weight = EffectWeight { effect, energy, error_if_off, saved: None };
         weighed.push(Weighed { weight, without: Some(count(scene, &camera)) });
     }
     weighed
@@ -205,7 +205,7 @@ pub(super) fn weigh(
 impl Weighed {
     /// The weight, with the core-seconds of an iteration by `way` that leaving the effect out would save. `cost` is
     /// counted without a guide.
-    pub fn saving(self, cost: &Cost, candidate: Candidate, settings: &Settings, pixels: f64) -> Weight {
+    pub fn saving(self, cost: &Cost, candidate: Candidate, settings: &Settings, pixels: f64) -> EffectWeight {
         let saved = match self.without {
             // Of unguided paths it tells the share.
             Some(without) => {
@@ -215,7 +215,7 @@ impl Weighed {
             }
             None => saved(cost, (candidate, settings), self.weight.effect, pixels),
         };
-        Weight { saved: Some(saved), ..self.weight }
+        EffectWeight { saved: Some(saved), ..self.weight }
     }
 }
 

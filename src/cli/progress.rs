@@ -216,9 +216,9 @@ impl Reporter {
                 }
             }
             Form::Json => {
-                let Progress { iteration, iterations, seconds, remaining, light_paths, told, .. } = *progress;
+                let Progress { iteration, iterations, seconds, remaining, light_paths, error_coverage, .. } = *progress;
                 let error = progress.finished.or(progress.error);
-                let error_of = if progress.finished.is_some() { FINISHED_PICTURE } else { told.name() };
+                let error_of = if progress.finished.is_some() { FINISHED_PICTURE } else { error_coverage.name() };
                 let expected = progress.expected.map(|(error, seconds)| Expected { error, seconds });
                 let frame = self.turn.map(|turn| turn.frame);
                 let line =
@@ -274,7 +274,8 @@ fn sentence(progress: &Progress) -> String {
         }
         (Some(error), None) => text += &format!(", error {}", percent(error)),
         (None, _) => {
-            let error = progress.error.map(|error| format!(", error {}{}", percent(error), progress.told.note()));
+            let error =
+                progress.error.map(|error| format!(", error {}{}", percent(error), progress.error_coverage.note()));
             text += &error.unwrap_or_default();
         }
     }
@@ -316,12 +317,12 @@ mod tests {
             light_paths: 1_200_000,
             photons: 1,
             error: Some(0.031),
-            told: ErrorCoverage::All,
+            error_coverage: ErrorCoverage::All,
             finished: None,
             expected: None,
         };
         assert_eq!(sentence(&progress), "iteration 12 of 64, 3.1 s, 4 min 10 s left, 387 k photons/s, error 3.1 %");
-        let noise = Progress { told: ErrorCoverage::Noise, remaining: None, iterations: None, ..progress };
+        let noise = Progress { error_coverage: ErrorCoverage::Noise, remaining: None, iterations: None, ..progress };
         assert_eq!(sentence(&noise), "iteration 12, 3.1 s, 387 k photons/s, error 3.1 % (noise only)");
         let known = Progress { finished: Some(0.021), expected: Some((0.01, 40.0)), ..noise };
         assert_eq!(sentence(&known), "iteration 12, 3.1 s, 387 k photons/s, error 2.1 % now, 1.0 % in about 40.0 s");

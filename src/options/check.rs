@@ -9,13 +9,13 @@ use crate::transport::Indirect;
 /// Whether a method takes an option, by the name of its field.
 pub fn takes(option: &str, method: Method) -> bool {
     match option {
-        "photons" | "knn" => method.counts_photons(),
+        "photons" | "knn" => method.takes_photon_count(),
         "photon_memory" => method.has_one_map(),
         "levels" => method.has_levels(),
         "initial_bandwidth" => method.has_bandwidths(),
         "alpha" | "radius_rule" => method.takes_alpha(),
         "kernel" => method.takes_kernels(BandwidthRule::Memoryless),
-        "guide" => method.guides(),
+        "guide" => method.supports_guiding(),
         "indirect" => method.search_with_paths().is_some(),
         "debug_techniques" => method.has_techniques(),
         option => !option.starts_with("cppm_") || method.rules().contains(&BandwidthRule::ChiSquared),
@@ -69,7 +69,7 @@ impl RenderOptions {
         }
         let by_neighbours = self.initial_bandwidth == Some(BandwidthChoice::Knn);
         let contradicted = |option: &str| match option {
-            "initial_bandwidth" => by_neighbours && !method.counts_photons(),
+            "initial_bandwidth" => by_neighbours && !method.takes_photon_count(),
             "radius_rule" => self.radius_rule.is_some_and(|rule| !method.rules().contains(&rule.into())),
             "guide" => self.cppm_plus,
             "indirect" => local,

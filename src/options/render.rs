@@ -210,7 +210,7 @@ impl RenderOptions {
         let method = candidate.method;
         let guide = match self.guide {
             None => true,
-            Some(OnOff::On) => candidate.guided || !method.guides(),
+            Some(OnOff::On) => candidate.guided || !method.supports_guiding(),
             Some(OnOff::Off) => !candidate.guided,
         };
         let indirect = self.indirect.is_none_or(|asked| !method.gathers() || candidate.indirect == asked);
@@ -246,10 +246,10 @@ impl RenderOptions {
 
     /// What sets the largest initial bandwidth of a method with so many levels.
     fn initial(&self, method: Method, levels: usize) -> Result<InitialBandwidth> {
-        let usual = if method.counts_photons() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
+        let usual = if method.takes_photon_count() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
         match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
             (BandwidthChoice::Knn, k) => {
-                Ok(InitialBandwidth::Nearest(k.map_or(method.neighbours(levels), |k| k as usize)))
+                Ok(InitialBandwidth::Nearest(k.map_or(method.default_neighbours(levels), |k| k as usize)))
             }
             (_, Some(_)) => {
                 Err(Error::usage("--knn has no effect with this --initial-bandwidth").hint("leave one of the two out"))
@@ -283,13 +283,13 @@ impl RenderOptions {
         let settings = Settings {
             method,
             seed: self.seed_of_frame(),
-            photons: self.photons.unwrap_or(method.photons()),
+            photons: self.photons.unwrap_or(method.default_photons()),
             photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,
             techniques: false,
-            initial: self.initial(method, levels.count)?,
-            widest: [SCREEN_CAP; 2],
-            alpha: self.alpha.unwrap_or(method.alpha()),
+            initial_bandwidth: self.initial(method, levels.count)?,
+            max_initial_bandwidth: [SCREEN_CAP; 2],
+            alpha: self.alpha.unwrap_or(method.default_alpha()),
             volume_alpha: self.alpha.unwrap_or(VOLUME_ALPHA),
             radius_rule,
             kernel: self.kernel.unwrap_or_default(),

@@ -35,7 +35,7 @@ pub fn media(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
 pub fn bandwidth(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
     let radius = scene.lights.sky().radius;
     let least = LEAST_ASKED * radius;
-    match settings.initial {
+    match settings.initial_bandwidth {
         InitialBandwidth::Fixed(asked) if asked < least => {
             let cause = format!(
                 "--initial-bandwidth {asked}: in a scene of radius {radius:.3} single precision does not tell such lengths apart"

@@ -16,7 +16,7 @@ use std::io::{BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of every checkpoint.
-pub const MAGIC: &[u8; 23] = b"caustique checkpoint 5\n";
+pub const MAGIC: &[u8; 23] = b"caustique checkpoint 6\n";
 /// What checkpoints of all versions begin with.
 const KIND: &[u8] = b"caustique checkpoint ";
 /// Pixels packed together.
@@ -59,7 +59,7 @@ pub struct Head {
 /// The file system.
 pub fn write(path: &Path, head: &Head, state: State<&[PixelAccumulator]>) -> Result<()> {
     let head = serde_json::to_vec(head).map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
-    let (state, pixels) = state.exchange(());
+    let (state, pixels) = state.replace_pixels(());
     let state = postcard::to_allocvec(&state).map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
     atomic::write(path, |file| {
         let written = file
@@ -127,7 +127,7 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
         Ok(())
     });
     read.map_err(|_| damaged())?;
-    Ok((head, state.exchange(pixels).0))
+    Ok((head, state.replace_pixels(pixels).0))
 }
 
 /// Whether a checkpoint is of the render that is asked for.

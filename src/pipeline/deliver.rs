@@ -9,7 +9,7 @@ use crate::estimator::PixelAccumulator;
 use crate::film::{LayerSet, Naming, Selection};
 use crate::finish::{ERROR, Finished, FinishedError, reads};
 use crate::image::exr::{self, Attributes};
-use crate::render::{Accuracy, CONFIDENCE, Clock, History, Rendered, TechniquePicture, cpu_seconds, peak_memory};
+use crate::render::{Accuracy, CONFIDENCE, Clock, HistoryEntry, Rendered, TechniquePicture, cpu_seconds, peak_memory};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
@@ -64,9 +64,9 @@ pub(super) fn deliver(
     keep: bool,
 ) -> Result<(Delivery, Vec<PixelAccumulator>)> {
     let Writing { facts, selection, naming, plan, arguments, reproducible, more } = writing;
-    let mut header = rendered.account((!reproducible).then_some(rayon::current_num_threads()));
-    let (rejections, unseen) = (rendered.rejections(), rendered.unseen());
-    let of_estimate = rendered.relative_error();
+    let mut header = rendered.header((!reproducible).then_some(rayon::current_num_threads()));
+    let (rejections, unseen) = (rendered.rejections(), rendered.error.unseen);
+    let of_estimate = rendered.error.relative();
     let settings = rendered.settings.clone();
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let finishes = ready.is_some();
@@ -76,13 +76,13 @@ pub(super) fn deliver(
     attributes.frame = Some(facts.frame);
     attributes.moment = exr::Moment { number: facts.made_for.frame, rate: facts.made_for.frame_rate };
     let techniques = std::mem::take(&mut rendered.techniques);
-    let history = std::mem::take(&mut rendered.history);
+    let history = std::mem::take(&mut rendered.stats.history);
     let seen = if finishes { Seen::of(&rendered.pixels, &facts.named) } else { Seen::default() };
     // The pixels are most of the memory, and all that is wanted of them is in the layers.
     let pixels = if keep { rendered.pixels } else { Vec::new() };
     header.insert("plan".into(), plan.clone());
     header.insert("arguments".into(), arguments.clone());
-    let rejected = rejections.sentence().filter(|_| rejections.are_many());
+    let rejected = rejections.sentence().filter(|_| rejections.are_too_many());
     let mut warnings: Vec<&String> = facts.warnings.iter().chain(&rejected).collect();
     header.insert("warnings".into(), json!(warnings));
     if let Some(number) = facts.made_for.frame {
@@ -109,7 +109,7 @@ pub(super) fn deliver(
     };
     let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account.error));
     let error = of_finished.as_ref().map(Reached::error).or(of_estimate);
-    let unseen = unseen.sentence(&settings).filter(|_| error.is_some_and(|error| unseen.rules(error)));
+    let unseen = unseen.sentence(&settings).filter(|_| error.is_some_and(|error| unseen.dominates(error)));
     if let Some(sentence) = &unseen {
         warnings.push(sentence);
         header.insert("warnings".into(), json!(warnings));
@@ -158,13 +158,13 @@ pub(super) fn deliver(
 pub struct Reached {
     accuracy: Accuracy,
     /// The last moment judged with the picture as it is.
-    history: Vec<History>,
-    last: History,
+    history: Vec<HistoryEntry>,
+    last: HistoryEntry,
 }
 
 impl Reached {
     /// By a history and what the finish has told at its end; `None` where nothing is known.
-    fn of(mut history: Vec<History>, error: Option<FinishedError>) -> Option<Reached> {
+    fn of(mut history: Vec<HistoryEntry>, error: Option<FinishedError>) -> Option<Reached> {
         let last = history.last_mut()?;
         if error.is_some() {
             last.finished = error;
@@ -241,7 +241,7 @@ pub fn tell_stored(header: &mut Map<String, Value>, account: &Finished) {
     let timed = number("seconds").is_some();
     let unseen = header.get("unseen").and_then(|unseen| unseen.get("error")).and_then(Value::as_f64).unwrap_or(0.0);
     let error = account.error.map(|error| FinishedError { unseen: unseen * unseen, ..error });
-    let history = History {
+    let history = HistoryEntry {
         seconds: number("seconds").unwrap_or(0.0),
         cpu_seconds: number("cpu_seconds").unwrap_or(0.0),
         iterations,

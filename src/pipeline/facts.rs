@@ -4,8 +4,8 @@ use super::layers;
 use crate::film::output::Shape;
 use crate::image::exr;
 use crate::light::MAX_GROUPS;
-use crate::render::output::shape;
-use crate::render::{Part, Settings};
+use crate::render::output::layer_shape;
+use crate::render::{Settings, ShardResult};
 use crate::scene::description::PictureDefaults;
 use crate::scene::{CameraRequest, MAX_SIZE, Scene};
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ impl Facts {
         let [x, y, ..] = scene.window(request, (width, height))?.unwrap_or_default();
         let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
         Ok(Facts {
-            shape: shape(settings, scene),
+            shape: layer_shape(settings, scene),
             named: layers::Named::of(scene),
             frame: exr::Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc },
             warnings: scene.warnings.clone(),
@@ -47,13 +47,13 @@ impl Facts {
     }
 
     /// Whether they can be of a picture that is made of this part: a file can say anything.
-    pub(super) fn are_sound(&self, part: &Part) -> bool {
+    pub(super) fn are_sound(&self, part: &ShardResult) -> bool {
         let Settings { method, levels, .. } = &part.settings;
         let Shape { levels: count, own, compared, groups, .. } = &self.shape;
         let [width, height] = self.frame.display;
         let [x, y] = self.frame.corner;
         let inside = |corner: u32, size: u32, whole: u32| corner.checked_add(size).is_some_and(|end| end <= whole);
-        (*count, *own, *compared) == (levels.count, levels.own(), part.settings.compared_levels())
+        (*count, *own, *compared) == (levels.count, levels.picture_level(), part.settings.compared_levels())
             && (groups.is_empty() || method.has_techniques() && groups.len() <= MAX_GROUPS)
             && inside(x, part.size.0, width.min(MAX_SIZE))
             && inside(y, part.size.1, height.min(MAX_SIZE))

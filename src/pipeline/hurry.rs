@@ -2,8 +2,8 @@
 //! once, with as much work for a pixel.
 
 use crate::camera::Camera;
-use crate::choose::{small, window_factor};
-use crate::render::{Session, Settings, Stage};
+use crate::choose::{pilot_settings, window_cost_ratio};
+use crate::render::{RenderInput, Session, Settings};
 use crate::scene::View;
 
 /// Pixels of the smaller picture, at most.
@@ -18,7 +18,7 @@ const LEAST_SECONDS: f64 = 1.0;
 pub(super) fn warn(view: View<'_>, settings: &Settings) -> Option<String> {
     let time = settings.time?;
     let seconds = seconds(view, settings)?;
-    let remedy = match settings.method.counts_photons() {
+    let remedy = match settings.method.takes_photon_count() {
         true => "fewer --photons, a smaller --width or more --time",
         false => "a smaller --width or more --time",
     };
@@ -34,9 +34,9 @@ fn seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Option<f64>
     let walked = camera.sizes().map(count)[usize::from(settings.method.walks_whole_picture())];
     let pilot = camera.downscale((PIXELS.min(SHARE * walked) / pixels(camera)).sqrt());
     let share = pixels(&pilot) / pixels(camera);
-    let factor = window_factor(scene, camera, settings);
-    let settings = Settings { guided: false, ..small(settings, share) };
-    let stage = Stage::new(scene, &pilot, &settings);
+    let factor = window_cost_ratio(scene, camera, settings);
+    let settings = Settings { guided: false, ..pilot_settings(settings, share) };
+    let stage = RenderInput::new(scene, &pilot, &settings);
     let mut session = Session::new(&stage);
     let before = session.spent().seconds;
     session.step_within(None).then(|| factor * (session.spent().seconds - before) / share)

@@ -6,7 +6,7 @@
 use super::Ready;
 use crate::error::Result;
 use crate::finish::reads_for_error;
-use crate::render::{Accuracy, LEAST, Progress, Session, Spent};
+use crate::render::{Accuracy, MIN_ITERATIONS_FOR_ERROR, Progress, Session, TimeSpent};
 
 /// Without a target a picture is judged anew when it has had so many times the iterations.
 const RARELY: u64 = 4;
@@ -30,19 +30,19 @@ pub(super) fn judge(
         None => iterations >= RARELY * last,
         Some(target) => {
             let reached = known.is_some_and(|known| known.error(iterations) <= target);
-            session.records() || (reached && iterations as f64 >= (1.0 + NEAR) * last as f64)
+            session.is_recorded() || (reached && iterations as f64 >= (1.0 + NEAR) * last as f64)
         }
     };
-    if iterations < LEAST || iterations == last || !due {
+    if iterations < MIN_ITERATIONS_FOR_ERROR || iterations == last || !due {
         return Ok(known);
     }
-    let mut spent = Spent::default();
-    let judged = spent.during(|| {
+    let mut spent = TimeSpent::default();
+    let judged = spent.measure(|| {
         let set = session.layers(reads_for_error)?;
         ready.finish().estimate_error(&set)
     });
-    session.charge(spent);
-    session.judged(judged?);
+    session.add_time(spent);
+    session.record_finished_error(judged?);
     Ok(Accuracy::of(session.history()))
 }
 
@@ -57,7 +57,7 @@ pub(super) fn told(
     let Some(accuracy) = accuracy else { return *progress };
     let error = accuracy.error(session.iterations());
     let wanted = target.unwrap_or(0.5 * error);
-    let seconds = accuracy.iterations_to(wanted).map(|iterations| session.seconds_to(iterations));
+    let seconds = accuracy.iterations_to(wanted).map(|iterations| session.seconds_until(iterations));
     let expected = seconds.filter(|seconds| *seconds > 0.0).map(|seconds| (wanted, seconds));
     Progress { finished: Some(error), expected, ..*progress }
 }
@@ -71,6 +71,6 @@ pub(super) fn reached(progress: &Progress, session: &Session<'_>, accuracy: Opti
         None => progress.error,
     };
     // Without a light the black picture is right.
-    let error = error.or(session.is_dark().then_some(0.0));
-    iterations >= LEAST && error.is_some_and(|error| error <= target)
+    let error = error.or(session.has_no_lights().then_some(0.0));
+    iterations >= MIN_ITERATIONS_FOR_ERROR && error.is_some_and(|error| error <= target)
 }

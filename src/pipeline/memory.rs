@@ -38,7 +38,7 @@ fn needed(
     let light_paths = 1.0 + f64::from(u8::from(settings.levels.two_paths));
     let method = settings.method;
     let gathered = (f64::from(settings.photons) * per_light_path * PHOTON_BYTES as f64) as u64;
-    let (merged, photons) = match (method.counts_photons(), method.has_bandwidths()) {
+    let (merged, photons) = match (method.takes_photon_count(), method.has_bandwidths()) {
         _ if method.has_one_map() => (0, settings.photon_memory.min(gathered)),
         (true, _) => (0, gathered),
         (false, true) => ((light_paths * per_light_path * MERGED_BYTES as f64) as u64, 0),
@@ -53,7 +53,7 @@ fn needed(
     let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
     // Bandwidths of their own, and counts.
     let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
-    let state = match settings.rule() {
+    let state = match settings.bandwidth_rule() {
         Some(BandwidthRule::ChiSquared) => {
             // Guided, the largest weight as well.
             size_of::<chi_squared::Bandwidth>() + (cells + usize::from(settings.guided)) * size_of::<u32>()
@@ -129,8 +129,8 @@ impl Cap {
         let pixels = needs(&Settings { photons: 0, ..settings.clone() });
         let left = self.bytes.saturating_sub(pixels);
         let least = (f64::from(LEAST_PHOTONS) * per_light_path * PHOTON_BYTES as f64) as u64;
-        if !settings.method.counts_photons() || left < least {
-            let least = if settings.method.counts_photons() { pixels + least } else { whole };
+        if !settings.method.takes_photon_count() || left < least {
+            let least = if settings.method.takes_photon_count() { pixels + least } else { whole };
             let cause = format!(
                 "{} x {} pixels with --method {} need {} MiB at least, and --memory allows {mib}",
                 sizes[0].0,
@@ -166,14 +166,14 @@ pub fn check(view: View<'_>, settings: &Settings, channels: usize, finishes: boo
     let groups = scene.lights.groups().names.len();
     let needed = needed(camera.sizes(), (channels, groups), settings, photons_per_path(scene, camera, settings));
     let needed = needed + if finishes { finish_bytes(size, groups) } else { 0 };
-    let paths = if settings.method.counts_photons() {
+    let paths = if settings.method.takes_photon_count() {
         let each = if settings.method.has_one_map() { "" } else { " an iteration" };
         format!(" and {} light paths{each}", settings.photons)
     } else {
         format!(" with --method {}", settings.method.name())
     };
     let method = settings.method;
-    let fewer = match (method.counts_photons(), method.has_levels()) {
+    let fewer = match (method.takes_photon_count(), method.has_levels()) {
         (true, _) => "fewer --photons",
         (false, true) => "fewer --levels",
         (false, false) => "--crop for a part of the picture",

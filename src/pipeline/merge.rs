@@ -9,7 +9,7 @@ use super::shard::Open;
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
 use crate::film::Naming;
-use crate::render::{Part, Rendered, Settings};
+use crate::render::{Rendered, Settings, ShardResult};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -104,8 +104,9 @@ impl Shards {
     /// What is to be known of them before they are joined: shards that ended early, and those that are missing.
     pub fn warnings(&self) -> Vec<String> {
         let early = self.files.iter().filter_map(|(path, open)| {
-            let Part { settings, iterations, .. } = &open.part;
-            let total = settings.iterations_of_shard().filter(|total| iterations < total)?;
+            let ShardResult { settings, stats, .. } = &open.part;
+            let iterations = stats.iterations;
+            let total = settings.iterations_of_shard().filter(|total| iterations < *total)?;
             Some(format!("{}: ended after {iterations} of {total} iterations", path.display()))
         });
         let missing =
@@ -121,8 +122,8 @@ impl Shards {
         let arguments = self.arguments();
         let none = || Error::usage("there is no shard");
         let Shards { mut files, missing } = self;
-        let parts: Vec<Part> = files.iter().map(|(_, open)| open.part.clone()).collect();
-        let part = Part::join(&parts).ok_or_else(none)?;
+        let parts: Vec<ShardResult> = files.iter().map(|(_, open)| open.part.clone()).collect();
+        let part = ShardResult::merge(&parts).ok_or_else(none)?;
         let (facts, plan) =
             files.first().map(|(_, open)| (open.facts.clone(), open.head.plan.clone())).ok_or_else(none)?;
         let selection = layers::selection(&order.layers, &facts.shape, order.finish.is_some())?;
@@ -147,8 +148,7 @@ impl Shards {
             reproducible: order.reproducible,
             more,
         };
-        let mut rendered = part.rendered(pixels);
-        rendered.close_history();
+        let rendered = part.with_pixels(pixels);
         watch(Step::Finishes(&rendered, ready.as_ref().and_then(|ready| ready.missing.as_ref())));
         deliver(writing, rendered, (ready.as_mut(), None), false).map(|(delivery, _)| delivery)
     }
@@ -181,13 +181,13 @@ fn check((first, whole): (&Path, &Open), (path, open): (&Path, &Open)) -> Result
         let cause = format!("was rendered with another --{key} than {first}: {here} here, {there} there");
         return Err(error(cause).hint("merge shards of one render"));
     }
-    let of = |part: &Part| {
+    let of = |part: &ShardResult| {
         let Settings { shard, method, levels, .. } = part.settings;
         (part.size, shard.count, method, levels)
     };
     if of(&open.part) != of(&whole.part) || open.head.candidate != whole.head.candidate {
         let [here, there] = [open, whole].map(|of| {
-            let Part { settings, size: (width, height), .. } = &of.part;
+            let ShardResult { settings, size: (width, height), .. } = &of.part;
             format!("one of {} shards by {} at {width} x {height}", settings.shard.count, settings.method.name())
         });
         let cause = format!("is {here}, {first} is {there}");

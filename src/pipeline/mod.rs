@@ -42,8 +42,10 @@ use crate::finish::{Finish, reads_for_picture};
 use crate::image::atomic::is_same_file;
 use crate::image::exr;
 use crate::plan::{Plan, Switches};
-use crate::render::output::shape;
-use crate::render::{Candidate, Control, Progress, Rendered, Session, Settings, Spent, Stage, StopReason, drive};
+use crate::render::output::layer_shape;
+use crate::render::{
+    Candidate, Control, Progress, RenderInput, Rendered, Session, Settings, StopReason, TimeSpent, drive,
+};
 use crate::scene::{CameraRequest, Scene, View};
 use crate::stop::Stop;
 use serde_json::{Map, Value, json};
@@ -204,7 +206,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     let mut plan = plan::plan(&asked, settings.method, view, removed);
     plan.warnings.extend(less);
     plan.warnings.extend(ungrouped(scene, &settings));
-    let dark = layers::dark(&selection, &shape(&settings, scene), order.finish.is_some());
+    let dark = layers::dark(&selection, &layer_shape(&settings, scene), order.finish.is_some());
     plan.warnings.extend(dark.iter().map(|name| format!("layer \"{name}\" is black: the render has no such light")));
     let (mut ready, settings) = readied(&order, view, settings, &selection, watch)?;
     // The error that is asked for is that of the picture that is delivered.
@@ -221,11 +223,11 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
     // As a plan of its own tells it.
     plan.warnings.splice(0..0, scene.warnings.iter().cloned());
     let facts = Facts::new(scene, &order.camera, &settings)?;
-    let stage = Stage::new(scene, &camera, &settings);
+    let stage = RenderInput::new(scene, &camera, &settings);
     let (mut session, told) = match saved {
         None => {
             let spent = choice.as_ref().map(|choice| choice.spent).unwrap_or_default();
-            (Session::after(&stage, spent), json!(plan))
+            (Session::with_time_spent(&stage, spent), json!(plan))
         }
         Some((head, state)) => {
             watch.resumed(state.iterations());
@@ -285,7 +287,7 @@ pub fn render_loaded(mut order: Order<'_>, loaded: &Loaded, watch: &mut dyn Watc
         reproducible: order.reproducible,
         more: Map::new(),
     };
-    let part = rendered.settings.is_shard().then(|| rendered.part());
+    let part = rendered.settings.is_shard().then(|| rendered.shard_result());
     let delivered = deliver(writing, rendered, (ready.as_mut(), Some(watch)), part.is_some());
     watch.waits(None);
     let (delivery, pixels) = delivered?;
@@ -308,7 +310,7 @@ impl Order<'_> {
 /// What is to be said where lights have groups and the method does not tell them apart.
 fn ungrouped(scene: &Scene, settings: &Settings) -> Option<String> {
     let groups = scene.lights.groups().names.len();
-    let lost = groups > 0 && shape(settings, scene).groups.is_empty();
+    let lost = groups > 0 && layer_shape(settings, scene).groups.is_empty();
     let name = settings.method.name();
     lost.then(|| format!("its {groups} light groups have no layers: --method {name} does not tell lights apart (auto, path, light, bdpt, bpm and vcm do)"))
 }
@@ -323,8 +325,8 @@ fn preview(session: &mut Session<'_>, ready: Option<&mut Ready>, frame: &exr::Fr
     if !watch.looks() {
         return;
     }
-    let mut spent = Spent::default();
-    spent.during(|| {
+    let mut spent = TimeSpent::default();
+    spent.measure(|| {
         let wanted = |name: &str| name.is_empty() || (ready.is_some() && reads_for_picture(name));
         let picture = session.layers(wanted).and_then(|mut set| {
             if let Some(ready) = ready {
@@ -335,7 +337,7 @@ fn preview(session: &mut Session<'_>, ready: Option<&mut Ready>, frame: &exr::Fr
         });
         watch.picture(picture, frame);
     });
-    session.charge(spent);
+    session.add_time(spent);
 }
 
 /// The settings for the picture's size, and the layers that are wanted, once both are known to fit the scene.
@@ -344,7 +346,7 @@ fn checked(order: &Order<'_>, view: View<'_>) -> Result<(Settings, Selection)> {
     check::media(&order.scene.path, &order.settings, scene)?;
     check::bandwidth(&order.scene.path, &order.settings, scene)?;
     let settings = sized(order.settings.clone(), order.photons, camera.size());
-    let (shape, finishes) = (shape(&settings, scene), order.finish.is_some());
+    let (shape, finishes) = (layer_shape(&settings, scene), order.finish.is_some());
     let selection = layers::selection(&order.layers, &shape, finishes)?;
     layers::check_names(&selection, &shape, finishes, order.naming)?;
     // Before anything is tried, which takes time.
@@ -354,7 +356,7 @@ fn checked(order: &Order<'_>, view: View<'_>) -> Result<(Settings, Selection)> {
 
 /// Settings that fit into memory, and what the cap that was asked for takes from them.
 fn fitted(order: &Order<'_>, view: View<'_>, settings: Settings) -> Result<(Settings, Option<String>)> {
-    let channels = layers::channels(&shape(&settings, view.scene));
+    let channels = layers::channels(&layer_shape(&settings, view.scene));
     let (settings, less) = match order.memory {
         Some(cap) => cap.plan(view, settings, channels)?,
         None => (settings, None),
@@ -365,7 +367,7 @@ fn fitted(order: &Order<'_>, view: View<'_>, settings: Settings) -> Result<(Sett
 
 /// Settings for a picture of that size: what the number of light paths follows from where none is asked for.
 pub fn sized(settings: Settings, photons: Option<u32>, size: (u32, u32)) -> Settings {
-    Settings { photons: photons.unwrap_or(settings.usual_photons(size)), ..settings }
+    Settings { photons: photons.unwrap_or(settings.default_photons(size)), ..settings }
 }
 
 /// What auto chooses, where it is to: among ways whose pictures have the layers asked for.
@@ -379,8 +381,9 @@ fn choose(
     let chosen = match auto {
         None => None,
         Some(mut auto) => {
-            let has_layers =
-                |of: &Settings| layers::selection(&order.layers, &shape(of, scene), order.finish.is_some()).is_ok();
+            let has_layers = |of: &Settings| {
+                layers::selection(&order.layers, &layer_shape(of, scene), order.finish.is_some()).is_ok()
+            };
             let techniques = settings.techniques;
             let make = |candidate: Candidate| {
                 let able = !techniques || candidate.method.has_techniques();
@@ -410,7 +413,7 @@ fn readied(
     let mut ready = finish::open(asked, Some(settings.levels.count))?;
     watch.finishes(ready.missing.as_ref());
     let Some(time) = settings.time else { return Ok((Some(ready), settings)) };
-    let parts = film::names(&shape(&settings, scene));
+    let parts = film::names(&layer_shape(&settings, scene));
     let wanted = parts.iter().filter_map(|name| finished_part(name)).filter(|part| selection.wants(part)).count();
     let (width, height) = camera.size();
     let left = time - ready.reserve(time, width as usize * height as usize, wanted)?;

@@ -2,10 +2,10 @@
 //! pixel, goes on for some seconds, is finished and judged as the render will be, and its decay is carried on.
 
 use crate::camera::Camera;
-use crate::choose::small;
+use crate::choose::pilot_settings;
 use crate::error::Result;
 use crate::finish::{Finish, reads_for_error};
-use crate::render::{Accuracy, LEAST, Session, Settings, Spent, Stage};
+use crate::render::{Accuracy, MIN_ITERATIONS_FOR_ERROR, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::View;
 use serde::Serialize;
 
@@ -44,18 +44,18 @@ pub fn outlook(
     let pixels = |camera: &Camera| f64::from(camera.size().0) * f64::from(camera.size().1);
     let pilot = camera.downscale((PIXELS / pixels(camera)).sqrt().min(1.0));
     let share = pixels(&pilot) / pixels(camera);
-    let stage = Stage::new(scene, &pilot, &small(settings, share));
+    let stage = RenderInput::new(scene, &pilot, &pilot_settings(settings, share));
     let mut session = Session::new(&stage);
     let before = session.spent();
-    let mut next = LEAST;
+    let mut next = MIN_ITERATIONS_FOR_ERROR;
     loop {
         session.step();
         let (done, spent) = (session.iterations(), session.spent());
-        let over = done >= ENOUGH || (done >= LEAST && spent.seconds >= SECONDS);
+        let over = done >= ENOUGH || (done >= MIN_ITERATIONS_FOR_ERROR && spent.seconds >= SECONDS);
         if done == next || over {
             next = 2 * done;
             let set = session.layers(reads_for_error)?;
-            session.judged(finish.estimate_error(&set)?);
+            session.record_finished_error(finish.estimate_error(&set)?);
         }
         if over {
             break;
@@ -65,8 +65,8 @@ pub fn outlook(
     let done = session.iterations();
     let reached = accuracy.error(done);
     let Some(iterations) = accuracy.iterations_to(error) else { return Ok(None) };
-    let iterations = iterations.max(LEAST as f64);
-    let Spent { seconds, cpu_seconds } = session.spent();
+    let iterations = iterations.max(MIN_ITERATIONS_FOR_ERROR as f64);
+    let TimeSpent { seconds, cpu_seconds } = session.spent();
     let of_render = |spent: f64, once: f64| once + (spent - once) / done as f64 / share * iterations;
     Ok(Some(Outlook {
         error,

@@ -1,6 +1,6 @@
 //! The plan of a render, with what a pilot has measured.
 
-use crate::choose::{Choice, Trial};
+use crate::choose::{Choice, PilotResult};
 use crate::plan::switch::Removed;
 use crate::plan::{self, Plan, Switches};
 use crate::render::Method;
@@ -40,11 +40,12 @@ pub fn plan(asked: &Asked<'_>, method: Method, View { scene, camera }: View<'_>,
 
 /// Why auto has chosen what it has.
 pub fn why(choice: &Choice) -> String {
-    let because = choice.because.map(|because| format!(", for {because}")).unwrap_or_default();
-    let Some(trial) = choice.trial() else { return format!("auto: {}{because}", choice.candidate.name()) };
-    let mut others: Vec<&Trial> = choice.trials.iter().filter(|other| other.candidate != trial.candidate).collect();
+    let because = choice.reason.map(|because| format!(", for {because}")).unwrap_or_default();
+    let Some(trial) = choice.chosen_pilot() else { return format!("auto: {}{because}", choice.candidate.name()) };
+    let mut others: Vec<&PilotResult> =
+        choice.pilots.iter().filter(|other| other.candidate != trial.candidate).collect();
     others.sort_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
-    let error = |trial: &Trial| match trial.squared_error {
+    let error = |trial: &PilotResult| match trial.squared_error {
         squared if squared.is_infinite() => "nothing seen".into(),
         // Below what the pilot's own noise can tell.
         squared if squared == f64::MIN_POSITIVE => "too little to tell".into(),

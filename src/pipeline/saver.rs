@@ -3,7 +3,7 @@
 use super::Watch;
 use super::checkpoint::{self, Head, Saving};
 use crate::error::{Error, ErrorKind, Result};
-use crate::render::{Clock, Session, Spent, StopReason};
+use crate::render::{Clock, Session, StopReason, TimeSpent};
 use std::path::PathBuf;
 
 /// Saves a render every so often.
@@ -30,9 +30,9 @@ impl<'a> Saver<'a> {
         if self.clock.seconds() < self.next {
             return;
         }
-        let mut spent = Spent::default();
-        spent.during(|| self.save(session, watch));
-        session.charge(spent);
+        let mut spent = TimeSpent::default();
+        spent.measure(|| self.save(session, watch));
+        session.add_time(spent);
         self.next = self.clock.seconds() + self.saving.every;
     }
 

@@ -10,13 +10,13 @@ use super::facts::Facts;
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
-use crate::render::Part;
+use crate::render::ShardResult;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// The last bytes of a file with such a tail.
-pub const MARK: &[u8; 8] = b"caustqS3";
+pub const MARK: &[u8; 8] = b"caustqS4";
 /// The length and the mark.
 const END: i64 = 16;
 
@@ -27,7 +27,7 @@ pub struct Tail {
     /// What is known of its scene.
     pub facts: Facts,
     /// What it is besides its pixels.
-    pub part: Part,
+    pub part: ShardResult,
     /// Its pixels.
     pub pixels: Vec<PixelAccumulator>,
 }
@@ -58,7 +58,7 @@ pub struct Open {
     /// What is known of its scene.
     pub facts: Facts,
     /// What it is besides its pixels.
-    pub part: Part,
+    pub part: ShardResult,
     file: BufReader<File>,
 }
 
@@ -80,7 +80,7 @@ impl Open {
                 Error::new(ErrorKind::Usage, path.display(), cause).hint("merge it with the version that made it")
             );
         }
-        let (facts, part): (Facts, Part) =
+        let (facts, part): (Facts, ShardResult) =
             postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
         let arguments = head.arguments.is_object();
         if !(part.is_sound() && facts.are_sound(&part) && arguments) {

@@ -40,21 +40,27 @@ pub fn peak_memory() -> u64 {
 
 /// Time that a render has taken: its own, not that of others between its iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Spent {
+pub struct TimeSpent {
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Processor seconds of the whole process.
     pub cpu_seconds: f64,
 }
 
-impl Spent {
+impl TimeSpent {
     /// Does some work and adds the time it takes.
-    pub fn during<T>(&mut self, work: impl FnOnce() -> T) -> T {
+    pub fn measure<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let (clock, cpu_start) = (Clock::start(), cpu_seconds());
         let done = work();
         self.seconds += clock.seconds();
         self.cpu_seconds += cpu_seconds() - cpu_start;
         done
+    }
+
+    /// Adds other time.
+    pub fn add(&mut self, other: TimeSpent) {
+        self.seconds += other.seconds;
+        self.cpu_seconds += other.cpu_seconds;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::image::Errors;
 use crate::peers::Peer;
-use crate::render::{Settings, Spent};
+use crate::render::{Settings, TimeSpent};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -16,7 +16,7 @@ pub struct Entry {
     /// Its settings; seeds are the race's.
     pub settings: Settings,
     /// Time that choosing the settings took, which counts as a render's own.
-    pub decided: Spent,
+    pub decided: TimeSpent,
     /// What finishes its pictures, if they are finished.
     pub finish: Option<String>,
 }
@@ -24,7 +24,7 @@ pub struct Entry {
 impl Entry {
     /// Its settings as data: those that say something to its method.
     pub fn object(&self) -> Value {
-        let Settings { method, levels, photons, alpha, initial, max_depth, .. } = self.settings;
+        let Settings { method, levels, photons, alpha, initial_bandwidth, max_depth, .. } = self.settings;
         let mut object = json!({
             "name": self.name,
             "options": self.options,
@@ -32,12 +32,12 @@ impl Entry {
             "levels": levels.count,
             "max_depth": (max_depth < u32::MAX).then_some(max_depth),
         });
-        if method.counts_photons() {
+        if method.takes_photon_count() {
             object["photons"] = photons.into();
         }
         if method.has_bandwidths() {
             object["alpha"] = alpha.into();
-            object["initial_bandwidth"] = format!("{initial:?}").into();
+            object["initial_bandwidth"] = format!("{initial_bandwidth:?}").into();
         }
         object
     }

@@ -10,7 +10,7 @@ use crate::film::Picture;
 use crate::finish::{Denoiser, Estimate, Quality};
 use crate::image::errors;
 use crate::peers::{Answer, Drivers, Peer, Rendering, Task};
-use crate::render::{Method, Session, Settings, Spent, Stage};
+use crate::render::{Method, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::Scene;
 
 /// Budgets double from this share of the whole time.
@@ -50,7 +50,7 @@ impl Denoising {
     /// Memory's alone.
     pub fn new(denoiser: Denoiser, scene: &Scene, camera: &Camera, seed: u64) -> Result<Denoising> {
         let settings = Settings { method: Method::Path, seed, ..Settings::default() };
-        let stage = Stage::new(scene, camera, &settings);
+        let stage = RenderInput::new(scene, camera, &settings);
         let mut session = Session::new(&stage);
         (0..GUIDES).for_each(|_| {
             session.step();
@@ -61,7 +61,7 @@ impl Denoising {
     }
 
     /// The denoised picture, and what that took.
-    fn run(&mut self, picture: &Picture) -> Result<(Picture, Spent)> {
+    fn run(&mut self, picture: &Picture) -> Result<(Picture, TimeSpent)> {
         let estimate = Estimate {
             mean: picture.clone(),
             deviation: Picture::filled(picture.size(), [0.0; 3]),
@@ -69,8 +69,8 @@ impl Denoising {
             normal: self.normal.clone(),
             alpha: None,
         };
-        let mut spent = Spent::default();
-        let denoised = spent.during(|| self.denoiser.run(&estimate, Quality::High))?;
+        let mut spent = TimeSpent::default();
+        let denoised = spent.measure(|| self.denoiser.run(&estimate, Quality::High))?;
         Ok((denoised, spent))
     }
 }
@@ -157,7 +157,7 @@ impl Guests {
             account.unfinished += 1;
             return Made::Nothing;
         }
-        let point = |picture: &Picture, denoised: Option<Spent>| {
+        let point = |picture: &Picture, denoised: Option<TimeSpent>| {
             let more = denoised.unwrap_or_default();
             Some(Point {
                 line: 0,

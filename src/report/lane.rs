@@ -4,7 +4,7 @@ use super::entry::Moments;
 use crate::error::Result;
 use crate::film::Picture;
 use crate::finish::{Finish, reads_for_picture};
-use crate::render::{Session, Spent};
+use crate::render::{Session, TimeSpent};
 
 /// When runs stop and where they are measured.
 #[derive(Clone, Debug)]
@@ -26,7 +26,7 @@ pub(super) struct Lane<'a> {
     pub(super) session: Session<'a>,
     pub(super) moments: Moments,
     /// Times of the finish.
-    pub(super) finishings: Vec<Spent>,
+    pub(super) finishings: Vec<TimeSpent>,
     /// Iterations that were measured.
     pub(super) measured: u64,
     /// Whether it goes on.
@@ -41,7 +41,7 @@ impl<'a> Lane<'a> {
 
     /// The median of the times of the finish, by wall clock. The first use of a network is slower than those after it,
     /// and so is one that the machine disturbs.
-    pub(super) fn finishing(&self) -> Option<Spent> {
+    pub(super) fn finishing(&self) -> Option<TimeSpent> {
         let mut times = self.finishings.clone();
         times.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
         times.get(times.len() / 2).copied()
@@ -67,9 +67,9 @@ impl<'a> Lane<'a> {
 
     /// The picture, finished.
     pub(super) fn finished(&mut self, finish: &mut Finish) -> Result<Picture> {
-        let mut spent = Spent::default();
+        let mut spent = TimeSpent::default();
         let session = &mut self.session;
-        let picture = spent.during(|| {
+        let picture = spent.measure(|| {
             // Quarters and parts are for those who look closer.
             let mut set = session.layers(|name| name.is_empty() || reads_for_picture(name))?;
             finish.apply(&mut set, |_| false)?;

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::film::Picture;
 use crate::finish::Finish;
 use crate::image::errors;
-use crate::render::{Rendered, Spent, StopReason};
+use crate::render::{Rendered, StopReason, TimeSpent};
 
 /// Who takes part.
 pub struct Field<'a> {
@@ -146,7 +146,7 @@ impl Outcome {
     }
 
     /// Adds the finish's time to all points of finished pictures.
-    fn charge(&mut self, of: Of, seed: u64, finish: Spent) {
+    fn charge(&mut self, of: Of, seed: u64, finish: TimeSpent) {
         let line = self.line(of);
         for point in self.points.iter_mut().filter(|point| point.line == line && point.seed == seed) {
             point.seconds += finish.seconds;
@@ -177,7 +177,7 @@ impl Outcome {
     fn add(&mut self, of: Of, picture: &Picture, lane: &Lane<'_>, look: &Look<'_>) -> Result<()> {
         let Some(errors) = errors(picture, &look.reference.picture) else { return Ok(()) };
         let spent = lane.session.spent();
-        let estimate = lane.session.estimate().filter(|_| of.is_raw());
+        let estimate = lane.session.estimate_error().estimate.filter(|_| of.is_raw());
         let point = Point {
             line: 0,
             seed: look.seed,

@@ -1,7 +1,7 @@
 //! What is measured.
 
 use crate::image::Errors;
-use crate::render::{Phases, Spent};
+use crate::render::{Phases, TimeSpent};
 
 /// A curve measured at a moment.
 #[derive(Clone, Debug)]
@@ -39,9 +39,9 @@ pub struct Ending {
     /// Iterations done.
     pub iterations: u64,
     /// Time of pilot and iterations.
-    pub spent: Spent,
+    pub spent: TimeSpent,
     /// Core-seconds by phase.
     pub phases: Phases,
     /// Time of the finish: the median of its uses.
-    pub finish: Option<Spent>,
+    pub finish: Option<TimeSpent>,
 }

@@ -12,7 +12,7 @@ use super::point::Point;
 use super::reference::Reference;
 use super::spool::Spool;
 use crate::error::Result;
-use crate::render::{Control, Session, Settings, Stage};
+use crate::render::{Control, RenderInput, Session, Settings};
 use crate::scene::View;
 use std::collections::VecDeque;
 use std::path::Path;
@@ -55,10 +55,10 @@ pub fn race(
         let of_entry = |entry: &Entry| {
             let settings =
                 Settings { seed, iterations: None, time: None, target_error: None, ..entry.settings.clone() };
-            Stage::new(scene, camera, &settings)
+            RenderInput::new(scene, camera, &settings)
         };
-        let stages: Vec<Stage<'_>> = entries.iter().map(of_entry).collect();
-        let sessions = stages.iter().zip(entries).map(|(stage, entry)| Session::after(stage, entry.decided));
+        let stages: Vec<RenderInput<'_>> = entries.iter().map(of_entry).collect();
+        let sessions = stages.iter().zip(entries).map(|(stage, entry)| Session::with_time_spent(stage, entry.decided));
         let mut lanes: Vec<Lane<'_>> = sessions.map(|session| Lane::new(session, rules)).collect();
         let mut turns: VecDeque<Turn> = field.guests.iter().flat_map(Guests::turns).collect();
         let all = turns.len();

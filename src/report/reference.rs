@@ -11,7 +11,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Picture, Size};
 use crate::image::exr::{self, Attributes};
 use crate::image::{Errors, errors};
-use crate::render::{Control, Session, Settings, Stage};
+use crate::render::{Control, RenderInput, Session, Settings};
 use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -160,14 +160,15 @@ impl Halves {
     ) -> Halves {
         // Numbers that nobody gives to a render.
         let seeds = [0, 1].map(|half| settings.seed ^ (0x8000_cafe_0000_0000 + half));
-        let stages = seeds.map(|seed| Stage::new(scene, camera, &Settings { seed, ..settings.clone() }));
+        let stages = seeds.map(|seed| RenderInput::new(scene, camera, &Settings { seed, ..settings.clone() }));
         let [mut a, mut b] = [0, 1].map(|half| Session::new(&stages[half]));
         loop {
             a.step();
             b.step();
             let seconds = a.spent().seconds + b.spent().seconds;
             let stopped = observe(a.iterations(), seconds) == Control::Stop;
-            if a.iterations() >= 2 && (stopped || a.finished() || settings.time.is_some_and(|time| seconds >= time)) {
+            if a.iterations() >= 2 && (stopped || a.is_finished() || settings.time.is_some_and(|time| seconds >= time))
+            {
                 break;
             }
         }

@@ -243,7 +243,7 @@ pub(super) fn runs(subject: &Subject) -> Markup {
                         td { (method.name()) }
                         td.number { (settings.levels.count) }
                         td { (entry.finish.as_deref().unwrap_or("off")) }
-                        td.number { (if method.counts_photons() { settings.photons.to_string() } else { "–".into() }) }
+                        td.number { (if method.takes_photon_count() { settings.photons.to_string() } else { "–".into() }) }
                         td.number { (if method.has_bandwidths() { short(settings.alpha) } else { "–".into() }) }
                         td { code { (entry.options) } }
                     }

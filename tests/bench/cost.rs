@@ -5,7 +5,7 @@
 
 use caustique::choose::counted_cost;
 use caustique::render::Candidate;
-use caustique::render::{Levels, Method, Session, Settings, Stage, cpu_seconds};
+use caustique::render::{Levels, Method, RenderInput, Session, Settings, cpu_seconds};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::Indirect;
@@ -36,9 +36,9 @@ fn main() {
             .camera(&CameraRequest { width: Some(width), ..CameraRequest::default() })
             .unwrap_or_else(|e| panic!("{e}"));
         for way in ways {
-            let settings = Settings::of(way);
+            let settings = Settings::for_candidate(way);
             let settings = Settings { levels: levels.unwrap_or(settings.levels), ..settings };
-            let stage = Stage::new(&scene, &camera, &settings);
+            let stage = RenderInput::new(&scene, &camera, &settings);
             let mut session = Session::new(&stage);
             session.step();
             let mut taken: Vec<f64> = (0..ITERATIONS)

@@ -10,7 +10,7 @@ use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings, Ta
 use caustique::math::{Frame, Vec2, Vec3};
 use caustique::photon::ThinningKey;
 use caustique::random::{Domain, Purpose, Stream};
-use caustique::render::{Levels, Method, Session, Settings, Stage};
+use caustique::render::{Levels, Method, RenderInput, Session, Settings};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::FoundPhotons;
@@ -170,7 +170,7 @@ struct Steps {
 impl Steps {
     /// Their iterations, each after or before that of the other, by turns.
     fn of(scene: &Scene, camera: &Camera, settings: [&Settings; 2], iterations: usize) -> Steps {
-        let stages = settings.map(|settings| Stage::new(scene, camera, settings));
+        let stages = settings.map(|settings| RenderInput::new(scene, camera, settings));
         let mut sessions = stages.each_ref().map(Session::new);
         let mut steps = Steps { all: [vec![], vec![]], eye: [vec![], vec![]] };
         // The first has what is made once.

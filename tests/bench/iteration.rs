@@ -6,7 +6,7 @@
 use caustique::camera::Camera;
 use caustique::combine::{Combiner, LevelStack, Model, Runtime};
 use caustique::estimator::InitialBandwidth;
-use caustique::render::output::shape;
+use caustique::render::output::layer_shape;
 use caustique::render::{Control, Levels, Settings, cpu_seconds, peak_memory, render};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{CameraRequest, Scene};
@@ -33,12 +33,12 @@ fn main() {
                 seed: u64::from(round),
                 iterations: Some(2),
                 levels: *levels,
-                initial: InitialBandwidth::Nearest(*k),
+                initial_bandwidth: InitialBandwidth::Nearest(*k),
                 ..Settings::default()
             };
             let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
             let n = f64::from(rounds) * 2.0;
-            let p = rendered.phases;
+            let p = rendered.stats.phases;
             for (sum, x) in phases[v].iter_mut().zip([p.light, p.map, p.eye]) {
                 *sum += x / n;
             }
@@ -85,7 +85,7 @@ fn combine(scene: &Scene, camera: &Camera) -> f64 {
     let model = Model::open("compact").unwrap_or_else(|e| panic!("{e}"));
     let mut combiner = Combiner::new(&model, &runtime).unwrap_or_else(|e| panic!("{e}"));
     let start = cpu_seconds();
-    let set = rendered.layers(&shape(&settings, scene), |_| true).unwrap_or_else(|e| panic!("{e}"));
+    let set = rendered.layers(&layer_shape(&settings, scene), |_| true).unwrap_or_else(|e| panic!("{e}"));
     drop(rendered);
     let stack = LevelStack::of(&set).unwrap_or_else(|e| panic!("{e}"));
     let combined = combiner.run(&stack).unwrap_or_else(|e| panic!("{e}"));

@@ -85,7 +85,7 @@ fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
         .expect("a camera");
     let settings = Settings {
         method,
-        initial: InitialBandwidth::Footprint,
+        initial_bandwidth: InitialBandwidth::Footprint,
         levels: Levels::new(levels),
         alpha: 0.75,
         iterations: Some(12),
@@ -94,11 +94,11 @@ fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
     let (mut seconds, mut light_paths, mut photons) = (f64::INFINITY, 0.0, 0);
     for _ in 0..2 {
         let rendered = render(scene, &camera, &settings, |_, _| Control::Continue);
-        let (first, last) = (&rendered.history[0], &rendered.history[rendered.history.len() - 1]);
+        let (first, last) = (&rendered.stats.history[0], &rendered.stats.history[rendered.stats.history.len() - 1]);
         let iterations = (last.iterations - first.iterations) as f64;
         seconds = f64::min(seconds, (last.cpu_seconds - first.cpu_seconds) / iterations);
-        light_paths = rendered.light_paths as f64 / rendered.iterations as f64;
-        photons = rendered.photons;
+        light_paths = rendered.stats.light_paths as f64 / rendered.stats.iterations as f64;
+        photons = rendered.stats.photons;
     }
     Cost { seconds, light_paths, photons }
 }

@@ -15,7 +15,7 @@ mod scenes;
 
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::estimator::rule::memoryless::radius2_factor;
-use caustique::render::{Method, Session, Settings, Stage};
+use caustique::render::{Method, RenderInput, Session, Settings};
 use field::{Field, PixelField};
 use plotters::prelude::*;
 use serde_json::{Value, json};
@@ -65,7 +65,7 @@ impl Run {
             finer,
             photons,
             method,
-            ..Run::memoryless(method.alpha())
+            ..Run::memoryless(method.default_alpha())
         }
     }
 }
@@ -116,7 +116,7 @@ fn main() {
                 iterations: None,
                 ..field.settings(RADIUS, photons, seed)
             };
-            let stage = Stage::new(&scene, &camera, &settings);
+            let stage = RenderInput::new(&scene, &camera, &settings);
             let mut session = Session::new(&stage);
             let (mut sums, mut given, mut squares) = (vec![0.0; fields.len()], vec![0.0; fields.len()], 0.0);
             // The bandwidths of the next iteration, where they are the photons' doing.

@@ -43,7 +43,7 @@ fn by_photons(
                 photons,
                 indirect,
                 guided,
-                initial: InitialBandwidth::Fixed(radius),
+                initial_bandwidth: InitialBandwidth::Fixed(radius),
                 levels: Levels::new(1),
                 iterations: Some(iterations),
                 ..Settings::default()

@@ -64,7 +64,7 @@ fn settings(iterations: u64, photons: u32, radius: f32) -> Settings {
     Settings {
         iterations: Some(iterations),
         photons,
-        initial: InitialBandwidth::Fixed(radius),
+        initial_bandwidth: InitialBandwidth::Fixed(radius),
         levels: Levels::decorrelated(5),
         ..Settings::default()
     }

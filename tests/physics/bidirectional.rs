@@ -37,7 +37,7 @@ fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rend
 fn settings(iterations: u64, radius: f32, seed: u64) -> Settings {
     Settings {
         seed,
-        initial: InitialBandwidth::Fixed(radius),
+        initial_bandwidth: InitialBandwidth::Fixed(radius),
         levels: Levels::new(1),
         alpha: 0.75,
         iterations: Some(iterations),
@@ -436,7 +436,7 @@ fn techniques_share_the_picture() {
         let settings = Settings { levels: Levels::decorrelated(levels), techniques: true, ..settings(5, 0.08, 3) };
         let rendered = render(&scene, method, 40, &settings);
         let plain = render(&scene, method, 40, &Settings { techniques: false, ..settings.clone() });
-        let own = settings.levels.own();
+        let own = settings.levels.picture_level();
         assert!(plain.techniques.is_empty());
         let names: Vec<String> = rendered.techniques.iter().map(|picture| picture.name()).collect();
         assert!(expected.iter().all(|name| names.iter().any(|n| n == name)), "{method:?}: {names:?}");

@@ -420,7 +420,7 @@ fn settings(iterations: u64, seed: u64) -> Settings {
 }
 
 fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
-    Settings { photons, initial: InitialBandwidth::Fixed(radius), ..settings(iterations, seed) }
+    Settings { photons, initial_bandwidth: InitialBandwidth::Fixed(radius), ..settings(iterations, seed) }
 }
 
 fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
@@ -487,7 +487,7 @@ fn strong(ior: f32) -> Material {
 }
 
 fn merging(iterations: u64, seed: u64) -> Settings {
-    Settings { initial: InitialBandwidth::Fixed(0.06), ..settings(iterations, seed) }
+    Settings { initial_bandwidth: InitialBandwidth::Fixed(0.06), ..settings(iterations, seed) }
 }
 
 fn plus(settings: Settings) -> Settings {

@@ -76,7 +76,7 @@ fn means(scene: &Scene, method: Method) -> Vec<f64> {
         method,
         photons: 6000,
         iterations: Some(if by_photons { 10 } else { 8 }),
-        initial: InitialBandwidth::Fixed(0.15),
+        initial_bandwidth: InitialBandwidth::Fixed(0.15),
         ..Settings::default()
     };
     let mean = |seed| {

@@ -39,7 +39,7 @@ fn mean(scene: &Scene, settings: &Settings) -> (f64, f64) {
     let rendered = render(scene, &camera, settings, |_, _| Control::Continue);
     assert_eq!(rendered.rejected(), 0);
     let pixels = rendered.pixels.len() as f64;
-    let own = settings.levels.own();
+    let own = settings.levels.picture_level();
     let all: f64 = rendered.pixels.iter().map(|pixel| pixel.mean(own).x).sum();
     let shared: f64 = rendered.pixels.iter().map(|pixel| pixel.parts().indirect.x / f64::from(pixel.iterations)).sum();
     (all / pixels, shared / pixels)
@@ -62,7 +62,7 @@ fn all_light_is_there_once() {
                 seed,
                 indirect,
                 photons: 15_000,
-                initial: InitialBandwidth::Fixed(radius),
+                initial_bandwidth: InitialBandwidth::Fixed(radius),
                 levels: Levels::new(levels),
                 iterations: Some(16),
                 ..Settings::default()
@@ -111,7 +111,7 @@ fn bandwidths_shrink_on_metal() {
                 method,
                 radius_rule,
                 photons: 10_000,
-                initial: InitialBandwidth::Fixed(first),
+                initial_bandwidth: InitialBandwidth::Fixed(first),
                 levels: Levels::new(1),
                 iterations: Some(iterations),
                 ..Settings::default()
@@ -155,7 +155,7 @@ fn empty_maps_bring_nothing_and_take_nothing() {
             method,
             seed,
             photons,
-            initial: InitialBandwidth::Fixed(0.2),
+            initial_bandwidth: InitialBandwidth::Fixed(0.2),
             levels: Levels::new(1),
             iterations: Some(1000),
             ..Settings::default()

@@ -6,7 +6,7 @@
 
 use crate::support;
 
-use caustique::choose::{Choice, Weight, choose};
+use caustique::choose::{Choice, EffectWeight, choose};
 use caustique::estimator::{InitialBandwidth, PixelAccumulator};
 use caustique::finish::{Denoiser, Finish};
 use caustique::light::{Guide, Region, SpotEdge};
@@ -209,9 +209,11 @@ fn lamps_have_budgets_of_their_own() {
     assert!(Guide::new(&scene.lights, false).is_none(), "nothing makes caustics");
     let picture = |guided| {
         let wide = InitialBandwidth::Fixed(0.2);
-        light_and_variance(&scene, Settings { photons: 4000, guided, initial: wide, ..Settings::default() }, |p| {
-            p.parts().indirect
-        })
+        light_and_variance(
+            &scene,
+            Settings { photons: 4000, guided, initial_bandwidth: wide, ..Settings::default() },
+            |p| p.parts().indirect,
+        )
     };
     let ((light, unguided), (same, guided)) = (picture(false), picture(true));
     assert!((light / same - 1.0).abs() < 0.2, "{light} and {same}");
@@ -229,7 +231,8 @@ fn rules_that_count_photons_can_be_guided() {
         let mean = |guided: bool| {
             let seeds = (1..=16).map(|seed| {
                 let narrow = InitialBandwidth::Fixed(0.05);
-                let settings = Settings { photons: 10_000, guided, initial: narrow, seed, ..Settings::default() };
+                let settings =
+                    Settings { photons: 10_000, guided, initial_bandwidth: narrow, seed, ..Settings::default() };
                 light_and_variance(&scene, Settings { method, ..settings }, |p| p.parts().caustic).0
             });
             mean_and_error(&seeds.collect::<Vec<f64>>())
@@ -249,7 +252,7 @@ fn the_caustic_of_a_small_ball_is_found() {
     let scene = small_ball();
     let variance = |guided, indirect| {
         let narrow = InitialBandwidth::Fixed(0.02);
-        let settings = Settings { photons: 20_000, guided, indirect, initial: narrow, ..Settings::default() };
+        let settings = Settings { photons: 20_000, guided, indirect, initial_bandwidth: narrow, ..Settings::default() };
         light_and_variance(&scene, settings, |p| p.parts().caustic)
     };
     let (_, unguided) = variance(false, Indirect::Photons);
@@ -302,14 +305,15 @@ fn auto(scene: &Scene, threads: usize, iterations: u64) -> Choice {
 }
 
 /// The weight of an effect.
-fn weight(weights: &[Weight], effect: Effect) -> Option<Weight> {
+fn weight(weights: &[EffectWeight], effect: Effect) -> Option<EffectWeight> {
     weights.iter().find(|weight| weight.effect == effect).copied()
 }
 
 /// What is chosen among the ways that are allowed.
 fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(Candidate) -> bool + Sync) -> Choice {
     let camera = scene.camera(&square(24)).expect("a camera");
-    let settings = |candidate| Settings { photons: 2000, iterations: Some(iterations), ..Settings::of(candidate) };
+    let settings =
+        |candidate| Settings { photons: 2000, iterations: Some(iterations), ..Settings::for_candidate(candidate) };
     let make = |candidate| allowed(candidate).then(|| settings(candidate));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let mut finish = Finish::new(Denoiser::Own, None);
@@ -321,15 +325,15 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(C
 fn the_choice_does_not_depend_on_threads() {
     let scene = matte_room();
     let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
-    assert_eq!(one.trials.len(), 3, "{:?}", one.because);
+    assert_eq!(one.pilots.len(), 3, "{:?}", one.reason);
     assert_eq!(one.candidate, three.candidate);
-    for (a, b) in one.trials.iter().zip(&three.trials) {
+    for (a, b) in one.pilots.iter().zip(&three.pilots) {
         println!("{}: {:.5}", a.candidate.name(), a.error());
         assert_eq!(a.squared_error.to_bits(), b.squared_error.to_bits(), "{}", a.candidate.name());
     }
-    let chosen = one.trial().expect("a trial");
-    let best = one.trials.iter().all(|trial| trial.squared_error >= chosen.squared_error);
-    assert!(best || chosen.candidate == Candidate::USUAL, "{}", chosen.candidate.name());
+    let chosen = one.chosen_pilot().expect("a trial");
+    let best = one.pilots.iter().all(|trial| trial.squared_error >= chosen.squared_error);
+    assert!(best || chosen.candidate == Candidate::DEFAULT, "{}", chosen.candidate.name());
     let bits = |choice: &Choice| -> Vec<_> {
         choice.weights.iter().map(|w| (w.effect, w.energy.map(f64::to_bits), w.saved.map(f64::to_bits))).collect()
     };
@@ -378,13 +382,13 @@ fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
     };
     let chosen = |scene: &Scene| {
         let camera = scene.camera(&square(16)).expect("a camera");
-        let make = |candidate| Some(Settings { iterations: Some(4), ..Settings::of(candidate) });
+        let make = |candidate| Some(Settings { iterations: Some(4), ..Settings::for_candidate(candidate) });
         choose(View::new(scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false)
             .expect("a choice")
             .candidate
     };
-    assert_eq!(chosen(&cloudy(false, 1.2)), Candidate::FOCUSED_GATHERING);
-    assert_eq!(chosen(&cloudy(true, 1.2)), Candidate::FOCUSED);
+    assert_eq!(chosen(&cloudy(false, 1.2)), Candidate::GUIDED_GATHERING);
+    assert_eq!(chosen(&cloudy(true, 1.2)), Candidate::GUIDED);
     let finds = |scene: &Scene, method: Method| method.search().finds(Effect::Sds, &scene.survey);
     let methods = [Method::Vcm, Method::Sppm];
     assert_eq!(methods.map(|method| finds(&cloudy(false, 1.2), method)), [false, true]);
@@ -399,7 +403,7 @@ fn what_is_left_out_is_weighed_too() {
     let weights = |scene: &Scene, off: ClassSet| {
         let camera = scene.camera(&square(24)).expect("a camera");
         let make = |candidate| {
-            let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(candidate) };
+            let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::for_candidate(candidate) };
             (candidate == Candidate::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
         };
         choose(View::new(scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false)
@@ -482,13 +486,15 @@ fn a_pilot_can_be_stopped() {
     let camera = scene.camera(&square(24)).expect("a camera");
     let asked = |answer: bool| {
         let times = std::cell::Cell::new(0);
-        let make = |candidate| Some(Settings { photons: 2000, iterations: Some(20_000), ..Settings::of(candidate) });
+        let make = |candidate| {
+            Some(Settings { photons: 2000, iterations: Some(20_000), ..Settings::for_candidate(candidate) })
+        };
         let stop = || {
             times.set(times.get() + 1);
             answer
         };
         let choice = choose(View::new(&scene, &camera), &mut Finish::new(Denoiser::Own, None), make, stop);
-        assert!(choice.is_some_and(|choice| choice.trials.len() == 3));
+        assert!(choice.is_some_and(|choice| choice.pilots.len() == 3));
         times.get()
     };
     let (stopped, whole) = (asked(true), asked(false));
@@ -513,18 +519,18 @@ fn caustics_are_left_to_guided_light_paths() {
     description.cameras.push(look_at(DVec3::new(0.0, 0.3, 0.5), DVec3::new(0.0, 0.05, 0.0), 50.0));
     let scene = build(description);
     let choice = auto(&scene, 2, 20_000);
-    assert!(choice.trials.is_empty() && choice.candidate == Candidate::FOCUSED, "{}", choice.candidate.name());
+    assert!(choice.pilots.is_empty() && choice.candidate == Candidate::GUIDED, "{}", choice.candidate.name());
     let camera = scene.camera(&square(24)).expect("a camera");
     let light = |candidate| {
-        let settings = Settings { iterations: Some(16), ..Settings::of(candidate) };
+        let settings = Settings { iterations: Some(16), ..Settings::for_candidate(candidate) };
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
         rendered.pixels.iter().map(|pixel| pixel.parts().caustic.element_sum()).sum::<f64>()
     };
-    let (guided, unguided) = (light(Candidate::FOCUSED), light(Candidate::USUAL));
+    let (guided, unguided) = (light(Candidate::GUIDED), light(Candidate::DEFAULT));
     println!("{guided:.3e} of caustics by guided light paths, {unguided:.3e} by others");
     assert!(guided > 0.0 && unguided < 0.2 * guided);
     let unguided = auto_among(&scene, 2, 20_000, |candidate| !candidate.guided);
-    assert_eq!(unguided.candidate, Candidate::USUAL);
+    assert_eq!(unguided.candidate, Candidate::DEFAULT);
 }
 
 /// What a scene does not call for is not tried, and a short render tries nothing.
@@ -532,19 +538,19 @@ fn caustics_are_left_to_guided_light_paths() {
 fn only_what_is_called_for_is_tried() {
     let scene = matte_room();
     let matte_only = auto(&scene, 2, 20_000);
-    let tried: Vec<Method> = matte_only.trials.iter().map(|trial| trial.candidate.method).collect();
+    let tried: Vec<Method> = matte_only.pilots.iter().map(|trial| trial.candidate.method).collect();
     assert_eq!(tried, [Method::Vcm, Method::Path, Method::Bdpt]);
-    assert!(matte_only.trials.iter().all(|trial| !trial.candidate.guided));
+    assert!(matte_only.pilots.iter().all(|trial| !trial.candidate.guided));
     // Where nothing has narrow lobes no photons of caustics are sent.
     let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
-    let photons = |narrow_lobes| of_caustics.of_photons(&Survey { narrow_lobes, ..Survey::default() });
+    let photons = |narrow_lobes| of_caustics.photon_classes(&Survey { narrow_lobes, ..Survey::default() });
     assert!(photons(false).is_empty() && photons(true).has(PathClass::IndirectFocus));
     // Nothing but indirect light asks for photons; direct light costs its connections.
     let choice = auto_among(&scene, 2, 20_000, |candidate| candidate.method != Method::Bdpt);
     let saved = |effect: Effect| weight(&choice.weights, effect).and_then(|w| w.saved);
-    let whole = choice.trial().map(|trial| trial.seconds_per_iteration);
+    let whole = choice.chosen_pilot().map(|trial| trial.seconds_per_iteration);
     assert!(saved(Effect::Indirect) > Some(0.0) && saved(Effect::Indirect) < whole, "{:?}", choice.weights);
     assert!(saved(Effect::Direct) > Some(0.0) && saved(Effect::Direct) < whole, "{:?}", choice.weights);
     let short = auto(&glass_room(), 2, 2);
-    assert!(short.trials.is_empty() && short.candidate == Candidate::FOCUSED);
+    assert!(short.pilots.is_empty() && short.candidate == Candidate::GUIDED);
 }

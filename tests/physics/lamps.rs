@@ -32,7 +32,7 @@ fn seen(scene: &Scene, method: Method) -> (f64, f64) {
         method,
         photons: 6000,
         iterations: Some(48),
-        initial: InitialBandwidth::Fixed(0.03),
+        initial_bandwidth: InitialBandwidth::Fixed(0.03),
         ..Settings::default()
     };
     let mean = |seed| {

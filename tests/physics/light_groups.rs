@@ -5,7 +5,7 @@ use crate::support;
 
 use caustique::film::output::names;
 use caustique::math::{DVec3, Rgb, Vec3};
-use caustique::render::output::shape;
+use caustique::render::output::layer_shape;
 use caustique::render::{Control, Levels, Method, Rendered, Settings, Shard, render};
 use caustique::scene::Scene;
 use caustique::scene::description::{
@@ -62,7 +62,7 @@ fn each_group_has_its_colour_and_nothing_else_in_all_pixels_by_all_methods() {
     assert_eq!(scene.lights.groups().names, ["panel", "lamps", "sky"]);
     for method in Method::ALL.iter().copied().filter(|method| method.has_techniques()) {
         let rendered = picture(&scene, method, WHOLE);
-        let own = rendered.settings.levels.own();
+        let own = rendered.settings.levels.picture_level();
         let mut seen = [[0.0; 2]; 3];
         for (index, pixel) in rendered.pixels.iter().enumerate() {
             let (all, caustic) = (pixel.mean(own), pixel.parts().caustic / f64::from(pixel.iterations));
@@ -93,7 +93,7 @@ fn light_of_no_group_is_left_out_and_layers_bear_the_names() {
         let [panel, sky] = [0, 1].map(|group| pixel.group(group)[0]);
         assert!(panel.y == 0.0 && sky.y == 0.0 && sky.z <= pixel.mean(0).z * (1.0 + 1e-6), "{panel} {sky}");
     }
-    let of = |method| names(&shape(&Settings { method, ..Settings::default() }, &scene));
+    let of = |method| names(&layer_shape(&Settings { method, ..Settings::default() }, &scene));
     for name in ["LightGroup_panel", "Caustic_panel", "LightGroup_sky", "Caustic_sky"] {
         assert!(
             of(Method::Vcm).iter().any(|layer| layer == name) && !of(Method::Sppm).iter().any(|layer| layer == name)

@@ -24,7 +24,7 @@ fn means(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> Vec<f64> 
     let mean = |seed| {
         let rendered = render(scene, &camera, &Settings { seed, ..settings.clone() }, |_, _| Control::Continue);
         assert_eq!(rendered.rejected(), 0);
-        let own = rendered.settings.levels.own();
+        let own = rendered.settings.levels.picture_level();
         rendered.pixels.iter().map(|p| p.mean(own).x).sum::<f64>() / rendered.pixels.len() as f64
     };
     (0..seeds).map(mean).collect()
@@ -92,6 +92,6 @@ fn milk_in_a_wide_scene_is_lit() {
     // Photons have all light but that which comes straight from the sky: it grows inwards over a mean free path, and so
     // does the bias with a kernel as wide.
     let initial = InitialBandwidth::Fixed(0.025);
-    let by_photons = Settings { initial, photons: 20_000, ..settings(Method::Sppm, 8) };
+    let by_photons = Settings { initial_bandwidth: initial, photons: 20_000, ..settings(Method::Sppm, 8) };
     check("milk in a wide scene", &means(&scene, &by_photons, 8, 12), 1.0, (0.04, 0.2));
 }

@@ -146,7 +146,7 @@ fn settings(iterations: u64, seed: u64) -> Settings {
 /// With bandwidth levels for methods that gather photons in media.
 fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
     let initial = InitialBandwidth::Fixed(radius);
-    Settings { photons, initial, levels: Levels::new(5), ..settings(iterations, seed) }
+    Settings { photons, initial_bandwidth: initial, levels: Levels::new(5), ..settings(iterations, seed) }
 }
 
 fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
@@ -163,7 +163,7 @@ fn means(scene: &Scene, method: Method, size: u32, seeds: u64, of: impl Fn(u64) 
     for seed in 0..seeds {
         let settings = of(seed);
         let rendered = render(scene, method, size, &settings);
-        let own = rendered.settings.levels.own();
+        let own = rendered.settings.levels.picture_level();
         for (c, means) in means.iter_mut().enumerate() {
             let sum = rendered.pixels.iter().map(|p| p.mean(own)[c]).sum::<f64>();
             means.push(sum / rendered.pixels.len() as f64);

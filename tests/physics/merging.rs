@@ -63,7 +63,7 @@ fn merging_without_reuse_is_as_noisy_as_path_tracing() {
         method,
         photons,
         seed: 3,
-        initial: InitialBandwidth::Fixed(radius),
+        initial_bandwidth: InitialBandwidth::Fixed(radius),
         levels: Levels::new(1),
         alpha: 1.0,
         iterations: Some(iterations),
@@ -112,7 +112,7 @@ fn caustics_on_glossy_surfaces_stay_noisy() {
         let settings = Settings {
             method: Method::Vcm,
             levels: Levels::new(1),
-            initial: InitialBandwidth::Fixed(0.02),
+            initial_bandwidth: InitialBandwidth::Fixed(0.02),
             alpha: 0.75,
             iterations: Some(48),
             ..Settings::default()

@@ -25,7 +25,7 @@ fn settings(photons: u32, seed: u64) -> Settings {
         method: Method::Pm,
         seed,
         photons,
-        initial: InitialBandwidth::Nearest(100),
+        initial_bandwidth: InitialBandwidth::Nearest(100),
         levels: Levels::new(1),
         iterations: Some(4),
         ..Settings::default()
@@ -78,7 +78,7 @@ fn a_magnified_view_has_its_photons() {
     let scene = furnace(0.1);
     for method in [Method::Sppm, Method::Appm, Method::Cppm] {
         let of = |seed| Settings { method, seed, photons: 1000, iterations: Some(32), ..Settings::default() };
-        let own = of(0).levels.own();
+        let own = of(0).levels.picture_level();
         let mean = |seed: u64| {
             let rendered = picture(&scene, &of(seed));
             rendered.pixels.iter().map(|pixel| pixel.mean(own).x).sum::<f64>() / rendered.pixels.len() as f64
@@ -103,7 +103,7 @@ fn photons_are_forecast() {
         let told = photons_per_path(&scene, &camera, &settings);
         assert!((told - 9.0).abs() < 4.0 * 9.5 / 2048f64.sqrt(), "{told}");
         let rendered = picture(&scene, &settings);
-        let left = rendered.photons as f64 / rendered.light_paths as f64;
+        let left = rendered.stats.photons as f64 / rendered.stats.light_paths as f64;
         assert!((left - 9.0).abs() < 4.0 * 9.5 / 20_000f64.sqrt(), "{left}");
     }
 }
@@ -117,9 +117,13 @@ fn a_full_map_is_no_darker() {
     for seed in 0..SEEDS {
         let all = Settings { photon_memory: most * PHOTON_BYTES, ..settings(200_000, seed) };
         let rendered = picture(&scene, &all);
-        assert!(rendered.map_is_full() && rendered.light_paths < 100_000, "{} light paths", rendered.light_paths);
+        assert!(
+            rendered.map_is_full() && rendered.stats.light_paths < 100_000,
+            "{} light paths",
+            rendered.stats.light_paths
+        );
         // The path that did not fit had a few photons.
-        assert!((most - 100..=most).contains(&rendered.photons), "{} photons", rendered.photons);
+        assert!((most - 100..=most).contains(&rendered.stats.photons), "{} photons", rendered.stats.photons);
         values.push(mean(&rendered));
     }
     check("full", &values, 1.0, 5e-3, 0.03);

@@ -90,7 +90,13 @@ fn a_uniform_field_has_no_bias_at_any_bandwidth() {
         for radius in radii {
             let mean = |seed| {
                 let initial = InitialBandwidth::Fixed(radius);
-                let settings = Settings { seed, initial, photons: 6000, iterations: Some(12), ..settings.clone() };
+                let settings = Settings {
+                    seed,
+                    initial_bandwidth: initial,
+                    photons: 6000,
+                    iterations: Some(12),
+                    ..settings.clone()
+                };
                 let rendered = picture(&scene, 8, &settings);
                 rendered.pixels.iter().map(|p| p.mean(0).x).sum::<f64>() / 64.0
             };
@@ -122,8 +128,11 @@ fn all_agree_with_path_tracing() {
         (0..8)
             .map(|seed| {
                 let iterations = Some(iterations);
-                let rendered =
-                    picture(&scene, SIZE, &Settings { seed, iterations, photons, initial, ..settings.clone() });
+                let rendered = picture(
+                    &scene,
+                    SIZE,
+                    &Settings { seed, iterations, photons, initial_bandwidth: initial, ..settings.clone() },
+                );
                 tiles(|index| rendered.pixels[index].mean(0).element_sum() / 3.0)
             })
             .collect()
@@ -220,7 +229,7 @@ fn merging_alone_has_the_bias_of_its_bandwidths() {
     let places = (0..width * height).map(|k| (k % width, k / width));
     let fields: Vec<PixelField> =
         places.map(|place| PixelField::new(Field::Point, place, 4, radius, width * height)).collect();
-    let alpha = Method::Vcm.alpha();
+    let alpha = Method::Vcm.default_alpha();
     let expected = |field: &PixelField| {
         let mean = |i| field.moments(radius * radius * radius2_factor(i, alpha)).mean;
         (1..=n).map(mean).sum::<f64>() / n as f64
@@ -260,7 +269,7 @@ fn measurement_points_follow_the_talks_curves() {
         let settings = Settings {
             method: Method::Ppm,
             levels: Levels::new(1),
-            initial: InitialBandwidth::Fixed(radius),
+            initial_bandwidth: InitialBandwidth::Fixed(radius),
             photons: 4000,
             iterations: Some(n),
             ..Settings::default()

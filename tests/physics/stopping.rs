@@ -5,7 +5,7 @@ use crate::support;
 use caustique::film::{Layer, LayerSet};
 use caustique::image::{Floor, metrics};
 use caustique::math::{DVec3, Vec3};
-use caustique::render::{Control, Levels, Method, Rendered, Session, Settings, Stage, StopReason, render};
+use caustique::render::{Control, Levels, Method, RenderInput, Rendered, Session, Settings, StopReason, render};
 use caustique::scene::{Description, Scene};
 use caustique::stop::Stop;
 use std::sync::Arc;
@@ -41,14 +41,18 @@ fn errors_do_not_depend_on_the_unit_of_radiance() {
         let settings =
             Settings { method, photons: 3000, iterations: Some(400), target_error: Some(0.12), ..Settings::default() };
         let all = scenes.each_ref().map(|scene| rendered(scene, &settings));
-        let error = |rendered: &Rendered| rendered.relative_error().expect("light is seen");
+        let error = |rendered: &Rendered| rendered.error.relative().expect("light is seen");
         let own = error(&all[0]);
         assert_eq!(all[0].stop, StopReason::Error, "{method:?}: {own}");
         for (other, of) in all[1..].iter().zip(["dark", "bright"]) {
-            assert_eq!((other.stop, other.iterations), (StopReason::Error, all[0].iterations), "{method:?} {of}");
+            assert_eq!(
+                (other.stop, other.stats.iterations),
+                (StopReason::Error, all[0].stats.iterations),
+                "{method:?} {of}"
+            );
             assert!((error(other) / own - 1.0).abs() < 1e-6, "{method:?} {of}: {} {own}", error(other));
         }
-        println!("{method:?}: {} iterations, {own}", all[0].iterations);
+        println!("{method:?}: {} iterations, {own}", all[0].stats.iterations);
     }
 }
 
@@ -66,10 +70,10 @@ fn a_black_picture_is_not_finished() {
         Settings { method: Method::Path, iterations: Some(40), target_error: Some(0.9), ..Settings::default() };
     let dark = rendered(&scene, &settings);
     assert!(dark.pixels.iter().all(|pixel| pixel.mean(0) == DVec3::ZERO));
-    assert_eq!((dark.stop, dark.iterations, dark.relative_error()), (StopReason::Iterations, 40, None));
+    assert_eq!((dark.stop, dark.stats.iterations, dark.error.relative()), (StopReason::Iterations, 40, None));
     // Photons find it.
     let seen = rendered(&scene, &Settings { method: Method::Sppm, photons: 3000, ..settings });
-    assert!(seen.relative_error().is_some());
+    assert!(seen.error.relative().is_some());
     assert_eq!(seen.stop, StopReason::Error);
 }
 
@@ -89,7 +93,7 @@ fn a_least_number_of_iterations() {
             ..Settings::default()
         };
         let rendered = rendered(&build(description), &settings);
-        assert_eq!((rendered.stop, rendered.iterations), (StopReason::Error, 8), "{emission}");
+        assert_eq!((rendered.stop, rendered.stats.iterations), (StopReason::Error, 8), "{emission}");
     }
 }
 
@@ -123,7 +127,7 @@ fn iterations_are_given_up_as_a_whole() {
         let levels = if method.has_levels() { Levels::decorrelated(3) } else { Levels::new(1) };
         let photons = 3000;
         let settings = Settings { method, levels, photons, iterations: Some(3), ..Settings::default() };
-        let stage = Stage::new(&scene, &camera, &settings);
+        let stage = RenderInput::new(&scene, &camera, &settings);
         let undisturbed = rendered_by(&stage, |_| {});
         let disturbed = rendered_by(&stage, |session| {
             let mut seconds = 2e-4;
@@ -132,7 +136,7 @@ fn iterations_are_given_up_as_a_whole() {
                 assert_eq!(session.iterations(), 1, "{method:?}");
             }
         });
-        assert_eq!(disturbed.iterations, 3);
+        assert_eq!(disturbed.stats.iterations, 3);
         for (a, b) in undisturbed.pixels.iter().zip(&disturbed.pixels) {
             assert_eq!(format!("{a:?}"), format!("{b:?}"), "{method:?}");
         }
@@ -141,11 +145,11 @@ fn iterations_are_given_up_as_a_whole() {
 }
 
 /// Three iterations, with something done after the first.
-fn rendered_by<'a>(stage: &'a Stage<'a>, between: impl FnOnce(&mut Session<'a>)) -> Rendered {
+fn rendered_by<'a>(stage: &'a RenderInput<'a>, between: impl FnOnce(&mut Session<'a>)) -> Rendered {
     let mut session = Session::new(stage);
     session.step();
     between(&mut session);
-    while !session.finished() {
+    while !session.is_finished() {
         session.step();
     }
     session.finish(StopReason::Iterations)
@@ -165,7 +169,7 @@ fn the_first_iteration_ends_by_request_alone() {
     };
     let ends = |expected: (u64, StopReason)| {
         let rendered = render(&scene, &camera, &settings, |_, _| Control::Continue);
-        assert_eq!((rendered.iterations, rendered.stop), expected);
+        assert_eq!((rendered.stats.iterations, rendered.stop), expected);
     };
     ends((1, StopReason::Time));
     asked.store(true, Ordering::Relaxed);

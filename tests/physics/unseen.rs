@@ -5,7 +5,9 @@ use crate::support;
 use caustique::estimator::{InitialBandwidth, PixelAccumulator};
 use caustique::finish::{Denoiser, Finish};
 use caustique::math::{DVec3, Vec3};
-use caustique::render::{Accuracy, Levels, Method, Part, Rendered, Session, Settings, Shard, Stage, StopReason};
+use caustique::render::{
+    Accuracy, Levels, Method, RenderInput, Rendered, Session, Settings, Shard, ShardResult, StopReason,
+};
 use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, point_light, quad, sphere, square};
 
@@ -35,26 +37,34 @@ fn room() -> Scene {
 
 fn settings(method: Method, initial: InitialBandwidth) -> Settings {
     let levels = if method.has_levels() { Levels::new(5) } else { Levels::new(1) };
-    Settings { method, levels, initial, photons: 4000, seed: 1, iterations: Some(ITERATIONS), ..Settings::default() }
+    Settings {
+        method,
+        levels,
+        initial_bandwidth: initial,
+        photons: 4000,
+        seed: 1,
+        iterations: Some(ITERATIONS),
+        ..Settings::default()
+    }
 }
 
 /// A render, and what its end has told of the finished picture.
 fn rendered(scene: &Scene, settings: &Settings) -> (Rendered, Accuracy) {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
-    let stage = Stage::new(scene, &camera, settings);
+    let stage = RenderInput::new(scene, &camera, settings);
     let mut session = Session::new(&stage);
-    while !session.finished() {
+    while !session.is_finished() {
         session.step();
     }
     let set = session.layers(|_| true).expect("all layers");
     let error = Finish::new(Denoiser::Own, None).estimate_error(&set).expect("our own denoiser does not fail");
-    session.judged(error);
+    session.record_finished_error(error);
     let accuracy = Accuracy::of(session.history()).expect("there is noise");
     (session.finish(StopReason::Iterations), accuracy)
 }
 
 fn mean(rendered: &Rendered) -> f64 {
-    let own = rendered.settings.levels.own();
+    let own = rendered.settings.levels.picture_level();
     let sum: DVec3 = rendered.pixels.iter().map(|pixel| pixel.mean(own)).sum();
     sum.y / rendered.pixels.len() as f64
 }
@@ -80,12 +90,12 @@ fn light_that_no_photon_has_brought_is_in_the_interval() {
         let told = accuracy.error(ITERATIONS);
         println!("{method:?}: off by {error:.3}, told {told:.3} ({low:.3} to {high:.3})");
         assert!((low..high).contains(&error) && (0.5..2.0).contains(&(told / error)), "{method:?}: {low} to {high}");
-        let sentence = picture.unseen().sentence(&picture.settings).expect("light is expected");
+        let sentence = picture.error.unseen.sentence(&picture.settings).expect("light is expected");
         assert!(sentence.starts_with("no photon of caustics has reached the picture ("), "{sentence}");
-        assert!(picture.relative_error().expect("light is seen") > 0.5);
+        assert!(picture.error.relative().expect("light is seen") > 0.5);
         let mut faulty = picture;
-        faulty.photon_record.counts.gathered = [1 << 20; 2];
-        assert!(faulty.unseen().squared.sqrt() < 0.2 * error);
+        faulty.stats.photon_record.counts.gathered = [1 << 20; 2];
+        assert!(faulty.estimate_error().unseen.squared.sqrt() < 0.2 * error);
     }
 }
 
@@ -96,16 +106,16 @@ fn errors_are_as_they_were_where_photons_come() {
     let nearest = InitialBandwidth::Nearest(20);
     for method in [Method::Sppm, Method::Vcm, Method::Cppm] {
         let (picture, accuracy) = rendered(&room(), &settings(method, nearest));
-        let (unseen, told) = (picture.unseen(), accuracy.error(ITERATIONS));
+        let (unseen, told) = (picture.error.unseen, accuracy.error(ITERATIONS));
         let without = (told * told - unseen.squared).sqrt();
-        println!("{method:?}: {:.5} of {told:.4}, {:?}", unseen.squared.sqrt(), picture.photon_record.counts);
-        assert!(told / without - 1.0 < 0.001 && !unseen.rules(told), "{method:?}: {told} {without}");
+        println!("{method:?}: {:.5} of {told:.4}, {:?}", unseen.squared.sqrt(), picture.stats.photon_record.counts);
+        assert!(told / without - 1.0 < 0.001 && !unseen.dominates(told), "{method:?}: {told} {without}");
     }
     let dial = dial();
     let (mut unseen, mut estimated) = (0.0, 0.0);
     for seed in 1..=8 {
         let (picture, accuracy) = rendered(&dial, &Settings { seed, ..settings(Method::Sppm, nearest) });
-        unseen += picture.unseen().squared;
+        unseen += picture.error.unseen.squared;
         estimated += accuracy.error(ITERATIONS).powi(2);
     }
     println!("dial: {:.3} of the squared error", unseen / estimated);
@@ -122,16 +132,16 @@ fn counts_join() {
         let (whole, _) = rendered(&scene, &settings);
         let shards = [0, 1, 2]
             .map(|index| rendered(&scene, &Settings { shard: Shard { index, count: 3 }, ..settings.clone() }).0);
-        let parts: Vec<Part> = shards.iter().map(Rendered::part).collect();
+        let parts: Vec<ShardResult> = shards.iter().map(Rendered::shard_result).collect();
         let mut pixels: Vec<PixelAccumulator> = shards[0].pixels.clone();
         for shard in &shards[1..] {
             pixels.iter_mut().zip(&shard.pixels).for_each(|(own, other)| own.join(other.clone()));
         }
-        let joined = Part::join(&parts).expect("there are shards").rendered(pixels);
-        assert_eq!(joined.photon_record, whole.photon_record, "{method:?}");
-        assert_eq!(joined.unseen(), whole.unseen(), "{method:?}");
-        assert_ne!(shards[0].photon_record, whole.photon_record);
-        let stage = Stage::new(&scene, &camera, &settings);
+        let joined = ShardResult::merge(&parts).expect("there are shards").with_pixels(pixels);
+        assert_eq!(joined.stats.photon_record, whole.stats.photon_record, "{method:?}");
+        assert_eq!(joined.error.unseen, whole.error.unseen, "{method:?}");
+        assert_ne!(shards[0].stats.photon_record, whole.stats.photon_record);
+        let stage = RenderInput::new(&scene, &camera, &settings);
         let mut session = Session::new(&stage);
         for _ in 0..ITERATIONS / 2 {
             session.step();
@@ -139,9 +149,9 @@ fn counts_join() {
         let bytes = postcard::to_allocvec(&session.state().expect("a state")).expect("bytes");
         let state = postcard::from_bytes(&bytes).expect("a state");
         let mut session = Session::resume(&stage, state).expect("its own state");
-        while !session.finished() {
+        while !session.is_finished() {
             session.step();
         }
-        assert_eq!(session.finish(StopReason::Iterations).photon_record, whole.photon_record, "{method:?}");
+        assert_eq!(session.finish(StopReason::Iterations).stats.photon_record, whole.stats.photon_record, "{method:?}");
     }
 }

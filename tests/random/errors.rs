@@ -31,7 +31,7 @@ pub fn errors(world: &World, shot: &Shot) -> Result<[Errors; 2], String> {
 }
 
 fn of(rendered: &[Rendered]) -> Errors {
-    let own = rendered[0].settings.levels.own();
+    let own = rendered[0].settings.levels.picture_level();
     let n = rendered.len() as f64;
     let pixels = rendered[0].pixels.len();
     let values: Vec<Vec<glam::DVec3>> =
@@ -47,7 +47,8 @@ fn of(rendered: &[Rendered]) -> Errors {
         .sum();
     // The mean of n pictures is a part of each of them.
     let actual = (squared / (pixels as f64 * (n - 1.0))).sqrt();
-    let reported = rendered.iter().filter_map(Rendered::relative_error).map(|error| error * error).sum::<f64>() / n;
+    let reported =
+        rendered.iter().filter_map(|rendered| rendered.error.relative()).map(|error| error * error).sum::<f64>() / n;
     Errors { actual, reported: reported.sqrt() }
 }
 

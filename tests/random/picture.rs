@@ -72,7 +72,7 @@ impl Shot {
             photons: photons * self.photons,
             levels: Levels::new(1),
             iterations: Some((f64::from(iterations) * self.effort).ceil() as u64),
-            alpha: self.method.alpha(),
+            alpha: self.method.default_alpha(),
             max_depth: self.max_depth,
             ..Settings::default()
         }
@@ -134,7 +134,7 @@ pub fn pictures(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Resu
 
 /// Means of a picture, of a window in tiles or whole.
 fn means(rendered: &Rendered, window: Option<[u32; 4]>) -> Vec<f64> {
-    let own = rendered.settings.levels.own();
+    let own = rendered.settings.levels.picture_level();
     let [left, top, width, _] = window.unwrap_or([0, 0, TILES, TILES]);
     let tile = SIZE / TILES;
     let mut means = vec![f64::NAN; MEANS];

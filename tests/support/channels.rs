@@ -12,7 +12,7 @@ pub const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
 
 /// Tile means of every channel.
 pub fn tiles(rendered: &Rendered) -> Vec<f64> {
-    let own = rendered.settings.levels.own();
+    let own = rendered.settings.levels.picture_level();
     let mut sums = vec![0.0; 3 * TILES];
     for (index, pixel) in (0..).zip(&rendered.pixels) {
         let tile = (index / SIZE / TILE * (SIZE / TILE) + index % SIZE / TILE) as usize;

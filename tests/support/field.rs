@@ -81,7 +81,7 @@ impl Field {
             seed,
             photons,
             levels: Levels::new(1),
-            initial: InitialBandwidth::Fixed(radius as f32),
+            initial_bandwidth: InitialBandwidth::Fixed(radius as f32),
             max_depth: self.max_depth(),
             ..Settings::default()
         }

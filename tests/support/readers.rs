@@ -9,7 +9,7 @@ use caustique::film::Naming;
 use caustique::image::exr;
 use caustique::pipeline::merge::{Order, Shards};
 use caustique::pipeline::{checkpoint, records, shard};
-use caustique::render::{Candidate, Control, Method, Session, Settings, Stage, StopReason, render};
+use caustique::render::{Candidate, Control, Method, RenderInput, Session, Settings, StopReason, render};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::gltf::{self, ReadOptions};
 use caustique::scene::{CameraRequest, Scene, environment_file, usd};
@@ -63,8 +63,12 @@ fn scene(bytes: &[u8], _: &Path) {
     let Some(scene) = read.and_then(|description| told(Scene::build(description, 1))) else { return };
     let Ok(camera) = scene.camera(&small()) else { return };
     for method in METHODS {
-        let settings =
-            Settings { iterations: Some(1), photons: 64, max_depth: 16, ..Settings::of(Candidate::plain(method)) };
+        let settings = Settings {
+            iterations: Some(1),
+            photons: 64,
+            max_depth: 16,
+            ..Settings::for_candidate(Candidate::unguided(method))
+        };
         let pixels = render(&scene, &camera, &settings, |_, _| Control::Continue).pixels.len();
         assert_eq!(pixels, 4);
     }
@@ -79,7 +83,7 @@ fn small() -> CameraRequest {
 }
 
 /// Renders of [`METHODS`] that saved states are gone on with: of a triangle in light from all around.
-static STAGES: LazyLock<Vec<Stage<'static>>> = LazyLock::new(|| {
+static STAGES: LazyLock<Vec<RenderInput<'static>>> = LazyLock::new(|| {
     let document = serde_json::json!({
         "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
         "scenes": [{"nodes": [0], "extras": {"caustique": {"environment": {"color": [1, 1, 1]}}}}],
@@ -92,7 +96,7 @@ static STAGES: LazyLock<Vec<Stage<'static>>> = LazyLock::new(|| {
     let description = gltf::read_bytes(&bytes, Path::new("fuzz.glb"), &ReadOptions::default()).expect("it is a scene");
     let scene: &Scene = Box::leak(Box::new(Scene::build(description, 1).expect("it can be built")));
     let camera = Box::leak(Box::new(scene.camera(&small()).expect("there is one")));
-    METHODS.map(|method| Stage::new(scene, camera, &Settings::of(Candidate::plain(method)))).into()
+    METHODS.map(|method| RenderInput::new(scene, camera, &Settings::for_candidate(Candidate::unguided(method)))).into()
 });
 
 /// A scene in JSON and, behind a zero, what lies beside it as `a.bin`, `a.png`, `a.jpg`, `a.hdr` and `a.exr`.

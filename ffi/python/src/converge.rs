@@ -13,7 +13,7 @@ use caustique::finish::Finish;
 use caustique::options::{MethodChoice, RenderOptions, SceneOptions};
 use caustique::pipeline::{Loaded, Ready, check, finish, memory, plan, sized};
 use caustique::plan::{Effect, Presence};
-use caustique::render::{Control, Method, Settings, Spent};
+use caustique::render::{Control, Method, Settings, TimeSpent};
 use caustique::report::crop::Look;
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
@@ -254,7 +254,7 @@ impl Comparison {
         let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         for (Run { name, options }, settings) in self.runs.iter().zip(settings) {
             let mut settings = sized(settings, options.photons, camera.size());
-            let mut decided = Spent::default();
+            let mut decided = TimeSpent::default();
             let mut choice = None;
             if options.method.0.is_none() {
                 let limited = RenderOptions { time: self.time(), ..options.clone() };

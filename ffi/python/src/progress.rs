@@ -34,7 +34,7 @@ impl From<&caustique::render::Progress> for Progress {
     fn from(progress: &caustique::render::Progress) -> Progress {
         let caustique::render::Progress { iteration, iterations, seconds, remaining, light_paths, .. } = *progress;
         let error = progress.finished.or(progress.error);
-        let error_of = if progress.finished.is_some() { FINISHED_PICTURE } else { progress.told.name() };
+        let error_of = if progress.finished.is_some() { FINISHED_PICTURE } else { progress.error_coverage.name() };
         Progress { iteration, iterations, seconds, remaining, light_paths, error, error_of }
     }
 }

@@ -107,7 +107,7 @@ fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: us
 fn header(subject: &Subject, outcome: &Outcome, line: &Line, threads: usize) -> Value {
     let mut header = match line.of {
         Of::Estimate(run) | Of::Finished(run) => {
-            let mut header = outcome.renders[run].account(Some(threads));
+            let mut header = outcome.renders[run].header(Some(threads));
             header.insert("options".into(), subject.entries[run].options.as_str().into());
             Value::Object(header)
         }

@@ -6,7 +6,7 @@ use crate::cli::render::RenderArgs;
 use crate::cli::usage;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{MethodChoice, RenderOptions};
-use caustique::render::{Method, Settings, Spent};
+use caustique::render::{Method, Settings, TimeSpent};
 use caustique::report::entry::Entry;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
@@ -88,7 +88,8 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
         time: None,
         ..render.settings()?
     };
-    let entry = Entry { name: name.into(), options: options.into(), settings, decided: Spent::default(), finish: None };
+    let entry =
+        Entry { name: name.into(), options: options.into(), settings, decided: TimeSpent::default(), finish: None };
     let mut job = render.job;
     job.no_combine |= args.no_finish;
     Ok(Run { entry, args: job })

@@ -21,7 +21,7 @@ use caustique::image::exr;
 use caustique::pipeline::plan::why;
 use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
 use caustique::plan::Plan;
-use caustique::render::output::shape_of;
+use caustique::render::output::layer_shape_of;
 use caustique::render::{Progress, Rendered, Settings};
 use caustique::scene::description::PictureDefaults;
 use caustique::scene::{Scene, Survey};
@@ -52,7 +52,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     // What is in the scene is not known yet.
     let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
     let groups = layers::groups_named(&args.run.layers);
-    layers::selection(&args.run.layers, &shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
+    layers::selection(&args.run.layers, &layer_shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
     output::check_render(&args.output)?;
     args.picture.check()?;
     files::check_usd_layer(args)?;
@@ -194,7 +194,7 @@ impl Watch for Telling<'_> {
             reporter.finish();
         }
         self.summary = Some(Summary::of(rendered));
-        self.seconds = rendered.seconds;
+        self.seconds = rendered.stats.time.seconds;
     }
 
     fn estimated(&mut self, set: &LayerSet, attributes: &exr::Attributes) {

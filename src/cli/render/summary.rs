@@ -31,16 +31,16 @@ pub struct Summary {
 
 impl Summary {
     pub fn of(rendered: &Rendered) -> Summary {
-        let p = rendered.phases;
+        let p = rendered.stats.phases;
         Summary {
-            iterations: rendered.iterations,
-            light_paths: rendered.light_paths,
-            seconds: rendered.seconds,
+            iterations: rendered.stats.iterations,
+            light_paths: rendered.stats.light_paths,
+            seconds: rendered.stats.time.seconds,
             phases: format!(
                 "core-seconds: pilot {:.1}, light {:.1}, map {:.1}, eye {:.1}",
                 p.pilot, p.light, p.map, p.eye
             ),
-            error: rendered.relative_error(),
+            error: rendered.error.relative(),
             told: rendered.settings.error_coverage(),
             has_one_bandwidth: rendered.settings.method.has_bandwidths() && rendered.settings.levels.count < 2,
             rejections: rendered.rejections(),
@@ -48,7 +48,7 @@ impl Summary {
             stop: rendered.stop,
             full: rendered.map_is_full().then(|| {
                 let settings = &rendered.settings;
-                (rendered.photons, settings.photons, settings.photon_memory)
+                (rendered.stats.photons, settings.photons, settings.photon_memory)
             }),
         }
     }
@@ -101,7 +101,7 @@ impl Summary {
 
     /// What was left out as not finite, if anything was: a warning where that is much, else for `people` alone.
     pub fn tell_rejected(&self, output: &Path, people: bool) {
-        let (name, many) = (output.display(), self.rejections.are_many());
+        let (name, many) = (output.display(), self.rejections.are_too_many());
         if let Some(sentence) = self.rejections.sentence().filter(|_| many || people) {
             say(&format!("{}{name}: {sentence}", if many { "warning: " } else { "" }));
         }

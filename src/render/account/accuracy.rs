@@ -8,7 +8,7 @@
 //! iterations. Moments count by how sure they are. Bias that all quarters have in common is told by bandwidth levels,
 //! and added.
 
-use super::history::History;
+use super::history::HistoryEntry;
 use crate::finish::{DEFAULT_CONVERGENCE_RATE, FinishedError};
 
 /// What a power may come out as: noise alone falls with a half, and nothing rises.
@@ -74,7 +74,7 @@ impl Moment {
 
 impl Accuracy {
     /// From a history; `None` while no moment was judged, or none had noise.
-    pub fn of(history: &[History]) -> Option<Accuracy> {
+    pub fn of(history: &[HistoryEntry]) -> Option<Accuracy> {
         let judged = || history.iter().filter_map(|moment| Some((moment.iterations, moment.finished?)));
         let moments: Vec<Moment> = judged().filter_map(|(n, verdict)| Moment::of(n, &verdict)).collect();
         let (last, verdict) = judged().next_back()?;
@@ -128,8 +128,8 @@ mod tests {
     use super::*;
 
     /// A history judged at some iterations, whose finished error falls as said.
-    fn history(judged: &[u64], squared: impl Fn(f64) -> f64, bias: f64) -> Vec<History> {
-        let moment = |&iterations: &u64| History {
+    fn history(judged: &[u64], squared: impl Fn(f64) -> f64, bias: f64) -> Vec<HistoryEntry> {
+        let moment = |&iterations: &u64| HistoryEntry {
             seconds: 0.0,
             cpu_seconds: 0.0,
             iterations,

@@ -45,7 +45,7 @@ impl ErrorCoverage {
 impl Settings {
     /// What the estimated error of such a render knows of.
     pub fn error_coverage(&self) -> ErrorCoverage {
-        let compared = self.levels.own() + 1 < self.compared_levels();
+        let compared = self.levels.picture_level() + 1 < self.compared_levels();
         match self.method {
             method if method.has_fixed_points() => ErrorCoverage::PhotonNoise,
             method if method.has_one_map() => ErrorCoverage::Noise,

@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
 pub enum StopReason {
     /// All iterations are done.
     Iterations,
-    /// The time is up.
+    /// The time limit has passed.
     Time,
-    /// The estimated error is reached.
+    /// The estimated error has reached its target.
     Error,
-    /// The observer stopped it.
+    /// The observer stopped the render.
     Interrupted,
 }
 
-/// One moment of a render's history.
+/// State of a render at one moment of its history.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct History {
+pub struct HistoryEntry {
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Processor seconds of the whole process.
@@ -29,8 +29,8 @@ pub struct History {
     pub iterations: u64,
     /// Light paths emitted.
     pub light_paths: u64,
-    /// Estimated squared relative error, when two iterations are done.
+    /// Estimated squared relative error; `None` before two iterations and while the picture is black.
     pub estimate: Option<ErrorEstimate>,
-    /// The error of the picture finished from half of these iterations, where it was judged.
+    /// Measured error of the picture finished from half of these iterations, at moments where it was measured.
     pub finished: Option<FinishedError>,
 }

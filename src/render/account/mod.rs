@@ -1,21 +1,24 @@
-//! The account of a render: pixels, layers, counts, and the error as it is estimated without a reference.
+//! What a render hands on: pixels, layers, counts, and the error as estimated without a reference.
 
 mod accuracy;
 mod error_coverage;
 mod error_estimate;
 mod history;
-mod joined;
 pub mod output;
+mod photon_record;
+mod pixel_state;
 mod rejections;
-mod result;
-mod unseen;
+mod rendered;
+mod shard_result;
+mod stats;
 
 pub use accuracy::{Accuracy, CONFIDENCE};
 pub use error_coverage::ErrorCoverage;
-pub use error_estimate::ErrorEstimate;
-pub use history::{History, StopReason};
-pub use joined::Part;
+pub use error_estimate::{ErrorEstimate, ErrorReport};
+pub use history::{HistoryEntry, StopReason};
+pub use photon_record::{PhotonRecord, UnseenLight};
+pub(super) use pixel_state::PixelState;
 pub use rejections::Rejections;
-pub use result::Rendered;
-pub(super) use result::error_estimate;
-pub use unseen::{PhotonRecord, Unseen};
+pub use rendered::Rendered;
+pub use shard_result::ShardResult;
+pub use stats::RenderStats;

@@ -1,26 +1,27 @@
 //! What a render leaves in its file: layers, and the account in the header.
 
-use super::history::StopReason;
-use super::result::Rendered;
+use super::history::{HistoryEntry, StopReason};
+use super::rendered::Rendered;
 use crate::error::Result;
 use crate::film::{LayerSet, output};
+use crate::photon::Kind;
 use crate::render::pass::PhotonCounts;
 use crate::render::settings::Settings;
 use crate::scene::{Scene, Survey};
 use serde_json::{Map, Value, json};
 
 /// Which layers a render of a scene with these settings has.
-pub fn shape(settings: &Settings, scene: &Scene) -> output::Shape {
-    shape_of(settings, &scene.survey, &scene.lights.groups().names)
+pub fn layer_shape(settings: &Settings, scene: &Scene) -> output::Shape {
+    layer_shape_of(settings, &scene.survey, &scene.lights.groups().names)
 }
 
 /// The same of any scene with such a survey and groups of lights.
-pub fn shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -> output::Shape {
+pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -> output::Shape {
     output::Shape {
         levels: settings.levels.count,
         compared: settings.compared_levels(),
-        own: settings.levels.own(),
-        kinds: settings.kinds(survey),
+        own: settings.levels.picture_level(),
+        kinds: settings.bandwidth_kinds(survey),
         environment: survey.environment,
         classes: settings.classes,
         volume: survey.scattering,
@@ -38,59 +39,65 @@ impl Rendered {
         output::layers((self.width, self.height), &self.pixels, &self.bandwidths, shape, wanted)
     }
 
-    /// The header's object: what was done, how long it took and how well it came out. Callers add what only they know:
-    /// arguments, warnings, the combiner, the peak of memory. `threads` is `None` for a reproducible file, which has no
-    /// clocks, no memory and no threads in it.
-    pub fn account(&self, threads: Option<usize>) -> Map<String, Value> {
-        let shard = self.settings.shard;
-        let mut account = Map::new();
-        let mut put = |key: &str, value: Value| account.insert(key.into(), value);
+    /// JSON object of the file's header: settings, counts, time and estimated error of the render. The pipeline adds
+    /// arguments, warnings, the finish and the peak of memory. `threads` is `None` for a reproducible file, whose header
+    /// has no clocks, memory or threads.
+    pub fn header(&self, threads: Option<usize>) -> Map<String, Value> {
+        let Rendered { settings, stats, .. } = self;
+        let mut header = Map::new();
+        let mut put = |key: &str, value: Value| header.insert(key.into(), value);
         put("version", env!("CARGO_PKG_VERSION").into());
-        put("method", self.settings.method.name().into());
-        put("seed", self.settings.seed.into());
-        put("iterations", self.iterations.into());
-        put("light_paths", self.light_paths.into());
-        put("shard", json!({"index": shard.index, "count": shard.count}));
-        if self.settings.method.has_one_map() {
-            put("map", json!({"photons": self.photons, "full": self.map_is_full()}));
+        put("method", settings.method.name().into());
+        put("seed", settings.seed.into());
+        put("iterations", stats.iterations.into());
+        put("light_paths", stats.light_paths.into());
+        put("shard", json!({"index": settings.shard.index, "count": settings.shard.count}));
+        if settings.method.has_one_map() {
+            put("map", json!({"photons": stats.photons, "full": self.map_is_full()}));
         }
-        put("levels", self.settings.levels.count.into());
+        put("levels", settings.levels.count.into());
         put("stopped", stop_name(self.stop).into());
-        put("error", self.relative_error().into());
-        put("error_of", json!(self.settings.error_coverage()));
-        put("variance_known", (self.iterations >= 2).into());
+        put("error", self.error.relative().into());
+        put("error_of", json!(settings.error_coverage()));
+        put("variance_known", (stats.iterations >= 2).into());
         let rejections = self.rejections();
         put("rejected", rejections.rejected().into());
         put("rejected_by", rejections.header().into());
-        let history = self.history.iter().map(|moment| {
-            let mut entry = json!({
-                "iterations": moment.iterations, "light_paths": moment.light_paths,
-                "error": moment.estimate.map(|estimate| estimate.root()),
-                "variance": moment.estimate.map(|estimate| estimate.variance),
-            });
-            if threads.is_some() {
-                entry["seconds"] = moment.seconds.into();
-                entry["cpu_seconds"] = moment.cpu_seconds.into();
-            }
-            entry
-        });
-        put("history", history.collect());
-        if self.settings.method.has_bandwidths() {
-            let unseen = self.unseen();
-            let of_kind = |kind: usize| {
-                let PhotonCounts { stored, gathered } = self.photon_record.counts;
-                json!({"stored": stored[kind], "gathered": gathered[kind]})
-            };
-            let photons = json!({"indirect": of_kind(0), "caustic": of_kind(1), "error": unseen.squared.sqrt()});
-            put("unseen", photons);
+        put("history", stats.history.iter().map(|entry| history_header(entry, threads.is_some())).collect());
+        if settings.method.has_bandwidths() {
+            put("unseen", self.unseen_header());
         }
         if let Some(threads) = threads {
-            put("seconds", self.seconds.into());
-            put("phases", json!(self.phases));
+            put("seconds", stats.time.seconds.into());
+            put("phases", json!(stats.phases));
             put("threads", threads.into());
         }
-        account
+        header
     }
+
+    /// Photons stored and gathered by kind, and the relative error by light that they have hardly brought.
+    fn unseen_header(&self) -> Value {
+        let PhotonCounts { stored, gathered } = self.stats.photon_record.counts;
+        let counts = |kind: Kind| json!({"stored": stored[kind as usize], "gathered": gathered[kind as usize]});
+        json!({
+            "indirect": counts(Kind::Indirect),
+            "caustic": counts(Kind::Caustic),
+            "error": self.error.unseen.squared.sqrt(),
+        })
+    }
+}
+
+fn history_header(entry: &HistoryEntry, with_clocks: bool) -> Value {
+    let mut value = json!({
+        "iterations": entry.iterations, "light_paths": entry.light_paths,
+        "error": entry.estimate.map(|estimate| estimate.root()),
+        "variance": entry.estimate.map(|estimate| estimate.variance),
+    });
+    if with_clocks {
+        value["seconds"] = entry.seconds.into();
+        value["cpu_seconds"] = entry.cpu_seconds.into();
+    }
+    value
 }
 
 /// Why a render stopped, in a word.

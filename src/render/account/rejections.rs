@@ -22,7 +22,7 @@ pub struct Rejections {
 
 impl Rejections {
     /// Those of pixels, and of the light paths that served them.
-    pub fn of(pixels: &[PixelAccumulator], light: u64) -> Rejections {
+    pub fn count(pixels: &[PixelAccumulator], light: u64) -> Rejections {
         let mut all = Rejections { light, ..Rejections::default() };
         for pixel in pixels {
             let by_cause = pixel.rejected.by_cause().map(u64::from);
@@ -66,7 +66,7 @@ impl Rejections {
     }
 
     /// Whether so much is missing that the picture may be wrong: light paths count as samples do, features do not.
-    pub fn are_many(&self) -> bool {
+    pub fn are_too_many(&self) -> bool {
         (self.rejected() + self.light) as f64 > ALLOWED * self.samples as f64
     }
 }
@@ -92,13 +92,13 @@ mod tests {
             pixel
         };
         let mut pixels = vec![pixel(0); 1000];
-        assert_eq!(Rejections::of(&pixels, 0).sentence(), None);
+        assert_eq!(Rejections::count(&pixels, 0).sentence(), None);
         pixels[7] = pixel(1);
-        let one = Rejections::of(&pixels, 0);
-        assert!(!one.are_many() && Rejections::of(&pixels, 1).are_many());
+        let one = Rejections::count(&pixels, 0);
+        assert!(!one.are_too_many() && Rejections::count(&pixels, 1).are_too_many());
         pixels[8] = pixel(1);
-        let two = Rejections::of(&pixels, 0);
-        assert!(two.are_many());
+        let two = Rejections::count(&pixels, 0);
+        assert!(two.are_too_many());
         assert_eq!((two.rejected(), two.header()["connection"].as_u64()), (2, Some(2)));
         let said =
             "2 of 1000000 samples were not finite and are left out (connection 2); the layer Rejected shows where";

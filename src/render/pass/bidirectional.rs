@@ -200,7 +200,7 @@ impl<'a> Passes<'a> {
         let guide = self.guide.clone();
         let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
         for ((pair, pass), samples) in self.pairs.iter().zip(&passes).zip(&mut self.samples) {
-            let own = pair.own(self.settings.levels.own());
+            let own = pair.own(self.settings.levels.picture_level());
             let streams = Streams::in_sequence(seed, i, pair.camera);
             let mut on_film = samples.par_tiles().zip(watches.par_iter_mut()).collect::<Vec<_>>().into_iter();
             let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
@@ -329,14 +329,14 @@ impl<'l> SplatsByTile<'l> {
 impl Integrator for Passes<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         if !self.settings.method.has_bandwidths() {
-            return self.settings.pixels(self.scene, self.camera);
+            return self.settings.initial_pixels(self.scene, self.camera);
         }
         // Merging is one of many strategies, and small kernels suffice \[Georgiev et al. 2012\].
-        let initial = match self.settings.initial {
+        let initial = match self.settings.initial_bandwidth {
             InitialBandwidth::Fixed(radius) => InitialBandwidth::Fixed(radius),
             _ => InitialBandwidth::Footprint,
         };
-        let Settings { widest: [widest, _], seed, .. } = *self.settings;
+        let Settings { max_initial_bandwidth: [widest, _], seed, .. } = *self.settings;
         let (none, camera_paths) = (PhotonMap::build(Vec::new()), self.camera_paths());
         let all = initial_bandwidths(&camera_paths, initial, widest, seed, [&none; 2]);
         // A footprint is the same number of pixels everywhere; a fixed radius is compared with the median one.
@@ -350,7 +350,7 @@ impl Integrator for Passes<'_> {
             _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
         };
         self.covered = std::f32::consts::PI * pixels * pixels;
-        all.into_iter().map(self.settings.pixel(self.scene)).collect()
+        all.into_iter().map(self.settings.pixel_factory(self.scene)).collect()
     }
 
     fn guide(&self) -> Option<&Guide> {

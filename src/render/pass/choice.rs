@@ -44,7 +44,7 @@ pub(in crate::render) fn integrator<'a>(
 /// Progressive photon mapping by the rule that the settings say.
 fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Integrator + 'a> {
     use BandwidthRule as Rule;
-    match (settings.rule(), settings.kernel) {
+    match (settings.bandwidth_rule(), settings.kernel) {
         // Photons of equal flux are as dense as the light.
         (Some(Rule::ChiSquared), _) if sppm.guide().is_some() && !settings.has_channels() => {
             counting(sppm, settings, Thinned::new(&settings.chi_squared), kernel::Box)

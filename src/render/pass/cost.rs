@@ -79,7 +79,7 @@ impl Cost {
         let initial_media = InitialMedia::of(scene, camera);
         let camera_paths =
             CameraPaths { indirect: Indirect::Photons, ..settings.camera_paths(scene, camera, &initial_media) };
-        let reach = |length: f32| match settings.initial {
+        let reach = |length: f32| match settings.initial_bandwidth {
             InitialBandwidth::Fixed(radius) => radius,
             _ => footprint(camera, length),
         };
@@ -107,7 +107,7 @@ impl Cost {
             self.lengths;
         let paths = pixels * eye_paths(settings);
         // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
-        let unwanted = candidate.method.gathers() && settings.of_photons(&self.survey).is_empty();
+        let unwanted = candidate.method.gathers() && settings.photon_classes(&self.survey).is_empty();
         let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
         let wanted = |classes: ClassSet| !(settings.classes & classes_in(&self.survey) & classes).is_empty();
         let (camera_alone, camera_media_alone) =

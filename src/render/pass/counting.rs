@@ -277,14 +277,14 @@ impl<R: CountingRule, K: Kernel> Integrator for Counting<'_, R, K> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
         let pixels = self.sppm.pixels();
         let levels = self.settings.levels;
-        let neighbours = match self.settings.initial {
+        let neighbours = match self.settings.initial_bandwidth {
             InitialBandwidth::Nearest(k) => k as f32,
             _ => 0.0,
         };
         let begin = |bandwidth: f32, level: usize| {
             // Each level's area is half that of the next larger, and so is the number of photons it begins with.
             let scale = level_factor2(level, levels.count);
-            let above = level as i32 - levels.own() as i32;
+            let above = level as i32 - levels.picture_level() as i32;
             self.rule.begin(bandwidth * bandwidth * scale, neighbours * scale, above)
         };
         let channels = self.channels.map_or(1, |channels| channels.len());

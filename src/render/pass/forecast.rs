@@ -18,8 +18,8 @@ pub fn photons_per_path(scene: &Scene, camera: &Camera, settings: &Settings) -> 
     let initial_media = InitialMedia::new(scene, camera.position());
     let pass = LightPaths::new(settings.seed, 0, Domain::PilotLight, SAMPLES, settings.max_depth)
         .with(IterationWavelengths::new(settings.seed, 0));
-    let pass = match settings.method.counts_photons() {
-        true => pass.wanting(settings.of_photons(&scene.survey), settings.indirect),
+    let pass = match settings.method.takes_photon_count() {
+        true => pass.wanting(settings.photon_classes(&scene.survey), settings.indirect),
         false => pass,
     };
     let photons = trace_photons(scene, &initial_media, &pass);

@@ -332,7 +332,7 @@ impl<'a> Metropolis<'a> {
 
 impl Integrator for Metropolis<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
+        self.settings.initial_pixels(self.camera_paths.scene, self.camera_paths.camera)
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {

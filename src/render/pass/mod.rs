@@ -24,7 +24,7 @@ pub use bidirectional::bytes_per_whole_tile;
 pub(super) use choice::integrator;
 pub(crate) use cost::Cost;
 pub use forecast::photons_per_path;
-pub(super) use integrator::Integrator;
+pub(super) use integrator::{Integrator, Work};
 pub use photon_counts::PhotonCounts;
 pub use pm::PHOTON_BYTES;
 pub use sample_buffer::sample_bytes;

@@ -14,7 +14,7 @@ pub struct PhotonCounts {
 
 impl PhotonCounts {
     /// Adds the counts of other iterations.
-    pub fn join(&mut self, other: &PhotonCounts) {
+    pub fn add(&mut self, other: &PhotonCounts) {
         for kind in Kind::ALL.map(|kind| kind as usize) {
             self.stored[kind] += other.stored[kind];
             self.gathered[kind] += other.gathered[kind];

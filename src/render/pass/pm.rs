@@ -134,7 +134,7 @@ impl<'a> Pm<'a> {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
         let pass = LightPaths::new(seed, 1, Domain::Light, photons, max_depth)
-            .wanting(self.settings.of_photons(&self.camera_paths.scene.survey), Indirect::Photons)
+            .wanting(self.settings.photon_classes(&self.camera_paths.scene.survey), Indirect::Photons)
             .stopped_by(&self.settings.stop);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
         let (photons, traced, lost) = trace(self.camera_paths.scene, self.initial_media, &pass, most);
@@ -149,7 +149,7 @@ impl<'a> Pm<'a> {
 
 impl Integrator for Pm<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        self.settings.pixels(self.camera_paths.scene, self.camera_paths.camera)
+        self.settings.initial_pixels(self.camera_paths.scene, self.camera_paths.camera)
     }
 
     fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
@@ -162,9 +162,9 @@ impl Integrator for Pm<'_> {
         }
         let start = cpu_seconds();
         let (camera_paths, camera) = (&self.camera_paths, self.camera_paths.camera);
-        let count = match self.settings.initial {
+        let count = match self.settings.initial_bandwidth {
             InitialBandwidth::Nearest(k) => k.clamp(2, MAX_NEIGHBOURS),
-            _ => self.settings.method.neighbours(1),
+            _ => self.settings.method.default_neighbours(1),
         };
         let least = LEAST * camera_paths.scene.lights.sky().radius;
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);

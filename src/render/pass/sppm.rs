@@ -131,7 +131,7 @@ impl<'a> Sppm<'a> {
         initial_media: &'a InitialMedia,
     ) -> Sppm<'a> {
         let camera_paths = settings.camera_paths(scene, camera, initial_media);
-        let guided = settings.guided && !settings.of_photons(&scene.survey).is_empty();
+        let guided = settings.guided && !settings.photon_classes(&scene.survey).is_empty();
         let region = region(&camera_paths, settings.seed);
         let guide = guided.then(|| learn_guide(&camera_paths, initial_media, settings, region)).flatten();
         let samples = SampleBuffer::of_paths(camera.size().0 as usize * camera.size().1 as usize, settings.levels);
@@ -145,7 +145,7 @@ impl<'a> Sppm<'a> {
 
     /// Kinds of photons that there are.
     pub fn kinds(&self) -> ByKind<bool> {
-        self.settings.kinds(&self.camera_paths.scene.survey)
+        self.settings.bandwidth_kinds(&self.camera_paths.scene.survey)
     }
 
     /// What an iteration is to measure.
@@ -176,7 +176,7 @@ impl<'a> Sppm<'a> {
             let pass = pass
                 .with(IterationWavelengths::new(seed, i))
                 .stopped_by(&self.settings.stop)
-                .wanting(self.settings.of_photons(&self.camera_paths.scene.survey), Indirect::Photons);
+                .wanting(self.settings.photon_classes(&self.camera_paths.scene.survey), Indirect::Photons);
             let each = pass.paths();
             let photons = flux[channel].map_or(Photons::default(), |flux| {
                 trace_by(&pass, 0..each, |arena, index, photons| {
@@ -190,7 +190,7 @@ impl<'a> Sppm<'a> {
             work.light_paths += u64::from(each);
             work.photons += maps.len();
             work.rejected += maps.rejected();
-            work.counts.join(&maps.counts());
+            work.counts.add(&maps.counts());
             maps
         });
         (maps, work)
@@ -231,7 +231,7 @@ impl<'a> Sppm<'a> {
         LightPaths::new(seed, i, domain, photons, max_depth)
             .guided(self.guide.as_ref())
             .lighting(self.region)
-            .wanting(self.settings.of_photons(&self.camera_paths.scene.survey), self.settings.indirect)
+            .wanting(self.settings.photon_classes(&self.camera_paths.scene.survey), self.settings.indirect)
             .with(IterationWavelengths::new(seed, i))
             .stopped_by(&self.settings.stop)
     }
@@ -239,7 +239,7 @@ impl<'a> Sppm<'a> {
 
 impl Integrator for Sppm<'_> {
     fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        let Settings { initial, widest, seed, .. } = *self.settings;
+        let Settings { initial_bandwidth: initial, max_initial_bandwidth: widest, seed, .. } = *self.settings;
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
             trace_photons(self.camera_paths.scene, self.initial_media, &self.light_pass(0, Domain::PilotLight))
         } else {
@@ -251,7 +251,7 @@ impl Integrator for Sppm<'_> {
             self.later2 = usual_radius2(&maps[Kind::Caustic as usize], k);
         }
         let mut pixels: Vec<PixelAccumulator> =
-            bandwidths.into_iter().map(self.settings.pixel(self.camera_paths.scene)).collect();
+            bandwidths.into_iter().map(self.settings.pixel_factory(self.camera_paths.scene)).collect();
         if self.camera_paths.scene.survey.scattering {
             let pilot = PhotonMap::build(pilot.volume);
             let bandwidths = initial_volume_bandwidths(&self.camera_paths, initial, widest[1], seed, &pilot);

@@ -31,8 +31,8 @@ pub struct Progress {
     /// Estimated relative error of the method's own image (root of relMSE), when two iterations are done and light is
     /// seen.
     pub error: Option<f64>,
-    /// What that knows of.
-    pub told: ErrorCoverage,
+    /// Which parts of the error that estimate includes.
+    pub error_coverage: ErrorCoverage,
     /// Relative error of the picture as it would be delivered, in place of that above, where it is known.
     pub finished: Option<f64>,
     /// An error that is still to be reached, and in how many seconds it may be.

@@ -1,7 +1,7 @@
 //! The loop over iterations that all methods share: when it stops, and what it reports.
 
 use super::control::{Control, Progress};
-use super::{Session, Stage};
+use super::{RenderInput, Session};
 use crate::camera::Camera;
 use crate::estimator::{PixelAccumulator, QUARTERS};
 use crate::render::account::Rendered;
@@ -12,7 +12,7 @@ use crate::scene::Scene;
 
 /// Iterations before which the estimated error ends no render: two in every quarter, by whose scatter the variance is
 /// told.
-pub const LEAST: u64 = 2 * QUARTERS as u64;
+pub const MIN_ITERATIONS_FOR_ERROR: u64 = 2 * QUARTERS as u64;
 
 /// Renders. `observe` is called after every iteration and may stop the render; it also gets the pixels, to show or save
 /// them.
@@ -25,7 +25,7 @@ pub fn render(
     settings: &Settings,
     mut observe: impl FnMut(&Progress, &[PixelAccumulator]) -> Control,
 ) -> Rendered {
-    let stage = Stage::new(scene, camera, settings);
+    let stage = RenderInput::new(scene, camera, settings);
     let mut session = Session::new(&stage);
     let stop = drive(&mut session, |progress, session| observe(progress, session.pixels()));
     session.finish(stop)
@@ -39,7 +39,7 @@ pub fn drive<'a>(
 ) -> StopReason {
     let settings = session.settings();
     loop {
-        if session.finished() {
+        if session.is_finished() {
             return StopReason::Iterations;
         }
         // A picture is the least that is wanted: the first iteration may take longer.
@@ -54,8 +54,8 @@ pub fn drive<'a>(
             Control::Reached => return StopReason::Error,
         }
         // Without a light the black picture is right.
-        let error = progress.error.or(session.is_dark().then_some(0.0));
-        let error = error.filter(|_| progress.iteration >= LEAST);
+        let error = progress.error.or(session.has_no_lights().then_some(0.0));
+        let error = error.filter(|_| progress.iteration >= MIN_ITERATIONS_FOR_ERROR);
         if let Some(reason) = settings.stops(session.spent().seconds, error) {
             return reason;
         }

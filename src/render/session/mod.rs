@@ -1,380 +1,273 @@
-//! A render that goes on one iteration at a time, so that several can take turns.
+//! A render that advances by one iteration at a time, so that several renders can take turns.
 
 mod control;
 mod drive;
+mod input;
 mod state;
 
 pub use control::{Control, Progress};
-pub use drive::{LEAST, drive, render};
+pub use drive::{MIN_ITERATIONS_FOR_ERROR, drive, render};
+pub use input::RenderInput;
 pub use state::State;
 
-use crate::camera::Camera;
 use crate::error::Result;
-use crate::estimator::bandwidth::initial_volume_bandwidths;
 use crate::estimator::{BandwidthState, PixelAccumulator};
 use crate::film::{self, LayerSet, Picture};
 use crate::finish::FinishedError;
 use crate::light::Guide;
-use crate::photon::PhotonMap;
-use crate::render::account::ErrorEstimate;
-use crate::render::account::output;
-use crate::render::account::{History, StopReason};
-use crate::render::account::{PhotonRecord, Unseen};
-use crate::render::account::{Rendered, error_estimate};
-use crate::render::clock::{Phases, Spent};
-use crate::render::pass::Integrator;
-use crate::render::pass::integrator;
-use crate::render::settings::{Levels, Settings};
-use crate::scene::Scene;
+use crate::render::account::{
+    ErrorReport, HistoryEntry, PhotonRecord, PixelState, RenderStats, Rendered, StopReason, output,
+};
+use crate::render::clock::{Phases, TimeSpent};
+use crate::render::pass::{Integrator, integrator};
+use crate::render::settings::Settings;
 use crate::stat::sum::MAX_TERMS;
-use crate::transport::InitialMedia;
-use state::Rest;
+use state::Counters;
 
-/// What a render reads: scene, camera, settings, and what these say together.
-pub struct Stage<'a> {
-    scene: &'a Scene,
-    camera: &'a Camera,
-    settings: Settings,
-    initial_media: InitialMedia,
-}
-
-impl<'a> Stage<'a> {
-    /// Methods without bandwidth levels get one.
-    pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &Settings) -> Stage<'a> {
-        let mut settings = settings.clone();
-        if !settings.method.has_levels() {
-            settings.levels = Levels::new(1);
-        }
-        Stage { scene, camera, settings, initial_media: InitialMedia::of(scene, camera) }
-    }
-
-    /// The settings of the render.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-
-    /// The largest that bandwidths in media may be, by pixel: what they are without photons.
-    pub fn widest_in_media(&self) -> Vec<f32> {
-        let Settings { initial, widest, seed, .. } = self.settings;
-        let camera_paths = self.settings.camera_paths(self.scene, self.camera, &self.initial_media);
-        initial_volume_bandwidths(&camera_paths, initial, widest[1], seed, &PhotonMap::build(Vec::new()))
-    }
-
-    /// Width and height of the picture (pixels).
-    pub fn size(&self) -> (u32, u32) {
-        self.camera.size()
-    }
-}
-
-/// A render under way.
+/// A render between two iterations.
 pub struct Session<'a> {
-    stage: &'a Stage<'a>,
+    input: &'a RenderInput<'a>,
     integrator: Box<dyn Integrator + 'a>,
     pixels: Vec<PixelAccumulator>,
-    phases: Phases,
-    spent: Spent,
-    pilot_seconds: f64,
-    /// The next iteration, from 0.
-    next: u64,
-    done: u64,
-    light_paths: u64,
-    photons: usize,
-    rejected: u64,
-    photon_record: PhotonRecord,
-    history: Vec<History>,
-    next_record: u64,
-    /// The error after the last iteration, where it was wanted.
-    last: Option<ErrorEstimate>,
+    counters: Counters,
+    /// Error after the last iteration, if it has been estimated.
+    error: Option<ErrorReport>,
 }
 
 impl<'a> Session<'a> {
-    /// Runs the pilot, if the method has one.
-    pub fn new(stage: &'a Stage<'a>) -> Session<'a> {
-        Session::after(stage, Spent::default())
+    /// Starts a render: runs the pilot, if the method has one.
+    pub fn new(input: &'a RenderInput<'a>) -> Session<'a> {
+        Session::with_time_spent(input, TimeSpent::default())
     }
 
-    /// The same of a render on which some time has been spent already, by choosing its settings, which counts as its
-    /// own.
-    pub fn after(stage: &'a Stage<'a>, mut spent: Spent) -> Session<'a> {
-        let Stage { scene, camera, settings, initial_media } = stage;
-        let (integrator, pixels) = spent.during(|| {
+    /// Starts a render on which `time` has been spent already, by choosing its settings. That time counts as part of the
+    /// render.
+    pub fn with_time_spent(input: &'a RenderInput<'a>, mut time: TimeSpent) -> Session<'a> {
+        let RenderInput { scene, camera, settings, initial_media } = input;
+        let (integrator, pixels) = time.measure(|| {
             let mut integrator = integrator(scene, camera, settings, initial_media);
             let pixels = integrator.pixels();
             (integrator, pixels)
         });
-        Session {
-            stage,
-            integrator,
-            pixels,
-            phases: Phases { pilot: spent.cpu_seconds, ..Phases::default() },
-            spent,
-            pilot_seconds: spent.seconds,
-            next: settings.shard.index,
-            done: 0,
-            light_paths: 0,
-            photons: 0,
-            rejected: 0,
-            photon_record: PhotonRecord::new(scene, settings, initial_media),
-            history: Vec::new(),
-            next_record: 1,
-            last: None,
-        }
+        let stats = RenderStats::new(PhotonRecord::new(scene, settings, initial_media), time);
+        let counters = Counters { stats, next: settings.shard.index, next_record: 1, pilot_seconds: time.seconds };
+        Session { input, integrator, pixels, counters, error: None }
     }
 
-    /// Goes on from a saved state; `None` where it is of another picture or method.
-    pub fn resume(stage: &'a Stage<'a>, state: State) -> Option<Session<'a>> {
-        let mut session = Session::new(stage);
-        let State { pixels, rest } = state;
-        let Rest { next, done, light_paths, photons, rejected, next_record, history, .. } = rest;
-        let Rest { phases, spent, pilot_seconds, passes, photon_record, .. } = rest;
-        let (levels, groups) = (stage.settings.levels.count, stage.settings.light_groups(stage.scene));
+    /// Continues from a saved state; `None` if the state is of another picture or method.
+    pub fn resume(input: &'a RenderInput<'a>, state: State) -> Option<Session<'a>> {
+        let mut session = Session::new(input);
+        let State { pixels, counters, passes } = state;
+        let (levels, groups) = (input.settings.levels.count, input.settings.light_groups(input.scene));
         let fits = pixels.len() == session.pixels.len()
             && pixels.iter().all(|pixel| pixel.holds(levels, groups))
             && session.integrator.restore(&passes);
-        fits.then(|| Session {
-            pixels,
-            phases,
-            spent,
-            pilot_seconds,
-            next,
-            done,
-            light_paths,
-            photons: photons as usize,
-            rejected,
-            photon_record,
-            history,
-            next_record,
-            ..session
-        })
+        fits.then(|| Session { pixels, counters, ..session })
     }
 
-    /// The state as it is, to be saved.
+    /// The current state, to be saved.
     ///
     /// # Errors
-    /// None: it is written to memory.
+    /// None: the state of the passes is packed in memory.
     pub fn state(&self) -> postcard::Result<State<&[PixelAccumulator]>> {
-        let rest = Rest {
-            next: self.next,
-            done: self.done,
-            light_paths: self.light_paths,
-            photons: self.photons as u64,
-            rejected: self.rejected,
-            photon_record: self.photon_record,
-            next_record: self.next_record,
-            history: self.history.clone(),
-            phases: self.phases,
-            spent: self.spent,
-            pilot_seconds: self.pilot_seconds,
-            passes: self.integrator.state()?,
-        };
-        Ok(State { pixels: &self.pixels, rest })
+        Ok(State { pixels: &self.pixels, counters: self.counters.clone(), passes: self.integrator.state()? })
     }
 
-    /// Whether all iterations that were asked for are done, or as many as can be summed.
-    pub fn finished(&self) -> bool {
-        self.next >= self.stage.settings.iterations.unwrap_or(u64::MAX).min(MAX_TERMS)
+    /// Whether all iterations are done: those of the settings, or as many as pixels can sum exactly.
+    pub fn is_finished(&self) -> bool {
+        self.counters.next >= self.settings().iterations.unwrap_or(u64::MAX).min(MAX_TERMS)
     }
 
-    /// Adds one iteration; none where an end was asked for in its midst ([`Settings::stop`]).
+    /// Adds one iteration, or none if the user stops it ([`Settings::stop`]).
     pub fn step(&mut self) -> Progress {
         self.step_within(None);
         self.progress()
     }
 
-    /// The same, which is given up after so many seconds, too; false where it was.
+    /// Adds one iteration; discards it and returns false if it takes more than `seconds` or the user stops it.
     pub fn step_within(&mut self, seconds: Option<f64>) -> bool {
-        let mut spent = self.spent;
-        self.stage.settings.stop.start_iteration(seconds);
-        let done = spent.during(|| self.iterate());
-        self.spent = spent;
-        if let Some((true, error)) = done {
-            self.record(error);
+        let mut time = self.counters.stats.time;
+        self.settings().stop.start_iteration(seconds);
+        let done = time.measure(|| self.iterate());
+        self.counters.stats.time = time;
+        if done && self.is_record_due() {
+            self.record();
         }
-        self.last = done.and_then(|(_, error)| error);
-        done.is_some()
+        done
     }
 
-    /// What there is to say after an iteration.
+    /// Renders an iteration and estimates the error if the history or a stop condition needs it: that reads every pixel.
+    /// Returns false if the iteration was discarded.
+    fn iterate(&mut self) -> bool {
+        let Counters { next, stats, .. } = &mut self.counters;
+        // Iterations are numbered from 1; 0 is the pilot.
+        let Some(work) = self.integrator.iterate(*next + 1, &mut self.pixels, &mut stats.phases) else { return false };
+        stats.add_iteration(&work);
+        *next += self.input.settings.shard.count;
+        self.error = None;
+        if self.is_record_due() || self.settings().target_error.is_some() {
+            self.error = Some(self.estimate_error());
+        }
+        true
+    }
+
+    /// Whether the history records the error after this iteration: at powers of sqrt(2), and after the last one.
+    fn is_record_due(&self) -> bool {
+        self.iterations() >= self.counters.next_record || Some(self.iterations()) == self.iterations_of_shard()
+    }
+
+    fn record(&mut self) {
+        let error = self.estimate_error();
+        self.counters.stats.record_error(error.estimate);
+        self.counters.next_record = (self.iterations() as f64 * std::f64::consts::SQRT_2).ceil() as u64;
+    }
+
+    /// Progress after the last iteration.
     pub fn progress(&self) -> Progress {
-        let error = self.last;
-        let error = error.or_else(|| self.history.last().and_then(|moment| moment.estimate));
-        let settings = &self.stage.settings;
-        let total = self.total();
+        let Counters { stats, pilot_seconds, .. } = &self.counters;
+        let recorded = || stats.history.last().and_then(|entry| entry.estimate);
+        let error = self.error.and_then(|error| error.estimate).or_else(recorded);
+        let (done, total, seconds) = (stats.iterations, self.iterations_of_shard(), stats.time.seconds);
         Progress {
-            iteration: self.done,
+            iteration: done,
             iterations: total,
-            seconds: self.spent.seconds,
-            remaining: settings.remaining(self.done, total, self.spent.seconds, self.pilot_seconds),
-            light_paths: self.light_paths,
-            photons: self.photons,
+            seconds,
+            remaining: self.settings().remaining(done, total, seconds, *pilot_seconds),
+            light_paths: stats.light_paths,
+            photons: stats.photons as usize,
             error: error.map(|error| error.root()),
-            told: settings.error_coverage(),
+            error_coverage: self.settings().error_coverage(),
             finished: None,
             expected: None,
         }
     }
 
-    /// Whether the last iteration is one of those that the history tells of.
-    pub fn records(&self) -> bool {
-        self.history.last().is_some_and(|moment| moment.iterations == self.done)
+    /// Whether the history has an entry of the last iteration.
+    pub fn is_recorded(&self) -> bool {
+        self.counters.stats.is_recorded()
     }
 
-    /// The error so far against time.
-    pub fn history(&self) -> &[History] {
-        &self.history
+    /// Estimated error against time.
+    pub fn history(&self) -> &[HistoryEntry] {
+        &self.counters.stats.history
     }
 
-    /// Keeps what was told of the picture finished from half of the iterations so far ([`History::finished`]).
-    pub fn judged(&mut self, verdict: Option<FinishedError>) {
-        let unseen = self.unseen().squared;
-        if !self.records() {
-            self.push(self.estimate());
+    /// Adds the measured error of the picture finished from half of the iterations so far to the history
+    /// ([`HistoryEntry::finished`]).
+    pub fn record_finished_error(&mut self, finished: Option<FinishedError>) {
+        let error = self.estimate_error();
+        self.error = Some(error);
+        if !self.is_recorded() {
+            self.counters.stats.record_error(error.estimate);
         }
-        if let Some(moment) = self.history.last_mut() {
-            moment.finished = verdict.map(|verdict| FinishedError { unseen, ..verdict });
+        if let Some(entry) = self.counters.stats.history.last_mut() {
+            entry.finished = finished.map(|finished| FinishedError { unseen: error.unseen.squared, ..finished });
         }
     }
 
-    /// Seconds until so many iterations are done, at the pace so far.
-    pub fn seconds_to(&self, iterations: f64) -> f64 {
-        let pace = (self.spent.seconds - self.pilot_seconds) / self.done.max(1) as f64;
-        (iterations - self.done as f64).max(0.0) * pace
+    /// Seconds until `iterations` are done, at the mean speed so far.
+    pub fn seconds_until(&self, iterations: f64) -> f64 {
+        let done = self.iterations();
+        let pace = (self.spent().seconds - self.counters.pilot_seconds) / done.max(1) as f64;
+        (iterations - done as f64).max(0.0) * pace
     }
 
-    /// An iteration, and the error where it is wanted: for the history, or to stop the render. `None` where it was given
-    /// up.
-    fn iterate(&mut self) -> Option<(bool, Option<ErrorEstimate>)> {
-        let settings = &self.stage.settings;
-        // Iterations count from 1; pass 0 is the pilot's.
-        let work = self.integrator.iterate(self.next + 1, &mut self.pixels, &mut self.phases)?;
-        self.next += settings.shard.count;
-        self.done += 1;
-        self.light_paths += work.light_paths;
-        self.photons = work.photons;
-        self.rejected += work.rejected;
-        self.photon_record.counts.join(&work.counts);
-        // The error costs a look at every pixel: at powers of sqrt(2), and whenever it may stop the render.
-        let record = self.done >= self.next_record || Some(self.done) == self.total();
-        let wanted = record || settings.target_error.is_some();
-        Some((record, if wanted { self.estimate() } else { None }))
+    /// Iterations of this shard, if their number stops the render.
+    fn iterations_of_shard(&self) -> Option<u64> {
+        self.settings().iterations_of_shard()
     }
 
-    fn record(&mut self, estimate: Option<ErrorEstimate>) {
-        self.push(estimate);
-        self.next_record = (self.done as f64 * std::f64::consts::SQRT_2).ceil() as u64;
-    }
-
-    fn push(&mut self, estimate: Option<ErrorEstimate>) {
-        let (iterations, light_paths) = (self.done, self.light_paths);
-        let Spent { seconds, cpu_seconds } = self.spent;
-        self.history.push(History { seconds, cpu_seconds, iterations, light_paths, estimate, finished: None });
-    }
-
-    /// Iterations of this shard, when their number is what stops the render.
-    fn total(&self) -> Option<u64> {
-        self.stage.settings.iterations_of_shard()
-    }
-
-    /// Where its light paths start, if they are guided.
+    /// The learnt distribution of starts of light paths, if they are guided.
     pub(crate) fn guide(&self) -> Option<&Guide> {
         self.integrator.guide()
     }
 
-    /// The pixels as they are.
+    /// Pixels, row by row from the top.
     pub fn pixels(&self) -> &[PixelAccumulator] {
         &self.pixels
     }
 
-    /// Whether no light shines, so that the black picture is right.
-    pub fn is_dark(&self) -> bool {
-        self.stage.scene.lights.is_empty()
+    /// Whether the scene has no lights, so that the black picture is right.
+    pub fn has_no_lights(&self) -> bool {
+        self.input.scene.lights.is_empty()
     }
 
-    /// The settings it was made with.
+    /// Settings of the render.
     pub fn settings(&self) -> &'a Settings {
-        &self.stage.settings
+        &self.input.settings
     }
 
     /// Iterations done.
     pub fn iterations(&self) -> u64 {
-        self.done
+        self.counters.stats.iterations
     }
 
     /// Light paths emitted.
     pub fn light_paths(&self) -> u64 {
-        self.light_paths
+        self.counters.stats.light_paths
     }
 
-    /// Time taken so far by pilot and iterations.
-    pub fn spent(&self) -> Spent {
-        self.spent
+    /// Time spent so far by pilot and iterations, and added by [`Session::add_time`].
+    pub fn spent(&self) -> TimeSpent {
+        self.counters.stats.time
     }
 
     /// Core-seconds per phase so far.
     pub fn phases(&self) -> Phases {
-        self.phases
+        self.counters.stats.phases
     }
 
-    /// Estimated error of the method's own image, see [`Rendered::relative_error`].
-    pub fn estimate(&self) -> Option<ErrorEstimate> {
-        error_estimate(&self.pixels, &self.stage.settings).map(|error| error.with(self.unseen()))
+    /// Estimated error of the method's own picture after the last iteration.
+    pub fn estimate_error(&self) -> ErrorReport {
+        self.error.unwrap_or_else(|| {
+            let bandwidths = self.bandwidths();
+            self.counters.stats.estimate_error(&PixelState::new(&self.pixels, &bandwidths, self.settings()))
+        })
     }
 
-    /// Light of which hardly any photon has come.
-    fn unseen(&self) -> Unseen {
-        let settings = &self.stage.settings;
-        self.photon_record.unseen((&self.pixels, &self.bandwidths()), settings, self.light_paths)
-    }
-
-    /// The method's own image as it is, row by row from the top.
+    /// The method's own picture after the last iteration.
     pub fn picture(&self) -> Picture {
-        let own = self.stage.settings.levels.own();
-        let pixels = &self.pixels;
-        Picture::from_fn(self.stage.camera.size().into(), |i| pixels[i].mean(own).as_vec3().to_array())
+        let (pixels, level) = (&self.pixels, self.settings().levels.picture_level());
+        Picture::from_fn(self.input.size().into(), |i| pixels[i].mean(level).as_vec3().to_array())
     }
 
-    /// Counts time that was spent on the render between its iterations as its own.
-    pub fn charge(&mut self, spent: Spent) {
-        self.spent.seconds += spent.seconds;
-        self.spent.cpu_seconds += spent.cpu_seconds;
+    /// Adds time that the caller spent on the render between iterations.
+    pub fn add_time(&mut self, time: TimeSpent) {
+        self.counters.stats.time.add(time);
     }
 
-    /// The layers as they are, see [`Rendered::layers`].
+    /// The layers after the last iteration whose names are `wanted`, see [`Rendered::layers`].
     ///
     /// # Errors
-    /// None: its pixels are as many as its size says.
+    /// None: the number of pixels fits the size of the picture.
     pub fn layers(&self, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
-        let shape = output::shape(&self.stage.settings, self.stage.scene);
-        film::output::layers(self.stage.camera.size(), &self.pixels, &self.bandwidths(), &shape, wanted)
+        let shape = output::layer_shape(self.settings(), self.input.scene);
+        film::output::layers(self.input.size(), &self.pixels, &self.bandwidths(), &shape, wanted)
     }
 
     /// Bandwidths of the last iteration.
     fn bandwidths(&self) -> BandwidthState {
-        let settings = &self.stage.settings;
-        BandwidthState::new(settings.schedule(settings.last(self.done)), self.integrator.counted())
+        let settings = self.settings();
+        BandwidthState::new(settings.schedule(settings.last_iteration(self.iterations())), self.integrator.counted())
     }
 
-    /// Ends it.
+    /// Ends the render.
     pub fn finish(mut self, stop: StopReason) -> Rendered {
-        if self.done > 0 && self.history.last().is_none_or(|moment| moment.iterations != self.done) {
-            self.record(self.estimate());
+        let error = self.estimate_error();
+        self.error = Some(error);
+        if self.iterations() > 0 && !self.is_recorded() {
+            self.record();
         }
-        let (width, height) = self.stage.camera.size();
+        let (width, height) = self.input.size();
         Rendered {
             width,
             height,
-            techniques: self.integrator.techniques(self.done),
+            techniques: self.integrator.techniques(self.iterations()),
             bandwidths: self.bandwidths(),
             pixels: self.pixels,
-            settings: self.stage.settings.clone(),
-            iterations: self.done,
-            light_paths: self.light_paths,
-            photons: self.photons as u64,
-            light_rejected: self.rejected,
-            photon_record: self.photon_record,
-            seconds: self.spent.seconds,
-            phases: self.phases,
-            history: self.history,
+            settings: self.input.settings.clone(),
+            stats: self.counters.stats,
+            error,
             stop,
         }
     }
@@ -398,7 +291,7 @@ mod tests {
     use super::*;
     use crate::math::DAffine3;
     use crate::scene::description::{CameraDescription, Projection};
-    use crate::scene::{CameraRequest, Description};
+    use crate::scene::{CameraRequest, Description, Scene};
 
     /// Pixels count iterations in 32 bits, and their sums are exact for 2^23: no render goes on beyond, however many
     /// are asked for, nor does the last of many shards.
@@ -418,12 +311,12 @@ mod tests {
         let camera =
             scene.camera(&CameraRequest { width: Some(2), height: Some(1), ..CameraRequest::default() }).unwrap();
         for (iterations, last) in [(None, MAX_TERMS), (Some(1 << 40), MAX_TERMS), (Some(100), 100)] {
-            let stage = Stage::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
+            let stage = RenderInput::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
             let mut session = Session::new(&stage);
-            session.next = last - 1;
-            assert!(!session.finished());
+            session.counters.next = last - 1;
+            assert!(!session.is_finished());
             session.step();
-            assert!(session.finished() && session.done == 1);
+            assert!(session.is_finished() && session.iterations() == 1);
         }
     }
 }

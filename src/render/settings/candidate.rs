@@ -18,17 +18,17 @@ pub struct Candidate {
 impl Candidate {
     /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is
     /// left to a technique that finds it badly.
-    pub const USUAL: Candidate = Candidate::plain(Method::Vcm);
+    pub const DEFAULT: Candidate = Candidate::unguided(Method::Vcm);
     /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where
     /// others would have found the glass, and without which it is hardly found where it is small.
-    pub const FOCUSED: Candidate = Candidate { guided: true, ..Candidate::USUAL };
+    pub const GUIDED: Candidate = Candidate { guided: true, ..Candidate::DEFAULT };
     /// What is taken where the usual does not find all light that is focused.
-    pub const FOCUSED_GATHERING: Candidate = Candidate { guided: true, ..Candidate::GATHERING };
+    pub const GUIDED_GATHERING: Candidate = Candidate { guided: true, ..Candidate::GATHERING };
     /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
-    pub const GATHERING: Candidate = Candidate::plain(Method::Sppm);
+    pub const GATHERING: Candidate = Candidate::unguided(Method::Sppm);
 
     /// A method with light paths as they come.
-    pub const fn plain(method: Method) -> Candidate {
+    pub const fn unguided(method: Method) -> Candidate {
         Candidate { method, indirect: Indirect::Photons, guided: false }
     }
 

@@ -245,7 +245,7 @@ impl Method {
 
     /// Whether it weighs sampling techniques against each other path by path, or has but one.
     pub fn has_techniques(self) -> bool {
-        !self.counts_photons() && !self.has_chains()
+        !self.takes_photon_count() && !self.has_chains()
     }
 
     /// Whether its samples are Markov chains.
@@ -295,33 +295,33 @@ impl Method {
 
     /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have
     /// one for every eye path, or none.
-    pub fn counts_photons(self) -> bool {
+    pub fn takes_photon_count(self) -> bool {
         self.row().photons.is_some()
     }
 
     /// Whether its light paths can be guided.
-    pub fn guides(self) -> bool {
+    pub fn supports_guiding(self) -> bool {
         self.row().guides
     }
 
     /// Default number of light paths of methods where it is a setting.
-    pub fn photons(self) -> u32 {
+    pub fn default_photons(self) -> u32 {
         self.row().photons.unwrap_or(DEFAULT_PHOTONS)
     }
 
     /// Default number of neighbours that set bandwidths.
-    pub fn neighbours(self, levels: usize) -> usize {
+    pub fn default_neighbours(self, levels: usize) -> usize {
         let (several, one) = self.row().neighbours;
         if levels == 1 { one } else { several }
     }
 
     /// Default reduction rate of the memoryless rule.
-    pub fn alpha(self) -> f64 {
+    pub fn default_alpha(self) -> f64 {
         self.row().alpha
     }
 
     /// The method that is tried in its place by pilots, where levels must keep the ratio of their bandwidths.
-    pub fn pilot(self) -> Method {
+    pub fn pilot_method(self) -> Method {
         self.row().pilot.unwrap_or(self)
     }
 }

@@ -67,7 +67,7 @@ impl Levels {
 
     /// The level (from 0) that is the method's own image: the second largest, whose bandwidth is the usual one (k = 10
     /// where the largest is set by k = 20).
-    pub fn own(&self) -> usize {
+    pub fn picture_level(&self) -> usize {
         self.count.saturating_sub(2)
     }
 }
@@ -141,9 +141,9 @@ pub struct Settings {
     pub techniques: bool,
     /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is
     /// its bandwidth.
-    pub initial: InitialBandwidth,
+    pub initial_bandwidth: InitialBandwidth,
     /// Largest initial bandwidth over the picture's width: on surfaces and in media.
-    pub widest: [f32; 2],
+    pub max_initial_bandwidth: [f32; 2],
     /// Reduction rate of the memoryless rule and that of local statistics, in (0, 1].
     pub alpha: f64,
     /// The same for photons in media.
@@ -182,8 +182,8 @@ impl Default for Settings {
             guided: false,
             levels: Levels::new(5),
             techniques: false,
-            initial: InitialBandwidth::Nearest(DEFAULT_KNN.0),
-            widest: [SCREEN_CAP; 2],
+            initial_bandwidth: InitialBandwidth::Nearest(DEFAULT_KNN.0),
+            max_initial_bandwidth: [SCREEN_CAP; 2],
             alpha: memoryless::ALPHA,
             volume_alpha: volume::ALPHA,
             radius_rule: RadiusRule::Memoryless,
@@ -201,7 +201,7 @@ impl Default for Settings {
 
 impl Settings {
     /// Those of a way to render when nothing else is asked for.
-    pub fn of(candidate: Candidate) -> Settings {
+    pub fn for_candidate(candidate: Candidate) -> Settings {
         let method = candidate.method;
         let levels = Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 });
         Settings {
@@ -209,13 +209,13 @@ impl Settings {
             indirect: candidate.indirect,
             guided: candidate.guided,
             levels,
-            photons: method.photons(),
-            initial: if method.counts_photons() {
-                InitialBandwidth::Nearest(method.neighbours(levels.count))
+            photons: method.default_photons(),
+            initial_bandwidth: if method.takes_photon_count() {
+                InitialBandwidth::Nearest(method.default_neighbours(levels.count))
             } else {
                 InitialBandwidth::Footprint
             },
-            alpha: method.alpha(),
+            alpha: method.default_alpha(),
             ..Settings::default()
         }
     }
@@ -223,8 +223,8 @@ impl Settings {
     /// Light paths of an iteration of a picture of that size where no number is asked for. Where they bring caustics
     /// alone, eye paths bring the rest and are what most of the error is left by: guided ones, which meet glass at once
     /// and take several times as long, are no more than those.
-    pub fn usual_photons(&self, (width, height): (u32, u32)) -> u32 {
-        let usual = self.method.photons();
+    pub fn default_photons(&self, (width, height): (u32, u32)) -> u32 {
+        let usual = self.method.default_photons();
         if self.guided && self.indirect == Indirect::Paths { usual.min(width.saturating_mul(height)) } else { usual }
     }
 
@@ -242,16 +242,16 @@ impl Settings {
     }
 
     /// What makes its pixels before the first iteration, from their largest initial bandwidths.
-    pub(in crate::render) fn pixel(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
+    pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.power_exponent());
         let groups = self.light_groups(scene);
         move |bandwidths| PixelAccumulator::new(levels, exponent, bandwidths).with_groups(groups)
     }
 
     /// All pixels before the first iteration, of methods without bandwidths of pixels.
-    pub(in crate::render) fn pixels(&self, scene: &Scene, camera: &Camera) -> Vec<PixelAccumulator> {
+    pub(in crate::render) fn initial_pixels(&self, scene: &Scene, camera: &Camera) -> Vec<PixelAccumulator> {
         let (width, height) = camera.size();
-        vec![self.pixel(scene)([0.0; 2]); width as usize * height as usize]
+        vec![self.pixel_factory(scene)([0.0; 2]); width as usize * height as usize]
     }
 
     /// Groups of lights whose light is told apart: by methods that know of each light where it comes from.
@@ -260,7 +260,7 @@ impl Settings {
     }
 
     /// The number (from 1) of the last of so many iterations of this shard.
-    pub fn last(&self, done: u64) -> u64 {
+    pub fn last_iteration(&self, done: u64) -> u64 {
         self.shard.index + done.saturating_sub(1) * self.shard.count + 1
     }
 
@@ -286,42 +286,42 @@ impl Settings {
     }
 
     /// Classes of light that photons are to bring to eye paths that gather them.
-    pub fn of_photons(&self, survey: &Survey) -> ClassSet {
+    pub fn photon_classes(&self, survey: &Survey) -> ClassSet {
         self.search().owned_by(Owner::Photons) & self.classes & classes_in(survey)
     }
 
     /// Kinds of photons that have bandwidths; where light paths are merged, which tells no kinds apart, the first.
-    pub fn kinds(&self, survey: &Survey) -> ByKind<bool> {
+    pub fn bandwidth_kinds(&self, survey: &Survey) -> ByKind<bool> {
         if self.method.gathers() {
-            self.indirect.kinds(self.of_photons(survey))
+            self.indirect.kinds(self.photon_classes(survey))
         } else {
             [self.method.has_bandwidths(), false]
         }
     }
 
     /// The rule that its bandwidths follow, if they follow one.
-    pub fn rule(&self) -> Option<BandwidthRule> {
+    pub fn bandwidth_rule(&self) -> Option<BandwidthRule> {
         self.method.rule(self.radius_rule.into())
     }
 
     /// Whether red, green and blue have photons and bandwidths of their own.
     pub fn has_channels(&self) -> bool {
-        self.rule() == Some(BandwidthRule::ChiSquared) && self.chi_squared.plus
+        self.bandwidth_rule() == Some(BandwidthRule::ChiSquared) && self.chi_squared.plus
     }
 
     /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any
     /// order.
     pub fn is_memoryless(&self) -> bool {
-        self.rule().is_none_or(|rule| rule == BandwidthRule::Memoryless)
+        self.bandwidth_rule().is_none_or(|rule| rule == BandwidthRule::Memoryless)
     }
 
     /// Levels whose bandwidths are in the fixed ratio from which their bias can be told: all, or, where each shrinks on
     /// its own, those up to the method's own image, which leaves none to compare it with.
     pub fn compared_levels(&self) -> usize {
-        if self.is_memoryless() || self.rule() == Some(BandwidthRule::Adaptive) {
+        if self.is_memoryless() || self.bandwidth_rule() == Some(BandwidthRule::Adaptive) {
             self.levels.count
         } else {
-            self.levels.own() + 1
+            self.levels.picture_level() + 1
         }
     }
 }

@@ -6,7 +6,7 @@ use caustique::film::{Layer, LayerSet};
 use caustique::image::exr;
 use caustique::image::tonemap::ToneMap;
 use caustique::math::DVec3;
-use caustique::render::{Levels, Method, Session, Settings, Stage};
+use caustique::render::{Levels, Method, RenderInput, Session, Settings};
 use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{CameraRequest, Scene};
 use serde_json::{Value, json};
@@ -46,8 +46,8 @@ impl Ground {
         (width as usize, height as usize)
     }
 
-    pub fn stage(&self, settings: &Settings) -> Stage<'_> {
-        Stage::new(&self.scene, &self.camera, settings)
+    pub fn stage(&self, settings: &Settings) -> RenderInput<'_> {
+        RenderInput::new(&self.scene, &self.camera, settings)
     }
 
     /// The picture after some iterations.
@@ -90,8 +90,8 @@ impl Ground {
             _ => InitialBandwidth::Nearest(neighbours),
         };
         // The usual alpha of a method that merges.
-        let alpha = method.alpha();
-        let settings = |seed| Settings { initial, alpha, ..settings(method, photons, seed) };
+        let alpha = method.default_alpha();
+        let settings = |seed| Settings { initial_bandwidth: initial, alpha, ..settings(method, photons, seed) };
         let stages = [1_000_001, 1_000_002].map(|seed| self.stage(&settings(seed)));
         let [mut a, mut b] = [0, 1].map(|half| Session::new(&stages[half]));
         while a.spent().cpu_seconds + b.spent().cpu_seconds < seconds {
@@ -120,7 +120,7 @@ pub fn settings(method: Method, photons: u32, seed: u64) -> Settings {
         photons,
         seed,
         levels: Levels::new(1),
-        initial: InitialBandwidth::Nearest(10),
+        initial_bandwidth: InitialBandwidth::Nearest(10),
         iterations: None,
         ..Settings::default()
     }

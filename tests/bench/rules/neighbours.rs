@@ -28,11 +28,11 @@ pub fn neighbours(
             for (method, found) in METHODS.iter().zip(&mut found) {
                 for (k, found) in NEIGHBOURS.iter().zip(found) {
                     let initial = InitialBandwidth::Nearest(*k);
-                    found.push(after(&Settings { initial, ..settings(*method, photons, seed) }));
+                    found.push(after(&Settings { initial_bandwidth: initial, ..settings(*method, photons, seed) }));
                 }
             }
             let initial = InitialBandwidth::Fixed(radius);
-            everywhere.push(after(&Settings { initial, ..settings(Method::Appm, photons, seed) }));
+            everywhere.push(after(&Settings { initial_bandwidth: initial, ..settings(Method::Appm, photons, seed) }));
             eprintln!("{}: seed {seed} done", ground.name);
         }
         let point = |k: usize, errors: &[Errors]| {

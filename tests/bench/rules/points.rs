@@ -2,7 +2,7 @@
 
 use crate::ground::{Ground, METHODS, Shot, moments, settings};
 use crate::plot::{Curve, Panel, panels};
-use caustique::render::{Session, Stage};
+use caustique::render::{RenderInput, Session};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub fn points(
     let mut bandwidths = vec![vec![Vec::new(); METHODS.len()]; pixels.len()];
     let mut errors = vec![vec![vec![0.0; moments.len()]; METHODS.len()]; pixels.len()];
     for seed in 0..seeds {
-        let stages: Vec<Stage<'_>> = METHODS.iter().map(|m| ground.stage(&settings(*m, photons, seed))).collect();
+        let stages: Vec<RenderInput<'_>> = METHODS.iter().map(|m| ground.stage(&settings(*m, photons, seed))).collect();
         for (m, stage) in stages.iter().enumerate() {
             let mut session = Session::new(stage);
             for (at, moment) in moments.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Error against iterations and core-seconds by method: Table 1 of \[CPPM 2020\].
 
 use crate::ground::{Ground, METHODS, Shot, moments, settings};
-use caustique::render::{Session, Stage};
+use caustique::render::{RenderInput, Session};
 use serde_json::{Value, json};
 
 /// Methods take turns, iteration by iteration, so that they share what else the machine does.
@@ -11,7 +11,7 @@ pub fn race(ground: &Ground, (photons, iterations, seeds): (u32, u64, u64), refe
     let mut runs: Vec<Vec<Value>> = METHODS.iter().map(|_| Vec::new()).collect();
     let mut last: Vec<Vec<Shot>> = METHODS.iter().map(|_| Vec::new()).collect();
     for seed in 0..seeds {
-        let stages: Vec<Stage<'_>> = METHODS.iter().map(|m| ground.stage(&settings(*m, photons, seed))).collect();
+        let stages: Vec<RenderInput<'_>> = METHODS.iter().map(|m| ground.stage(&settings(*m, photons, seed))).collect();
         let mut sessions: Vec<Session<'_>> = stages.iter().map(Session::new).collect();
         let mut points: Vec<Vec<Value>> = METHODS.iter().map(|_| Vec::new()).collect();
         for i in 1..=iterations {

@@ -65,7 +65,7 @@ const UNSAID: [(&str, &[&str]); 6] = [
             "interrupted while the stage was read",
         ],
     ),
-    ("they are no messages", &["caustique checkpoint 5n", "caustique checkpoint ", "not said", "default material"]),
+    ("they are no messages", &["caustique checkpoint 6n", "caustique checkpoint ", "not said", "default material"]),
 ];
 
 /// The files of the loaders.

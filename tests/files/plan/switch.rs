@@ -7,7 +7,7 @@ use caustique::camera::Camera;
 use caustique::material::{Alpha, Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::plan::{Effect, EffectSet, switch};
-use caustique::render::output::shape;
+use caustique::render::output::layer_shape;
 use caustique::render::{Control, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
@@ -23,7 +23,7 @@ fn picture(description: Description) -> String {
 fn picture_of(scene: &Scene, camera: &Camera) -> String {
     let settings = Settings { iterations: Some(2), photons: 500, ..Settings::default() };
     let rendered = render(scene, camera, &settings, |_, _| Control::Continue);
-    let layers = rendered.layers(&shape(&rendered.settings, scene), |_| true).expect("there are layers");
+    let layers = rendered.layers(&layer_shape(&rendered.settings, scene), |_| true).expect("there are layers");
     layers
         .layers
         .iter()

@@ -7,7 +7,7 @@ use crate::support::tiles::{SIZE, TILES, average, disagreeing, tiles};
 use caustique::estimator::{InitialBandwidth, Parts};
 use caustique::math::DVec3;
 use caustique::plan::{ClassSet, Effect, EffectSet};
-use caustique::render::output::shape;
+use caustique::render::output::layer_shape;
 use caustique::render::{Control, Levels, Method, Rendered, Settings, render};
 use caustique::scene::Scene;
 use caustique::transport::Indirect;
@@ -37,7 +37,11 @@ fn settings(method: Method, indirect: Indirect, classes: ClassSet) -> Settings {
         indirect,
         classes,
         photons: 4000,
-        initial: if method == Method::Pm { InitialBandwidth::Nearest(20) } else { InitialBandwidth::Fixed(0.06) },
+        initial_bandwidth: if method == Method::Pm {
+            InitialBandwidth::Nearest(20)
+        } else {
+            InitialBandwidth::Fixed(0.06)
+        },
         levels: Levels::new(1),
         alpha: 1.0,
         iterations: Some(3),
@@ -108,7 +112,7 @@ fn every_method_leaves_out_what_is_switched_off() {
             |part: fn(&Parts) -> DVec3| rendered.pixels.iter().map(|p| part(&p.parts()).element_sum()).sum::<f64>();
         assert_eq!((sum(|p| p.caustic), sum(|p| p.emission)), (0.0, 0.0), "{method:?}");
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) > 0.0, "{method:?}");
-        let layers = rendered.layers(&shape(&rendered.settings, &scene), |_| true).expect("there are layers");
+        let layers = rendered.layers(&layer_shape(&rendered.settings, &scene), |_| true).expect("there are layers");
         assert!(layers.get("Caustic").is_none() && layers.get("Emission").is_none() && layers.get("Direct").is_some());
         // Nothing is left for photons.
         let lit = without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy, Effect::Volume]);
@@ -128,20 +132,25 @@ fn photons_that_nobody_wants_are_not_traced() {
     let of = |classes| picture(&scene, 24, &settings(Method::Sppm, Indirect::Photons, classes));
     let whole = of(ClassSet::ALL);
     let plain = of(without(&[Effect::Caustic, Effect::Sds]));
-    assert!(plain.photons < whole.photons && plain.light_paths == whole.light_paths);
+    assert!(plain.stats.photons < whole.stats.photons && plain.stats.light_paths == whole.stats.light_paths);
     for (a, b) in plain.pixels.iter().zip(&whole.pixels) {
         let [a, b] = [a, b].map(|p| [p.parts().emission, p.parts().direct, p.parts().indirect]);
         assert_eq!(a, b);
     }
     let caustics = of(without(&[Effect::Indirect, Effect::Glossy]));
-    assert!(caustics.photons + plain.photons < whole.photons * 11 / 10, "{} {}", caustics.photons, whole.photons);
+    assert!(
+        caustics.stats.photons + plain.stats.photons < whole.stats.photons * 11 / 10,
+        "{} {}",
+        caustics.stats.photons,
+        whole.stats.photons
+    );
     let none = of(without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy]));
-    assert_eq!((none.photons, none.light_paths), (0, 0));
+    assert_eq!((none.stats.photons, none.stats.light_paths), (0, 0));
     for (a, b) in none.pixels.iter().zip(&whole.pixels) {
         assert_eq!(a.parts().emission, b.parts().emission);
     }
     let paths = picture(&scene, 24, &settings(Method::Sppm, Indirect::Paths, only(Effect::Direct)));
-    assert_eq!(paths.light_paths, 0);
+    assert_eq!(paths.stats.light_paths, 0);
 }
 
 /// Tiles of some classes alone, by several seeds.
@@ -151,7 +160,7 @@ fn by(scene: &Scene, way: (Method, Indirect), effect: Effect, iterations: u64, p
             seed,
             photons,
             iterations: Some(iterations),
-            initial: InitialBandwidth::Fixed(0.04),
+            initial_bandwidth: InitialBandwidth::Fixed(0.04),
             ..settings(way.0, way.1, only(effect))
         };
         let rendered = picture(scene, SIZE, &settings);

@@ -2,7 +2,9 @@
 
 use crate::support::scenes::{add, build, look_at, matte, point_light, quad, square};
 use caustique::math::{DVec3, Vec3};
-use caustique::render::{Control, Method, Part, Rejections, Rendered, Session, Settings, Shard, Stage, render};
+use caustique::render::{
+    Control, Method, Rejections, RenderInput, Rendered, Session, Settings, Shard, ShardResult, render,
+};
 use caustique::scene::{Description, Scene};
 
 const SIZE: u32 = 32;
@@ -34,12 +36,12 @@ fn by(rejections: &Rejections, cause: &str) -> u64 {
 
 /// All that a render tells of it.
 fn checked(rendered: &Rendered) -> Rejections {
-    let own = rendered.settings.levels.own();
+    let own = rendered.settings.levels.picture_level();
     for pixel in &rendered.pixels {
         assert!(pixel.mean(own).is_finite() && pixel.iterations + pixel.rejected.total() == ITERATIONS as u32);
     }
     let rejections = rendered.rejections();
-    let account = rendered.account(None);
+    let account = rendered.header(None);
     assert_eq!(account["rejected"], rejections.rejected());
     assert_eq!(account["rejected_by"], serde_json::Value::from(rejections.header()));
     let samples = ["path", "emission", "direct_light", "connection", "photons", "splat", "sum"];
@@ -60,12 +62,12 @@ fn what_overflows_is_counted_by_cause() {
         (Method::Vcm, &["direct_light", "connection"]),
     ] {
         let quiet = checked(&rendered(&dim, &settings(method)));
-        assert!(quiet.sentence().is_none() && !quiet.are_many(), "{method:?}: {quiet:?}");
+        assert!(quiet.sentence().is_none() && !quiet.are_too_many(), "{method:?}: {quiet:?}");
         let loud = rendered(&bright, &settings(method));
         let rejections = checked(&loud);
         println!("{method:?}: {}", rejections.sentence().unwrap_or_default());
-        let lit = loud.pixels.iter().filter(|pixel| pixel.mean(loud.settings.levels.own()).x > 0.0).count();
-        assert!(lit > loud.pixels.len() / 4 && rejections.are_many(), "{method:?}: {lit} pixels, {rejections:?}");
+        let lit = loud.pixels.iter().filter(|pixel| pixel.mean(loud.settings.levels.picture_level()).x > 0.0).count();
+        assert!(lit > loud.pixels.len() / 4 && rejections.are_too_many(), "{method:?}: {lit} pixels, {rejections:?}");
         for cause in causes {
             assert!(by(&rejections, cause) > 0, "{method:?}: {cause} in {rejections:?}");
         }
@@ -84,7 +86,7 @@ fn light_paths_that_cannot_begin_are_counted() {
         let rendered = rendered(&scene, &settings(method));
         let rejections = checked(&rendered);
         let lost = by(&rejections, "light_paths");
-        assert!(rejections.are_many() && lost >= rendered.light_paths, "{method:?}: {rejections:?}");
+        assert!(rejections.are_too_many() && lost >= rendered.stats.light_paths, "{method:?}: {rejections:?}");
     }
 }
 
@@ -98,16 +100,16 @@ fn counts_join_over_shards_and_checkpoints() {
         let shards: Vec<Rendered> = (0..3)
             .map(|index| rendered(&scene, &Settings { shard: Shard { index, count: 3 }, ..settings(method) }))
             .collect();
-        let parts: Vec<Part> = shards.iter().map(Rendered::part).collect();
+        let parts: Vec<ShardResult> = shards.iter().map(Rendered::shard_result).collect();
         let mut pixels = shards[2].pixels.clone();
         for shard in [&shards[0], &shards[1]] {
             pixels.iter_mut().zip(&shard.pixels).for_each(|(all, pixel)| all.join(pixel.clone()));
         }
-        let joined = Part::join(&parts).expect("there are shards").rendered(pixels);
+        let joined = ShardResult::merge(&parts).expect("there are shards").with_pixels(pixels);
         assert_eq!(joined.rejections(), whole.rejections(), "{method:?}");
         assert!(whole.rejected() > 0 && shards[0].rejections() != whole.rejections());
 
-        let stage = Stage::new(&scene, &camera, &settings(method));
+        let stage = RenderInput::new(&scene, &camera, &settings(method));
         let mut session = Session::new(&stage);
         for _ in 0..ITERATIONS / 2 {
             session.step();
@@ -115,7 +117,7 @@ fn counts_join_over_shards_and_checkpoints() {
         let saved = postcard::to_allocvec(&session.state().expect("memory")).expect("memory");
         let state = postcard::from_bytes(&saved).expect("a state");
         let mut session = Session::resume(&stage, state).expect("the same render");
-        while !session.finished() {
+        while !session.is_finished() {
             session.step();
         }
         let resumed = session.finish(whole.stop);

@@ -1,0 +1,37 @@
+//! Pixels after an iteration, as error estimates read them.
+
+use crate::estimator::{BandwidthState, PixelAccumulator};
+use crate::photon::Kind;
+use crate::render::settings::Settings;
+use crate::stat::floor;
+use crate::transport::Indirect;
+
+/// Pixels and bandwidths after the last iteration.
+pub(in crate::render) struct PixelState<'a> {
+    pub pixels: &'a [PixelAccumulator],
+    pub settings: &'a Settings,
+    bandwidths: &'a BandwidthState,
+    /// Mean of RGB of each pixel, in the level that is the picture.
+    pub values: Vec<f64>,
+    /// Added to squared values in relative errors.
+    pub floor: f64,
+}
+
+impl<'a> PixelState<'a> {
+    pub fn new(
+        pixels: &'a [PixelAccumulator],
+        bandwidths: &'a BandwidthState,
+        settings: &'a Settings,
+    ) -> PixelState<'a> {
+        let level = settings.levels.picture_level();
+        let values: Vec<f64> = pixels.iter().map(|pixel| pixel.mean(level).element_sum() / 3.0).collect();
+        let floor = floor::relative_to_mean(values.iter().copied());
+        PixelState { pixels, settings, bandwidths, values, floor }
+    }
+
+    /// Squared bandwidth of the picture's level at a pixel. With [`Indirect::Paths`] only caustic photons have one.
+    pub fn radius2(&self, index: usize, kind: Kind) -> f32 {
+        let kind = if self.settings.indirect == Indirect::Paths { Kind::Caustic } else { kind };
+        self.bandwidths.radius2(index, &self.pixels[index], kind, self.settings.levels.picture_level())
+    }
+}
