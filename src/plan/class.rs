@@ -1,9 +1,9 @@
-//! Classes of light paths, in the manner of Heckbert: every path is in exactly one.
+//! Classes of light paths in Heckbert's notation. Every path is in exactly one class.
 //!
-//! A path is what happens at its vertices from the camera to the light, a letter each ([`Event`]): `C` a perfect mirror
-//! or clear glass, `M` the perfect mirror of a surface that also scatters otherwise (a coat), `S` a sharp lobe, `B` a
-//! broad one, `V` a medium. `N` is any of `C M S`, `G` one of `M S`, `D` one of `C M`. It ends on a light that has a
-//! size, `L`, or none, `P`; the table says `L` where that makes no difference.
+//! A path is a string of the events ([`Event`]) at its vertices, from the camera to the light: `C` is a perfect mirror or
+//! clear glass, `M` the perfect mirror of a surface that has other lobes (a coat), `S` a sharp lobe, `B` a broad lobe, `V`
+//! a medium. `N` is any of `C M S`, `G` is `M` or `S`, `D` is `C` or `M`. The path ends on a light of finite size, `L`, or
+//! on a delta light, `P`. The table writes `L` where both are possible.
 //!
 //! | class | path | effect | part |
 //! | --- | --- | --- | --- |
@@ -11,20 +11,20 @@
 //! | `Direct` | `C* B L` | direct | direct |
 //! | `Highlight` | `C* S L` | glossy | direct |
 //! | `Coat` | `C* M D* L` | glossy | indirect |
-//! | `Reflection` | `C* G N* L`, none of the other three of narrow lobes alone | glossy | indirect |
+//! | `Reflection` | `C* G N* L`, unless `Highlight`, `Coat`, `Caustic` or `Sds` | glossy | indirect |
 //! | `ReflectedDirect` | `C* G N* (B or V) L` | glossy | indirect |
-//! | `ReflectedIndirect` | `C* G` and whatever follows, the last lobe broad | glossy | indirect |
-//! | `ReflectedFocus` | the same, narrow lobes after the last broad one, and no `Sds` | glossy | indirect |
-//! | `Indirect` | `C* B`, whatever follows, and then a broad lobe or a medium | indirect | indirect |
-//! | `IndirectFocus` | the same, and then narrow lobes | indirect | indirect |
+//! | `ReflectedIndirect` | `C* G`, any events with a `B` or `V`, then `(B or V) L` | glossy | indirect |
+//! | `ReflectedFocus` | `C* G`, any events with a `B` or `V`, then `N+ L`, unless `Sds` | glossy | indirect |
+//! | `Indirect` | `C* B`, any events, then `(B or V) L` | indirect | indirect |
+//! | `IndirectFocus` | `C* B`, any events with a `B` or `V`, then `N+ L` | indirect | indirect |
 //! | `Caustic` | `B N+ L`; `S D+ P` | caustic | caustic |
 //! | `Sds` | `N+ B N+ L`; `N+ S D+ P` | sds | caustic |
 //! | `Single` | `C* V L` | volume | volume |
-//! | `Volume` | `C* V` and whatever follows | volume | volume |
+//! | `Volume` | `C* V`, then at least one event | volume | volume |
 //!
-//! So the effect *glossy* is what narrow lobes show, caustics excepted: first of all events that are not clear there is
-//! a narrow lobe. Nobody sees a light without size but by a lobe that has a width: where only perfect mirrors and glass
-//! are between the two, that lobe, if it is sharp, shows a caustic.
+//! The effect *glossy* contains the paths whose first event after `C*` is a narrow lobe, except caustics. A delta light is
+//! visible only through a lobe that is not a delta lobe. If this lobe is sharp, and only perfect mirrors and clear glass
+//! are between the lobe and the light, the lobe shows a caustic.
 //!
 //! [`CameraSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class
 //! ([`CameraSuffix::class_with`]).
@@ -40,7 +40,7 @@ use crate::bsdf::LobeSet;
 use serde::{Deserialize, Serialize};
 use std::ops::BitAnd;
 
-/// What a vertex does to a path.
+/// The kind of scattering at a vertex of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A perfect mirror or clear glass and nothing else.
@@ -56,10 +56,10 @@ pub enum Event {
 }
 
 impl Event {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Event; 5] = [Event::Clear, Event::Mirror, Event::Sharp, Event::Broad, Event::Medium];
 
-    /// A surface with `lobes` scatters by one of them.
+    /// The event if a surface with `lobes` scatters by `lobe`.
     #[inline]
     pub fn of(lobe: LobeSet, lobes: LobeSet) -> Event {
         if lobe.intersects(LobeSet::BROAD) {
@@ -73,7 +73,7 @@ impl Event {
         }
     }
 
-    /// The same where it may be a medium, which has no lobes.
+    /// The event at a surface with `lobes` that scatters by `lobe`, or in a medium, which has no lobes.
     #[inline]
     pub fn by(lobe: LobeSet, lobes: Option<LobeSet>) -> Event {
         lobes.map_or(Event::Medium, |lobes| Event::of(lobe, lobes))
@@ -85,7 +85,7 @@ impl Event {
     }
 }
 
-/// A class of light paths; see the table above.
+/// A class of light paths; see the table in `plan/class.rs`.
 #[allow(missing_docs, reason = "the table says it")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum PathClass {
@@ -105,23 +105,23 @@ pub enum PathClass {
     Volume,
 }
 
-/// Additive part of the picture, a layer each.
+/// An additive part of the picture; each has a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Emitters seen directly or through perfect mirrors and clear glass.
+    /// Lights seen directly or through perfect mirrors and clear glass.
     Emission,
-    /// Light from lights at the first vertex that scatters otherwise.
+    /// Direct light at the first surface that is neither a perfect mirror nor clear glass.
     Direct,
     /// Light focused by mirrors and glass.
     Caustic,
-    /// Everything else from surfaces.
+    /// All other light from surfaces.
     Indirect,
-    /// Light whose first vertex that is not clear, seen from the eye, is in a medium.
+    /// Light whose first vertex from the camera, apart from perfect mirrors and clear glass, is in a medium.
     Volume,
 }
 
 impl PathClass {
-    /// All of them.
+    /// All classes.
     pub const ALL: [PathClass; 14] = [
         PathClass::Emission,
         PathClass::Direct,
@@ -139,12 +139,12 @@ impl PathClass {
         PathClass::Volume,
     ];
 
-    /// Of a whole path, from the camera to a light, `sizeless` or not.
+    /// The class of a whole path, given by its events from the camera to a light. `sizeless`: it is a delta light.
     pub fn of(events: impl IntoIterator<Item = Event>, sizeless: bool) -> PathClass {
         events.into_iter().fold(CameraSuffix::START, CameraSuffix::then).class_at_light(sizeless)
     }
 
-    /// The part of the picture that it belongs to.
+    /// The part of the picture that the class belongs to.
     #[inline]
     pub fn part(self) -> Part {
         use PathClass as C;
@@ -158,7 +158,7 @@ impl PathClass {
         }
     }
 
-    /// The effect that it belongs to.
+    /// The effect that the class belongs to.
     pub fn effect(self) -> Effect {
         use PathClass as C;
         match self {
@@ -174,7 +174,7 @@ impl PathClass {
     }
 }
 
-/// A set of classes.
+/// A set of path classes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClassSet(u16);
 
@@ -184,51 +184,51 @@ impl ClassSet {
     /// No class.
     pub const NONE: ClassSet = ClassSet(0);
 
-    /// Those of an effect.
+    /// The classes of an effect.
     pub fn of(effect: Effect) -> ClassSet {
         PathClass::ALL.into_iter().filter(|class| class.effect() == effect).collect()
     }
 
-    /// All but those of some effects.
+    /// The classes that belong to none of the effects.
     pub fn without(effects: EffectSet) -> ClassSet {
         PathClass::ALL.into_iter().filter(|class| !effects.has(class.effect())).collect()
     }
 
-    /// One class.
+    /// The set of one class.
     #[inline]
     pub const fn one(class: PathClass) -> ClassSet {
         ClassSet(1 << class as u16)
     }
 
-    /// All but these.
+    /// The classes that are not in the set.
     pub const fn complement(self) -> ClassSet {
         ClassSet(ClassSet::ALL.0 & !self.0)
     }
 
-    /// Both.
+    /// The classes in either set.
     #[inline]
     pub const fn and(self, other: ClassSet) -> ClassSet {
         ClassSet(self.0 | other.0)
     }
 
-    /// Whether it holds a class.
+    /// Whether the set contains a class.
     #[inline]
     pub const fn has(self, class: PathClass) -> bool {
         self.0 & 1 << class as u16 != 0
     }
 
-    /// Whether it holds a class of a part.
+    /// Whether the set contains a class of a part.
     pub fn has_part(self, part: Part) -> bool {
         PathClass::ALL.into_iter().any(|class| self.has(class) && class.part() == part)
     }
 
-    /// Whether it holds every class.
+    /// Whether the set contains every class.
     #[inline]
     pub const fn is_all(self) -> bool {
         self.0 == ClassSet::ALL.0
     }
 
-    /// Whether it holds none.
+    /// Whether the set is empty.
     #[inline]
     pub const fn is_empty(self) -> bool {
         self.0 == 0
@@ -249,13 +249,13 @@ impl FromIterator<PathClass> for ClassSet {
     }
 }
 
-/// What narrow lobes show.
+/// The classes of the effect *glossy*.
 fn glossy() -> ClassSet {
     ClassSet::of(Effect::Glossy)
 }
 
 impl Switches {
-    /// Classes of light paths that are left. The other effects switched off are gone from the scene itself.
+    /// The path classes that are not switched off. Other effects are switched off by removing them from the scene.
     pub fn classes(self) -> ClassSet {
         ClassSet::without(self.off.classes())
     }

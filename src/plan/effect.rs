@@ -1,30 +1,30 @@
-//! The effects by name, and sets of them.
+//! Effects of light transport, and sets of them.
 
 use serde::{Serialize, Serializer};
 use std::str::FromStr;
 
-/// Something that a scene may call for and a render may simulate.
+/// An effect that a scene may call for and a render may simulate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effect {
-    /// Sources of light that can be seen.
+    /// Visible lights.
     Emission,
-    /// Light that comes straight from its source.
+    /// Light that one surface scatters between the light and the camera.
     Direct,
-    /// Light that surfaces have scattered before.
+    /// Light that several surfaces scatter.
     Indirect,
-    /// Narrow lobes: what shines and reflects, but for perfect mirrors and clear glass, and for caustics.
+    /// Reflections in narrow lobes, except perfect mirrors, clear glass and caustics.
     Glossy,
-    /// Light that mirrors and glass have focused.
+    /// Light focused by mirrors and glass.
     Caustic,
-    /// The same seen through glass or in a mirror: specular, diffuse, specular.
+    /// Caustics seen through glass or in a mirror: specular, diffuse, specular.
     Sds,
-    /// Media that absorb or scatter.
+    /// Absorption and scattering in media.
     Volume,
-    /// Colours that refract differently.
+    /// Refraction that depends on the wavelength.
     Dispersion,
-    /// Blur out of the camera's focus.
+    /// Blur outside the camera's focus.
     DepthOfField,
-    /// Light from all around.
+    /// Light from an environment.
     Environment,
     /// Cut-outs and blending.
     Alpha,
@@ -33,7 +33,7 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// All of them, in the order in which they are listed.
+    /// All effects, in the order of lists.
     pub const ALL: [Effect; 12] = [
         Effect::Emission,
         Effect::Direct,
@@ -49,7 +49,7 @@ impl Effect {
         Effect::Textures,
     ];
 
-    /// Its name on the command line and in files.
+    /// The name of the effect on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Effect::Emission => "emission",
@@ -67,8 +67,8 @@ impl Effect {
         }
     }
 
-    /// Whether it is a class of light paths; the others are properties of the scene, and without them it is another
-    /// scene.
+    /// Whether the effect is a set of path classes. The other effects are properties of the scene: to remove one changes
+    /// the scene.
     pub fn is_class(self) -> bool {
         self <= Effect::Sds
     }
@@ -83,7 +83,7 @@ impl Serialize for Effect {
 impl FromStr for Effect {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        // What fills space is called a medium, too.
+        // `medium` is an alias.
         let name = if text == "medium" { "volume" } else { text };
         Effect::ALL.into_iter().find(|effect| effect.name() == name).ok_or_else(|| {
             let names = Effect::ALL.map(Effect::name).join(", ");
@@ -97,25 +97,25 @@ impl FromStr for Effect {
 pub struct EffectSet(u16);
 
 impl EffectSet {
-    /// Nothing.
+    /// The empty set.
     pub const NONE: EffectSet = EffectSet(0);
 
-    /// Whether it holds an effect.
+    /// Whether the set contains an effect.
     pub fn has(self, effect: Effect) -> bool {
         self.0 & 1 << effect as u16 != 0
     }
 
-    /// Whether it holds nothing.
+    /// Whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// The effects, in their order.
+    /// The effects of the set, in the order of [`Effect::ALL`].
     pub fn iter(self) -> impl Iterator<Item = Effect> {
         Effect::ALL.into_iter().filter(move |effect| self.has(*effect))
     }
 
-    /// Those that are classes of light paths.
+    /// The effects of the set that are path classes.
     pub fn classes(self) -> EffectSet {
         self.iter().filter(|effect| effect.is_class()).collect()
     }
@@ -127,12 +127,13 @@ impl FromIterator<Effect> for EffectSet {
     }
 }
 
-/// Effects asked for against the plan: `-dispersion,+volume`.
+/// The value of `--effects`, such as `-dispersion,+volume`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Switches {
-    /// To be left out.
+    /// Effects to leave out.
     pub off: EffectSet,
-    /// Asked for by name; the plan has everything that the scene calls for, so this only asserts it.
+    /// Effects that the user expects. The plan simulates every effect of the scene anyway, and warns if one of these is
+    /// not in the scene.
     pub on: EffectSet,
 }
 
@@ -183,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn classes_come_first_and_names_are_found() {
+    fn path_classes_come_first_and_every_name_parses() {
         assert_eq!(Effect::ALL.iter().filter(|effect| effect.is_class()).count(), 6);
         for effect in Effect::ALL {
             assert_eq!(effect.name().parse(), Ok(effect));

@@ -1,64 +1,68 @@
-//! Materials, objects and lights by name: what calls for an effect, in words that are cut where there are many.
+//! Names of materials, objects and lights in reasons and warnings; long lists are truncated.
 
 use crate::light::Emitter;
 use crate::material::Material;
 use crate::scene::Scene;
 use std::collections::HashSet;
 
-/// Names that stand on a line; the others are counted.
-const ON_A_LINE: usize = 3;
-/// Reasons that are listed; the others are counted.
-const REASONS: usize = 4;
+/// Maximum number of names on a line; the others are counted.
+const MAX_NAMES: usize = 3;
+/// Maximum number of reasons in a list; the others are counted.
+const MAX_REASONS: usize = 4;
 
-/// `a, b, c and 12 more`.
-pub(super) fn cut(names: &[String]) -> String {
-    let shown = names.iter().take(ON_A_LINE).cloned().collect::<Vec<_>>().join(", ");
-    if names.len() > ON_A_LINE { format!("{shown} and {} more", names.len() - ON_A_LINE) } else { shown }
+/// Lists names, at most [`MAX_NAMES`] of them: `a, b, c and 12 more`.
+pub(super) fn truncate_names(names: &[String]) -> String {
+    let shown = names.iter().take(MAX_NAMES).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > MAX_NAMES { format!("{shown} and {} more", names.len() - MAX_NAMES) } else { shown }
 }
 
-/// The first reasons, and how many there are besides.
-pub(super) fn cut_list(mut reasons: Vec<String>) -> Vec<String> {
-    let more = reasons.len().saturating_sub(REASONS);
+/// Keeps at most [`MAX_REASONS`] reasons, and appends the number of the others.
+pub(super) fn truncate_reasons(mut reasons: Vec<String>) -> Vec<String> {
+    let more = reasons.len().saturating_sub(MAX_REASONS);
     if more > 0 {
-        reasons.truncate(REASONS);
+        reasons.truncate(MAX_REASONS);
         reasons.push(format!("and {more} more"));
     }
     reasons
 }
 
-/// A material and the objects that wear it.
-pub(super) struct Worn<'a> {
+/// A material and the objects that use it.
+pub(super) struct UsedMaterial<'a> {
     pub(super) material: &'a Material,
     /// Quoted names, each once, in the scene's order.
     pub(super) objects: Vec<String>,
 }
 
-impl Worn<'_> {
-    /// `material "glass" on "Cube", "Ball" and 2 more`.
+impl UsedMaterial<'_> {
+    /// Describes the material in a message: `material "glass" on "Cube", "Ball" and 2 more`.
     pub(super) fn label(&self) -> String {
-        format!("material \"{}\" on {}", self.material.name, cut(&self.objects))
+        format!("material \"{}\" on {}", self.material.name, truncate_names(&self.objects))
     }
 }
 
-/// The materials that something wears; `instances` are index of the material and name of the object.
-pub(super) fn worn<'a>(materials: &'a [Material], instances: impl Iterator<Item = (u32, &'a str)>) -> Vec<Worn<'a>> {
-    let mut all: Vec<Worn> = materials.iter().map(|material| Worn { material, objects: vec![] }).collect();
+/// The materials that `instances` use, each given by the index of its material and the name of its object.
+pub(super) fn used_materials<'a>(
+    materials: &'a [Material],
+    instances: impl Iterator<Item = (u32, &'a str)>,
+) -> Vec<UsedMaterial<'a>> {
+    let mut all: Vec<UsedMaterial> =
+        materials.iter().map(|material| UsedMaterial { material, objects: vec![] }).collect();
     let mut known = HashSet::new();
     for (material, object) in instances {
         if known.insert((material, object)) {
             all[material as usize].objects.push(format!("\"{object}\""));
         }
     }
-    all.retain(|worn| !worn.objects.is_empty());
+    all.retain(|used| !used.objects.is_empty());
     all
 }
 
-/// The materials that something in the scene wears.
-pub(super) fn worn_in(scene: &Scene) -> Vec<Worn<'_>> {
-    worn(&scene.materials.list, scene.shapes.instances.iter().map(|i| (i.material, i.name.as_str())))
+/// The materials that the instances of a scene use.
+pub(super) fn used_in_scene(scene: &Scene) -> Vec<UsedMaterial<'_>> {
+    used_materials(&scene.materials.list, scene.shapes.instances.iter().map(|i| (i.material, i.name.as_str())))
 }
 
-/// Lights that give light, each object that glows once; `which` chooses among them.
+/// Names of the lights with power that satisfy `which`; each emissive object is listed once.
 pub(super) fn lights(scene: &Scene, which: impl Fn(&Emitter) -> bool) -> Vec<String> {
     let sky = scene.lights.sky();
     let mut known = HashSet::new();
@@ -72,11 +76,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_lists_are_cut() {
+    fn long_lists_are_truncated() {
         let names = |n: usize| (0..n).map(|i| format!("n{i}")).collect::<Vec<_>>();
-        assert_eq!(cut(&names(3)), "n0, n1, n2");
-        assert_eq!(cut(&names(15)), "n0, n1, n2 and 12 more");
-        assert_eq!(cut_list(names(4)).len(), 4);
-        assert_eq!(cut_list(names(16)).last().map(String::as_str), Some("and 12 more"));
+        assert_eq!(truncate_names(&names(3)), "n0, n1, n2");
+        assert_eq!(truncate_names(&names(15)), "n0, n1, n2 and 12 more");
+        assert_eq!(truncate_reasons(names(4)).len(), 4);
+        assert_eq!(truncate_reasons(names(16)).last().map(String::as_str), Some("and 12 more"));
     }
 }

@@ -1,48 +1,48 @@
-//! Which effects a scene calls for, and because of what, from the scene and the camera alone.
+//! Effects that a scene calls for, and the reasons, from scene and camera alone.
 
 use super::effect::Effect;
-use super::names::{Worn, cut, cut_list, lights, worn_in};
+use super::names::{UsedMaterial, lights, truncate_names, truncate_reasons, used_in_scene};
 use crate::camera::Camera;
 use crate::material::{Alpha, Material};
 use crate::scene::Scene;
 
-/// What calls for each effect, by name.
+/// For each effect, the names of the materials, lights and so on that call for it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Presence {
     because: [Vec<String>; Effect::ALL.len()],
 }
 
 impl Presence {
-    /// Looks at what the scene wears and what lights it. An effect is present rather too often than too seldom: whether
-    /// its light comes through is for a render to find out.
+    /// Inspects the materials and lights of a scene. The result may contain effects that the picture does not show,
+    /// because no ray is traced.
     pub fn of(scene: &Scene, camera: &Camera) -> Presence {
         let all = lights(scene, |_| true);
         let lit = |reasons: Vec<String>| if all.is_empty() { vec![] } else { reasons };
-        let worn = worn_in(scene);
-        let objects: Vec<String> = worn.iter().flat_map(|worn| worn.objects.iter().cloned()).collect();
-        let under = format!("under {}", cut(&all));
-        let glossy = |worn: &Worn| worn.material.is_glossy() && !worn.material.is_clear();
-        let shines = |worn: &Worn| glossy(worn).then(|| worn.label());
-        let focuses = |worn: &&Worn| worn.material.focuses();
-        let caustic = |worn: &Worn| format!("{} {under}", worn.label());
-        let seen = |worn: &Worn| {
-            let how = if worn.material.transmission > 0.0 { "through" } else { "in" };
-            format!("caustics seen {how} {}", worn.label())
+        let used = used_in_scene(scene);
+        let objects: Vec<String> = used.iter().flat_map(|used| used.objects.iter().cloned()).collect();
+        let under = format!("under {}", truncate_names(&all));
+        let glossy = |used: &UsedMaterial| used.material.is_glossy() && !used.material.is_clear();
+        let shines = |used: &UsedMaterial| glossy(used).then(|| used.label());
+        let focuses = |used: &&UsedMaterial| used.material.focuses();
+        let caustic = |used: &UsedMaterial| format!("{} {under}", used.label());
+        let seen = |used: &UsedMaterial| {
+            let how = if used.material.transmission > 0.0 { "through" } else { "in" };
+            format!("caustics seen {how} {}", used.label())
         };
         let environment = scene.lights.sky().environment.is_some();
-        let property = |effect| property(effect, &worn);
+        let property = |effect| material_reasons(effect, &used);
         let because = Effect::ALL.map(|effect| {
-            cut_list(match effect {
-                // A sun with a disc shows it; what is smaller than any disc nobody sees.
+            truncate_reasons(match effect {
+                // Suns with a disc are visible; delta lights are not.
                 Effect::Emission => lights(scene, |emitter| !emitter.is_delta()),
                 Effect::Direct if objects.is_empty() => vec![],
                 Effect::Direct => all.clone(),
                 Effect::Indirect if objects.is_empty() => vec![],
-                Effect::Indirect => lit(vec![format!("{} {under}", cut(&objects))]),
-                Effect::Glossy => lit(worn.iter().filter_map(shines).collect()),
-                Effect::Caustic => lit(worn.iter().filter(focuses).map(caustic).collect()),
-                // Whatever focuses can also stand between the eye and what it, or another, focuses on.
-                Effect::Sds => lit(worn.iter().filter(focuses).map(seen).collect()),
+                Effect::Indirect => lit(vec![format!("{} {under}", truncate_names(&objects))]),
+                Effect::Glossy => lit(used.iter().filter_map(shines).collect()),
+                Effect::Caustic => lit(used.iter().filter(focuses).map(caustic).collect()),
+                // An object that focuses light can also be between the camera and a caustic.
+                Effect::Sds => lit(used.iter().filter(focuses).map(seen).collect()),
                 Effect::Volume => scene.medium.map(|_| SPACE.to_string()).into_iter().chain(property(effect)).collect(),
                 Effect::DepthOfField => Vec::from_iter(camera.has_lens().then(|| "the camera's aperture".into())),
                 Effect::Environment => Vec::from_iter(environment.then(|| ENVIRONMENT.into())),
@@ -52,7 +52,7 @@ impl Presence {
         Presence { because }
     }
 
-    /// What calls for an effect; nothing: the scene has none of it.
+    /// Names of the materials, lights and so on that call for an effect; empty if the scene does not have the effect.
     pub fn because(&self, effect: Effect) -> &[String] {
         &self.because[effect as usize]
     }
@@ -63,13 +63,13 @@ impl Presence {
     }
 }
 
-/// The medium that fills the space, as a reason.
+/// The medium outside all solids, as a reason.
 pub(super) const SPACE: &str = "the scene's medium";
-/// Light from all around, as a reason.
+/// The environment, as a reason.
 pub(super) const ENVIRONMENT: &str = "the environment";
 
-/// Materials that call for an effect that is a property of materials.
-pub(super) fn property(effect: Effect, worn: &[Worn]) -> Vec<String> {
+/// The materials that call for an effect, if the effect is a property of materials.
+pub(super) fn material_reasons(effect: Effect, used: &[UsedMaterial]) -> Vec<String> {
     let calls: fn(&Material) -> bool = match effect {
         Effect::Volume => |material| material.is_solid_glass() && material.medium.is_some(),
         Effect::Dispersion => Material::disperses,
@@ -78,5 +78,5 @@ pub(super) fn property(effect: Effect, worn: &[Worn]) -> Vec<String> {
         _ => return vec![],
     };
     let inside = if effect == Effect::Volume { "the medium of " } else { "" };
-    worn.iter().filter(|worn| calls(worn.material)).map(|worn| format!("{inside}{}", worn.label())).collect()
+    used.iter().filter(|used| calls(used.material)).map(|used| format!("{inside}{}", used.label())).collect()
 }

@@ -1,52 +1,52 @@
-//! How a method looks for light, as far as that decides which effects it finds.
+//! The techniques that a method combines, and the effects that they find.
 
 use super::class::{ClassSet, PathClass};
 use super::effect::Effect;
 use crate::scene::{Scene, Survey};
 
-/// Kinds of methods.
+/// Combination of techniques by which a method finds light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Search {
-    /// Paths from the eye, connected to lights.
+    /// Camera paths, connected to lights.
     CameraPaths,
-    /// Paths from the lights, connected to the eye.
+    /// Light paths, connected to the camera.
     LightPaths,
-    /// Both, connected to each other.
+    /// Camera and light paths, connected to each other.
     Connections,
-    /// Eye paths that gather the photons of one map, on surfaces.
+    /// Camera paths that gather photons of a single map, on surfaces.
     Map,
-    /// Eye paths that gather photons, on surfaces and in media.
+    /// Camera paths that gather photons, on surfaces and in media.
     Photons,
-    /// Eye paths connected to lights, that gather photons of caustics.
+    /// Camera paths, connected to lights, that gather photons of caustics.
     PathsAndPhotons,
-    /// Both, merged where they meet, on surfaces.
+    /// Camera and light paths, merged on surfaces.
     Merging,
-    /// Both, connected and merged.
+    /// Camera and light paths, connected to each other and merged.
     ConnectionsAndMerging,
 }
 
-/// Who brings the light of a class: one technique, or several whose weights sum to one.
+/// The techniques that carry the light of a path class: one, or several whose MIS weights sum to one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Owner {
-    /// Eye paths that run into lights.
+    /// Camera paths that hit lights.
     Hits,
-    /// Connections to lights, and eye paths that run into them; where these come from a sharp lobe by mirrors and clear
-    /// glass, photons of caustics as well.
+    /// Next-event estimation, and camera paths that hit lights. For hits by way of a sharp lobe and then mirrors or clear
+    /// glass, also photons of caustics.
     Lit,
     /// Photons, gathered or merged.
     Photons,
     /// Light paths, connected to the camera.
     LightPaths,
-    /// Eye and light paths connected in all ways, and merged where the method merges.
+    /// All connections between camera and light paths, and merging if the method merges.
     Connections,
 }
 
 impl Search {
-    /// The one who brings the light of a class; `None`: nobody does.
+    /// The techniques that carry the light of a class; `None` if the method misses it.
     pub fn owner(self, class: PathClass) -> Option<Owner> {
         use PathClass as C;
         Some(match (self, class) {
-            // No other technique can find these.
+            // No other technique can find these classes.
             (_, C::Emission | C::Coat) => Owner::Hits,
             (Search::CameraPaths, _) => Owner::Lit,
             (Search::LightPaths, _) => Owner::LightPaths,
@@ -60,32 +60,32 @@ impl Search {
         })
     }
 
-    /// The classes that someone brings.
+    /// The classes whose light `owner` carries.
     pub fn owned_by(self, owner: Owner) -> ClassSet {
         PathClass::ALL.into_iter().filter(|class| self.owner(*class) == Some(owner)).collect()
     }
 
-    /// Whether it finds all light of an effect. A light without size is hit by no path: without photons it shows no
-    /// light behind glass, where it could be neither connected to nor run into.
+    /// Whether the techniques find all light of an effect. No path hits a delta light, and no connection passes through
+    /// glass, so only photons find a delta light behind glass.
     pub fn finds(self, effect: Effect, scene: &Survey) -> bool {
         let Survey { delta_lights, scattering, cloudy_glass, .. } = *scene;
         match (self, effect) {
             (Search::CameraPaths, Effect::Caustic | Effect::Sds) => !delta_lights,
             (Search::LightPaths, Effect::Sds) => false,
             (Search::Connections, Effect::Sds) => !delta_lights,
-            // Light that comes into clear glass and scatters there once: photons are merged on surfaces alone.
+            // Light that enters clear glass and scatters there once is missed: photons are merged on surfaces only.
             (Search::ConnectionsAndMerging, Effect::Sds) => !(delta_lights && cloudy_glass),
             (Search::Map | Search::Merging, Effect::Volume) => !scattering,
-            // Photons end where they first scatter broadly, eye paths do not scatter in media.
+            // Photons end where they first scatter broadly, and camera paths do not scatter in media.
             (Search::PathsAndPhotons, Effect::Volume | Effect::Indirect) => !scattering,
             _ => true,
         }
     }
 
-    /// What brings an effect into the picture.
+    /// The techniques that carry an effect, in words.
     pub(super) fn carrier(self, effect: Effect, scene: &Scene) -> &'static str {
         let media_scatter = scene.survey.scattering;
-        // Photons of caustics, if there are any, share what sharp lobes show of lamps.
+        // Reflections of lights in sharp lobes are shared with the photons of caustics, if there are any.
         let shared = scene.survey.glints && !scene.lights.targets().spheres().is_empty();
         let gathers = matches!(self, Search::Map | Search::Photons);
         let walks = matches!(self, Search::CameraPaths | Search::PathsAndPhotons);

@@ -1,9 +1,9 @@
-//! `--effects`: leaves effects that are properties of the scene out of its description, before anything is built of it,
-//! or out of the scene, to see what they mean to it.
+//! `--effects`: removes effects that are properties of the scene, from its description before the scene is built, or from
+//! a built scene to measure what they contribute.
 
 use super::effect::{Effect, EffectSet};
-use super::names::{cut_list, worn};
-use super::presence::{ENVIRONMENT, SPACE, property};
+use super::names::{truncate_reasons, used_materials};
+use super::presence::{ENVIRONMENT, SPACE, material_reasons};
 use crate::error::Result;
 use crate::material::{Alpha, Material, Materials};
 use crate::math::{Rgb, Vec4};
@@ -11,27 +11,27 @@ use crate::scene::{Description, Scene};
 use crate::texture::{Integers, Texels, Texture, TextureRef};
 use std::sync::Arc;
 
-/// What called for effects that were left out.
+/// The removed effects, each with the names of the materials and so on that called for it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Removed(Vec<(Effect, Vec<String>)>);
 
 impl Removed {
-    /// What called for an effect that was left out, by name.
+    /// Names of the materials and so on that called for a removed effect.
     pub fn because(&self, effect: Effect) -> &[String] {
         self.0.iter().find(|(removed, _)| *removed == effect).map_or(&[], |(_, because)| because)
     }
 }
 
-/// Leaves out those of the effects that are no classes of light paths: the scene without them is another scene.
+/// Removes the effects that are properties of the scene, not path classes, from its description.
 pub fn off(description: &mut Description, effects: EffectSet) -> Removed {
     let properties = effects.iter().filter(|effect| !effect.is_class());
     Removed(properties.map(|effect| (effect, remove(description, effect))).collect())
 }
 
-/// Removes an effect; what called for it.
+/// Removes an effect from a description. Returns the names of the materials and so on that called for it.
 fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
     let instances = description.instances.iter().map(|placed| (placed.material, placed.name.as_str()));
-    let mut because = property(effect, &worn(&description.materials, instances));
+    let mut because = material_reasons(effect, &used_materials(&description.materials, instances));
     if let Some(left) = strip(effect, &mut description.materials, &description.textures) {
         description.textures = left;
     }
@@ -48,14 +48,14 @@ fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
         Effect::Environment => because.extend(description.environment.take().map(|_| ENVIRONMENT.into())),
         _ => {}
     }
-    cut_list(because)
+    truncate_reasons(because)
 }
 
-/// The scene without an effect that is a property of it, as [`off`] leaves it out of its description; what is the same
-/// is shared. Lenses are the camera's ([`crate::camera::Camera::pinhole`]).
+/// A copy of the scene without an effect, as [`off`] removes it from the description. Unchanged data are shared. For
+/// depth of field, see [`crate::camera::Camera::pinhole`].
 ///
 /// # Errors
-/// Without cut-outs shapes are committed to Embree again, which may be out of memory.
+/// The effect is alpha, so shapes are committed to Embree again, and it is out of memory.
 pub fn without(scene: &Scene, effect: Effect) -> Result<Scene> {
     let mut list = scene.materials.list.clone();
     let shared = &scene.materials.textures;
@@ -65,7 +65,7 @@ pub fn without(scene: &Scene, effect: Effect) -> Result<Scene> {
     scene.with_materials(Materials { list, textures }, medium, environment)
 }
 
-/// Takes an effect out of materials; the textures that are left, where those change.
+/// Removes an effect from materials. Returns the remaining textures if they change.
 fn strip(effect: Effect, materials: &mut [Material], textures: &[Texture]) -> Option<Vec<Texture>> {
     match effect {
         Effect::Volume => materials.iter_mut().for_each(|material| material.medium = None),
@@ -77,10 +77,10 @@ fn strip(effect: Effect, materials: &mut [Material], textures: &[Texture]) -> Op
     None
 }
 
-/// Puts the mean of every texture in its place; the textures that cut-outs need.
+/// Replaces every texture by its mean. Returns the textures that cut-outs need.
 fn flatten_all(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture> {
     let means: Vec<Vec4> = textures.iter().map(Texture::mean).collect();
-    // Cut-outs are another effect: what they need of textures stays.
+    // Cut-outs are another effect, so their alpha stays.
     let mut kept = Vec::new();
     for material in materials {
         let cutout = material.base_color_texture.filter(|_| material.alpha != Alpha::Opaque);
@@ -99,10 +99,10 @@ fn flatten_all(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture>
     kept
 }
 
-/// White with the texture's alpha.
+/// A white texture with the alpha of `texture`.
 fn mask_of(texture: &Texture) -> Texture {
     fn white<T: Copy>(data: &[T], channels: u8, most: T) -> Vec<T> {
-        // Grey and alpha, or RGBA; without alpha all is white.
+        // Two channels are grey and alpha, four are RGBA. Without alpha, the texture is opaque.
         let alpha = |texel: &[T]| if channels.is_multiple_of(2) { texel[texel.len() - 1] } else { most };
         data.chunks_exact(usize::from(channels.max(1))).flat_map(|texel| [most, alpha(texel)]).collect()
     }
@@ -119,8 +119,8 @@ fn mask_of(texture: &Texture) -> Texture {
     Texture { name: texture.name.clone(), texels, ..*texture }
 }
 
-/// Multiplies the factors of a material by the means of their textures, which it then lacks; `keep_alpha`: the alpha
-/// stays with its texture.
+/// Multiplies the factors of a material by the means of their textures and removes the textures. `keep_alpha`: the base
+/// colour's alpha does not change, because its texture stays.
 fn flatten(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, keep_alpha: bool) {
     let take = |texture: &mut Option<TextureRef>| texture.take().map_or(Vec4::ONE, &mean);
     let mut base = take(&mut material.base_color_texture);
@@ -131,7 +131,7 @@ fn flatten(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, keep_alph
     let metallic_roughness = take(&mut material.metallic_roughness_texture);
     material.roughness *= metallic_roughness.y;
     material.metallic *= metallic_roughness.z;
-    // The mean of normals is the surface's own.
+    // The mean of a normal map is the surface's normal.
     material.normal_texture = None;
     let color = |factor: Rgb, texel: Vec4| factor * texel.truncate();
     material.emission = color(material.emission, take(&mut material.emission_texture));

@@ -1,8 +1,8 @@
-//! Reading a path from either end: what of it decides its class.
+//! Incremental classification of a path from the camera or from a light.
 
 use super::{ClassSet, Event, PathClass, glossy};
 
-/// First event of a path that is not clear.
+/// The first event of a path that is not [`Event::Clear`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum First {
     Nothing,
@@ -11,43 +11,43 @@ enum First {
     Medium,
 }
 
-/// A path so far, from the camera.
+/// Events of a path from the camera so far, as far as they determine its class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraSuffix {
     first: First,
-    /// Anything has happened.
+    /// There was an event.
     begun: bool,
-    /// Exactly one event is not clear, and it is the last.
+    /// The last event is the only one that is not clear.
     alone: bool,
-    /// Nothing but delta lobes.
+    /// All events are delta lobes.
     delta: bool,
-    /// Broad lobes and media, up to two.
-    spreads: u8,
-    /// One of them is a medium.
+    /// Number of broad lobes and media, at most 2.
+    broad_count: u8,
+    /// There was a medium.
     medium: bool,
-    /// Narrow lobes since the last of them.
+    /// There was a narrow lobe since the last broad lobe or medium.
     narrowed: bool,
-    /// Something was before the first broad lobe; as long as there is none, before the last sharp one.
-    before: bool,
-    /// Of narrow lobes alone: a sharp one, and delta lobes since.
+    /// There was an event before the first broad lobe; without a broad lobe so far, before the last sharp lobe.
+    preceded: bool,
+    /// All events are narrow lobes: a sharp one, and then delta lobes.
     glint: bool,
 }
 
 impl CameraSuffix {
-    /// Nothing has happened yet.
+    /// A path without events.
     pub const START: CameraSuffix = CameraSuffix {
         first: First::Nothing,
         begun: false,
         alone: false,
         delta: true,
-        spreads: 0,
+        broad_count: 0,
         medium: false,
         narrowed: false,
-        before: false,
+        preceded: false,
         glint: false,
     };
 
-    /// It goes on.
+    /// Appends an event.
     #[must_use]
     #[inline]
     pub fn then(self, event: Event) -> CameraSuffix {
@@ -61,26 +61,26 @@ impl CameraSuffix {
             (first, _) => first,
         };
         let sharp = event == Event::Sharp;
-        let marks = self.spreads == 0 && (sharp || !narrow);
+        let may_focus = self.broad_count == 0 && (sharp || !narrow);
         CameraSuffix {
             first,
             begun: true,
             alone: clear && first != First::Nothing,
             delta: self.delta && narrow && !sharp,
-            spreads: (self.spreads + u8::from(!narrow)).min(2),
+            broad_count: (self.broad_count + u8::from(!narrow)).min(2),
             medium: self.medium || event == Event::Medium,
-            narrowed: narrow && (self.narrowed || self.spreads > 0),
-            before: if marks { self.begun } else { self.before },
-            glint: self.spreads == 0 && narrow && !sharp && !self.delta,
+            narrowed: narrow && (self.narrowed || self.broad_count > 0),
+            preceded: if may_focus { self.begun } else { self.preceded },
+            glint: self.broad_count == 0 && narrow && !sharp && !self.delta,
         }
     }
 
-    /// The class if it ends on a light, `sizeless` or not.
+    /// The class of the path if it ends on a light here. `sizeless`: it is a delta light.
     #[inline]
     pub fn class_at_light(self, sizeless: bool) -> PathClass {
         use PathClass as C;
-        let caustic = if self.before { C::Sds } else { C::Caustic };
-        match (self.first, self.spreads, self.narrowed) {
+        let caustic = if self.preceded { C::Sds } else { C::Caustic };
+        match (self.first, self.broad_count, self.narrowed) {
             (First::Nothing, ..) => C::Emission,
             (First::Medium, ..) if self.alone => C::Single,
             (First::Medium, ..) => C::Volume,
@@ -100,34 +100,34 @@ impl CameraSuffix {
         }
     }
 
-    /// The class if the rest is a path from a light.
+    /// The class of the path that joins this path with a path from a light.
     #[inline]
-    pub fn class_with(self, beam: LightPrefix) -> PathClass {
-        let mut sight = self;
-        for _ in 0..beam.spreads() {
-            sight = sight.then(if beam.0 & LightPrefix::MEDIUM != 0 { Event::Medium } else { Event::Broad });
+    pub fn class_with(self, light: LightPrefix) -> PathClass {
+        let mut path = self;
+        for _ in 0..light.broad_count() {
+            path = path.then(if light.0 & LightPrefix::MEDIUM != 0 { Event::Medium } else { Event::Broad });
         }
-        match beam.tail() {
-            Tail::None => sight.class_at_light(false),
-            Tail::Narrow => sight.then(Event::Sharp).class_at_light(false),
-            Tail::Delta => sight.then(Event::Mirror).class_at_light(true),
-            Tail::Glint => sight.then(Event::Sharp).then(Event::Mirror).class_at_light(true),
+        match light.narrow() {
+            NarrowPart::None => path.class_at_light(false),
+            NarrowPart::Any => path.then(Event::Sharp).class_at_light(false),
+            NarrowPart::Delta => path.then(Event::Mirror).class_at_light(true),
+            NarrowPart::Glint => path.then(Event::Sharp).then(Event::Mirror).class_at_light(true),
         }
     }
 
-    /// Nothing so far but perfect mirrors and clear glass.
+    /// Whether all events so far are perfect mirrors or clear glass.
     #[inline]
     pub fn is_clear(self) -> bool {
         self.first == First::Nothing
     }
 
-    /// Classes that it can still come to, or is in; rather too many than too few.
+    /// A superset of the classes that the path has now or can have after more events.
     pub fn reachable_classes(self) -> ClassSet {
         use PathClass as C;
-        let caustic = if self.spreads == 1 && self.medium || self.spreads > 1 {
+        let caustic = if self.broad_count == 1 && self.medium || self.broad_count > 1 {
             ClassSet::NONE
-        } else if self.spreads == 1 {
-            ClassSet::one(if self.before { C::Sds } else { C::Caustic })
+        } else if self.broad_count == 1 {
+            ClassSet::one(if self.preceded { C::Sds } else { C::Caustic })
         } else {
             [C::Caustic, C::Sds].into_iter().collect()
         };
@@ -140,20 +140,21 @@ impl CameraSuffix {
     }
 }
 
-/// What is between a light and the first broad lobe or medium on a path's way from it.
+/// The narrow lobes of a light path between the light and its first broad lobe or medium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Tail {
+enum NarrowPart {
     None,
-    /// Narrow lobes.
-    Narrow,
-    /// Delta lobes after a light without size.
+    /// Narrow lobes, other than those below.
+    Any,
+    /// Delta lobes after a delta light.
     Delta,
-    /// The same and then narrow lobes, a sharp one first.
+    /// Delta lobes after a delta light, then a sharp lobe, then any narrow lobes.
     Glint,
 }
 
-/// A path so far, from a light. A byte, for photons: two bits of what is next to the light (`Tail`), two that count
-/// broad lobes and media up to two, one set where there is one and it is a medium, one of the light without size.
+/// Events of a light path so far, as far as they determine the class of a whole path. Photons store it in one byte: two
+/// bits for the `NarrowPart`, two bits for the number of broad lobes and media (at most 2), one bit if the first of these
+/// is a medium, one bit for a delta light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightPrefix(u8);
 
@@ -161,60 +162,61 @@ impl LightPrefix {
     const MEDIUM: u8 = 1 << 4;
     const SIZELESS: u8 = 1 << 5;
 
-    /// How many there can be.
+    /// Number of possible values.
     pub const COUNT: usize = 1 << 6;
 
-    /// Below [`LightPrefix::COUNT`].
+    /// The value as an index below [`LightPrefix::COUNT`].
     #[inline]
     pub fn index(self) -> usize {
         usize::from(self.0) % LightPrefix::COUNT
     }
 
-    /// From a light that has a size, by narrow lobes alone.
-    pub const FOCUSED: LightPrefix = LightPrefix(Tail::Narrow as u8);
-    /// The same, and then by a broad lobe.
-    pub const SCATTERED: LightPrefix = LightPrefix(Tail::Narrow as u8 | 1 << 2);
+    /// A path of narrow lobes alone, from a light of finite size.
+    pub const FOCUSED: LightPrefix = LightPrefix(NarrowPart::Any as u8);
+    /// A path of narrow lobes and then a broad lobe, from a light of finite size.
+    pub const SCATTERED: LightPrefix = LightPrefix(NarrowPart::Any as u8 | 1 << 2);
 
-    /// Straight from a light.
+    /// A path without events. `sizeless`: it starts at a delta light.
     #[inline]
     pub fn start(sizeless: bool) -> LightPrefix {
         LightPrefix(if sizeless { LightPrefix::SIZELESS } else { 0 })
     }
 
     #[inline]
-    fn tail(self) -> Tail {
+    fn narrow(self) -> NarrowPart {
         match self.0 & 3 {
-            0 => Tail::None,
-            1 => Tail::Narrow,
-            2 => Tail::Delta,
-            _ => Tail::Glint,
+            0 => NarrowPart::None,
+            1 => NarrowPart::Any,
+            2 => NarrowPart::Delta,
+            _ => NarrowPart::Glint,
         }
     }
 
+    /// Number of broad lobes and media, at most 2.
     #[inline]
-    fn spreads(self) -> u8 {
+    fn broad_count(self) -> u8 {
         self.0 >> 2 & 3
     }
 
-    /// It goes on.
+    /// Appends an event.
     #[must_use]
     #[inline]
     pub fn then(self, event: Event) -> LightPrefix {
-        let (tail, sizeless) = (self.tail(), self.0 & LightPrefix::SIZELESS);
+        let (narrow, sizeless) = (self.narrow(), self.0 & LightPrefix::SIZELESS);
         if !event.is_narrow() {
-            let medium = if self.spreads() == 0 && event == Event::Medium { LightPrefix::MEDIUM } else { 0 };
-            return LightPrefix(tail as u8 | (self.spreads() + 1).min(2) << 2 | medium | sizeless);
+            let medium = if self.broad_count() == 0 && event == Event::Medium { LightPrefix::MEDIUM } else { 0 };
+            return LightPrefix(narrow as u8 | (self.broad_count() + 1).min(2) << 2 | medium | sizeless);
         }
-        if self.spreads() > 0 {
+        if self.broad_count() > 0 {
             return self;
         }
-        let tail = match (tail, event) {
-            (Tail::None, Event::Sharp) => Tail::Narrow,
-            (Tail::None, _) if sizeless != 0 => Tail::Delta,
-            (Tail::None, _) => Tail::Narrow,
-            (Tail::Delta, Event::Sharp) => Tail::Glint,
-            (tail, _) => tail,
+        let narrow = match (narrow, event) {
+            (NarrowPart::None, Event::Sharp) => NarrowPart::Any,
+            (NarrowPart::None, _) if sizeless != 0 => NarrowPart::Delta,
+            (NarrowPart::None, _) => NarrowPart::Any,
+            (NarrowPart::Delta, Event::Sharp) => NarrowPart::Glint,
+            (narrow, _) => narrow,
         };
-        LightPrefix(tail as u8 | sizeless)
+        LightPrefix(narrow as u8 | sizeless)
     }
 }

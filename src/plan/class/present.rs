@@ -1,10 +1,10 @@
-//! Classes of light paths that a scene can have.
+//! Path classes that are possible in a scene.
 
 use super::{ClassSet, PathClass};
 use crate::plan::Effect;
 use crate::scene::Survey;
 
-/// Classes of light paths that there can be where a scene has what its survey says.
+/// Path classes that are possible in a scene with this survey.
 pub fn classes_in(survey: &Survey) -> ClassSet {
     let mut absent = ClassSet::NONE;
     if !survey.scattering {

@@ -1,6 +1,6 @@
 use super::*;
 
-/// All paths of up to so many events.
+/// All paths of at most `most` events.
 fn paths(most: usize) -> Vec<Vec<Event>> {
     let mut all = vec![vec![]];
     let mut last = all.clone();
@@ -25,7 +25,7 @@ fn letters(path: &[Event]) -> String {
     path.iter().map(letter).collect()
 }
 
-/// The rows of the table that a path is in, read with string operations alone.
+/// The classes of the table that a path matches, by string operations alone.
 fn rows(path: &str, sizeless: bool) -> Vec<PathClass> {
     use PathClass as C;
     let rest = path.trim_start_matches('C');
@@ -34,7 +34,7 @@ fn rows(path: &str, sizeless: bool) -> Vec<PathClass> {
     let glossy = rest.starts_with(['M', 'S']);
     let broadly = path.ends_with(['B', 'V']);
     let spreads = path.matches(['B', 'V']).count();
-    // `prefix X N+`, X the only broad lobe.
+    // `prefix B N+`, where `B` is the only broad lobe.
     let focus = path.split_once('B').filter(|(before, after)| narrow(before) && narrow(after) && !after.is_empty());
     let spark = path.rsplit_once('S').filter(|(before, after)| narrow(before) && delta(after) && !after.is_empty());
     let caustic = focus.or(spark.filter(|_| sizeless)).map(|(before, _)| before);
@@ -70,34 +70,34 @@ fn every_path_is_in_exactly_one_class() {
     assert!(seen.is_all());
 }
 
-/// However a path is put together of an eye's and a light's, its class is the same.
+/// A path has the same class for every split into a camera path and a light path.
 #[test]
-fn halves_tell_the_class_of_the_whole() {
+fn camera_and_light_path_determine_the_class_of_the_whole_path() {
     for path in paths(6) {
         for sizeless in [false, true] {
             let whole = PathClass::of(path.iter().copied(), sizeless);
-            // Where they meet is a vertex with a lobe that is not delta.
+            // The two paths join at a vertex with a lobe that is not a delta lobe.
             for (at, _) in path.iter().enumerate().filter(|(_, event)| !matches!(event, Event::Clear | Event::Mirror)) {
-                let sight = path[..=at].iter().fold(CameraSuffix::START, |sight, event| sight.then(*event));
-                let beam =
-                    path[at + 1..].iter().rev().fold(LightPrefix::start(sizeless), |beam, event| beam.then(*event));
-                assert_eq!(sight.class_with(beam), whole, "{} {sizeless} at {at}", letters(&path));
+                let camera = path[..=at].iter().fold(CameraSuffix::START, |camera, event| camera.then(*event));
+                let light =
+                    path[at + 1..].iter().rev().fold(LightPrefix::start(sizeless), |light, event| light.then(*event));
+                assert_eq!(camera.class_with(light), whole, "{} {sizeless} at {at}", letters(&path));
             }
         }
     }
 }
 
 #[test]
-fn nothing_is_ahead_that_was_not_told() {
+fn reachable_classes_contain_the_class_of_every_continuation() {
     for path in paths(6) {
         for sizeless in [false, true] {
             let class = PathClass::of(path.iter().copied(), sizeless);
-            let mut sight = CameraSuffix::START;
+            let mut camera = CameraSuffix::START;
             for event in &path {
-                assert!(sight.reachable_classes().has(class), "{}", letters(&path));
-                sight = sight.then(*event);
+                assert!(camera.reachable_classes().has(class), "{}", letters(&path));
+                camera = camera.then(*event);
             }
-            assert!(sight.reachable_classes().has(class), "{}", letters(&path));
+            assert!(camera.reachable_classes().has(class), "{}", letters(&path));
         }
     }
     let caustic = CameraSuffix::START.then(Event::Broad).then(Event::Clear);
@@ -106,10 +106,8 @@ fn nothing_is_ahead_that_was_not_told() {
     );
 }
 
-/// Parts and effects cut the same classes: no part but that of light which surfaces have scattered before holds more
-/// than one effect, glossy and sds apart.
 #[test]
-fn sets_of_classes() {
+fn sets_of_classes_contain_the_parts_and_effects_of_their_members() {
     let off: EffectSet = [Effect::Caustic, Effect::Sds].into_iter().collect();
     let on = ClassSet::without(off);
     assert!(!on.has_part(Part::Caustic) && on.has_part(Part::Indirect) && !on.is_all() && !on.is_empty());

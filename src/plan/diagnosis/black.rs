@@ -1,4 +1,4 @@
-//! Why a picture is black.
+//! Explanations of a black picture.
 
 use super::super::{EffectPlan, PlanRequest};
 use super::rays;
@@ -7,10 +7,10 @@ use crate::light::Emitter;
 use crate::math::Vec2;
 use crate::scene::Scene;
 
-/// Camera rays along each edge of the picture.
-const EDGE: u32 = 32;
+/// Number of camera rays along each edge of the picture.
+const RAYS_PER_EDGE: u32 = 32;
 
-/// The camera looks past the scene, and nothing shines from behind it.
+/// Warns if the camera sees no surface, no scattering medium and no light at infinity.
 pub(super) fn nothing_seen(scene: &Scene, camera: &Camera) -> Option<String> {
     let shows_more = scene.survey.scattering || scene.lights.emitters().iter().any(Emitter::is_infinite);
     (!shows_more && !sees_anything(scene, camera)).then(|| {
@@ -18,13 +18,13 @@ pub(super) fn nothing_seen(scene: &Scene, camera: &Camera) -> Option<String> {
     })
 }
 
-/// The likeliest reason, and a remedy, should the whole picture be black; empty without any light, which is told when the
-/// scene is built. `warned`: something looks like a mistake.
+/// The most likely reason for a black picture, with a remedy. Empty for a scene without light, because building it already
+/// warns. `warned`: the plan has other warnings.
 pub(in super::super) fn reason(
     scene: &Scene,
     camera: &Camera,
     effects: &[EffectPlan],
-    asked: &PlanRequest,
+    request: &PlanRequest,
     warned: bool,
 ) -> String {
     if scene.lights.is_empty() {
@@ -40,15 +40,15 @@ pub(in super::super) fn reason(
     if warned {
         return "what the warnings above name is the likely reason".into();
     }
-    let method = asked.method;
+    let method = request.method;
     format!("no light has reached the camera: lights may be enclosed or turned away, or too hard to find for {method}")
 }
 
 fn sees_anything(scene: &Scene, camera: &Camera) -> bool {
     let (width, height) = camera.size();
-    let at = |i: u32, size: u32| ((f64::from(i) + 0.5) / f64::from(EDGE) * f64::from(size)) as u32;
-    (0..EDGE * EDGE).any(|i| {
-        let film = camera.film_point((at(i % EDGE, width), at(i / EDGE, height)), Vec2::splat(0.5));
+    let at = |i: u32, size: u32| ((f64::from(i) + 0.5) / f64::from(RAYS_PER_EDGE) * f64::from(size)) as u32;
+    (0..RAYS_PER_EDGE * RAYS_PER_EDGE).any(|i| {
+        let film = camera.film_point((at(i % RAYS_PER_EDGE, width), at(i / RAYS_PER_EDGE, height)), Vec2::splat(0.5));
         let ray = camera.ray(film, Vec2::splat(0.5));
         rays::first(scene, ray.origin, ray.direction, f32::INFINITY, i).is_some()
     })

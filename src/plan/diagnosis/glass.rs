@@ -1,6 +1,6 @@
-//! Glass that casts no caustic.
+//! Warns about glass that casts no caustic.
 
-use super::super::names::{Worn, cut, worn, worn_in};
+use super::super::names::{UsedMaterial, truncate_names, used_in_scene, used_materials};
 use super::rays;
 use crate::geometry::{Instance, Mesh};
 use crate::light::Receiver;
@@ -11,30 +11,31 @@ use crate::stat::median;
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A mesh whose points are this near a plane, in parts of its size, is flat.
-const FLAT: f32 = 1e-3;
-/// Glass objects that are looked at.
-const OBJECTS: usize = 64;
-/// Meshes, or copies, of one.
-const COPIES: usize = 16;
-/// Points on each of these.
-const POINTS: usize = 16;
-/// Lights asked for from each point.
-const SAMPLES: u32 = 64;
-/// Rays from all lights together.
-const EMITTED: u32 = 1 << 14;
-/// Bodies that fade less may be meant to.
-const MOST_ALPHA: f32 = 0.75;
-/// Share of a body that fades, at least, and faces on which that is looked up.
-const MOST_OF_BODY: f32 = 0.9;
-const FACES: usize = 256;
+/// Maximum distance of the points of a flat mesh from a plane, relative to the size of the mesh.
+const FLAT_TOLERANCE: f32 = 1e-3;
+/// Maximum number of glass objects that are checked for light.
+const MAX_OBJECTS: usize = 64;
+/// Maximum number of instances of an object that are checked for light.
+const MAX_INSTANCES: usize = 16;
+/// Maximum number of points on an instance.
+const MAX_POINTS: usize = 16;
+/// Number of light samples from each point.
+const LIGHT_SAMPLES: u32 = 64;
+/// Number of rays from all lights together.
+const LIGHT_RAYS: u32 = 1 << 14;
+/// Maximum alpha of a transparent body; higher alpha may be intended.
+const MAX_ALPHA: f32 = 0.75;
+/// Minimum share of a body's faces that are transparent.
+const MIN_TRANSPARENT_SHARE: f32 = 0.9;
+/// Maximum number of faces whose alpha is looked up.
+const MAX_FACES: usize = 256;
 
 fn is_glass(material: &Material) -> bool {
     material.transmission >= 0.5 && material.ior != 1.0
 }
 
-/// Curved thin walls: most were meant to be solid, and thin only because the exporter wrote no thickness and the mesh
-/// is open. Flat ones are panes, which a thickness would change little.
+/// Warns about curved thin walls. Most are meant to be solid, and are thin because the exporter wrote no thickness and the
+/// mesh is open. Flat walls are panes, where a thickness would change little.
 pub(super) fn thin(scene: &Scene) -> Vec<String> {
     let (meshes, materials) = (&scene.shapes.meshes, &scene.materials.list);
     let mut flat: BTreeMap<u32, bool> = BTreeMap::new();
@@ -44,13 +45,13 @@ pub(super) fn thin(scene: &Scene) -> Vec<String> {
         wall && !*flat.entry(instance.mesh).or_insert_with(|| is_flat(&meshes[instance.mesh as usize]))
     };
     let instances = scene.shapes.instances.iter().filter(|instance| meant_solid(instance));
-    let worn = worn(materials, instances.map(|i| (i.material, i.name.as_str())));
-    let tell = |label: String| {
+    let used = used_materials(materials, instances.map(|i| (i.material, i.name.as_str())));
+    let warning = |label: String| {
         format!(
             "{label}: a thin wall does not bend light and casts no caustic; close the mesh (a bowl has an inside and an outside), or give the material a thickness"
         )
     };
-    worn.iter().map(|worn| tell(worn.label())).collect()
+    used.iter().map(|used| warning(used.label())).collect()
 }
 
 fn is_flat(mesh: &Mesh) -> bool {
@@ -65,24 +66,24 @@ fn is_flat(mesh: &Mesh) -> bool {
         off = off.max((*p - origin).dot(normal).abs());
         size = size.max(p.distance(origin));
     }
-    off <= FLAT * size
+    off <= FLAT_TOLERANCE * size
 }
 
-/// Glass too rough to focus light.
-pub(super) fn wide(scene: &Scene) -> Vec<String> {
-    let tell = |material: &Material, label: String| {
+/// Warns about glass too rough to focus light.
+pub(super) fn frosted(scene: &Scene) -> Vec<String> {
+    let warning = |material: &Material, label: String| {
         format!(
             "{label}: its roughness of {} spreads light too wide for a caustic to show; {MAX_FOCUSING_ROUGHNESS} and more is frosted",
             material.roughness
         )
     };
-    let worn = worn_in(scene);
-    let wide = worn.iter().filter(|worn| is_glass(worn.material) && !worn.material.focuses());
-    wide.map(|worn| tell(worn.material, worn.label())).collect()
+    let used = used_in_scene(scene);
+    let frosted = used.iter().filter(|used| is_glass(used.material) && !used.material.focuses());
+    frosted.map(|used| warning(used.material, used.label())).collect()
 }
 
-/// Smooth closed bodies that fade by alpha, as old models have it for glass: a veil of that share, and no lens.
-pub(super) fn faded(scene: &Scene) -> Vec<String> {
+/// Warns about smooth closed bodies with partial alpha, which old models use for glass. Alpha does not refract.
+pub(super) fn alpha_glass(scene: &Scene) -> Vec<String> {
     let materials = &scene.materials.list;
     let mut alphas: BTreeMap<u32, f32> = BTreeMap::new();
     let mut named = Vec::new();
@@ -97,18 +98,19 @@ pub(super) fn faded(scene: &Scene) -> Vec<String> {
             named.push((instance.material, instance.name.as_str()));
         }
     }
-    let tell = |(worn, alpha): (&Worn, f32)| {
+    let warning = |(used, alpha): (&UsedMaterial, f32)| {
         format!(
             "{}: its alpha of {} lets light through straight, so it bends no light and casts no caustic; if it is glass, give it transmission 1 and alpha 1",
-            worn.label(),
+            used.label(),
             (100.0 * alpha).round() / 100.0
         )
     };
-    // In the order of materials, both of them.
-    worn(materials, named.into_iter()).iter().zip(alphas.into_values()).map(tell).collect()
+    // Both lists are in the order of materials.
+    used_materials(materials, named.into_iter()).iter().zip(alphas.into_values()).map(warning).collect()
 }
 
-/// The alpha of a closed body which fades all over; that of a texture is looked up on faces spread over the mesh.
+/// Median alpha of a closed body, looked up on faces spread over the mesh; `None` if the body is not transparent
+/// everywhere.
 fn alpha_of_body(scene: &Scene, index: u32) -> Option<f32> {
     let instance = &scene.shapes.instances[index as usize];
     let mesh = &scene.shapes.meshes[instance.mesh as usize];
@@ -116,22 +118,23 @@ fn alpha_of_body(scene: &Scene, index: u32) -> Option<f32> {
         return None;
     }
     let material = &scene.materials.list[instance.material as usize];
-    let faces = rays::spread(mesh.triangles.len(), FACES);
-    let places = faces.filter_map(|face| scene.shapes.surface(index, face as u32, [1.0 / 3.0; 2]));
-    let mut alphas: Vec<f32> = places.map(|place| material.alpha(&place, &scene.materials.textures)).collect();
-    let fading = alphas.iter().filter(|alpha| **alpha > 0.0 && **alpha <= MOST_ALPHA).count();
+    let faces = rays::spread_indices(mesh.triangles.len(), MAX_FACES);
+    let surfaces = faces.filter_map(|face| scene.shapes.surface(index, face as u32, [1.0 / 3.0; 2]));
+    let mut alphas: Vec<f32> = surfaces.map(|surface| material.alpha(&surface, &scene.materials.textures)).collect();
+    let transparent = alphas.iter().filter(|alpha| **alpha > 0.0 && **alpha <= MAX_ALPHA).count();
     let middle = median(&mut alphas, f32::total_cmp)?;
-    (fading as f32 >= MOST_OF_BODY * alphas.len() as f32).then_some(middle)
+    (transparent as f32 >= MIN_TRANSPARENT_SHARE * alphas.len() as f32).then_some(middle)
 }
 
-/// What stands between the lights and a glass object: `None` if light comes through somewhere.
+/// Result of shadow rays from a glass object to the lights.
 struct Shade {
+    /// A light shines on some point of the object.
     lit: bool,
-    /// Quoted names, and on how many of the ways each stands.
+    /// Quoted name of each blocking object, and the number of shadow rays that it blocks.
     blockers: BTreeMap<String, usize>,
 }
 
-/// Glass that no light shines on directly. It may still be lit by way of mirrors and walls, but hardly focuses that.
+/// Warns about glass without direct light. Mirrors and walls may still light it, but such light makes hardly any caustic.
 pub(super) fn unlit(scene: &Scene) -> Vec<String> {
     let mut objects: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
@@ -142,17 +145,17 @@ pub(super) fn unlit(scene: &Scene) -> Vec<String> {
     }
     let mut warnings = Vec::new();
     let reached = OnceCell::new();
-    for (object, instances) in objects.iter().take(OBJECTS) {
+    for (object, instances) in objects.iter().take(MAX_OBJECTS) {
         let shade = shade(scene, instances);
         if shade.lit || reached.get_or_init(|| objects_lit(scene)).contains(object) {
             continue;
         }
         let mut blockers: Vec<(&String, &usize)> = shade.blockers.iter().collect();
-        blockers.sort_by_key(|(_, ways)| std::cmp::Reverse(**ways));
+        blockers.sort_by_key(|(_, rays)| std::cmp::Reverse(**rays));
         let names: Vec<String> = blockers.into_iter().map(|(name, _)| name.clone()).collect();
         let why = match names.is_empty() {
             true => "aim a light at it".to_string(),
-            false => format!("what stands in the way is {}", cut(&names)),
+            false => format!("what stands in the way is {}", truncate_names(&names)),
         };
         let name = &scene.objects[*object as usize];
         warnings.push(format!("object \"{name}\": no light shines on its glass, so it casts no caustic; {why}"));
@@ -160,16 +163,16 @@ pub(super) fn unlit(scene: &Scene) -> Vec<String> {
     warnings
 }
 
-/// Objects that rays from the lights meet, through whatever transmits light. Narrow beams miss the few points of a large
-/// face that are asked for light.
+/// Objects that rays from the lights hit, through transmitting surfaces. These rays find narrow beams, which miss the few
+/// sampled points of a large face.
 fn objects_lit(scene: &Scene) -> BTreeSet<u32> {
     /// Steps of the additive sequence that fills the hypercube evenly \[Roberts 2018\].
     const STEPS: [f64; 4] =
         [0.856_674_883_854_502_9, 0.733_891_856_627_126, 0.628_706_721_037_804_3, 0.538_596_948_320_147_3];
     let (shapes, materials) = (&scene.shapes, &scene.materials);
     let mut objects = BTreeSet::new();
-    for k in 0..EMITTED {
-        let choice = (f64::from(k) + 0.5) / f64::from(EMITTED);
+    for k in 0..LIGHT_RAYS {
+        let choice = (f64::from(k) + 0.5) / f64::from(LIGHT_RAYS);
         let [a, b, c, d] = STEPS.map(|step| (step * f64::from(k)).fract() as f32);
         let emitted = scene.lights.sample_emission(shapes, materials, choice, Vec2::new(a, b), Vec2::new(c, d));
         let Some(ray) = emitted else { continue };
@@ -182,11 +185,11 @@ fn objects_lit(scene: &Scene) -> BTreeSet<u32> {
 
 fn shade(scene: &Scene, instances: &[u32]) -> Shade {
     let mut shade = Shade { lit: false, blockers: BTreeMap::new() };
-    for index in rays::spread(instances.len(), COPIES).map(|i| instances[i]) {
+    for index in rays::spread_indices(instances.len(), MAX_INSTANCES).map(|i| instances[i]) {
         let mesh = &scene.shapes.meshes[scene.shapes.instances[index as usize].mesh as usize];
-        for primitive in rays::spread(mesh.triangles.len(), POINTS) {
+        for primitive in rays::spread_indices(mesh.triangles.len(), MAX_POINTS) {
             let Some(point) = scene.shapes.surface(index, primitive as u32, [1.0 / 3.0; 2]) else { continue };
-            for k in 0..SAMPLES {
+            for k in 0..LIGHT_SAMPLES {
                 let Some((direction, distance)) = towards_light(scene, point.p, k) else { continue };
                 match rays::first_opaque(scene, point.ray_origin(direction), direction, distance, k) {
                     None => {
@@ -204,14 +207,14 @@ fn shade(scene: &Scene, instances: &[u32]) -> Shade {
     shade
 }
 
-/// Direction and distance of a light that would shine on `p`; `k` chooses one, and a point of it.
+/// Direction and distance of a light that shines on `p` if nothing is between; `k` selects the light and a point of it.
 fn towards_light(scene: &Scene, p: Vec3, k: u32) -> Option<(Vec3, f32)> {
     /// Steps of the additive sequence that fills the square evenly \[Roberts 2018\].
     const STEPS: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
-    let choice = (f64::from(k) + 0.5) / f64::from(SAMPLES);
+    let choice = (f64::from(k) + 0.5) / f64::from(LIGHT_SAMPLES);
     let u = (STEPS * k as f32).fract();
     let light = scene.lights.sample_direct(&scene.shapes, &scene.materials, &Receiver::anywhere(p), choice, u)?;
-    // The end of the way is off the light's own surface.
+    // Ends before the light's own surface.
     let distance = light.target.map_or(f32::INFINITY, |target| target.distance(p) * 0.9999);
     (light.radiance.max_element() > 0.0).then_some((light.wi, distance))
 }

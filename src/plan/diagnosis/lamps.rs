@@ -1,6 +1,6 @@
-//! Lamps whose light does not come through, or is out of proportion.
+//! Warns about lights in wrong units, about blocked lights, and about a missing environment.
 
-use super::super::names::cut;
+use super::super::names::truncate_names;
 use super::super::{Effect, PlanRequest};
 use super::rays;
 use crate::light::Emitter;
@@ -9,22 +9,24 @@ use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::PI;
 
-/// Lumens of a watt, as exporters count.
+/// Lumens per watt, as exporters count.
 const EFFICACY: f32 = 683.0;
-/// Lights that are so many times out of proportion as the units differ, within this factor.
-const ABOUT: f32 = 5.0;
-/// Lights that are looked at.
-const LIGHTS: usize = 64;
-/// Directions from a point light.
+/// Powers of two lights are suspicious if their ratio is `EFFICACY` within this factor.
+const RATIO_TOLERANCE: f32 = 5.0;
+/// Maximum number of lights that are checked.
+const MAX_LIGHTS: usize = 64;
+/// Number of directions from a point light.
 const DIRECTIONS: u32 = 256;
-/// Surfaces that light meets one after another, before it counts as enclosed.
+/// Number of surfaces that enclosed light hits one after the other.
 const BOUNCES: usize = 4;
-/// Places on a surface that glows, and directions from each.
-const PLACES: (usize, u32) = (8, 64);
+/// Maximum number of triangles of an emissive object that are sampled.
+const MAX_EMITTING_TRIANGLES: usize = 8;
+/// Number of directions from each of these triangles.
+const DIRECTIONS_PER_TRIANGLE: u32 = 64;
 
-/// Lamps in lumens beside surfaces and environments in watts, or the other way round: the units are a guess, and by the
-/// other guess the lights were in proportion. Lamps are compared with surfaces, suns with the environment; where there is
-/// nothing to compare lumens with, the guess is told.
+/// Warns if the guessed units of punctual lights seem wrong: their ratio to other lights is about the ratio of lumens to
+/// watts, so the other units would make them comparable. Points and spots are compared with emissive surfaces, suns with
+/// the environment. Without anything to compare lumens with, the warning states the guess.
 pub(super) fn units(scene: &Scene) -> Option<String> {
     let guessed = scene.guessed_units.as_ref()?;
     let sky = scene.lights.sky();
@@ -48,14 +50,14 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
         ));
     }
     let around = sky.environment.as_ref().map_or(0.0, |environment| PI * luminance(environment.mean()));
-    let about = EFFICACY / ABOUT..EFFICACY * ABOUT;
+    let suspicious = EFFICACY / RATIO_TOLERANCE..EFFICACY * RATIO_TOLERANCE;
     let pairs =
         [(lamps, "its lamps", surfaces, "its surfaces that glow"), (suns, "its suns", around, "the environment")];
     let (strong, weak, many) = pairs.into_iter().find_map(|(a, named_a, b, named_b)| {
-        // Taken for watts they would be too strong; taken for lumens, too weak.
+        // Lumens taken for watts are too strong; watts taken for lumens are too weak.
         let many = if guessed.photometric { b / a } else { a / b };
         let (strong, weak) = if guessed.photometric { (named_b, named_a) } else { (named_a, named_b) };
-        about.contains(&many).then_some((strong, weak, many))
+        suspicious.contains(&many).then_some((strong, weak, many))
     })?;
     let (taken, other) = if guessed.photometric { ("lumens", "radiometric") } else { ("watts", "photometric") };
     Some(format!(
@@ -64,30 +66,31 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
     ))
 }
 
-/// Lamps alone, where the file's writer never says what shines from all around. A scene without any light is told when
-/// it is built.
-pub(super) fn no_environment(scene: &Scene, asked: &PlanRequest) -> Option<String> {
+/// Warns about a missing environment if the exporter never writes one. For a scene without any light, building the scene
+/// already warns.
+pub(super) fn no_environment(scene: &Scene, request: &PlanRequest) -> Option<String> {
     let dark = scene.environment_unknown && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
-    (dark && !asked.switches.off.has(Effect::Environment)).then(|| {
+    (dark && !request.switches.off.has(Effect::Environment)).then(|| {
         "no environment: Blender's own exporter leaves the world out, so what it shines is missing; export with scripts/blender/export.py, or give it with --env (--env 0,0,0 if it is dark)".into()
     })
 }
 
-/// A light, and the rays that leave it.
-struct Source {
+/// A light and sampled rays that leave it.
+struct LightRays {
     name: String,
-    /// Object that glows.
+    /// The object, for an emissive surface.
     object: Option<u32>,
+    /// Origins and directions.
     rays: Vec<(Vec3, Vec3)>,
 }
 
-/// Lamps and surfaces that glow; light from infinity comes from outside.
-fn sources(scene: &Scene) -> Vec<Source> {
+/// Rays of all lights with power that are not at infinity.
+fn light_rays(scene: &Scene) -> Vec<LightRays> {
     let mut sources = Vec::new();
     let mut glowing: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     let sky = scene.lights.sky();
     for (index, emitter) in scene.lights.emitters().iter().enumerate().filter(|(_, e)| e.power(sky) > 0.0) {
-        let from = |p: Vec3, shines: &dyn Fn(&Vec3) -> bool| Source {
+        let from = |p: Vec3, shines: &dyn Fn(&Vec3) -> bool| LightRays {
             name: scene.light_name(index),
             object: None,
             rays: rays::directions(DIRECTIONS).filter(shines).map(|d| (p, d)).collect(),
@@ -100,59 +103,58 @@ fn sources(scene: &Scene) -> Vec<Source> {
             Emitter::Triangle { instance, .. } => glowing.entry(*instance).or_default().push(index),
             Emitter::Sun { .. } | Emitter::Environment => {}
         }
-        if sources.len() >= LIGHTS {
+        if sources.len() >= MAX_LIGHTS {
             break;
         }
     }
-    for (instance, triangles) in glowing.into_iter().take(LIGHTS) {
+    for (instance, triangles) in glowing.into_iter().take(MAX_LIGHTS) {
         let mut rays = Vec::new();
-        for at in rays::spread(triangles.len(), PLACES.0) {
+        for at in rays::spread_indices(triangles.len(), MAX_EMITTING_TRIANGLES) {
             let Emitter::Triangle { primitive, two_sided, .. } = &scene.lights.emitters()[triangles[at]] else {
                 continue;
             };
             let Some(place) = scene.shapes.surface(instance, *primitive, [1.0 / 3.0; 2]) else { continue };
             let shines = |d: &Vec3| *two_sided || place.ng.dot(*d) > 0.0;
-            rays.extend(rays::directions(PLACES.1).filter(shines).map(|d| (place.ray_origin(d), d)));
+            rays.extend(rays::directions(DIRECTIONS_PER_TRIANGLE).filter(shines).map(|d| (place.ray_origin(d), d)));
         }
         let object = Some(scene.shapes.instances[instance as usize].object);
-        sources.push(Source { name: scene.light_name(triangles[0]), object, rays });
+        sources.push(LightRays { name: scene.light_name(triangles[0]), object, rays });
     }
     sources
 }
 
-/// Lamps in a casing that lets no light out. In a room without windows no light gets out, either: but there the camera
-/// is among what it lights.
+/// Warns about lights in a casing that lets no light out. A closed room with the camera inside is not a casing.
 pub(super) fn encased(scene: &Scene, camera: Vec3) -> Vec<String> {
     let mut warnings = Vec::new();
-    for Source { name, object, rays } in sources(scene) {
+    for LightRays { name, object, rays } in light_rays(scene) {
         let Some(mut casing) = enclosure(scene, rays) else { continue };
         casing.retain(|lit| Some(*lit) != object);
-        if casing.is_empty() || within(scene, &casing, camera) {
+        if casing.is_empty() || is_within(scene, &casing, camera) {
             continue;
         }
         let names: Vec<String> = casing.iter().map(|lit| format!("\"{}\"", scene.objects[*lit as usize])).collect();
         warnings.push(format!(
             "{name}: all its light stays within {}, and the camera is outside; make an opening, or give the casing a material that transmits light",
-            cut(&names)
+            truncate_names(&names)
         ));
     }
     warnings
 }
 
-/// An environment that nothing which the camera sees gets any light from: a sky dome, or a room without windows.
+/// Warns about an environment that cannot light the surroundings of the camera: a sky dome or a closed room blocks it.
 pub(super) fn shut_out(scene: &Scene, camera: Vec3) -> Option<String> {
     scene.lights.sky().environment.as_ref()?;
     let rays = rays::directions(DIRECTIONS).map(|d| (camera, d)).collect();
     let mut around = enclosure(scene, rays)?;
-    around.retain(|object| within(scene, &BTreeSet::from([*object]), camera));
+    around.retain(|object| is_within(scene, &BTreeSet::from([*object]), camera));
     let names: Vec<String> = around.iter().map(|object| format!("\"{}\"", scene.objects[*object as usize])).collect();
-    let by = if names.is_empty() { "what stands around the camera".into() } else { cut(&names) };
+    let by = if names.is_empty() { "what stands around the camera".into() } else { truncate_names(&names) };
     Some(format!(
         "the environment lights nothing that the camera sees: {by} shuts it out; make an opening, let it glow if it is the sky, or take it away"
     ))
 }
 
-/// All opaque objects that light meets which goes on from surface to surface; `None` if some gets away.
+/// The opaque objects that rays hit while they bounce from surface to surface; `None` if a ray leaves the scene.
 fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>> {
     let onward: Vec<Vec3> = rays::directions(DIRECTIONS).collect();
     let mut met = BTreeSet::new();
@@ -161,7 +163,7 @@ fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>
             let (origin, direction) = *ray;
             let surface = rays::first_opaque(scene, origin, direction, f32::INFINITY, index as u32)?;
             met.insert(scene.shapes.instances[surface.instance as usize].object);
-            // Any direction on the side that the ray came from; neighbours go on in different ones.
+            // Continues on the side that the ray came from, in different directions for neighbouring rays.
             let front = if direction.dot(surface.ng) < 0.0 { surface.ng } else { -surface.ng };
             let next = onward[(97 * index + 41 * bounce) % onward.len()];
             let next = if next.dot(front) < 0.0 { -next } else { next };
@@ -171,8 +173,8 @@ fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>
     (!rays.is_empty()).then_some(met)
 }
 
-/// Whether a point is in the box around objects.
-fn within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
+/// Whether a point is in the bounding box of objects.
+fn is_within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for instance in scene.shapes.instances.iter().filter(|instance| objects.contains(&instance.object)) {
         for &q in &scene.shapes.meshes[instance.mesh as usize].positions {
@@ -183,13 +185,13 @@ fn within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
     p.cmpge(low).all() && p.cmple(high).all()
 }
 
-/// Lamps without size that shine through glass, where the method does not find them.
-pub(super) fn behind_glass(scene: &Scene, asked: &PlanRequest) -> Vec<String> {
-    if asked.search.finds(Effect::Caustic, &scene.survey) {
+/// Warns about delta lights behind glass if the method does not find their caustics.
+pub(super) fn behind_glass(scene: &Scene, request: &PlanRequest) -> Vec<String> {
+    if request.search.finds(Effect::Caustic, &scene.survey) {
         return vec![];
     }
     let mut warnings = Vec::new();
-    for source in sources(scene).into_iter().filter(|source| source.object.is_none()) {
+    for source in light_rays(scene).into_iter().filter(|source| source.object.is_none()) {
         let mut panes = BTreeMap::new();
         let n = source.rays.len();
         for (token, (origin, direction)) in source.rays.into_iter().enumerate() {
@@ -201,7 +203,7 @@ pub(super) fn behind_glass(scene: &Scene, asked: &PlanRequest) -> Vec<String> {
             }
         }
         let through: usize = panes.values().sum();
-        // A little glass in a corner of its light is no mistake.
+        // If less than half of the light passes glass, the glass is hardly a mistake.
         if 2 * through < n || through == 0 {
             continue;
         }
@@ -210,8 +212,8 @@ pub(super) fn behind_glass(scene: &Scene, asked: &PlanRequest) -> Vec<String> {
             "{}: {} % of its light goes through the glass of {}, and --method {} cannot find a lamp without size there; choose --method sppm or vcm, or give it a radius",
             source.name,
             100 * through / n,
-            cut(&names),
-            asked.method
+            truncate_names(&names),
+            request.method
         ));
     }
     warnings

@@ -1,8 +1,8 @@
-//! Why is there no caustic? What looks like a mistake in the scene, told from the scene alone, each with a remedy.
+//! Warnings about likely mistakes in a scene, such as glass without a caustic, each with a remedy.
 //!
-//! What the file itself shows (open and inverted meshes, a scene without light) is told when it is read and built.
-//! Where rays are asked here, they go in fixed directions and their number is fixed: the same scene gets the same
-//! answer everywhere.
+//! Reading and building the scene already warns about mistakes in the file itself (open and inverted meshes, a scene
+//! without light). The checks here trace a fixed number of rays in fixed directions, so a scene always gets the same
+//! warnings.
 
 pub(super) mod black;
 mod culling;
@@ -15,19 +15,19 @@ use super::PlanRequest;
 use crate::camera::Camera;
 use crate::scene::Scene;
 
-/// All that looks like a mistake.
-pub(super) fn warnings(scene: &Scene, camera: &Camera, asked: &PlanRequest) -> Vec<String> {
+/// The warnings of all checks.
+pub(super) fn warnings(scene: &Scene, camera: &Camera, request: &PlanRequest) -> Vec<String> {
     let mut warnings = glass::thin(scene);
     warnings.extend(culling::culled(scene, camera));
-    warnings.extend(glass::wide(scene));
-    warnings.extend(glass::faded(scene));
+    warnings.extend(glass::frosted(scene));
+    warnings.extend(glass::alpha_glass(scene));
     warnings.extend(overlap::unordered(scene));
     warnings.extend(lamps::units(scene));
-    warnings.extend(lamps::no_environment(scene, asked));
+    warnings.extend(lamps::no_environment(scene, request));
     if !scene.lights.is_empty() {
         warnings.extend(lamps::encased(scene, camera.position()));
         warnings.extend(lamps::shut_out(scene, camera.position()));
-        warnings.extend(lamps::behind_glass(scene, asked));
+        warnings.extend(lamps::behind_glass(scene, request));
         warnings.extend(glass::unlit(scene));
         warnings.extend(black::nothing_seen(scene, camera));
     }

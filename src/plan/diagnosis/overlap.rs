@@ -1,4 +1,4 @@
-//! Solids that overlap and have the same priority.
+//! Warns about overlapping solids of equal priority.
 
 use super::rays;
 use crate::geometry::{Instance, Mesh};
@@ -7,22 +7,24 @@ use crate::scene::Scene;
 use crate::scene::contact::RaySurfaces;
 use crate::trace::Ray;
 
-/// Solids that are looked at, and triangles of each whose edges are followed.
-const SOLIDS: usize = 64;
-const TRIANGLES: usize = 256;
-/// Surfaces that an edge may cross.
-const MOST_CROSSED: usize = 16;
-/// Parts of an edge at its ends in which it may touch another surface, and the cosine to a surface that it may lie in.
-const TOUCHES: f32 = 1e-3;
+/// Maximum number of solids that are checked.
+const MAX_SOLIDS: usize = 64;
+/// Maximum number of triangles of a solid whose edges are traced.
+const MAX_TRIANGLES: usize = 256;
+/// Maximum number of surfaces along an edge.
+const MAX_SURFACES: usize = 16;
+/// An edge touches a surface, instead of crossing it, at a smaller cosine, or within this share of its length from an end.
+const TOUCH_TOLERANCE: f32 = 1e-3;
 
-/// Pairs of solids of different materials where an edge of one goes through the surface of the other.
+/// Warnings about pairs of solids of different materials and equal priority, if an edge of one crosses the surface of the
+/// other.
 pub(super) fn unordered(scene: &Scene) -> Vec<String> {
     let materials = &scene.materials.list;
     let solid = |instance: &&Instance| materials[instance.material as usize].is_solid_glass();
-    let solids: Vec<&Instance> = scene.shapes.instances.iter().filter(solid).take(SOLIDS).collect();
+    let solids: Vec<&Instance> = scene.shapes.instances.iter().filter(solid).take(MAX_SOLIDS).collect();
     let mut pairs: Vec<(u32, u32)> = Vec::new();
     for instance in &solids {
-        for crossed in crossed(scene, instance) {
+        for crossed in crossed_solids(scene, instance) {
             let other = &scene.shapes.instances[crossed as usize];
             let [own, its] = [instance, other].map(|i| materials[i.material as usize].priority);
             let pair = (instance.object.min(other.object), instance.object.max(other.object));
@@ -32,38 +34,40 @@ pub(super) fn unordered(scene: &Scene) -> Vec<String> {
         }
     }
     let name = |object: u32| &scene.objects[object as usize];
-    let tell = |(a, b): (u32, u32)| {
+    let warning = |(a, b): (u32, u32)| {
         format!(
             "objects \"{}\" and \"{}\" overlap, and their materials have the same priority: where they do, the smaller one is taken to fill the space; give one of them the higher priority (extras.caustique.priority)",
             name(a),
             name(b)
         )
     };
-    pairs.into_iter().map(tell).collect()
+    pairs.into_iter().map(warning).collect()
 }
 
-/// Instances of solids through whose surface edges of one go.
-fn crossed(scene: &Scene, instance: &Instance) -> Vec<u32> {
+/// Instances of solids whose surface an edge of `instance` crosses.
+fn crossed_solids(scene: &Scene, instance: &Instance) -> Vec<u32> {
     let mesh: &Mesh = &scene.shapes.meshes[instance.mesh as usize];
     let mut crossed = Vec::new();
-    for at in rays::spread(mesh.triangles.len(), TRIANGLES) {
+    for at in rays::spread_indices(mesh.triangles.len(), MAX_TRIANGLES) {
         let [a, b, c] = instance.corners(mesh, at as u32);
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            follow(scene, instance.object, from, to, &mut crossed);
+            trace_edge(scene, instance.object, from, to, &mut crossed);
         }
     }
     crossed
 }
 
-/// Follows an edge of an object.
-fn follow(scene: &Scene, object: u32, from: Vec3, to: Vec3, crossed: &mut Vec<u32>) {
+/// Traces an edge of an object, and adds the solids whose surface it crosses to `crossed`.
+fn trace_edge(scene: &Scene, object: u32, from: Vec3, to: Vec3, crossed: &mut Vec<u32>) {
     let length = from.distance(to);
     let Some(direction) = (to - from).try_normalize() else { return };
     let mut along = RaySurfaces::new(Ray { origin: from, direction, tmax: length, token: 0 }, None);
-    for _ in 0..MOST_CROSSED {
+    for _ in 0..MAX_SURFACES {
         let Some((surface, _)) = along.next(scene, false) else { return };
         let share = surface.p.distance(from) / length;
-        let across = direction.dot(surface.ng).abs() > TOUCHES && share > TOUCHES && share < 1.0 - TOUCHES;
+        let across = direction.dot(surface.ng).abs() > TOUCH_TOLERANCE
+            && share > TOUCH_TOLERANCE
+            && share < 1.0 - TOUCH_TOLERANCE;
         let solid = scene.materials.list[surface.material as usize].is_solid_glass();
         let other = scene.shapes.instances[surface.instance as usize].object != object;
         if across && solid && other && !crossed.contains(&surface.instance) {

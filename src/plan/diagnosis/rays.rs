@@ -1,4 +1,4 @@
-//! Rays in fixed directions, and what they meet.
+//! Rays in fixed directions, and the surfaces that they hit.
 
 use crate::geometry::Surface;
 use crate::math::Vec3;
@@ -6,10 +6,10 @@ use crate::scene::Scene;
 use crate::scene::contact::RaySurfaces;
 use crate::trace::Ray;
 
-/// A ray through more surfaces than this that let it pass is given up.
-const MOST_SURFACES: usize = 64;
+/// Maximum number of transmitting surfaces along a ray.
+const MAX_SURFACES: usize = 64;
 
-/// Directions spread evenly over the sphere: a spiral that turns by the golden angle.
+/// `n` directions, spread evenly over the sphere on a spiral with the golden angle between neighbours.
 pub(super) fn directions(n: u32) -> impl Iterator<Item = Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     (0..n).map(move |i| {
@@ -20,18 +20,18 @@ pub(super) fn directions(n: u32) -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// The first surface along a ray; `token` decides about cut-outs.
+/// The first surface along a ray; `token` is the random number for alpha.
 pub(super) fn first(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
     let hit = scene.tracer.intersect(&Ray { origin, direction, tmax, token })?;
     scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)
 }
 
-/// The first surface along a ray that lets no light through. What lets light through does not bend the ray.
+/// The first opaque surface along a ray, which is not refracted on the way.
 pub(super) fn first_opaque(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
     first_opaque_after(scene, origin, direction, tmax, token, |_| {})
 }
 
-/// The same; `passed` gets each surface before it.
+/// [`first_opaque`], which calls `passed` with each transmitting surface on the way.
 pub(super) fn first_opaque_after(
     scene: &Scene,
     origin: Vec3,
@@ -41,7 +41,7 @@ pub(super) fn first_opaque_after(
     mut passed: impl FnMut(&Surface),
 ) -> Option<Surface> {
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, None);
-    for _ in 0..MOST_SURFACES {
+    for _ in 0..MAX_SURFACES {
         let (surface, _) = along.next(scene, false)?;
         if !scene.materials.list[surface.material as usize].transmits() {
             return Some(surface);
@@ -52,8 +52,8 @@ pub(super) fn first_opaque_after(
     None
 }
 
-/// At most `n` of `0..len`, evenly spread.
-pub(super) fn spread(len: usize, n: usize) -> impl Iterator<Item = usize> {
+/// At most `n` indices, evenly spread over `0..len`.
+pub(super) fn spread_indices(len: usize, n: usize) -> impl Iterator<Item = usize> {
     let n = n.min(len);
     (0..n).map(move |i| (2 * i + 1) * len / (2 * n))
 }
@@ -63,12 +63,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn directions_are_even_and_samples_are_spread() {
+    fn directions_and_indices_are_evenly_spread() {
         let all: Vec<Vec3> = directions(256).collect();
         assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-6));
         assert!((all.iter().copied().sum::<Vec3>() / 256.0).length() < 0.01);
-        assert_eq!(spread(3, 8).collect::<Vec<_>>(), [0, 1, 2]);
-        assert_eq!(spread(100, 4).collect::<Vec<_>>(), [12, 37, 62, 87]);
-        assert_eq!(spread(0, 4).count(), 0);
+        assert_eq!(spread_indices(3, 8).collect::<Vec<_>>(), [0, 1, 2]);
+        assert_eq!(spread_indices(100, 4).collect::<Vec<_>>(), [12, 37, 62, 87]);
+        assert_eq!(spread_indices(0, 4).count(), 0);
     }
 }
