@@ -301,7 +301,7 @@ const NAMES_METHODS: [&str; 8] = [
     "src/render/pass/choice.rs",
     "src/render/settings/candidate.rs",
     "src/choose/pilot.rs",
-    "src/report/guests.rs",
+    "src/report/peer_renders.rs",
     "src/cli/converge/reference.rs",
     "src/cli/converge/runs.rs",
     "ffi/python/src/converge.rs",

@@ -17,7 +17,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// Of values; `None` if there are none.
+    /// PictureSource values; `None` if there are none.
     pub fn of(values: &[f64]) -> Option<Mean> {
         let n = values.len() as f64;
         let value = values.iter().sum::<f64>() / n;
@@ -29,7 +29,7 @@ impl Mean {
 
 /// A run at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
+pub struct CurvePoint {
     /// Iterations done.
     pub iterations: u64,
     /// Wall-clock seconds.
@@ -47,7 +47,7 @@ pub struct Spot {
 }
 
 /// Whether a few bright samples rule a picture's error: the worst 0.5 % of its pixels hold more than half of its
-/// relMSE. Of Gaussian noise as large everywhere they hold 2 to 5 %.
+/// relMSE. PictureSource Gaussian noise as large everywhere they hold 2 to 5 %.
 pub fn fireflies(errors: &Errors) -> bool {
     (1.0 - TRIMMED_SHARE) * errors.relmse_trimmed < 0.5 * errors.relmse
 }
@@ -56,9 +56,9 @@ pub fn fireflies(errors: &Errors) -> bool {
 #[derive(Clone, Debug, Default)]
 pub struct Curve {
     /// Mean over seeds, by iterations.
-    pub mean: Vec<Spot>,
-    /// Of every seed.
-    pub by_seed: Vec<Vec<Spot>>,
+    pub mean: Vec<CurvePoint>,
+    /// PictureSource every seed.
+    pub by_seed: Vec<Vec<CurvePoint>>,
     /// The reference's own error.
     pub own: f64,
 }
@@ -69,9 +69,9 @@ pub(super) fn between(a: f64, b: f64, t: f64) -> f64 {
 }
 
 /// Seconds, core-seconds and figure after so many iterations, between two moments as a power of iterations.
-fn at(curve: &[Spot], iterations: u64) -> Option<[f64; 3]> {
-    let values = |spot: &Spot| [spot.seconds, spot.cpu_seconds, spot.figure];
-    let next = curve.iter().position(|spot| spot.iterations >= iterations)?;
+fn at(curve: &[CurvePoint], iterations: u64) -> Option<[f64; 3]> {
+    let values = |curve_point: &CurvePoint| [curve_point.seconds, curve_point.cpu_seconds, curve_point.figure];
+    let next = curve.iter().position(|curve_point| curve_point.iterations >= iterations)?;
     let after = &curve[next];
     let Some(before) = next.checked_sub(1).map(|i| &curve[i]).filter(|_| after.iterations > iterations) else {
         return (after.iterations == iterations).then_some(values(after));
@@ -97,7 +97,7 @@ pub struct Slope {
 
 /// Why no exponent is fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Unfit {
+pub enum FitFailure {
     /// Fewer than four measurements above the reference's own error in the last decade.
     Few(usize),
     /// They span less than a factor of four.
@@ -110,14 +110,14 @@ pub enum Unfit {
     Denoised,
 }
 
-impl fmt::Display for Unfit {
+impl fmt::Display for FitFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Unfit::Few(n) => write!(f, "{n} measurements are too few"),
-            Unfit::Narrow => write!(f, "the measurements span too little"),
-            Unfit::Fireflies(n) => write!(f, "fireflies rule {n} of the measurements"),
-            Unfit::Scattered(error) => write!(f, "the measurements scatter too much (± {error:.1})"),
-            Unfit::Denoised => write!(f, "denoised pictures follow no power"),
+            FitFailure::Few(n) => write!(f, "{n} measurements are too few"),
+            FitFailure::Narrow => write!(f, "the measurements span too little"),
+            FitFailure::Fireflies(n) => write!(f, "fireflies rule {n} of the measurements"),
+            FitFailure::Scattered(error) => write!(f, "the measurements scatter too much (± {error:.1})"),
+            FitFailure::Denoised => write!(f, "denoised pictures follow no power"),
         }
     }
 }
@@ -141,12 +141,12 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// A spot's place on it.
-    pub fn of(self, spot: &Spot) -> f64 {
+    /// A curve_point's place on it.
+    pub fn of(self, curve_point: &CurvePoint) -> f64 {
         match self {
-            Axis::Iterations => spot.iterations as f64,
-            Axis::Seconds => spot.seconds,
-            Axis::CoreSeconds => spot.cpu_seconds,
+            Axis::Iterations => curve_point.iterations as f64,
+            Axis::Seconds => curve_point.seconds,
+            Axis::CoreSeconds => curve_point.cpu_seconds,
         }
     }
 }
@@ -155,40 +155,41 @@ impl Curve {
     /// The curve of a line, by its number.
     pub fn of(line: usize, points: &[Point], metric: Metric, reference: &Reference) -> Curve {
         let own = reference.error.of(metric).unwrap_or(0.0);
-        let mut by_seed: Vec<(u64, Vec<Spot>)> = Vec::new();
+        let mut by_seed: Vec<(u64, Vec<CurvePoint>)> = Vec::new();
         for point in points.iter().filter(|point| point.line == line) {
             let figure = metric.of(&point.errors) - own;
             let reported = reference.figure(metric, &point.errors).is_some();
             let Point { iterations, seconds, cpu_seconds, .. } = *point;
             let fireflies = metric == Metric::RelMse && fireflies(&point.errors);
-            let spot = Spot { iterations, seconds, cpu_seconds, figure, spread: None, reported, fireflies };
+            let curve_point =
+                CurvePoint { iterations, seconds, cpu_seconds, figure, spread: None, reported, fireflies };
             match by_seed.iter_mut().find(|(seed, _)| *seed == point.seed) {
-                Some((_, spots)) => spots.push(spot),
-                None => by_seed.push((point.seed, vec![spot])),
+                Some((_, curve_points)) => curve_points.push(curve_point),
+                None => by_seed.push((point.seed, vec![curve_point])),
             }
         }
-        Curve::from_seeds(by_seed.into_iter().map(|(_, spots)| spots).collect(), own)
+        Curve::from_seeds(by_seed.into_iter().map(|(_, curve_points)| curve_points).collect(), own)
     }
 
     /// The mean of curves, as far as all of them go. Those that a clock has stopped end after different numbers of
     /// iterations: a curve without a moment that another has is interpolated there.
-    pub fn from_seeds(by_seed: Vec<Vec<Spot>>, own: f64) -> Curve {
-        let mut moments: Vec<u64> = by_seed.iter().flatten().map(|spot| spot.iterations).collect();
+    pub fn from_seeds(by_seed: Vec<Vec<CurvePoint>>, own: f64) -> Curve {
+        let mut moments: Vec<u64> = by_seed.iter().flatten().map(|curve_point| curve_point.iterations).collect();
         moments.sort_unstable();
         moments.dedup();
         let mean = |&iterations: &u64| {
             let all: Vec<[f64; 3]> = by_seed.iter().map(|curve| at(curve, iterations)).collect::<Option<_>>()?;
-            let mean = |i: usize| Mean::of(&all.iter().map(|spot| spot[i]).collect::<Vec<_>>());
+            let mean = |i: usize| Mean::of(&all.iter().map(|curve_point| curve_point[i]).collect::<Vec<_>>());
             let figure = mean(2)?;
-            let here = |spot: &&Spot| spot.iterations == iterations;
-            Some(Spot {
+            let here = |curve_point: &&CurvePoint| curve_point.iterations == iterations;
+            Some(CurvePoint {
                 iterations,
                 seconds: mean(0)?.value,
                 cpu_seconds: mean(1)?.value,
                 figure: figure.value,
                 spread: figure.error,
                 reported: figure.value > own && figure.value > 0.0,
-                fireflies: by_seed.iter().flatten().filter(here).any(|spot| spot.fireflies),
+                fireflies: by_seed.iter().flatten().filter(here).any(|curve_point| curve_point.fireflies),
             })
         };
         Curve { mean: moments.iter().filter_map(mean).collect(), by_seed, own }
@@ -198,13 +199,13 @@ impl Curve {
     pub fn without_each_seed(&self) -> Vec<Curve> {
         let without = |left: usize| {
             let rest = self.by_seed.iter().enumerate().filter(|(seed, _)| *seed != left);
-            Curve::from_seeds(rest.map(|(_, spots)| spots.clone()).collect(), self.own)
+            Curve::from_seeds(rest.map(|(_, curve_points)| curve_points.clone()).collect(), self.own)
         };
         if self.by_seed.len() > 1 { (0..self.by_seed.len()).map(without).collect() } else { Vec::new() }
     }
 
     /// Where it ends.
-    pub fn last(&self) -> Option<&Spot> {
+    pub fn last(&self) -> Option<&CurvePoint> {
         self.mean.last()
     }
 
@@ -212,21 +213,24 @@ impl Curve {
     ///
     /// # Errors
     /// Why it means nothing.
-    pub fn slope(&self, axis: Axis) -> Result<Slope, Unfit> {
-        let last = self.last().ok_or(Unfit::Few(0))?.iterations;
-        let decade = |spot: &&Spot| spot.reported && spot.iterations * 10 >= last;
-        let fit = |curve: &[Spot]| {
-            let spots: Vec<&Spot> = curve.iter().filter(decade).collect();
-            let points: Vec<(f64, f64)> = spots.iter().map(|spot| (axis.of(spot), spot.figure)).collect();
+    pub fn slope(&self, axis: Axis) -> Result<Slope, FitFailure> {
+        let last = self.last().ok_or(FitFailure::Few(0))?.iterations;
+        let decade = |curve_point: &&CurvePoint| curve_point.reported && curve_point.iterations * 10 >= last;
+        let fit = |curve: &[CurvePoint]| {
+            let curve_points: Vec<&CurvePoint> = curve.iter().filter(decade).collect();
+            let points: Vec<(f64, f64)> =
+                curve_points.iter().map(|curve_point| (axis.of(curve_point), curve_point.figure)).collect();
             let ends = points.first().zip(points.last()).map(|(first, last)| (first.0, last.0));
-            let Some(range) = ends.filter(|_| points.len() >= POINTS) else { return Err(Unfit::Few(points.len())) };
-            let ruled = spots.iter().filter(|spot| spot.fireflies).count();
+            let Some(range) = ends.filter(|_| points.len() >= POINTS) else {
+                return Err(FitFailure::Few(points.len()));
+            };
+            let ruled = curve_points.iter().filter(|curve_point| curve_point.fireflies).count();
             match PowerLaw::fit(points.iter().copied()) {
-                _ if range.1 < SPAN * range.0 => Err(Unfit::Narrow),
-                _ if ruled > 0 => Err(Unfit::Fireflies(ruled)),
+                _ if range.1 < SPAN * range.0 => Err(FitFailure::Narrow),
+                _ if ruled > 0 => Err(FitFailure::Fireflies(ruled)),
                 Some(line) if line.exponent_error <= SCATTER => Ok((line, range, points.len())),
-                Some(line) => Err(Unfit::Scattered(line.exponent_error)),
-                None => Err(Unfit::Narrow),
+                Some(line) => Err(FitFailure::Scattered(line.exponent_error)),
+                None => Err(FitFailure::Narrow),
             }
         };
         let (line, range, points) = fit(&self.mean)?;
@@ -244,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_mean_goes_as_far_as_all_seeds_do() {
-        let spot = |iterations: u64, figure: f64| Spot {
+        let curve_point = |iterations: u64, figure: f64| CurvePoint {
             iterations,
             seconds: 0.5 * iterations as f64,
             cpu_seconds: iterations as f64,
@@ -253,9 +257,10 @@ mod tests {
             reported: true,
             fireflies: false,
         };
-        let power = |factor: f64, moments: &[u64]| moments.iter().map(|&n| spot(n, factor / n as f64)).collect();
+        let power = |factor: f64, moments: &[u64]| moments.iter().map(|&n| curve_point(n, factor / n as f64)).collect();
         let curve = Curve::from_seeds(vec![power(1.0, &[1, 2, 4, 8]), power(3.0, &[1, 2, 4, 7])], 0.2);
-        let shown: Vec<(u64, f64)> = curve.mean.iter().map(|spot| (spot.iterations, spot.figure)).collect();
+        let shown: Vec<(u64, f64)> =
+            curve.mean.iter().map(|curve_point| (curve_point.iterations, curve_point.figure)).collect();
         assert_eq!(shown.len(), 4);
         assert_eq!((shown[0], shown[2], shown[3].0), ((1, 2.0), (4, 0.5), 7));
         assert!((shown[3].1 - 2.0 / 7.0).abs() < 1e-12 && (curve.mean[3].seconds - 3.5).abs() < 1e-12, "{shown:?}");
@@ -266,12 +271,12 @@ mod tests {
         assert_eq!(curve.without_each_seed()[0].mean[3].iterations, 7);
         // Without a figure above the reference's own error there is nothing to fit.
         let below = Curve::from_seeds(vec![power(0.1, &[1, 2, 4, 8])], 0.2).slope(Axis::Iterations);
-        assert_eq!(below.err(), Some(Unfit::Few(0)));
+        assert_eq!(below.err(), Some(FitFailure::Few(0)));
     }
 
     #[test]
     fn exponents_that_mean_nothing_are_not_fitted() {
-        let spot = |&(iterations, figure): &(u64, f64)| Spot {
+        let curve_point = |&(iterations, figure): &(u64, f64)| CurvePoint {
             iterations,
             seconds: iterations as f64,
             cpu_seconds: iterations as f64,
@@ -281,14 +286,14 @@ mod tests {
             fireflies: figure > 1.0,
         };
         let fit = |points: &[(u64, f64)]| {
-            Curve::from_seeds(vec![points.iter().map(spot).collect()], 0.0).slope(Axis::Iterations)
+            Curve::from_seeds(vec![points.iter().map(curve_point).collect()], 0.0).slope(Axis::Iterations)
         };
         let line = [(10, 1.0), (20, 0.5), (40, 0.25), (80, 0.125)];
         assert!(fit(&line).is_ok_and(|slope| (slope.exponent.value + 1.0).abs() < 1e-12 && slope.points == 4));
-        assert_eq!(fit(&line[1..]), Err(Unfit::Few(3)));
-        assert_eq!(fit(&[(10, 1.0), (12, 0.8), (14, 0.7), (16, 0.6)]), Err(Unfit::Narrow));
-        assert_eq!(fit(&[(10, 1.0), (20, 1.1), (40, 0.25), (80, 0.125)]), Err(Unfit::Fireflies(1)));
-        assert!(matches!(fit(&[(10, 1.0), (20, 0.1), (40, 0.9), (80, 0.1)]), Err(Unfit::Scattered(_))));
+        assert_eq!(fit(&line[1..]), Err(FitFailure::Few(3)));
+        assert_eq!(fit(&[(10, 1.0), (12, 0.8), (14, 0.7), (16, 0.6)]), Err(FitFailure::Narrow));
+        assert_eq!(fit(&[(10, 1.0), (20, 1.1), (40, 0.25), (80, 0.125)]), Err(FitFailure::Fireflies(1)));
+        assert!(matches!(fit(&[(10, 1.0), (20, 0.1), (40, 0.9), (80, 0.1)]), Err(FitFailure::Scattered(_))));
     }
 
     /// Equal Gaussian noise is no firefly; one pixel of a thousand that is a hundred times as wrong is.

@@ -1,7 +1,7 @@
 //! The report as CSV and JSON.
 
-use super::curve::{Mean, Slope, Spot, Unfit, fireflies};
-use super::entry::Of;
+use super::curve::{CurvePoint, FitFailure, Mean, Slope, fireflies};
+use super::entry::PictureSource;
 use super::outcome::Outcome;
 use super::point::Point;
 use super::summary::{Subject, Summary, finite};
@@ -36,7 +36,7 @@ impl<'a> Row<'a> {
         let line = &subject.lines[point.line];
         Row {
             run: &line.name,
-            method: method(subject, line.of),
+            method: method(subject, line.source),
             seed: point.seed,
             iterations: point.iterations,
             light_paths: point.light_paths,
@@ -55,10 +55,12 @@ impl<'a> Row<'a> {
 }
 
 /// The method of a curve; another renderer's is its way there.
-fn method(subject: &Subject, of: Of) -> &'static str {
+fn method(subject: &Subject, of: PictureSource) -> &'static str {
     match of {
-        Of::Estimate(entry) | Of::Finished(entry) => subject.entries[entry].settings.method.name(),
-        Of::Guest(guest) | Of::Denoised(guest) => subject.guests[guest].mode,
+        PictureSource::Estimate(entry) | PictureSource::Finished(entry) => {
+            subject.entries[entry].settings.method.name()
+        }
+        PictureSource::Peer(peer) | PictureSource::Denoised(peer) => subject.peers[peer].mode,
     }
 }
 
@@ -114,15 +116,15 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
 
 /// A curve with what made it.
 fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> Value {
-    let of = subject.lines[line].of;
+    let of = subject.lines[line].source;
     let mut object = match of {
-        Of::Estimate(entry) | Of::Finished(entry) => subject.entries[entry].object(),
-        Of::Guest(guest) | Of::Denoised(guest) => peer(subject, outcome, summary, guest),
+        PictureSource::Estimate(entry) | PictureSource::Finished(entry) => subject.entries[entry].object(),
+        PictureSource::Peer(peer) | PictureSource::Denoised(peer) => peer_object(subject, outcome, summary, peer),
     };
     object["name"] = subject.lines[line].name.as_str().into();
     object["finish"] = match of {
-        Of::Finished(entry) => json!(subject.entries[entry].finish),
-        Of::Denoised(_) => "Open Image Denoise".into(),
+        PictureSource::Finished(entry) => json!(subject.entries[entry].finish),
+        PictureSource::Denoised(_) => "Open Image Denoise".into(),
         _ => Value::Null,
     };
     object["theory"] = summary.theories[line]
@@ -130,29 +132,30 @@ fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> 
     for (name, fit) in ["fit_iterations", "fit_seconds"].into_iter().zip(&summary.slopes[line]) {
         object[name] = fit.as_ref().map_or(Value::Null, slope);
     }
-    object["no_fit"] = summary.slopes[line][0].as_ref().err().map(Unfit::to_string).into();
-    object["curve"] = summary.curves[line].mean.iter().filter(|spot| spot.reported).map(spot).collect();
-    if let Of::Estimate(entry) = of {
+    object["no_fit"] = summary.slopes[line][0].as_ref().err().map(FitFailure::to_string).into();
+    object["curve"] =
+        summary.curves[line].mean.iter().filter(|curve_point| curve_point.reported).map(curve_point).collect();
+    if let PictureSource::Estimate(entry) = of {
         object["overhead"] = json!(summary.overhead[entry]);
     }
     object
 }
 
 /// What is known of another renderer.
-fn peer(subject: &Subject, outcome: &Outcome, summary: &Summary, guest: usize) -> Value {
-    let account = &outcome.guests[guest];
+fn peer_object(subject: &Subject, outcome: &Outcome, summary: &Summary, peer: usize) -> Value {
+    let account = &outcome.peers[peer];
     let startup = Mean::of(&account.startups).map(|mean| mean.value);
-    let likeness = summary.likeness[guest];
+    let ratio = summary.mean_ratios[peer];
     json!({
-        "renderer": format!("{:?}", subject.guests[guest].renderer).to_lowercase(),
-        "mode": subject.guests[guest].mode,
+        "renderer": format!("{:?}", subject.peers[peer].renderer).to_lowercase(),
+        "mode": subject.peers[peer].mode,
         "version": account.version,
         "startup_seconds": startup,
         "approximations": account.approximations,
         "unfinished": account.unfinished,
         "out": account.out,
-        "mean_ratio": likeness.map(|of| json!({"value": finite(of.ratio), "standard_error": finite(of.error)})),
-        "same_scene": likeness.map(|of| of.is_same()),
+        "mean_ratio": ratio.map(|of| json!({"value": finite(of.ratio), "standard_error": finite(of.error)})),
+        "same_scene": ratio.map(|of| of.is_same()),
     })
 }
 
@@ -170,8 +173,8 @@ fn slope(slope: &Slope) -> Value {
     })
 }
 
-fn spot(spot: &Spot) -> Value {
-    let Spot { iterations, seconds, cpu_seconds, figure, spread, fireflies, .. } = *spot;
+fn curve_point(curve_point: &CurvePoint) -> Value {
+    let CurvePoint { iterations, seconds, cpu_seconds, figure, spread, fireflies, .. } = *curve_point;
     json!({
         "iterations": iterations, "seconds": seconds, "cpu_seconds": cpu_seconds, "figure": finite(figure),
         "standard_error": spread.map(finite), "fireflies": fireflies,

@@ -1,4 +1,4 @@
-//! What is compared, the curves that come of it, and the figure it is compared by.
+//! The runs that are compared, their curves, and the metric.
 
 use crate::image::Errors;
 use crate::peers::Peer;
@@ -9,20 +9,20 @@ use serde_json::{Value, json};
 /// A method with its settings, and a name.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// What the report calls it.
+    /// Name in the report.
     pub name: String,
-    /// The options of `caustique render` that it stands for.
+    /// The same run as options of `caustique render`.
     pub options: String,
-    /// Its settings; seeds are the race's.
+    /// Settings; the seed comes from [`Rules::seeds`](super::equal_time::Rules::seeds).
     pub settings: Settings,
-    /// Time that choosing the settings took, which counts as a render's own.
+    /// Time that `auto` took to choose the settings; it counts as render time.
     pub decided: TimeSpent,
-    /// What finishes its pictures, if they are finished.
+    /// Name of the finish, if the report also shows finished pictures.
     pub finish: Option<String>,
 }
 
 impl Entry {
-    /// Its settings as data: those that say something to its method.
+    /// The settings that its method uses, as JSON.
     pub fn object(&self) -> Value {
         let Settings { method, levels, photons, alpha, initial_bandwidth, max_depth, .. } = self.settings;
         let mut object = json!({
@@ -46,54 +46,55 @@ impl Entry {
 /// A curve of the report.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// What the report calls it.
+    /// Name in the report.
     pub name: String,
-    /// What its pictures are.
-    pub of: Of,
+    /// Source of the pictures that the curve measures.
+    pub source: PictureSource,
 }
 
-/// What the pictures of a curve are; entries and guests by number, from 0.
+/// Source of the pictures of a curve: an entry or a peer by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Of {
-    /// The estimate of an entry, as the method leaves it.
+pub enum PictureSource {
+    /// The estimate of an entry, not finished.
     Estimate(usize),
-    /// The picture that is finished from it.
+    /// The finished picture of an entry.
     Finished(usize),
-    /// Another renderer's picture.
-    Guest(usize),
-    /// The same, denoised.
+    /// The picture of another renderer.
+    Peer(usize),
+    /// The picture of another renderer after Open Image Denoise.
     Denoised(usize),
 }
 
-impl Of {
-    /// Whether it is ours: such curves know iterations, others samples per pixel.
+impl PictureSource {
+    /// Whether caustique renders it. Such curves count iterations, those of peers count samples per pixel.
     pub fn is_ours(self) -> bool {
-        matches!(self, Of::Estimate(_) | Of::Finished(_))
+        matches!(self, PictureSource::Estimate(_) | PictureSource::Finished(_))
     }
 
-    /// Whether it is what a renderer makes, before any denoiser.
+    /// Whether no denoiser has changed the picture.
     pub fn is_raw(self) -> bool {
-        matches!(self, Of::Estimate(_) | Of::Guest(_))
+        matches!(self, PictureSource::Estimate(_) | PictureSource::Peer(_))
     }
 }
 
-/// The curves of entries and guests: each as it is, then as it is finished, where it is.
-pub fn lines(entries: &[Entry], guests: &[Peer], denoised: bool) -> Vec<Line> {
-    let two = |name: &str, of: Of, and: Option<(&str, Of)>| {
-        let more = and.map(|(suffix, of)| Line { name: format!("{name}{suffix}"), of });
-        std::iter::once(Line { name: name.into(), of }).chain(more)
+/// The curves of entries and peers: each without a denoiser, then with one, where that is compared.
+pub fn lines(entries: &[Entry], peers: &[Peer], denoised: bool) -> Vec<Line> {
+    let with_second = |name: &str, source: PictureSource, second: Option<(&str, PictureSource)>| {
+        let second = second.map(|(suffix, source)| Line { name: format!("{name}{suffix}"), source });
+        std::iter::once(Line { name: name.into(), source }).chain(second)
     };
     let ours = entries.iter().enumerate().flat_map(|(i, entry)| {
-        two(&entry.name, Of::Estimate(i), entry.finish.as_ref().map(|_| (", finished", Of::Finished(i))))
+        let finished = entry.finish.as_ref().map(|_| (", finished", PictureSource::Finished(i)));
+        with_second(&entry.name, PictureSource::Estimate(i), finished)
     });
-    let theirs = guests
-        .iter()
-        .enumerate()
-        .flat_map(|(i, guest)| two(guest.name, Of::Guest(i), denoised.then_some((" + OIDN", Of::Denoised(i)))));
+    let theirs = peers.iter().enumerate().flat_map(|(i, peer)| {
+        let denoised = denoised.then_some((" + OIDN", PictureSource::Denoised(i)));
+        with_second(peer.name, PictureSource::Peer(i), denoised)
+    });
     ours.chain(theirs).collect()
 }
 
-/// The figure that curves, targets and fits are about.
+/// The error metric of curves, targets and fits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -111,7 +112,7 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// Its name for people.
+    /// Name in the report.
     pub fn name(self) -> &'static str {
         match self {
             Metric::RelMse => "relMSE",
@@ -120,7 +121,7 @@ impl Metric {
         }
     }
 
-    /// Its value among the errors of a picture.
+    /// The error of a picture in this metric.
     pub fn of(self, errors: &Errors) -> f64 {
         match self {
             Metric::RelMse => errors.relmse,
@@ -130,7 +131,7 @@ impl Metric {
     }
 }
 
-/// Moments at which pictures are measured: iterations 1, 2, 3, ... in a geometric series.
+/// Iteration counts at which pictures are measured: 1, 2, 3, ... in a geometric series.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {
     ratio: f64,
@@ -138,12 +139,12 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// A series with this ratio, above 1.
+    /// A series with a ratio above 1.
     pub fn new(ratio: f64) -> Moments {
         Moments { ratio, next: 1 }
     }
 
-    /// Whether so many iterations are a moment; asked after each.
+    /// Whether `iterations` is in the series; called after every iteration.
     pub fn reached(&mut self, iterations: u64) -> bool {
         if iterations < self.next {
             return false;

@@ -21,7 +21,7 @@ const SHOWN: f64 = 0.95;
 pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison: &Comparison) -> Result<String> {
     let (pixels, truth) = (image.beauty()?, reference.beauty()?);
     let floor = truth.relative_floor();
-    // Of a pixel, whose squared error is given by channel.
+    // PictureSource a pixel, whose squared error is given by channel.
     let relative =
         |square: f64, worth: &[f32; 3]| (square / 3.0 / (channel_mean(*worth).powi(2) + floor)).sqrt() as f32;
     let distance =

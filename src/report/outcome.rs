@@ -1,11 +1,11 @@
 //! What comes of a race while it goes on.
 
-use super::entry::{Entry, Line, Of, lines};
-use super::guests::{Account, Guests, Made, Turn};
-use super::lane::{Lane, Rules};
-use super::point::{Ending, Point};
+use super::entry::{Entry, Line, PictureSource, lines};
+use super::entry_run::{EntryRun, Rules};
+use super::peer_renders::{PeerRenders, PeerResult, PeerSummary, PeerTurn};
+use super::picture_store::PictureStore;
+use super::point::{Point, RunEnd};
 use super::reference::Reference;
-use super::spool::Spool;
 use crate::error::{Error, Result};
 use crate::film::Picture;
 use crate::finish::Finish;
@@ -13,32 +13,32 @@ use crate::image::errors;
 use crate::render::{Rendered, StopReason, TimeSpent};
 
 /// Who takes part.
-pub struct Field<'a> {
+pub struct Participants<'a> {
     /// Ours.
     pub entries: &'a [Entry],
     /// What finishes their pictures, as many.
     pub finishes: &'a mut [Option<Finish>],
     /// Other renderers.
-    pub guests: Option<Guests>,
+    pub peers: Option<PeerRenders>,
 }
 
 /// A race's result.
 pub struct Outcome {
     /// The curves.
     pub lines: Vec<Line>,
-    /// What is known of the guests.
-    pub guests: Vec<Account>,
+    /// What is known of the peers.
+    pub peers: Vec<PeerSummary>,
     /// By seed, then in the order they were measured.
     pub points: Vec<Point>,
-    /// Of every run and seed.
-    pub endings: Vec<Ending>,
+    /// PictureSource every run and seed.
+    pub endings: Vec<RunEnd>,
     /// Runs of the first seed as renders leave them, without their pixels.
     pub renders: Vec<Rendered>,
     /// Whether it was stopped.
     pub interrupted: bool,
     /// What went wrong on the way; the run in question ended there.
     pub failures: Vec<Error>,
-    pictures: Spool,
+    pictures: PictureStore,
 }
 
 impl Outcome {
@@ -62,12 +62,12 @@ pub(super) struct Look<'a> {
 }
 
 impl Outcome {
-    pub(super) fn new(field: &Field<'_>, pictures: Spool) -> Outcome {
-        let peers = field.guests.as_ref().map_or(&[][..], |guests| &guests.peers);
-        let denoised = field.guests.as_ref().is_some_and(|guests| guests.denoising.is_some());
+    pub(super) fn new(participants: &Participants<'_>, pictures: PictureStore) -> Outcome {
+        let peers = participants.peers.as_ref().map_or(&[][..], |peers| &peers.peers);
+        let denoised = participants.peers.as_ref().is_some_and(|peers| peers.denoising.is_some());
         Outcome {
-            lines: lines(field.entries, peers, denoised),
-            guests: vec![Account::default(); peers.len()],
+            lines: lines(participants.entries, peers, denoised),
+            peers: vec![PeerSummary::default(); peers.len()],
             points: Vec::new(),
             endings: Vec::new(),
             renders: Vec::new(),
@@ -86,30 +86,36 @@ impl Outcome {
     pub(super) fn step(
         &mut self,
         run: usize,
-        lane: &mut Lane<'_>,
-        field: &mut Field<'_>,
+        entry_run: &mut EntryRun<'_>,
+        participants: &mut Participants<'_>,
         rules: &Rules,
         look: &Look<'_>,
     ) -> bool {
-        lane.session.step();
-        let iterations = lane.session.iterations();
-        let done = lane.done(rules);
-        let moment = lane.moments.reached(iterations) || rules.more.contains(&(run, iterations)) || done;
-        let measured = moment && self.measure(run, lane, &mut field.finishes[run], look);
-        lane.open &= !done;
+        entry_run.session.step();
+        let iterations = entry_run.session.iterations();
+        let done = entry_run.done(rules);
+        let moment = entry_run.moments.reached(iterations) || rules.more.contains(&(run, iterations)) || done;
+        let measured = moment && self.measure(run, entry_run, &mut participants.finishes[run], look);
+        entry_run.open &= !done;
         measured
     }
 
-    /// A guest's render; whether it was measured, `None` if it was stopped.
-    pub(super) fn host(&mut self, turn: Turn, field: &mut Field<'_>, look: &Look<'_>) -> Option<bool> {
-        let Some(guests) = field.guests.as_mut().filter(|_| self.guests[turn.guest].out.is_none()) else {
+    /// A peer's render; whether it was measured, `None` if it was stopped.
+    pub(super) fn host(
+        &mut self,
+        turn: PeerTurn,
+        participants: &mut Participants<'_>,
+        look: &Look<'_>,
+    ) -> Option<bool> {
+        let Some(peers) = participants.peers.as_mut().filter(|_| self.peers[turn.peer].out.is_none()) else {
             return Some(false);
         };
-        match guests.take(turn, look.seed, look.reference, &mut self.guests[turn.guest]) {
-            Made::Stopped => None,
-            Made::Nothing => Some(false),
-            Made::Points(points) => {
-                for ((point, picture), of) in points.into_iter().zip([Of::Guest(turn.guest), Of::Denoised(turn.guest)])
+        match peers.take(turn, look.seed, look.reference, &mut self.peers[turn.peer]) {
+            PeerResult::Stopped => None,
+            PeerResult::Nothing => Some(false),
+            PeerResult::Points(points) => {
+                for ((point, picture), of) in
+                    points.into_iter().zip([PictureSource::Peer(turn.peer), PictureSource::Denoised(turn.peer)])
                 {
                     let kept = self.keep(point, of, &picture, look);
                     self.failures.extend(kept.err());
@@ -120,20 +126,21 @@ impl Outcome {
     }
 
     /// What is left to do when a race with a seed ends.
-    pub(super) fn end(&mut self, lanes: Vec<Lane<'_>>, field: &mut Field<'_>, look: &Look<'_>) {
-        for (run, mut lane) in lanes.into_iter().enumerate() {
-            let iterations = lane.session.iterations();
-            if lane.open && iterations > lane.measured {
-                self.measure(run, &mut lane, &mut field.finishes[run], look);
+    pub(super) fn end(&mut self, entry_runs: Vec<EntryRun<'_>>, participants: &mut Participants<'_>, look: &Look<'_>) {
+        for (run, mut entry_run) in entry_runs.into_iter().enumerate() {
+            let iterations = entry_run.session.iterations();
+            if entry_run.open && iterations > entry_run.measured {
+                self.measure(run, &mut entry_run, &mut participants.finishes[run], look);
             }
-            let (spent, phases, finish) = (lane.session.spent(), lane.session.phases(), lane.finishing());
+            let (spent, phases, finish) =
+                (entry_run.session.spent(), entry_run.session.phases(), entry_run.finishing());
             if let Some(finish) = finish {
-                self.charge(Of::Finished(run), look.seed, finish);
+                self.charge(PictureSource::Finished(run), look.seed, finish);
             }
-            self.endings.push(Ending { run, seed: look.seed, iterations, spent, phases, finish });
+            self.endings.push(RunEnd { run, seed: look.seed, iterations, spent, phases, finish });
             if look.keep {
                 let stop = if self.interrupted { StopReason::Interrupted } else { StopReason::Iterations };
-                let mut rendered = lane.session.finish(stop);
+                let mut rendered = entry_run.session.finish(stop);
                 rendered.pixels = Vec::new();
                 self.renders.push(rendered);
             }
@@ -141,12 +148,12 @@ impl Outcome {
     }
 
     /// The number of a curve.
-    fn line(&self, of: Of) -> usize {
-        self.lines.iter().position(|line| line.of == of).unwrap_or_default()
+    fn line(&self, of: PictureSource) -> usize {
+        self.lines.iter().position(|line| line.source == of).unwrap_or_default()
     }
 
     /// Adds the finish's time to all points of finished pictures.
-    fn charge(&mut self, of: Of, seed: u64, finish: TimeSpent) {
+    fn charge(&mut self, of: PictureSource, seed: u64, finish: TimeSpent) {
         let line = self.line(of);
         for point in self.points.iter_mut().filter(|point| point.line == line && point.seed == seed) {
             point.seconds += finish.seconds;
@@ -156,33 +163,39 @@ impl Outcome {
     }
 
     /// Adds points; a run that cannot be measured ends. Whether there is a new one.
-    fn measure(&mut self, run: usize, lane: &mut Lane<'_>, finish: &mut Option<Finish>, look: &Look<'_>) -> bool {
-        lane.measured = lane.session.iterations();
+    fn measure(
+        &mut self,
+        run: usize,
+        entry_run: &mut EntryRun<'_>,
+        finish: &mut Option<Finish>,
+        look: &Look<'_>,
+    ) -> bool {
+        entry_run.measured = entry_run.session.iterations();
         let before = self.points.len();
-        let mut add = |lane: &mut Lane<'_>| -> Result<()> {
-            let picture = lane.session.picture();
-            self.add(Of::Estimate(run), &picture, lane, look)?;
+        let mut add = |entry_run: &mut EntryRun<'_>| -> Result<()> {
+            let picture = entry_run.session.picture();
+            self.add(PictureSource::Estimate(run), &picture, entry_run, look)?;
             let Some(finish) = finish else { return Ok(()) };
-            let picture = lane.finished(finish)?;
-            self.add(Of::Finished(run), &picture, lane, look)
+            let picture = entry_run.finished(finish)?;
+            self.add(PictureSource::Finished(run), &picture, entry_run, look)
         };
-        if let Err(error) = add(lane) {
+        if let Err(error) = add(entry_run) {
             self.failures.push(error);
-            lane.open = false;
+            entry_run.open = false;
         }
         self.points.len() > before
     }
 
     /// Adds a measurement; none where the picture has no finite pixel yet.
-    fn add(&mut self, of: Of, picture: &Picture, lane: &Lane<'_>, look: &Look<'_>) -> Result<()> {
+    fn add(&mut self, of: PictureSource, picture: &Picture, entry_run: &EntryRun<'_>, look: &Look<'_>) -> Result<()> {
         let Some(errors) = errors(picture, &look.reference.picture) else { return Ok(()) };
-        let spent = lane.session.spent();
-        let estimate = lane.session.estimate_error().estimate.filter(|_| of.is_raw());
+        let spent = entry_run.session.spent();
+        let estimate = entry_run.session.estimate_error().estimate.filter(|_| of.is_raw());
         let point = Point {
             line: 0,
             seed: look.seed,
-            iterations: lane.session.iterations(),
-            light_paths: lane.session.light_paths(),
+            iterations: entry_run.session.iterations(),
+            light_paths: entry_run.session.light_paths(),
             seconds: spent.seconds,
             cpu_seconds: spent.cpu_seconds,
             finish_seconds: None,
@@ -194,7 +207,7 @@ impl Outcome {
     }
 
     /// Adds a point to its curve, with its picture if it is of the first seed.
-    fn keep(&mut self, point: Point, of: Of, picture: &Picture, look: &Look<'_>) -> Result<()> {
+    fn keep(&mut self, point: Point, of: PictureSource, picture: &Picture, look: &Look<'_>) -> Result<()> {
         let number = if look.keep { Some(self.pictures.push(picture)?) } else { None };
         self.points.push(Point { line: self.line(of), picture: number, ..point });
         Ok(())

@@ -1,7 +1,7 @@
 //! What an iteration costs and of what, and what levels and finish add, as Table 2 of \[post-reconstruction 2021\].
 
 use super::entry::Entry;
-use super::point::Ending;
+use super::point::RunEnd;
 use crate::render::Phases;
 use serde::Serialize;
 
@@ -33,7 +33,7 @@ pub struct Overhead {
 }
 
 /// The table, a row per entry; `None` for a run that did nothing.
-pub fn table(entries: &[Entry], endings: &[Ending]) -> Vec<Option<Overhead>> {
+pub fn table(entries: &[Entry], endings: &[RunEnd]) -> Vec<Option<Overhead>> {
     let rows: Vec<Option<Overhead>> = (0..entries.len()).map(|run| row(run, endings)).collect();
     let cost = |run: usize| rows[run].as_ref().map(|row| row.seconds_per_iteration).filter(|cost| *cost > 0.0);
     let against = |run: usize, base: usize| Some(cost(run)? / cost(base)?);
@@ -48,14 +48,14 @@ pub fn table(entries: &[Entry], endings: &[Ending]) -> Vec<Option<Overhead>> {
     table
 }
 
-fn row(run: usize, endings: &[Ending]) -> Option<Overhead> {
-    let mine: Vec<&Ending> = endings.iter().filter(|e| e.run == run && e.iterations > 0).collect();
+fn row(run: usize, endings: &[RunEnd]) -> Option<Overhead> {
+    let mine: Vec<&RunEnd> = endings.iter().filter(|e| e.run == run && e.iterations > 0).collect();
     let n = mine.len() as f64;
-    let mean = |get: &dyn Fn(&Ending) -> f64| mine.iter().map(|ending| get(ending)).sum::<f64>() / n;
+    let mean = |get: &dyn Fn(&RunEnd) -> f64| mine.iter().map(|ending| get(ending)).sum::<f64>() / n;
     if mine.is_empty() {
         return None;
     }
-    let finish = |e: &Ending| e.finish.unwrap_or_default();
+    let finish = |e: &RunEnd| e.finish.unwrap_or_default();
     let each = |get: fn(&Phases) -> f64| mean(&|e| get(&e.phases) / e.iterations as f64);
     Some(Overhead {
         iterations: mean(&|e| e.iterations as f64),

@@ -1,11 +1,11 @@
 //! The report as one page that needs nothing from outside: pictures, plots and style are in it.
 
 use super::crop;
-use super::entry::{Metric, Of};
+use super::entry::{Metric, PictureSource};
 use super::number::{plain, short};
 use super::outcome::Outcome;
 use super::summary::{Strip, Subject, Summary};
-use super::tables::{fits, guests, overheads, runs, targets};
+use super::tables::{fits, overheads, peers, runs, targets};
 use crate::error::Result;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -37,7 +37,7 @@ pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Pl
         (marks(subject, summary))
         (targets(subject, summary))
         (fits(subject, summary))
-        (guests(subject, outcome, summary))
+        (peers(subject, outcome, summary))
         (overheads(subject, summary))
         (reference(subject, summary))
         @for strip in &summary.strips { (crops(strip, summary, &bar)) }
@@ -88,7 +88,7 @@ fn lead(subject: &Subject) -> String {
         1 => "1 run".into(),
         n => format!("{n} runs in turns of one iteration"),
     };
-    let runs = match subject.guests.len() {
+    let runs = match subject.peers.len() {
         0 => runs,
         1 => format!("{runs} and another renderer"),
         n => format!("{runs} and {n} of other renderers"),
@@ -107,12 +107,12 @@ fn meaning(metric: Metric) -> &'static str {
 
 /// What the marks of the plots mean.
 fn marks(subject: &Subject, summary: &Summary) -> Markup {
-    let any = |found: &dyn Fn(Of) -> bool| subject.lines.iter().any(|line| found(line.of));
+    let any = |found: &dyn Fn(PictureSource) -> bool| subject.lines.iter().any(|line| found(line.source));
     html! {
         p.note {
             @if any(&|of| !of.is_raw()) { "Full lines and marks: what a method leaves. Dashes and hollow marks: the \
                 picture finished or denoised from it, the time for that added. " }
-            @if summary.curves.iter().flat_map(|curve| &curve.mean).any(|spot| spot.fireflies) {
+            @if summary.curves.iter().flat_map(|curve| &curve.mean).any(|curve_point| curve_point.fireflies) {
                 "Crosses: fireflies rule the figure, for the worst 0.5 % of the pixels hold more than half of it. "
             }
             @if any(&|of| !of.is_ours()) { "Other renderers: each point is a render of its own, started when ours \

@@ -1,7 +1,7 @@
 //! The plots: error against iterations and against seconds, both axes logarithmic, as SVG.
 
-use super::curve::{Axis, Curve, Spot};
-use super::entry::{Metric, Of};
+use super::curve::{Axis, Curve, CurvePoint};
+use super::entry::{Metric, PictureSource};
 use super::number::{minus, plain};
 use super::summary::{Subject, Summary};
 use crate::error::{Error, ErrorKind, Result};
@@ -27,16 +27,16 @@ const FAINT: RGBColor = RGBColor(228, 228, 228);
 pub const COLOURS: [(u8, u8, u8); 7] =
     [(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (0, 0, 0)];
 
-/// The colour of a curve: an entry's or a guest's, whatever is made of its pictures.
+/// The colour of a curve: an entry's or a peer's, whatever is made of its pictures.
 pub fn colour(subject: &Subject, line: usize) -> (u8, u8, u8) {
     COLOURS[number(subject, line) % COLOURS.len()]
 }
 
-/// The number of an entry, or of a guest after them.
+/// The number of an entry, or of a peer after them.
 fn number(subject: &Subject, line: usize) -> usize {
-    match subject.lines[line].of {
-        Of::Estimate(entry) | Of::Finished(entry) => entry,
-        Of::Guest(guest) | Of::Denoised(guest) => subject.entries.len() + guest,
+    match subject.lines[line].source {
+        PictureSource::Estimate(entry) | PictureSource::Finished(entry) => entry,
+        PictureSource::Peer(peer) | PictureSource::Denoised(peer) => subject.entries.len() + peer,
     }
 }
 
@@ -52,7 +52,7 @@ struct Picture<'a> {
     metric: Metric,
     axis: Axis,
     /// What is reported, by line.
-    curves: Vec<Vec<Spot>>,
+    curves: Vec<Vec<CurvePoint>>,
 }
 
 /// Error in a metric against an axis; `None` where no curve has a figure to show. Samples of other renderers are no
@@ -67,11 +67,11 @@ pub fn svg(
     curves: &[Curve],
     axis: Axis,
 ) -> Result<Option<String>> {
-    let shown = |(line, curve): (usize, &Curve)| -> Vec<Spot> {
-        let counts = axis != Axis::Iterations || subject.lines[line].of.is_ours();
-        curve.mean.iter().filter(|spot| counts && spot.reported).copied().collect()
+    let shown = |(line, curve): (usize, &Curve)| -> Vec<CurvePoint> {
+        let counts = axis != Axis::Iterations || subject.lines[line].source.is_ours();
+        curve.mean.iter().filter(|curve_point| counts && curve_point.reported).copied().collect()
     };
-    let curves: Vec<Vec<Spot>> = curves.iter().enumerate().map(shown).collect();
+    let curves: Vec<Vec<CurvePoint>> = curves.iter().enumerate().map(shown).collect();
     let Some((across, up)) = ranges(&curves, axis) else { return Ok(None) };
     let mut text = String::new();
     let drawn = draw(&mut text, &Picture { subject, summary, metric, axis, curves }, (across, up));
@@ -80,13 +80,13 @@ pub fn svg(
 }
 
 /// What both axes span.
-fn ranges(curves: &[Vec<Spot>], axis: Axis) -> Option<((f64, f64), (f64, f64))> {
-    let span = |values: &dyn Fn(&Spot) -> f64, room: f64| {
+fn ranges(curves: &[Vec<CurvePoint>], axis: Axis) -> Option<((f64, f64), (f64, f64))> {
+    let span = |values: &dyn Fn(&CurvePoint) -> f64, room: f64| {
         let all = || curves.iter().flatten().map(values).filter(|v| *v > 0.0 && v.is_finite());
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
         (high > 0.0).then(|| (low / room, (high * room).max(low * 1.5)))
     };
-    Some((span(&|spot| axis.of(spot), 1.15)?, span(&|spot| spot.figure, 1.4)?))
+    Some((span(&|curve_point| axis.of(curve_point), 1.15)?, span(&|curve_point| curve_point.figure, 1.4)?))
 }
 
 /// A logarithmic axis with ticks at powers of ten, and at 2 and 5 times these where there is room.
@@ -154,17 +154,18 @@ fn series(
     line: usize,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let (r, g, b) = colour(picture.subject, line);
-    let (ink, of, curve) = (RGBColor(r, g, b), picture.subject.lines[line].of, &picture.curves[line]);
-    let points: Vec<(f64, f64)> = curve.iter().map(|spot| (picture.axis.of(spot), spot.figure)).collect();
+    let (ink, of, curve) = (RGBColor(r, g, b), picture.subject.lines[line].source, &picture.curves[line]);
+    let points: Vec<(f64, f64)> =
+        curve.iter().map(|curve_point| (picture.axis.of(curve_point), curve_point.figure)).collect();
     let thick = ink.stroke_width(2);
     match of.is_raw() {
         true => chart.draw_series(LineSeries::new(points.iter().copied(), thick)).map(drop)?,
         false => chart.draw_series(DashedLineSeries::new(points.iter().copied(), 6, 4, thick)).map(drop)?,
     }
-    let bar = |spot: &Spot| {
-        let spread = spot.spread?;
-        let (x, low) = (picture.axis.of(spot), (spot.figure - spread).max(0.1 * spot.figure));
-        Some(PathElement::new(vec![(x, low), (x, spot.figure + spread)], ink.stroke_width(1)))
+    let bar = |curve_point: &CurvePoint| {
+        let spread = curve_point.spread?;
+        let (x, low) = (picture.axis.of(curve_point), (curve_point.figure - spread).max(0.1 * curve_point.figure));
+        Some(PathElement::new(vec![(x, low), (x, curve_point.figure + spread)], ink.stroke_width(1)))
     };
     chart.draw_series(curve.iter().filter_map(bar))?;
     let fill = if of.is_raw() { ink.filled() } else { ink.stroke_width(1) };
@@ -174,7 +175,10 @@ fn series(
     } else {
         chart.draw_series(points.iter().map(|&point| TriangleMarker::new(point, 5, fill)))?;
     }
-    let ruled = curve.iter().filter(|spot| spot.fireflies).map(|spot| (picture.axis.of(spot), spot.figure));
+    let ruled = curve
+        .iter()
+        .filter(|curve_point| curve_point.fireflies)
+        .map(|curve_point| (picture.axis.of(curve_point), curve_point.figure));
     chart.draw_series(ruled.map(|point| Cross::new(point, 6, INK.stroke_width(1))))?;
     Ok(())
 }
@@ -206,15 +210,16 @@ fn guides(chart: &mut Chart<'_, '_>, picture: &Picture<'_>) -> std::result::Resu
     let mut drawn: Vec<f64> = Vec::new();
     for (theory, curve) in picture.summary.theories.iter().zip(&picture.curves) {
         let Some(exponent) = theory.map(|theory| theory.exponent).filter(|exponent| *exponent < 0.0) else { continue };
-        let Some(last) = curve.last().map(|spot| spot.iterations as f64) else { continue };
-        let decade: Vec<&Spot> = curve.iter().filter(|spot| 10.0 * spot.iterations as f64 >= last).collect();
+        let Some(last) = curve.last().map(|curve_point| curve_point.iterations as f64) else { continue };
+        let decade: Vec<&CurvePoint> =
+            curve.iter().filter(|curve_point| 10.0 * curve_point.iterations as f64 >= last).collect();
         let first = decade[0].iterations as f64;
         if drawn.iter().any(|other| (other - exponent).abs() < 1e-6) || first == last {
             continue;
         }
         drawn.push(exponent);
         // Below the lowest of the points, so that it crosses none.
-        let height = |spot: &&Spot| spot.figure / (spot.iterations as f64).powf(exponent);
+        let height = |curve_point: &&CurvePoint| curve_point.figure / (curve_point.iterations as f64).powf(exponent);
         let lowest = BELOW * decade.iter().map(height).fold(f64::INFINITY, f64::min);
         let at = |x: f64| (x, lowest * x.powf(exponent));
         chart.draw_series(LineSeries::new([at(first), at(last)], GUIDE.stroke_width(2)))?;
@@ -240,9 +245,9 @@ fn names(
     chart: &Chart<'_, '_>,
     picture: &Picture<'_>,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let end = |(line, curve): (usize, &Vec<Spot>)| {
-        let spot = curve.last()?;
-        let (x, y) = chart.backend_coord(&(picture.axis.of(spot), spot.figure));
+    let end = |(line, curve): (usize, &Vec<CurvePoint>)| {
+        let curve_point = curve.last()?;
+        let (x, y) = chart.backend_coord(&(picture.axis.of(curve_point), curve_point.figure));
         Some((line, x, y))
     };
     let mut ends: Vec<(usize, i32, i32)> = picture.curves.iter().enumerate().filter_map(end).collect();

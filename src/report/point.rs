@@ -6,7 +6,7 @@ use crate::render::{Phases, TimeSpent};
 /// A curve measured at a moment.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Which curve of [`Outcome::lines`](super::race::Outcome), from 0.
+    /// Which curve of [`Outcome::lines`](super::equal_time::Outcome), from 0.
     pub line: usize,
     /// Its seed.
     pub seed: u64,
@@ -31,7 +31,7 @@ pub struct Point {
 
 /// Where a run's time went.
 #[derive(Clone, Debug)]
-pub struct Ending {
+pub struct RunEnd {
     /// Which entry, from 0.
     pub run: usize,
     /// Its seed.

@@ -38,21 +38,21 @@ fn kept(points: &[Point], line: usize) -> impl Iterator<Item = &Point> {
 }
 
 /// Where runs are beside each other: at about the same time, and at about the same error.
-struct Meeting {
+struct Alignment {
     time: f64,
     error: f64,
     at_time: Vec<Point>,
     at_error: Vec<Point>,
 }
 
-impl Meeting {
-    fn of(runs: usize, outcome: &Outcome, metric: Metric) -> Meeting {
+impl Alignment {
+    fn of(runs: usize, outcome: &Outcome, metric: Metric) -> Alignment {
         let raw = |point: &Point| metric.of(&point.errors);
         // The time that all runs have.
         let last = |run: usize| kept(&outcome.points, run).last();
         let ends: Vec<&Point> = (0..runs).filter_map(last).collect();
         let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
-        // Of the errors that runs end with the one that most runs pass, and of several the smallest.
+        // PictureSource the errors that runs end with the one that most runs pass, and of several the smallest.
         let passes = |error: f64, run: usize| {
             let errors = || kept(&outcome.points, run).map(raw);
             errors().any(|e| e >= error) && errors().any(|e| e <= error)
@@ -67,7 +67,7 @@ impl Meeting {
         };
         let at_time = nearest(&|p| (p.seconds / time).ln().abs());
         let at_error = nearest(&|p| (raw(p) / error).ln().abs());
-        Meeting { time, error, at_time, at_error }
+        Alignment { time, error, at_time, at_error }
     }
 }
 
@@ -82,7 +82,7 @@ pub(super) fn pictures(
     curves: &[Curve],
 ) -> Result<(Vec<Window>, Shown, Vec<Strip>)> {
     let lines = outcome.lines.clone();
-    let Meeting { time, error, at_time, at_error } = Meeting::of(lines.len(), outcome, metric);
+    let Alignment { time, error, at_time, at_error } = Alignment::of(lines.len(), outcome, metric);
     let mut load = |points: &[Point]| -> Result<Vec<Picture>> {
         points.iter().filter_map(|point| outcome.picture(point).transpose()).collect()
     };
@@ -94,16 +94,15 @@ pub(super) fn pictures(
     let strip = |title: String, points: &[Point], pictures: &[Picture]| -> Result<Strip> {
         let largest = crop::scale(pictures, &reference.picture, &windows);
         let shown = |(point, picture): (&Point, &Picture)| -> Result<Shown> {
-            let spot = curves[point.line]
-                .by_seed
-                .first()
-                .and_then(|curve| curve.iter().find(|spot| spot.iterations == point.iterations && spot.reported));
-            let figure = spot.map_or("below the reference's error".into(), |spot| {
-                format!("{} {}", metric.name(), short(spot.figure))
+            let curve_point = curves[point.line].by_seed.first().and_then(|curve| {
+                curve.iter().find(|curve_point| curve_point.iterations == point.iterations && curve_point.reported)
+            });
+            let figure = curve_point.map_or("below the reference's error".into(), |curve_point| {
+                format!("{} {}", metric.name(), short(curve_point.figure))
             });
             let seconds = short(point.seconds);
             let line = &lines[point.line];
-            let count = match line.of.is_ours() {
+            let count = match line.source.is_ours() {
                 true => iterations(point.iterations),
                 false => format!("{} samples a pixel", point.iterations),
             };

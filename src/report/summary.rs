@@ -2,12 +2,12 @@
 //! write down.
 
 use super::crop::{Look, Window};
-use super::curve::{Axis, Curve, Slope, Unfit};
-use super::entry::{Entry, Line, Metric, Of};
+use super::curve::{Axis, Curve, FitFailure, Slope};
+use super::entry::{Entry, Line, Metric, PictureSource};
+use super::equal_time::Rules;
 use super::outcome::Outcome;
 use super::overhead::{self, Overhead};
 use super::point::Point;
-use super::race::Rules;
 use super::reference::Reference;
 use super::strips;
 use super::target::{self, Reached, Target};
@@ -27,7 +27,7 @@ pub struct Subject {
     /// Ours.
     pub entries: Vec<Entry>,
     /// Other renderers.
-    pub guests: Vec<Peer>,
+    pub peers: Vec<Peer>,
     /// The curves.
     pub lines: Vec<Line>,
     /// Seeds, moments, ends.
@@ -42,9 +42,9 @@ pub struct Subject {
     pub settings: Vec<(String, String)>,
 }
 
-/// How a guest's picture compares with the reference as a whole.
+/// How a peer's picture compares with the reference as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Likeness {
+pub struct MeanRatio {
     /// The mean of its longest renders over the reference's.
     pub ratio: f64,
     /// Its standard error, taking errors of pixels for independent.
@@ -54,7 +54,7 @@ pub struct Likeness {
 /// A ratio of means that is so near to one is of the same scene.
 const SAME: f64 = 0.01;
 
-impl Likeness {
+impl MeanRatio {
     /// Whether it is one within a hundredth and twice the noise.
     pub fn is_same(&self) -> bool {
         (self.ratio - 1.0).abs() <= SAME + 2.0 * self.error
@@ -62,7 +62,7 @@ impl Likeness {
 }
 
 /// Curves in a metric.
-pub struct Figure {
+pub struct MetricCurves {
     /// The metric.
     pub metric: Metric,
     /// A curve per line.
@@ -74,17 +74,17 @@ pub struct Summary {
     /// A curve per line.
     pub curves: Vec<Curve>,
     /// The same in the metric beside: trimmed, or of all pixels where the report's is trimmed itself.
-    pub beside: Figure,
+    pub beside: MetricCurves,
     /// Fitted exponents per line, by iterations and by seconds.
-    pub slopes: Vec<[Result<Slope, Unfit>; 2]>,
+    pub slopes: Vec<[Result<Slope, FitFailure>; 2]>,
     /// What theory says, per line.
     pub theories: Vec<Option<Theory>>,
     /// Errors to reach.
     pub targets: Vec<Target>,
     /// Per target and line.
     pub reached: Vec<Vec<Reached>>,
-    /// Per guest, of those that have made a picture.
-    pub likeness: Vec<Option<Likeness>>,
+    /// Per peer, of those that have made a picture.
+    pub mean_ratios: Vec<Option<MeanRatio>>,
     /// Per entry.
     pub overhead: Vec<Option<Overhead>>,
     /// Parts of the picture that are shown.
@@ -98,7 +98,7 @@ pub struct Summary {
 }
 
 /// What decides about the report, besides the race.
-pub struct Wishes {
+pub struct ReportOptions {
     /// Targets that were asked for; the usual ones otherwise.
     pub targets: Vec<f64>,
     /// More targets: the error of an entry's estimate (from 0) after so many iterations.
@@ -115,7 +115,7 @@ pub struct Wishes {
 ///
 /// # Errors
 /// Pictures that cannot be read again.
-pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> error::Result<Summary> {
+pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptions) -> error::Result<Summary> {
     let Subject { entries, lines, metric, reference, .. } = subject;
     let own = reference.error.of(*metric).unwrap_or(0.0);
     let curves_in = |metric: Metric| -> Vec<Curve> {
@@ -123,16 +123,16 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> e
     };
     let curves = curves_in(*metric);
     let other = if *metric == Metric::RelMseTrimmed { Metric::RelMse } else { Metric::RelMseTrimmed };
-    let beside = Figure { metric: other, curves: curves_in(other) };
-    let mut notes = wishes.notes.clone();
-    let mut targets: Vec<Target> = wishes.targets.iter().map(|&error| Target { error, of: String::new() }).collect();
-    for &(run, iterations) in &wishes.targets_of {
+    let beside = MetricCurves { metric: other, curves: curves_in(other) };
+    let mut notes = options.notes.clone();
+    let mut targets: Vec<Target> = options.targets.iter().map(|&error| Target { error, of: String::new() }).collect();
+    for &(run, iterations) in &options.targets_of {
         let name = &entries[run].name;
-        let line = lines.iter().position(|line| line.of == Of::Estimate(run)).unwrap_or_default();
-        match curves[line].mean.iter().find(|spot| spot.iterations == iterations) {
-            Some(spot) => {
+        let line = lines.iter().position(|line| line.source == PictureSource::Estimate(run)).unwrap_or_default();
+        match curves[line].mean.iter().find(|curve_point| curve_point.iterations == iterations) {
+            Some(curve_point) => {
                 targets.push(Target {
-                    error: spot.figure,
+                    error: curve_point.figure,
                     of: format!("{name} after {}", super::number::iterations(iterations)),
                 });
             }
@@ -150,7 +150,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> e
             outcome.points.len()
         ));
     }
-    let ruled = curves.iter().filter(|curve| curve.last().is_some_and(|spot| spot.fireflies)).count();
+    let ruled = curves.iter().filter(|curve| curve.last().is_some_and(|curve_point| curve_point.fireflies)).count();
     if ruled > 0 {
         notes.push(format!(
             "Fireflies rule the last measurement of {ruled} of {} curves: the worst 0.5 % of the pixels hold more than \
@@ -163,11 +163,11 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> e
         notes.push("The comparison was stopped before its end; this is what was done.".into());
     }
     let (windows, whole, strips) =
-        strips::pictures((*metric, reference), outcome, (&wishes.windows, wishes.look), &curves)?;
+        strips::pictures((*metric, reference), outcome, (&options.windows, options.look), &curves)?;
     Ok(Summary {
-        slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.of, curve)).collect(),
-        theories: lines.iter().map(|line| theory_of(line.of, entries)).collect(),
-        likeness: (0..subject.guests.len()).map(|guest| likeness(guest, subject, outcome)).collect(),
+        slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.source, curve)).collect(),
+        theories: lines.iter().map(|line| theory_of(line.source, entries)).collect(),
+        mean_ratios: (0..subject.peers.len()).map(|peer| mean_ratios(peer, subject, outcome)).collect(),
         curves,
         beside,
         targets,
@@ -181,22 +181,23 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, wishes: &Wishes) -> e
 }
 
 /// The exponents of a curve.
-fn slopes(of: Of, curve: &Curve) -> [Result<Slope, Unfit>; 2] {
-    [Axis::Iterations, Axis::Seconds].map(|axis| if of.is_raw() { curve.slope(axis) } else { Err(Unfit::Denoised) })
+fn slopes(of: PictureSource, curve: &Curve) -> [Result<Slope, FitFailure>; 2] {
+    [Axis::Iterations, Axis::Seconds]
+        .map(|axis| if of.is_raw() { curve.slope(axis) } else { Err(FitFailure::Denoised) })
 }
 
 /// What theory says of a curve.
-fn theory_of(of: Of, entries: &[Entry]) -> Option<Theory> {
+fn theory_of(of: PictureSource, entries: &[Entry]) -> Option<Theory> {
     match of {
-        Of::Estimate(entry) => theory(&entries[entry].settings),
+        PictureSource::Estimate(entry) => theory(&entries[entry].settings),
         _ => None,
     }
 }
 
-/// A guest's mean over the reference's: of its longest render with every seed.
-fn likeness(guest: usize, subject: &Subject, outcome: &Outcome) -> Option<Likeness> {
+/// A peer's mean over the reference's: of its longest render with every seed.
+fn mean_ratios(peer: usize, subject: &Subject, outcome: &Outcome) -> Option<MeanRatio> {
     let Subject { lines, reference, rules, .. } = subject;
-    let line = lines.iter().position(|line| line.of == Of::Guest(guest))?;
+    let line = lines.iter().position(|line| line.source == PictureSource::Peer(peer))?;
     let last = |seed: &u64| outcome.points.iter().rfind(|point| point.line == line && point.seed == *seed);
     let ends: Vec<&Point> = rules.seeds.iter().filter_map(last).collect();
     let ratios: Option<Vec<f64>> = ends.iter().map(|point| point.errors.mean_ratio).collect();
@@ -206,7 +207,7 @@ fn likeness(guest: usize, subject: &Subject, outcome: &Outcome) -> Option<Likene
     let mean = values.sum::<f64>() / (3.0 * reference.picture.len() as f64);
     let squares = ends.iter().map(|point| point.errors.mse).sum::<f64>() / n;
     let error = (squares / reference.picture.len() as f64 / n).sqrt() / mean;
-    Some(Likeness { ratio: ratios.iter().sum::<f64>() / n, error })
+    Some(MeanRatio { ratio: ratios.iter().sum::<f64>() / n, error })
 }
 
 /// The run of a name.

@@ -1,28 +1,28 @@
 //! The tables of the page.
 
 use super::curve::Mean;
-use super::entry::Of;
+use super::entry::PictureSource;
 use super::number::{minus, plain, short, short_with_error, with_error};
 use super::outcome::Outcome;
 use super::overhead::Overhead;
 use super::plot::colour;
-use super::summary::{Likeness, Subject, Summary};
+use super::summary::{MeanRatio, Subject, Summary};
 use super::target::Reached;
 use maud::{Markup, html};
 
 /// A curve's name beside its colour.
 fn name(subject: &Subject, line: usize) -> Markup {
     let ((r, g, b), of) = (colour(subject, line), &subject.lines[line]);
-    let style = match of.of.is_raw() {
+    let style = match of.source.is_raw() {
         true => format!("background:rgb({r},{g},{b})"),
         false => format!("border:2px solid rgb({r},{g},{b})"),
     };
     html! { span.dot style=(style) {} (of.name) }
 }
 
-/// The name of what an entry leaves, or a guest.
-fn name_of(subject: &Subject, of: Of) -> Markup {
-    subject.lines.iter().position(|line| line.of == of).map_or_else(|| html! {}, |line| name(subject, line))
+/// The name of what an entry leaves, or a peer.
+fn name_of(subject: &Subject, of: PictureSource) -> Markup {
+    subject.lines.iter().position(|line| line.source == of).map_or_else(|| html! {}, |line| name(subject, line))
 }
 
 /// Times to given errors.
@@ -108,7 +108,7 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
                 thead { tr { th { "Run" } th.number { "in iterations" } th.number { "theory" }
                     th.number { "in seconds" }
                     th.number { "points" } th.number { "iterations" } th { "Theory" } } }
-                tbody { @for (line, of) in subject.lines.iter().enumerate().filter(|(_, line)| line.of.is_raw()) {
+                tbody { @for (line, of) in subject.lines.iter().enumerate().filter(|(_, line)| line.source.is_raw()) {
                     @let [by_iterations, by_seconds] = &summary.slopes[line];
                     @let theory = summary.theories[line];
                     tr {
@@ -127,7 +127,7 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
                                 td.dim colspan="3" { small { (why.to_string()) } }
                             }
                         }
-                        @let unknown = if of.of.is_ours() { "no closed form" } else { "–" };
+                        @let unknown = if of.source.is_ours() { "no closed form" } else { "–" };
                         td { small { (theory.map_or(unknown, |t| t.because)) } }
                     }
                 } }
@@ -141,8 +141,8 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
 }
 
 /// Other renderers: whether their picture is of the same scene, what they took, and why some are missing.
-pub(super) fn guests(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Markup {
-    if subject.guests.is_empty() {
+pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Markup {
+    if subject.peers.is_empty() {
         return html! {};
     }
     let seconds = |values: &[f64]| Mean::of(values).map_or("–".into(), |mean| short(mean.value));
@@ -153,11 +153,11 @@ pub(super) fn guests(subject: &Subject, outcome: &Outcome, summary: &Summary) ->
                 thead { tr { th { "Renderer" } th { "Version" } th.number { "mean" br; small { "over the reference's" } }
                     th { "Same scene" }
                     th.number { "starting up" br; small { "s, not counted" } } th { "What is another there" } } }
-                tbody { @for (guest, account) in outcome.guests.iter().enumerate() { tr {
-                    td { (name_of(subject, Of::Guest(guest))) }
+                tbody { @for (peer, account) in outcome.peers.iter().enumerate() { tr {
+                    td { (name_of(subject, PictureSource::Peer(peer))) }
                     td { (if account.version.is_empty() { "–" } else { &account.version }) }
-                    td.number { (summary.likeness[guest].as_ref().map_or("–".into(), ratio)) }
-                    td { (summary.likeness[guest].as_ref().map_or("–".into(), verdict)) }
+                    td.number { (summary.mean_ratios[peer].as_ref().map_or("–".into(), ratio)) }
+                    td { (summary.mean_ratios[peer].as_ref().map_or("–".into(), verdict)) }
                     td.number { (seconds(&account.startups)) }
                     td { small {
                         @if let Some(why) = &account.out { b { "Left out: " } (why) ". " }
@@ -176,11 +176,11 @@ pub(super) fn guests(subject: &Subject, outcome: &Outcome, summary: &Summary) ->
     }
 }
 
-fn ratio(of: &Likeness) -> String {
+fn ratio(of: &MeanRatio) -> String {
     with_error(&Mean { value: of.ratio, error: Some(of.error) }, 4)
 }
 
-fn verdict(of: &Likeness) -> String {
+fn verdict(of: &MeanRatio) -> String {
     let off = 100.0 * (of.ratio - 1.0);
     match of.is_same() {
         true if off.abs() <= 1.0 => "within 1 %".into(),
@@ -207,7 +207,7 @@ pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
                     th.number { "light" br; small { "core-s" } } th.number { "map" br; small { "core-s" } }
                     th.number { "eye" br; small { "core-s" } } } }
                 tbody { @for (run, row) in summary.overhead.iter().enumerate() { tr {
-                    td { (name_of(subject, Of::Estimate(run))) }
+                    td { (name_of(subject, PictureSource::Estimate(run))) }
                     td.number { (row.as_ref().map_or("–".into(), |row| format!("{:.0}", row.iterations))) }
                     td.number { (cell(row, &|row| Some(row.render_seconds))) }
                     td.number { (cell(row, &|row| row.finish_seconds)) }
@@ -239,7 +239,7 @@ pub(super) fn runs(subject: &Subject) -> Markup {
                 tbody { @for (run, entry) in subject.entries.iter().enumerate() {
                     @let (settings, method) = (&entry.settings, entry.settings.method);
                     tr {
-                        td { (name_of(subject, Of::Estimate(run))) }
+                        td { (name_of(subject, PictureSource::Estimate(run))) }
                         td { (method.name()) }
                         td.number { (settings.levels.count) }
                         td { (entry.finish.as_deref().unwrap_or("off")) }

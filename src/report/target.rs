@@ -1,6 +1,6 @@
 //! Time to target: iterations and seconds until a run's error has fallen to a given one, as Table 1 of \[CPPM 2020\].
 
-use super::curve::{Curve, Mean, Spot, between};
+use super::curve::{Curve, CurvePoint, Mean, between};
 
 /// An error to reach, and why this one.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,12 +36,13 @@ pub enum Reached {
 /// From where on a curve stays at or below `target`: iterations, seconds, core-seconds, and whether it always was.
 /// Between two moments the error is a power of each.
 pub fn fall(curve: &Curve, target: f64) -> Option<([f64; 3], bool)> {
-    let place = |spot: &Spot| [spot.iterations as f64, spot.seconds, spot.cpu_seconds];
-    let spots = &curve.mean;
-    let Some(last_above) = spots.iter().rposition(|spot| spot.figure > target) else {
-        return spots.first().map(|first| (place(first), true));
+    let place =
+        |curve_point: &CurvePoint| [curve_point.iterations as f64, curve_point.seconds, curve_point.cpu_seconds];
+    let curve_points = &curve.mean;
+    let Some(last_above) = curve_points.iter().rposition(|curve_point| curve_point.figure > target) else {
+        return curve_points.first().map(|first| (place(first), true));
     };
-    let (before, after) = (&spots[last_above], spots.get(last_above + 1)?);
+    let (before, after) = (&curve_points[last_above], curve_points.get(last_above + 1)?);
     // What is below the reference's own error is not known.
     let [high, low] = [before.figure, after.figure].map(|figure| figure.max(curve.own));
     let t = if low > 0.0 && high > low { (high / target).ln() / (high / low).ln() } else { 1.0 };
@@ -73,7 +74,9 @@ pub fn reach(curve: &Curve, target: f64) -> Reached {
 /// Targets where none are asked for: at most four errors of 1, 2, 5 times a power of ten, the smallest that two runs
 /// reach (one, if it is alone).
 pub fn usual(curves: &[Curve], own: f64) -> Vec<Target> {
-    let reported = |curve: &Curve| curve.mean.iter().filter(|spot| spot.reported).map(|s| s.figure).collect::<Vec<_>>();
+    let reported = |curve: &Curve| {
+        curve.mean.iter().filter(|curve_point| curve_point.reported).map(|s| s.figure).collect::<Vec<_>>()
+    };
     let figures: Vec<Vec<f64>> = curves.iter().map(reported).collect();
     let largest = figures.iter().flatten().copied().fold(0.0, f64::max);
     let reach = |error: f64| figures.iter().filter(|f| f.iter().any(|figure| *figure <= error)).count();
@@ -87,8 +90,8 @@ pub fn usual(curves: &[Curve], own: f64) -> Vec<Target> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    fn spots(figures: &[(u64, f64, f64)]) -> Vec<Spot> {
-        let spot = |&(iterations, seconds, figure): &(u64, f64, f64)| Spot {
+    fn curve_points(figures: &[(u64, f64, f64)]) -> Vec<CurvePoint> {
+        let curve_point = |&(iterations, seconds, figure): &(u64, f64, f64)| CurvePoint {
             iterations,
             seconds,
             cpu_seconds: 2.0 * seconds,
@@ -97,11 +100,11 @@ mod tests {
             reported: true,
             fireflies: false,
         };
-        figures.iter().map(spot).collect()
+        figures.iter().map(curve_point).collect()
     }
 
     fn one(figures: &[(u64, f64, f64)]) -> Curve {
-        Curve::from_seeds(vec![spots(figures)], 0.0)
+        Curve::from_seeds(vec![curve_points(figures)], 0.0)
     }
 
     #[test]
@@ -120,7 +123,7 @@ mod tests {
 
     #[test]
     fn answers_of_the_table() {
-        let of = |factor: f64| spots(&[(1, 0.1, factor), (4, 0.4, 0.5 * factor), (16, 1.6, 0.25 * factor)]);
+        let of = |factor: f64| curve_points(&[(1, 0.1, factor), (4, 0.4, 0.5 * factor), (16, 1.6, 0.25 * factor)]);
         let two = |own: f64| Curve::from_seeds(vec![of(1.0), of(1.0)], own);
         assert_eq!(reach(&two(0.2), 0.1), Reached::BelowReference);
         assert_eq!(reach(&two(0.0), 0.1), Reached::Never(16, 1.6));

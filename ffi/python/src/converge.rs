@@ -17,9 +17,9 @@ use caustique::render::{Control, Method, Settings, TimeSpent};
 use caustique::report::crop::Look;
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
-use caustique::report::race::{Field, Rules, race};
+use caustique::report::equal_time::{Participants, Rules, render_in_turns};
 use caustique::report::reference::{Halves, Reference};
-use caustique::report::summary::{Subject, Wishes, summarize};
+use caustique::report::summary::{ReportOptions, Subject, summarize};
 use caustique::scene::View;
 use caustique::stat::sum::MAX_TERMS;
 use pyo3::prelude::*;
@@ -212,8 +212,8 @@ impl Comparison {
         // Where pictures of the race are kept meanwhile.
         let folder = caustique::temporary::create_folder("caustique-")?;
         let view = View::new(built, camera);
-        let field = Field { entries: &entries, finishes: &mut finishes, guests: None };
-        let mut outcome = race(view, field, &rules, &reference, folder.path(), |step| {
+        let participants = Participants { entries: &entries, finishes: &mut finishes, peers: None };
+        let mut outcome = render_in_turns(view, participants, &rules, &reference, folder.path(), |step| {
             told.tell(json!({
                 "run": step.name,
                 "iterations": step.iterations,
@@ -229,13 +229,14 @@ impl Comparison {
             settings: Vec::new(),
             metric: self.metric,
             lines: outcome.lines.clone(),
-            guests: Vec::new(),
+            peers: Vec::new(),
             entries,
             rules,
             reference,
         };
         let look = Look { exposure: 0.0, tonemap: Default::default() };
-        let none = Wishes { targets: Vec::new(), targets_of: Vec::new(), windows: Vec::new(), look, notes: Vec::new() };
+        let none =
+            ReportOptions { targets: Vec::new(), targets_of: Vec::new(), windows: Vec::new(), look, notes: Vec::new() };
         let summary = summarize(&subject, &mut outcome, &none)?;
         match outcome.failures.pop() {
             Some(error) => Err(error),

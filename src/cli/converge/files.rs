@@ -7,10 +7,10 @@ use caustique::film::{Layer, LayerSet};
 use caustique::image::atomic;
 use caustique::image::exr::{self, Attributes};
 use caustique::report::curve::Axis;
-use caustique::report::entry::{Line, Metric, Of};
+use caustique::report::entry::{Line, Metric, PictureSource};
+use caustique::report::equal_time::Outcome;
 use caustique::report::page::Plots;
 use caustique::report::point::Point;
-use caustique::report::race::Outcome;
 use caustique::report::summary::{Subject, Summary};
 use caustique::report::{data, page, plot};
 use serde_json::{Value, json};
@@ -105,20 +105,20 @@ fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: us
 
 /// What the header of a curve's picture says.
 fn header(subject: &Subject, outcome: &Outcome, line: &Line, threads: usize) -> Value {
-    let mut header = match line.of {
-        Of::Estimate(run) | Of::Finished(run) => {
+    let mut header = match line.source {
+        PictureSource::Estimate(run) | PictureSource::Finished(run) => {
             let mut header = outcome.renders[run].header(Some(threads));
             header.insert("options".into(), subject.entries[run].options.as_str().into());
             Value::Object(header)
         }
-        Of::Guest(guest) | Of::Denoised(guest) => {
-            json!({"renderer": subject.guests[guest].name, "renderer_version": outcome.guests[guest].version})
+        PictureSource::Peer(peer) | PictureSource::Denoised(peer) => {
+            json!({"renderer": subject.peers[peer].name, "renderer_version": outcome.peers[peer].version})
         }
     };
     header["name"] = line.name.as_str().into();
-    header["combined"] = match line.of {
-        Of::Finished(run) => json!({"finish": subject.entries[run].finish}),
-        Of::Denoised(_) => json!({"finish": "Open Image Denoise"}),
+    header["combined"] = match line.source {
+        PictureSource::Finished(run) => json!({"finish": subject.entries[run].finish}),
+        PictureSource::Denoised(_) => json!({"finish": "Open Image Denoise"}),
         _ => Value::Null,
     };
     header

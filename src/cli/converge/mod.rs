@@ -1,8 +1,8 @@
 //! `caustique converge`: accuracy against time.
 
 mod files;
-mod guests;
 mod options;
+mod peers;
 mod progress;
 mod reference;
 mod runs;
@@ -21,8 +21,8 @@ use caustique::plan::switch::Removed;
 use caustique::render::{Control, Settings};
 use caustique::report::crop::{Look, Window};
 use caustique::report::entry::Entry;
-use caustique::report::race::{Field, Rules, race};
-use caustique::report::summary::{Subject, Wishes, find, summarize};
+use caustique::report::equal_time::{Participants, Rules, render_in_turns};
+use caustique::report::summary::{ReportOptions, Subject, find, summarize};
 use caustique::scene::View;
 use progress::Reporter;
 use runs::Run;
@@ -67,15 +67,15 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let mut notes = Vec::new();
     let source = reference::source(args, view, &runs, &seeds, &mut notes)?;
     let (entries, mut finishes) = open(args, runs, &choices, view, &removed)?;
-    let guests = guests::all(args, view, threads, &interrupt, &mut notes)?;
-    let peers = guests.as_ref().map_or_else(Vec::new, |guests| guests.peers.clone());
+    let renders = peers::all(args, view, threads, &interrupt, &mut notes)?;
+    let peers = renders.as_ref().map_or_else(Vec::new, |renders| renders.peers.clone());
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
     let reference = reference::get(args, source, view, &interrupt, &mut notes, entries.len())?;
     let rules = Rules { time: time(args), iterations: args.iterations, ratio: args.moments, more: more.clone(), seeds };
     let mut reporter = Reporter::new(args.progress);
-    let field = Field { entries: &entries, finishes: &mut finishes, guests };
-    let mut outcome = race(view, field, &rules, &reference, &args.output, |step| {
+    let participants = Participants { entries: &entries, finishes: &mut finishes, peers: renders };
+    let mut outcome = render_in_turns(view, participants, &rules, &reference, &args.output, |step| {
         reporter.step(step);
         if interrupt.asked() { Control::Stop } else { Control::Continue }
     })?;
@@ -88,13 +88,13 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
         settings: settings(args, &rules),
         metric: args.error_metric,
         lines: outcome.lines.clone(),
-        guests: peers,
+        peers,
         entries,
         rules,
         reference,
     };
     let look = Look { exposure: args.exposure as f32, tonemap: args.tonemap };
-    let wishes = Wishes { targets: args.targets.clone(), targets_of: more, windows, look, notes };
+    let wishes = ReportOptions { targets: args.targets.clone(), targets_of: more, windows, look, notes };
     let summary = summarize(&subject, &mut outcome, &wishes)?;
     files::write(args, &subject, &mut outcome, &summary, threads)?;
     if let Some(error) = outcome.failures.pop() {

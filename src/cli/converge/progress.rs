@@ -3,8 +3,8 @@
 use crate::cli::progress::{Bar, Form, PLAIN_EVERY, Waiting, duration};
 use crate::cli::say;
 use caustique::render::Clock;
+use caustique::report::equal_time::Step;
 use caustique::report::number::short;
-use caustique::report::race::Step;
 use serde_json::json;
 
 /// Reports on a reference and a race.

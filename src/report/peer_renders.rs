@@ -18,9 +18,9 @@ const FIRST: f64 = 1.0 / 16.0;
 /// Iterations of path tracing that the denoiser's guides are the mean of.
 const GUIDES: u64 = 32;
 
-/// What is known of a guest in the end.
+/// What is known of a peer in the end.
 #[derive(Clone, Debug, Default)]
-pub struct Account {
+pub struct PeerSummary {
     /// Version of the renderer.
     pub version: String,
     /// Seconds of starting up, of each render.
@@ -33,8 +33,8 @@ pub struct Account {
     pub out: Option<String>,
 }
 
-/// The denoiser of guests' pictures, and its guides.
-pub struct Denoising {
+/// The denoiser of peers' pictures, and its guides.
+pub struct PeerDenoiser {
     /// Open Image Denoise.
     pub denoiser: Denoiser,
     /// Albedo.
@@ -43,12 +43,12 @@ pub struct Denoising {
     pub normal: Option<Picture>,
 }
 
-impl Denoising {
+impl PeerDenoiser {
     /// With guides by our own path tracing, the same for all and not counted.
     ///
     /// # Errors
     /// Memory's alone.
-    pub fn new(denoiser: Denoiser, scene: &Scene, camera: &Camera, seed: u64) -> Result<Denoising> {
+    pub fn new(denoiser: Denoiser, scene: &Scene, camera: &Camera, seed: u64) -> Result<PeerDenoiser> {
         let settings = Settings { method: Method::Path, seed, ..Settings::default() };
         let stage = RenderInput::new(scene, camera, &settings);
         let mut session = Session::new(&stage);
@@ -57,7 +57,7 @@ impl Denoising {
         });
         let set = session.layers(|name| ["albedo", "normal"].contains(&name))?;
         let [albedo, normal] = ["albedo", "normal"].map(|name| set.picture(name));
-        Ok(Denoising { denoiser, albedo, normal })
+        Ok(PeerDenoiser { denoiser, albedo, normal })
     }
 
     /// The denoised picture, and what that took.
@@ -75,39 +75,39 @@ impl Denoising {
     }
 }
 
-/// Who drives the guests.
-pub enum Driving {
+/// Who drives the peers.
+pub enum Driver {
     /// Their drivers.
     By(Drivers),
     /// Nobody, for a reason that holds for all.
     Refused(String),
 }
 
-/// The guests of a race.
-pub struct Guests {
+/// The peers of a race.
+pub struct PeerRenders {
     /// Who they are.
     pub peers: Vec<Peer>,
     /// Who drives them.
-    pub driving: Driving,
+    pub driver: Driver,
     /// What denoises their pictures.
-    pub denoising: Option<Denoising>,
+    pub denoising: Option<PeerDenoiser>,
     /// Seconds of the longest renders.
     pub time: f64,
     /// Whether to stop, asked while one of them renders.
     pub stop: Box<dyn Fn() -> bool>,
 }
 
-/// A render to come: a guest by number, and its seconds.
+/// A render to come: a peer by number, and its seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turn {
-    /// Which guest.
-    pub guest: usize,
+pub struct PeerTurn {
+    /// Which peer.
+    pub peer: usize,
     /// Seconds of rendering.
     pub budget: f64,
 }
 
 /// What came of a turn.
-pub enum Made {
+pub enum PeerResult {
     /// Points without their lines and pictures' numbers: of the picture, and of the denoised one.
     Points(Vec<(Point, Picture)>),
     /// Nothing that can be measured.
@@ -116,46 +116,52 @@ pub enum Made {
     Stopped,
 }
 
-impl Guests {
+impl PeerRenders {
     /// All turns of a seed, by budget.
-    pub fn turns(&self) -> Vec<Turn> {
+    pub fn turns(&self) -> Vec<PeerTurn> {
         let doublings = (1.0 / FIRST).log2().round() as i32;
         let budgets = (0..=doublings).map(|i| self.time * FIRST * f64::from(i).exp2());
-        budgets.flat_map(|budget| (0..self.peers.len()).map(move |guest| Turn { guest, budget })).collect()
+        budgets.flat_map(|budget| (0..self.peers.len()).map(move |peer| PeerTurn { peer, budget })).collect()
     }
 
-    /// Makes a render and measures it. What goes wrong ends the guest's part, and `account` says why.
-    pub fn take(&mut self, turn: Turn, seed: u64, reference: &Reference, account: &mut Account) -> Made {
+    /// Makes a render and measures it. What goes wrong ends the peer's part, and `account` says why.
+    pub fn take(&mut self, turn: PeerTurn, seed: u64, reference: &Reference, account: &mut PeerSummary) -> PeerResult {
         let task = Task { budget: turn.budget, seed };
-        let answer = match &self.driving {
-            Driving::Refused(why) => {
+        let answer = match &self.driver {
+            Driver::Refused(why) => {
                 account.out = Some(why.clone());
-                return Made::Nothing;
+                return PeerResult::Nothing;
             }
-            Driving::By(drivers) => drivers.render(&self.peers[turn.guest], task, &*self.stop),
+            Driver::By(drivers) => drivers.render(&self.peers[turn.peer], task, &*self.stop),
         };
         match answer {
             Ok(Answer::Rendered(rendering)) => self.measure(*rendering, seed, reference, account),
             Ok(Answer::Cannot(why)) => {
                 account.out = Some(format!("cannot say the scene: {}", why.join("; ")));
-                Made::Nothing
+                PeerResult::Nothing
             }
-            Ok(Answer::Stopped) => Made::Stopped,
+            Ok(Answer::Stopped) => PeerResult::Stopped,
             Err(error) => {
                 account.out = Some(error.to_string());
-                Made::Nothing
+                PeerResult::Nothing
             }
         }
     }
 
-    fn measure(&mut self, rendering: Rendering, seed: u64, reference: &Reference, account: &mut Account) -> Made {
+    fn measure(
+        &mut self,
+        rendering: Rendering,
+        seed: u64,
+        reference: &Reference,
+        account: &mut PeerSummary,
+    ) -> PeerResult {
         let Rendering { picture, seconds, core_seconds, startup_seconds, passes, version, approximations } = rendering;
         account.version = version;
         account.approximations = approximations;
         account.startups.push(startup_seconds);
         if passes < 1.0 {
             account.unfinished += 1;
-            return Made::Nothing;
+            return PeerResult::Nothing;
         }
         let point = |picture: &Picture, denoised: Option<TimeSpent>| {
             let more = denoised.unwrap_or_default();
@@ -180,6 +186,6 @@ impl Guests {
                 Err(error) => account.out = Some(error.to_string()),
             }
         }
-        Made::Points(made)
+        PeerResult::Points(made)
     }
 }

@@ -5,20 +5,20 @@
 //! makes.
 
 use super::entry::Entry;
-use super::guests::{Guests, Turn};
-use super::lane::Lane;
+use super::entry_run::EntryRun;
 use super::outcome::Look;
+use super::peer_renders::{PeerRenders, PeerTurn};
+use super::picture_store::PictureStore;
 use super::point::Point;
 use super::reference::Reference;
-use super::spool::Spool;
 use crate::error::Result;
 use crate::render::{Control, RenderInput, Session, Settings};
 use crate::scene::View;
 use std::collections::VecDeque;
 use std::path::Path;
 
-pub use super::lane::Rules;
-pub use super::outcome::{Field, Outcome};
+pub use super::entry_run::Rules;
+pub use super::outcome::{Outcome, Participants};
 
 /// What is told after every step.
 pub struct Step<'a> {
@@ -41,16 +41,16 @@ pub struct Step<'a> {
 ///
 /// # Errors
 /// The file system, before anything is rendered.
-pub fn race(
+pub fn render_in_turns(
     View { scene, camera }: View<'_>,
-    mut field: Field<'_>,
+    mut participants: Participants<'_>,
     rules: &Rules,
     reference: &Reference,
     folder: &Path,
     mut observe: impl FnMut(&Step<'_>) -> Control,
 ) -> Result<Outcome> {
-    let entries = field.entries;
-    let mut outcome = Outcome::new(&field, Spool::new(folder, reference.picture.size())?);
+    let entries = participants.entries;
+    let mut outcome = Outcome::new(&participants, PictureStore::new(folder, reference.picture.size())?);
     for (round, &seed) in rules.seeds.iter().enumerate() {
         let of_entry = |entry: &Entry| {
             let settings =
@@ -59,47 +59,47 @@ pub fn race(
         };
         let stages: Vec<RenderInput<'_>> = entries.iter().map(of_entry).collect();
         let sessions = stages.iter().zip(entries).map(|(stage, entry)| Session::with_time_spent(stage, entry.decided));
-        let mut lanes: Vec<Lane<'_>> = sessions.map(|session| Lane::new(session, rules)).collect();
-        let mut turns: VecDeque<Turn> = field.guests.iter().flat_map(Guests::turns).collect();
+        let mut entry_runs: Vec<EntryRun<'_>> = sessions.map(|session| EntryRun::new(session, rules)).collect();
+        let mut turns: VecDeque<PeerTurn> = participants.peers.iter().flat_map(PeerRenders::turns).collect();
         let all = turns.len();
         let look = Look { seed, keep: round == 0, reference };
-        let guests = outcome.guests.len() as f64;
-        let share = |lanes: &[Lane<'_>], left: usize| {
-            let ours = lanes.iter().map(|lane| lane.fraction(rules)).sum::<f64>();
-            let theirs = guests * (1.0 - left as f64 / all.max(1) as f64);
-            (round as f64 + (ours + theirs) / (lanes.len() as f64 + guests)) / rules.seeds.len() as f64
+        let peers = outcome.peers.len() as f64;
+        let share = |entry_runs: &[EntryRun<'_>], left: usize| {
+            let ours = entry_runs.iter().map(|entry_run| entry_run.fraction(rules)).sum::<f64>();
+            let theirs = peers * (1.0 - left as f64 / all.max(1) as f64);
+            (round as f64 + (ours + theirs) / (entry_runs.len() as f64 + peers)) / rules.seeds.len() as f64
         };
         loop {
             let (name, iterations, seconds, measured, is_ours);
-            if let Some(turn) = due(&turns, &lanes) {
+            if let Some(turn) = due(&turns, &entry_runs) {
                 turns.pop_front();
-                let guest = turn.guest;
-                match outcome.host(turn, &mut field, &look) {
+                let peer = turn.peer;
+                match outcome.host(turn, &mut participants, &look) {
                     None => {
                         outcome.interrupted = true;
                         break;
                     }
                     Some(found) => measured = found,
                 }
-                name = field.guests.as_ref().map_or("", |guests| guests.peers[guest].name);
+                name = participants.peers.as_ref().map_or("", |peers| peers.peers[peer].name);
                 (iterations, seconds) = outcome.last_of(measured);
                 is_ours = false;
-            } else if let Some(run) = next(&lanes, rules) {
-                measured = outcome.step(run, &mut lanes[run], &mut field, rules, &look);
+            } else if let Some(run) = next(&entry_runs, rules) {
+                measured = outcome.step(run, &mut entry_runs[run], &mut participants, rules, &look);
                 name = &entries[run].name;
-                (iterations, seconds) = (lanes[run].session.iterations(), lanes[run].session.spent().seconds);
+                (iterations, seconds) = (entry_runs[run].session.iterations(), entry_runs[run].session.spent().seconds);
                 is_ours = true;
             } else {
                 break;
             }
             let point = outcome.points.last().filter(|_| measured);
-            let fraction = share(&lanes, turns.len());
+            let fraction = share(&entry_runs, turns.len());
             if observe(&Step { name, is_ours, iterations, seconds, fraction, point }) == Control::Stop {
                 outcome.interrupted = true;
                 break;
             }
         }
-        outcome.end(lanes, &mut field, &look);
+        outcome.end(entry_runs, &mut participants, &look);
         if outcome.interrupted {
             break;
         }
@@ -107,14 +107,14 @@ pub fn race(
     Ok(outcome)
 }
 
-/// The guests' next turn, once all of ours that go on have rendered as long.
-fn due(turns: &VecDeque<Turn>, lanes: &[Lane<'_>]) -> Option<Turn> {
-    let far = |lane: &Lane<'_>| !lane.open || lane.session.spent().seconds >= turns[0].budget;
-    turns.front().filter(|_| lanes.iter().all(far)).copied()
+/// The peers' next turn, once all of ours that go on have rendered as long.
+fn due(turns: &VecDeque<PeerTurn>, entry_runs: &[EntryRun<'_>]) -> Option<PeerTurn> {
+    let far = |entry_run: &EntryRun<'_>| !entry_run.open || entry_run.session.spent().seconds >= turns[0].budget;
+    turns.front().filter(|_| entry_runs.iter().all(far)).copied()
 }
 
 /// The run that has used the least; the first of equals.
-fn next(lanes: &[Lane<'_>], rules: &Rules) -> Option<usize> {
-    let open = (0..lanes.len()).filter(|&run| lanes[run].open);
-    open.min_by(|&a, &b| lanes[a].used(rules).total_cmp(&lanes[b].used(rules)))
+fn next(entry_runs: &[EntryRun<'_>], rules: &Rules) -> Option<usize> {
+    let open = (0..entry_runs.len()).filter(|&run| entry_runs[run].open);
+    open.min_by(|&a, &b| entry_runs[a].used(rules).total_cmp(&entry_runs[b].used(rules)))
 }

@@ -7,11 +7,11 @@ use caustique::error::{Error, Result};
 use caustique::finish::{Denoiser, DenoiserChoice};
 use caustique::options::SceneOptions;
 use caustique::peers::{Drivers, Renderer};
-use caustique::report::guests::{Denoising, Driving, Guests};
+use caustique::report::peer_renders::{Driver, PeerDenoiser, PeerRenders};
 use caustique::scene::gltf::{Glass, LightUnits};
 use caustique::scene::{View, usd};
 
-/// The guests that are asked for; `None` where there are none.
+/// The peers that are asked for; `None` where there are none.
 ///
 /// # Errors
 /// A renderer is not installed; no `--time` says how long they render.
@@ -21,7 +21,7 @@ pub fn all(
     threads: usize,
     interrupt: &Interrupt,
     notes: &mut Vec<String>,
-) -> Result<Option<Guests>> {
+) -> Result<Option<PeerRenders>> {
     let mut renderers: Vec<Renderer> = args.with.clone();
     renderers.dedup();
     if renderers.is_empty() {
@@ -32,16 +32,16 @@ pub fn all(
         return Err(error.hint("add --time SECONDS"));
     };
     let drivers = Drivers::new(&renderers, &args.scene.path, args.camera.as_deref(), camera.size(), threads)?;
-    let driving = match refused(args) {
+    let driver = match refused(args) {
         Some(why) => {
             say(&format!("warning: --with: {why}; other renderers are left out"));
-            Driving::Refused(why)
+            Driver::Refused(why)
         }
-        None => Driving::By(drivers),
+        None => Driver::By(drivers),
     };
     let denoising = match Denoiser::open(DenoiserChoice::Oidn) {
-        Ok((denoiser, _)) if matches!(driving, Driving::By(_)) => {
-            Some(Denoising::new(denoiser, scene, camera, args.seed)?)
+        Ok((denoiser, _)) if matches!(driver, Driver::By(_)) => {
+            Some(PeerDenoiser::new(denoiser, scene, camera, args.seed)?)
         }
         Ok(_) => None,
         Err(error) => {
@@ -53,7 +53,7 @@ pub fn all(
     let interrupt = interrupt.clone();
     let stop = Box::new(move || interrupt.asked());
     let peers = renderers.into_iter().flat_map(Renderer::peers).collect();
-    Ok(Some(Guests { peers, driving, denoising, time, stop }))
+    Ok(Some(PeerRenders { peers, driver, denoising, time, stop }))
 }
 
 /// An option or a kind of file that drivers do not know, so that they would render another scene.

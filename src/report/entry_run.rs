@@ -22,7 +22,7 @@ pub struct Rules {
 }
 
 /// A run under way.
-pub(super) struct Lane<'a> {
+pub(super) struct EntryRun<'a> {
     pub(super) session: Session<'a>,
     pub(super) moments: Moments,
     /// Times of the finish.
@@ -33,10 +33,10 @@ pub(super) struct Lane<'a> {
     pub(super) open: bool,
 }
 
-impl<'a> Lane<'a> {
+impl<'a> EntryRun<'a> {
     /// At its beginning.
-    pub(super) fn new(session: Session<'a>, rules: &Rules) -> Lane<'a> {
-        Lane { session, moments: Moments::new(rules.ratio), finishings: Vec::new(), measured: 0, open: true }
+    pub(super) fn new(session: Session<'a>, rules: &Rules) -> EntryRun<'a> {
+        EntryRun { session, moments: Moments::new(rules.ratio), finishings: Vec::new(), measured: 0, open: true }
     }
 
     /// The median of the times of the finish, by wall clock. The first use of a network is slower than those after it,

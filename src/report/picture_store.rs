@@ -7,21 +7,21 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// A file without a name, gone with the process, full of pictures of one size.
-pub struct Spool {
+pub struct PictureStore {
     folder: PathBuf,
     file: File,
     size: Size,
     count: u64,
 }
 
-impl Spool {
+impl PictureStore {
     /// An empty one in a folder, for pictures of this size.
     ///
     /// # Errors
     /// The file system.
-    pub fn new(folder: &Path, size: Size) -> Result<Spool> {
+    pub fn new(folder: &Path, size: Size) -> Result<PictureStore> {
         let file = tempfile::tempfile_in(folder).map_err(|cause| Error::io(folder, &cause))?;
-        Ok(Spool { folder: folder.into(), file, size, count: 0 })
+        Ok(PictureStore { folder: folder.into(), file, size, count: 0 })
     }
 
     /// Keeps a picture; returns its number.
@@ -63,12 +63,12 @@ mod tests {
     fn pictures_come_back_in_any_order() {
         let folder = tempfile::tempdir().expect("a folder");
         let size = Size { width: 2, height: 1 };
-        let mut spool = Spool::new(folder.path(), size).expect("a file");
+        let mut store = PictureStore::new(folder.path(), size).expect("a file");
         let pictures = [[[1.0, 2.0, 3.0], [4.0, 5.0, f32::INFINITY]], [[0.5; 3], [-1e-30; 3]]];
         let pictures = pictures.map(|pixels| Picture::new(size, pixels.to_vec()));
-        let numbers: Vec<u64> = pictures.iter().map(|p| spool.push(p).expect("it is written")).collect();
+        let numbers: Vec<u64> = pictures.iter().map(|p| store.push(p).expect("it is written")).collect();
         for (number, picture) in numbers.iter().zip(&pictures).rev() {
-            assert_eq!(spool.get(*number).expect("it is there"), *picture);
+            assert_eq!(store.get(*number).expect("it is there"), *picture);
         }
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
     }
