@@ -50,7 +50,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     let camera = scene.camera(&job.camera_request()?)?;
     let view = View::new(&scene, &camera);
     check::media(&job.scene.path, &settings, &scene)?;
-    let make = |candidate| job.allowed(candidate, camera.size());
+    let make = |candidate| job.candidate_settings(candidate, camera.size());
     let choice = if job.method.0.is_none() {
         let mut finish = job.pilot_finish();
         let tried = || choose(view, &mut finish, make, || false);

@@ -1,5 +1,5 @@
-//! A description of options for everything that is not the command line: Python's arguments and their stubs, render
-//! settings of USD, the panel of Blender's add-on, and tables in the documentation.
+//! Descriptions of options for Python's arguments and stubs, the render settings of USD stages, the panel of Blender's
+//! add-on, and the tables in the documentation.
 
 use super::check::takes;
 use super::number::ValueRange;
@@ -10,44 +10,44 @@ use serde::Serialize;
 use std::any::TypeId;
 use std::path::PathBuf;
 
-/// An option.
+/// The description of an option.
 #[derive(Clone, Debug, Serialize)]
 pub struct OptionDescription {
-    /// Name of its field, as `max_depth`.
+    /// Name of the field, such as `max_depth`.
     pub name: String,
-    /// Its name on the command line, as `--max-depth`.
+    /// Name on the command line, such as `--max-depth`.
     pub option: String,
-    /// What it takes.
+    /// Kind of value that the option takes.
     pub kind: ValueKind,
-    /// What its values are called in the help, and how many of these there may be.
+    /// Placeholders of the values in the help, one for each value.
     pub values: Vec<String>,
-    /// Its default, where it is one value.
+    /// The default, if it is a single value.
     pub default: Option<String>,
-    /// Range of a number.
+    /// Range of a numeric value.
     pub range: Option<ValueRange>,
     /// Names to choose from, each with its help.
     pub choices: Vec<(String, String)>,
-    /// Heading of the help.
+    /// Heading in the help.
     pub heading: String,
-    /// Its help.
+    /// Help text.
     pub help: String,
-    /// Methods that take it; empty: all.
+    /// Names of the methods that take the option; empty if all do.
     pub methods: Vec<&'static str>,
-    /// Whether the render settings of a stage of USD may give it.
+    /// Whether the render settings of a USD stage may contain the option.
     pub stage: bool,
-    /// Its name as an argument of Python's `render`, or of `Scene`; `None`: it is none.
+    /// Name of the argument of Python's `render` or `Scene`; `None` if there is no such argument.
     pub python: Option<String>,
-    /// Whether it is an argument of `Scene`.
+    /// Whether the option is an argument of Python's `Scene`.
     pub of_scene: bool,
-    /// Why it is none.
+    /// Why Python has no such argument.
     pub not_in_python: Option<&'static str>,
 }
 
-/// What an option takes.
+/// Kind of value that an option takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ValueKind {
-    /// Nothing: it is given or not.
+    /// No value: the option is present or not.
     Flag,
     /// A whole number.
     Integer,
@@ -59,11 +59,11 @@ pub enum ValueKind {
     Switch,
     /// A file.
     Path,
-    /// A text of a form of its own.
+    /// Text in another format.
     Text,
 }
 
-/// Options that are no arguments of Python, and why.
+/// Options that are not arguments in Python, and why.
 const NOT_IN_PYTHON: [(&str, &str); 13] = [
     ("output", "the picture is an Image: its method save writes it"),
     ("png", "an argument of Image.save"),
@@ -94,25 +94,26 @@ const OF_SCENE: [(&str, &str); 10] = [
     ("strict", "strict"),
 ];
 
-/// Headings of options that a stage of USD may give: those about the picture and the way to it. A stage may come from
-/// anywhere, so files and permissions are the command line's alone.
-const OF_STAGES: [&str; 6] = ["Method", "When to stop", "Expert", "Light and glass", "Effects", "Finish"];
-/// Options of other headings that a stage may give.
-const ALSO_OF_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compression", "reproducible"];
-/// Options of these headings that it may not: files, permissions, memory, and what stages say by other means.
-const NOT_OF_STAGES: [&str; 6] = ["env", "model", "allow_outside", "strict", "photon_memory", "light_units"];
+/// Headings of the options that a USD stage may set. Stages come from untrusted sources, so only the command line sets
+/// files and permissions.
+const STAGE_HEADINGS: [&str; 6] = ["Method", "When to stop", "Expert", "Light and glass", "Effects", "Finish"];
+/// Options under other headings that a stage may set.
+const ALSO_IN_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compression", "reproducible"];
+/// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has other
+/// means.
+const NOT_IN_STAGES: [&str; 6] = ["env", "model", "allow_outside", "strict", "photon_memory", "light_units"];
 
 /// Describes the options of a command, in the order of its help.
 pub fn describe(command: &Command) -> Vec<OptionDescription> {
     command.get_arguments().filter(|arg| arg.get_long().is_some() && arg.get_id() != "help").map(entry).collect()
 }
 
-/// The options that are arguments of Python's `render`, each by its name there.
+/// The options that are arguments of Python's `render`.
 pub fn of_python() -> Vec<OptionDescription> {
     describe(&command()).into_iter().filter(|entry| entry.python.is_some() && !entry.of_scene).collect()
 }
 
-/// The options of a scene, which are arguments of Python's `Scene`.
+/// The options that are arguments of Python's `Scene`.
 pub fn of_scene() -> Vec<OptionDescription> {
     describe(&command()).into_iter().filter(|entry| entry.of_scene).collect()
 }
@@ -141,7 +142,7 @@ fn entry(arg: &Arg) -> OptionDescription {
         heading: heading.into(),
         help: arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default(),
         methods: methods(&name),
-        stage: of_stages(&name, heading, kind),
+        stage: is_allowed_in_stages(&name, heading, kind),
         python,
         of_scene: of_scene.is_some(),
         not_in_python,
@@ -170,16 +171,17 @@ fn kind(arg: &Arg) -> ValueKind {
     }
 }
 
-/// Methods that take an option; empty: all.
+/// Names of the methods that take an option; empty if all do.
 fn methods(option: &str) -> Vec<&'static str> {
     let taking = Method::value_variants().iter().filter(|method| takes(option, **method));
     let names: Vec<&str> = taking.map(|method| method.name()).collect();
     if names.len() == Method::value_variants().len() { Vec::new() } else { names }
 }
 
-fn of_stages(name: &str, heading: &str, kind: ValueKind) -> bool {
-    let about_the_picture = OF_STAGES.contains(&heading) && !NOT_OF_STAGES.contains(&name);
-    kind != ValueKind::Path && (about_the_picture || ALSO_OF_STAGES.contains(&name))
+/// Whether a USD stage may set an option.
+fn is_allowed_in_stages(name: &str, heading: &str, kind: ValueKind) -> bool {
+    let allowed = STAGE_HEADINGS.contains(&heading) && !NOT_IN_STAGES.contains(&name);
+    kind != ValueKind::Path && (allowed || ALSO_IN_STAGES.contains(&name))
 }
 
 #[cfg(test)]
@@ -187,9 +189,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exceptions_are_options() {
+    fn lists_of_exceptions_name_existing_options() {
         let known: Vec<String> = describe(&command()).into_iter().map(|entry| entry.name).collect();
-        // The others are the program's own.
+        // Options that only the program defines.
         let of_program = [
             "output",
             "png",
@@ -203,7 +205,7 @@ mod tests {
             "progress",
         ];
         let listed =
-            NOT_IN_PYTHON.iter().chain(&OF_SCENE).map(|(name, _)| *name).chain(NOT_OF_STAGES).chain(ALSO_OF_STAGES);
+            NOT_IN_PYTHON.iter().chain(&OF_SCENE).map(|(name, _)| *name).chain(NOT_IN_STAGES).chain(ALSO_IN_STAGES);
         for name in listed {
             assert!(known.iter().any(|option| option == name) || of_program.contains(&name), "{name}");
         }

@@ -1,4 +1,4 @@
-//! Which methods take which options, and what is said of an option that has no effect.
+//! Checks whether an option has an effect with the chosen method.
 
 use super::render::RenderOptions;
 use super::values::{BandwidthChoice, OnOff};
@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::render::{BandwidthRule, KernelChoice, Method, RadiusRule, Settings, Shard};
 use crate::transport::Indirect;
 
-/// Whether a method takes an option, by the name of its field.
+/// Whether an option, given by the name of its field, has an effect with a method.
 pub fn takes(option: &str, method: Method) -> bool {
     match option {
         "photons" | "knn" => method.takes_photon_count(),
@@ -22,7 +22,7 @@ pub fn takes(option: &str, method: Method) -> bool {
     }
 }
 
-/// The error of an option that has no effect; it has with the method `other`.
+/// The error of an option that has no effect; the hint suggests the method `other`.
 fn no_effect(option: &str, with: &str, other: &str) -> Error {
     let option = format!("--{}", option.replace('_', "-"));
     let error = Error::usage(format!("{option} has no effect {with}"));
@@ -30,7 +30,7 @@ fn no_effect(option: &str, with: &str, other: &str) -> Error {
 }
 
 impl RenderOptions {
-    /// The error of an option that has no effect on the method.
+    /// The error of an option that has no effect with the chosen method; the hint suggests the method `other`.
     pub fn no_effect(&self, option: &str, chosen: Option<Method>, other: &str) -> Error {
         let plus = if self.cppm_plus { " --cppm-plus" } else { "" };
         match chosen {
@@ -39,8 +39,8 @@ impl RenderOptions {
         }
     }
 
-    /// Options with a value that asks for something.
-    fn given(&self) -> [(&'static str, bool); 14] {
+    /// Names of the options that depend on the method, and whether each is set to something other than off.
+    fn method_options(&self) -> [(&'static str, bool); 14] {
         [
             ("photons", self.photons.is_some()),
             ("photon_memory", self.photon_memory.is_some()),
@@ -59,7 +59,8 @@ impl RenderOptions {
         ]
     }
 
-    /// Errors: options that have no effect on the method. `chosen`: the method if one is chosen, to name it.
+    /// Rejects options that have no effect with `method`. `chosen` is the method to name in the error, `None` before
+    /// `auto` has chosen.
     pub(super) fn check_method(&self, method: Method, chosen: Option<Method>, rule: RadiusRule) -> Result<()> {
         let local = rule == RadiusRule::Local;
         if self.kernel.is_some_and(|kernel| kernel != KernelChoice::Box) && (local || !takes("kernel", method)) {
@@ -75,8 +76,8 @@ impl RenderOptions {
             "indirect" => local,
             _ => false,
         };
-        let idle = |(option, given): &(&str, bool)| *given && (!takes(option, method) || contradicted(option));
-        let Some((option, _)) = self.given().into_iter().find(idle) else { return Ok(()) };
+        let has_no_effect = |(option, set): &(&str, bool)| *set && (!takes(option, method) || contradicted(option));
+        let Some((option, _)) = self.method_options().into_iter().find(has_no_effect) else { return Ok(()) };
         let other = match option {
             "photon_memory" => "pm",
             option if option.starts_with("cppm") => "cppm",
@@ -87,7 +88,7 @@ impl RenderOptions {
         Err(self.no_effect(shown, chosen, other))
     }
 
-    /// Errors: a shard that has nothing to render, or that depends on the others.
+    /// Rejects a shard without iterations, and shards of a method whose iterations depend on each other.
     pub(super) fn check_shard(&self, settings: &Settings) -> Result<()> {
         let Settings { shard: Shard { index, count }, iterations, method, .. } = *settings;
         if let Some(n) = iterations.filter(|n| index >= *n) {

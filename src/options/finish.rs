@@ -22,7 +22,7 @@ pub struct FinishOptions {
 }
 
 impl FinishOptions {
-    /// The same for the pipeline.
+    /// The options as the pipeline takes them.
     pub fn order(&self) -> Order {
         Order { denoiser: self.denoise, model: self.model.clone() }
     }

@@ -1,4 +1,4 @@
-//! Frames of an animation, and their numbers in the names of files.
+//! Frames of an animation, and frame numbers in file names.
 
 use super::number::whole;
 use serde::{Serialize, Serializer};
@@ -14,8 +14,8 @@ pub struct Frames {
     step: u32,
 }
 
-/// The last number that a frame may have.
-const LAST: u32 = 10_000_000;
+/// Maximum frame number.
+const MAX_FRAME: u32 = 10_000_000;
 
 impl Frames {
     /// One frame.
@@ -23,13 +23,13 @@ impl Frames {
         Frames { first: frame, last: frame, step: 1 }
     }
 
-    /// The numbers.
+    /// The frame numbers, in order.
     pub fn iter(self) -> impl ExactSizeIterator<Item = u32> {
         let count = (self.last - self.first) / self.step + 1;
         (0..count).map(move |i| self.first + i * self.step)
     }
 
-    /// The frame, if it is one alone.
+    /// The frame number, if there is only one.
     pub fn single(self) -> Option<u32> {
         (self.iter().len() == 1).then_some(self.first)
     }
@@ -39,8 +39,8 @@ impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Frames, String> {
-        let shape = || "it must be A-B, A-B,STEP or a single frame, such as 1-100 or 1-100,2".to_string();
-        let number = |text: &str| whole(0..=LAST)(text.trim()).map_err(|_| shape());
+        let expected = || "it must be A-B, A-B,STEP or a single frame, such as 1-100 or 1-100,2".to_string();
+        let number = |text: &str| whole(0..=MAX_FRAME)(text.trim()).map_err(|_| expected());
         let (range, step) = text.split_once(',').map_or((text, Ok(1)), |(range, step)| (range, number(step)));
         let (first, last) = range.split_once('-').unwrap_or((range, range));
         let frames = Frames { first: number(first)?, last: number(last)?, step: step? };
@@ -68,12 +68,12 @@ impl Serialize for Frames {
     }
 }
 
-/// A file whose name has a frame's number in place of each run of `#` (so many digits at least), of `%d` or of `%04d`;
-/// `None`: its name has none of these.
+/// The path of one frame of a sequence: the frame number replaces `%d`, `%04d`, and each run of `#` (padded to the length
+/// of the run) in the file name. `None` if the file name has no such placeholder.
 pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let (mut made, mut rest, mut found) = (String::new(), name, false);
-    while let Some((before, digits, after)) = place(rest) {
+    while let Some((before, digits, after)) = placeholder(rest) {
         made += before;
         made += &format!("{frame:0digits$}");
         (rest, found) = (after, true);
@@ -81,14 +81,14 @@ pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
     found.then(|| path.with_file_name(made + rest))
 }
 
-/// Whether a name looks as if a number ought to stand in it: a single `#` may be part of it.
+/// Whether a file name is certainly meant as a pattern. A single `#` is not, because it may be part of the name.
 pub fn is_pattern(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     name.contains("##") || name.contains('%') && numbered(path, 0).is_some_and(|_| !name.contains('#'))
 }
 
-/// The first place for a number: what stands before it, its least digits, and what stands behind.
-fn place(name: &str) -> Option<(&str, usize, &str)> {
+/// Finds the first placeholder. Returns the text before it, its minimum number of digits, and the text after it.
+fn placeholder(name: &str) -> Option<(&str, usize, &str)> {
     name.char_indices().find_map(|(at, sign)| {
         let rest = &name[at + sign.len_utf8()..];
         match sign {
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges() {
+    fn ranges_of_frames_are_parsed_and_printed() {
         let list = |text: &str| text.parse::<Frames>().map(|frames| frames.iter().collect::<Vec<u32>>());
         assert_eq!(list("5"), Ok(vec![5]));
         assert_eq!(list("0-3"), Ok(vec![0, 1, 2, 3]));
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn names() {
+    fn frame_numbers_replace_placeholders_in_file_names() {
         let name = |pattern: &str, frame| numbered(Path::new(pattern), frame).map(|path| path.display().to_string());
         assert_eq!(name("a##/out.####.exr", 7).as_deref(), Some("a##/out.0007.exr"));
         assert_eq!(name("#.exr", 12345).as_deref(), Some("12345.exr"));

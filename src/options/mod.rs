@@ -1,7 +1,8 @@
-//! Every option of a render, once: its name, default, unit, range and help, and which methods take it.
+//! The options of a render. Each is defined once, with its name, default, unit, range, help and the methods that take it.
 //!
-//! The command line parses these types, Python's keyword arguments become words of the same options ([`parse`]), and
-//! [`catalogue`] describes them for what is generated: the add-on's panel, render settings of USD, stubs and tables.
+//! The command line parses these types. Python's keyword arguments are turned into command-line arguments and parsed by
+//! [`parse`]. [`catalogue`] describes the options for generated files: the add-on's panel, the options in a USD stage,
+//! stubs and tables.
 
 pub mod catalogue;
 mod check;

@@ -9,32 +9,32 @@ use std::ops::Bound::{self, Excluded, Included, Unbounded};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// Range of an option's values.
+/// Range of a numeric option.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ValueRange {
     /// The smallest value, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<Number>,
-    /// Values are above `min`.
+    /// Whether the range excludes `min`.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub above_min: bool,
     /// The largest value, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<Number>,
-    /// Values are below `max`.
+    /// Whether the range excludes `max`.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub below_max: bool,
 }
 
 impl ArgExt for ValueRange {}
 
-/// An option whose value is a number of a range: attributes of a field in a definition of options.
+/// Attributes of numeric options: parser and range.
 pub trait Ranged {
-    /// A whole number.
+    /// The option takes a whole number in a range.
     fn whole<T>(self, range: RangeInclusive<T>) -> Self
     where
         T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static;
-    /// A finite number.
+    /// The option takes a finite number in a range.
     fn between(self, range: (Bound<f64>, Bound<f64>)) -> Self;
 }
 
@@ -44,8 +44,8 @@ impl Ranged for Arg {
         T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static,
     {
         let number = |end: &T| end.to_string().parse().ok();
-        let told = ValueRange { min: number(range.start()), max: number(range.end()), ..ValueRange::default() };
-        self.value_parser(whole(range)).add(told)
+        let described = ValueRange { min: number(range.start()), max: number(range.end()), ..ValueRange::default() };
+        self.value_parser(whole(range)).add(described)
     }
 
     fn between(self, (low, high): (Bound<f64>, Bound<f64>)) -> Arg {
@@ -53,17 +53,17 @@ impl Ranged for Arg {
             Included(x) | Excluded(x) => Number::from_f64(x),
             Unbounded => None,
         };
-        let told = ValueRange {
+        let described = ValueRange {
             min: number(low),
             above_min: matches!(low, Excluded(_)),
             max: number(high),
             below_max: matches!(high, Excluded(_)),
         };
-        self.value_parser(between(low, high)).add(told)
+        self.value_parser(between(low, high)).add(described)
     }
 }
 
-/// A finite number between two bounds.
+/// A parser of finite numbers between two bounds.
 pub fn between(low: Bound<f64>, high: Bound<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
     move |text| {
         let value: f64 = text.trim().parse().map_err(|_| "it is not a number".to_string())?;
@@ -84,7 +84,7 @@ pub fn between(low: Bound<f64>, high: Bound<f64>) -> impl Fn(&str) -> Result<f64
     }
 }
 
-/// The range in words: `it must be in (0, 1]`, `it must be above 0`.
+/// Describes a range in an error: `it must be in (0, 1]`, `it must be above 0`.
 fn describe(low: Bound<f64>, high: Bound<f64>) -> String {
     match (low, high) {
         (Included(l), Unbounded) => format!("it must be at least {l}"),
@@ -107,17 +107,17 @@ fn describe(low: Bound<f64>, high: Bound<f64>) -> String {
     }
 }
 
-/// Any finite number.
+/// Parses a finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
     between(Unbounded, Unbounded)(text)
 }
 
-/// A finite number above zero.
+/// Parses a finite number above zero.
 pub fn positive(text: &str) -> Result<f64, String> {
     between(Excluded(0.0), Unbounded)(text)
 }
 
-/// A whole number of a range.
+/// A parser of whole numbers in a range.
 pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
 where
     T: FromStr + PartialOrd + Display + Clone + Send + Sync,
@@ -128,33 +128,37 @@ where
     }
 }
 
-/// A relative error: above 0 and below 1.
+/// Parses a relative error, above 0 and below 1.
 pub fn relative_error(text: &str) -> Result<f64, String> {
     between(Excluded(0.0), Excluded(1.0))(text)
 }
 
-/// A number of threads; 0 is all.
+/// Parses a number of threads; 0 means all cores.
 pub fn threads(text: &str) -> Result<usize, String> {
     whole(0..=1024)(text)
 }
 
-/// What a channel of a colour may be: beyond it sums of the light of several pixels would be no single precision.
-const RADIANCES: RangeInclusive<f64> = 0.0..=1e30;
+/// Range of a colour channel. Sums over pixels of larger values would overflow single precision.
+const CHANNEL_RANGE: RangeInclusive<f64> = 0.0..=1e30;
 
-/// A factor on radiance.
+/// Parses a factor of radiance.
 pub fn strength(text: &str) -> Result<f64, String> {
     let factor = finite(text)?;
-    if RADIANCES.contains(&factor) { Ok(factor) } else { Err(format!("it must be from 0 to {:e}", RADIANCES.end())) }
+    if CHANNEL_RANGE.contains(&factor) {
+        Ok(factor)
+    } else {
+        Err(format!("it must be from 0 to {:e}", CHANNEL_RANGE.end()))
+    }
 }
 
-/// Three numbers that a colour may have, separated by commas; `None` when the text is no list of numbers at all.
+/// Parses a colour, three numbers separated by commas. `None` if the text is not a list of numbers.
 pub fn rgb(text: &str) -> Option<Result<[f32; 3], String>> {
     let values: Vec<f64> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
     let color: Result<[f64; 3], _> = values.try_into();
     Some(match color {
         Err(values) => Err(format!("a colour has three numbers R,G,B, not {}", values.len())),
-        Ok(color) if color.iter().all(|c| RADIANCES.contains(c)) => Ok(color.map(|c| c as f32)),
-        Ok(_) => Err(format!("a colour has three numbers from 0 to {:e}", RADIANCES.end())),
+        Ok(color) if color.iter().all(|c| CHANNEL_RANGE.contains(c)) => Ok(color.map(|c| c as f32)),
+        Ok(_) => Err(format!("a colour has three numbers from 0 to {:e}", CHANNEL_RANGE.end())),
     })
 }
 
@@ -163,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_hold_at_their_ends_and_name_themselves() {
+    fn values_outside_a_range_are_rejected_with_the_range() {
         let alpha = between(Excluded(0.0), Included(1.0));
         assert_eq!(alpha("1"), Ok(1.0));
         assert_eq!(alpha("0"), Err("it must be in (0, 1]".into()));
@@ -179,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_told_from_files() {
+    fn colours_are_distinguished_from_file_names() {
         assert_eq!(rgb("1,0.5,0"), Some(Ok([1.0, 0.5, 0.0])));
         assert_eq!(rgb("sky,1.exr"), None);
         assert!(rgb("1,2").is_some_and(|r| r.is_err()));

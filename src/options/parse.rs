@@ -1,4 +1,4 @@
-//! Options from words, for callers that have no command line.
+//! Parsing of options for callers without a command line.
 
 use super::render::RenderOptions;
 use super::run::RunOptions;
@@ -7,35 +7,35 @@ use clap::{Args, Command, FromArgMatches, ValueEnum};
 use std::error::Error;
 use std::ffi::OsString;
 
-/// Why words are refused.
+/// Why arguments were rejected.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InvalidOption {
-    /// The option that is at fault, by the name of its field; empty where none is.
+    /// Field name of the invalid option; empty if the error concerns no single option.
     pub option: String,
-    /// What is wrong with it, or what it may be.
+    /// The problem, or the valid values.
     pub reason: String,
 }
 
-/// The options of a render as a command that parses them.
+/// A clap command with the options of a render.
 pub(super) fn command() -> Command {
     let command = RunOptions::augment_args(RenderOptions::augment_args(Command::new("render")));
     command.no_binary_name(true).disable_help_flag(true).args_override_self(true)
 }
 
-/// Options from words as the command line has them, such as `--photons=1000`, of which the last is the scene.
+/// Parses options from command-line arguments such as `--photons=1000`, with the scene as the last one.
 ///
 /// # Errors
-/// An unknown option, or a value that is out of range.
+/// An option is unknown, or a value is out of range.
 pub fn parse(words: impl IntoIterator<Item = OsString>) -> Result<(RenderOptions, RunOptions), InvalidOption> {
     let parsed = command().try_get_matches_from(words);
     let both = |matches| Ok((RenderOptions::from_arg_matches(&matches)?, RunOptions::from_arg_matches(&matches)?));
     parsed.and_then(both).map_err(|error| InvalidOption::of(&error))
 }
 
-/// The value of a name, in which `_` stands for `-`, too.
+/// The value with a name, in which `_` may replace `-`.
 ///
 /// # Errors
-/// There is none; the error lists the names.
+/// No value has the name; the error lists the valid names.
 pub fn one_of<T: ValueEnum>(name: &str) -> Result<T, String> {
     T::from_str(&name.replace('_', "-"), false).map_err(|_| {
         let values = T::value_variants().iter().filter_map(T::to_possible_value);
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_become_options_or_a_reason() {
+    fn arguments_are_parsed_or_rejected_with_a_reason() {
         let parse = |text: &str| parse(text.split(' ').map(OsString::from));
         let (render, run) = parse("--photons=1000 --filter gaussian 2.5 --memory=64 -- scene.glb").unwrap();
         assert_eq!((render.photons, run.memory, render.scene.path.to_str()), (Some(1000), Some(64), Some("scene.glb")));

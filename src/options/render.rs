@@ -1,7 +1,7 @@
-//! What is rendered and how: every option that `caustique render`, `caustique plan` and Python's `render` have in common,
-//! with its default, unit, range and help; and the [`Settings`] that they come to.
+//! Options that `caustique render`, `caustique plan` and Python's `render` have in common, and the [`Settings`] that
+//! follow from them.
 
-// Help names defaults in brackets, which are no links.
+// Help texts have defaults in brackets, which are not links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
 use super::finish::FinishOptions;
@@ -161,52 +161,53 @@ pub struct RenderOptions {
     pub finish: FinishOptions,
 }
 
-/// The helps of `--levels` and `--photon-memory` name these.
+/// The help texts of `--levels` and `--photon-memory` repeat these numbers.
 const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 160);
 
 impl RenderOptions {
-    /// The picture asked for.
+    /// The requested camera, size, window and pixel filter.
     ///
     /// # Errors
-    /// A filter that there is not.
+    /// The filter is invalid.
     pub fn camera_request(&self) -> Result<CameraRequest> {
         let crop = self.crop.as_ref().map(|choice| choice.crop);
         let filter = self.filter.as_deref().map_or(Ok(Filter::default()), filter)?;
         Ok(CameraRequest { camera: self.camera.clone(), width: self.width, height: self.height, crop, filter })
     }
 
-    /// The render asked for; with `auto` settings by which effects are weighed.
+    /// The settings of the requested render. With `--method auto`, the settings of the default method, which pilots use to
+    /// weigh effects.
     ///
     /// # Errors
-    /// Options that contradict each other.
+    /// Options contradict each other.
     pub fn settings(&self) -> Result<Settings> {
-        // Until `auto` has chosen: whatever the default of the library does not take, no candidate takes.
+        // Before `auto` has chosen, the default method stands in. No candidate takes an option that it does not take.
         let method = self.method.0.unwrap_or_default();
         let candidate =
             Candidate { method, guided: self.guide == Some(OnOff::On), indirect: self.indirect.unwrap_or_default() };
         self.settings_of(candidate, self.method.0)
     }
 
-    /// What denoises the picture.
+    /// The denoiser of the picture.
     fn denoiser(&self) -> DenoiserChoice {
         if self.no_combine { DenoiserChoice::None } else { self.finish.denoise }
     }
 
-    /// The finish of auto's pilots.
+    /// The finish of the pilots of `auto`.
     pub fn pilot_finish(&self) -> Finish {
         Finish::for_pilots(self.denoiser())
     }
 
-    /// The finish of a pilot that predicts the error of the render: as the render's, but without a network.
+    /// The finish of a pilot that predicts the error of the render: the denoiser of the render, without a network.
     ///
     /// # Errors
-    /// A library that was asked for by name is missing.
+    /// The user chose a denoiser whose library is missing.
     pub fn outlook_finish(&self) -> Result<Finish> {
         Ok(Finish::new(Denoiser::open(self.denoiser())?.0, None))
     }
 
-    /// Settings of a candidate of `auto`, for a picture of that size; `None` where the options exclude it.
-    pub fn allowed(&self, candidate: Candidate, size: (u32, u32)) -> Option<Settings> {
+    /// Settings of a candidate of `auto`, for a picture of `size` pixels; `None` if the options exclude the candidate.
+    pub fn candidate_settings(&self, candidate: Candidate, size: (u32, u32)) -> Option<Settings> {
         let method = candidate.method;
         let guide = match self.guide {
             None => true,
@@ -214,16 +215,16 @@ impl RenderOptions {
             Some(OnOff::Off) => !candidate.guided,
         };
         let indirect = self.indirect.is_none_or(|asked| !method.gathers() || candidate.indirect == asked);
-        // A network combines as many levels as it has learnt.
-        let usual = self.settings().ok()?.levels;
-        let levels = |settings: &Settings| self.finish.model.is_none() || settings.levels == usual;
+        // A network takes the number of levels that it was trained with.
+        let required = self.settings().ok()?.levels;
+        let levels = |settings: &Settings| self.finish.model.is_none() || settings.levels == required;
         let settings = self.settings_of(candidate, Some(method)).ok();
         let allowed = settings.filter(|settings| guide && indirect && levels(settings));
         allowed.map(|settings| sized(settings, self.photons, size))
     }
 
-    /// The seed of the frame that is rendered.
-    fn seed_of_frame(&self) -> u64 {
+    /// The seed of the rendered frame.
+    fn frame_seed(&self) -> u64 {
         let frame = self.scene.frames.and_then(Frames::single);
         match (self.frame_seed, frame) {
             (FrameSeed::Vary, Some(frame)) => self.seed.wrapping_add(frame.into()),
@@ -233,21 +234,21 @@ impl RenderOptions {
 
     /// Parameters of the chi-squared rule.
     fn chi_squared(&self) -> ChiSquaredSettings {
-        let usual = ChiSquaredSettings::default();
+        let default = ChiSquaredSettings::default();
         ChiSquaredSettings {
-            annuli: self.cppm_grid.map_or(usual.annuli, |grid| grid.annuli),
-            sectors: self.cppm_grid.map_or(usual.sectors, |grid| grid.sectors),
-            k: self.cppm_k.unwrap_or(usual.k),
-            beta: self.cppm_beta.unwrap_or(usual.beta),
-            significance: self.cppm_significance.unwrap_or(usual.significance),
+            annuli: self.cppm_grid.map_or(default.annuli, |grid| grid.annuli),
+            sectors: self.cppm_grid.map_or(default.sectors, |grid| grid.sectors),
+            k: self.cppm_k.unwrap_or(default.k),
+            beta: self.cppm_beta.unwrap_or(default.beta),
+            significance: self.cppm_significance.unwrap_or(default.significance),
             plus: self.cppm_plus,
         }
     }
 
-    /// What sets the largest initial bandwidth of a method with so many levels.
-    fn initial(&self, method: Method, levels: usize) -> Result<InitialBandwidth> {
-        let usual = if method.takes_photon_count() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
-        match (self.initial_bandwidth.unwrap_or(usual), self.knn) {
+    /// The largest initial bandwidth of a method with `levels` levels.
+    fn initial_bandwidth(&self, method: Method, levels: usize) -> Result<InitialBandwidth> {
+        let default = if method.takes_photon_count() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
+        match (self.initial_bandwidth.unwrap_or(default), self.knn) {
             (BandwidthChoice::Knn, k) => {
                 Ok(InitialBandwidth::Nearest(k.map_or(method.default_neighbours(levels), |k| k as usize)))
             }
@@ -259,7 +260,7 @@ impl RenderOptions {
         }
     }
 
-    /// Levels, and whether level 1 has an eye path of its own.
+    /// The number of bandwidth levels, and whether level 1 has a camera path of its own.
     fn levels(&self, method: Method) -> Levels {
         let count = self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 });
         // Equation (6) of the 2021 paper combines an independent level with correlated ones.
@@ -267,14 +268,14 @@ impl RenderOptions {
         if two_paths { Levels::decorrelated(count) } else { Levels::new(count) }
     }
 
-    /// Settings of a candidate. `method`: the one that is chosen, if one is.
+    /// Settings of a candidate. `chosen` is the method to name in errors, `None` before `auto` has chosen.
     fn settings_of(&self, candidate: Candidate, chosen: Option<Method>) -> Result<Settings> {
         let method = candidate.method;
         let local = method.rules().first() == Some(&BandwidthRule::Local);
         let radius_rule = self.radius_rule.unwrap_or(if local { RadiusRule::Local } else { RadiusRule::Memoryless });
         self.check_method(method, chosen, radius_rule)?;
         if method.has_one_map() && self.knn == Some(1) {
-            // The k-th photon is on the rim: with one neighbour there would be none inside.
+            // The k-th photon is at the edge of the kernel, so one neighbour would leave no photon inside.
             let error = Error::usage("--knn must be 2 or more with --method pm");
             return Err(error.hint(format!("the default is {DEFAULT_MAP_KNN}")));
         }
@@ -282,12 +283,12 @@ impl RenderOptions {
         let limited = self.time.is_some() || self.target_error.is_some();
         let settings = Settings {
             method,
-            seed: self.seed_of_frame(),
+            seed: self.frame_seed(),
             photons: self.photons.unwrap_or(method.default_photons()),
             photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,
             techniques: false,
-            initial_bandwidth: self.initial(method, levels.count)?,
+            initial_bandwidth: self.initial_bandwidth(method, levels.count)?,
             max_initial_bandwidth: [SCREEN_CAP; 2],
             alpha: self.alpha.unwrap_or(method.default_alpha()),
             volume_alpha: self.alpha.unwrap_or(VOLUME_ALPHA),

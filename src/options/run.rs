@@ -57,12 +57,13 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// The cap on memory, if one is given.
+    /// The limit of `--memory`, if it is given.
     pub fn cap(&self) -> Option<Cap> {
         self.memory.map(|mib| Cap { bytes: u64::from(mib) << 20 })
     }
 
-    /// Where the state is saved, if at all: in the file asked for, else beside the output.
+    /// Where and how often the checkpoint is saved: in the file of `--checkpoint`, or beside `output`. `None` if nothing
+    /// is saved.
     pub fn saving(&self, output: Option<&Path>) -> Option<Saving> {
         let beside = |output: &Path| {
             let mut name = output.file_name().filter(|_| output.extension().is_some())?.to_owned();

@@ -60,13 +60,13 @@ pub struct SceneOptions {
     pub strict: bool,
 }
 
-/// `--env`.
+/// The value of `--env`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum EnvironmentChoice {
-    /// One radiance from everywhere.
+    /// Uniform radiance.
     Color([f32; 3]),
-    /// An image.
+    /// A latitude-longitude image.
     File(#[serde(serialize_with = "lossy")] PathBuf),
 }
 
@@ -81,7 +81,7 @@ impl FromStr for EnvironmentChoice {
 }
 
 impl SceneOptions {
-    /// A file without any options but where what it names may lie.
+    /// Default options for a scene file; `allow_outside`: the file may name files outside its folder.
     pub fn of(path: &Path, allow_outside: bool) -> SceneOptions {
         SceneOptions {
             path: path.into(),
@@ -99,7 +99,8 @@ impl SceneOptions {
         }
     }
 
-    /// The same of one frame: a scene whose name is a pattern is a file for each, unless there is a file of that very name.
+    /// The options for one frame of the animation. If the name of the scene is a pattern such as `a.####.glb`, and no file
+    /// has exactly this name, each frame is a file of its own.
     pub fn at(&self, frame: u32) -> SceneOptions {
         let file = numbered(&self.path, frame).filter(|_| !self.path.exists());
         let of_sequence = self.of_sequence || file.is_some();
@@ -107,7 +108,7 @@ impl SceneOptions {
         SceneOptions { path, frames: Some(Frames::one(frame)), of_sequence, ..self.clone() }
     }
 
-    /// What is asked of the pipeline.
+    /// The options as the pipeline takes them.
     pub fn order(&self) -> Order {
         let environment = self.env.clone().map(|choice| match choice {
             EnvironmentChoice::Color(color) => Environment::Color(color.into()),
@@ -123,7 +124,7 @@ impl SceneOptions {
         }
     }
 
-    /// `--effects`.
+    /// The effects to switch off or to ask for.
     pub fn switches(&self) -> Switches {
         self.effects.unwrap_or_default()
     }
@@ -142,7 +143,7 @@ impl SceneOptions {
     }
 }
 
-/// A path as JSON, as far as it is text.
+/// Serializes a path as text; bytes that are not text are replaced.
 fn lossy<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&path.display())
 }

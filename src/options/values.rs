@@ -1,4 +1,4 @@
-//! Values of options that are neither numbers nor types of the modules that they concern.
+//! Types of option values that no other module defines.
 
 use crate::camera::{Filter, MAX_FILTER_WIDTH};
 use crate::error::{Error, Result};
@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 use std::str::FromStr;
 use std::sync::LazyLock;
 
-/// `--method`; `None` is auto.
+/// The value of `--method`; `None` is `auto`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MethodChoice(pub Option<Method>);
 
@@ -19,7 +19,7 @@ const AUTO: &str =
     "vcm, guided where light is focused; elsewhere path or bdpt where a short pilot shows them to be clearly better";
 
 impl MethodChoice {
-    /// Its name.
+    /// The name of the method, or `auto`.
     pub fn name(self) -> &'static str {
         self.0.map_or("auto", Method::name)
     }
@@ -69,15 +69,15 @@ pub enum FrameSeed {
     Same,
 }
 
-/// `--initial-bandwidth`.
+/// The value of `--initial-bandwidth`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BandwidthChoice {
-    /// By neighbours.
+    /// The distance to the k-th nearest photon.
     Knn,
-    /// By pixels.
+    /// A multiple of the pixel's footprint.
     Footprint,
-    /// Scene units.
+    /// A length in scene units.
     #[serde(untagged)]
     Length(f64),
 }
@@ -97,12 +97,12 @@ impl FromStr for BandwidthChoice {
     }
 }
 
-/// `--cppm-grid NA,NS`.
+/// The value of `--cppm-grid NA,NS`: cells of the chi-squared test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct GridChoice {
-    /// Annuli.
+    /// Number of annuli.
     pub annuli: usize,
-    /// Sectors of each.
+    /// Number of sectors of each annulus.
     pub sectors: usize,
 }
 
@@ -120,12 +120,12 @@ impl FromStr for GridChoice {
     }
 }
 
-/// A window of the picture.
+/// The value of `--crop`: a window of the picture.
 #[derive(Clone, Debug, Serialize)]
 pub struct CropChoice {
-    /// As it was written.
+    /// The text that was parsed.
     pub window: String,
-    /// What it means.
+    /// The parsed window.
     #[serde(skip)]
     pub crop: Crop,
 }
@@ -148,7 +148,7 @@ impl FromStr for CropChoice {
             let [Some(x), Some(y), Some(w), Some(h)] = numbers else { return Err(fault()) };
             Crop::Pixels([x, y, w, h])
         };
-        // What is empty or beyond any picture is beyond this one.
+        // Rejects windows that are empty or outside the largest possible picture.
         match crop.window((MAX_SIZE, MAX_SIZE)) {
             Some(_) => Ok(CropChoice { window: text.into(), crop }),
             None => Err("the window is empty or not within the picture".into()),
@@ -156,10 +156,10 @@ impl FromStr for CropChoice {
     }
 }
 
-/// The filter of a name and perhaps a width.
+/// Parses `--filter`: the name of a pixel filter, and optionally its width in pixels.
 ///
 /// # Errors
-/// There is no such filter, or none of that width.
+/// The name or the width is invalid.
 pub fn filter(words: &[String]) -> Result<Filter> {
     let fault = |cause: String| {
         let filters = "box, gaussian or blackman-harris";

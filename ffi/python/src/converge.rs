@@ -259,7 +259,7 @@ impl Comparison {
             let mut choice = None;
             if options.method.0.is_none() {
                 let limited = RenderOptions { time: self.time(), ..options.clone() };
-                let make = |candidate| limited.allowed(candidate, camera.size());
+                let make = |candidate| limited.candidate_settings(candidate, camera.size());
                 choice = choose(View::new(built, camera), &mut options.pilot_finish(), make, || told.caller.stops());
             }
             if let Some(choice) = &choice {

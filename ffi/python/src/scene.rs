@@ -128,7 +128,7 @@ impl Scene {
         let arguments = self.arguments(py, options)?;
         let progress = progress.map(Arc::new);
         let done = work(py, threads, |caller| {
-            let allowed = |candidate, size| asked.allowed(candidate, size);
+            let allowed = |candidate, size| asked.candidate_settings(candidate, size);
             let auto = asked.method.0.is_none().then(|| Auto { allowed: &allowed, finish: asked.pilot_finish() });
             let order = Order {
                 scene: self.order(),
@@ -179,7 +179,7 @@ impl Scene {
             let choice = match asked.method.0 {
                 Some(_) => None,
                 None => {
-                    let make = |candidate| asked.allowed(candidate, camera.size());
+                    let make = |candidate| asked.candidate_settings(candidate, camera.size());
                     choose(View::new(scene, &camera), &mut asked.pilot_finish(), make, || caller.stops())
                 }
             };

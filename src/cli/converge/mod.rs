@@ -149,7 +149,7 @@ fn choose_all(
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
         run.entry.settings = sized(run.entry.settings.clone(), run.args.photons, view.camera.size());
-        let make = |candidate| run.args.allowed(candidate, view.camera.size()).map(limits);
+        let make = |candidate| run.args.candidate_settings(candidate, view.camera.size()).map(limits);
         if run.args.method.0.is_some() {
             return Ok(None);
         }

@@ -64,7 +64,7 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
 }
 
 fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<()> {
-    let allowed = |candidate, size| args.job.allowed(candidate, size);
+    let allowed = |candidate, size| args.job.candidate_settings(candidate, size);
     let auto = args.job.method.0.is_none().then(|| Auto { allowed: &allowed, finish: args.job.pilot_finish() });
     let order = Order {
         scene: args.job.scene.order(),
