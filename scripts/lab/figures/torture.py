@@ -244,7 +244,7 @@ def table(results):
         f"picture) by at",
         f"most {TILE:.0%}. Images are baked at {BAKE_SIZE} x {BAKE_SIZE} texels.",
         "",
-        f"{len(results)} features: " + ", ".join(f"{n} {v}" for v, n in counts.items()) + ".",
+        f"Verdicts of {len(results)} features: " + "; ".join(f"{v}: {n}" for v, n in counts.items()) + ".",
         "",
         "The mean is the ratio of the channel with the largest difference. FLIP is the visible difference from 0 to 1,",
         f"averaged over the pixels, including noise: two renders by Cycles of {SAMPLES} samples each differ by "
