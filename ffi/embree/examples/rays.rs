@@ -1,4 +1,5 @@
-//! Millions of rays a second, on a mesh of a million triangles: random segments, and a pinhole camera's rays.
+//! Measures the speed of ray queries (millions of rays per second) on a mesh of a million triangles, for random rays
+//! and for the rays of a pinhole camera.
 //!
 //! `cargo run --release -p caustique-embree --example rays [THREADS]`; `CAUSTIQUE_EMBREE` chooses the library.
 
@@ -37,7 +38,7 @@ fn main() {
     }
 }
 
-/// As [`best`], eight rays at once.
+/// Prints the speed of [`Scene::intersect8`](caustique_embree::Scene::intersect8), like [`best`].
 fn eights(name: &str, threads: usize, rays: &[Ray], scene: &caustique_embree::Scene) {
     let mut seconds = f64::INFINITY;
     for _ in 0..5 {
@@ -58,7 +59,7 @@ fn eights(name: &str, threads: usize, rays: &[Ray], scene: &caustique_embree::Sc
     println!("{name:17} {:6.2} Mrays/s", (threads * rays.len()) as f64 / seconds * 1e-6);
 }
 
-/// Prints the best of five runs; each thread traces all the rays.
+/// Prints the speed of the fastest of five runs, in which each thread traces all rays.
 fn best(name: &str, threads: usize, rays: &[Ray], hit: impl Fn(&Ray) -> bool + Sync) {
     let mut seconds = f64::INFINITY;
     let mut hits = 0;

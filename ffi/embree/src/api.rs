@@ -1,19 +1,19 @@
-//! The C functions and structures we use, per version of Embree, and nothing more.
+//! The C functions and structures of Embree that this crate uses.
 //!
-//! Source: `rtcore_*.h` of Embree 3.13.5 and 4.3.3. Where the two agree there is one definition.
+//! Source: `rtcore_*.h` of Embree 3.13.5 and 4.3.3. Definitions that are equal in both versions exist once.
 
 use std::ffi::{c_char, c_void};
 
-/// `RTCDevice`, `RTCScene`, `RTCGeometry`: opaque pointers, null on failure.
+/// `RTCDevice`, `RTCScene` or `RTCGeometry`: an opaque pointer, null on failure.
 pub type Handle = *mut c_void;
 
 pub const INVALID_GEOMETRY_ID: u32 = u32::MAX;
 
 pub const DEVICE_PROPERTY_VERSION_MAJOR: u32 = 1;
 pub const DEVICE_PROPERTY_VERSION_MINOR: u32 = 2;
-/// Packets of eight are traced as such.
-pub const DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED: u32 = 33;
 pub const DEVICE_PROPERTY_VERSION_PATCH: u32 = 3;
+/// Whether the device traces packets of eight rays natively.
+pub const DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED: u32 = 33;
 
 pub const GEOMETRY_TYPE_TRIANGLE: u32 = 0;
 pub const GEOMETRY_TYPE_INSTANCE: u32 = 121;
@@ -27,11 +27,11 @@ pub const FORMAT_FLOAT3X4_COLUMN_MAJOR: u32 = 0x9234;
 
 pub const BUILD_QUALITY_MEDIUM: u32 = 1;
 pub const SCENE_FLAG_ROBUST: u32 = 1 << 2;
-/// Rays may bring a filter of their own: `RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION` of Embree 3, and
+/// Enables per-ray filters: `RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION` of Embree 3, and
 /// `RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS` of Embree 4.
 pub const SCENE_FLAG_RAY_FILTER: u32 = 1 << 3;
 
-/// `RTCError`, as words.
+/// The meaning of an `RTCError`.
 pub fn error_name(code: u32) -> &'static str {
     match code {
         2 => "invalid argument",
@@ -94,7 +94,7 @@ impl RawHit {
     };
 }
 
-/// `RTCRayHit8`: structures of arrays. As with [`RawHit`], `instance_primitive` is there from Embree 4.3 on.
+/// `RTCRayHit8`, with one array per field. As in [`RawHit`], `instance_primitive` exists from Embree 4.3 on.
 #[repr(C, align(32))]
 #[derive(Clone, Copy)]
 pub struct RawRayHit8 {
@@ -115,14 +115,14 @@ pub struct RawRayHit8 {
     pub instance_primitive: [u32; 8],
 }
 
-/// Which of eight rays are to be traced: all bits set, or none.
+/// Mask of the rays to trace in a packet of eight: all bits set, or none.
 #[repr(C, align(32))]
 pub struct Valid8(pub [i32; 8]);
 
 const _: () = assert!(size_of::<RawRayHit8>() == 21 * 32);
 
-/// `RTCIntersectContext` of Embree 3. The last field is there only in builds with `RTC_MIN_WIDTH`, and
-/// padding otherwise.
+/// `RTCIntersectContext` of Embree 3. The last field exists only in builds with `RTC_MIN_WIDTH`; it is padding in
+/// others.
 #[repr(C)]
 pub struct IntersectContext3 {
     flags: u32,
@@ -141,41 +141,41 @@ impl IntersectContext3 {
     };
 }
 
-/// A context of Embree 3 and what our filter finds behind it.
+/// The context of Embree 3, followed by user data for the filter of the ray.
 #[repr(C)]
 struct Context3 {
     context: IntersectContext3,
-    beside: *mut c_void,
+    user_data: *mut c_void,
 }
 
-/// `RTCRayQueryContext` of Embree 4 (the second number is there only where instances come in arrays, and padding
-/// otherwise) and what our filter finds behind it.
+/// `RTCRayQueryContext` of Embree 4, followed by user data for the filter of the ray. The second number of `instance`
+/// exists only in builds with instance arrays; it is padding in others.
 #[repr(C)]
 struct Context4 {
     instance: [u32; 2],
-    beside: *mut c_void,
+    user_data: *mut c_void,
 }
 
-const _: () = assert!(std::mem::offset_of!(Context3, beside) == 24);
-const _: () = assert!(std::mem::offset_of!(Context4, beside) == 8);
+const _: () = assert!(std::mem::offset_of!(Context3, user_data) == 24);
+const _: () = assert!(std::mem::offset_of!(Context4, user_data) == 8);
 
-/// What [`Trace::intersect_filtered`] was given for its filter, by the major version of Embree.
+/// The user data that was passed to [`Trace::intersect_filtered`], for the major version of Embree.
 ///
 /// # Safety
-/// `arguments` must be those that Embree has called a filter of that function with.
-pub unsafe fn beside<const MAJOR: u32, T>(arguments: &FilterArguments) -> *mut T {
-    // SAFETY: the caller vouches for the context, which is one of ours.
-    let beside = unsafe {
+/// `arguments` must be the arguments with which Embree has called a filter of that function.
+pub unsafe fn context_user_data<const MAJOR: u32, T>(arguments: &FilterArguments) -> *mut T {
+    // SAFETY: the caller guarantees that the context is one of these structures.
+    let user_data = unsafe {
         match MAJOR {
-            3 => (*arguments.context.cast::<Context3>()).beside,
-            _ => (*arguments.context.cast::<Context4>()).beside,
+            3 => (*arguments.context.cast::<Context3>()).user_data,
+            _ => (*arguments.context.cast::<Context4>()).user_data,
         }
     };
-    beside.cast()
+    user_data.cast()
 }
 
-/// `RTCIntersectArguments` of Embree 4. The last field is there only in builds with `RTC_MIN_WIDTH`, and padding
-/// otherwise.
+/// `RTCIntersectArguments` of Embree 4. The last field exists only in builds with `RTC_MIN_WIDTH`; it is padding in
+/// others.
 #[repr(C)]
 struct IntersectArguments4 {
     flags: u32,
@@ -197,7 +197,7 @@ impl IntersectArguments4 {
     };
 }
 
-/// `RTCFilterFunctionNArguments`. With single rays `count` is 1, and the structures of arrays `RTCRayN` and
+/// `RTCFilterFunctionNArguments`. For single rays `count` is 1, and the structures `RTCRayN` and
 /// `RTCHitN` are laid out as `RTCRay` and `RTCHit`.
 #[repr(C)]
 pub struct FilterArguments {
@@ -230,7 +230,7 @@ macro_rules! functions {
             /// # Safety
             /// The library's symbols of these names must be Embree's, and the library must stay loaded.
             pub unsafe fn load(library: &libloading::Library) -> Result<Self, libloading::Error> {
-                // SAFETY: the caller vouches for the symbols' types and the library's lifetime.
+                // SAFETY: the caller guarantees the symbols' types and the library's lifetime.
                 Ok(unsafe { Self { $($field: *library.get($symbol)?),* } })
             }
         }
@@ -238,7 +238,7 @@ macro_rules! functions {
 }
 
 functions! {
-    /// What is alike in Embree 3 and 4.
+    /// Functions with equal signatures in Embree 3 and 4.
     Common {
         new_device = b"rtcNewDevice\0" (*const c_char) -> Handle;
         release_device = b"rtcReleaseDevice\0" (Handle);
@@ -265,7 +265,7 @@ functions! {
 }
 
 functions! {
-    /// Tracing in Embree 3.
+    /// Ray queries of Embree 3.
     Trace3 {
         intersect = b"rtcIntersect1\0" (Handle, *mut IntersectContext3, *mut RawRayHit);
         occluded = b"rtcOccluded1\0" (Handle, *mut IntersectContext3, *mut RawRay);
@@ -274,8 +274,7 @@ functions! {
 }
 
 functions! {
-    /// Tracing in Embree 4. The last argument may be null, which means incoherent rays and the geometries'
-    /// own filters.
+    /// Ray queries of Embree 4. The last argument may be null, which means incoherent rays and no per-ray filter.
     Trace4 {
         intersect = b"rtcIntersect1\0" (Handle, *mut RawRayHit, *mut c_void);
         occluded = b"rtcOccluded1\0" (Handle, *mut RawRay, *mut c_void);
@@ -283,7 +282,7 @@ functions! {
     }
 }
 
-/// The functions whose form differs. One branch per ray, always taken the same way.
+/// The functions whose signatures differ. The branch on the version costs little, because it always goes the same way.
 #[derive(Clone, Copy)]
 pub enum Trace {
     V3(Trace3),
@@ -299,7 +298,7 @@ impl Trace {
         match self {
             Trace::V3(functions) => {
                 let mut context = IntersectContext3::INCOHERENT;
-                // SAFETY: the caller vouches for scene and ray; the context lives through the call.
+                // SAFETY: the caller guarantees scene and ray. The context outlives the call.
                 unsafe { (functions.intersect)(scene, &mut context, ray) }
             }
             // SAFETY: as above; Embree 4 documents null arguments as the defaults.
@@ -314,7 +313,7 @@ impl Trace {
         match self {
             Trace::V3(functions) => {
                 let mut context = IntersectContext3::INCOHERENT;
-                // SAFETY: the caller vouches for scene and ray; the context lives through the call.
+                // SAFETY: the caller guarantees scene and ray. The context outlives the call.
                 unsafe { (functions.occluded)(scene, &mut context, ray) }
             }
             // SAFETY: as above.
@@ -322,56 +321,56 @@ impl Trace {
         }
     }
 
-    /// Like [`Trace::intersect`], with a filter that is asked about every hit which the geometry's own has let pass: of
-    /// `filters` the one for this version, which finds `with` by [`beside`].
+    /// Like [`Trace::intersect`], with a per-ray filter that is called for every hit that the filter of the geometry
+    /// has accepted. `filters` has one filter for each version. It gets `user_data` by [`context_user_data`].
     ///
     /// # Safety
-    /// As for [`Trace::intersect`]; the filters must be sound with a pointer to `T` that is `with`.
+    /// As for [`Trace::intersect`]. The filters must be sound for this `user_data`.
     pub unsafe fn intersect_filtered<T>(
         &self,
         scene: Handle,
         ray: *mut RawRayHit,
         filters: [FilterFunction; 2],
-        with: *mut T,
+        user_data: *mut T,
     ) {
-        let (of_3, of_4) = (filters[0] as *const c_void, filters[1] as *const c_void);
-        let beside = with.cast();
+        let [filter3, filter4] = filters.map(|filter| filter as *const c_void);
+        let user_data = user_data.cast();
         match self {
             Trace::V3(functions) => {
-                let context = IntersectContext3 { filter: of_3, ..IntersectContext3::INCOHERENT };
-                let mut context = Context3 { context, beside };
-                // SAFETY: the caller vouches for scene and ray; the context lives through the call.
+                let context = IntersectContext3 { filter: filter3, ..IntersectContext3::INCOHERENT };
+                let mut context = Context3 { context, user_data };
+                // SAFETY: the caller guarantees scene and ray. The context outlives the call.
                 unsafe { (functions.intersect)(scene, (&raw mut context).cast(), ray) }
             }
             Trace::V4(functions) => {
-                let mut context = Context4 { instance: [INVALID_GEOMETRY_ID; 2], beside };
+                let mut context = Context4 { instance: [INVALID_GEOMETRY_ID; 2], user_data };
                 let mut arguments = IntersectArguments4 {
                     flags: 1 << 1,
                     context: (&raw mut context).cast(),
-                    filter: of_4,
+                    filter: filter4,
                     ..IntersectArguments4::COHERENT
                 };
-                // SAFETY: as above; context and arguments live through the call.
+                // SAFETY: as above. Context and arguments outlive the call.
                 unsafe { (functions.intersect)(scene, ray, (&raw mut arguments).cast()) }
             }
         }
     }
 
-    /// Coherent rays, eight at once.
+    /// Traces a packet of eight coherent rays.
     ///
     /// # Safety
-    /// As for [`Trace::intersect`]; the library's devices must support packets of eight.
+    /// As for [`Trace::intersect`]. The device must support packets of eight.
     #[inline(always)]
     pub unsafe fn intersect8(&self, valid: &Valid8, scene: Handle, rays: *mut RawRayHit8) {
         match self {
             Trace::V3(functions) => {
                 let mut context = IntersectContext3::COHERENT;
-                // SAFETY: the caller vouches for scene and rays; the context lives through the call.
+                // SAFETY: the caller guarantees scene and rays. The context outlives the call.
                 unsafe { (functions.intersect8)(valid, scene, &mut context, rays) }
             }
             Trace::V4(functions) => {
                 let mut arguments = IntersectArguments4::COHERENT;
-                // SAFETY: as above; the arguments live through the call.
+                // SAFETY: as above. The arguments outlive the call.
                 unsafe { (functions.intersect8)(valid, scene, rays, (&raw mut arguments).cast()) }
             }
         }

@@ -1,4 +1,4 @@
-//! A device: one set of Embree's worker threads, and the place its errors are collected.
+//! An Embree device: a set of worker threads, and its error callback.
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,20 +16,20 @@ pub struct Device {
 struct Inner {
     raw: Handle,
     library: Library,
-    /// The first error since the last check. An `Arc`, and so at an address that stays: Embree holds it.
+    /// The first error since the last check. Embree holds its address, which the `Arc` keeps stable.
     error: Arc<ErrorSlot>,
 }
 
 type ErrorSlot = Mutex<Option<String>>;
 
-// SAFETY: Embree's devices may be used from several threads at once, and what it reports is behind a mutex.
+// SAFETY: Embree's devices may be used from several threads at once, and the error is behind a mutex.
 unsafe impl Send for Inner {}
 // SAFETY: as above.
 unsafe impl Sync for Inner {}
 
 impl Device {
-    /// Makes a device whose scenes are built by `threads` threads, 0 for as many as there are processors.
-    /// Rays are traced by the threads that ask.
+    /// Creates a device that builds scenes with `threads` threads; 0 means one per processor. Rays are traced by the
+    /// calling threads.
     ///
     /// # Errors
     ///
@@ -38,23 +38,23 @@ impl Device {
         let during = "make a device";
         let common = library.common();
         let configuration = CString::new(format!("threads={threads}")).unwrap_or_default();
-        // SAFETY: the string lives through the call, which copies what it needs.
+        // SAFETY: the string outlives the call, which does not keep it.
         let raw = unsafe { (common.new_device)(configuration.as_ptr()) };
         if raw.is_null() {
-            // SAFETY: null asks for the error of the last failed creation on this thread.
+            // SAFETY: a null device returns the error of the last failed creation on this thread.
             let code = unsafe { (common.device_error)(raw) };
             return Err(Error::Embree { during, message: api::error_name(code).into() });
         }
         let inner = Inner { raw, library: library.clone(), error: Arc::default() };
         let slot = Arc::as_ptr(&inner.error);
-        // SAFETY: the slot is owned by `inner`, stays where it is, and is dropped after the device is released.
+        // SAFETY: the slot is owned by `inner`, does not move, and is dropped after the device is released.
         unsafe { (common.set_error_function)(raw, record_error, slot as *mut c_void) };
         let device = Device { inner: Arc::new(inner) };
         device.check(during)?;
         Ok(device)
     }
 
-    /// The library this device is of.
+    /// The library of this device.
     pub fn library(&self) -> &Library {
         &self.inner.library
     }
@@ -71,7 +71,7 @@ impl Device {
         Arc::ptr_eq(&self.inner, &other.inner)
     }
 
-    /// Turns what Embree has reported since the last check into an error.
+    /// Returns the first error that Embree has reported since the last check.
     pub(crate) fn check(&self, during: &'static str) -> Result<(), Error> {
         match self.inner.error.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(message) => Err(Error::Embree { during, message }),
@@ -79,7 +79,7 @@ impl Device {
         }
     }
 
-    /// A handle that Embree returned, or the error it reported instead.
+    /// The handle that Embree returned, or the error that it reported instead.
     pub(crate) fn check_handle(&self, handle: Handle, during: &'static str) -> Result<Handle, Error> {
         self.check(during)?;
         if handle.is_null() {
@@ -91,13 +91,13 @@ impl Device {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        // SAFETY: the handle came from `new_device` and is released once; scenes hold a `Device`, so none is
-        // left.
+        // SAFETY: the handle came from `new_device` and is released once. No scene is left, because scenes hold a
+        // `Device`.
         unsafe { (self.library.common().release_device)(self.raw) }
     }
 }
 
-/// Embree's error callback; may come from any of its threads.
+/// Embree's error callback, which any of its threads may call.
 unsafe extern "C" fn record_error(slot: *mut c_void, code: u32, text: *const c_char) {
     // SAFETY: the pointer is the one given in `Device::new`, alive as long as the device.
     let slot = unsafe { &*(slot as *const ErrorSlot) };

@@ -1,4 +1,4 @@
-//! What can go wrong, as data.
+//! The errors of this crate.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,75 +6,74 @@ use std::path::PathBuf;
 use crate::geometry::{GeometryId, MAX_GEOMETRY_ID};
 use crate::library::LIBRARY_VARIABLE;
 
-/// A failure to find Embree, to use it, or to accept what it was given.
+/// A failure to find or use Embree, or an invalid argument.
 ///
-/// `Display` says what is wrong; [`Error::hint`] what to do about it.
+/// `Display` says what is wrong, [`Error::hint`] what to do about it.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// No Embree was found under any of the names it goes by: each name with the loader's reason.
+    /// Embree was not found under any of its names.
     NotFound {
         /// File names or paths tried, in order, each with the reason it failed.
         tried: Vec<(PathBuf, String)>,
     },
-    /// A library was found and cannot be used.
+    /// A library was found, but cannot be used.
     Unusable {
-        /// The file.
+        /// Path of the library file.
         path: PathBuf,
-        /// Why not.
+        /// Reason why it cannot be used.
         reason: String,
     },
-    /// Embree reported an error of its own.
+    /// Embree reported an error.
     Embree {
-        /// What was being done.
+        /// The operation that failed, such as "build a scene".
         during: &'static str,
-        /// Embree's words.
+        /// Embree's message.
         message: String,
     },
     /// A vertex is NaN, infinite, or farther out than Embree can represent (about 1.8e18).
     BadVertex {
-        /// The geometry it belongs to.
+        /// The mesh.
         geometry: GeometryId,
-        /// Its place among the positions, from 0.
+        /// Index of the vertex.
         vertex: usize,
-        /// Its coordinates.
+        /// Coordinates of the vertex.
         position: [f32; 3],
     },
-    /// A triangle names a vertex that does not exist.
+    /// A triangle has an index of a vertex that does not exist.
     BadIndex {
-        /// The geometry it belongs to.
+        /// The mesh.
         geometry: GeometryId,
-        /// Its place among the triangles, from 0.
+        /// Index of the triangle.
         triangle: usize,
-        /// The index it names.
+        /// The invalid index.
         index: u32,
-        /// How many vertices there are.
+        /// Number of vertices of the mesh.
         vertices: usize,
     },
-    /// An instance's matrix holds NaN or infinity, cannot be inverted, or is too extreme for single precision: scales
-    /// below about 1e-9, or a scene moved or blown up beyond 1.8e18.
+    /// The matrix of an instance contains NaN or infinity, is not invertible, or is too extreme for single precision:
+    /// it scales by less than about 1e-9, or moves the scene beyond 1.8e18.
     BadTransform {
         /// The instance.
         geometry: GeometryId,
-        /// The matrix, as it was given.
+        /// The matrix.
         local_to_world: [f32; 12],
     },
     /// A geometry id is used twice in one scene.
     DuplicateId(GeometryId),
-    /// A geometry id above [`MAX_GEOMETRY_ID`].
+    /// A geometry id is above [`MAX_GEOMETRY_ID`].
     IdTooLarge(GeometryId),
-    /// A filter was set on an id that is no triangle mesh of the scene.
+    /// A filter was set for an id that is not a triangle mesh of the scene.
     NoSuchMesh(GeometryId),
-    /// An instance of a scene that itself holds instances: Embree follows one level only.
+    /// The instanced scene contains instances itself. Only one level is supported.
     NestedInstance(GeometryId),
-    /// An instance of a scene that belongs to another device.
+    /// The instanced scene belongs to another device.
     OtherDevice(GeometryId),
 }
 
 impl Error {
-    /// What the user can do about it, where that is known: one line, without a trailing full stop.
-    ///
-    /// For a missing or unusable library it names the package to install, by distribution.
+    /// Advice for the user, if there is any: one line without a full stop. For a missing or unusable library, the
+    /// package to install on each distribution.
     pub fn hint(&self) -> Option<String> {
         match self {
             Error::NotFound { .. } | Error::Unusable { .. } => Some(format!(

@@ -9,14 +9,14 @@ use crate::api::{self, FilterArguments, FilterFunction, INVALID_GEOMETRY_ID, Raw
 use crate::geometry::GeometryId;
 use crate::ray::Hit;
 
-/// A hit that Embree proposes to a filter.
+/// A possible hit, which a filter accepts or rejects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// The mesh.
     pub geometry: GeometryId,
-    /// The instance the mesh was reached through, if any.
+    /// The instance of the mesh, if the mesh is in an instanced scene.
     pub instance: Option<GeometryId>,
-    /// The triangle's place among the mesh's triangles.
+    /// Index of the triangle in the mesh.
     pub primitive: u32,
     /// Barycentric coordinate of the triangle's second corner.
     pub u: f32,
@@ -26,25 +26,25 @@ pub struct Candidate {
     pub token: u32,
 }
 
-/// Decides on a candidate: `false` rejects it, and the ray goes on.
+/// Accepts a candidate by returning true. If it returns false, the ray continues.
 ///
-/// Must be a pure function of the candidate: Embree may ask several times for one crossing, in any order, and
-/// about crossings behind the nearest.
+/// Must be a pure function of the candidate: Embree may call it several times for one intersection, in any order, and
+/// for intersections behind the nearest one.
 pub type Filter = Arc<dyn Fn(&Candidate) -> bool + Send + Sync>;
 
 thread_local! {
-    /// A panic on its way around Embree's frames, which it must not unwind.
+    /// A panic of a filter, stored until Embree has returned, because it must not unwind through Embree's frames.
     static PANIC: Cell<Option<Box<dyn Any + Send>>> = const { Cell::new(None) };
 }
 
-/// The function Embree calls for meshes with a filter, whose user data is a `*const Filter`.
+/// The filter function that Embree calls for a mesh whose user data is a `*const Filter`.
 ///
 /// # Safety
 /// To be called by Embree only, for a ray of [`Scene::intersect`](crate::Scene::intersect) or
 /// [`Scene::occluded`](crate::Scene::occluded).
 pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
-    // SAFETY: Embree passes valid arguments; single rays only are traced, so each pointer is to one item laid
-    // out as in `RawRay` and `RawHit` (of which `instance_primitive`, absent in Embree 3, is not read).
+    // SAFETY: Embree passes valid arguments. Meshes with a filter are traced by single rays only, so each pointer is to
+    // one item laid out as in `RawRay` and `RawHit`. `instance_primitive`, which Embree 3 lacks, is not read.
     let (valid, filter, hit, token) = unsafe {
         let arguments = &*arguments;
         debug_assert_eq!(arguments.count, 1);
@@ -53,8 +53,8 @@ pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
     if *valid == 0 {
         return;
     }
-    // SAFETY: as above. Fields are read one by one: a reference would claim the whole of a structure that
-    // is shorter in Embree 3.
+    // SAFETY: as above. Fields are read one by one, because the structure is shorter in Embree 3, and a reference would
+    // claim all of it.
     let candidate = unsafe {
         let instance = (*hit).instance;
         Candidate {
@@ -69,30 +69,30 @@ pub unsafe extern "C" fn call(arguments: *const FilterArguments) {
     match catch_unwind(AssertUnwindSafe(|| filter(&candidate))) {
         Ok(true) => {}
         Ok(false) => *valid = 0,
-        // The hit is accepted so that the ray soon ends.
+        // Accepting the hit ends the ray early.
         Err(panic) => PANIC.set(Some(panic)),
     }
 }
 
-/// Filters of a ray, for Embree 3 and 4, that hand every hit to the closure `&mut dyn FnMut(Hit)` beside them, and let
-/// none stop the ray.
-pub const REPORT: [FilterFunction; 2] = [report::<3>, report::<4>];
+/// Per-ray filters for Embree 3 and 4 that pass every hit to a closure `&mut dyn FnMut(Hit)`, which is the user data of
+/// the ray's context, and then reject it.
+pub const REPORT_FILTERS: [FilterFunction; 2] = [report::<3>, report::<4>];
 
 /// # Safety
 /// To be called by Embree only, for [`Scene::each_hit`](crate::Scene::each_hit).
 unsafe extern "C" fn report<const MAJOR: u32>(arguments: *const FilterArguments) {
-    // SAFETY: as for `call`; beside the context is a pointer to the closure, which lives through the call.
+    // SAFETY: as for `call`. The user data of the context is a pointer to the closure, which outlives the call.
     let (valid, hit, t, each) = unsafe {
         let arguments = &*arguments;
         debug_assert_eq!(arguments.count, 1);
-        let each = &mut *api::beside::<MAJOR, &mut dyn FnMut(Hit)>(arguments);
+        let each = &mut *api::context_user_data::<MAJOR, &mut dyn FnMut(Hit)>(arguments);
         (&mut *arguments.valid, arguments.hit, (*arguments.ray).tfar, each)
     };
     if *valid == 0 {
         return;
     }
     *valid = 0;
-    // SAFETY: as for `call`: what is read is there in Embree 3, too, and the rest is never looked at.
+    // SAFETY: as for `call`. All fields that are read exist in Embree 3, too.
     let hit = unsafe {
         let (ng, u, v) = ((*hit).ng, (*hit).u, (*hit).v);
         let (primitive, geometry, instance) = ((*hit).primitive, (*hit).geometry, (*hit).instance);
@@ -103,7 +103,7 @@ unsafe extern "C" fn report<const MAJOR: u32>(arguments: *const FilterArguments)
     }
 }
 
-/// Lets a panic of a filter go on, now that Embree has returned.
+/// Resumes the stored panic of a filter, if any, after Embree has returned.
 #[inline]
 pub fn resume_panic() {
     if let Some(panic) = PANIC.take() {

@@ -1,18 +1,16 @@
-//! Numbers of geometries, and the space that they may fill.
+//! Ids of geometries, bounding boxes, and the largest coordinate.
 
 use std::fmt;
 
-/// The number of a mesh or instance within its scene.
-///
-/// Give small, dense numbers: Embree keeps a table up to the largest.
+/// Id of a mesh or instance in its scene. Ids should be small and dense, because Embree has a table up to the largest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct GeometryId(pub u32);
 
-/// The largest id a mesh or instance may have.
+/// The largest id of a mesh or instance.
 pub const MAX_GEOMETRY_ID: GeometryId = GeometryId((1 << 24) - 1);
 
-/// Embree (`FLT_LARGE` in its sources) drops triangles with coordinates beyond this without a word, and takes no
-/// rays with such.
+/// The largest coordinate (`FLT_LARGE` in Embree's sources). Embree silently drops triangles with larger ones, and must
+/// not be called with such rays.
 pub(crate) const MAX_COORDINATE: f32 = 1.844e18;
 
 impl fmt::Display for GeometryId {
@@ -24,8 +22,8 @@ impl fmt::Display for GeometryId {
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Least x, y and z.
+    /// Smallest x, y and z.
     pub min: [f32; 3],
-    /// Greatest x, y and z.
+    /// Largest x, y and z.
     pub max: [f32; 3],
 }

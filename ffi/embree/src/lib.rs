@@ -1,10 +1,9 @@
 //! Safe bindings to the parts of Intel Embree 3 and 4 that `caustique` uses.
 //!
-//! The library is looked for when the program runs, not when it is built, so one binary serves
-//! Debian 12 (`libembree3.so.3`, package `libembree3-3`), Debian 13 (`libembree4.so.4`, package
-//! `libembree4-4`) and everything else that ships Embree 3 or 4. [`Library::load`] finds it, or
-//! returns an error whose [`Error::hint`] says what to install. The environment variable
-//! [`LIBRARY_VARIABLE`] names a library file to use instead.
+//! The library is loaded when the program runs, not linked when it is built. So one binary works on Debian 12
+//! (`libembree3.so.3`, package `libembree3-3`), on Debian 13 (`libembree4.so.4`, package `libembree4-4`) and on every
+//! system that ships Embree 3 or 4. [`Library::load`] finds the library, or returns an error whose [`Error::hint`] says
+//! what to install. The environment variable [`LIBRARY_VARIABLE`] names a library file to use instead.
 //!
 //! ```no_run
 //! use caustique_embree::{Device, GeometryId, Library, Ray, SceneBuilder};
@@ -30,24 +29,22 @@
 //!
 //! # Order of the types
 //!
-//! [`Library`] -> [`Device`] -> [`SceneBuilder`] -> [`Scene`] -> [`Hit`]. Each keeps alive what it
-//! needs, so values may be dropped in any order. A [`Scene`] is immutable and may be traced from any
-//! number of threads.
+//! [`Library`] -> [`Device`] -> [`SceneBuilder`] -> [`Scene`] -> [`Hit`]. Each value keeps alive the values that it
+//! depends on, so they may be dropped in any order. A [`Scene`] is immutable, and any number of threads may trace it.
 //!
 //! # Why not an existing crate
 //!
-//! `embree4-rs` and `embree4-sys` link Embree 4 when they are built, which leaves Debian 12 out, and
-//! the structures of `embree4-sys` 0.0.10 lack `RTCHit::instPrimID`, which Embree has had since
-//! 4.3: the library writes it 4 bytes past the end of their 80-byte `RTCRayHit`. The structures here
-//! have room for it whatever version is loaded (96 bytes, aligned to 16), and every library is
-//! tried once on a small scene, with guard bytes behind the structure, before it is used
-//! (see [`Library::hit_extent`]).
+//! `embree4-rs` and `embree4-sys` link Embree 4 when they are built, which excludes Debian 12. The structures of
+//! `embree4-sys` 0.0.10 lack `RTCHit::instPrimID`, which Embree has since 4.3, so the library writes 4 bytes past the
+//! end of their 80-byte `RTCRayHit`. The structures here have room for it in every version (96 bytes, aligned to 16).
+//! Before a library is used, a ray is traced in a small scene with guard bytes behind the structure (see
+//! [`Library::hit_extent`]).
 //!
-//! # What is unsafe
+//! # Unsafe code
 //!
-//! This crate trusts two things it cannot prove: that the file found under Embree's name is Embree (loading it runs its initialisers), and
-//! that its C interface is the one its version number promises, of which the trial above checks what
-//! can be checked. A loaded library is never unloaded: Embree's worker threads outlive its devices.
+//! This crate relies on two assumptions that it cannot prove. The file found under Embree's name must be Embree,
+//! because loading it runs its initialisers. Its C interface must be that of its version number; the test ray checks a
+//! part of it. A loaded library is never unloaded, because Embree's worker threads outlive its devices.
 
 mod api;
 mod device;

@@ -1,4 +1,4 @@
-//! The opened library: its functions, and what it says of itself.
+//! A loaded library.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,11 +8,11 @@ use caustique_library::Version;
 
 use crate::api::{Common, Trace};
 
-/// Name of the environment variable that, when set and not empty, holds the path of the Embree library to
-/// use. Nothing else is tried then.
+/// Environment variable with the path of the Embree library to use. If it is set and not empty, no other library is
+/// tried.
 pub const LIBRARY_VARIABLE: &str = "CAUSTIQUE_EMBREE";
 
-/// An opened and tried Embree library. Clones share it.
+/// A loaded and tested Embree library. Clones share it.
 #[derive(Clone)]
 pub struct Library {
     inner: Arc<Inner>,
@@ -27,23 +27,23 @@ struct Inner {
 }
 
 impl Library {
-    /// A library with these functions, which was opened from `path` and writes `hit_extent` bytes of `RTCRayHit`.
+    /// The library with these functions that was loaded from `path` and writes `hit_extent` bytes of `RTCRayHit`.
     pub(crate) fn new(path: &Path, version: Version, hit_extent: usize, common: Common, trace: Trace) -> Library {
         Library { inner: Arc::new(Inner { path: path.to_owned(), version, hit_extent, common, trace }) }
     }
 
-    /// The file that was opened: its full path where the system tells, else the name it was found by.
+    /// The file that was loaded: its full path if the system reports it, else the name that was requested.
     pub fn path(&self) -> &Path {
         &self.inner.path
     }
 
-    /// The version, as a device of the library reports it.
+    /// The version that a device of the library reports.
     pub fn version(&self) -> Version {
         self.inner.version
     }
 
-    /// How many bytes of `RTCRayHit` the library was seen to use when it was tried: 80 up to Embree 4.2,
-    /// 84 from 4.3 on. Room is kept for 96; a library that uses more is refused.
+    /// Number of bytes of `RTCRayHit` that the library wrote in a test: 80 up to Embree 4.2, 84 from 4.3 on. This crate
+    /// reserves 96 bytes and refuses libraries that write more.
     pub fn hit_extent(&self) -> usize {
         self.inner.hit_extent
     }

@@ -1,4 +1,4 @@
-//! Finds and opens the library, version 4 or 3, or says what to install.
+//! Finds and loads the library, version 4 or 3.
 
 use std::path::{Path, PathBuf};
 
@@ -9,8 +9,8 @@ use crate::error::Error;
 use crate::library::{LIBRARY_VARIABLE, Library};
 use crate::probe;
 
-/// Names to try, best first. Those with a version number are what distributions install for programs, the
-/// others come with development packages.
+/// Names to try, best first. Names with a version number belong to runtime packages, the others to development
+/// packages.
 #[cfg(not(any(target_os = "macos", windows)))]
 const NAMES: &[&str] = &["libembree4.so.4", "libembree3.so.3", "libembree4.so", "libembree3.so"];
 #[cfg(target_os = "macos")]
@@ -26,12 +26,12 @@ const NAMES: &[&str] = &[
 const NAMES: &[&str] = &["embree4.dll", "embree3.dll"];
 
 impl Library {
-    /// Opens the library named by [`LIBRARY_VARIABLE`], or else the first usable one of the names
-    /// Embree goes by, version 4 before 3, where the system looks for libraries.
+    /// Loads the library that [`LIBRARY_VARIABLE`] names. If it names none, loads the first usable library that the
+    /// system's loader finds under Embree's names, version 4 before 3.
     ///
     /// # Errors
     ///
-    /// [`Error::NotFound`] with what was tried; [`Error::Unusable`] as for [`Library::load_from`].
+    /// [`Error::NotFound`] with the names that were tried; [`Error::Unusable`] as for [`Library::load_from`].
     pub fn load() -> Result<Library, Error> {
         match path_from_env(LIBRARY_VARIABLE) {
             Some(path) => Library::load_from(path),
@@ -39,14 +39,13 @@ impl Library {
         }
     }
 
-    /// Opens one library file. A bare file name is looked for where the system looks for libraries.
+    /// Loads a library file. The system's loader looks up a bare file name in its own folders.
     ///
-    /// Loading runs the file's initialisers: give it nothing that is not trusted.
+    /// Loading runs the file's initialisers, so the file must be trusted.
     ///
     /// # Errors
     ///
-    /// [`Error::Unusable`] when the file cannot be opened, is not Embree, is neither version 3 nor 4, or does
-    /// not find the triangle of the trial scene where it is.
+    /// [`Error::Unusable`] if the file cannot be opened, is not Embree 3 or 4, or fails the test scene.
     pub fn load_from(path: impl AsRef<Path>) -> Result<Library, Error> {
         load(path.as_ref()).map_err(|Refusal { path, reason }| Error::Unusable { path, reason })
     }
@@ -58,9 +57,9 @@ fn load_first(names: &[&str]) -> Result<Library, Error> {
 }
 
 fn load(path: &Path) -> Result<Library, Refusal> {
-    // SAFETY: initialisers run here; that the file is to be trusted is in the documentation.
+    // SAFETY: initialisers run here. The documentation requires a trusted file.
     let library = unsafe { open(path) }?;
-    // SAFETY: the symbols carry Embree's names; the library is never unloaded (see below).
+    // SAFETY: the symbols have Embree's names, and the library is never unloaded (see below).
     let common = unsafe { Common::load(&library) }.map_err(|error| {
         let missing = Refusal::by_loader(path, &error).reason;
         Refusal::new(path, format!("not Embree 3 or 4 ({missing})"))
@@ -69,19 +68,18 @@ fn load(path: &Path) -> Result<Library, Refusal> {
 
     let version = probe::version(&common).map_err(|reason| Refusal::new(&path, reason))?;
     let trace = match version.major {
-        // SAFETY: as for `common`; the version says which form the functions have.
+        // SAFETY: as for `common`. The version determines the signatures.
         3 => unsafe { Trace3::load(&library) }.map(Trace::V3),
         // SAFETY: as above.
         4 => unsafe { Trace4::load(&library) }.map(Trace::V4),
         _ => return Err(Refusal::new(&path, format!("Embree {version} is neither version 3 nor 4"))),
     }
     .map_err(|error| Refusal::by_loader(&path, &error))?;
-    // Embree's worker threads may still be on their way out when the last device is released, so its
-    // code must stay mapped.
+    // Embree's worker threads may still be running when the last device is released, so the code must stay mapped.
     std::mem::forget(library);
 
-    let untried = Library::new(&path, version, 0, common, trace);
-    let extent = probe::try_out(&untried).map_err(|reason| Refusal::new(&path, reason))?;
+    let untested = Library::new(&path, version, 0, common, trace);
+    let extent = probe::try_out(&untested).map_err(|reason| Refusal::new(&path, reason))?;
     Ok(Library::new(&path, version, extent, common, trace))
 }
 

@@ -1,8 +1,8 @@
-//! Tries a library out before it is used: which version it says it is, and whether its structures are ours.
+//! Tests a library before it is used: reads its version, and checks that its structures have the expected layout.
 //!
-//! Nothing in a C library tells how it was configured, and some options move fields (more than one level of
-//! instances) or make rays go unanswered (no filter functions). So a triangle is placed behind an instance
-//! and hit once, with guard bytes behind the structure that Embree fills.
+//! A C library does not report its build options. Some of them move fields (more than one level of instances) or
+//! disable filter functions. So a ray is traced to a triangle in an instance, with guard bytes behind the structure
+//! that Embree fills.
 
 use std::mem::offset_of;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::scene::{Scene, SceneBuilder};
 
 /// The version that a device of the library reports.
 pub fn version(common: &Common) -> Result<Version, String> {
-    // SAFETY: the configuration is a C string; a null device is not used further; the device is released once.
+    // SAFETY: the configuration is a C string, a null device is not used further, and the device is released once.
     unsafe {
         let device = (common.new_device)(c"threads=1".as_ptr());
         if device.is_null() {
@@ -37,7 +37,8 @@ pub fn version(common: &Common) -> Result<Version, String> {
     }
 }
 
-/// Traces two rays and returns the number of bytes of the ray's structure in use, or what was wrong.
+/// Tests the library in a small scene. Returns the number of bytes of `RTCRayHit` that it writes, or the reason why it
+/// cannot be used.
 pub fn try_out(library: &Library) -> Result<usize, String> {
     let scene = trial_scene(library).map_err(|error| format!("the trial scene failed: {error}"))?;
     let ray = Ray { origin: [5.25, 0.25, 2.0], direction: [0.0, 0.0, -1.0], tmin: 0.0, tmax: 9.0, token: 0 };
@@ -48,7 +49,7 @@ pub fn try_out(library: &Library) -> Result<usize, String> {
     }
     let ids = (hit.geometry, hit.instance, hit.primitive);
     let numbers = [raw.ray.tfar, hit.u, hit.v];
-    // Embree divides by an approximate reciprocal, so equality would be too much to ask.
+    // Not exactly equal, because Embree divides by an approximate reciprocal.
     let close = numbers.iter().zip([2.0, 0.25, 0.25]).all(|(a, b)| (a - b).abs() < 1e-4);
     if ids != (3, 7, 1) || !close {
         return Err(format!(
@@ -84,23 +85,23 @@ fn trial_scene(library: &Library) -> Result<Scene, Error> {
 
 const GUARD: u8 = 0xAB;
 
-/// Room for the structure and for whatever might be written behind it.
+/// Memory for the structure and for bytes that a library might write behind it.
 #[repr(C, align(64))]
 struct Guarded([u8; 512]);
 
-/// Traces a ray with guard bytes where the hit will be written and behind it. Returns what was found, and
-/// where the last byte that changed ends.
+/// Traces a ray with guard bytes in place of the hit and behind it. Returns the ray and hit, and the offset behind the
+/// last byte that changed.
 fn guarded_intersect(scene: &Scene, ray: &Ray) -> (RawRayHit, usize) {
     let mut buffer = Guarded([GUARD; 512]);
     let start = buffer.0.as_mut_ptr();
-    // SAFETY: both writes are inside `buffer` and aligned. Embree wants the geometry's id set to invalid.
-    // The pointer is good for the whole of `buffer`, so what the library writes behind the structure is too.
+    // SAFETY: both writes are aligned and inside `buffer`. Embree requires an invalid id of the geometry. The pointer
+    // is valid for all of `buffer`, so the library may write behind the structure.
     unsafe {
         start.cast::<RawRay>().write(RawRay::new(ray));
         start.add(offset_of!(RawRayHit, hit.geometry)).cast::<u32>().write(api::INVALID_GEOMETRY_ID);
         scene.trace.intersect(scene.raw, start.cast());
     }
     let end = buffer.0.iter().rposition(|&byte| byte != GUARD).map_or(0, |last| last + 1);
-    // SAFETY: `buffer` is large enough, aligned, initialised, and any bits make a `RawRayHit`.
+    // SAFETY: `buffer` is large enough, aligned and initialised, and all bit patterns are valid for `RawRayHit`.
     (unsafe { buffer.0.as_ptr().cast::<RawRayHit>().read() }, end)
 }

@@ -1,4 +1,4 @@
-//! What a scene answers for a ray. The hot path: no allocation, no lock, one call through a C function pointer.
+//! Ray queries. This is the hot path: it has no allocation and no lock, and one call through a C function pointer.
 
 use crate::api::{INVALID_GEOMETRY_ID, RawHit, RawRay, RawRayHit, RawRayHit8, Valid8};
 use crate::filter;
@@ -7,15 +7,15 @@ use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 
 impl Scene {
-    /// The nearest hit, or none.
+    /// The nearest hit, if any.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
-        if !raw.ray.is_valid(self.reach) {
+        if !raw.ray.is_valid(self.max_ray_coordinate) {
             return None;
         }
-        // SAFETY: the scene is committed and alive; the structure is initialised and as large as any
-        // version's, which was tried when the library was loaded.
+        // SAFETY: the scene is committed and alive. The structure is initialised and large enough for the library,
+        // which was tested when the library was loaded.
         unsafe { self.trace.intersect(self.raw, &mut raw) };
         if self.filtered {
             filter::resume_panic();
@@ -23,24 +23,25 @@ impl Scene {
         (raw.hit.geometry != INVALID_GEOMETRY_ID).then(|| Hit::new(raw.ray.tfar, &raw.hit))
     }
 
-    /// Calls `each` with every hit on the segment, in no order. For few and short rays: each hit is a call back from
-    /// Embree.
+    /// Calls `each` with every hit on the segment, in arbitrary order. Slow, because each hit is a callback from
+    /// Embree: meant for few and short rays.
     pub fn each_hit(&self, ray: &Ray, each: &mut dyn FnMut(Hit)) {
         let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
-        if !raw.ray.is_valid(self.reach) {
+        if !raw.ray.is_valid(self.max_ray_coordinate) {
             return;
         }
         let mut each = each;
-        // SAFETY: as in `intersect`; the filters take what they are given here.
-        unsafe { self.trace.intersect_filtered(self.raw, &mut raw, filter::REPORT, &raw mut each) };
+        // SAFETY: as in `intersect`. The user data has the type that the filters expect.
+        unsafe { self.trace.intersect_filtered(self.raw, &mut raw, filter::REPORT_FILTERS, &raw mut each) };
         filter::resume_panic();
     }
 
-    /// Calls `each` with the nearest hits of up to eight rays that go much the same way, as those of neighbouring
-    /// pixels do: faster than one by one. `ray(k)` is ray k of 8, if there is one.
+    /// Traces up to eight rays of similar directions, such as those of neighbouring pixels, and calls `each` with the
+    /// number and nearest hit of every ray that hits. Faster than [`Scene::intersect`] for each ray. `ray(k)` is ray k
+    /// of 8, if there is one.
     ///
-    /// Ties and rays through edges may be decided otherwise than by [`Scene::intersect`]; which rays are traced
-    /// together decides, nothing else.
+    /// For ties and rays through edges, the hit may differ from that of [`Scene::intersect`]. It depends only on the
+    /// rays of the packet.
     #[inline]
     pub fn intersect8(&self, ray: impl Fn(usize) -> Option<Ray>, mut each: impl FnMut(usize, Hit)) {
         if !self.packets {
@@ -56,7 +57,7 @@ impl Scene {
         let mut all = RawRayHit8 {
             origin: [[0.0; 8]; 3],
             tnear: [0.0; 8],
-            // Rays that are not traced are given a direction and no length.
+            // Rays that are not traced have a direction and a negative length.
             direction: [[0.0; 8], [0.0; 8], [1.0; 8]],
             time: [0.0; 8],
             tfar: [-1.0; 8],
@@ -72,7 +73,8 @@ impl Scene {
             instance_primitive: missed,
         };
         for k in 0..8 {
-            let Some(raw) = ray(k).map(|ray| RawRay::new(&ray)).filter(|ray| ray.is_valid(self.reach)) else {
+            let Some(raw) = ray(k).map(|ray| RawRay::new(&ray)).filter(|ray| ray.is_valid(self.max_ray_coordinate))
+            else {
                 continue;
             };
             valid.0[k] = -1;
@@ -82,8 +84,8 @@ impl Scene {
             }
             (all.tnear[k], all.tfar[k], all.id[k]) = (raw.tnear, raw.tfar, raw.id);
         }
-        // SAFETY: the scene is committed and alive; the structure is initialised and as large as any version's;
-        // `packets` says that the device supports them.
+        // SAFETY: the scene is committed and alive. The structure is initialised and large enough for all versions.
+        // `packets` is true, so the device supports packets.
         unsafe { self.trace.intersect8(&valid, self.raw, &mut all) };
         for k in 0..8 {
             if all.geometry[k] == INVALID_GEOMETRY_ID {
@@ -102,11 +104,11 @@ impl Scene {
         }
     }
 
-    /// Whether anything lies on the segment.
+    /// Whether any hit is on the segment.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut raw = RawRay::new(ray);
-        if !raw.is_valid(self.reach) {
+        if !raw.is_valid(self.max_ray_coordinate) {
             return false;
         }
         // SAFETY: as in `intersect`.
@@ -114,7 +116,7 @@ impl Scene {
         if self.filtered {
             filter::resume_panic();
         }
-        // Embree sets `tfar` to minus infinity, and leaves it as it was otherwise.
+        // Embree sets `tfar` to minus infinity if there is a hit, and else leaves it unchanged.
         raw.tfar < 0.0
     }
 }

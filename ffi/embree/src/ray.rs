@@ -5,46 +5,46 @@ use crate::geometry::GeometryId;
 
 /// A segment of a ray: the points `origin + t * direction` with `tmin <= t <= tmax`.
 ///
-/// A ray with NaN or too large a coordinate hits nothing. Coordinates up to 1e9 are never too large; the limit is
-/// 1.844e18 in scenes without instances.
+/// A ray with NaN or with a coordinate beyond the limit of the scene hits nothing. The limit is 1.844e18 in scenes
+/// without instances, and at least 1e9 in others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where t = 0.
+    /// Point at t = 0.
     pub origin: [f32; 3],
-    /// Need not be of unit length; t counts in its lengths.
+    /// Direction, of any length. The length is the unit of t.
     pub direction: [f32; 3],
-    /// Least t of a hit. Values below 0 act as 0.
+    /// Smallest t of a hit. Negative values count as 0.
     pub tmin: f32,
-    /// Greatest t of a hit; may be infinite. Below `tmin` there is nothing to hit.
+    /// Largest t of a hit; may be infinite. A ray with `tmax < tmin` hits nothing.
     pub tmax: f32,
-    /// Handed to filters as [`Candidate::token`](crate::Candidate::token), and of no other effect.
+    /// Passed to filters as [`Candidate::token`](crate::Candidate::token). It has no other effect.
     pub token: u32,
 }
 
 /// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Distance from the origin, in lengths of the ray's direction. Off by a few units in the last place, as u
-    /// and v are: Embree divides by an approximate reciprocal.
+    /// Distance from the origin in units of the length of the ray's direction. Like u and v, it has an error of a few
+    /// units in the last place, because Embree divides by an approximate reciprocal.
     pub t: f32,
     /// Barycentric coordinate of the triangle's second corner: the point hit is
     /// `(1 - u - v) * p0 + u * p1 + v * p2`.
     pub u: f32,
     /// Barycentric coordinate of the triangle's third corner.
     pub v: f32,
-    /// The triangle's normal `cross(p1 - p0, p2 - p0)`, not normalised, facing wherever the corners' order says.
-    /// In the space of the mesh: for a hit in an instance, before its transform.
+    /// Normal of the triangle, `cross(p1 - p0, p2 - p0)`, not normalized. For a hit in an instance, in the space of the
+    /// mesh before the transform.
     pub ng: [f32; 3],
-    /// The triangle's place among the mesh's triangles.
+    /// Index of the triangle in the mesh.
     pub primitive: u32,
-    /// The mesh, by its id in the scene it was added to.
+    /// Id of the mesh in the scene that it was added to.
     pub geometry: GeometryId,
-    /// The instance it was reached through, by its id in the scene traced; none for that scene's own meshes.
+    /// Id of the instance in the traced scene; `None` for meshes of that scene.
     pub instance: Option<GeometryId>,
 }
 
 impl Hit {
-    /// What Embree has written, at `t`.
+    /// The hit that Embree has written to `hit`, at the distance `t`.
     #[inline(always)]
     pub(crate) fn new(t: f32, hit: &RawHit) -> Hit {
         Hit {
@@ -74,14 +74,14 @@ impl RawRay {
         }
     }
 
-    /// Whether the segment holds any point, and all its numbers are such as Embree takes.
+    /// Whether the segment is not empty and its coordinates are at most `max_coordinate`.
     ///
-    /// Asked before Embree is: a library built with assertions, as Debian's 3.13.5 is, aborts the program
-    /// on any other ray, and `occluded` tells the answer by the sign of `tfar`.
+    /// Embree must not trace any other ray: a library built with assertions, such as Debian's 3.13.5, aborts the
+    /// program, and `occluded` needs a `tfar` that is not negative.
     #[inline(always)]
-    pub(crate) fn is_valid(&self, reach: f32) -> bool {
-        // Written so that NaN is invalid, and without branches.
-        let within = |x: f32| x.abs() <= reach;
+    pub(crate) fn is_valid(&self, max_coordinate: f32) -> bool {
+        // This form rejects NaN and has no branches.
+        let within = |x: f32| x.abs() <= max_coordinate;
         let [a, b, c] = self.origin.map(within);
         let [d, e, f] = self.direction.map(within);
         a & b & c & d & e & f & (self.tnear <= self.tfar)

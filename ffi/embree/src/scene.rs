@@ -10,36 +10,38 @@ use crate::filter::{self, Filter};
 use crate::geometry::{Bounds, GeometryId, MAX_COORDINATE, MAX_GEOMETRY_ID};
 use crate::transform;
 
-/// A scene in the making.
+/// Builds a scene.
 ///
-/// Scenes are robust: rays do not slip between triangles that share an edge. At corners Embree leaves a gap about
-/// as wide as rounding: of rays aimed exactly at the corners of a tessellated sphere, one or two in a hundred miss.
+/// Scenes are built in Embree's robust mode: rays do not pass between triangles that share an edge. At corners a gap of
+/// about the rounding error remains: one or two in a hundred rays aimed exactly at the corners of a tessellated sphere
+/// miss it.
 ///
-/// Which of two triangles is hit by a ray through their common edge depends neither on the number of threads nor on
-/// the run. Build quality is medium for that reason: of Embree's builders only the one for high quality is not
-/// deterministic, by its makers' word. Robust scenes do without it in any case.
+/// The triangle that is hit by a ray through a shared edge depends neither on the number of threads nor on the run.
+/// Therefore the build quality is medium: according to Embree's documentation, only the builder for high quality is not
+/// deterministic, and robust scenes do not use it anyway.
 pub struct SceneBuilder {
     owned: Owned,
-    kinds: HashMap<GeometryId, Kind>,
+    geometries: HashMap<GeometryId, BuilderGeometry>,
     has_instances: bool,
     has_filters: bool,
-    /// Largest coordinate a ray may have.
-    reach: f32,
+    /// Largest valid coordinate of a ray.
+    max_ray_coordinate: f32,
 }
 
-/// What an id stands for.
-enum Kind {
-    /// A mesh, attached to the scene.
+/// A geometry of a scene builder.
+enum BuilderGeometry {
+    /// A mesh.
     Mesh(Geometry),
-    /// A mesh without triangles, which Embree need not know of.
+    /// A mesh without triangles, which is not passed to Embree.
     Empty,
+    /// An instance of another scene.
     Instance(Geometry),
 }
 
-/// Embree's scene, and what it points to. The fields are dropped in this order.
+/// An Embree scene and the objects that it points to. The fields are dropped in this order.
 struct Owned {
     raw: RawScene,
-    /// `Arc`s, and so at addresses that stay: Embree holds them.
+    /// Filters whose addresses Embree holds. An `Arc` keeps the address stable.
     filters: Vec<Arc<Filter>>,
     children: Vec<Scene>,
 }
@@ -49,15 +51,15 @@ struct RawScene {
     device: Device,
 }
 
-/// A geometry, of which we hold one reference.
+/// An Embree geometry, of which this value holds one reference.
 struct Geometry {
     raw: Handle,
     device: Device,
 }
 
-// SAFETY: Embree's objects are reference-counted atomically and tied to no thread; changes go through `&mut`.
+// SAFETY: Embree's objects have atomic reference counts and belong to no thread. Changes need `&mut`.
 unsafe impl Send for RawScene {}
-// SAFETY: as above; with `&` a committed scene is only read.
+// SAFETY: as above. Through `&` a committed scene is only read.
 unsafe impl Sync for RawScene {}
 // SAFETY: as for `RawScene`.
 unsafe impl Send for Geometry {}
@@ -86,21 +88,21 @@ impl Geometry {
         Ok(Geometry { raw, device: device.clone() })
     }
 
-    /// Copies triples into a new buffer of the geometry, which Embree pads as its vector loads need.
+    /// Copies `items` to a new buffer of the geometry, which Embree pads as its vector loads require.
     fn fill<T: Copy>(&self, buffer: u32, format: u32, items: &[[T; 3]]) -> Result<(), Error> {
         const { assert!(size_of::<[T; 3]>() == 12) };
         let during = "make a buffer";
         // SAFETY: the geometry is alive; Embree allocates at least `items.len()` items of 12 bytes.
         let memory = unsafe { (self.device.common().new_buffer)(self.raw, buffer, 0, format, 12, items.len()) };
         let memory = self.device.check_handle(memory, during)?;
-        // SAFETY: `memory` has room for the items, is aligned to 16 and is nobody else's.
+        // SAFETY: `memory` has room for the items, is aligned to 16, and nothing else refers to it.
         unsafe { std::ptr::copy_nonoverlapping(items.as_ptr(), memory as *mut [T; 3], items.len()) };
         Ok(())
     }
 }
 
 impl SceneBuilder {
-    /// Begins an empty scene.
+    /// Creates a builder of an empty scene.
     ///
     /// # Errors
     ///
@@ -120,23 +122,23 @@ impl SceneBuilder {
         let owned = Owned { raw, filters: Vec::new(), children: Vec::new() };
         Ok(SceneBuilder {
             owned,
-            kinds: HashMap::new(),
+            geometries: HashMap::new(),
             has_instances: false,
             has_filters: false,
-            reach: MAX_COORDINATE,
+            max_ray_coordinate: MAX_COORDINATE,
         })
     }
 
-    /// Adds a mesh of triangles `indices` over corners `positions`, both copied. Degenerate triangles are
-    /// allowed and never hit; so are meshes without triangles.
+    /// Adds a triangle mesh and copies its data. Degenerate triangles are allowed and never hit. A mesh without
+    /// triangles is allowed, too.
     ///
     /// # Errors
     ///
-    /// [`Error::BadVertex`], [`Error::BadIndex`], [`Error::DuplicateId`], [`Error::IdTooLarge`], or
-    /// [`Error::Embree`] when memory is short. The builder may be used on after an error.
+    /// [`Error::BadVertex`], [`Error::BadIndex`], [`Error::DuplicateId`], [`Error::IdTooLarge`], or [`Error::Embree`]
+    /// when memory is short. The builder stays usable after an error.
     pub fn triangles(&mut self, id: GeometryId, positions: &[[f32; 3]], indices: &[[u32; 3]]) -> Result<(), Error> {
         self.check_id(id)?;
-        // Written so that NaN fails too.
+        // This form rejects NaN.
         let fits = |position: &[f32; 3]| position.iter().all(|x| x.abs() <= MAX_COORDINATE);
         if let Some(vertex) = positions.iter().position(|position| !fits(position)) {
             return Err(Error::BadVertex { geometry: id, vertex, position: positions[vertex] });
@@ -148,18 +150,18 @@ impl SceneBuilder {
             }
         }
         if indices.is_empty() {
-            self.kinds.insert(id, Kind::Empty);
+            self.geometries.insert(id, BuilderGeometry::Empty);
             return Ok(());
         }
         let mesh = Geometry::new(self.device(), api::GEOMETRY_TYPE_TRIANGLE)?;
         mesh.fill(api::BUFFER_TYPE_VERTEX, api::FORMAT_FLOAT3, positions)?;
         mesh.fill(api::BUFFER_TYPE_INDEX, api::FORMAT_UINT3, indices)?;
-        self.kinds.insert(id, Kind::Mesh(mesh));
+        self.geometries.insert(id, BuilderGeometry::Mesh(mesh));
         Ok(())
     }
 
-    /// Adds an instance of a committed scene. `local_to_world` is the affine map's 3x4 matrix, column by
-    /// column: the images of the x, y and z axes, then the translation.
+    /// Adds an instance of a committed scene. `local_to_world` is the column-major 3x4 matrix of the affine transform:
+    /// the images of the x, y and z axes, then the translation.
     ///
     /// # Errors
     ///
@@ -173,7 +175,7 @@ impl SceneBuilder {
         if child.shared.has_instances {
             return Err(Error::NestedInstance(id));
         }
-        let Some(reach) = transform::reach(local_to_world, child.bounds()) else {
+        let Some(limit) = transform::max_ray_coordinate(local_to_world, child.bounds()) else {
             return Err(Error::BadTransform { geometry: id, local_to_world: *local_to_world });
         };
         let instance = Geometry::new(self.device(), api::GEOMETRY_TYPE_INSTANCE)?;
@@ -187,25 +189,25 @@ impl SceneBuilder {
         }
         self.device().check("make an instance")?;
         self.owned.children.push(child.clone());
-        self.reach = self.reach.min(reach);
+        self.max_ray_coordinate = self.max_ray_coordinate.min(limit);
         self.has_instances = true;
         self.has_filters |= child.filtered;
-        self.kinds.insert(id, Kind::Instance(instance));
+        self.geometries.insert(id, BuilderGeometry::Instance(instance));
         Ok(())
     }
 
-    /// Lets `filter` decide on every hit of the mesh `id`, for [`Scene::intersect`] and [`Scene::occluded`]
-    /// alike. A mesh has one filter, the one set last. It must be a pure function of its candidate (see
-    /// [`Filter`]). If it panics, the panic continues from the call that traced the ray.
+    /// Sets the filter of the mesh `id`, which decides on every hit of all queries. It replaces an earlier filter of
+    /// the mesh. It must be a pure function (see [`Filter`]). If it panics, the panic continues in the call that traces
+    /// the ray.
     ///
     /// # Errors
     ///
-    /// [`Error::NoSuchMesh`] unless `id` was given to [`SceneBuilder::triangles`] before.
+    /// [`Error::NoSuchMesh`] unless `id` was passed to [`SceneBuilder::triangles`] before.
     pub fn filter(&mut self, id: GeometryId, filter: Filter) -> Result<(), Error> {
-        let mesh = match self.kinds.get(&id) {
-            Some(Kind::Mesh(mesh)) => mesh,
-            Some(Kind::Empty) => return Ok(()),
-            Some(Kind::Instance(_)) | None => return Err(Error::NoSuchMesh(id)),
+        let mesh = match self.geometries.get(&id) {
+            Some(BuilderGeometry::Mesh(mesh)) => mesh,
+            Some(BuilderGeometry::Empty) => return Ok(()),
+            Some(BuilderGeometry::Instance(_)) | None => return Err(Error::NoSuchMesh(id)),
         };
         let filter = Arc::new(filter);
         let common = self.owned.raw.device.common();
@@ -229,8 +231,8 @@ impl SceneBuilder {
         let device = self.owned.raw.device.clone();
         let common = device.common();
         let scene = self.owned.raw.raw;
-        for (id, kind) in &self.kinds {
-            if let Kind::Mesh(geometry) | Kind::Instance(geometry) = kind {
+        for (id, geometry) in &self.geometries {
+            if let BuilderGeometry::Mesh(geometry) | BuilderGeometry::Instance(geometry) = geometry {
                 // SAFETY: both are alive; the scene takes its own reference to the geometry.
                 unsafe {
                     (common.commit_geometry)(geometry.raw);
@@ -251,7 +253,7 @@ impl SceneBuilder {
             trace,
             packets,
             filtered: self.has_filters,
-            reach: self.reach,
+            max_ray_coordinate: self.max_ray_coordinate,
             shared: Arc::new(shared),
         })
     }
@@ -264,24 +266,25 @@ impl SceneBuilder {
         if id > MAX_GEOMETRY_ID {
             return Err(Error::IdTooLarge(id));
         }
-        match self.kinds.contains_key(&id) {
+        match self.geometries.contains_key(&id) {
             true => Err(Error::DuplicateId(id)),
             false => Ok(()),
         }
     }
 }
 
-/// A committed scene: immutable, shared by its clones, and free to be traced from many threads at once.
-/// It keeps alive the scenes it instances, its filters, and its device.
+/// A committed scene: immutable, shared by its clones, and safe to trace from many threads at once. It keeps its
+/// instanced scenes, its filters and its device alive.
 #[derive(Clone)]
 pub struct Scene {
-    // Here rather than behind the `Arc`, so that a ray costs one indirection less.
+    // Outside of the `Arc`, so that a ray costs one indirection less.
     pub(crate) raw: Handle,
     pub(crate) trace: Trace,
     pub(crate) filtered: bool,
-    /// Rays may be traced eight at once. Filters are called with one ray at a time.
+    /// Whether rays may be traced in packets of eight. Not with filters, which expect single rays.
     pub(crate) packets: bool,
-    pub(crate) reach: f32,
+    /// Largest valid coordinate of a ray.
+    pub(crate) max_ray_coordinate: f32,
     shared: Arc<Shared>,
 }
 
@@ -296,7 +299,7 @@ unsafe impl Send for Scene {}
 unsafe impl Sync for Scene {}
 
 impl Scene {
-    /// The smallest axis-aligned box around everything in the scene; none if it is empty.
+    /// The smallest axis-aligned box that contains the scene; `None` if the scene is empty.
     pub fn bounds(&self) -> Option<Bounds> {
         let device = &self.shared.owned.raw.device;
         let mut bounds = RawBounds { lower: [f32::INFINITY; 4], upper: [f32::NEG_INFINITY; 4] };

@@ -1,20 +1,20 @@
-//! Which instance transforms can be traced, and with which rays.
+//! Limits on instance transforms, and on the rays in scenes with instances.
 //!
-//! Embree carries rays into the instance's space by the inverse matrix, in single precision, and takes only
-//! coordinates up to [`MAX_COORDINATE`] there too: a library built with assertions aborts the program on others.
+//! Embree transforms rays to the space of an instance in single precision. Coordinates there must not exceed
+//! [`MAX_COORDINATE`] either: a library built with assertions aborts the program.
 
 use crate::geometry::{Bounds, MAX_COORDINATE};
 
-/// Every scene takes rays with coordinates at least this large.
-const LEAST_REACH: f32 = 1e9;
+/// Every scene accepts rays with coordinates up to at least this value.
+const MIN_RAY_LIMIT: f32 = 1e9;
 
-/// Least volume of the parallelepiped of the unit axes' images, scaled to unit length. Below, rounding makes the
-/// inverse meaningless.
-const LEAST_VOLUME: f64 = 1e-4;
+/// Smallest volume of the parallelepiped spanned by the images of the axes, scaled to unit length. Below it, rounding
+/// errors make the inverse useless.
+const MIN_VOLUME: f64 = 1e-4;
 
-/// The largest coordinate of a ray's origin and direction that stays valid in the instance's space. None if the
-/// matrix (column-major 3x4) is not finite, not invertible, or too extreme for single precision.
-pub fn reach(local_to_world: &[f32; 12], child: Option<Bounds>) -> Option<f32> {
+/// The largest coordinate of a ray that stays valid in the space of the instance. `None` if the matrix (column-major
+/// 3x4) is not finite, not invertible, or too extreme for single precision.
+pub fn max_ray_coordinate(local_to_world: &[f32; 12], child: Option<Bounds>) -> Option<f32> {
     if !local_to_world.iter().all(|x| x.is_finite()) {
         return None;
     }
@@ -23,8 +23,8 @@ pub fn reach(local_to_world: &[f32; 12], child: Option<Bounds>) -> Option<f32> {
     let [x, y, z, move_by] = [column(0), column(3), column(6), column(9)];
     let determinant = dot(x, cross(y, z));
     let lengths = [x, y, z].map(|v| dot(v, v).sqrt()).iter().product::<f64>();
-    // Embree forms the determinant in f32; written so that NaN fails.
-    let regular = (determinant as f32).is_normal() && determinant.abs() >= LEAST_VOLUME * lengths;
+    // Embree computes the determinant in f32. This form rejects NaN.
+    let regular = (determinant as f32).is_normal() && determinant.abs() >= MIN_VOLUME * lengths;
     if !regular {
         return None;
     }
@@ -38,11 +38,12 @@ pub fn reach(local_to_world: &[f32; 12], child: Option<Bounds>) -> Option<f32> {
     if far {
         return None;
     }
-    // Each row of the inverse gives |local| <= sum |row| * |ray| + |moved|; half is left to rounding.
+    // For each row of the inverse, |local| <= sum |row| * |ray| + |row . translation|. Half of the range is left for
+    // rounding errors.
     let rows = [cross(y, z), cross(z, x), cross(x, y)].map(|v| v.map(|a| a / determinant));
     let bound = |row: [f64; 3]| (0.5 * max - dot(row, move_by).abs()) / row.iter().map(|a| a.abs()).sum::<f64>();
-    let reach = rows.into_iter().map(bound).fold(max, f64::min) as f32;
-    (reach >= LEAST_REACH).then_some(reach)
+    let limit = rows.into_iter().map(bound).fold(max, f64::min) as f32;
+    (limit >= MIN_RAY_LIMIT).then_some(limit)
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -1,4 +1,4 @@
-//! The binding against whichever Embree `CAUSTIQUE_EMBREE` names, or the one the system has.
+//! Tests the binding with the Embree that `CAUSTIQUE_EMBREE` names, or that the system has.
 
 mod support;
 
@@ -21,6 +21,7 @@ fn down(x: f32, y: f32) -> Ray {
     ray([x, y, 5.0], [0.0, 0.0, -1.0])
 }
 
+/// The hits of a packet of rays.
 fn together(scene: &Scene, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
     let mut hits = [None; 8];
     scene.intersect8(|k| rays[k], |k, hit| hits[k] = Some(hit));
@@ -28,12 +29,12 @@ fn together(scene: &Scene, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
 }
 
 #[test]
-fn library_says_what_it_is_and_stays_within_the_structure() {
+fn the_library_reports_its_version_and_stays_within_the_structure() {
     let library = library();
     let version = library.version();
     assert!(version.major == 3 || version.major == 4, "{version}");
     assert!(library.path().to_string_lossy().contains("embree"), "{library:?}");
-    // 4.3 brought `instPrimID`.
+    // Embree has `instPrimID` since 4.3.
     let expected = if (version.major, version.minor) >= (4, 3) { 84 } else { 80 };
     assert_eq!(library.hit_extent(), expected, "{version}");
 }
@@ -64,7 +65,7 @@ fn one_triangle_is_hit_with_its_coordinates_and_normal() {
     let hit = scene.intersect(&down(0.5, 1.5)).unwrap();
     assert_close([hit.t, hit.u, hit.v], [5.0, 0.25, 0.5]);
     assert_eq!((hit.primitive, hit.geometry, hit.instance), (0, ID, None));
-    // cross(p1 - p0, p2 - p0), of twice the triangle's area, from whichever side it is hit.
+    // cross(p1 - p0, p2 - p0), whose length is twice the area of the triangle, for hits from both sides.
     assert_eq!(hit.ng, [0.0, 0.0, 6.0]);
     let from_below = scene.intersect(&ray([0.5, 1.5, -5.0], [0.0, 0.0, 1.0])).unwrap();
     assert_eq!(from_below.ng, [0.0, 0.0, 6.0]);
@@ -76,7 +77,7 @@ fn one_triangle_is_hit_with_its_coordinates_and_normal() {
 }
 
 #[test]
-fn segment_ends_count() {
+fn hits_are_within_the_segment() {
     let scene = one_triangle();
     let segment = |tmin, tmax| Ray { tmin, tmax, ..down(0.5, 0.5) };
     for (tmin, tmax, expected) in [
@@ -95,14 +96,14 @@ fn segment_ends_count() {
         assert_eq!(scene.intersect(&segment).is_some(), expected, "{segment:?}");
         assert_eq!(scene.occluded(&segment), expected, "{segment:?}");
     }
-    // Behind the origin there is nothing, however low tmin is.
+    // A negative tmin does not reach behind the origin.
     let behind = Ray { tmin: -9.0, ..ray([0.5, 0.5, -1.0], [0.0, 0.0, -1.0]) };
     assert_eq!(scene.intersect(&behind), None);
     assert!(!scene.occluded(&behind));
 }
 
 #[test]
-fn rays_of_odd_numbers_do_no_harm() {
+fn rays_with_extreme_numbers_do_not_crash() {
     let scene = million();
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, f32::MIN_POSITIVE / 4.0, f32::MAX, 0.3];
     for x in odd {
@@ -136,7 +137,7 @@ fn a_million_triangles_agree_with_brute_force() {
             (Some(hit), Some((t, near))) => {
                 hits += 1;
                 assert!((f64::from(hit.t) - t).abs() < 1e-5 * (1.0 + t), "{hit:?}, {t}");
-                // On an edge either neighbour will do.
+                // On an edge, both adjacent triangles are correct.
                 assert!(near.contains(&hit.primitive), "{hit:?}, {near:?}");
                 let corners = indices[hit.primitive as usize].map(|index| positions[index as usize]);
                 let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
@@ -152,7 +153,7 @@ fn a_million_triangles_agree_with_brute_force() {
     assert!((10..50).contains(&hits), "{hits} of 60 rays hit: a poor test");
 }
 
-/// Eight at once find what one finds: the same triangle, but for rays within rounding of an edge.
+/// Packets find the same triangles as single rays, except for rays within rounding errors of an edge.
 #[test]
 fn packets_agree_with_single_rays() {
     let scene = million();
@@ -164,7 +165,7 @@ fn packets_agree_with_single_rays() {
         let rays: [Option<Ray>; 8] = std::array::from_fn(|k| {
             let spread = 0.05 * random.unit();
             let direction = [towards[0] + spread, towards[1] - spread, towards[2]];
-            // Some absent, some that Embree must not see.
+            // Some rays are absent, and some must not be passed to Embree.
             match (packet + k) % 11 {
                 0 => None,
                 1 => Some(ray([f32::NAN, 0.0, 0.0], direction)),
@@ -191,9 +192,8 @@ fn packets_agree_with_single_rays() {
     assert!(hits > 20_000 && others * 1000 < hits, "{hits} alike, {others} not");
 }
 
-/// With filters, and through instances.
 #[test]
-fn packets_call_filters_and_reach_into_instances() {
+fn packets_call_filters_and_hit_instances() {
     let scene = sheets(|candidate| candidate.token == 0);
     let rays: [Option<Ray>; 8] =
         std::array::from_fn(|k| Some(Ray { token: k as u32 % 2, ..down(0.1 + 0.02 * k as f32, 0.2) }));
@@ -229,10 +229,10 @@ fn intersect_and_occluded_agree() {
     assert!((20_000..180_000).contains(&hits), "{hits}");
 }
 
-/// A closed surface, from inside: no ray may escape through an edge. Aimed exactly at a corner, where six
-/// triangles meet, some do in Embree (see `SceneBuilder`); a change in how many is worth knowing of.
+/// No ray from inside of a closed surface escapes through an edge. Of rays aimed exactly at corners, where six
+/// triangles meet, at most 2 % escape (see `SceneBuilder`).
 #[test]
-fn rays_do_not_slip_through_edges() {
+fn rays_do_not_escape_through_edges() {
     let (positions, indices) = sphere(64);
     let mut builder = builder();
     builder.triangles(ID, &positions, &indices).unwrap();
@@ -286,7 +286,7 @@ fn bad_vertices_are_named() {
             let error = builder.triangles(ID, &positions, &[[0, 1, 2]]).unwrap_err();
             assert!(matches!(error, Error::BadVertex { geometry: ID, vertex: 1, .. }), "{error:?}");
             assert!(error.to_string().starts_with("geometry 4: vertex 1 at ("), "{error}");
-            // The builder is as it was.
+            // The builder is unchanged.
             builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();
             assert!(builder.commit().unwrap().occluded(&down(0.5, 0.5)));
         }
@@ -316,22 +316,22 @@ fn bad_ids_are_refused() {
     assert_eq!(scene.intersect(&down(9.5, 0.5)).unwrap().geometry, MAX_GEOMETRY_ID);
 }
 
-/// Turns x to y and y to -x, doubles z, then moves by (10, 20, 30): column by column.
+/// Column-major matrix that rotates x to y and y to -x, doubles z, and translates by (10, 20, 30).
 const MAP: [f32; 12] = [0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 2.0, 10.0, 20.0, 30.0];
 
 #[test]
-fn instance_is_hit_where_its_map_puts_it() {
+fn instances_are_hit_at_their_transformed_position() {
     let child = one_triangle();
     let mut builder = builder();
     builder.triangles(GeometryId(0), &[[-9.0, -9.0, 0.0], [-8.0, -9.0, 0.0], [-9.0, -8.0, 0.0]], &[[0, 1, 2]]).unwrap();
     builder.instance(GeometryId(6), &child, &MAP).unwrap();
     drop(child);
     let scene = builder.commit().unwrap();
-    // (0.5, 1.5, 0) goes to (-1.5 + 10, 0.5 + 20, 30).
+    // (0.5, 1.5, 0) is transformed to (-1.5 + 10, 0.5 + 20, 30).
     let hit = scene.intersect(&ray([8.5, 20.5, 50.0], [0.0, 0.0, -2.0])).unwrap();
     assert_close([hit.t, hit.u, hit.v], [10.0, 0.25, 0.5]);
     assert_eq!((hit.primitive, hit.geometry, hit.instance), (0, ID, Some(GeometryId(6))));
-    // The normal is the mesh's, before the map.
+    // The normal is in the space of the mesh.
     assert_eq!(hit.ng, [0.0, 0.0, 6.0]);
     let own = scene.intersect(&ray([-8.9, -8.9, 5.0], [0.0, 0.0, -1.0])).unwrap();
     assert_eq!((own.geometry, own.instance), (GeometryId(0), None));
@@ -339,7 +339,7 @@ fn instance_is_hit_where_its_map_puts_it() {
     assert_eq!((bounds.min, bounds.max), ([-9.0, -9.0, 0.0], [10.0, 22.0, 30.0]));
 }
 
-/// A tilted triangle under a map that tilts it further: the normal must be told apart from the world's.
+/// The transform tilts the triangle, so the normals in both spaces differ.
 #[test]
 fn instance_normals_are_in_the_space_of_the_mesh() {
     let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [0.0, 1.0, 0.25]];
@@ -375,9 +375,9 @@ fn bad_instances_are_refused() {
     assert_eq!(nested, Err(Error::NestedInstance(ID)));
 }
 
-/// Debian's Embree 3 is built with assertions, and aborts on rays that the inverse map makes too large.
+/// Debian's Embree 3 is built with assertions and aborts if the inverse transform makes a ray too large.
 #[test]
-fn extreme_instances_are_refused_or_do_no_harm() {
+fn extreme_instances_are_refused_or_do_not_crash() {
     let child = one_triangle();
     let mut random = Random(23);
     let (mut taken, mut refused) = (0, 0);
@@ -390,7 +390,7 @@ fn extreme_instances_are_refused_or_do_no_harm() {
             map[3 * column..][..3].copy_from_slice(&random.direction().map(|x| length * x));
         }
         if random.unit() < 0.3 {
-            // All but flat.
+            // Nearly flat.
             let k = (random.unit() * 3.0) as usize;
             map[6 + k] = map[k];
         }
@@ -412,7 +412,7 @@ fn extreme_instances_are_refused_or_do_no_harm() {
             scene.intersect(&ray(origin, direction));
             scene.occluded(&ray(origin, direction));
         }
-        // At the triangle itself, from an origin not far away in its own measure.
+        // A ray at the triangle, from an origin that is near in the space of the mesh.
         let world = |p: [f32; 3]| -> [f32; 3] {
             std::array::from_fn(|k| map[k] * p[0] + map[3 + k] * p[1] + map[6 + k] * p[2] + map[9 + k])
         };
@@ -434,7 +434,7 @@ fn sheets(filter: impl Fn(&Candidate) -> bool + Send + Sync + 'static) -> Scene 
 }
 
 #[test]
-fn filter_rejects_and_the_ray_goes_on() {
+fn rays_continue_after_a_rejected_hit() {
     let scene = sheets(|candidate| {
         assert_eq!((candidate.geometry, candidate.instance, candidate.primitive), (GeometryId(1), None, 0));
         candidate.u < 0.25 && candidate.token == 77
@@ -452,7 +452,7 @@ fn filter_rejects_and_the_ray_goes_on() {
 }
 
 #[test]
-fn filter_inside_an_instance_is_told_of_it() {
+fn candidates_in_an_instance_have_its_id() {
     let mut child = builder();
     child.triangles(GeometryId(2), &TRIANGLE, &[[0, 1, 2]]).unwrap();
     child
@@ -481,7 +481,7 @@ fn filter_inside_an_instance_is_told_of_it() {
 }
 
 #[test]
-fn panic_in_a_filter_reaches_the_caller_and_is_then_over() {
+fn a_panic_in_a_filter_reaches_the_caller_once() {
     let scene = sheets(|candidate| if candidate.token == 13 { panic!("unlucky") } else { true });
     let unlucky = Ray { token: 13, tmax: 1.0, ..ray([0.3, 0.3, 1.5], [0.0, 0.0, -1.0]) };
     let caught = |call: &dyn Fn()| {
@@ -495,7 +495,7 @@ fn panic_in_a_filter_reaches_the_caller_and_is_then_over() {
 }
 
 #[test]
-fn filter_needs_a_mesh_and_the_last_one_counts() {
+fn a_filter_needs_a_mesh_and_replaces_an_earlier_one() {
     let mut builder = builder();
     assert_eq!(builder.filter(ID, Arc::new(|_| true)), Err(Error::NoSuchMesh(ID)));
     builder.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();
@@ -528,7 +528,7 @@ fn scene_outlives_builder_device_and_library_handles() {
 }
 
 #[test]
-fn abandoned_builder_is_freed() {
+fn a_dropped_builder_frees_its_filters() {
     let seen = Arc::new(());
     let held = seen.clone();
     let mut builder = builder();
@@ -555,7 +555,7 @@ fn threads_see_the_same_hits() {
 }
 
 #[test]
-fn threads_may_build_at_once() {
+fn threads_may_build_scenes_at_once() {
     let device = device(0);
     std::thread::scope(|scope| {
         for k in 0..4u32 {
@@ -573,13 +573,12 @@ fn threads_may_build_at_once() {
     });
 }
 
-/// Where triangles coincide, and on common corners and edges, a ray has several right answers. Which one is given
-/// must not depend on the number of threads that built the scene, nor change from build to build.
+/// For coinciding triangles, and at common corners and edges, several hits are correct. The choice must not depend on
+/// the number of threads that built the scene, and must not change from build to build.
 #[test]
 fn ties_do_not_depend_on_threads() {
-    // Flat, of a power of two and hit aslant, so that the six triangles around a corner are at the same distance to the
-    // last bit and in the ray's way all; and now and then a pile of triangles that are one and the same, higher than a
-    // leaf of Embree's tree.
+    // A flat grid whose size is a power of two, hit at an angle, so that a ray at a corner hits six triangles at
+    // exactly the same distance. Some triangles exist 41 times, which is more than fits into a leaf of Embree's BVH.
     let (mut positions, mut indices) = grid(512);
     positions.iter_mut().for_each(|position| position[2] = 0.0);
     let targets = positions.clone();
@@ -603,7 +602,7 @@ fn ties_do_not_depend_on_threads() {
         let found = answers(threads, &indices);
         assert_eq!(differing(&found, &expected), 0, "with {threads} threads");
     }
-    // That these are ties: the same triangles in another order are found to differ.
+    // The test is sensitive: with the triangles in reverse order, other triangles are hit.
     let reversed: Vec<_> = indices.iter().rev().copied().collect();
     let last = indices.len() as u32 - 1;
     let found: Vec<_> = answers(1, &reversed).iter().map(|hit| hit.map(|primitive| last - primitive)).collect();

@@ -1,4 +1,4 @@
-//! Libraries that are missing, or are not Embree.
+//! Errors for libraries that are missing or are not Embree.
 
 use std::path::Path;
 

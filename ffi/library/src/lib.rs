@@ -1,5 +1,5 @@
-//! Finds and opens shared libraries at run time: the part that the bindings of Embree, Open Image Denoise and ONNX
-//! Runtime have in common.
+//! Finds and loads shared libraries at run time: the common part of the bindings of Embree, Open Image Denoise and ONNX
+//! Runtime.
 
 use std::ffi::OsStr;
 use std::fmt;
@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 
 pub use libloading::Library;
 
-/// Levels of folders that [`find_below`] searches under a folder.
-const DEPTH: usize = 3;
+/// Number of levels of subfolders that [`find_below`] searches.
+const MAX_DEPTH: usize = 3;
 
 /// The version number of a library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
-    /// As in 4.
+    /// The first number.
     pub major: u32,
-    /// As in 4.3.
+    /// The second number.
     pub minor: u32,
-    /// As in 4.3.3.
+    /// The third number.
     pub patch: u32,
 }
 
@@ -30,9 +30,9 @@ impl fmt::Display for Version {
 /// A library file that cannot be used, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// The file, or the name that the system's loader was asked for.
+    /// Path of the file, or the name that was passed to the system's loader.
     pub path: PathBuf,
-    /// Why it cannot be used, without the path.
+    /// Reason why it cannot be used, without the path.
     pub reason: String,
 }
 
@@ -50,27 +50,27 @@ impl Refusal {
     }
 }
 
-/// The path in an environment variable that is set and not empty.
+/// The path in the environment variable `name`; `None` if it is not set or empty.
 pub fn path_from_env(name: &str) -> Option<PathBuf> {
     std::env::var_os(name).filter(|path| !path.is_empty()).map(PathBuf::from)
 }
 
-/// Opens the library file at `path`. The system's loader looks a bare file name up in its own folders.
+/// Loads the library file at `path`. The system's loader looks up a bare file name in its own folders.
 ///
 /// # Errors
-/// The loader's message.
+/// The loader cannot load the file.
 ///
 /// # Safety
 /// Loading runs the file's initialisers, so the file must be trusted.
 pub unsafe fn open(path: &Path) -> Result<Library, Refusal> {
-    // SAFETY: the caller answers for the file.
+    // SAFETY: the caller guarantees that the file is trusted.
     unsafe { Library::new(OsStr::new(path)) }.map_err(|error| Refusal::by_loader(path, &error))
 }
 
-/// The first of `candidates` that `load` accepts.
+/// Loads the first of `candidates` that `load` accepts.
 ///
 /// # Errors
-/// Every candidate with the reason of its refusal, in order.
+/// `load` accepts none. The error lists all candidates with the reasons, in order.
 pub fn load_first_of<T>(
     candidates: &[PathBuf],
     load: impl Fn(&Path) -> Result<T, Refusal>,
@@ -85,12 +85,12 @@ pub fn load_first_of<T>(
     Err(tried)
 }
 
-/// The files below `folders` whose names begin with `stem`. In each folder the longest name, which holds the fullest
-/// version number, comes first.
+/// Finds the files below `folders` whose names begin with `stem`. In each folder, longer names come first: they contain
+/// the more complete version number.
 pub fn find_below(folders: &[PathBuf], stem: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for folder in folders {
-        add_files_below(folder, stem, DEPTH, &mut found);
+        add_files_below(folder, stem, MAX_DEPTH, &mut found);
     }
     found
 }
@@ -110,12 +110,12 @@ fn add_files_below(folder: &Path, stem: &str, depth: usize, found: &mut Vec<Path
     }
 }
 
-/// The last part of a path; empty where it is not UTF-8.
+/// The file name of a path; empty if it is not UTF-8.
 pub fn file_name(path: &Path) -> &str {
     path.file_name().and_then(OsStr::to_str).unwrap_or_default()
 }
 
-/// The file that holds the code or data at `address`, by the name that the loader was given.
+/// The file that contains the code or data at `address`, under the name by which it was loaded.
 #[cfg(unix)]
 pub fn file_containing(address: usize) -> Option<PathBuf> {
     use std::ffi::{CStr, c_char, c_int, c_void};
@@ -138,12 +138,12 @@ pub fn file_containing(address: usize) -> Option<PathBuf> {
     if unsafe { dladdr(address as *const c_void, &mut info) } == 0 || info.file_name.is_null() {
         return None;
     }
-    // SAFETY: a non-null name is a C string that lives as long as the library. The bindings never unload one.
+    // SAFETY: a non-null name is a C string that is valid while the library is loaded. The bindings never unload one.
     let name = unsafe { CStr::from_ptr(info.file_name) };
     Some(PathBuf::from(OsStr::from_bytes(name.to_bytes())))
 }
 
-/// The file that holds the code or data at `address`: this system cannot tell.
+/// Always `None`: this system does not report the file that contains an address.
 #[cfg(not(unix))]
 pub fn file_containing(_address: usize) -> Option<PathBuf> {
     None

@@ -1,4 +1,5 @@
-//! How long one picture takes at each quality and what memory, and whether any number of threads gives the same bytes.
+//! Measures time and memory for one picture at each quality, and prints whether all numbers of threads give the same
+//! bytes.
 //!
 //! `cargo run --release -p caustique-oidn --example denoise [WIDTH HEIGHT [THREADS...]]`
 
@@ -8,7 +9,7 @@ use std::time::Instant;
 
 use caustique_oidn::{Device, Error, Input, Library, Quality};
 
-/// Pixels whose values spread over several decades, as those of few samples do.
+/// Random pixels whose values span several decades, like those of a render with few samples.
 fn noise(count: usize, seed: u64) -> Vec<[f32; 3]> {
     let mut state = seed;
     let mut unit = || {
@@ -18,22 +19,22 @@ fn noise(count: usize, seed: u64) -> Vec<[f32; 3]> {
     (0..count).map(|_| std::array::from_fn(|_| 4.0 * unit().powi(3))).collect()
 }
 
-/// Seconds that all threads of this process together have computed, where the system tells.
+/// Core-seconds that this process has used; zero if the system does not report them.
 fn core_seconds() -> f64 {
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // Behind the name, which may hold anything, the 12th and 13th number, in hundredths of a second.
+    // The 12th and 13th number behind the name, which may contain any character. In hundredths of a second.
     let rest = text.rsplit(')').next().unwrap_or_default();
     rest.split_whitespace().skip(11).take(2).flat_map(str::parse::<f64>).sum::<f64>() / 100.0
 }
 
-/// The most memory that this process has had, in MiB, where the system tells.
+/// Peak memory of this process (MiB); zero if the system does not report it.
 fn peak_memory() -> u64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or_default();
     line.trim().trim_end_matches(" kB").parse().unwrap_or(0) / 1024
 }
 
-/// A number that differs where bytes do, as good as surely: FNV-1a.
+/// Hash of the bytes by FNV-1a.
 fn fingerprint(pixels: &[[f32; 3]]) -> u64 {
     let bytes = pixels.iter().flatten().flat_map(|value| value.to_bits().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))

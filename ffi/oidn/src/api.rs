@@ -1,25 +1,25 @@
-//! The C functions and constants we use, and nothing more. All are in every version 2.
+//! The C functions and constants of Open Image Denoise that this crate uses. All exist in every version 2.
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// A device or a filter: opaque pointers, null on failure.
+/// A device or a filter: an opaque pointer, null on failure.
 pub type Handle = *mut c_void;
 
-/// The kind of device that computes on the processor.
+/// Device type of the CPU.
 pub const DEVICE_TYPE_CPU: c_int = 1;
 
 /// Pixels of three floats.
 pub const FORMAT_FLOAT3: c_int = 3;
 
-/// From version 2.3 on.
+/// Exists from version 2.3 on.
 pub const QUALITY_FAST: c_int = 4;
 pub const QUALITY_BALANCED: c_int = 5;
 pub const QUALITY_HIGH: c_int = 6;
 
-/// What [`Functions::device_error`] returns when there was none.
+/// Result of [`Functions::device_error`] if there is no error.
 pub const NO_ERROR: c_int = 0;
 
-/// The library's error codes, as words.
+/// The meaning of an error code.
 pub fn error_name(code: c_int) -> &'static str {
     match code {
         2 => "invalid argument",
@@ -42,7 +42,7 @@ macro_rules! functions {
             /// # Safety
             /// The library's symbols of these names must be Open Image Denoise's, and the library must stay loaded.
             pub unsafe fn load(library: &libloading::Library) -> Result<Self, libloading::Error> {
-                // SAFETY: the caller vouches for the symbols' types and the library's lifetime.
+                // SAFETY: the caller guarantees the symbols' types and the library's lifetime.
                 Ok(unsafe { Self { $($field: *library.get($symbol)?),* } })
             }
         }
@@ -50,7 +50,7 @@ macro_rules! functions {
 }
 
 functions! {
-    /// The typed setters came with version 2.0: an older library lacks them, and is refused for that.
+    /// The functions of the library. Versions before 2.0 lack the typed setters and are therefore refused.
     Functions {
         new_device = b"oidnNewDevice\0" (c_int) -> Handle;
         release_device = b"oidnReleaseDevice\0" (Handle);
@@ -61,7 +61,7 @@ functions! {
         set_device_bool = b"oidnSetDeviceBool\0" (Handle, *const c_char, bool);
         new_filter = b"oidnNewFilter\0" (Handle, *const c_char) -> Handle;
         release_filter = b"oidnReleaseFilter\0" (Handle);
-        // Filter, name, pixels, format, width, height, then offset and strides in bytes (0: packed).
+        // Filter, name, pixels, format, width, height, then offset, pixel stride and row stride in bytes (0: packed).
         set_image = b"oidnSetSharedFilterImage\0"
             (Handle, *const c_char, *mut c_void, c_int, usize, usize, usize, usize, usize);
         unset_image = b"oidnUnsetFilterImage\0" (Handle, *const c_char);

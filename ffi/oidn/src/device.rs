@@ -1,4 +1,4 @@
-//! A device: one set of the library's worker threads.
+//! A device: a set of worker threads of the library.
 
 use std::ffi::{CStr, c_char, c_int};
 use std::sync::Arc;
@@ -10,8 +10,8 @@ use crate::error::Error;
 use crate::library::Library;
 use crate::limits::MAX_THREADS;
 
-/// A device that denoises on the processor. Clones share it; it may be used from several threads, whose pictures are
-/// then denoised one after the other.
+/// A device that denoises on the CPU. Clones share it. Several threads may use it; their pictures are denoised one
+/// after the other.
 #[derive(Clone)]
 pub struct Device {
     inner: Arc<Inner>,
@@ -28,16 +28,15 @@ struct Raw {
     release: unsafe extern "C" fn(Handle),
 }
 
-// SAFETY: the library locks a device in every call that uses it, keeps errors apart by thread, and ties none of its
-// objects to the thread that made them.
+// SAFETY: the library locks a device in every call, stores errors per thread, and its objects belong to no thread.
 unsafe impl Send for Raw {}
 // SAFETY: as above.
 unsafe impl Sync for Raw {}
 
 impl Device {
-    /// Makes a device that denoises with `threads` threads, 0 for as many as the processor has cores. They are not
-    /// tied to cores, which others may be using. The library's own environment variables (`OIDN_NUM_THREADS` and
-    /// its like) have the last word.
+    /// Creates a device that denoises with `threads` threads; 0 means one per core. Threads are not pinned to cores,
+    /// because other programs may use them. The library's own environment variables (`OIDN_NUM_THREADS` and others)
+    /// take precedence.
     ///
     /// # Errors
     ///
@@ -52,7 +51,7 @@ impl Device {
         Ok(Device { inner: Arc::new(Inner { raw, library: library.clone() }) })
     }
 
-    /// The library this device is of.
+    /// The library of this device.
     pub fn library(&self) -> &Library {
         &self.inner.library
     }
@@ -65,7 +64,7 @@ impl Device {
         self.inner.library.functions()
     }
 
-    /// Turns what the library has reported on this thread since the last check into an error.
+    /// Returns the first error that the library has reported on this thread since the last check.
     pub(crate) fn check(&self, during: &'static str) -> Result<(), Error> {
         match take_error(self.functions(), self.raw()) {
             Some(message) => Err(Error::Oidn { during, message }),
@@ -75,12 +74,12 @@ impl Device {
 }
 
 impl Raw {
-    /// Makes a device and readies it, or says why not.
+    /// Creates and commits a device. The error is the library's message.
     fn open(functions: &Functions, threads: c_int) -> Result<Raw, String> {
-        // SAFETY: a constant of the library's.
+        // SAFETY: the argument is a device type of the library.
         let handle = unsafe { (functions.new_device)(api::DEVICE_TYPE_CPU) };
         if handle.is_null() {
-            // Without a device, the error is that of the last failed creation on this thread.
+            // A null device returns the error of the last failed creation on this thread.
             let unknown = || "it made none and did not say why".into();
             return Err(take_error(functions, handle).unwrap_or_else(unknown));
         }
@@ -100,12 +99,13 @@ impl Raw {
 
 impl Drop for Raw {
     fn drop(&mut self) {
-        // SAFETY: the handle came from `new_device` and is released once; filters hold a `Device`, so none is left.
+        // SAFETY: the handle came from `new_device` and is released once. No filter is left, because filters hold a
+        // `Device`.
         unsafe { (self.release)(self.handle) }
     }
 }
 
-/// Makes a device and asks its version, which shows that the library finds its modules.
+/// Creates a device and reads its version. This fails if the library does not find its modules.
 pub(crate) fn probe(functions: &Functions) -> Result<Version, String> {
     let device = Raw::open(functions, 1).map_err(|reason| format!("makes no device for this processor: {reason}"))?;
     let number = |name: &CStr| {
@@ -120,10 +120,10 @@ pub(crate) fn probe(functions: &Functions) -> Result<Version, String> {
     Ok(Version { major, minor, patch })
 }
 
-/// The first error on this thread since the last call, in words, and forgotten by the library then.
+/// Takes the first error that the library has recorded on this thread since the last call.
 fn take_error(functions: &Functions, device: Handle) -> Option<String> {
     let mut text: *const c_char = std::ptr::null();
-    // SAFETY: a device or null; the library fills in the pointer, or leaves it.
+    // SAFETY: `device` is a device or null. The library sets the pointer or leaves it null.
     let code = unsafe { (functions.device_error)(device, &mut text) };
     if code == api::NO_ERROR {
         return None;
@@ -132,7 +132,7 @@ fn take_error(functions: &Functions, device: Handle) -> Option<String> {
     if text.is_null() {
         return Some(name.to_owned());
     }
-    // SAFETY: the library gives a C string that lives until the next call on this thread.
+    // SAFETY: the library returns a C string that is valid until the next call on this thread.
     let text = unsafe { CStr::from_ptr(text) }.to_string_lossy();
     Some(if text.is_empty() { name.to_owned() } else { format!("{name} ({text})") })
 }

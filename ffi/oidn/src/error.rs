@@ -1,4 +1,4 @@
-//! What can go wrong, as data.
+//! The errors of this crate.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,59 +6,59 @@ use std::path::PathBuf;
 use crate::library::LIBRARY_VARIABLE;
 use crate::limits::{MAX_SIDE, MAX_THREADS};
 
-/// A failure to find Open Image Denoise, to use it, or to accept what it was given.
+/// A failure to find or use Open Image Denoise, or an invalid argument.
 ///
-/// `Display` says what is wrong; [`Error::hint`] what to do about it.
+/// `Display` says what is wrong, [`Error::hint`] what to do about it.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// No library was found under any of the names it goes by: each name with the loader's reason.
+    /// The library was not found under any of its names.
     NotFound {
         /// File names or paths tried, in order, each with the reason it failed.
         tried: Vec<(PathBuf, String)>,
     },
-    /// [`LIBRARY_VARIABLE`] names what is no file.
+    /// [`LIBRARY_VARIABLE`] names a file that does not exist.
     NoSuchFile(PathBuf),
-    /// A library was found and cannot be used.
+    /// A library was found, but cannot be used.
     Unusable {
-        /// The file.
+        /// Path of the library file.
         path: PathBuf,
-        /// Why not.
+        /// Reason why it cannot be used.
         reason: String,
     },
-    /// Open Image Denoise reported an error of its own.
+    /// Open Image Denoise reported an error.
     Oidn {
-        /// What was being done.
+        /// The operation that failed, such as "make a device".
         during: &'static str,
-        /// The library's words.
+        /// The library's message.
         message: String,
     },
     /// More threads than [`MAX_THREADS`].
     TooManyThreads(usize),
-    /// A picture without pixels, or with a side longer than [`MAX_SIDE`].
+    /// A picture has no pixels, or a side longer than [`MAX_SIDE`].
     BadSize {
-        /// Pixels in a row.
+        /// Width in pixels.
         width: usize,
-        /// Rows.
+        /// Height in pixels.
         height: usize,
     },
-    /// A picture whose pixels are not as many as its size says.
+    /// The number of pixels of a picture is not width times height.
     BadLength {
         /// `color`, `albedo` or `normal`.
         picture: &'static str,
-        /// How many pixels it has.
+        /// Number of pixels passed.
         pixels: usize,
-        /// Pixels in a row that it should have.
+        /// Expected width.
         width: usize,
-        /// Rows that it should have.
+        /// Expected height.
         height: usize,
     },
-    /// Normals without albedo: no network was trained for that.
+    /// Normals without albedo, for which the library has no network.
     NormalWithoutAlbedo,
 }
 
 impl Error {
-    /// What the user can do about it, where that is known: one line, without a trailing full stop.
+    /// Advice for the user, if there is any: one line without a full stop.
     pub fn hint(&self) -> Option<String> {
         match self {
             Error::NotFound { .. } | Error::NoSuchFile(_) | Error::Unusable { .. } => {

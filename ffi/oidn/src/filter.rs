@@ -1,4 +1,4 @@
-//! A filter: the network with its weights, ready for pictures of one size and kind.
+//! Denoising of pictures by a filter, which holds the network.
 
 use std::ffi::{CStr, c_int, c_void};
 
@@ -7,45 +7,45 @@ use crate::device::Device;
 use crate::error::Error;
 use crate::limits::MAX_SIDE;
 
-/// How well, against how fast.
+/// Trade-off between quality and speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Quality {
-    /// For a first look. Libraries older than 2.3 do not know it and take [`Quality::Balanced`] instead.
+    /// For previews. Libraries older than 2.3 use [`Quality::Balanced`] instead.
     Fast,
-    /// For pictures that change while they are looked at.
+    /// For interactive use.
     Balanced,
-    /// For what is delivered.
+    /// For final pictures.
     #[default]
     High,
 }
 
-/// A picture to denoise. Rows follow each other, pixels are of three channels.
+/// A picture to denoise. Pictures are row-major with three channels per pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
-    /// Pixels in a row.
+    /// Width in pixels.
     pub width: usize,
-    /// Rows.
+    /// Height in pixels.
     pub height: usize,
-    /// What is to be denoised. NaN and what is negative count as 0. Infinite and huge values are taken and do no harm
-    /// beyond the picture, but spoil it: see the crate's documentation.
+    /// The noisy picture. NaN and negative values count as 0. Infinite and huge values are allowed, but spoil the
+    /// result: see the crate's documentation.
     pub color: &'a [[f32; 3]],
-    /// Colour of the surfaces, from 0 to 1, as a guide.
+    /// Albedo of the surfaces, from 0 to 1, as a guide.
     pub albedo: Option<&'a [[f32; 3]]>,
-    /// Normals of the surfaces, each coordinate from -1 to 1, as a guide; only together with albedo.
+    /// Normals of the surfaces, each coordinate from -1 to 1, as a guide. Only together with `albedo`.
     pub normal: Option<&'a [[f32; 3]]>,
-    /// How well, against how fast.
+    /// Trade-off between quality and speed.
     pub quality: Quality,
-    /// Whether `color` goes beyond 1, as radiance does. Otherwise what does is cut off.
+    /// Whether `color` may exceed 1, like radiance. If false, larger values are clamped.
     pub hdr: bool,
-    /// Whether the guides are free of noise. They are then trusted to the pixel, and noise of theirs is kept.
+    /// Whether the guides are free of noise. If true, their noise remains in the result.
     pub clean_aux: bool,
-    /// Roughly the most memory to compute with, in MiB: the picture is cut into overlapping tiles that fit, as far as
-    /// tiles can be small. `None`: no limit.
+    /// Approximate limit on memory (MiB); `None` means no limit. The picture is cut into overlapping tiles that fit,
+    /// but tiles have a minimum size.
     pub max_memory_mib: Option<u32>,
 }
 
 impl<'a> Input<'a> {
-    /// A picture of radiances without guides, at high quality.
+    /// A picture of radiance without guides, at high quality.
     pub fn new(width: usize, height: usize, color: &'a [[f32; 3]]) -> Input<'a> {
         let quality = Quality::High;
         Input {
@@ -61,7 +61,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Everything the library would have to trust.
+    /// Checks sizes and guides, which the library does not check.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let (width, height) = (self.width, self.height);
         let sides = 1..=MAX_SIDE;
@@ -80,14 +80,14 @@ impl<'a> Input<'a> {
     }
 }
 
-/// Denoises pictures, one after the other. What the network needs is made ready by the first and kept: a later picture
-/// of the same size, kinds of guides and settings, whatever its content, spares that time (a tenth, for 1280x720).
+/// Denoises pictures, one after the other. The first picture prepares the network. Later pictures of the same size,
+/// guides and settings save this time (a tenth of the total for 1280x720).
 pub struct Filter {
     raw: Handle,
     device: Device,
 }
 
-// SAFETY: the library ties filters to their device, not to a thread; it is used through `&mut` alone.
+// SAFETY: filters belong to their device, not to a thread, and are used only through `&mut`.
 unsafe impl Send for Filter {}
 
 impl Filter {
@@ -95,18 +95,18 @@ impl Filter {
         let during = "make a filter";
         // SAFETY: the device lives as long as the filter, which holds a clone; the name is a C string.
         let raw = unsafe { (device.functions().new_filter)(device.raw(), c"RT".as_ptr()) };
-        // Before the check, so that it is released whatever that says.
+        // Created before the check, so that the handle is released if the check fails.
         let filter = (!raw.is_null()).then(|| Filter { raw, device: device.clone() });
         device.check(during)?;
         filter.ok_or_else(|| Error::Oidn { during, message: api::error_name(1).into() })
     }
 
-    /// The denoised picture. Its values are finite and not negative, whatever came in.
+    /// Denoises a picture. The values of the result are finite and not negative, for any input.
     ///
     /// # Errors
     ///
-    /// [`Error::BadSize`], [`Error::BadLength`] and [`Error::NormalWithoutAlbedo`], before the library sees any of it;
-    /// [`Error::Oidn`] with what it reports, for instance that there is no memory left. The filter serves on.
+    /// [`Error::BadSize`], [`Error::BadLength`] and [`Error::NormalWithoutAlbedo`], before the library is called;
+    /// [`Error::Oidn`] with the library's message, for instance if memory is short. The filter stays usable.
     pub fn denoise(&mut self, input: &Input) -> Result<Vec<[f32; 3]>, Error> {
         input.check()?;
         let mut output = Vec::new();
@@ -116,7 +116,7 @@ impl Filter {
         })?;
         output.resize(input.color.len(), [0.0; 3]);
 
-        // All pointers are set anew each time: those of the last picture may have become invalid since.
+        // All pointers are set for every picture, because those of the last picture may be invalid.
         let size = (input.width, input.height);
         self.set_image(c"color", Some(input.color), size)?;
         self.set_image(c"albedo", input.albedo, size)?;
@@ -134,17 +134,17 @@ impl Filter {
         self.set_bool(c"cleanAux", input.clean_aux && input.albedo.is_some())?;
 
         let functions = self.device.functions();
-        // SAFETY: the handle is a filter, its pictures are as large as it was told (checked above).
+        // SAFETY: the handle is a filter, and its pictures have the sizes that were set (checked above).
         unsafe { (functions.commit_filter)(self.raw) };
         self.device.check("prepare to denoise")?;
-        // SAFETY: as above; inputs and output are borrowed or owned here until the call is over, which returns when
-        // the output is written, and they do not overlap. Inputs are only read.
+        // SAFETY: as above. Inputs and output are borrowed or owned here until the call returns, after the output is
+        // written. They do not overlap, and inputs are only read.
         unsafe { (functions.execute_filter)(self.raw) };
         self.device.check("denoise")?;
         Ok(output)
     }
 
-    /// A picture that the filter reads, or that it does without.
+    /// Sets or removes a picture that the filter reads.
     fn set_image(&mut self, name: &CStr, pixels: Option<&[[f32; 3]]>, size: (usize, usize)) -> Result<(), Error> {
         match pixels {
             Some(pixels) => self.set_pixels(name, pixels.as_ptr().cast_mut().cast(), size),
@@ -156,10 +156,10 @@ impl Filter {
         }
     }
 
-    /// The pointer is kept by the library, and followed when the filter is executed, not before.
+    /// Sets the pointer to a picture. The library stores it and reads through it only when the filter is executed.
     fn set_pixels(&mut self, name: &CStr, pixels: *mut c_void, (width, height): (usize, usize)) -> Result<(), Error> {
         let (format, set_image) = (api::FORMAT_FLOAT3, self.device.functions().set_image);
-        // SAFETY: the handle is a filter, the name a C string; whoever executes the filter answers for the pixels.
+        // SAFETY: the handle is a filter, the name a C string. The code that executes the filter guarantees the pixels.
         unsafe { set_image(self.raw, name.as_ptr(), pixels, format, width, height, 0, 0, 0) };
         self.device.check("set a picture")
     }
@@ -178,7 +178,7 @@ impl Filter {
 }
 
 impl Device {
-    /// A denoiser of pictures with this device.
+    /// Creates a filter of this device.
     ///
     /// # Errors
     ///
@@ -187,13 +187,13 @@ impl Device {
         Filter::new(self)
     }
 
-    /// Denoises one picture. For several of one size and kind [`Device::filter`] is faster.
+    /// Denoises one picture. For several pictures of one size and kind, a [`Device::filter`] is faster.
     ///
     /// # Errors
     ///
     /// As for [`Filter::denoise`].
     pub fn denoise(&self, input: &Input) -> Result<Vec<[f32; 3]>, Error> {
-        // What is wrong with the input is told before the library is asked for anything.
+        // Errors of the input are reported before the library is called.
         input.check()?;
         self.filter()?.denoise(input)
     }
@@ -201,7 +201,7 @@ impl Device {
 
 impl Drop for Filter {
     fn drop(&mut self) {
-        // SAFETY: the handle came from `new_filter` and is released once; its device is still there.
+        // SAFETY: the handle came from `new_filter` and is released once. Its device is alive.
         unsafe { (self.device.functions().release_filter)(self.raw) }
     }
 }

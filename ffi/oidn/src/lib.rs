@@ -1,8 +1,8 @@
 //! Safe bindings to the parts of Intel Open Image Denoise 2 that `caustique` uses.
 //!
-//! The library is looked for when the program runs, not when it is built, and the program renders without it.
-//! [`Library::load`] finds it, or returns an error whose [`Error::hint`] says what to do. The environment variable
-//! [`LIBRARY_VARIABLE`] names a library file to use instead.
+//! The library is loaded when the program runs, not linked when it is built, and the program renders without it.
+//! [`Library::load`] finds the library, or returns an error whose [`Error::hint`] says what to do. The environment
+//! variable [`LIBRARY_VARIABLE`] names a library file to use instead.
 //!
 //! ```no_run
 //! use caustique_oidn::{Device, Input, Library};
@@ -13,7 +13,7 @@
 //! let (width, height) = (64, 48);
 //! let (noisy, albedo) = (vec![[0.5; 3]; width * height], vec![[0.8; 3]; width * height]);
 //! let input = Input { albedo: Some(&albedo), ..Input::new(width, height, &noisy) };
-//! // Several pictures of one size and with the same guides: what the network needs is made ready once.
+//! // For several pictures of one size and with the same guides, one filter prepares the network once.
 //! let mut filter = device.filter()?;
 //! let first = filter.denoise(&input)?;
 //! let second = filter.denoise(&Input { color: &first, ..input })?;
@@ -24,34 +24,35 @@
 //!
 //! # Order of the types
 //!
-//! [`Library`] -> [`Device`] -> [`Filter`]. Each keeps alive what it needs, so values may be dropped in any order. A
-//! library and a device may be used from several threads; a filter may go to another, and serves one at a time.
+//! [`Library`] -> [`Device`] -> [`Filter`]. Each value keeps alive the values that it depends on, so they may be
+//! dropped in any order. Several threads may use a library and a device at once. A filter may move to another thread,
+//! but only one thread at a time may use it.
 //!
-//! # The same bytes from any number of threads
+//! # Determinism
 //!
-//! Version 2.5.1 gives the same bytes on 1, 2, 3, 5 and 8 threads (of which a machine of two cores ran them), each
-//! time, from a new filter and from a used one, at all qualities, with and without guides, from 1x1 to 1280x720. A
-//! limit of memory, and so tiles, does not change them either, but takes a fifth longer. The tests hold whatever
-//! library they find to that; 1280x720 at [`Quality::Fast`] alone, for time. Another processor may give others, as it
-//! may be given other instructions; so may another version of the library.
+//! With version 2.5.1 the result has the same bytes with 1, 2, 3, 5 and 8 threads (on a machine with two cores), in
+//! repeated calls, from a new filter and from a used one, at all qualities, with and without guides, from 1x1 to
+//! 1280x720. A memory limit, and so tiles, does not change the bytes, but takes a fifth longer. The tests check this
+//! for the library that they find; for 1280x720 only at [`Quality::Fast`], to save time. Another processor may give
+//! other bytes, because the library may use other instructions there; so may another version of the library.
 //!
-//! # What it costs and what it is not good at
+//! # Costs and limitations
 //!
-//! 1280x720 on one or two cores with AVX-512: 1.2 core-seconds at [`Quality::Fast`], 2.3 at the other two, which are
-//! bit for bit the same on a processor; guides add nothing that can be measured. The process has then had 0.33 and
-//! 0.56 GiB at most. `cargo run --release -p caustique-oidn --example denoise` measures it.
+//! A picture of 1280x720 on one or two cores with AVX-512 takes 1.2 core-seconds and 0.33 GiB at [`Quality::Fast`], and
+//! 2.3 core-seconds and 0.56 GiB at the other two qualities, which give identical bits on a CPU. Guides have no
+//! measurable cost. `cargo run --release -p caustique-oidn --example denoise` measures this.
 //!
-//! Pictures of less than about 8 pixels a side come out with the wrong brightness. With [`Input::hdr`] the library
-//! takes its exposure from the mean of the logarithms, so a value that is infinite or beyond 1e6 or so spoils what is
-//! around it, and enough of them the whole picture. Cut such values off before.
+//! Pictures with a side below about 8 pixels get a wrong brightness. With [`Input::hdr`] the library computes its
+//! exposure from the mean of the logarithms, so a value that is infinite or above about 1e6 spoils its surroundings,
+//! and many of them spoil the whole picture. Such values must be clamped before.
 //!
-//! # What is unsafe
+//! # Unsafe code
 //!
-//! This crate trusts two things it cannot prove: that the file found under the library's name is Open Image Denoise
-//! (loading it runs its initialisers), and that its C interface is the one its version number promises. It hands
-//! over nothing but pictures whose sizes it has checked, borrowed until the call is over; asks for the library's
-//! error after every call that can fail; and releases what it made, once. A loaded library is never unloaded: its
-//! worker threads outlive its devices.
+//! This crate relies on two assumptions that it cannot prove. The file found under the library's name must be Open
+//! Image Denoise, because loading it runs its initialisers. Its C interface must be that of its version number. The
+//! crate passes only pictures of checked sizes, which stay borrowed until the call returns. It reads the library's
+//! error after every call that can fail, and releases every object once. A loaded library is never unloaded, because
+//! its worker threads outlive its devices.
 
 mod api;
 mod device;

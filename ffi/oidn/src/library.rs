@@ -1,4 +1,4 @@
-//! The opened library: its functions, and what it says of itself.
+//! A loaded library.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,11 +8,10 @@ use caustique_library::Version;
 
 use crate::api::Functions;
 
-/// Name of the environment variable that, when set and not empty, holds the path of the library to use. Nothing else
-/// is tried then.
+/// Environment variable with the path of the library to use. If it is set and not empty, no other library is tried.
 pub const LIBRARY_VARIABLE: &str = "CAUSTIQUE_OIDN";
 
-/// An opened Open Image Denoise that has made a device. Clones share it.
+/// A loaded Open Image Denoise library that has created a device in a test. Clones share it.
 #[derive(Clone)]
 pub struct Library {
     inner: Arc<Inner>,
@@ -25,22 +24,23 @@ struct Inner {
 }
 
 impl Library {
-    /// A library with these functions, which was opened from `path`.
+    /// The library with these functions that was loaded from `path`.
     pub(crate) fn new(path: PathBuf, version: Version, functions: Functions) -> Library {
         Library { inner: Arc::new(Inner { path, version, functions }) }
     }
 
-    /// The real file that was opened, links followed, where the system tells; else the name it was found by.
+    /// The file that was loaded, with symbolic links resolved, if the system reports it, else the name that was
+    /// requested.
     pub fn path(&self) -> &Path {
         &self.inner.path
     }
 
-    /// The version, as a device of the library reports it.
+    /// The version that a device of the library reports.
     pub fn version(&self) -> Version {
         self.inner.version
     }
 
-    /// Whether [`crate::Quality::Fast`] is known: from version 2.3 on.
+    /// Whether the library supports [`crate::Quality::Fast`]: from version 2.3 on.
     pub fn has_fast(&self) -> bool {
         self.version() >= Version { major: 2, minor: 3, patch: 0 }
     }

@@ -1,7 +1,7 @@
-//! Sizes that the library is asked for at most.
+//! Limits on the arguments of the library.
 
-/// The most threads that a device is made for. The library sets a place aside for each, used or not.
+/// Largest number of threads of a device. The library allocates memory for each, whether it is used or not.
 pub const MAX_THREADS: usize = 4096;
 
-/// The longest side of a picture.
+/// Longest side of a picture (pixels).
 pub const MAX_SIDE: usize = 65_536;

@@ -1,4 +1,4 @@
-//! Finds and opens the library, once per process, or says what to install.
+//! Finds and loads the library, once per process.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -10,27 +10,27 @@ use crate::device;
 use crate::error::Error;
 use crate::library::{LIBRARY_VARIABLE, Library};
 
-/// Names that the system's loader is asked for, best first: those of programs' packages, then of development packages.
+/// Names for the system's loader, best first: of runtime packages, then of development packages.
 const NAMES: &[&str] = &["libOpenImageDenoise.so.2", "libOpenImageDenoise.so"];
 
-/// How all names of the library's file begin. Names of its modules do not.
+/// Common start of all names of the library file. Names of its modules start differently.
 const STEM: &str = "libOpenImageDenoise.so";
 
 /// The library that [`Library::load`] found.
 static LOADED: Mutex<Option<Library>> = Mutex::new(None);
 
 impl Library {
-    /// The library: found by the first call that finds it, the same for all later ones.
+    /// Finds and loads the library. After the first success, all later calls return the same library.
     ///
-    /// Candidates in order: the file that [`LIBRARY_VARIABLE`] names, and then no other; the system's loader under
-    /// the library's usual names; any `libOpenImageDenoise.so*` below one of `folders`.
+    /// If [`LIBRARY_VARIABLE`] is set, only the file that it names is tried. Otherwise the candidates are the library's
+    /// usual names for the system's loader, then any `libOpenImageDenoise.so*` below `folders`.
     ///
-    /// Loading runs the file's initialisers: give it no folder that is not trusted.
+    /// Loading runs the file's initialisers, so the folders must be trusted.
     ///
     /// # Errors
     ///
-    /// [`Error::NotFound`] with what was tried; [`Error::NoSuchFile`] when the variable names none;
-    /// [`Error::Unusable`], as for [`Library::load_from`], when it names one that does not serve.
+    /// [`Error::NotFound`] with the candidates; [`Error::NoSuchFile`] if the variable names a missing file;
+    /// [`Error::Unusable`] as for [`Library::load_from`].
     pub fn load(folders: &[PathBuf]) -> Result<Library, Error> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(library) = &*loaded {
@@ -43,21 +43,22 @@ impl Library {
         Ok(loaded.insert(library).clone())
     }
 
-    /// Opens one library file. A bare file name is looked for where the system looks for libraries. The library finds
-    /// its own modules: in its folder, as it is laid out by its makers and by `scripts/setup.sh`.
+    /// Loads a library file. The system's loader looks up a bare file name in its own folders. The library finds its
+    /// modules in its own folder, as in the official packages and after `scripts/setup.sh`.
     ///
-    /// Loading runs the file's initialisers: give it nothing that is not trusted.
+    /// Loading runs the file's initialisers, so the file must be trusted.
     ///
     /// # Errors
     ///
-    /// [`Error::Unusable`] when the file cannot be opened, is not Open Image Denoise 2, or makes no device for this
-    /// processor.
+    /// [`Error::Unusable`] if the file cannot be opened, is not Open Image Denoise 2, or cannot create a device for
+    /// this processor.
     pub fn load_from(path: impl AsRef<Path>) -> Result<Library, Error> {
         load(path.as_ref()).map_err(|Refusal { path, reason }| Error::Unusable { path, reason })
     }
 }
 
-/// Loads the file that the variable names. It is a path, even without a folder: the system's loader is not asked.
+/// Loads the file that the environment variable names. The name is a path even without a folder, so the system's loader
+/// does not search for it.
 fn load_named(path: &Path) -> Result<Library, Error> {
     match std::path::absolute(path) {
         Ok(absolute) if absolute.is_file() => Library::load_from(absolute),
@@ -69,23 +70,23 @@ fn load_first(candidates: &[PathBuf]) -> Result<Library, Error> {
     load_first_of(candidates, load).map_err(|tried| Error::NotFound { tried })
 }
 
-/// The names and files to try when no file is named, in order.
+/// The names and files to try if the environment variable is not set, in order.
 fn candidates(folders: &[PathBuf]) -> Vec<PathBuf> {
     NAMES.iter().map(PathBuf::from).chain(find_below(folders, STEM)).collect()
 }
 
 fn load(path: &Path) -> Result<Library, Refusal> {
-    // SAFETY: initialisers run here; that the file is to be trusted is in the documentation.
+    // SAFETY: initialisers run here. The documentation requires a trusted file.
     let library = unsafe { open(path) }?;
-    // SAFETY: the symbols carry the library's names; it is never unloaded once they are called (see below).
+    // SAFETY: the symbols have the library's names, and it is not unloaded after they are called (see below).
     let functions = unsafe { Functions::load(&library) }.map_err(|error| {
         let missing = Refusal::by_loader(path, &error).reason;
         Refusal::new(path, format!("not Open Image Denoise 2 ({missing})"))
     })?;
     let path = file_containing(functions.new_device as usize).unwrap_or_else(|| path.to_owned());
     let path = path.canonicalize().unwrap_or(path);
-    // Its worker threads may still be on their way out when the last device is released, so its code must stay
-    // mapped. Nothing of it has run before this line but initialisers.
+    // The library's worker threads may still be running when the last device is released, so its code must stay mapped.
+    // Before this line only initialisers have run.
     std::mem::forget(library);
 
     let version = device::probe(&functions).map_err(|reason| Refusal::new(&path, reason))?;

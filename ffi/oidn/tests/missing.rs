@@ -1,4 +1,4 @@
-//! Libraries that are missing, or are not Open Image Denoise.
+//! Errors for libraries that are missing or are not Open Image Denoise.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The binding against whichever Open Image Denoise `CAUSTIQUE_OIDN` names, or the one that is found.
+//! Tests the binding with the Open Image Denoise that `CAUSTIQUE_OIDN` names, or that is found.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -7,12 +7,12 @@ use caustique_oidn::{Device, Error, Input, Library, MAX_SIDE, MAX_THREADS, Quali
 
 const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::High];
 
-/// Where `scripts/setup.sh` puts the library.
+/// The folder in which `scripts/setup.sh` installs the library.
 fn folders() -> [PathBuf; 1] {
     [Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.deps/oidn")]
 }
 
-/// The library under test, opened once.
+/// The library under test, loaded once.
 fn library() -> &'static Library {
     static LIBRARY: OnceLock<Library> = OnceLock::new();
     LIBRARY
@@ -23,7 +23,7 @@ fn device(threads: usize) -> Device {
     Device::new(library(), threads).unwrap()
 }
 
-/// Uniform in [0, 2), by SplitMix64: a constant picture of 1 with noise.
+/// A constant picture of 1 with noise: uniform values in [0, 2), by SplitMix64.
 fn noise(pixels: usize, seed: u64) -> Vec<[f32; 3]> {
     let mut state = seed;
     let mut next = || {
@@ -36,7 +36,7 @@ fn noise(pixels: usize, seed: u64) -> Vec<[f32; 3]> {
     (0..pixels).map(|_| std::array::from_fn(|_| next())).collect()
 }
 
-/// Root of the mean square of the distance from 1.
+/// Root mean square of the difference from 1.
 fn deviation(pixels: &[[f32; 3]]) -> f64 {
     let squares: f64 = pixels.iter().flatten().map(|&value| (f64::from(value) - 1.0).powi(2)).sum();
     (squares / (3 * pixels.len()) as f64).sqrt()
@@ -46,7 +46,7 @@ fn bits(pixels: &[[f32; 3]]) -> Vec<u32> {
     pixels.iter().flatten().map(|value| value.to_bits()).collect()
 }
 
-/// A picture with both guides.
+/// An input with both guides.
 fn guided<'a>(
     (width, height): (usize, usize),
     color: &'a [[f32; 3]],
@@ -57,19 +57,19 @@ fn guided<'a>(
 }
 
 #[test]
-fn library_says_what_it_is_and_is_the_same_the_second_time() {
+fn the_library_reports_its_version_and_is_loaded_once() {
     let library = library();
     assert!(library.version() >= Version { major: 2, minor: 0, patch: 0 }, "{library:?}");
     assert!(library.version().to_string().starts_with("2."), "{library:?}");
     let path = library.path();
     assert!(path.is_absolute() && path.is_file() && !path.is_symlink(), "{library:?}");
     assert!(path.file_name().unwrap().to_string_lossy().starts_with("libOpenImageDenoise.so"), "{library:?}");
-    let again = Library::load(&folders()).unwrap();
-    assert_eq!((again.path(), again.version()), (path, library.version()));
+    let second = Library::load(&folders()).unwrap();
+    assert_eq!((second.path(), second.version()), (path, library.version()));
 }
 
 #[test]
-fn noise_about_a_constant_is_taken_out() {
+fn noise_on_a_constant_picture_is_removed() {
     let (width, height) = (96, 80);
     let color = noise(width * height, 1);
     let before = deviation(&color);
@@ -95,9 +95,9 @@ fn noise_about_a_constant_is_taken_out() {
     }
 }
 
-/// An edge that only the guides know sharply is kept where it is.
+/// An edge that is noisy in the picture but sharp in the guides is preserved.
 #[test]
-fn guides_are_looked_at() {
+fn guides_preserve_edges() {
     let (width, height) = (64, 64);
     let left = |k: usize| k % width < width / 2;
     let shade = |k: usize| if left(k) { 0.2 } else { 1.0 };
@@ -115,15 +115,15 @@ fn guides_are_looked_at() {
     assert!(with < 0.5 * without, "{with} with, {without} without");
 }
 
-/// What the crate's documentation promises of bytes: one, two or more threads, once or again, a new filter or a used
-/// one, in one piece or in tiles.
+/// The determinism that the crate's documentation promises: the same bytes with any number of threads, in repeated
+/// calls, from a new filter or a used one, with and without tiles.
 #[test]
-fn same_bytes_whatever_the_threads() {
+fn bytes_do_not_depend_on_threads_filters_or_tiles() {
     for (width, height) in [(1, 1), (1, 50), (2, 3), (64, 64), (320, 180), (641, 359), (1280, 720)] {
         let pixels = width * height;
         let (color, albedo, normal) = (noise(pixels, 3), noise(pixels, 4), noise(pixels, 5));
         let [mut one, mut two] = [1, 2].map(|threads| device(threads).filter().unwrap());
-        // The large one is there for its tiles and takes long.
+        // The large picture serves to test tiles. It takes long, so only one quality is tested.
         let large = pixels > 300_000;
         let qualities = if large { &QUALITIES[..1] } else { &QUALITIES[..] };
         for &quality in qualities {
@@ -134,16 +134,16 @@ fn same_bytes_whatever_the_threads() {
             let tiles = Input { max_memory_mib: Some(100), ..input };
             assert!(bits(&two.denoise(&tiles).unwrap()) == first, "{name}: tiles");
             if !large {
-                assert!(bits(&one.denoise(&input).unwrap()) == first, "{name}: again");
+                assert!(bits(&one.denoise(&input).unwrap()) == first, "{name}: repeated");
                 assert!(bits(&device(5).denoise(&input).unwrap()) == first, "{name}: five threads");
             }
         }
     }
 }
 
-/// A filter remembers nothing of earlier pictures: sizes, guides and settings come and go.
+/// The result of a filter does not depend on earlier pictures of other sizes, guides and settings.
 #[test]
-fn a_filter_serves_many_pictures() {
+fn a_filter_does_not_depend_on_earlier_pictures() {
     let device = device(2);
     let mut filter = device.filter().unwrap();
     let (albedo, normal) = (noise(40 * 30, 6), noise(40 * 30, 7));
@@ -168,7 +168,7 @@ fn a_filter_serves_many_pictures() {
     let mut seen = Vec::new();
     for (k, input) in inputs.iter().enumerate() {
         let found = filter.denoise(input).unwrap();
-        // Its guides are elsewhere the next time, and what was there is gone.
+        // The same guides at other addresses, after which the old memory may be freed.
         let copies = [input.albedo, input.normal].map(|guide| guide.map(<[_]>::to_vec));
         let moved = Input { albedo: copies[0].as_deref(), normal: copies[1].as_deref(), ..*input };
         assert!(bits(&filter.denoise(&moved).unwrap()) == bits(&found), "picture {k}, moved");
@@ -180,7 +180,7 @@ fn a_filter_serves_many_pictures() {
 }
 
 #[test]
-fn two_devices_on_two_threads_and_one_device_on_two() {
+fn threads_may_share_a_device_or_use_their_own() {
     let (width, height) = (150, 100);
     let pictures: Vec<_> = (0..4).map(|seed| noise(width * height, 10 + seed)).collect();
     let alone = device(1);
@@ -202,7 +202,7 @@ fn two_devices_on_two_threads_and_one_device_on_two() {
             }
         });
     }
-    // A filter goes to another thread, and outlives the device it was made with.
+    // A filter may move to another thread, and may outlive its device.
     let mut filter = device(1).filter().unwrap();
     let picture = &pictures[0];
     let moved = std::thread::spawn({
@@ -212,7 +212,7 @@ fn two_devices_on_two_threads_and_one_device_on_two() {
     assert!(moved.join().unwrap() == expected[0]);
 }
 
-/// Nothing that is not a picture reaches the library.
+/// Invalid pictures are refused before the library is called.
 #[test]
 fn sizes_and_lengths_are_checked() {
     let device = device(1);
@@ -244,11 +244,11 @@ fn sizes_and_lengths_are_checked() {
     assert_eq!(refused(&guides), "normal: 6 pixels are not 4 x 3");
     assert_eq!(refused(&Input { normal: Some(&pixels), ..right }), "normals guide only together with albedo");
     assert_eq!(Error::NormalWithoutAlbedo.hint().as_deref(), Some("give albedo, too, or leave normals out"));
-    assert!(filter.denoise(&right).is_ok(), "the filter serves on");
+    assert!(filter.denoise(&right).is_ok(), "the filter stays usable");
 }
 
 #[test]
-fn odd_values_do_no_harm() {
+fn extreme_values_give_finite_pictures() {
     let (width, height) = (33, 17);
     let (clean, device) = (noise(width * height, 21), device(1));
     for odd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1.0, f32::MIN_POSITIVE / 4.0] {
@@ -270,7 +270,7 @@ fn odd_values_do_no_harm() {
 }
 
 #[test]
-fn threads_without_sense() {
+fn too_many_threads_are_refused() {
     let error = Device::new(library(), MAX_THREADS + 1).err().unwrap();
     assert_eq!(error.to_string(), "4097 threads are more than 4096");
     assert!(matches!(Device::new(library(), usize::MAX), Err(Error::TooManyThreads(usize::MAX))));

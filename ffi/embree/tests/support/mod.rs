@@ -1,10 +1,10 @@
-//! Meshes, rays and an oracle for the tests of the binding.
+//! Meshes, rays and a brute-force ray tracer for the tests of the binding.
 
 use std::sync::OnceLock;
 
 use caustique_embree::{Device, GeometryId, Library, Ray, Scene, SceneBuilder};
 
-/// The library under test, opened once.
+/// The library under test, loaded once.
 pub fn library() -> &'static Library {
     static LIBRARY: OnceLock<Library> = OnceLock::new();
     LIBRARY.get_or_init(|| Library::load().unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint())))
@@ -14,7 +14,7 @@ pub fn device(threads: usize) -> Device {
     Device::new(library(), threads).unwrap()
 }
 
-/// A builder on a device that all tests share, so that their scenes can be instanced by each other.
+/// A builder on a device that all tests share, so that scenes can instance each other.
 pub fn builder() -> SceneBuilder {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     SceneBuilder::new(DEVICE.get_or_init(|| device(0))).unwrap()
@@ -24,7 +24,7 @@ pub fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
     Ray { origin, direction, tmin: 0.0, tmax: f32::INFINITY, token: 0 }
 }
 
-/// SplitMix64: enough for test rays.
+/// The random number generator SplitMix64.
 pub struct Random(pub u64);
 
 impl Random {
@@ -37,21 +37,21 @@ impl Random {
         ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
     }
 
-    /// Uniform in a box about the unit square's height field.
+    /// A uniform point of a box around the height field.
     pub fn point(&mut self) -> [f32; 3] {
         [self.unit(), self.unit(), self.unit() - 0.5]
     }
 
-    /// Not of unit length, and all over the sphere.
+    /// A direction that is not of unit length.
     pub fn direction(&mut self) -> [f32; 3] {
         [self.unit() - 0.5, self.unit() - 0.5, self.unit() - 0.5]
     }
 }
 
-/// Quads along a side of the mesh of a million triangles: 708 x 708 x 2 = 1,002,528.
+/// Number of quads along a side of the mesh of a million triangles: 708 x 708 x 2 = 1,002,528.
 pub const SIDE: usize = 708;
 
-/// A height field over the unit square, of `side` times `side` quads, in two triangles each.
+/// A height field over the unit square of `side` times `side` quads, each cut into two triangles.
 pub fn grid(side: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let height = |x: f32, y: f32| 0.1 * (17.0 * x).sin() * (23.0 * y).cos();
     let at = |k| k as f32 / side as f32;
@@ -65,7 +65,7 @@ pub fn grid(side: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (positions, indices)
 }
 
-/// [`grid`] of [`SIDE`], built once.
+/// The scene of the [`grid`] of [`SIDE`], built once.
 pub fn million() -> &'static Scene {
     static SCENE: OnceLock<Scene> = OnceLock::new();
     SCENE.get_or_init(|| {
@@ -76,7 +76,7 @@ pub fn million() -> &'static Scene {
     })
 }
 
-/// A unit sphere of `rings` bands of `2 * rings` quads; those at the poles are degenerate on one side.
+/// A unit sphere of `rings` bands of `2 * rings` quads. Half of the triangles at the poles are degenerate.
 pub fn sphere(rings: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let around = 2 * rings;
     let mut positions = Vec::new();
@@ -99,13 +99,13 @@ pub fn sphere(rings: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (positions, indices)
 }
 
-/// The point a `weight` of the way from `a` to `b`.
+/// Linear interpolation from `a` to `b`.
 pub fn between(a: [f32; 3], b: [f32; 3], weight: f32) -> [f32; 3] {
     std::array::from_fn(|k| a[k] + weight * (b[k] - a[k]))
 }
 
-/// The nearest hit by asking every triangle, in double precision: its distance, and all triangles that are hit
-/// there within rounding. By Moeller and Trumbore, which shares no code or method with Embree's tree.
+/// The nearest hit over all triangles in double precision, by Moeller and Trumbore's test: its distance, and all
+/// triangles that are hit there within rounding errors. Independent of Embree.
 pub fn brute_force(positions: &[[f32; 3]], indices: &[[u32; 3]], ray: &Ray) -> Option<(f64, Vec<u32>)> {
     let wide = |p: [f32; 3]| p.map(f64::from);
     let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -131,7 +131,7 @@ pub fn brute_force(positions: &[[f32; 3]], indices: &[[u32; 3]], ray: &Ray) -> O
     Some((nearest, hits.iter().filter(|&&(t, _)| near(t)).map(|&(_, k)| k).collect()))
 }
 
-/// Within a few units in the last place: Embree divides by an approximate reciprocal.
+/// Asserts equality within a few units in the last place, because Embree divides by an approximate reciprocal.
 #[track_caller]
 pub fn assert_close(found: [f32; 3], expected: [f32; 3]) {
     let close = |k: usize| (found[k] - expected[k]).abs() <= 4.0 * f32::EPSILON * expected[k].abs();
