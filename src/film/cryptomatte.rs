@@ -1,41 +1,40 @@
-//! Cryptomatte: who covers a pixel, and how much of it.
+//! Cryptomatte: ids of the objects or materials that cover a pixel, with their coverage.
 //!
 //! Friedman and Jones, "Fully Automatic ID Mattes with Support for Motion Blur and Transparency", SIGGRAPH posters
 //! 2015, and the Cryptomatte specification 1.2.0 (github.com/Psyop/Cryptomatte). An id is the hash of a name, stored as
 //! the float of the same bits; two ranks (id, coverage) fit into the four channels of a layer, largest coverage first.
 
-use super::ascii::ascii_json;
 use super::layers::{Layer, Plane, Sample};
 use super::naming::Naming;
 
-/// Ranks kept per pixel; two a layer.
+/// Ranks per pixel; each layer stores two.
 pub const RANKS: usize = 6;
 
-/// An id as it is stored: the bits of a float that is neither denormal, infinite nor NaN.
+/// An id: the bits of a float that is neither denormal, infinite nor NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Id(pub u32);
 
 impl Id {
-    /// MurmurHash3_32 with seed 0 of the name's UTF-8, then the specification's `uint32_to_float32`: where the exponent
-    /// would be all zeros or all ones its lowest bit is flipped, since programs flush denormals and mangle NaN.
+    /// MurmurHash3_32 with seed 0 of the UTF-8 name, then the specification's `uint32_to_float32`: it flips the lowest bit
+    /// of an exponent of all zeros or all ones, because programs flush denormals and change NaN.
     pub fn of(name: &str) -> Self {
         let bits = murmur(name);
         let exponent = (bits >> 23) & 0xff;
         Id(if exponent == 0 || exponent == 0xff { bits ^ (1 << 23) } else { bits })
     }
 
-    /// The value in a file.
+    /// The float that files store.
     pub fn to_f32(self) -> f32 {
         f32::from_bits(self.0)
     }
 }
 
 fn murmur(name: &str) -> u32 {
-    // A slice in memory cannot fail to be read.
+    // Reading from a slice cannot fail.
     murmur3::murmur3_32(&mut name.as_bytes(), 0).unwrap_or(0)
 }
 
-/// The ids of one kind of thing, objects or materials.
+/// Ids and names of objects or of materials.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cryptomatte {
     kind: String,
@@ -44,8 +43,8 @@ pub struct Cryptomatte {
 }
 
 impl Cryptomatte {
-    /// Ids for `names`, in their order; things of the same name share an id. `kind` names the layers: `CryptoObject`,
-    /// `CryptoMaterial`.
+    /// Computes ids for `names`, in their order; equal names share an id. `kind` is the prefix of the layers:
+    /// `CryptoObject` or `CryptoMaterial`.
     pub fn new(kind: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
         let names: Vec<String> = names.into_iter().collect();
         let ids = names.iter().map(|name| Id::of(name)).collect();
@@ -57,8 +56,8 @@ impl Cryptomatte {
         &self.ids
     }
 
-    /// The header's string attributes, by name: `name`, `hash`, `conversion` and `manifest` under the key that is the
-    /// first seven hex digits of the hash of the layers' name in the file.
+    /// String attributes for the EXR header, as (key, value): `name`, `hash`, `conversion` and `manifest`. The specification
+    /// builds the keys from the first seven hex digits of the hash of the layers' name in the file.
     pub fn attributes(&self, naming: Naming) -> [(String, String); 4] {
         let name = naming.layer(&self.kind);
         let hash = format!("{:08x}", murmur(&name));
@@ -74,8 +73,8 @@ impl Cryptomatte {
         ]
     }
 
-    /// The layers `CryptoObject00` to `02` from the ranks of every pixel; `samples` is the weight that a pixel covered
-    /// entirely has gathered.
+    /// The layers `CryptoObject00` to `02` from the ranks of every pixel; `samples` is the total weight of a fully covered
+    /// pixel.
     pub fn layers(&self, pixels: &[PixelRanks], samples: f32) -> Vec<Layer> {
         let sorted: Vec<[Rank; RANKS]> = pixels.iter().map(PixelRanks::sorted).collect();
         let layer = |index: usize| {
@@ -98,19 +97,19 @@ struct Rank {
     weight: f32,
 }
 
-/// What covers one pixel so far.
+/// Running coverage of one pixel by id.
 ///
-/// The weights always sum to all that was added. While at most six ids were seen they are exact; a seventh takes the
-/// place of the least and inherits its weight (Metwally, Agrawal, El Abbadi, "Efficient Computation of Frequent and
-/// Top-k Elements in Data Streams", 2005: whatever covers more than a sixth of the pixel is surely kept, and no weight
-/// is too large by more than the least one).
+/// The weights always sum to the total added. They are exact for up to six ids; a seventh replaces the id with the least
+/// weight and inherits that weight (Metwally, Agrawal, El Abbadi, "Efficient Computation of Frequent and Top-k Elements
+/// in Data Streams", 2005). An id that covers more than a sixth of the pixel is never lost, and no weight is too large by
+/// more than the least one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelRanks {
     ranks: [Rank; RANKS],
 }
 
 impl PixelRanks {
-    /// Adds a weight that is above zero.
+    /// Adds a weight above zero.
     pub fn add(&mut self, id: Id, weight: f32) {
         let mut least = 0;
         for i in 0..RANKS {
@@ -129,10 +128,25 @@ impl PixelRanks {
         rank.weight += weight;
     }
 
-    /// Largest weight first, ids in order among equals; absent ranks (zero) last.
+    /// Ranks by descending weight, then by id; empty ranks (weight zero) last.
     fn sorted(&self) -> [Rank; RANKS] {
         let mut ranks = self.ranks;
         ranks.sort_by(|a, b| b.weight.total_cmp(&a.weight).then(a.id.cmp(&b.id)));
         ranks
     }
+}
+
+/// JSON in ASCII, which EXR headers require: other characters become `\u` escapes (surrogate pairs above U+FFFF).
+pub fn ascii_json(json: &str) -> String {
+    let mut ascii = String::with_capacity(json.len());
+    for c in json.chars() {
+        if c.is_ascii() {
+            ascii.push(c);
+        } else {
+            for unit in c.encode_utf16(&mut [0; 2]) {
+                ascii.push_str(&format!("\\u{unit:04x}"));
+            }
+        }
+    }
+    ascii
 }

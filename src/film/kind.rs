@@ -1,20 +1,20 @@
-//! The table of layers. `output.rs` gives a layer its values; names in files, `--layers`, `info`, merging, the finish,
-//! Blender's add-on, the USD converter and the page for compositors follow this table.
+//! The table of layers. Names in files, `--layers`, `info`, merging, the finish, Blender's add-on, the USD converter and
+//! the page for compositors read it; `output.rs` computes the values.
 
-/// Beginning of the names of layers of a group of lights.
+/// Prefix of a layer with the light of one light group.
 pub const LIGHT_GROUP: &str = "LightGroup_";
-/// Beginning of the names of layers of its caustics.
+/// Prefix of a layer with the caustics of one light group.
 pub const CAUSTIC: &str = "Caustic_";
-/// Beginning of the names of finished parts.
+/// Prefix of a finished part.
 pub const COMBINED: &str = "Combined";
 
-/// Beginnings of the names of cryptomattes: of objects and of materials.
+/// Prefixes of the cryptomattes of objects and of materials.
 pub const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
 
-/// What follows a kind's name in the names of its layers.
+/// The suffix that a layer's name has after the name of its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suffix {
-    /// Nothing: there is one layer.
+    /// None: the kind has one layer.
     None,
     /// The number of a bandwidth level, from 1.
     Level,
@@ -26,60 +26,60 @@ pub enum Suffix {
     Group,
 }
 
-/// How a layer of renders with different seeds is put together.
+/// How the layers of renders with different seeds are merged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Merge {
     /// The mean.
     Mean,
-    /// Variances of the mean: independent ones add by squares of weights.
+    /// Variances of means of independent renders: a sum weighted by the squares of the shares.
     Variance,
-    /// Standard errors: their mean square.
+    /// Standard errors: the root of their mean square.
     Error,
-    /// Counts: their sum.
+    /// Counts: the sum.
     Sum,
-    /// The first render's: distances, which the background has none of, and bandwidths.
+    /// The first render's values: distances, which have no mean with the background, and bandwidths.
     First,
-    /// Ids and their shares.
+    /// Cryptomatte ranks: coverages are added by id.
     Matte,
 }
 
-/// What the finish reads a layer for.
+/// Purpose for which the finish reads a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
     /// The picture.
     Picture,
-    /// The error of the picture.
+    /// The estimate of the picture's error.
     Error,
-    /// A part of the picture, which is finished, too: its meaning then.
+    /// A part of the picture, which is finished as well; holds the meaning of the finished layer.
     Part(&'static str),
 }
 
-/// A kind of layers.
+/// A row of the table: one layer, or layers that differ by a suffix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LayerKind {
-    /// Name in plain files, without the suffix; empty for the picture.
+    /// Name in plain files, without the suffix; empty for the beauty.
     pub name: &'static str,
-    /// What follows the name.
+    /// Suffix of the name.
     pub suffix: Suffix,
     /// Components, one letter each.
     pub components: &'static str,
     /// Unit of the values.
     pub unit: &'static str,
-    /// What the values are.
+    /// Meaning of the values.
     pub meaning: &'static str,
     /// How renders with different seeds are merged.
     pub merge: Merge,
-    /// What the finish reads it for.
+    /// Purpose for which the finish reads the layer, if it does.
     pub finish: Option<Use>,
-    /// Whether compositing takes it (`--layers comp`), as it takes finished parts.
+    /// Whether `--layers comp` includes it; finished parts are always included.
     pub compositing: bool,
-    /// Whether half floats hold it as well as anybody sees, where no value is too large.
+    /// Whether half floats suffice unless a value is too large.
     pub half: bool,
-    /// Whether `--layers all` leaves it out.
+    /// Whether it has to be named: `--layers all` leaves it out.
     pub on_request: bool,
-    /// Blender's name of the pass, where it is another.
+    /// Blender's name of the pass, if it differs.
     pub blender: Option<&'static str>,
-    /// Switch of Blender's view layer that asks for the pass; finished parts have one of their own.
+    /// Property of Blender's view layer that enables the pass; finished parts share another one.
     pub switch: Option<&'static str>,
 }
 
@@ -102,29 +102,29 @@ impl LayerKind {
         switch: None,
     };
 
-    /// An additive part of the picture, and its meaning when finished.
+    /// An additive part of the picture, with the meanings of the part and of the finished part.
     const fn part(name: &'static str, meaning: &'static str, finished: &'static str) -> LayerKind {
         let switch = Some("noisy_parts");
         LayerKind { name, meaning, finish: Some(Use::Part(finished)), switch, ..LayerKind::COLOUR }
     }
 
-    /// The same of a group of lights.
+    /// An additive part that holds the light of one light group.
     const fn of_group(name: &'static str, meaning: &'static str, finished: &'static str) -> LayerKind {
         LayerKind { suffix: Suffix::Group, ..LayerKind::part(name, meaning, finished) }
     }
 
-    /// A bandwidth of each level.
+    /// Bandwidths, one layer for each level.
     const fn radius(name: &'static str, meaning: &'static str) -> LayerKind {
         let (suffix, merge) = (Suffix::Level, Merge::First);
         LayerKind { name, meaning, suffix, merge, components: "X", unit: "m", ..LayerKind::COLOUR }
     }
 
-    /// A distance or place that the first render tells.
+    /// A distance or position, taken from the first of merged renders.
     const fn first(name: &'static str, components: &'static str, meaning: &'static str) -> LayerKind {
         LayerKind { name, components, unit: "m", meaning, merge: Merge::First, ..LayerKind::COLOUR }
     }
 
-    /// Cryptomattes.
+    /// The layers of a cryptomatte.
     const fn matte(name: &'static str, switch: &'static str, meaning: &'static str) -> LayerKind {
         LayerKind {
             name,
@@ -139,12 +139,12 @@ impl LayerKind {
         }
     }
 
-    /// Name of the finished part, without the suffix; `None` for a layer that is no part.
+    /// Name of the finished part, without the suffix; `None` if the kind is not a part.
     pub fn finished(&self) -> Option<String> {
         matches!(self.finish, Some(Use::Part(_))).then(|| format!("{COMBINED}{}", self.name))
     }
 
-    /// Whether its layer or one of its layers has this name; the number may be missing.
+    /// Whether a layer of this kind has the name; a numbered name may lack its number.
     fn is(&self, name: &str) -> bool {
         match self.suffix {
             Suffix::None => name == self.name,
@@ -154,7 +154,7 @@ impl LayerKind {
     }
 }
 
-/// Kinds of layers, the parts in the order in which they are finished: the last takes the light of no part.
+/// The table. Parts are in the order in which they are finished: the last one takes light that no part accounts for.
 pub static LAYERS: &[LayerKind] = &[
     LayerKind {
         meaning: "beauty: the finished picture, or the estimator's own",
@@ -299,8 +299,8 @@ pub(super) fn stem(name: &str) -> &str {
     name.trim_end_matches(|c: char| c.is_ascii_digit())
 }
 
-/// The kind of a layer of ours by its plain name, and whether it is the finished part; `None` for a name that is not
-/// ours. A number may be missing: `Level` stands for all levels.
+/// The kind of a layer by its plain name, and whether the name is that of the finished part; `None` for an unknown name.
+/// A number may be missing: `Level` is the kind of all levels.
 pub fn kind_of(name: &str) -> Option<(&'static LayerKind, bool)> {
     let is = |name: &str| LAYERS.iter().find(|kind| kind.is(name));
     let finished = name.strip_prefix(COMBINED).and_then(is).filter(|kind| kind.finished().is_some());
@@ -313,12 +313,33 @@ pub fn part_names() -> impl Iterator<Item = &'static str> {
     LAYERS.iter().filter(is_part).map(|kind| kind.name)
 }
 
-/// The layer of the finished part; `None` for layers that are no parts.
+/// Name of the finished part of a layer; `None` if the layer is not a part.
 pub fn finished_part(name: &str) -> Option<String> {
     match kind_of(name)? {
         (LayerKind { finish: Some(Use::Part(_)), .. }, false) => Some(format!("{COMBINED}{name}")),
         _ => None,
     }
+}
+
+/// Components, unit and meaning of a layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LayerDescription {
+    /// Components, one letter each.
+    pub components: &'static str,
+    /// Unit of the values.
+    pub unit: &'static str,
+    /// Meaning of the values.
+    pub meaning: &'static str,
+}
+
+/// Description of a layer by its plain name; `None` for an unknown name.
+pub fn describe(name: &str) -> Option<LayerDescription> {
+    let (&LayerKind { components, unit, meaning, finish, .. }, finished) = kind_of(name)?;
+    let meaning = match finish {
+        Some(Use::Part(meaning)) if finished => meaning,
+        _ => meaning,
+    };
+    Some(LayerDescription { components, unit, meaning })
 }
 
 #[cfg(test)]

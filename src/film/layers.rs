@@ -1,12 +1,12 @@
 //! Named layers of one picture.
 //!
-//! A layer is a few planes, one per component, and `Level1.R` is the plane `R` of the layer `Level1`. The beauty is the
-//! layer with the empty name. A plane that stands alone in a file, such as `Z`, is the only plane `Z` of a layer `Z`.
+//! A layer has one plane per component: `Level1.R` is the plane `R` of the layer `Level1`. The beauty is the layer with
+//! the empty name. A lone channel of a file, such as `Z`, is the only plane `Z` of a layer `Z`.
 
 use super::picture::{Picture, Size};
 use crate::error::{Error, ErrorKind, Result};
 
-/// How a plane's values are stored in a file.
+/// Number format of a plane in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sample {
     /// 16 bits; at most 65504, 11 bits of precision.
@@ -18,38 +18,38 @@ pub enum Sample {
 /// One component of a layer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
-    /// The component, one letter in files of ours: `R G B A`, `X Y Z`, `U V`, `r g b a` for cryptomatte.
+    /// The component, one letter in our files: `R G B A`, `X Y Z`, `U V`, `r g b a` for cryptomatte.
     pub component: String,
-    /// How it is stored.
+    /// Number format in a file.
     pub sample: Sample,
     /// One value per pixel, row by row from the top, `width * height` of them.
     pub values: Vec<f32>,
 }
 
-/// Planes that belong together.
+/// A named group of planes, such as R, G and B of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// The name before the last dot of its channels; empty for the beauty.
+    /// The part of the channel names before the last dot; empty for the beauty.
     pub name: String,
-    /// Its components, in the order `R G B A`, `X Y Z`, `U V`.
+    /// One plane per component, in the order `R G B A`, `X Y Z`, `U V`.
     pub planes: Vec<Plane>,
 }
 
-/// All layers of a picture, of one size.
+/// All layers of a picture. They have the same size.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct LayerSet {
-    /// Pixels a row.
+    /// Pixels per row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// The layers, in the order they were added or stand in the file; no two have the same name.
+    /// The layers in the order of addition or of the file; names are unique.
     pub layers: Vec<Layer>,
 }
 
-/// What a layer is looked up for, whatever its name in the program that wrote it.
+/// Meaning of a layer, independent of the name that the writing program gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// The picture itself.
+    /// The picture.
     Beauty,
     /// Reflectance at the first rough hit.
     Albedo,
@@ -80,7 +80,7 @@ impl Layer {
         Layer { name: name.into(), planes: planes.collect() }
     }
 
-    /// The same layer stored with `sample`.
+    /// The layer with another number format in files.
     #[must_use]
     pub fn stored_as(mut self, sample: Sample) -> Self {
         self.planes.iter_mut().for_each(|plane| plane.sample = sample);
@@ -92,8 +92,8 @@ impl Layer {
         self.planes.iter().find(|plane| plane.component == component)
     }
 
-    /// The first three planes (`R G B`, `X Y Z`) per pixel; a layer of one or two planes repeats its first in all
-    /// three, as a grey picture does.
+    /// The first three planes (`R G B`, `X Y Z`), interleaved by pixel. A layer with one or two planes is read as grey:
+    /// its first plane is repeated.
     pub fn triples(&self) -> Vec<[f32; 3]> {
         let [r, g, b] = std::array::from_fn(|i| {
             let index = if self.planes.len() < 3 { 0 } else { i };
@@ -119,9 +119,10 @@ impl LayerSet {
         Size { width: self.width, height: self.height }
     }
 
-    /// Adds a layer, or replaces the one of that name.
+    /// Adds a layer, or replaces the layer with its name.
     ///
-    /// Errors: a plane whose size is not that of the picture.
+    /// # Errors
+    /// A plane has another size than the picture.
     pub fn push(&mut self, layer: Layer) -> Result<()> {
         if let Some(plane) = layer.planes.iter().find(|plane| plane.values.len() != self.pixels()) {
             let cause = format!("{} values for {} x {} pixels", plane.values.len(), self.width, self.height);
@@ -139,8 +140,8 @@ impl LayerSet {
         self.layers.iter().find(|layer| layer.name == name)
     }
 
-    /// The layer that plays a role, under the names that caustique, Blender, Mitsuba, pbrt, LuxCore and Arnold give it.
-    /// Blender's view layer and a part's name may precede the name (`ViewLayer.Denoising Albedo`).
+    /// The layer with a role, by the names that caustique, Blender, Mitsuba, pbrt, LuxCore and Arnold use. The name of a
+    /// view layer or file part may precede it (`ViewLayer.Denoising Albedo`).
     pub fn find(&self, role: Role) -> Option<&Layer> {
         let names: &[&str] = match role {
             Role::Beauty => {

@@ -1,16 +1,16 @@
-//! Names of layers: what each means, how it is called in files, and which ones `--layers` picks.
+//! Names of layers in EXR files: plain and Blender's.
 //!
-//! Nuke splits a channel's name into at most three tokens and turns what is not alphanumeric into `_`; Blender takes
-//! the last token for the component, wants one letter there, and holds names in 64 bytes; older readers stop at 31. So
-//! names of ours are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the component, and at most 31
-//! characters.
+//! Nuke splits a channel's name into at most three tokens and replaces characters that are not alphanumeric by `_`.
+//! Blender takes the last token for the component, wants one letter there, and stores names in 64 bytes. Older readers
+//! stop at 31 characters. So our names are `Layer.C` with `[A-Za-z][A-Za-z0-9_]*` for the layer, one letter for the
+//! component, and at most 31 characters.
 
-use super::kind::{CAUSTIC, LAYERS, LIGHT_GROUP, LayerKind, Suffix, Use, finished_part, kind_of, part_names, stem};
-use super::layers::{Layer, LayerSet, Sample};
+use super::kind::{CAUSTIC, LAYERS, LIGHT_GROUP, kind_of};
+use super::layers::{Layer, LayerSet, Plane};
 use crate::error::{Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
-/// How channels are called in an EXR.
+/// Naming scheme of the channels of an EXR.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -34,9 +34,9 @@ impl Naming {
         }
     }
 
-    /// What stands in a component of a layer in a file: which component of ours, and whether its sign is changed.
-    /// Positions and normals are in the world axes of glTF (y up) here and in plain files, and in Blender's (z up, (x, -z,
-    /// y)) in files with its names.
+    /// The component of our layer that a component in a file holds, and whether its sign is flipped. Positions and
+    /// normals are in glTF's world axes (y up) in memory and in plain files, and in Blender's axes (z up: x, -z, y) in
+    /// files with Blender's names.
     pub fn axis<'c>(self, layer: &str, component: &'c str) -> (&'c str, bool) {
         match (self, layer, component) {
             (Naming::Blender, layer, "Y") if has_axes(layer) => ("Z", true),
@@ -45,11 +45,11 @@ impl Naming {
         }
     }
 
-    /// A transform of points of the world, row by row, for points in a file's axes.
+    /// A matrix for world points, row by row, changed to take points in the file's axes.
     pub fn from_file_axes(self, m: [f32; 16]) -> [f32; 16] {
         match self {
             Naming::Plain => m,
-            // (x, y, z) of Blender is (x, z, -y) of ours: its second row is minus our third, its third our second.
+            // Blender's (x, y, z) is our (x, z, -y).
             Naming::Blender => std::array::from_fn(|i| match i / 4 {
                 1 => -m[8 + i % 4],
                 2 => m[4 + i % 4],
@@ -61,149 +61,61 @@ impl Naming {
     /// The channel's name in a file.
     pub fn channel(self, layer: &str, component: &str) -> String {
         let prefix = self.layer(layer);
-        // A layer of one plane of the same name stands for a lone channel at the root: `Z`, not `Z.Z`.
+        // A layer whose only plane has its name is one channel at the root: `Z`, not `Z.Z`.
         if prefix.is_empty() || prefix == component { component.to_owned() } else { format!("{prefix}.{component}") }
     }
 }
 
-/// Whether a layer of ours holds places or directions of the world.
-pub(super) fn has_axes(name: &str) -> bool {
+/// Whether a layer holds world positions or directions.
+fn has_axes(name: &str) -> bool {
     kind_of(name).is_some_and(|(kind, _)| kind.components == "XYZ")
 }
 
-/// What `describe` knows of a layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Description {
-    /// Components, one letter each.
-    pub components: &'static str,
-    /// Unit of the values.
-    pub unit: &'static str,
-    /// What the values are.
-    pub meaning: &'static str,
-}
-
-/// Components, unit and meaning of a layer of ours by its plain name; `None` for a name that is not ours.
-pub fn describe(name: &str) -> Option<Description> {
-    let (&LayerKind { components, unit, meaning, finish, .. }, finished) = kind_of(name)?;
-    let meaning = match finish {
-        Some(Use::Part(meaning)) if finished => meaning,
-        _ => meaning,
+/// Replaces Blender's names and axes by ours. Removes layers whose names we cannot write, and returns their names.
+pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
+    let known: Vec<&str> = LAYERS.iter().filter(|kind| kind.blender.is_some()).map(|kind| kind.name).collect();
+    for layer in &mut set.layers {
+        if let Some(plain) = known.iter().find(|plain| Naming::Blender.layer(plain) == layer.name) {
+            layer.name = (*plain).into();
+            to_our_axes(layer);
+        } else if let Some(pass) = layer.name.strip_prefix("ViewLayer.") {
+            layer.name = pass.into();
+        }
+    }
+    let fits = |layer: &Layer| {
+        let empty = |plane: &Plane| Plane { component: plane.component.clone(), sample: plane.sample, values: vec![] };
+        let planes = layer.planes.iter().map(empty).collect();
+        let alone = LayerSet { width: 0, height: 0, layers: vec![Layer { name: layer.name.clone(), planes }] };
+        check_names(&alone, Naming::Plain).is_ok()
     };
-    Some(Description { components, unit, meaning })
+    let (kept, left): (Vec<Layer>, Vec<Layer>) = std::mem::take(&mut set.layers).into_iter().partition(fits);
+    set.layers = kept;
+    left.into_iter().map(|layer| layer.name).collect()
 }
 
-/// What `--layers` asks for.
-#[derive(Clone, Debug, PartialEq, Eq, Default)]
-pub enum Selection {
-    /// Every layer but `Quarter1` to `Quarter4`, which few want.
-    #[default]
-    All,
-    /// The picture alone.
-    Beauty,
-    /// What compositing takes: the picture, its finished parts, albedo, normal, depth and cryptomattes; half floats
-    /// where they serve.
-    Comp,
-    /// Layers by name; `beauty` stands for the picture, and `Level` for `Level1`, `Level2`, ...
-    List(Vec<String>),
-}
-
-impl Selection {
-    /// Reads `all`, `comp`, `beauty` or names with commas between them. Errors: no name, or one that no layer of ours has, with
-    /// the nearest.
-    pub fn parse(text: &str) -> Result<Self> {
-        match text {
-            "all" => return Ok(Selection::All),
-            "beauty" => return Ok(Selection::Beauty),
-            "comp" => return Ok(Selection::Comp),
+/// Converts positions and normals from Blender's axes: (x, y, z) becomes (x, z, -y).
+fn to_our_axes(layer: &mut Layer) {
+    if !has_axes(&layer.name) {
+        return;
+    }
+    for plane in &mut layer.planes {
+        match plane.component.as_str() {
+            "Y" => {
+                plane.component = "Z".into();
+                plane.values.iter_mut().for_each(|value| *value = -*value);
+            }
+            "Z" => plane.component = "Y".into(),
             _ => {}
         }
-        let names: Vec<String> = text.split(',').map(|s| s.trim().to_owned()).filter(|s| !s.is_empty()).collect();
-        if names.is_empty() {
-            return Err(Error::new(ErrorKind::Usage, "--layers", "no layer is named")
-                .hint("give all, comp, beauty, or names such as beauty,Noisy,albedo"));
-        }
-        match names.iter().find(|name| *name != "beauty" && describe(name).is_none()) {
-            Some(unknown) => {
-                let known = suggestions();
-                Err(unknown_layer(unknown, known.iter().map(String::as_str)))
-            }
-            None => Ok(Selection::List(names)),
-        }
     }
-
-    /// Whether a layer of this plain name is asked for.
-    pub fn wants(&self, name: &str) -> bool {
-        let stem = stem(name);
-        match self {
-            Selection::All => !kind_of(name).is_some_and(|(kind, _)| kind.on_request),
-            Selection::Beauty => name.is_empty(),
-            Selection::Comp => kind_of(name).is_some_and(|(kind, finished)| finished || kind.compositing),
-            Selection::List(names) => {
-                names.iter().any(|n| n == name || (n == "beauty" && name.is_empty()) || (!stem.is_empty() && n == stem))
-            }
-        }
-    }
-
-    /// The picture with the layers asked for. Errors: one that the picture lacks, with the nearest it has.
-    pub fn apply(&self, set: LayerSet) -> Result<LayerSet> {
-        if let Selection::List(names) = self {
-            let present = |name: &String| {
-                let only = Selection::List(vec![name.clone()]);
-                set.layers.iter().any(|layer| only.wants(&layer.name))
-            };
-            if let Some(missing) = names.iter().find(|name| !present(name)) {
-                let shown =
-                    |layer: &Layer| if layer.name.is_empty() { "beauty".to_owned() } else { layer.name.clone() };
-                let present: Vec<String> = set.layers.iter().map(shown).collect();
-                return Err(unknown_layer(missing, present.iter().map(String::as_str)));
-            }
-        }
-        let layers = set.layers.into_iter().filter(|layer| self.wants(&layer.name));
-        let layers = match self {
-            Selection::Comp => {
-                layers.map(|layer| if serves_as_half(&layer) { layer.stored_as(Sample::Half) } else { layer }).collect()
-            }
-            _ => layers.collect(),
-        };
-        Ok(LayerSet { layers, ..set })
-    }
+    layer.planes.sort_by(|a, b| a.component.cmp(&b.component));
 }
 
-/// Whether half floats hold a layer as well as anybody sees: colours and directions, where none is too bright. Depth
-/// wants more digits, and the ids of cryptomattes are no numbers.
-fn serves_as_half(layer: &Layer) -> bool {
-    const LARGEST: f32 = 65_504.0;
-    kind_of(&layer.name).is_some_and(|(kind, finished)| finished || kind.half)
-        && layer.planes.iter().all(|plane| plane.values.iter().all(|value| value.abs() <= LARGEST))
-}
-
-/// Names to suggest from: of numbered layers the first.
-fn suggestions() -> Vec<String> {
-    let first = |kind: &LayerKind| match kind.suffix {
-        Suffix::None if kind.name.is_empty() => Some("beauty".into()),
-        Suffix::None => Some(kind.name.into()),
-        Suffix::Level | Suffix::Quarter => Some(format!("{}1", kind.name)),
-        Suffix::Ranks => Some(format!("{}00", kind.name)),
-        Suffix::Group => None,
-    };
-    LAYERS.iter().filter_map(first).chain(part_names().filter_map(finished_part)).collect()
-}
-
-fn unknown_layer<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Error {
-    let known: Vec<&str> = known.collect();
-    let error = Error::new(ErrorKind::Usage, "--layers", format!("no layer \"{name}\""));
-    let distance = |known: &str| strsim::levenshtein(&name.to_lowercase(), &known.to_lowercase());
-    let nearest = known.iter().map(|k| (distance(k), k)).min_by_key(|(d, _)| *d);
-    match nearest {
-        Some((d, k)) if d <= 1 + name.chars().count() / 3 => error.hint(format!("did you mean \"{k}\"?")),
-        _ => error.hint(format!("there are {}", known.join(", "))),
-    }
-}
-
-/// Checks that every channel has a name that Nuke and Blender read unharmed (see the head of this file).
+/// Checks that Nuke and Blender can read the name of every channel, see the head of this file.
 ///
-/// Errors: the first channel that breaks a rule, with the rule.
-pub fn check(set: &LayerSet, naming: Naming) -> Result<()> {
+/// # Errors
+/// The first channel that breaks a rule, with the rule; more channels than Nuke holds.
+pub fn check_names(set: &LayerSet, naming: Naming) -> Result<()> {
     let mut seen = std::collections::HashSet::new();
     for layer in &set.layers {
         for plane in &layer.planes {
@@ -233,30 +145,8 @@ fn fault(layer: &Layer, component: &str, naming: Naming, length: usize) -> Optio
     if layer.planes.len() > 4 {
         return Some("Nuke holds at most four components a layer");
     }
-    // Names of groups are the user's.
+    // The user chooses the names of light groups.
     let group = layer.name.contains(LIGHT_GROUP) || layer.name.contains(CAUSTIC);
     let limit = if naming == Naming::Plain && !group { 31 } else { 63 };
     (length > limit).then_some("the name is too long for other programs")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_suggested_name_is_described_and_well_formed() {
-        let mut set = LayerSet::new(1, 1);
-        for name in &suggestions() {
-            let name = if name == "beauty" { "" } else { name };
-            let components = describe(name).expect(name).components;
-            let planes = components.chars().map(|c| super::super::layers::Plane {
-                component: c.into(),
-                sample: super::super::layers::Sample::Float,
-                values: vec![0.0],
-            });
-            set.push(Layer { name: name.into(), planes: planes.collect() }).unwrap();
-        }
-        check(&set, Naming::Plain).unwrap();
-        check(&set, Naming::Blender).unwrap();
-    }
 }

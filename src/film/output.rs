@@ -1,16 +1,14 @@
 //! From the pixels of a render to its layers.
 //!
-//! - Before two iterations no variance is known. `Variance` then holds the square of the mean and `Error` the mean
-//!   itself: an error of the estimate's own size, which is finite and says that nothing is known. The file's header
-//!   says `"variance_known": false`.
-//! - `Error` is the estimated standard error of the uncombined image, the layer `Noisy`; the combined picture has no
-//!   estimate of its own. The file's header says `"error_of": "Noisy"`.
-//! - `A` is the fraction of eye paths that hit a surface or are taken by a medium in a mesh; where an environment
-//!   shines the background is part of the picture, and it is 1.
-//! - `Volume` is there only where media scatter, `VolumeRadius` where photons are gathered in them.
-//! - `CausticRadius` is there only where photons of caustics and others are gathered.
-//! - `depth` is the mean over those eye paths that have a first rough hit, and 1e10 where none has; `albedo` and
-//!   `normal` are zero there.
+//! - After fewer than two iterations no variance is known. `Variance` then holds the square of the mean and `Error` the
+//!   mean itself: a finite error of 100 %.
+//! - `Error` is the estimated standard error of `Noisy`. The finish replaces it by the error of the finished picture.
+//! - `A` is the fraction of camera paths that hit a surface or scatter in a medium within a mesh. It is 1 if an
+//!   environment light is visible, which makes the background part of the picture.
+//! - `Volume` exists only if media scatter, `VolumeRadius` if photons are gathered in media.
+//! - `CausticRadius` exists only if photons of caustics and other photons are gathered.
+//! - `depth` is the mean over the camera paths that have a first rough hit, and 1e10 if none has; `albedo` and `normal`
+//!   are zero then.
 
 use super::kind::{CAUSTIC, LIGHT_GROUP, kind_of};
 use super::layers::{Layer, LayerSet, Plane, Sample};
@@ -24,49 +22,49 @@ use serde::{Deserialize, Serialize};
 
 /// Depth of the background.
 pub const BACKGROUND: f32 = FAR;
-/// Pixels that are taken through all layers while they are in the cache.
+/// Pixels whose layers are all computed in turn while the pixels are in the cache.
 const BLOCK: usize = 2048;
 
-/// What the layers of a render depend on besides its pixels.
+/// The properties of a render, beside its pixels, that its layers depend on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Shape {
-    /// Bandwidth levels.
+    /// Number of bandwidth levels.
     pub levels: usize,
-    /// Levels from which the bias of that one can be told ([`SquaredError::of`]).
+    /// Number of levels that the bias of level `own` is estimated from ([`SquaredError::of`]).
     pub compared: usize,
-    /// The level (from 0) that is the method's own image.
+    /// Index, from 0, of the level that is the method's own image.
     pub own: usize,
-    /// Kinds of photons that have bandwidths, merged light paths counted as the first.
+    /// Kinds of photons that have bandwidths; merged light paths count as the first kind.
     pub kinds: ByKind<bool>,
-    /// Whether an environment light can be seen.
+    /// Whether an environment light is visible.
     pub environment: bool,
-    /// Classes of light paths that are looked for: a part of the picture without any has no layer.
+    /// Classes of light paths that are simulated: a part without any has no layer.
     pub classes: ClassSet,
     /// Whether media scatter.
     pub volume: bool,
     /// Whether photons are gathered in media.
     pub volume_photons: bool,
-    /// Names of groups of lights whose light is told apart.
+    /// Names of the light groups that have layers.
     pub groups: Vec<String>,
 }
 
-/// A pixel as the layers see it.
-struct At<'a> {
+/// Input of a layer at one pixel.
+struct PixelInput<'a> {
     pixel: &'a PixelAccumulator,
-    /// Of the pixel, row by row from the top.
+    /// Index of the pixel, row by row from the top.
     index: usize,
     bandwidths: &'a BandwidthState,
-    /// By which sample variances are too large.
+    /// Variance by quarters over sample variance, the factor that corrects sample variances.
     ratio: f64,
 }
 
-/// Values of one layer at one pixel, as many as it has components.
-type Get = Box<dyn Fn(&At<'_>) -> [f32; 4] + Sync>;
+/// Computes the values of one layer at one pixel; components that the layer lacks are ignored.
+type Get = Box<dyn Fn(&PixelInput<'_>) -> [f32; 4] + Sync>;
 
-/// One of the additive parts.
-type OfParts = fn(&Parts) -> DVec3;
+/// Selects one of the additive parts.
+type PartGetter = fn(&Parts) -> DVec3;
 
-/// A layer to be made.
+/// A layer with the function that computes it.
 struct Column {
     name: String,
     components: &'static str,
@@ -74,33 +72,34 @@ struct Column {
 }
 
 impl Column {
-    /// A layer of the [table](super::kind).
-    fn new(name: impl Into<String>, get: impl Fn(&At<'_>) -> [f32; 4] + Sync + 'static) -> Column {
+    /// A layer with the components that the [table](super::kind) gives it.
+    fn new(name: impl Into<String>, get: impl Fn(&PixelInput<'_>) -> [f32; 4] + Sync + 'static) -> Column {
         let name = name.into();
         let components = kind_of(&name).map_or("", |(kind, _)| kind.components);
         Column { name, components, get: Box::new(get) }
     }
 
     fn rgb(name: impl Into<String>, get: impl Fn(&PixelAccumulator) -> DVec3 + Sync + 'static) -> Column {
-        Column::new(name, move |at| three(get(at.pixel).as_vec3()))
+        Column::new(name, move |at| padded(get(at.pixel).as_vec3()))
     }
 
-    fn noise(name: impl Into<String>, get: impl Fn(&At<'_>) -> DVec3 + Sync + 'static) -> Column {
-        // Squares of 10^20 and more are no f32: what is known to be large is not to look as if nothing were known.
+    /// A variance or standard error.
+    fn noise(name: impl Into<String>, get: impl Fn(&PixelInput<'_>) -> DVec3 + Sync + 'static) -> Column {
+        // Squares of 1e20 and more overflow f32; a large known variance must not become infinity, which means unknown.
         let most = DVec3::splat(f64::from(f32::MAX));
-        Column::new(name, move |at| three(get(at).min(most).as_vec3()))
+        Column::new(name, move |at| padded(get(at).min(most).as_vec3()))
     }
 
     fn xyz(name: &str, get: impl Fn(&PixelAccumulator) -> Vec3 + Sync + 'static) -> Column {
-        Column::new(name, move |at| three(get(at.pixel)))
+        Column::new(name, move |at| padded(get(at.pixel)))
     }
 
-    fn one(name: impl Into<String>, get: impl Fn(&At<'_>) -> f32 + Sync + 'static) -> Column {
+    fn one(name: impl Into<String>, get: impl Fn(&PixelInput<'_>) -> f32 + Sync + 'static) -> Column {
         Column::new(name, move |at| [get(at), 0.0, 0.0, 0.0])
     }
 }
 
-fn three(v: Vec3) -> [f32; 4] {
+fn padded(v: Vec3) -> [f32; 4] {
     v.extend(0.0).to_array()
 }
 
@@ -109,17 +108,17 @@ fn mean(sum: DVec3, count: u32) -> DVec3 {
     if count == 0 { DVec3::ZERO } else { sum / f64::from(count) }
 }
 
-/// The kinds of photons that have bandwidths, and their layers: of one kind alone they are `Radius`.
-// Optimisers followed every way through this and its caller's loops, for minutes.
+/// Layer names for the kinds of photons that have bandwidths: `Radius` for the first of them, whichever it is.
+// Inlined into its caller's loops it took minutes to compile.
 #[inline(never)]
 pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
-    let there = Kind::ALL.into_iter().filter(|kind| kinds[*kind as usize]);
-    there.zip(["Radius", "CausticRadius"]).collect()
+    let present = Kind::ALL.into_iter().filter(|kind| kinds[*kind as usize]);
+    present.zip(["Radius", "CausticRadius"]).collect()
 }
 
-/// The layers that the pixels of a render give, cryptomattes excepted.
+/// All layers except the cryptomattes.
 fn columns(shape: &Shape) -> Vec<Column> {
-    let Shape { levels, compared, own, kinds, environment, classes, volume, volume_photons, .. } = *shape;
+    let Shape { levels, compared, own, kinds, environment, volume_photons, .. } = *shape;
     let mut columns = vec![
         Column::new("", move |at| {
             let alpha = if environment { 1.0 } else { at.pixel.coverage.hit_fraction() };
@@ -135,18 +134,38 @@ fn columns(shape: &Shape) -> Vec<Column> {
     }
     for (kind, name) in radius_layers(kinds) {
         for level in 0..levels {
-            let radius = move |at: &At<'_>| at.bandwidths.radius2(at.index, at.pixel, kind, level).sqrt();
+            let radius = move |at: &PixelInput<'_>| at.bandwidths.radius2(at.index, at.pixel, kind, level).sqrt();
             columns.push(Column::one(format!("{name}{}", level + 1), radius));
         }
     }
     for level in (0..levels).filter(|_| volume_photons) {
-        let radius = move |at: &At<'_>| at.bandwidths.volume_radius(at.pixel, level);
+        let radius = move |at: &PixelInput<'_>| at.bandwidths.volume_radius(at.pixel, level);
         columns.push(Column::one(format!("VolumeRadius{}", level + 1), radius));
     }
     for quarter in 0..QUARTERS {
         columns.push(Column::rgb(format!("Quarter{}", quarter + 1), move |p| p.quarter(quarter)));
     }
-    let parts: [(Part, &str, OfParts); 5] = [
+    columns.extend(part_columns(shape));
+    columns.extend([
+        Column::noise("Error", move |at| match SquaredError::of(at.pixel, own, compared) {
+            Some(error) => SquaredError { variance: error.variance * at.ratio, ..error }.root(),
+            None => at.pixel.mean(own).abs(),
+        }),
+        Column::rgb("albedo", PixelAccumulator::albedo),
+        Column::xyz("normal", |p| p.normal().as_vec3()),
+        Column::one("depth", |at| at.pixel.depth().map_or(BACKGROUND, |depth| depth as f32)),
+        Column::one("Z", |at| at.pixel.first().0),
+        Column::xyz("P", |p| p.first().1),
+        Column::one("Rejected", |at| at.pixel.rejected.total() as f32),
+    ]);
+    columns
+}
+
+/// The additive parts, and the light of light groups.
+fn part_columns(shape: &Shape) -> Vec<Column> {
+    let (classes, volume) = (shape.classes, shape.volume);
+    let mut columns = Vec::new();
+    let parts: [(Part, &str, PartGetter); 5] = [
         (Part::Direct, "Direct", |parts| parts.direct),
         (Part::Indirect, "Indirect", |parts| parts.indirect),
         (Part::Caustic, "Caustic", |parts| parts.caustic),
@@ -165,35 +184,23 @@ fn columns(shape: &Shape) -> Vec<Column> {
             columns.push(Column::rgb(format!("{CAUSTIC}{name}"), move |p| p.group(group)[1]));
         }
     }
-    columns.extend([
-        Column::noise("Error", move |at| match SquaredError::of(at.pixel, own, compared) {
-            Some(error) => SquaredError { variance: error.variance * at.ratio, ..error }.root(),
-            None => at.pixel.mean(own).abs(),
-        }),
-        Column::rgb("albedo", PixelAccumulator::albedo),
-        Column::xyz("normal", |p| p.normal().as_vec3()),
-        Column::one("depth", |at| at.pixel.depth().map_or(BACKGROUND, |depth| depth as f32)),
-        Column::one("Z", |at| at.pixel.first().0),
-        Column::xyz("P", |p| p.first().1),
-        Column::one("Rejected", |at| at.pixel.rejected.total() as f32),
-    ]);
     columns
 }
 
-/// Variance of the mean of a level; before two iterations the square of the mean.
+/// Variance of the mean of a level; after fewer than two iterations the square of the mean.
 fn variance(pixel: &PixelAccumulator, level: usize) -> DVec3 {
     if pixel.iterations < 2 { pixel.mean(level) * pixel.mean(level) } else { pixel.variance_of_mean(level) }
 }
 
-/// Names of the layers that [`layers`] can make.
+/// Names of all layers that [`layers`] can compute.
 pub fn names(shape: &Shape) -> Vec<String> {
     columns(shape).into_iter().map(|column| column.name).collect()
 }
 
-/// The layers of a picture whose name is `wanted`; pixels row by row from the top.
+/// Computes the layers whose names are `wanted`, from pixels row by row from the top.
 ///
 /// # Errors
-/// There are not `width * height` pixels.
+/// The number of pixels is not `width * height`.
 pub fn layers(
     (width, height): (u32, u32),
     pixels: &[PixelAccumulator],
@@ -207,7 +214,7 @@ pub fn layers(
     let mut values = vec![vec![0f32; pixels.len()]; channels];
     let noisy = columns.iter().any(|column| column.name.starts_with("Variance") || column.name == "Error");
     let ratios = if noisy { variance_ratio(pixels, width as usize, shape.own) } else { Vec::new() };
-    // One look at each pixel for all layers: pixels are large, and reading them all once per layer would take seconds.
+    // Each pixel is read once for all layers: pixels are large, and one pass per layer would take seconds.
     let mut blocks: Vec<Vec<&mut [f32]>> = Vec::new();
     blocks.resize_with(pixels.len().div_ceil(BLOCK), || Vec::with_capacity(channels));
     for plane in &mut values {
@@ -218,7 +225,7 @@ pub fn layers(
     blocks.par_iter_mut().zip(pixels.par_chunks(BLOCK)).enumerate().for_each(|(block, (planes, pixels))| {
         let at = |(i, pixel)| {
             let index = block * BLOCK + i;
-            At { pixel, index, bandwidths, ratio: ratios.get(index).copied().map_or(1.0, f64::from) }
+            PixelInput { pixel, index, bandwidths, ratio: ratios.get(index).copied().map_or(1.0, f64::from) }
         };
         let mut planes = planes.as_mut_slice();
         for column in &columns {
@@ -263,7 +270,7 @@ mod tests {
         }
     }
 
-    /// An eye path that finds `x` in every part and level; level `k` of the photons gives `x + k`.
+    /// A camera path with the light `x` in every part; level `k` of the photons has `x + k`.
     fn measure(x: f32, hit: bool) -> PixelSample {
         let photons = std::array::from_fn(|k| Rgb::splat(x + k as f32));
         PixelSample {
@@ -284,7 +291,7 @@ mod tests {
         }
     }
 
-    /// After an iteration whose squared radii on surfaces are a fraction of the first's.
+    /// Bandwidths of the memoryless rule after nine iterations.
     fn bandwidths() -> BandwidthState {
         BandwidthState::memoryless(Schedule::new(9, 5, 0.5, 0.5))
     }
@@ -316,7 +323,7 @@ mod tests {
             assert_eq!(value(&set, "Noisy", c), value(&set, "Level4", c));
             assert_eq!(value(&set, "Noisy", c), value(&set, "", c));
         }
-        // What the products of the memoryless rule are after 8 steps, then 1/sqrt(2) a level, in media 1/cbrt(2).
+        // The product of the memoryless rule after 8 steps, then 1/sqrt(2) a level, in media 1/cbrt(2).
         let product: f32 = (1..9).map(|k| (k as f32 + 0.5) / (k as f32 + 1.0)).product();
         let (surface, volume) = (product.sqrt(), product.cbrt());
         for (name, expected) in [
@@ -334,7 +341,7 @@ mod tests {
         let focused = Shape { kinds: [false, true], ..shape() };
         let alone = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &focused, |_| true).expect("one pixel");
         assert!((value(&alone, "Radius5", "X") - 4.0 * surface).abs() < 1e-6 && alone.get("CausticRadius5").is_none());
-        // One of ten eye paths missed: it counts for alpha and albedo, not for depth.
+        // One of ten camera paths missed: it counts for alpha and albedo, not for depth.
         assert_eq!(value(&set, "", "A"), 0.9);
         assert!((value(&set, "albedo", "R") - 0.45).abs() < 1e-6);
         assert_eq!((value(&set, "depth", "Z"), value(&set, "normal", "Y")), (4.0, 1.0));
@@ -343,9 +350,9 @@ mod tests {
         assert_eq!(names(&shape()), set.layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>());
     }
 
-    /// Squares of what f32 can hold are not always f32.
+    /// The square of a finite f32 may overflow.
     #[test]
-    fn the_variance_of_great_radiance_is_finite() {
+    fn the_variance_of_a_large_radiance_is_finite() {
         let mut pixel = PixelAccumulator::new(5, 0, [1.0; 2]).with_groups(1);
         for pass in 1..=4 {
             let light = Rgb::splat(if pass % 2 == 0 { 1e20 } else { 3e20 });
@@ -354,7 +361,7 @@ mod tests {
         }
         let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
         assert_eq!(value(&set, "Variance2", "R"), f32::MAX);
-        // (1e20)^2 four times, over 4 and 3, and the root of it.
+        // The root of (1e20)^2 four times, over 4 and 3.
         assert!((value(&set, "Error", "R") / (1e20 / 3f32.sqrt()) - 1.0).abs() < 1e-3);
     }
 

@@ -77,7 +77,7 @@ pub fn check_names(selection: &Selection, shape: &Shape, finished: bool, naming:
         Layer { planes: components.chars().map(plane).collect(), name }
     };
     let wanted = names(shape, finished).into_iter().filter(|name| selection.wants(name));
-    film::check(&LayerSet { width: 0, height: 0, layers: wanted.map(layer).collect() }, naming)
+    film::check_names(&LayerSet { width: 0, height: 0, layers: wanted.map(layer).collect() }, naming)
 }
 
 /// Groups of lights that are asked for by the names of their layers.

@@ -1,7 +1,7 @@
 //! Cryptomatte against the values that its authors publish.
 
 use caustique::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
-use caustique::film::{LayerSet, Naming, check};
+use caustique::film::{LayerSet, Naming, check_names};
 
 #[test]
 fn ids_are_those_of_the_specification() {
@@ -106,7 +106,7 @@ fn layers_have_names_that_programs_read() {
     for layer in matte.layers(&[pixel, PixelRanks::default()], 1.0) {
         set.push(layer).unwrap();
     }
-    check(&set, Naming::Plain).unwrap();
+    check_names(&set, Naming::Plain).unwrap();
     let names: Vec<&str> = set.layers.iter().map(|layer| layer.name.as_str()).collect();
     assert_eq!(names, ["CryptoMaterial00", "CryptoMaterial01", "CryptoMaterial02"]);
     let planes = &set.layers[0].planes;

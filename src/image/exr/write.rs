@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::{Attributes, Frame, SOFTWARE, header, zip};
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::{LayerSet, Naming, Plane, Sample, check};
+use crate::film::{LayerSet, Naming, Plane, Sample, check_names};
 use crate::image::atomic;
 use serde::Serialize;
 
@@ -68,7 +68,7 @@ pub fn write_followed(
     options: Options,
     tail: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
 ) -> Result<()> {
-    check(set, options.naming).map_err(|error| error.within(path.display()))?;
+    check_names(set, options.naming).map_err(|error| error.within(path.display()))?;
     let mut planes: Vec<(String, Source<'_>)> = Vec::new();
     for layer in &set.layers {
         for plane in &layer.planes {
