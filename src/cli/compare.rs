@@ -4,7 +4,7 @@ use super::progress::Form;
 use super::{output, print, print_json};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{Layer, LayerSet};
-use caustique::image::{Comparison, Floor, atomic, compare_above, exr, heat, png};
+use caustique::image::{Comparison, Floor, atomic, compare_with_floor, exr, heat, png};
 use caustique::report::errors;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let image = read(&args.image, args.layer.as_deref())?;
     let reference = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
-    let compared = Form::beside(args.json).during("comparing", || compare_above(&image, &reference, floor));
+    let compared = Form::beside(args.json).during("comparing", || compare_with_floor(&image, &reference, floor));
     let comparison = compared.map_err(|e| e.within(args.image.display()))?;
     if let Some(path) = &args.png {
         let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));

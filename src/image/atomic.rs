@@ -1,4 +1,4 @@
-//! Files that are either whole or not there.
+//! Atomic file writes: a file is either complete or absent.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, Permissions};
@@ -9,50 +9,52 @@ use tempfile::NamedTempFile;
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// Writes a file through `fill` so that nobody ever sees half of it: to a temporary file beside it, flushed to disk,
-/// then renamed. If anything fails the temporary file is removed and an older file at `path` stays as it was.
+/// Writes a file through `fill` to a temporary file beside it, flushes that to disk and renames it, so that no reader
+/// sees a partial file. On failure the temporary file is removed and an older file at `path` stays unchanged.
 ///
-/// A symbolic link is followed; a device such as `/dev/null` receives the bytes without a rename.
+/// Follows symbolic links. A device such as `/dev/null` receives the bytes without a rename.
 ///
-/// Errors: what `fill` returns, and those of the file system with the path and a remedy.
+/// # Errors
+/// Errors of `fill`, and of the file system with the path and a remedy.
 pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> Result<()>) -> Result<()> {
     let target = resolve(path)?;
-    let mut temporary = beside(&target).map_err(|cause| failure(path, &cause))?;
+    let mut temporary = temporary_beside(&target).map_err(|cause| failure(path, &cause))?;
     let mut buffered = BufWriter::with_capacity(1 << 18, temporary.as_file_mut());
     fill(&mut buffered)?;
     buffered.flush().map_err(|cause| failure(path, &cause))?;
     drop(buffered);
-    finish(&target, temporary).map_err(|cause| failure(path, &cause))
+    publish(&target, temporary).map_err(|cause| failure(path, &cause))
 }
 
-/// Writes a file as a whole, see [`write()`].
+/// Writes `bytes` as a file, see [`write()`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write(path, |file| file.write_all(bytes).map_err(|cause| failure(path, &cause)))
 }
 
-/// Finds out before a long render whether [`write()`] can succeed: the folder exists and takes new files, and `path` is
-/// no folder.
+/// Checks before a long render that [`write()`] can succeed: the folder exists and accepts new files, and `path` is not a
+/// folder.
 ///
-/// Errors: the reason, with a remedy.
+/// # Errors
+/// The reason, with a remedy.
 pub fn check_writable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
     match fs::symlink_metadata(&target) {
         Err(cause) if cause.kind() != io::ErrorKind::NotFound => return Err(failure(path, &cause)),
-        Ok(file) if is_kept(&target, &file) => {
+        Ok(file) if is_protected(&target, &file) => {
             let error =
                 Error::new(ErrorKind::Io, path.display(), "belongs to another user, whose files are kept there");
             return Err(error.hint("choose another name, or another folder"));
         }
         _ => {}
     }
-    beside(&target).map(drop).map_err(|cause| failure(path, &cause))
+    temporary_beside(&target).map(drop).map_err(|cause| failure(path, &cause))
 }
 
-/// Whether the folder of a file, such as `/tmp`, lets its owner alone replace it, and that is somebody else.
+/// Whether the folder, such as `/tmp`, allows only the owner to replace the file, and the owner is another user.
 #[cfg(unix)]
-fn is_kept(target: &Path, file: &fs::Metadata) -> bool {
+fn is_protected(target: &Path, file: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
-    /// The bit of a mode that says so.
+    /// The sticky bit of a mode.
     const STICKY: u32 = 0o1000;
     let user = rustix::process::geteuid().as_raw();
     let folder = fs::metadata(folder(target));
@@ -60,11 +62,11 @@ fn is_kept(target: &Path, file: &fs::Metadata) -> bool {
 }
 
 #[cfg(not(unix))]
-fn is_kept(_: &Path, _: &fs::Metadata) -> bool {
+fn is_protected(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// An error of the file system while writing `path`, with a remedy where there is one.
+/// An error of the file system while writing `path`, with a remedy if there is one.
 pub(crate) fn failure(path: &Path, cause: &io::Error) -> Error {
     let error = Error::io(path, cause);
     match cause.kind() {
@@ -79,7 +81,7 @@ pub(crate) fn failure(path: &Path, cause: &io::Error) -> Error {
     }
 }
 
-/// Whether two names are of one file, whichever way they are written.
+/// Whether two paths name the same file, by device and inode.
 #[cfg(unix)]
 pub fn is_same_file(one: &Path, other: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -87,19 +89,19 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
     one == other || file(one).is_some_and(|one| Some(one) == file(other))
 }
 
-/// Whether two names are of one file.
+/// Whether two paths are equal.
 #[cfg(not(unix))]
 pub fn is_same_file(one: &Path, other: &Path) -> bool {
     one == other
 }
 
-/// Where the bytes go: links followed, so that a link stays a link, also one to a file that is not there yet.
+/// The file behind a path. Links are followed, also to a file that does not exist yet, so that a link stays a link.
 fn resolve(path: &Path) -> Result<PathBuf> {
     let error = |cause: &str| Error::new(ErrorKind::Io, path.display(), cause);
     if path.file_name().is_none() || path.is_dir() {
         return Err(error("is a folder").hint("name a file in it"));
     }
-    // A pipe or a device has no name beside which a file could be made.
+    // No temporary file can be made beside a pipe or a device.
     if is_device(path) {
         return Ok(path.to_owned());
     }
@@ -119,7 +121,7 @@ fn resolve(path: &Path) -> Result<PathBuf> {
     Ok(fs::canonicalize(&target).unwrap_or(target))
 }
 
-/// Most links one after the other, as Linux has it.
+/// Maximum length of a chain of links, as on Linux.
 const MAX_LINKS: usize = 40;
 
 fn folder(path: &Path) -> &Path {
@@ -130,7 +132,8 @@ fn is_device(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|data| !data.is_file())
 }
 
-fn beside(target: &Path) -> io::Result<NamedTempFile> {
+/// A locked temporary file beside the target.
+fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
     let prefix = prefix(target);
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(SUFFIX);
@@ -144,7 +147,7 @@ fn beside(target: &Path) -> io::Result<NamedTempFile> {
     remove_stale(folder, &prefix);
     loop {
         let file = builder.tempfile_in(folder)?;
-        // Its lock says that somebody writes it. Who came between its making and its locking may have removed it.
+        // The lock marks a file that is being written. Another process may have removed the file before it was locked.
         let locked = file.as_file().lock().is_ok();
         if !locked || file.path().exists() {
             return Ok(file);
@@ -152,22 +155,24 @@ fn beside(target: &Path) -> io::Result<NamedTempFile> {
     }
 }
 
-/// What the names of the temporary files of a target begin with, and how they end.
+/// Prefix of the names of the temporary files of a target.
 fn prefix(target: &Path) -> OsString {
     let mut prefix = OsString::from(".caustique-");
-    // A name has 255 bytes at most.
+    // File names are limited to 255 bytes.
     if let Some(name) = target.file_name().filter(|name| name.len() <= 200) {
         prefix.push(name);
         prefix.push("-");
     }
     prefix
 }
+
+/// Suffix of the names of temporary files.
 const SUFFIX: &str = ".part";
-/// Random characters between the two.
+/// Random characters between prefix and suffix, the default of `tempfile`.
 const RANDOM: usize = 6;
 
-/// Removes temporary files that a process has left which was killed: those of the same target that nobody has locked.
-/// Where a file system has no locks nothing is removed.
+/// Removes the temporary files of this target that a killed process has left: those that no process has locked. On file
+/// systems without locks nothing is removed.
 fn remove_stale(folder: &Path, prefix: &OsStr) {
     let ours = |name: &OsStr| {
         let (name, prefix) = (name.as_encoded_bytes(), prefix.as_encoded_bytes());
@@ -176,10 +181,10 @@ fn remove_stale(folder: &Path, prefix: &OsStr) {
             && name.ends_with(SUFFIX.as_bytes())
     };
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    // To open a pipe would wait for its writer.
+    // Opening a pipe would wait for its writer.
     let is_file = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
     for entry in entries.filter(|entry| ours(&entry.file_name()) && is_file(entry)) {
-        // The lock is held while the file goes, so that nobody writes it.
+        // Holding the lock keeps writers out until the file is removed.
         let free = File::open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
         if free.is_some() {
             let _ = fs::remove_file(entry.path());
@@ -187,7 +192,7 @@ fn remove_stale(folder: &Path, prefix: &OsStr) {
     }
 }
 
-fn finish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
+fn publish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
     if is_device(target) {
         temporary.as_file_mut().rewind()?;
         return io::copy(temporary.as_file_mut(), &mut File::options().write(true).open(target)?).map(drop);
@@ -198,7 +203,7 @@ fn finish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
         temporary.as_file().set_permissions(older.permissions())?;
     }
     temporary.persist(target).map_err(|error| error.error)?;
-    // The rename itself reaches the disk with its folder; some file systems cannot do this, and then do not need it.
+    // The rename reaches the disk with its folder. File systems that cannot sync folders do not need it.
     if let Ok(folder) = File::open(folder(target)) {
         let _ = folder.sync_all();
     }
@@ -209,17 +214,17 @@ fn finish(target: &Path, mut temporary: NamedTempFile) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    /// A pipe keeps its name, by which it is opened, also where that is a link of the kernel's that leads nowhere.
+    /// The name of a pipe in `/proc` is a link that leads nowhere; it must not be followed.
     #[cfg(target_os = "linux")]
     #[test]
-    fn pipes_are_written_to() {
+    fn pipes_keep_their_names() {
         use std::os::fd::AsRawFd;
         let (_reader, writer) = std::io::pipe().expect("a pipe");
         let path = PathBuf::from(format!("/proc/self/fd/{}", writer.as_raw_fd()));
         assert_eq!(resolve(&path).expect("it can be written to"), path);
     }
 
-    /// A link stays a link, wherever it leads; one that leads nowhere is no file to be written.
+    /// A link stays a link; a link into a missing folder or to itself is an error.
     #[cfg(unix)]
     #[test]
     fn links_are_followed() {
@@ -244,7 +249,7 @@ mod tests {
         assert_eq!(long.hint.as_deref(), Some("choose a shorter name"), "{long}");
     }
 
-    /// A pipe that is called as a stale file is not waited for.
+    /// A pipe with the name of a stale file must not block the write.
     #[cfg(unix)]
     #[test]
     fn pipes_are_not_opened() {
@@ -256,7 +261,7 @@ mod tests {
         assert!(pipe.exists());
     }
 
-    /// What a killed process has left of a file goes at the next write; what is still written, or of another file, stays.
+    /// Stale temporary files of the same target are removed; locked ones and those of other targets stay.
     #[test]
     fn stale_files_are_removed() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -272,9 +277,9 @@ mod tests {
         assert_eq!(fs::read(path("a.exr")).expect("it is there"), b"whole");
         assert!(!path(stale).exists() && path(busy).exists() && others.iter().all(|name| path(name).exists()));
         assert_eq!(fs::read_dir(folder.path()).expect("it can be read").count(), 5);
-        // Two that write at once do not remove each other's.
-        let first = beside(&path("a.exr")).expect("it can be made");
-        let second = beside(&path("a.exr")).expect("it can be made");
+        // Two writers at once do not remove each other's files.
+        let first = temporary_beside(&path("a.exr")).expect("it can be made");
+        let second = temporary_beside(&path("a.exr")).expect("it can be made");
         assert!(first.path().exists() && second.path().exists() && path(busy).exists());
     }
 }

@@ -1,9 +1,9 @@
-//! FLIP: how much two pictures differ to an observer who flips between them, 0 (equal) to 1.
+//! FLIP: the difference that an observer sees when flipping between two pictures, 0 (equal) to 1.
 //!
 //! LDR-FLIP: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for
 //! Alternating Images", HPG 2020 (below: FLIP 2020). HDR-FLIP, the largest LDR-FLIP over exposures: Andersson, Nilsson,
 //! Shirley, Akenine-Moller, "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021 (below:
-//! HDR-FLIP 2021). With the authors' standard observer: a screen 0.7 m wide of 3840 pixels, 0.7 m away.
+//! HDR-FLIP 2021). The observer is the authors' standard one: a screen 0.7 m wide of 3840 pixels, 0.7 m away.
 
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
@@ -12,14 +12,14 @@ use super::tonemap::aces;
 use crate::film::{Picture, Size};
 use crate::math::{Rgb, luminance};
 
-/// Pixels a degree of the standard observer.
+/// Pixels per degree of the visual field, for the standard observer.
 const PIXELS_PER_DEGREE: f32 = 3840.0 * std::f32::consts::PI / 180.0;
 
 /// Compressive exponent of colour differences, FLIP 2020 section 4.1.3.
 const COLOUR_EXPONENT: f32 = 0.7;
 /// The share of the largest colour difference that maps to `KNEE_TO`, FLIP 2020 section 4.1.3.
 const KNEE_FROM: f32 = 0.4;
-/// See `KNEE_FROM`.
+/// The value that `KNEE_FROM` maps to.
 const KNEE_TO: f32 = 0.95;
 /// Width of the edge and point detectors in degrees, FLIP 2020 section 4.2.
 const DETECTOR_WIDTH: f32 = 0.082;
@@ -31,8 +31,8 @@ const FEATURE_EXPONENT: f32 = 0.5;
 ///
 /// Exposures go from the one that brings the reference's brightest pixel to 0.85 of the display to the one that does so
 /// with its median luminance (HDR-FLIP 2021 section 3.1), in steps of at most about one stop. Two cases the paper
-/// leaves open: if the median is zero, that of the luminances above zero takes its place; a black reference is looked
-/// at as it is.
+/// leaves open: a median of zero is replaced by the median of the luminances above zero; a black reference gets one
+/// exposure.
 pub fn hdr(reference: &Picture, test: &Picture) -> Vec<f32> {
     let (first, last) = exposures(reference);
     let count = (last - first).ceil().max(2.0) as usize;
@@ -77,18 +77,21 @@ fn exposures(reference: &Picture) -> (f32, f32) {
     ((bright / brightest).log2(), (bright / median).log2())
 }
 
-/// The filters, which depend on the observer only.
+/// The filters of the observer.
 struct Detector {
     /// Contrast sensitivity of the achromatic channel.
     achromatic: Vec<f32>,
+    /// Contrast sensitivity of the red-green channel.
     red_green: Vec<f32>,
-    /// That of blue and yellow is a sum of two Gaussians, each separable.
+    /// Contrast sensitivity of the blue-yellow channel, a sum of two separable Gaussians.
     blue_yellow: [Vec<f32>; 2],
-    /// Gaussian and its first and second derivative.
+    /// Gaussian.
     smooth: Vec<f32>,
+    /// First derivative of the Gaussian: edges.
     edge: Vec<f32>,
+    /// Second derivative of the Gaussian: points.
     point: Vec<f32>,
-    /// Largest colour difference, that of green and blue.
+    /// Largest colour difference, between green and blue.
     largest: f32,
     /// CIE XYZ to linear Rec. 709.
     from_xyz: Mat3,
@@ -109,7 +112,7 @@ impl Detector {
             let sum: f32 = values.iter().sum();
             scaled(values, 1.0 / sum)
         };
-        // Two-dimensional weights are products of one-dimensional ones, so these sum to one together: s1^2 + s2^2 = 1.
+        // Two-dimensional weights are products of one-dimensional ones: together they sum to s1^2 + s2^2 = 1.
         let (wide, narrow) = (gaussian(34.1, 0.04), gaussian(13.5, 0.025));
         let total = f32::hypot(wide.iter().sum(), narrow.iter().sum());
 
@@ -117,7 +120,7 @@ impl Detector {
         let reach = (3.0 * deviation).ceil() as i32;
         let g = |x: f32| (-x * x / (2.0 * deviation * deviation)).exp();
         let taps = |f: &dyn Fn(f32) -> f32| -> Vec<f32> { (-reach..=reach).map(|i| f(i as f32)).collect() };
-        // Positive weights of a derivative sum to one, negative ones to minus one.
+        // The positive weights of a derivative sum to 1, the negative ones to -1.
         let balanced = |values: Vec<f32>| -> Vec<f32> {
             let positive: f32 = values.iter().filter(|&&v| v > 0.0).sum();
             let negative: f32 = -values.iter().filter(|&&v| v < 0.0).sum::<f32>();
@@ -177,14 +180,16 @@ impl Detector {
     }
 }
 
+/// A picture as the observer perceives it.
 struct Percept {
     /// Hunt-adjusted CIELAB.
     colour: Vec<Vec3>,
+    /// Magnitudes of edges and points.
     edge: Vec<f32>,
     point: Vec<f32>,
 }
 
-/// Correlation of every row with `taps`; edge pixels repeat outwards.
+/// Correlation of every row with `taps`; border pixels are repeated outwards.
 fn horizontal(plane: &[f32], taps: &[f32], width: usize) -> Vec<f32> {
     let radius = taps.len() / 2;
     let mut out = vec![0.0; plane.len()];
@@ -199,7 +204,7 @@ fn horizontal(plane: &[f32], taps: &[f32], width: usize) -> Vec<f32> {
     out
 }
 
-/// Correlation of every column with `taps`; edge pixels repeat outwards.
+/// Correlation of every column with `taps`; border pixels are repeated outwards.
 fn vertical(plane: &[f32], taps: &[f32], width: usize, height: usize) -> Vec<f32> {
     let radius = taps.len() / 2;
     let mut out = vec![0.0; plane.len()];
@@ -212,10 +217,10 @@ fn vertical(plane: &[f32], taps: &[f32], width: usize, height: usize) -> Vec<f32
     out
 }
 
-/// White of the colour spaces, D65.
+/// The white point of the colour spaces, D65.
 const WHITE: Vec3 = Vec3::new(0.950_428_55, 1.0, 1.088_900_4);
 
-/// Linear Rec. 709 to CIE XYZ over the white, from the primaries' chromaticities.
+/// Linear Rec. 709 to CIE XYZ, from the chromaticities of the primaries.
 const TO_XYZ: Mat3 = Mat3::from_cols_array(&[
     10_135_552.0 / 24_577_794.0,
     2_613_072.0 / 12_288_897.0,
@@ -253,7 +258,7 @@ fn hunt(lab: Vec3) -> Vec3 {
     Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)
 }
 
-/// City block in lightness, Euclidean in wavelength (HyAB, FLIP 2020 section 4.1.2).
+/// City-block distance in lightness, Euclidean in the other two channels (HyAB, FLIP 2020 section 4.1.2).
 fn colour_distance(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x.abs() + (d.y * d.y + d.z * d.z).sqrt()

@@ -1,4 +1,4 @@
-//! Errors as colours.
+//! Colours of heat maps.
 
 use glam::Vec3;
 
@@ -25,8 +25,8 @@ const MAGMA: [[f32; 3]; 17] = [
     [0.987, 0.991, 0.750],
 ];
 
-/// Colour of an error from 0 (black) over red to 1 (pale yellow), sRGB-encoded, lighter always meaning more. What is
-/// not a number is shown as the largest error.
+/// Colour of an error, sRGB-encoded, from 0 (black) over red to 1 (pale yellow); lightness increases with the error. NaN
+/// has the colour of 1.
 pub fn magma(error: f32) -> Rgb {
     let position = if error.is_nan() { 16.0 } else { error.clamp(0.0, 1.0) * 16.0 };
     let index = (position as usize).min(15);

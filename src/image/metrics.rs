@@ -1,4 +1,4 @@
-//! The error of a picture against a reference.
+//! Error metrics of a picture against a reference.
 
 use serde::Serialize;
 
@@ -10,12 +10,12 @@ use crate::stat::{TRIMMED_SHARE, floor};
 
 /// The error of a picture A against a reference B of the same size, over all pixels that are finite in both.
 ///
-/// Serialises as `compare --json` shows it. All sums are in `f64` and in the order of pixels.
+/// Serialises as `compare --json` prints it. All sums are in `f64` and in the order of pixels.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Mean over pixels of [`relative_squared_error`], the papers' relMSE.
     pub relmse: f64,
-    /// The same without the worst 0.5 % of pixels (rounded down), [`TRIMMED_SHARE`].
+    /// relMSE without the worst 0.5 % of the pixels (rounded down), [`TRIMMED_SHARE`].
     pub relmse_trimmed: f64,
     /// Mean over pixels and channels of the squared difference.
     pub mse: f64,
@@ -23,10 +23,9 @@ pub struct Comparison {
     pub mean_ratio: Option<f64>,
     /// Mean over pixels of HDR-FLIP, see [`flip::hdr`].
     pub flip: f64,
-    /// What of the error changes from pixel to pixel, see [`grain`].
+    /// The part of relMSE that changes from pixel to pixel, see [`grain`].
     pub grain: f64,
-    /// What is added to the squared reference that errors are relative to: 0.01 of the papers' relMSE, or that of
-    /// [`Floor::Relative`].
+    /// The constant that is added to the squared reference, see [`Floor`].
     pub floor: f64,
     /// Pixels with a channel that is not finite, in either picture.
     pub pixels_not_finite: u64,
@@ -35,7 +34,7 @@ pub struct Comparison {
     pub flip_map: Vec<f32>,
 }
 
-/// What is added to the squared reference that errors are relative to.
+/// The constant that is added to the squared reference, to which errors are relative.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Floor {
     /// 0.01, as the papers define relMSE.
@@ -55,7 +54,7 @@ impl Floor {
     }
 }
 
-/// The figures of a [`Comparison`] that need no look at neighbours.
+/// The metrics of a [`Comparison`] that treat every pixel alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Errors {
     /// See [`Comparison::relmse`].
@@ -70,10 +69,10 @@ pub struct Errors {
 
 /// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is none.
 pub fn errors(a: &Picture, b: &Picture) -> Option<Errors> {
-    errors_above(a, b, floor::ABSOLUTE)
+    errors_with_floor(a, b, floor::ABSOLUTE)
 }
 
-fn errors_above(a: &Picture, b: &Picture, floor: f64) -> Option<Errors> {
+fn errors_with_floor(a: &Picture, b: &Picture, floor: f64) -> Option<Errors> {
     let finite = |&i: &usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len().min(b.len())).filter(finite).collect();
     if pixels.is_empty() {
@@ -96,7 +95,7 @@ pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     squared_error(x, r) / weight(r, floor::ABSOLUTE)
 }
 
-/// (mean of r over RGB)^2 + the floor.
+/// The denominator of relMSE: (mean of r over RGB)^2 plus the floor.
 fn weight(r: [f32; 3], floor: f64) -> f64 {
     channel_mean(r).powi(2) + floor
 }
@@ -106,18 +105,17 @@ pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     (0..3).map(|c| (f64::from(x[c]) - f64::from(r[c])).powi(2)).sum::<f64>() / 3.0
 }
 
-/// The part of the error of `a` against `b` that neighbours do not share: noise, and edges out of place, but no error
-/// that is smooth.
+/// The part of the relMSE of `a` against `b` that is not smooth: noise and displaced edges.
 ///
-/// The error of a channel less its mean over the 3 x 3 pixels around, fewer at the rim, is squared and weighed as
-/// relMSE weighs; the mean over pixels and channels counts. White noise keeps 8/9 of its relMSE, an offset nothing.
-/// Pixels that are not finite in both pictures are left out, as neighbours too; `None` if there is no other, or if the
-/// sizes are not `width * height`.
+/// From the error of each channel its mean over the 3 x 3 window (cut off at the border) is subtracted; the rest is
+/// squared, weighted like relMSE, and averaged over pixels and channels. White noise keeps 8/9 of its relMSE, a constant
+/// offset nothing. Pixels that are not finite in both pictures are left out, also of windows. `None` if no other pixel
+/// exists, or if the sizes differ.
 pub fn grain(a: &Picture, b: &Picture) -> Option<f64> {
-    grain_above(a, b, floor::ABSOLUTE)
+    grain_with_floor(a, b, floor::ABSOLUTE)
 }
 
-fn grain_above(a: &Picture, b: &Picture, floor: f64) -> Option<f64> {
+fn grain_with_floor(a: &Picture, b: &Picture, floor: f64) -> Option<f64> {
     if a.size() != b.size() {
         return None;
     }
@@ -149,18 +147,19 @@ fn grain_above(a: &Picture, b: &Picture, floor: f64) -> Option<f64> {
     (pixels > 0).then(|| sum / pixels as f64)
 }
 
-/// Compares the pictures (see [`LayerSet::beauty`]) of two files, `b` being the reference.
-///
-/// Errors: sizes that differ, a file without a picture, no pixel that is finite in both.
-pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
-    compare_above(a, b, Floor::Papers)
-}
-
-/// The same, relative to what is above `floor`.
+/// Compares the pictures (see [`LayerSet::beauty`]) of two files, with the papers' floor; `b` is the reference.
 ///
 /// # Errors
-/// Those of [`compare`].
-pub fn compare_above(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Comparison> {
+/// The sizes differ, a file has no picture, or no pixel is finite in both.
+pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
+    compare_with_floor(a, b, Floor::Papers)
+}
+
+/// [`compare`] with a chosen floor.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_with_floor(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Comparison> {
     check_sizes(a.size(), b.size())?;
     let bytes = (a.width as u64).saturating_mul(a.height as u64).saturating_mul(COMPARED_PIXEL_BYTES);
     if bytes >= memory::MIN_CHECKED_BYTES {
@@ -170,8 +169,8 @@ pub fn compare_above(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Compari
     compare_pictures(&a.beauty()?, &b.beauty()?, floor)
 }
 
-/// Bytes of a pixel while two pictures are compared, besides those of the files: two pictures, twice as vectors and at an
-/// exposure, and what the eye makes of them.
+/// Bytes per pixel while two pictures are compared, besides the layers of the files: two pictures, two exposed copies of
+/// them, and the buffers of FLIP.
 const COMPARED_PIXEL_BYTES: u64 = 200;
 
 fn check_sizes(a: Size, b: Size) -> Result<()> {
@@ -185,19 +184,19 @@ fn check_sizes(a: Size, b: Size) -> Result<()> {
 /// Compares the scene-linear picture `a` with the reference `b`, see [`compare`].
 ///
 /// # Errors
-/// Sizes that differ; no pixel that is finite in both.
+/// The sizes differ, or no pixel is finite in both.
 pub fn compare_pictures(a: &Picture, b: &Picture, floor: Floor) -> Result<Comparison> {
     check_sizes(a.size(), b.size())?;
     let finite = |i: usize| a[i].iter().chain(&b[i]).all(|v| v.is_finite());
     let pixels: Vec<usize> = (0..a.len()).filter(|&i| finite(i)).collect();
     let floor = floor.of(b);
     let (Some(Errors { relmse, relmse_trimmed, mse, mean_ratio }), Some(grain)) =
-        (errors_above(a, b, floor), grain_above(a, b, floor))
+        (errors_with_floor(a, b, floor), grain_with_floor(a, b, floor))
     else {
         return Err(Error::new(ErrorKind::Image, "", "the pictures have no pixel with finite values in common"));
     };
 
-    // FLIP filters over neighbours, so that a hole needs a value; black in both looks equal.
+    // FLIP filters over neighbours, so that missing pixels need a value: black in both pictures is no difference.
     let filled = |image: &Picture| Picture::from_fn(image.size(), |i| if finite(i) { image[i] } else { [0.0; 3] });
     let mut flip_map = flip::hdr(&filled(b), &filled(a));
     let flip = pixels.iter().map(|&i| f64::from(flip_map[i])).sum::<f64>() / pixels.len() as f64;

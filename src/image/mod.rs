@@ -1,4 +1,4 @@
-//! Pictures in files: EXR in and out, PNG, tone mapping, error metrics.
+//! Image files and their comparison: EXR, PNG, tone mapping, error metrics.
 
 pub mod atomic;
 pub mod exr;
@@ -9,4 +9,4 @@ pub mod png;
 pub mod tonemap;
 pub mod usd_layer;
 
-pub use metrics::{Comparison, Errors, Floor, compare, compare_above, errors, relative_squared_error};
+pub use metrics::{Comparison, Errors, Floor, compare, compare_with_floor, errors, relative_squared_error};

@@ -1,4 +1,4 @@
-//! 8-bit sRGB pictures to look at.
+//! PNG files: 8-bit sRGB.
 
 use std::path::Path;
 
@@ -8,16 +8,20 @@ use crate::image::atomic;
 use crate::image::tonemap::ToneMap;
 use crate::math::Rgb;
 
-/// Writes `pixels`, display values from 0 to 1, rows from the top, as an 8-bit RGB PNG, atomically (see
-/// [`atomic::write`]). What is not a number is black.
+/// Writes `pixels`, display values from 0 to 1, row by row from the top, as an 8-bit RGB PNG, atomically (see
+/// [`atomic::write`]). NaN becomes black.
 ///
-/// Errors: a number of pixels that is not `width * height`, or none; the file system.
+/// # Errors
+/// The number of pixels is zero or not that of `size`; errors of the file system.
 pub fn write(path: &Path, size: Size, pixels: impl IntoIterator<Item = Rgb>) -> Result<()> {
     let bytes = encode(size, pixels).map_err(|error| error.within(path.display()))?;
     atomic::write_bytes(path, &bytes)
 }
 
-/// The bytes of such a file, see [`write()`].
+/// The bytes of the PNG that [`write()`] writes.
+///
+/// # Errors
+/// The number of pixels is zero or not that of the size.
 pub fn encode(Size { width, height }: Size, pixels: impl IntoIterator<Item = Rgb>) -> Result<Vec<u8>> {
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     let bytes: Vec<u8> = pixels.into_iter().flat_map(|rgb| rgb.to_array().map(byte)).collect();
@@ -32,6 +36,9 @@ pub fn encode(Size { width, height }: Size, pixels: impl IntoIterator<Item = Rgb
 }
 
 /// Writes a scene-linear Rec. 709 picture after an exposure of `ev` stops and a tone curve, see [`write()`].
+///
+/// # Errors
+/// As [`write()`].
 pub fn write_tonemapped(path: &Path, picture: &Picture, ev: f32, curve: ToneMap) -> Result<()> {
     write(path, picture.size(), picture.iter().map(|&rgb| curve.display(rgb.into(), ev)))
 }

@@ -1,4 +1,4 @@
-//! From scene-linear light to a display: exposure, then a curve, then sRGB's encoding.
+//! Tone mapping: exposure, tone curve, and sRGB encoding.
 
 use glam::{Mat3, Vec3};
 
@@ -6,8 +6,8 @@ use crate::math::Rgb;
 pub use crate::scene::description::ToneMap;
 
 impl ToneMap {
-    /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour after an exposure of `ev` stops. A
-    /// channel that is not a number is black; infinity is as bright as light gets.
+    /// Display value, sRGB-encoded, 0 to 1, of a scene-linear Rec. 709 colour after an exposure of `ev` stops. A NaN
+    /// channel counts as 0; infinity is the brightest value.
     pub fn display(self, colour: Rgb, ev: f32) -> Rgb {
         // f32::max and clamp would let NaN through; Vec3's max does not.
         let clean = colour.to_array().map(|v| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1e30) });
@@ -27,29 +27,28 @@ pub fn srgb_encode(linear: f32) -> f32 {
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Its inverse.
+/// Inverse of [`srgb_encode`].
 pub fn srgb_decode(encoded: f32) -> f32 {
     let v = encoded.clamp(0.0, 1.0);
     if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Narkowicz's curve takes 1 for a colour brighter than a scene's white; he advises 0.6 before it.
+/// Exposure before Narkowicz's curve, as he advises: its 1 is brighter than the white of a scene.
 const PRE_EXPOSURE: f32 = 0.6;
 
 /// Rational fit to ACES' reference rendering and output transforms (Narkowicz 2015, "ACES Filmic Tone Mapping Curve").
 pub(super) fn aces(x: f32) -> f32 {
-    // Beyond this the squares would overflow; the curve is past one there.
+    // Larger squares would overflow; the curve exceeds 1 there.
     let x = x.min(1e6);
     (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).clamp(0.0, 1.0)
 }
 
 /// AgX, the base look as Blender 4 shows it: linear Rec. 709 to linear Rec. 709.
 ///
-/// In Rec. 2020: an inset moves the primaries towards white, log2 of 16.5 stops around middle grey 0.18 goes through a
-/// sigmoid, its power of 2.4 is undone, hues that the curve turned go three fifths of the way back, and an outset
-/// restores colourfulness. After T. Sobotka (github.com/sobotka/AgX) and E. Chow (github.com/EaryChow/AgX_LUT_Gen,
-/// whose "mix percent" is 40); matrices rounded as Filament has them. Blender's guard against colours outside Rec. 709
-/// is left out: channels clip instead.
+/// In Rec. 2020, an inset moves the primaries towards white; a sigmoid maps log2 over 16.5 stops around middle grey 0.18;
+/// the power of 2.4 is undone; three fifths of the hue shift of the curve is reverted; an outset restores colourfulness. After T. Sobotka (github.com/sobotka/AgX) and E. Chow (github.com/EaryChow/AgX_LUT_Gen,
+/// whose "mix percent" is 40); matrices rounded as Filament has them. Colours outside
+/// Rec. 709 are clipped, not compressed as Blender does.
 fn agx(colour: Rgb) -> Rgb {
     /// Rows of Rec. 709 to Rec. 2020 (ITU-R BT.2087).
     const TO_2020: [[f32; 3]; 3] = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]];
@@ -72,7 +71,7 @@ fn agx(colour: Rgb) -> Rgb {
     let inset = (rows(&INSET) * to_2020 * colour).max(Vec3::splat(1e-10));
     let curved = inset.to_array().map(|v| sigmoid((v.log2() - MIN_EV) / (MAX_EV - MIN_EV)));
     let linear = curved.map(|v| v.powf(2.4));
-    let (before, after) = (wavelength(inset.to_array()), wavelength(linear));
+    let (before, after) = (hue(inset.to_array()), hue(linear));
     // The shorter way around the circle.
     let turned = (after - before + 9.0).rem_euclid(6.0) - 3.0;
     let restored = with_hue(linear, before + 0.4 * turned);
@@ -80,7 +79,7 @@ fn agx(colour: Rgb) -> Rgb {
 }
 
 /// Hue of the hexagonal model (HSV) in sixths of a turn, red 0, green 2, blue 4; of grey, 0.
-fn wavelength([r, g, b]: [f32; 3]) -> f32 {
+fn hue([r, g, b]: [f32; 3]) -> f32 {
     let (high, low) = (r.max(g).max(b), r.min(g).min(b));
     let chroma = high - low;
     if chroma <= 0.0 {
@@ -94,12 +93,12 @@ fn wavelength([r, g, b]: [f32; 3]) -> f32 {
     }
 }
 
-/// The colour of another wavelength with the same largest and smallest channel.
-fn with_hue([r, g, b]: [f32; 3], wavelength: f32) -> Rgb {
+/// The colour with another hue and the same largest and smallest channel.
+fn with_hue([r, g, b]: [f32; 3], hue: f32) -> Rgb {
     let (high, low) = (r.max(g).max(b), r.min(g).min(b));
-    // A channel is high within a sixth of its own wavelength, low beyond a third, and changes evenly between.
+    // A channel is high within a sixth of a turn of its own hue, low beyond a third, and linear between.
     let channel = |own: f32| {
-        let away = ((wavelength - own + 9.0).rem_euclid(6.0) - 3.0).abs();
+        let away = ((hue - own + 9.0).rem_euclid(6.0) - 3.0).abs();
         low + (high - low) * (2.0 - away).clamp(0.0, 1.0)
     };
     Vec3::new(channel(0.0), channel(2.0), channel(4.0))
@@ -113,9 +112,10 @@ fn sigmoid(x: f32) -> f32 {
     let pivot = 10.0 / 16.5;
     let middle = 0.18f32.powf(1.0 / 2.4);
     let x = x.clamp(0.0, 1.0);
-    // Room the curve has on its side of the pivot: the scale makes it arrive at 0 or 1 exactly.
-    let (room_x, room_y) = if x < pivot { (pivot, middle) } else { (1.0 - pivot, 1.0 - middle) };
-    let scale = ((SLOPE * room_x).powf(-POWER) * ((SLOPE * room_x / room_y).powf(POWER) - 1.0)).powf(-1.0 / POWER);
+    // Extent of the curve on this side of the pivot: the scale makes it reach 0 or 1 exactly.
+    let (extent_x, extent_y) = if x < pivot { (pivot, middle) } else { (1.0 - pivot, 1.0 - middle) };
+    let scale =
+        ((SLOPE * extent_x).powf(-POWER) * ((SLOPE * extent_x / extent_y).powf(POWER) - 1.0)).powf(-1.0 / POWER);
     let t = SLOPE * (x - pivot).abs() / scale;
     let step = scale * t / (1.0 + t.powf(POWER)).powf(1.0 / POWER);
     if x < pivot { middle - step } else { middle + step }
@@ -146,7 +146,7 @@ mod tests {
         for i in 0..60 {
             let angle = i as f32 / 10.0;
             let colour = with_hue([0.2, 0.9, 0.5], angle);
-            assert!((wavelength(colour.to_array()).rem_euclid(6.0) - angle).abs() < 1e-5, "{angle}: {colour}");
+            assert!((hue(colour.to_array()).rem_euclid(6.0) - angle).abs() < 1e-5, "{angle}: {colour}");
             assert_eq!((colour.max_element(), colour.min_element()), (0.9, 0.2));
         }
     }

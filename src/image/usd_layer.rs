@@ -1,5 +1,5 @@
-//! A layer of USD that tells of a rendered EXR: RenderSettings, a RenderProduct that points to it, and a RenderVar for
-//! each of its layers (UsdRender).
+//! A USD layer that describes a rendered EXR: RenderSettings, a RenderProduct with the path of the EXR, and a RenderVar
+//! for each EXR layer (UsdRender).
 
 use super::atomic;
 use crate::error::Result;
@@ -7,18 +7,19 @@ use crate::film::{Layer, LayerSet};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// What the picture itself is called, which has no name in the EXR.
+/// Name of the beauty, which has no name in the EXR.
 const BEAUTY: &str = "beauty";
 
-/// Writes the layer to `path`; `product` is the EXR, named from the layer's folder where it lies there or below.
+/// Writes the USD layer to `path`. The path of the EXR `product` is relative if it lies in the folder of the layer or
+/// below.
 ///
 /// # Errors
-/// Those of the file system, with the path.
+/// Errors of the file system, with the path.
 pub fn write(path: &Path, product: &Path, set: &LayerSet) -> Result<()> {
     atomic::write_bytes(path, text(&relative(path, product), set).as_bytes())
 }
 
-/// The product's path as seen from the layer.
+/// The product's path, relative to the layer if it lies in its folder or below.
 fn relative(layer: &Path, product: &Path) -> String {
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let (layer, product) = (whole(layer), whole(product));
@@ -75,7 +76,7 @@ def Scope "Render"
     )
 }
 
-/// A RenderVar of a layer.
+/// The RenderVar of an EXR layer.
 fn var(name: &str, layer: &Layer) -> String {
     let components: String = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
     let kind = match components.as_str() {
@@ -92,7 +93,7 @@ fn var(name: &str, layer: &Layer) -> String {
     )
 }
 
-/// An identifier for a layer that no other has.
+/// A unique USD identifier for an EXR layer.
 fn prim_name(layer: &Layer, taken: &mut HashSet<String>) -> String {
     let name = if layer.name.is_empty() { BEAUTY } else { &layer.name };
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
@@ -106,7 +107,7 @@ fn prim_name(layer: &Layer, taken: &mut HashSet<String>) -> String {
     name
 }
 
-/// A text of the format, in double quotes.
+/// A USD string literal.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {

@@ -108,9 +108,9 @@ fn comparisons_above_a_relative_floor() {
     };
     for scale in [1.0f32 / 1024.0, 1.0, 1024.0] {
         let (a, b) = (layers(1.125 * scale), layers(scale));
-        let relative = metrics::compare_above(&a, &b, Floor::Relative).expect("sizes agree");
+        let relative = metrics::compare_with_floor(&a, &b, Floor::Relative).expect("sizes agree");
         assert!((relative.relmse - 0.015625 / 1.01).abs() < 1e-12, "{relative:?}");
-        let papers = metrics::compare_above(&a, &b, Floor::Papers).expect("sizes agree");
+        let papers = metrics::compare_with_floor(&a, &b, Floor::Papers).expect("sizes agree");
         let square = f64::from(scale).powi(2);
         assert!((papers.relmse - 0.015625 * square / (square + 0.01)).abs() < 1e-9 * papers.relmse, "{papers:?}");
     }

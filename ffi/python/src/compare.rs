@@ -7,7 +7,7 @@ use crate::value::to_python;
 use crate::work::work;
 use caustique::film::take_plain_names;
 use caustique::image::exr::ATTRIBUTE;
-use caustique::image::{Floor, compare_above};
+use caustique::image::{Floor, compare_with_floor};
 use caustique::pipeline::finish::open;
 use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
@@ -29,7 +29,7 @@ pub fn compare<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (a, b) = (picture("image", image, layer)?, picture("reference", reference, layer)?);
     let floor = if relative { Floor::Relative } else { Floor::Papers };
-    let mut comparison = py.detach(|| compare_above(&a, &b, floor)).map_err(raised)?;
+    let mut comparison = py.detach(|| compare_with_floor(&a, &b, floor)).map_err(raised)?;
     let map = std::mem::take(&mut comparison.flip_map);
     let told = to_python(py, &json!(comparison))?;
     if let Ok(map) = Array2::from_shape_vec((a.height, a.width), map) {

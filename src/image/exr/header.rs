@@ -1,16 +1,17 @@
-//! Headers with their attributes in order.
+//! Sorts the attributes of a written header.
 //!
-//! The `exr` crate keeps custom attributes in a `HashMap` and writes them in its order, which changes from run to run.
-//! The size of a header does not depend on the order, so it is put right afterwards, in place.
+//! The `exr` crate stores custom attributes in a `HashMap` and writes them in its order, which changes from run to run.
+//! The size of a header does not depend on the order, so that the attributes can be sorted in place afterwards.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
 /// Bytes of the magic number and the version before the first attribute.
 const PREAMBLE: u64 = 8;
 
-/// Sorts the attributes of a file of one part by name, as OpenEXR itself writes them.
+/// Sorts the attributes of a single-part file by name, as the OpenEXR library writes them.
 ///
-/// Errors: those of `file`, and `InvalidData` where the bytes are no header.
+/// # Errors
+/// Errors of `file`, and `InvalidData` if the bytes are not a header.
 pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F) -> io::Result<()> {
     file.seek(SeekFrom::Start(PREAMBLE))?;
     let mut attributes = Vec::new();
@@ -20,13 +21,13 @@ pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F) -> io::Resul
             attributes.push(attribute);
         }
     }
-    // The name comes first in the bytes, and its terminating zero before any letter: this is the order of names.
+    // The bytes begin with the name, whose terminating zero sorts before any letter: byte order is the order of names.
     attributes.sort_unstable();
     file.seek(SeekFrom::Start(PREAMBLE))?;
     file.write_all(&attributes.concat())
 }
 
-/// One attribute as it stands in the file: name, zero, type, zero, size of the value (four bytes, little endian),
+/// The bytes of one attribute: name, zero, type, zero, size of the value (four bytes, little endian),
 /// value. `None` at the end.
 fn read_attribute(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
@@ -44,7 +45,7 @@ fn read_attribute(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-/// Reads up to and with the next zero byte; returns the number of bytes before it.
+/// Reads up to the next zero byte, inclusive; returns the number of bytes before it.
 fn read_text(reader: &mut impl Read, bytes: &mut Vec<u8>) -> io::Result<usize> {
     for length in 0..=255 {
         let mut byte = [0];

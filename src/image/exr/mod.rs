@@ -1,8 +1,8 @@
-//! OpenEXR, in and out.
+//! Reading and writing OpenEXR.
 //!
-//! Written: one part of scan lines, channels sorted by name, attributes sorted by name, chunks in order of lines; the
-//! same layers and attributes give the same bytes whatever the number of threads. Read: any flat EXR that the `exr`
-//! crate decodes.
+//! The writer makes one part of scan lines, with channels and attributes sorted by name and chunks in order of lines:
+//! equal layers and attributes give equal bytes with any number of threads. The reader takes every flat EXR that the
+//! `exr` crate decodes.
 
 mod header;
 mod read;
@@ -24,30 +24,29 @@ use serde::{Deserialize, Serialize};
 /// Name of the attribute that holds our JSON object.
 pub const ATTRIBUTE: &str = "caustique";
 
-/// What a header says besides its channels.
+/// The contents of a header besides its channels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Attributes {
     /// String attributes by name, ASCII only: Python's OpenEXR refuses a whole file for one byte above 127.
     pub texts: BTreeMap<String, String>,
-    /// Where the picture is in a larger one, and what camera has seen it. Not read from files.
+    /// Window within a larger picture, and the camera. The reader leaves it empty.
     pub frame: Option<Frame>,
-    /// Where the picture is in a film. Not read from files.
+    /// Frame number and rate. The reader leaves it empty.
     pub moment: Moment,
 }
 
-/// Where a picture is in a film.
+/// Frame number and frame rate of a picture of an animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moment {
-    /// Its number: OpenEXR's `imageCounter`.
+    /// Frame number: OpenEXR's `imageCounter`.
     pub number: Option<i32>,
-    /// Frames in a second, as a fraction of two numbers above zero: OpenEXR's `framesPerSecond`.
+    /// Frames per second, as a fraction of two numbers above zero: OpenEXR's `framesPerSecond`.
     pub rate: Option<[u32; 2]>,
 }
 
 impl Moment {
-    /// Hours, minutes, seconds and frames at which the picture is shown, frame 0 at midnight and frames counted without
-    /// leaps, as SMPTE 12M does it. `None` without a number or a rate, and for what a time code cannot say: more than
-    /// 30 frames in a second, frames before the first or of another day.
+    /// SMPTE 12M time code without drop frames: hours, minutes, seconds, frames, with frame 0 at midnight. `None` without
+    /// a number or a rate, at more than 30 frames per second, and for negative frames or frames after 24 hours.
     pub fn time_code(self) -> Option<[u8; 4]> {
         let (number, [frames, of_seconds]) = (u32::try_from(self.number?).ok()?, self.rate?);
         let rate = frames.checked_add(of_seconds / 2)?.checked_div(of_seconds)?;
@@ -60,13 +59,13 @@ impl Moment {
     }
 }
 
-/// A picture as a part of a larger one, the display window, and its camera. Matrices are OpenEXR's: row by row, for row
-/// vectors on their left.
+/// Position of a picture in the display window of a larger one, and its camera. Matrices are in OpenEXR's convention:
+/// row by row, multiplied by row vectors from the left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Width and height of the display window (pixels).
     pub display: [u32; 2],
-    /// Left and top edge of the picture in it (pixels).
+    /// Left and top edge of the picture in the display window (pixels).
     pub corner: [u32; 2],
     /// World to camera: x to the right, y up, z along the view.
     pub world_to_camera: [f32; 16],
@@ -75,7 +74,7 @@ pub struct Frame {
 }
 
 impl Attributes {
-    /// The attribute `caustique` with this object.
+    /// Attributes with the JSON `object` under [`ATTRIBUTE`].
     pub fn of(object: &impl serde::Serialize) -> Result<Self> {
         let mut attributes = Attributes::default();
         attributes.insert(ATTRIBUTE, object)?;

@@ -1,4 +1,4 @@
-//! Any flat EXR to layers.
+//! Reads any flat EXR into layers.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -20,20 +20,22 @@ use crate::memory;
 
 /// Reads every channel of every part, and the string attributes of all parts.
 ///
-/// The picture is the display window: what a part's data window leaves out is zero, what it has beyond is left out.
-/// Samples of type half and uint become `f32` (uint above 2^24 is rounded). Of tiled files with mip maps the full
-/// resolution is read. A channel `a.b.C` is the component `C` of the layer `a.b`; root channels `R G B A` (or `Y`) are
-/// the layer with the empty name, any other root channel `Q` is the layer `Q` with the one component `Q`. In a file of
-/// several parts the part's name precedes channels that do not hold it yet; only the first part's may stay at the root.
+/// The picture is the display window: pixels outside a part's data window are zero, pixels outside the display window are
+/// dropped. Samples of type half and uint become `f32` (uint above 2^24 is rounded). The full resolution of tiled files
+/// with mip maps is read. A channel `a.b.C` is the component `C` of the layer `a.b`; root channels `R G B A` (or `Y`) are
+/// the layer with the empty name, any other root channel `Q` is the layer `Q` with the component `Q`. In a file of several
+/// parts the part's name is prefixed to channels that do not contain it; only root channels of the first part stay at the
+/// root. Never panics.
 ///
-/// Errors: a file that cannot be opened, is malformed, deep, subsampled or too large for its length. Never panics.
+/// # Errors
+/// The file cannot be opened, is malformed, deep or subsampled, or declares more pixels than its length can hold.
 pub fn read(path: &Path) -> Result<(LayerSet, Attributes)> {
     let file = File::open(path).map_err(|cause| Error::io(path, &cause))?;
     let length = file.metadata().map_err(|cause| Error::io(path, &cause))?.len();
     if length == 0 {
         return Err(Error::new(ErrorKind::Image, path.display(), "the file is empty"));
     }
-    // The decoder asserts what it believes to be true of any file; some files know better.
+    // Assertions in the decoder fail for some malformed files.
     let outcome = catch_unwind(AssertUnwindSafe(|| decode(BufReader::new(file), length)));
     let outcome = outcome.unwrap_or_else(|_| Err(invalid("the file contradicts itself")));
     outcome.map_err(|cause| match cause {
@@ -55,7 +57,7 @@ fn invalid(cause: &'static str) -> exr::error::Error {
 
 fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)> {
     let reader = exr::block::read(file, false)?;
-    plausible(reader.headers(), length)?;
+    check_size(reader.headers(), length)?;
     let chunks = reader.filter_chunks(false, |_, _, block| block.level == exr::math::Vec2(0, 0))?;
     let meta = exr::block::reader::ChunksReader::meta_data(&chunks).clone();
     let display = meta.headers[0].shared_attributes.display_window;
@@ -78,8 +80,8 @@ fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)>
     Ok((canvas.into_layers(&meta.headers), attributes(&meta.headers)))
 }
 
-/// Refuses headers that promise more than the file can hold, before anything is allocated for them.
-fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
+/// Rejects headers that declare more data than the file can hold, before anything is allocated for them.
+fn check_size(headers: &[Header], length: u64) -> Outcome<()> {
     let Some(first) = headers.first() else { return Err(invalid("no part")) };
     let window = |size: exr::math::Vec2<usize>| size.0 as u128 * size.1 as u128;
     let mut taken = 0u128;
@@ -93,45 +95,44 @@ fn plausible(headers: &[Header], length: u64) -> Outcome<()> {
         if header.chunk_count as u128 * 8 > u128::from(length) {
             return Err(invalid("more chunks than bytes"));
         }
-        if window(header.layer_size) * header.channels.bytes_per_pixel as u128 > u128::from(length) * ratio(header) {
+        if window(header.layer_size) * header.channels.bytes_per_pixel as u128 > u128::from(length) * max_ratio(header)
+        {
             return Err(invalid("more pixels than the file can hold"));
         }
         taken += window(first.shared_attributes.display_window.size) * 4 * header.channels.list.len() as u128;
     }
-    // A window of a large picture may be small.
+    // The file of a small window in a large picture may be small.
     match u64::try_from(taken) {
-        Ok(taken) if taken <= WHOLE.max(length.saturating_mul(memory::MAX_EXR_RATIO)) => {
+        Ok(taken) if taken <= MAX_WINDOWED_BYTES.max(length.saturating_mul(memory::MAX_EXR_RATIO)) => {
             memory::require(taken, "its pixels").map_err(|error| exr::error::Error::NotSupported(error.cause.into()))
         }
         _ => Err(invalid("the display window is too large for its file")),
     }
 }
 
-/// Deflate: 258 bytes by two bits, one for the length and one for the distance.
-const DEFLATE: u128 = 1032;
-/// Most bytes of a picture of which a file holds a small window.
-const WHOLE: u64 = 1 << 30;
+/// Maximum compression ratio of Deflate: 258 bytes from two bits, one for the length and one for the distance.
+const DEFLATE_RATIO: u128 = 1032;
+/// Bytes of a display window that are always accepted, because the file may hold a small window of it.
+const MAX_WINDOWED_BYTES: u64 = 1 << 30;
 
-/// How many bytes of samples a byte of a file stands for at most.
-fn ratio(header: &Header) -> u128 {
+/// Upper bound on the compression ratio: bytes of samples per byte of the file.
+fn max_ratio(header: &Header) -> u128 {
     match header.compression {
         Compression::Uncompressed => 1,
         // Two bytes repeat one 128 times.
         Compression::RLE => 64,
-        Compression::ZIP1 | Compression::ZIP16 => DEFLATE,
-        // Three of four bytes are kept.
-        Compression::PXR24 => DEFLATE * 4 / 3,
-        // Sixteen samples of two bytes by three bytes, if all are the same.
+        Compression::ZIP1 | Compression::ZIP16 => DEFLATE_RATIO,
+        // PXR24 stores three of four bytes.
+        Compression::PXR24 => DEFLATE_RATIO * 4 / 3,
+        // Sixteen equal samples of two bytes take three bytes.
         Compression::B44 | Compression::B44A => 32,
-        // Two codes of a bit at least and eight bits repeat a sample of two bytes 255 times; a bitmap says which values
-        // there are.
-        Compression::PIZ => DEFLATE,
+        // Ten bits, two codes of at least one bit and a count of eight, repeat a sample of two bytes 255 times.
+        Compression::PIZ => DEFLATE_RATIO,
         _ => u128::from(memory::MAX_EXR_RATIO),
     }
 }
 
-/// A chunk of DWA begins with the sizes of its sections, eleven 64-bit numbers, and the decoder allocates what they
-/// say.
+/// Checks the sizes of the sections of a DWA chunk, eleven 64-bit numbers at its start: the decoder allocates as they say.
 fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
     let Some(header) = headers.get(chunk.layer_index) else { return Err(invalid("part index")) };
     let bytes = match &chunk.compressed_block {
@@ -143,7 +144,7 @@ fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
     let whole = size.0.saturating_mul(size.1).saturating_mul(header.channels.bytes_per_pixel) as u64;
     let packed =
         matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) && bytes.len() as u64 != whole;
-    // Sections hold the block's samples, in run lengths of at most twice their size, and blocks of 8 x 8 round up.
+    // Sections hold the samples of the block. Run lengths may double their size, and blocks of 8 x 8 round it up.
     let limit = whole.saturating_mul(4).saturating_add(1 << 16);
     let number = |eight: &[u8]| eight.iter().rev().fold(0u64, |n, &byte| n << 8 | u64::from(byte));
     if packed && bytes.chunks_exact(8).take(11).any(|eight| number(eight) > limit) {
@@ -172,7 +173,7 @@ impl Canvas {
         Ok(Canvas { left: display.position.0.into(), top: display.position.1.into(), width, height, planes })
     }
 
-    /// Copies what lies within the display window.
+    /// Copies the pixels within the display window.
     fn paint(&mut self, block: &UncompressedBlock, headers: &[Header]) -> Outcome<()> {
         let part = block.index.layer;
         let header = headers.get(part).ok_or_else(|| invalid("part index"))?;
@@ -203,7 +204,7 @@ impl Canvas {
                 let (name, component) = split(&prefix, part == 0, &channel.name.to_string());
                 let sample = if channel.sample_type == SampleType::F16 { Sample::Half } else { Sample::Float };
                 let planes = layers.entry(name).or_default();
-                // A second channel of the same name, in another part, is another view of it; the first stands.
+                // A channel of the same name in another part is another view; the first one is kept.
                 if planes.iter().all(|plane| plane.component != component) {
                     planes.push(Plane { component, sample, values });
                 }
@@ -215,7 +216,7 @@ impl Canvas {
     }
 }
 
-/// Samples of one line, the first `skip` left out.
+/// Converts the samples of one line to f32, without the first `skip`.
 fn convert(bytes: &[u8], skip: usize, out: &mut [f32], sample: SampleType) {
     let four = |bytes: &[u8]| [bytes[0], bytes[1], bytes[2], bytes[3]];
     match sample {
@@ -237,7 +238,7 @@ fn convert(bytes: &[u8], skip: usize, out: &mut [f32], sample: SampleType) {
     }
 }
 
-/// Layer and component of a channel, see [`read`].
+/// Layer name and component of a channel, see [`read`].
 fn split(part: &str, first: bool, channel: &str) -> (String, String) {
     let (group, component) = channel.rsplit_once('.').unwrap_or(("", channel));
     let at_root = part.is_empty() || (first && group.is_empty());
@@ -256,7 +257,7 @@ fn is_picture(component: &str) -> bool {
     ["R", "G", "B", "A", "Y", "r", "g", "b", "a", "red", "green", "blue", "alpha"].contains(&component)
 }
 
-/// Order of components within a layer: by meaning, then by name.
+/// Sort key of components within a layer: R G B A, X Y Z W, U V, then by name.
 fn rank(component: &str) -> (usize, String) {
     let letter = component.chars().next().map_or(' ', |c| c.to_ascii_uppercase());
     ("RGBAXYZWUV".find(letter).unwrap_or(usize::MAX), component.to_owned())

@@ -1,4 +1,4 @@
-//! Layers to an EXR.
+//! Writes layers to an EXR.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -23,7 +23,7 @@ use crate::film::{LayerSet, Naming, Plane, Sample, check_names};
 use crate::image::atomic;
 use serde::Serialize;
 
-/// How pixels are packed; all of these are lossless.
+/// Compression of an EXR. Every method is lossless.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -39,28 +39,29 @@ pub enum Compression {
     None,
 }
 
-/// How a file is written.
+/// Options of [`write()`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Options {
-    /// How pixels are packed.
+    /// Compression of the pixels.
     pub compression: Compression,
-    /// How channels are called.
+    /// Names of the channels.
     pub naming: Naming,
 }
 
 /// Writes all layers and attributes to `path`, atomically (see [`atomic::write`]). Compresses on the current rayon
 /// pool; the bytes do not depend on its size.
 ///
-/// Errors: a picture without pixels or channels, a channel name that other programs cannot read, an attribute that is
-/// not ASCII, the file system.
+/// # Errors
+/// A picture without pixels or channels, a channel name that other programs cannot read, an attribute that is not ASCII;
+/// errors of the file system.
 pub fn write(path: &Path, set: &LayerSet, attributes: &Attributes, options: Options) -> Result<()> {
     write_followed(path, set, attributes, options, |_| Ok(()))
 }
 
-/// The same, with what `tail` writes behind the picture, where programs that read pictures do not look.
+/// [`write()`], followed by the data that `tail` appends to the file; readers of EXR ignore it.
 ///
 /// # Errors
-/// See [`write()`].
+/// As [`write()`], and errors of `tail`.
 pub fn write_followed(
     path: &Path,
     set: &LayerSet,
@@ -91,11 +92,11 @@ pub fn write_followed(
     })
 }
 
-/// What a channel is written from.
+/// Source of a channel's values.
 #[derive(Clone, Copy)]
 struct Source<'a> {
     plane: &'a Plane,
-    /// With its sign changed.
+    /// Whether the sign is flipped.
     negated: bool,
 }
 
@@ -171,7 +172,7 @@ fn header(
     Ok(header.with_attributes(own))
 }
 
-/// Primaries and white of the picture's colours.
+/// Primaries and white point of Rec. 709.
 const REC_709: Chromaticities =
     Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.3, 0.6), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.329) };
 
@@ -185,7 +186,7 @@ fn write_chunks(
     let headers: exr::meta::Headers = std::iter::once(header).collect();
     exr::block::write(file, headers, true, |meta, chunks| {
         let blocks: Vec<_> = enumerate_ordered_header_block_indices(&meta.headers).collect();
-        // A few blocks a thread keep all busy; what is held beside the layers stays small.
+        // A few blocks per thread keep all threads busy with little memory.
         for batch in blocks.chunks(4 * rayon::current_num_threads()) {
             let compressed: Vec<_> = batch
                 .par_iter()
@@ -208,17 +209,17 @@ fn write_chunks(
     })
 }
 
-/// A block as it stands in the file.
+/// Compresses a block.
 fn pack(block: UncompressedBlock, headers: &[Header]) -> exr::error::Result<Chunk> {
     let zipped = matches!(headers[0].compression, Packing::ZIP1 | Packing::ZIP16);
-    // Samples are in the machine's byte order here.
+    // The samples of a block are in the machine's byte order, our ZIP needs little-endian.
     if zipped && cfg!(target_endian = "little") {
         return Ok(zip::chunk(block, &headers[0]));
     }
     block.compress_to_chunk(headers)
 }
 
-/// Samples of one line in the machine's byte order.
+/// Writes the samples of one line in the machine's byte order.
 fn fill(bytes: &mut [u8], values: &[f32], sample: Sample, negated: bool) {
     let signed = |value: f32| if negated { -value } else { value };
     match sample {

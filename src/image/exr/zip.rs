@@ -1,19 +1,18 @@
-//! Blocks of pixels as OpenEXR's ZIP compression packs them (OpenEXR Technical Introduction, "Data Compression"): even
-//! bytes before odd ones, each as its difference from the one before, in a zlib stream.
+//! OpenEXR's ZIP compression (OpenEXR Technical Introduction, "Data Compression"): even bytes before odd ones, each as
+//! the difference from its predecessor, in a zlib stream.
 //!
-//! The `exr` crate deflates with miniz_oxide, which takes three times as long as libdeflate for the same size within half
-//! a percent.
+//! The `exr` crate uses miniz_oxide, which takes three times as long as libdeflate for files within half a percent of the
+//! size.
 
 use exr::block::UncompressedBlock;
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::meta::header::Header;
 use libdeflater::{CompressionLvl, Compressor};
 
-/// The block of scan lines as it stands in a file with this header; its samples are in the order of little-endian
-/// bytes.
+/// Compresses a block of scan lines whose samples are little-endian.
 pub(super) fn chunk(block: UncompressedBlock, header: &Header) -> Chunk {
     let top = block.index.pixel_position.y() as i32 + header.own_attributes.layer_position.y();
-    let packed = packed(&block.data);
+    let packed = compress(&block.data);
     Chunk {
         layer_index: block.index.layer,
         compressed_block: CompressedBlock::ScanLine(CompressedScanLineBlock {
@@ -23,11 +22,11 @@ pub(super) fn chunk(block: UncompressedBlock, header: &Header) -> Chunk {
     }
 }
 
-/// Higher levels take up to a third more time for half a percent fewer bytes.
+/// Compression level: higher ones take up to a third more time for half a percent fewer bytes.
 const LEVEL: i32 = 1;
 
-/// The bytes packed; `None` where that makes them no fewer: they stand as they are then.
-fn packed(bytes: &[u8]) -> Option<Vec<u8>> {
+/// The compressed bytes; `None` if they are not fewer, in which case OpenEXR stores the block uncompressed.
+fn compress(bytes: &[u8]) -> Option<Vec<u8>> {
     let differences = differences(bytes);
     let mut packed = vec![0; bytes.len()];
     let level = CompressionLvl::new(LEVEL).unwrap_or_default();
@@ -36,7 +35,7 @@ fn packed(bytes: &[u8]) -> Option<Vec<u8>> {
     (length < bytes.len()).then_some(packed)
 }
 
-/// Even bytes, then odd ones; each but the first less its predecessor, plus 128.
+/// Even bytes, then odd ones; from each except the first its predecessor is subtracted and 128 added.
 fn differences(bytes: &[u8]) -> Vec<u8> {
     let mut apart = vec![0; bytes.len()];
     let (even, odd) = apart.split_at_mut(bytes.len().div_ceil(2));
@@ -61,10 +60,9 @@ mod tests {
     use exr::meta::attribute::{ChannelDescription, Compression, LineOrder, SampleType, Text};
     use exr::meta::{BlockDescription, MetaData};
 
-    /// The `exr` crate's reader gets back what was packed: what repeats, which becomes small, and noise, which stays as
-    /// it is.
+    /// The `exr` crate reads back compressed blocks, and noise, which is stored uncompressed.
     #[test]
-    fn readers_unpack_what_is_packed() {
+    fn blocks_survive_compression() {
         let size = Vec2(13, 7);
         let channels = [("R", SampleType::F16), ("Z", SampleType::F32)];
         let channels = channels.map(|(name, sample)| ChannelDescription::named(name, sample));
