@@ -21,7 +21,7 @@ CASES = [
     ),
     Case(
         "shards",
-        "Three shards, merged in all six orders, and the whole",
+        "Three shards, merged in all six orders, and one whole render",
         SCENE,
         Shards("Iterations are numbered; a sum has a fixed order whoever made its parts."),
         DIVIDED,
@@ -31,7 +31,7 @@ CASES = [
     ),
     Case(
         "shards-files",
-        "The files of merges in all six orders",
+        "The files of shards that are merged in all six orders",
         SCENE,
         Shards("With --reproducible a merge writes no clocks and no names.", files=True),
         ("path", "vcm"),
@@ -40,7 +40,7 @@ CASES = [
     ),
     Case(
         "resumed",
-        "A render that is killed, and goes on",
+        "A render that is killed and resumed",
         SCENE,
         Resumed("A checkpoint is the whole state."),
         ("path", "sppm", "vcm", "cppm"),

@@ -76,7 +76,7 @@ def _with(material, layer, roughness, strength):
 CASES = [
     Case(
         "furnace-mirrors",
-        "A closed room of perfect mirrors, in which a ball glows",
+        "A closed room of perfect mirrors with a glowing ball",
         {"scene": mirrors},
         Value(
             1.0,
@@ -112,7 +112,7 @@ CASES = [
     _lobe("sheen", "White sheen over a white base", lambda r: _with(s.diffuse(1), "sheen", r, [1, 1, 1]), bound=0.01),
     Case(
         "furnace-glass-box",
-        "A closed box of clear glass, through its edges and corners",
+        "A closed box of clear glass, seen through its edges and corners",
         {"scene": partial(white, s.glass(1.5), shapes.box((-0.3, -0.3, -0.3), (0.3, 0.3, 0.3)))},
         Value(1.0, WHITE),
         seeds=FEW,

@@ -104,7 +104,7 @@ NOTHING = "A triangle without area is met by no ray."
 CASES = [
     Case(
         "degenerate",
-        "Triangles without area, in a mesh of their own and among others",
+        "Triangles without area, in a separate mesh and among other triangles",
         {
             "without": partial(stage, ball(smooth=False)),
             "own": lambda: stage(ball(smooth=False)).add(DEGENERATE, GREY),
@@ -134,7 +134,7 @@ CASES = [
     ),
     Case(
         "huge-and-tiny",
-        "A floor of 100 km and of 0.1 mm in one mesh, in a white furnace",
+        "Floors of 100 km and of 0.1 mm in one mesh, in a white furnace",
         {"scene": lambda: floor_of(shapes.floor(5e4, -0.01), shapes.floor(5e-5), eye=(0, 1e-3, 1e-6))},
         Value(
             1.0,
@@ -214,7 +214,7 @@ CASES = [
     ),
     Case(
         "scale-negative",
-        "A node that mirrors, and one that mirrors three times",
+        "A mirrored node, and one that is mirrored three times",
         {"by-hand": mirrored, "x": partial(scaled, -1, 1, 1), "xyz": partial(scaled, -1, -1, -1)},
         Equal(
             "by-hand",
@@ -229,7 +229,7 @@ CASES = [
     ),
     Case(
         "scale-singular",
-        "A node that flattens a ball to a disc is the disc",
+        "A node that flattens a ball to a disc looks like the disc",
         {"thin": partial(scaled, 1, 1e-4, 1), "flat": partial(scaled, 1, 0, 1)},
         Equal("thin", ("flat",), "A scale of zero is the limit of small ones.", bound=0.01, resolves=0.06),
         EYE,

@@ -86,7 +86,7 @@ CASES = [
     ),
     Case(
         "grazing-photons",
-        "Photons that a mirror sends to a floor at 89.9 degrees",
+        "Photons that a mirror reflects onto a floor at 89.9 degrees",
         {"scene": reflected_sun},
         Value(
             2 * ALBEDO / pi * 1e3 * cos(radians(89.9)),
@@ -111,7 +111,7 @@ CASES = [
     ),
     Case(
         "grazing-eye-metal",
-        "White metal likewise",
+        "White metal in a white furnace, seen at 89.999 degrees",
         {"scene": partial(low_eye, s.metal(1, 0.3))},
         Value(1.0, WHITE, bound=0.01),
         ("path", "bdpt", "vcm"),
@@ -120,7 +120,7 @@ CASES = [
     ),
     Case(
         "grazing-eye-mirror",
-        "A mirror likewise",
+        "A mirror in a white furnace, seen at 89.999 degrees",
         {"scene": partial(low_eye, s.metal(1, 0.0))},
         Value(1.0, WHITE),
         ("path", "bdpt", "vcm"),

@@ -99,7 +99,7 @@ PANE = 0.5 / pi * 3.0 * (1 - 0.04) / (1 + 0.04)
 CASES = [
     Case(
         "light-shrinks",
-        "A square lamp of the same intensity, from 20 cm to 2 µm",
+        "A square light of constant intensity whose side shrinks from 20 cm to 2 µm",
         {label: partial(shrinking, half) for label, half in SIZES.items()},
         Values(
             {label: lit_by_square(0.25 / half**2, half) for label, half in SIZES.items()},
@@ -112,7 +112,7 @@ CASES = [
     ),
     Case(
         "light-point",
-        "A point light of the intensity that the shrinking lamp tends to",
+        "A point light with the intensity of the shrinking light",
         {"scene": lambda: ground().point((0, HEIGHT, 0), 1.0)},
         Value(ALBEDO / pi / HEIGHT**2, "Albedo / pi times I / d²."),
         size=8,
@@ -120,7 +120,7 @@ CASES = [
     ),
     Case(
         "light-strength",
-        "Radiance 2^-40 and 2^40 (about 1e-12 and 1e12), with a caustic, to the last bit",
+        "A caustic by lights of radiance 2^-40 and 2^40 (about 1e-12 and 1e12), to the last bit",
         {"2^0": partial(strong, 0), **{label: partial(strong, p) for label, p in POWERS.items()}},
         Exact("2^0", POWERS, "Light transport is linear; a power of two changes exponents alone."),
         ("path", "bdpt", "vcm", "sppm", "ppm", "appm", "cppm", "bpm", "pm", "light"),
@@ -139,7 +139,7 @@ CASES = [
     ),
     Case(
         "light-sun-pane",
-        "The same suns through a pane of glass: light that photons carry",
+        "A delta sun, and one of 0.5 degrees, through a pane of glass, so that photons carry the light",
         {"delta": partial(pane, 0), "half": partial(pane, 0.5)},
         Values(
             {"delta": PANE, "half": PANE},
@@ -155,7 +155,7 @@ CASES = [
     ),
     Case(
         "light-many",
-        "100,489 tiny lamps with the power of one square",
+        "100,489 tiny lights with the total power of one square light",
         {"scene": partial(many, 317)},
         Value(
             lit_by_square(1.0, 1.0),
@@ -172,7 +172,7 @@ CASES = [
     ),
     Case(
         "light-black",
-        "A lamp of radiance zero among four bright ones",
+        "A light of radiance zero among four bright ones",
         {"without": partial(crowd, False), "with": partial(crowd, True)},
         Equal("without", ("with",), "What emits nothing adds nothing: it is a black surface."),
         seeds=FEW,

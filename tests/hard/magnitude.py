@@ -57,7 +57,7 @@ def _binary(name, title, powers, **more):
 CASES = [
     Case(
         "scale-decimal",
-        "The same room times 1e-3, 1e3 and 1e6",
+        "A room scaled by 1e-3, 1e3 and 1e6",
         _scales({"milli": 1e-3, "kilo": 1e3, "mega": 1e6}),
         Equal("one", ("milli", "kilo", "mega"), SAME, resolves=0.05),
         METHODS,
@@ -66,18 +66,18 @@ CASES = [
     ),
     _binary(
         "scale-binary-large",
-        "The same room times 2, 2^10 and 2^20, to the last bit",
+        "A room scaled by 2, 2^10 and 2^20, to the last bit",
         LARGE,
         fails={"bdpt": "One number in 3072 differs at factor 2, by one unit in its last place."},
     ),
     _binary(
         "scale-binary-small",
-        "The same room times 2^-10, 2 mm across, to the last bit",
+        "A room scaled by 2^-10, to 2 mm, to the last bit",
         SMALL,
     ),
     Case(
         "far-10km",
-        "The room 13 km from the origin",
+        "A room 13 km from the origin",
         _places(1e4),
         Equal("here", ("there",), PLACE.format("13 km", "0.5 mm"), bound=0.005, resolves=0.05),
         METHODS,
@@ -86,7 +86,7 @@ CASES = [
     ),
     Case(
         "far-1000km",
-        "The room 1,300 km from the origin",
+        "A room 1,300 km from the origin",
         _places(1e6),
         Equal(
             "here",

@@ -59,7 +59,7 @@ def half_space(albedo):
 
 G = (0.0, 0.999, -0.999)
 FIREFLIES = (
-    "Connections between vertices this near to each other leave fireflies: pixels of 50 among ones after 32 iterations."
+    "Connections between vertices this close together leave fireflies: some pixels are 50 instead of 1 after 32 iterations."
 )
 PEAK = (
     "The phase function's peak at g = 0.999 is 1e-3 radians wide: hardly a photon arrives within it, and most of the"
@@ -73,7 +73,7 @@ CLEAR = s.medium(0, 0)
 CASES = [
     Case(
         "media-none",
-        "A medium of density zero is no medium",
+        "A medium of density zero has no effect",
         {"without": partial(lit, None), "with": partial(lit, CLEAR)},
         Equal("without", ("with",), "Coefficients of zero neither absorb nor scatter.", resolves=0.06),
         METHODS,
@@ -82,7 +82,7 @@ CASES = [
     ),
     Case(
         "media-absorbing",
-        "A box that absorbs, of optical depth 0.001, 1 and 20",
+        "An absorbing box of optical depth 0.001, 1 and 20",
         {f"{depth:g}": partial(cloud, s.medium(depth, 0)) for depth in (0.001, 1, 20)},
         Values(
             {f"{depth:g}": exp(-depth) for depth in (0.001, 1, 20)},
@@ -96,7 +96,7 @@ CASES = [
     ),
     Case(
         "media-colour",
-        "A box that absorbs red, green and blue differently",
+        "A box with different absorption of red, green and blue",
         {"scene": partial(cloud, s.medium((0.1, 1, 3), 0))},
         Value([exp(-0.1), exp(-1), exp(-3)], "Beer and Lambert by channel.", bound=0.01),
         METHODS,
@@ -106,7 +106,7 @@ CASES = [
     ),
     Case(
         "media-eye-inside",
-        "The eye in the middle of a box that scatters, and of one that absorbs",
+        "A camera inside a scattering box, and inside an absorbing one",
         {
             "scatters": partial(cloud, s.medium(0, 3), 0.5, (0, 0, 0.2)),
             "absorbs": partial(cloud, s.medium(1, 0), 0.5, (0, 0, 0.2)),
@@ -124,7 +124,7 @@ CASES = [
     ),
     Case(
         "media-lamp-inside",
-        "A point light in a ball that absorbs",
+        "A point light inside an absorbing ball",
         {"scene": partial(lantern, s.medium(2, 0))},
         Value(0.5 / pi * exp(-0.6), "Albedo / pi times I / d², and exp(-2 0.3) of the way in the ball.", bound=0.005),
         METHODS,
@@ -133,7 +133,7 @@ CASES = [
     ),
     Case(
         "media-albedo-1",
-        "A box that scatters and absorbs nothing, g = 0, 0.999 and -0.999, in a white furnace",
+        "A scattering box without absorption, g = 0, 0.999 and -0.999, in a white furnace",
         {f"g{g:g}": partial(cloud, s.medium(0, 3, g)) for g in G},
         Values({f"g{g:g}": 1.0 for g in G}, WHITE, bound=0.005, resolves=0.1),
         METHODS,
@@ -142,7 +142,7 @@ CASES = [
     ),
     Case(
         "media-dense",
-        "Albedo 1 at 10^6 scatterings a metre, in a box of 0.1 mm, in a white furnace",
+        "A box of 0.1 mm with albedo 1 and a scattering coefficient of 10^6 per metre, in a white furnace",
         {"scene": partial(cloud, s.medium(0, 1e6), 5e-5, (0, 0, 4e-4))},
         Value(1.0, WHITE, bound=0.005, resolves=0.15),
         ("path", "bdpt", "vcm"),
@@ -153,7 +153,7 @@ CASES = [
     *(
         Case(
             f"media-half-space-{density:.0e}".replace("e+0", "e"),
-            f"A metre of {density:g} scatterings and absorptions a metre, albedo 0.5 and 0.9",
+            f"A layer of one metre with an extinction coefficient of {density:g} per metre, albedo 0.5 and 0.9",
             {f"{a:g}": partial(cloud, s.medium((1 - a) * density, a * density)) for a in (0.5, 0.9)},
             Values(
                 {f"{a:g}": half_space(a) for a in (0.5, 0.9)},

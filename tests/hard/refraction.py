@@ -108,7 +108,7 @@ GUIDE = reflectance(cos(radians(30)), 1.5)
 CASES = [
     Case(
         "ior-1",
-        "A solid of index 1 vanishes, roughness and all",
+        "A solid of index 1 is invisible, smooth or rough",
         {"without": stage, "with": partial(stage, (ball(), s.glass(1.0)))},
         Equal("without", ("with",), "An index of 1 neither bends nor reflects.", resolves=0.06),
         iterations=4,
@@ -127,7 +127,7 @@ CASES = [
     ),
     Case(
         "ior-1.0001",
-        "A solid of index 1.0001 all but vanishes",
+        "A solid of index 1.0001 is almost invisible",
         {"without": partial(outdoors, None), "with": partial(outdoors, s.glass(1.0001))},
         Equal(
             "without",
@@ -160,7 +160,7 @@ CASES = [
     ),
     Case(
         "ior-file-below-1",
-        "A file that says an index of 0.8, which its format does not allow",
+        "A file with an index of 0.8, which glTF does not allow",
         {"1": lambda: stage((ball(), s.glass(1.0))), "0.8": lambda: stage((ball(), s.glass(0.8)))},
         Equal(
             "1",
@@ -174,7 +174,7 @@ CASES = [
     ),
     Case(
         "critical-above",
-        "Above the critical angle glass reflects everything: a black tank below stays black",
+        "Total reflection above the critical angle: a black tank below the glass stays black",
         {"scene": partial(under_water, 41.9)},
         Black(1e-6, "The critical angle is asin(1 / 1.5) = 41.81°. At 41.9° no light comes from outside."),
         EYE,
@@ -199,7 +199,7 @@ CASES = [
     ),
     Case(
         "mesh-open",
-        "A box of glass that lacks a face, in a white furnace",
+        "A glass box without one of its faces, in a white furnace",
         {"scene": lambda: furnace((block(0.3).without([0, 1]), s.glass(1.5)))},
         Warned(
             "not closed",
@@ -212,7 +212,7 @@ CASES = [
     ),
     Case(
         "mesh-inverted",
-        "A box of glass whose faces point in, in a white furnace",
+        "A glass box whose faces point inwards, in a white furnace",
         {"scene": lambda: furnace((block(0.3).flipped(), s.glass(1.5)))},
         Value(1.0, WHITE + " Nor does which way a face was wound.", bound=0.005),
         EYE,
@@ -220,7 +220,7 @@ CASES = [
     ),
     Case(
         "eye-in-glass",
-        "The eye in a ball of glass, lit from everywhere",
+        "A camera inside a ball of glass that is lit from everywhere",
         {"scene": lambda: furnace((shapes.sphere((0, 0, 0), 1), s.glass(1.5)), eye=(0, 0.1, 0.3), field_deg=40)},
         Value(
             2.25,

@@ -84,7 +84,7 @@ SEAM = tuple(round(OWNER + step, 4) for step in (-0.006, -0.004, -0.002, 0.0, 0.
 CASES = [
     Case(
         "rough-delta-metal",
-        "Metal of roughness 1e-6 to 1e-3 is a mirror",
+        "Metal of roughness 1e-6 to 1e-3 looks like a mirror",
         _tiny(mirror),
         Equal(
             "0",
@@ -100,7 +100,7 @@ CASES = [
     ),
     Case(
         "rough-delta-glass",
-        "Glass of roughness 1e-6 to 1e-3 is clear",
+        "Glass of roughness 1e-6 to 1e-3 looks clear",
         _tiny(behind_glass),
         Equal("0", tuple(f"{r:g}" for r in TINY), "As metal's.", bound=0.005, resolves=0.05),
         EYE,
@@ -110,7 +110,7 @@ CASES = [
     ),
     Case(
         "rough-lobe",
-        "The share of a lobe that a lamp takes up, against quadrature",
+        "A light that covers part of a lobe, against numerical integration",
         lobes(SHARP),
         Values(
             {f"{r:g}": lobe_share(r * r) for r in SHARP},
@@ -126,7 +126,7 @@ CASES = [
     ),
     Case(
         "rough-sweep",
-        "Roughness from 0.2 to 1 in steps of 0.1: smooth, and falling",
+        "Roughness from 0.2 to 1 in steps of 0.1: radiance decreases smoothly",
         lobes(SWEEP),
         Sweep(
             {f"{r:g}": lobe_share(r * r) for r in SWEEP},
@@ -141,7 +141,7 @@ CASES = [
     ),
     Case(
         "rough-seam",
-        "Roughness around 0.447, an alpha of 0.2, where photons take over from eye paths",
+        "Roughness around 0.447 (an alpha of 0.2), where photons replace camera paths",
         lobes(SEAM),
         Sweep({f"{r:g}": lobe_share(r * r) for r in SEAM}, "As in rough-sweep.", bound=0.002),
         ("vcm", "sppm", "path"),
