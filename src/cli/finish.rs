@@ -1,18 +1,80 @@
-//! Opens the finish that options ask for, and says which denoiser is missing.
+//! `caustique finish`: finishes a rendered EXR. Also opens the finish of other commands.
 
+use super::output::{self, PictureArgs};
+use super::progress::{Form, duration};
 use super::say;
 use caustique::error::{Error, Result};
+use caustique::film::{Naming, take_plain_names};
+use caustique::image::exr;
 use caustique::options::FinishOptions;
-use caustique::pipeline::Ready;
+use caustique::options::number::threads;
+use caustique::pipeline::{OpenFinish, finish, write_error_of_finish};
+use caustique::render::Clock;
+use caustique::scene::description::PictureDefaults;
+use serde_json::json;
+use std::path::PathBuf;
 
-/// Opens a finish, see [`caustique::pipeline::finish::open`].
+/// Finish a rendered EXR as 'caustique render' finishes its own
+///
+/// The file needs a picture and what tells its noise: the layers that 'caustique render' writes, or from another
+/// renderer the beauty with a layer Variance (of the mean) or two independent halves, Half1 and Half2. Albedo and
+/// normal guide the denoiser, by the names that Blender, Mitsuba, pbrt, LuxCore and Arnold give them. With --model it
+/// needs Level1, Level2, ... and Variance1, ... All layers are kept, the picture itself is replaced.
+#[derive(clap::Args)]
+pub struct FinishArgs {
+    /// EXR to finish
+    input: PathBuf,
+    /// EXR to write
+    #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
+    output: PathBuf,
+    #[command(flatten)]
+    finish: FinishOptions,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Threads; 0 takes all cores
+    #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
+    threads: usize,
+}
+
+/// Finishes a file.
+pub fn run(args: &FinishArgs) -> Result<()> {
+    output::check(&args.output, "exr")?;
+    args.picture.check()?;
+    super::pool(args.threads)?.install(|| {
+        let mut opened = open(&args.finish, None)?;
+        let (mut set, mut attributes) = exr::read(&args.input)?;
+        // Names in the style of the input: cryptomatte attributes hold them too.
+        let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
+        let naming = if blender { Naming::Blender } else { Naming::Plain };
+        for name in take_plain_names(&mut set) {
+            let input = args.input.display();
+            say(&format!("warning: {input}: layer \"{name}\" cannot be written under this name and is left out"));
+        }
+        let clock = Clock::start();
+        let finish = || opened.finish().apply(&mut set, |_| true);
+        let account =
+            Form::Auto.during("finishing the picture", finish).map_err(|error| error.within(args.input.display()))?;
+        let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
+        object["combined"] = opened.header(&account);
+        if let Some(header) = object.as_object_mut() {
+            write_error_of_finish(header, &account);
+        }
+        attributes.insert(exr::ATTRIBUTE, &object)?;
+        exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
+        args.picture.write_png(&set, &PictureDefaults::default())?;
+        say(&format!("finished with {} in {}", opened.name(), duration(clock.seconds())));
+        Ok(())
+    })
+}
+
+/// Opens a finish as [`finish::open`] does, and says which denoiser is missing.
 ///
 /// # Errors
 /// A library that was asked for by name is missing, or the network takes other levels.
-pub fn open(options: &FinishOptions, levels: Option<usize>) -> Result<Ready> {
-    let ready = caustique::pipeline::finish::open(&options.order(), levels)?;
-    tell_missing(ready.missing.as_ref());
-    Ok(ready)
+pub fn open(options: &FinishOptions, levels: Option<usize>) -> Result<OpenFinish> {
+    let opened = finish::open(&options.request(), levels)?;
+    tell_missing(opened.missing.as_ref());
+    Ok(opened)
 }
 
 /// Says that our own denoiser takes the place of one that is missing.

@@ -1,8 +1,8 @@
-//! How commands are laid out for people: the order of their options in the help, and what all options have in common.
+//! The layout of the help: the order of options, and which options `-h` leaves out.
 
 use clap::{Arg, ArgAction, Command};
 
-/// Headings of options in the order of the help; those without one come first.
+/// Headings of options in the order of the help. Options without a heading come first.
 const HEADINGS: [&str; 12] = [
     "When to stop",
     "Runs",
@@ -17,14 +17,14 @@ const HEADINGS: [&str; 12] = [
     RUNNING,
     EXPERT,
 ];
-/// Heading of what has nothing to do with the picture.
+/// Heading of options that do not change the picture.
 const RUNNING: &str = "Running";
-/// Heading of what only researchers turn: `-h` leaves it out.
+/// Heading of options for researchers, which `-h` leaves out.
 const EXPERT: &str = "Expert";
 
-/// The command with its options in the order of their headings.
+/// Sorts the options of a command by the order of their headings.
 pub fn arrange(command: Command) -> Command {
-    let mut options: Vec<Arg> = command.get_arguments().cloned().map(common).collect();
+    let mut options: Vec<Arg> = command.get_arguments().cloned().map(with_common_settings).collect();
     options.sort_by_key(|option| {
         option.get_help_heading().map(|heading| HEADINGS.iter().position(|known| *known == heading))
     });
@@ -42,18 +42,18 @@ pub fn arrange(command: Command) -> Command {
     }
 }
 
-/// What every option does: a number below zero is its value, for its parser to judge.
-fn common(option: Arg) -> Arg {
-    let expert = option.get_help_heading() == Some(EXPERT);
-    let option = option.hide_short_help(expert);
+/// Settings of every option: `-h` leaves out options for experts, and a negative number is a value.
+fn with_common_settings(option: Arg) -> Arg {
+    let is_long = option.get_help_heading() == Some(EXPERT) || option.is_hide_short_help_set();
+    let option = option.hide_short_help(is_long);
     let has_value = !option.is_positional() && option.get_action().takes_values();
     if has_value { option.allow_negative_numbers(true) } else { option }
 }
 
-/// The command with an option for its help, the last but for those of experts.
+/// The command with its help option, which is the last before the options for experts.
 pub fn with_help(command: Command) -> Command {
     let long = command.get_arguments().any(|option| option.is_hide_short_help_set());
-    let about = if long { "Print help: -h what a person needs first, --help everything" } else { "Print help" };
+    let about = if long { "Print help: -h what you need first, --help everything" } else { "Print help" };
     let help = Arg::new("help").short('h').long("help").action(ArgAction::Help).help(about).display_order(usize::MAX);
     let runs = command.get_arguments().any(|option| option.get_help_heading() == Some(RUNNING));
     command.disable_help_flag(true).arg(help.help_heading(runs.then_some(RUNNING)))
@@ -65,7 +65,7 @@ mod tests {
     use crate::cli::command_line;
 
     #[test]
-    fn all_headings_have_a_place() {
+    fn all_headings_are_known() {
         command_line().debug_assert();
         for command in command_line().get_subcommands() {
             for heading in command.get_arguments().filter_map(Arg::get_help_heading) {

@@ -1,4 +1,4 @@
-//! `caustique merge`: the shards of one render to its picture, or renders of other seeds to their mean.
+//! `caustique merge`: merges the shards of one render to its picture, or renders of different seeds to their mean.
 
 use super::finish::tell_missing;
 use super::output::{self, PictureArgs};
@@ -9,9 +9,9 @@ use caustique::error::Result;
 use caustique::film::{LayerSet, Naming, Selection, take_plain_names};
 use caustique::finish::DenoiserChoice;
 use caustique::image::exr::{self, Attributes};
-use caustique::pipeline::merge::{self, Shards, Step, is_shard};
+use caustique::pipeline::merge::{MergeEvent, MergeRequest, Shards, is_shard};
 use caustique::pipeline::seeds::Seeds;
-use caustique::pipeline::{finish, tell_stored};
+use caustique::pipeline::{FinishRequest, finish, write_error_of_finish};
 use caustique::scene::description::PictureDefaults;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -34,9 +34,9 @@ pub struct MergeArgs {
     /// Do with the shards that are there: the picture so far
     #[arg(long)]
     partial: bool,
-    /// No finish at all [default: as the shards were asked]
-    #[arg(long, conflicts_with_all = ["model", "denoise"], help_heading = "Finish")]
-    no_combine: bool,
+    /// Do not finish the picture [default: as the shards were asked]
+    #[arg(long, alias = "no-combine", conflicts_with_all = ["model", "denoise"], help_heading = "Finish")]
+    no_finish: bool,
     /// What makes the denoised picture: 'auto', 'oidn', 'own' or 'none' [default: as the shards were asked]
     #[arg(long, value_enum, help_heading = "Finish")]
     denoise: Option<DenoiserChoice>,
@@ -67,26 +67,26 @@ pub fn run(args: &MergeArgs) -> Result<()> {
         output::check_inputs(output, args.inputs.iter().map(PathBuf::as_path))?;
     }
     let shards = args.inputs.iter().map(|path| is_shard(path)).collect::<Result<Vec<bool>>>()?;
-    super::pool(args.threads)?.install(|| if shards.contains(&true) { join(args) } else { average(args) })
+    super::pool(args.threads)?.install(|| if shards.contains(&true) { merge_shards(args) } else { average_seeds(args) })
 }
 
-/// What was asked for under this name, where it can still be read so.
-fn asked<T: DeserializeOwned>(arguments: &Value, name: &str) -> Option<T> {
+/// The value of an option in the header's `arguments`, if it has the expected type.
+fn given<T: DeserializeOwned>(arguments: &Value, name: &str) -> Option<T> {
     arguments.get(name).and_then(|value| serde_json::from_value(value.clone()).ok())
 }
 
 impl MergeArgs {
-    /// The finish that is asked for here, else there.
-    fn finish(&self, arguments: &Value) -> Option<finish::Order> {
-        let denoise = self.denoise.or_else(|| asked(arguments, "denoise")).unwrap_or_default();
-        let model = self.model.clone().or_else(|| asked(arguments, "model"));
+    /// The finish of these options, else of the options of the shards.
+    fn finish(&self, arguments: &Value) -> Option<FinishRequest> {
+        let denoise = self.denoise.or_else(|| given(arguments, "denoise")).unwrap_or_default();
+        let model = self.model.clone().or_else(|| given(arguments, "model"));
         let here = self.denoise.is_some() || self.model.is_some();
-        let none = self.no_combine || (!here && asked(arguments, "no-combine") == Some(true));
-        (!none).then_some(finish::Order { denoiser: denoise, model })
+        let none = self.no_finish || (!here && given(arguments, "no-combine") == Some(true));
+        (!none).then_some(FinishRequest { denoiser: denoise, model })
     }
 
     fn naming(&self, arguments: &Value) -> Naming {
-        self.exr_naming.or_else(|| asked(arguments, "exr-naming")).unwrap_or(Naming::Plain)
+        self.exr_naming.or_else(|| given(arguments, "exr-naming")).unwrap_or(Naming::Plain)
     }
 
     /// Writes the picture.
@@ -98,14 +98,15 @@ impl MergeArgs {
     }
 }
 
-/// Shards to the picture of their render.
-fn join(args: &MergeArgs) -> Result<()> {
+/// Merges shards to the picture of their render.
+fn merge_shards(args: &MergeArgs) -> Result<()> {
     let shards = Shards::open(&args.inputs, args.partial)?;
     let arguments = shards.arguments();
     let naming = args.naming(&arguments);
-    let order = merge::Order {
+    let layers: String = args.layers.clone().or_else(|| given(&arguments, "layers")).unwrap_or_else(|| "all".into());
+    let request = MergeRequest {
         finish: args.finish(&arguments),
-        layers: args.layers.clone().or_else(|| asked(&arguments, "layers")).unwrap_or_else(|| "all".into()),
+        layers: Selection::parse(&layers)?,
         naming,
         reproducible: args.reproducible,
     };
@@ -113,8 +114,8 @@ fn join(args: &MergeArgs) -> Result<()> {
     shards.warnings().iter().for_each(|warning| say(&format!("warning: {warning}")));
     let mut summary = None;
     let delivery = Form::Auto.during("merging", || {
-        shards.merge(&order, |step| {
-            if let Step::Finishes(rendered, missing) = step {
+        shards.merge(&request, |event| {
+            if let MergeEvent::Finishing { rendered, missing } = event {
                 tell_missing(missing);
                 summary = Some(Summary::of(rendered));
             }
@@ -122,8 +123,8 @@ fn join(args: &MergeArgs) -> Result<()> {
     })?;
     if let Some(summary) = summary {
         summary.tell();
-        if let Some((name, _)) = &delivery.finished {
-            tell_finish(name, &delivery, summary.told_of_finished());
+        if let Some(name) = &delivery.finished_by {
+            tell_finish(name, &delivery, summary.coverage_of_finished());
         }
         summary.tell_rejected(&args.output, true);
         tell_unseen(&args.output, &delivery);
@@ -131,12 +132,12 @@ fn join(args: &MergeArgs) -> Result<()> {
     args.write(&delivery.set, &delivery.attributes, naming, &made_for)?;
     let output = args.output.display();
     delivery.refusal.map_or(Ok(()), |error| {
-        Err(error.hint(format!("the unfinished picture is in {output}: 'caustique combine' finishes it")))
+        Err(error.hint(format!("the unfinished picture is in {output}: 'caustique finish' finishes it")))
     })
 }
 
-/// Renders of other seeds to their mean.
-fn average(args: &MergeArgs) -> Result<()> {
+/// Merges renders of different seeds to their mean.
+fn average_seeds(args: &MergeArgs) -> Result<()> {
     let mut seeds = Seeds::default();
     let mut blender = false;
     for path in &args.inputs {
@@ -149,13 +150,13 @@ fn average(args: &MergeArgs) -> Result<()> {
     let (mut set, mut attributes) = seeds.mean()?;
     let mut header = attributes.object().unwrap_or_default();
     let arguments = header["arguments"].clone();
-    if let Some(order) = args.finish(&arguments) {
-        let mut ready = finish::open(&order, None)?;
-        tell_missing(ready.missing.as_ref());
-        let account = ready.finish().apply(&mut set, |_| true)?;
-        header["combined"] = ready.facts(&account);
+    if let Some(request) = args.finish(&arguments) {
+        let mut opened = finish::open(&request, None)?;
+        tell_missing(opened.missing.as_ref());
+        let account = opened.finish().apply(&mut set, |_| true)?;
+        header["combined"] = opened.header(&account);
         if let Some(header) = header.as_object_mut() {
-            tell_stored(header, &account);
+            write_error_of_finish(header, &account);
         }
     }
     if let Some(layers) = &args.layers {

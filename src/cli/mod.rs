@@ -1,6 +1,5 @@
 //! The command line: one file per command. Data goes to stdout, talk to stderr; only this file prints.
 
-mod combine;
 mod compare;
 mod converge;
 mod doctor;
@@ -44,7 +43,8 @@ enum Command {
     /// Say which effects a scene calls for, which will be simulated, and why
     Plan(Box<plan::PlanArgs>),
     /// Finish a rendered EXR, also one of another renderer
-    Combine(combine::CombineArgs),
+    #[command(alias = "combine")]
+    Finish(finish::FinishArgs),
     /// Put the shards of a render together, or renders of other seeds
     Merge(merge::MergeArgs),
     /// Measure the error of an image against a reference
@@ -104,7 +104,7 @@ pub fn main() -> ExitCode {
     let result = match command {
         Command::Render(args) => render::run(&args),
         Command::Plan(args) => plan::run(&args),
-        Command::Combine(args) => combine::run(&args),
+        Command::Finish(args) => finish::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Converge(args) => converge::run(&args),

@@ -17,20 +17,23 @@ use std::path::{Path, PathBuf};
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Output")]
 pub struct PictureArgs {
-    /// Also write a picture to look at
+    /// Also write a PNG to look at
     #[arg(long, value_name = "FILE.png")]
     #[serde(skip)]
     pub png: Option<PathBuf>,
     /// Exposure of the PNG in stops [default: the scene's, else 0]
     #[arg(long, value_name = "EV", between = (Unbounded, Unbounded), allow_negative_numbers = true)]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub exposure: Option<f64>,
-    /// From light to the PNG's colours [default: the scene's, else agx]
+    /// Tone curve of the PNG [default: the scene's, else agx]
     #[arg(long, value_enum)]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub tonemap: Option<ToneMap>,
     /// Compression of the EXR; all are lossless
     #[arg(long, value_enum, default_value_t)]
+    #[arg(hide_short_help = true)]
     pub compression: Compression,
 }
 

@@ -2,11 +2,11 @@
 
 use super::progress::{Form, duration, percent};
 use super::{print, print_json, printable, scene};
-use caustique::choose::choose;
 use caustique::error::Result;
 use caustique::options::number::threads;
 use caustique::options::{RenderOptions, SceneOptions};
-use caustique::pipeline::{Loaded, Outlook, check, outlook, plan, sized};
+use caustique::pipeline::plan::{PlannedPicture, plan_picture};
+use caustique::pipeline::{Forecast, Loaded, MethodRequest, forecast, with_light_paths};
 use caustique::plan::{EffectPlan, Plan};
 use caustique::scene::View;
 use serde_json::json;
@@ -43,60 +43,50 @@ pub fn run(args: &PlanArgs) -> Result<()> {
 }
 
 fn report(args: &PlanArgs) -> Result<()> {
-    let job = &args.job;
-    // Options that contradict each other are errors here, too.
-    let settings = job.settings()?;
-    let Loaded { scene, removed } = scene::read(&job.scene, Form::beside(args.json), rayon::current_num_threads())?;
-    let camera = scene.camera(&job.camera_request()?)?;
-    let view = View::new(&scene, &camera);
-    check::media(&job.scene.path, &settings, &scene)?;
-    let make = |candidate| job.candidate_settings(candidate, camera.size());
-    let choice = if job.method.0.is_none() {
-        let mut finish = job.pilot_finish();
-        let tried = || choose(view, &mut finish, make, || false);
-        Form::beside(args.json).during("choosing a method", tried)
-    } else {
-        None
-    };
-    let asked = plan::Asked { choice: choice.as_ref(), max_depth: job.max_depth, switches: job.scene.switches() };
-    let mut plan = plan::plan(&asked, settings.method, view, &removed);
-    let of_scene = &scene.warnings;
-    plan.warnings.splice(0..0, of_scene.iter().cloned());
-    let outlook = match job.target_error {
-        Some(error) => {
-            let settings = choice.as_ref().map_or(&settings, |choice| &choice.settings);
-            let settings = sized(settings.clone(), job.photons, camera.size());
-            let mut finish = job.outlook_finish()?;
-            let tried = || outlook(view, &settings, &mut finish, error);
-            Some((error, Form::beside(args.json).during("trying how the error falls", tried)?))
-        }
-        None => None,
-    };
+    let (job, form) = (&args.job, Form::beside(args.json));
+    let request = job.picture_request()?;
+    let loaded = scene::read(&job.scene, form, rayon::current_num_threads())?;
+    let auto = matches!(request.method, MethodRequest::Auto(_));
+    let doing = if auto { "choosing a method" } else { "planning" };
+    let planned = form.during(doing, || plan_picture(request, &job.scene.path, &loaded, || false))?;
+    let forecast = job.target_error.map(|target| Ok((target, forecast_error(args, &loaded, &planned, target)?)));
+    let forecast = forecast.transpose()?;
+    let plan = &planned.plan;
     if args.json {
         let mut object = json!(plan);
-        if let Some((_, outlook)) = outlook {
-            object["outlook"] = json!(outlook);
+        if let Some((_, forecast)) = forecast {
+            object["outlook"] = json!(forecast);
         }
         print_json(&object)?
     } else {
-        let mut text = text(&plan);
-        if let Some((error, outlook)) = outlook {
-            text += &foretold(error, outlook);
+        let mut text = text(plan);
+        if let Some((error, forecast)) = forecast {
+            text += &sentence(error, forecast);
         }
-        if job.method.0.is_none() && plan.effects.iter().all(|effect| effect.energy.is_none()) {
+        if auto && plan.effects.iter().all(|effect| effect.energy.is_none()) {
             text += "nothing is measured: a pilot needs a longer render (--time, --iterations) or a larger picture\n";
         }
         print(&text)?
     }
-    if job.scene.strict && !of_scene.is_empty() {
-        return Err(scene::forbidden(&job.scene, of_scene.len()));
+    let warnings = &loaded.scene.warnings;
+    if job.scene.strict && !warnings.is_empty() {
+        return Err(scene::forbidden(&job.scene, warnings.len()));
     }
     Ok(())
 }
 
-/// `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, and by what that is told.
-fn foretold(error: f64, outlook: Option<Outlook>) -> String {
-    let Some(Outlook { iterations, seconds, core_seconds, pilot: (done, reached), .. }) = outlook else {
+/// The cost of a target error.
+fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, target: f64) -> Result<Option<Forecast>> {
+    let view = View::new(&loaded.scene, &planned.camera);
+    let settings = with_light_paths(planned.chosen.settings.clone(), args.job.photons, view.camera.size());
+    let mut finish = args.job.forecast_finish()?;
+    let work = || forecast(view, &settings, &mut finish, target);
+    Form::beside(args.json).during("trying how the error falls", work)
+}
+
+/// `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, and the pilot that this follows from.
+fn sentence(error: f64, forecast: Option<Forecast>) -> String {
+    let Some(Forecast { iterations, seconds, core_seconds, pilot: (done, reached), .. }) = forecast else {
         return format!("error {}: a pilot tells no time after which it is reached\n", percent(error));
     };
     format!(
@@ -181,9 +171,11 @@ fn text(plan: &Plan) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use caustique::pipeline::choose::Chosen;
+    use caustique::pipeline::plan::{self, PlanInput};
     use caustique::plan::switch::Removed;
     use caustique::plan::{Effect, Switches};
-    use caustique::render;
+    use caustique::render::{Candidate, Method, Settings};
     use caustique::scene::{CameraRequest, Description, Scene};
 
     /// Columns of figures are there when something has measured them, with a dash where it has not.
@@ -191,8 +183,9 @@ mod tests {
     fn figures_have_columns() {
         let scene = Scene::build(Description::default(), 1).unwrap();
         let camera = scene.camera(&CameraRequest::default()).unwrap();
-        let asked = plan::Asked { choice: None, max_depth: None, switches: Switches::default() };
-        let mut plan = plan::plan(&asked, render::Method::Vcm, View::new(&scene, &camera), &Removed::default());
+        let chosen = Chosen::named(Settings::for_candidate(Candidate::unguided(Method::Vcm)));
+        let input = PlanInput { chosen: &chosen, max_depth: None, switches: Switches::default() };
+        let mut plan = plan::plan(input, View::new(&scene, &camera), &Removed::default());
         assert_eq!(columns(&plan).len(), 2);
         let caustic = &mut plan.effects[Effect::Caustic as usize];
         (caustic.energy, caustic.seconds_per_iteration, caustic.error_if_off) = (Some(0.123), Some(0.25), Some(0.4));

@@ -24,7 +24,7 @@ pub fn read(args: &SceneOptions, form: Form, threads: usize) -> Result<Loaded> {
         },
     };
     let _waiting = Waiting::begin(form, &format!("reading {}", args.path.display()));
-    load(&args.order(), threads, &Stop::default())
+    load(&args.request(), threads, &Stop::default())
 }
 
 /// Prints a line for each warning; with `--strict` they are an error that lists them all.

@@ -30,7 +30,7 @@ pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
         usd::arguments(&path.path, path.allow_outside)?.into_iter().partition(named);
     said.retain(|word| {
         let name = word.trim_start_matches("--").split('=').next();
-        known.is_none_or(|known| known.get_arguments().any(|argument| argument.get_long() == name))
+        known.is_none_or(|known| known.get_arguments().any(|argument| has_name(argument, name)))
     });
     if matches!(&command, Command::Render(args) if !args.has_output()) {
         said.extend(output(&path, products)?);
@@ -50,6 +50,12 @@ pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
             None => Ok(command),
         },
     }
+}
+
+/// Whether an option has a name of the command line, which may be a former one.
+fn has_name(argument: &clap::Arg, name: Option<&str>) -> bool {
+    let aliases = argument.get_all_aliases().unwrap_or_default();
+    argument.get_long() == name || name.is_some_and(|name| aliases.contains(&name))
 }
 
 /// The output that the stage's product names, if there is one: a product, and a name.

@@ -17,7 +17,9 @@ pub struct OptionDescription {
     pub name: String,
     /// Name on the command line, such as `--max-depth`.
     pub option: String,
-    /// Kind of value that the option takes.
+    /// Former names of the field, which files may still give.
+    pub aliases: Vec<String>,
+    /// What it takes.
     pub kind: ValueKind,
     /// Placeholders of the values in the help, one for each value.
     pub values: Vec<String>,
@@ -127,13 +129,14 @@ fn entry(arg: &Arg) -> OptionDescription {
     let of_scene = OF_SCENE.iter().find(|(option, _)| *option == name).map(|(_, name)| *name);
     let python = not_in_python.is_none().then(|| match (of_scene, name.as_str()) {
         (Some(argument), _) => argument.into(),
-        (None, "no_combine") => "finish".into(),
+        (None, "no_finish") => "finish".into(),
         (None, name) => name.into(),
     });
     let heading = arg.get_help_heading().unwrap_or_default();
     let defaults = arg.get_default_values().iter().filter(|_| arg.get_action().takes_values());
     OptionDescription {
         option: format!("--{}", arg.get_long().unwrap_or_default()),
+        aliases: arg.get_all_aliases().unwrap_or_default().iter().map(|alias| alias.replace('-', "_")).collect(),
         kind,
         values: arg.get_value_names().unwrap_or_default().iter().map(ToString::to_string).collect(),
         default: defaults.map(|value| value.to_string_lossy().into_owned()).find(|value| !value.is_empty()),

@@ -16,7 +16,7 @@ use crate::estimator::bandwidth::SCREEN_CAP;
 use crate::estimator::rule::chi_squared::ChiSquaredSettings;
 use crate::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use crate::finish::{Denoiser, DenoiserChoice, Finish};
-use crate::pipeline::sized;
+use crate::pipeline::{AutoRequest, MethodRequest, PictureRequest, with_light_paths};
 use crate::render::{
     BandwidthRule, Candidate, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, Method,
     PHOTON_BYTES, RadiusRule, Settings, Shard,
@@ -32,118 +32,122 @@ use std::ops::Bound::{Excluded, Included, Unbounded};
 #[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct RenderOptions {
-    /// How light is found
+    /// Method that finds the light; 'auto' chooses one for the scene
     #[arg(long, value_enum, default_value_t, help_heading = "Method")]
     pub method: MethodChoice,
-    /// Light paths sent from the lights in an iteration: more give a smoother start, fewer faster iterations [default:
-    /// 100000]
+    /// Light paths per iteration: more give a smoother start, fewer give faster iterations [default: 100000]
     ///
-    /// By ppm, sppm, appm and cppm in each iteration, by pm once, for its one map, 2000000 unless told otherwise;
-    /// guided ones with --indirect paths send one a pixel, at most 100000. The other methods send one for every eye
+    /// For ppm, sppm, appm and cppm in each iteration, for pm once, for its one map, by default 2000000. Guided light
+    /// paths with --indirect paths are one per pixel, at most 100000. The other methods send one light path per camera
     /// path, or none
     #[arg(long, value_name = "N", whole = 1_u32..=50_000_000, help_heading = "Method")]
+    #[arg(hide_short_help = true)]
     pub photons: Option<u32>,
-    /// Memory for the map of pm in MiB, while it is built: 160 bytes a photon. Where it is full, light paths end, and a
-    /// warning says so [default: 1024]
+    /// Memory for the photon map of pm in MiB, while it is built: 160 bytes per photon. A full map ends the light
+    /// paths, and a warning says so [default: 1024]
     #[arg(long, value_name = "MIB", whole = 1..=u32::MAX, help_heading = "Expert")]
     pub photon_memory: Option<u32>,
-    /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5, each 1/sqrt(2) of the next larger: images from sharp
-    /// and noisy to smooth and blurred, from which the combiner makes one. The combiner that comes with the program
-    /// takes 5 [default: 5]
+    /// Bandwidth levels of ppm, sppm, appm, cppm and vcm, 1 to 5: each is 1/sqrt(2) of the next larger. Images range
+    /// from sharp and noisy to smooth and blurred. The network 'compact' of --model combines 5 [default: 5]
     #[arg(long, value_name = "M", whole = 1..=MAX_LEVELS, help_heading = "Expert")]
     pub levels: Option<usize>,
-    /// Eye paths of a pixel in an iteration with several levels: one for all levels, or two, of which one is level 1's
-    /// own, as the network of --model was trained with; they take about 1.7 times as long [default: 1, with --model 2]
+    /// Camera paths per pixel and iteration with several levels: one for all levels, or two, of which one is for level
+    /// 1 alone, as the network of --model was trained with. Two take about 1.7 times as long [default: 1, with --model
+    /// 2]
     #[arg(long, value_name = "1|2", whole = 1_u32..=2, help_heading = "Expert")]
     pub eye_paths: Option<u32>,
-    /// What sets the largest bandwidth to begin with: 'knn' the distance to the k-th nearest photon, 'footprint' three
-    /// pixels, or a length in scene units from 1e-9 to 1e9, the same everywhere [default: knn; bpm and vcm: footprint]
+    /// Largest bandwidth at the start: 'knn' is the distance to the k-th nearest photon, 'footprint' is three pixels, a
+    /// number is a length in scene units from 1e-9 to 1e9 for all pixels [default: knn; bpm and vcm: footprint]
     #[arg(long, value_name = "knn|footprint|R", help_heading = "Expert")]
     pub initial_bandwidth: Option<BandwidthChoice>,
-    /// Photons within the largest bandwidth to begin with, 1 to 1024; with pm within every bandwidth [default: 20, with
+    /// Photons within the largest bandwidth at the start, 1 to 1024; with pm within every bandwidth [default: 20, with
     /// one level 10; pm: 100]
     #[arg(long, value_name = "K", whole = 1_u32..=1024, help_heading = "Expert")]
     pub knn: Option<u32>,
-    /// How fast bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never
-    /// shrinks [default: 2/3; bpm and vcm: 0.75]
+    /// Rate at which bandwidths shrink, in (0, 1]: smaller values sharpen sooner and stay noisy longer, 1 never shrinks
+    /// [default: 2/3; bpm and vcm: 0.75]
     #[arg(long, value_name = "A", between = (Excluded(0.0), Included(1.0)), help_heading = "Expert")]
     pub alpha: Option<f64>,
-    /// With cppm the cells in which photons are counted: annuli and sectors of each, at most 64 in all [default: 2,6]
+    /// Annuli and sectors of the cells in which cppm counts photons, at most 64 cells [default: 2,6]
     #[arg(long, value_name = "NA,NS", help_heading = "Expert")]
     pub cppm_grid: Option<GridChoice>,
-    /// With cppm the factor of the squared bandwidth where nothing within it looks uniform, in (0, 1) [default: 0.8]
+    /// Factor of cppm on the squared bandwidth if the photons within it are not uniform, in (0, 1) [default: 0.8]
     #[arg(long, value_name = "K", between = (Excluded(0.0), Excluded(1.0)), help_heading = "Expert")]
     pub cppm_k: Option<f64>,
-    /// With cppm the growth, with every reduction, of the number of photons it takes for a test: 1 to 1000 [default:
-    /// 1.2]
+    /// Factor by which the number of photons for a test of cppm grows with every reduction, 1 to 1000 [default: 1.2]
     #[arg(long, value_name = "BETA", between = (Included(1.0), Included(1000.0)), help_heading = "Expert")]
     pub cppm_beta: Option<f64>,
-    /// With cppm the probability of taking uniform photons for others, in (0, 1) [default: 0.05]
+    /// Probability that a test of cppm rejects uniform photons, in (0, 1) [default: 0.05]
     #[arg(long, value_name = "P", between = (Excluded(0.0), Excluded(1.0)), help_heading = "Expert")]
     pub cppm_significance: Option<f64>,
-    /// With cppm red, green and blue apart, with photons of equal flux: finds what differs in colour or brightness but
-    /// not in the number of photons, such as the picture of a projector; takes about three times as long
+    /// Test red, green and blue of cppm separately, with photons of equal flux: finds edges in colour or brightness
+    /// that the number of photons does not show, such as in the picture of a projector. Takes about three times as long
     #[arg(long, help_heading = "Expert")]
     pub cppm_plus: bool,
-    /// How bandwidths of sppm shrink: 'memoryless' by the iteration's number alone, 'local' by the photons found
-    /// [default: memoryless; ppm: local]
+    /// Rule by which the bandwidths of sppm shrink: 'memoryless' by the number of the iteration, 'local' by the photons
+    /// found [default: memoryless; ppm: local]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub radius_rule: Option<RadiusRule>,
-    /// How sppm and appm weigh photons by their distance: 'box' alike within the bandwidth, 'epanechnikov' and
-    /// 'gaussian' (cut off at three standard deviations, which are the bandwidth) less towards the rim; ppm, cppm and
+    /// Weight of a photon of sppm and appm by its distance: 'box' is constant within the bandwidth, 'epanechnikov' and
+    /// 'gaussian' (cut off at three standard deviations, which are the bandwidth) fall towards the rim. ppm, cppm and
     /// the local rule count photons and need box [default: box]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub kernel: Option<KernelChoice>,
-    /// Guided emission: 'on' lets light paths start toward mirrors and glass, from the lights and as often as a short
-    /// pilot finds them to matter; the light is the same, its noise another. Not for path, pm and --cppm-plus [default:
-    /// off; auto: on where light is focused]
+    /// Guided emission: 'on' starts light paths towards mirrors and glass, from the lights and as often as a short
+    /// pilot finds useful. The light is the same, the noise differs. Not for path, pm and --cppm-plus [default: off;
+    /// auto: on if mirrors or glass focus light]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub guide: Option<OnOff>,
-    /// Who brings sppm the light that has bounced broadly: 'photons', or 'paths', eye paths that go on, which leaves
+    /// Source of the light of sppm after broad bounces: 'photons', or 'paths', camera paths that continue and leave
     /// caustics to the photons [default: photons]
     #[arg(long, value_enum, help_heading = "Expert")]
     pub indirect: Option<Indirect>,
-    /// Longest light path in segments, camera to light; boundaries that do not bend light are not counted [default: no
-    /// limit]
+    /// Longest light path in segments, camera to light; boundaries that do not refract light are not counted [default:
+    /// no limit]
     #[arg(long, value_name = "N", whole = 1_u32..=1_000_000, help_heading = "Method")]
+    #[arg(hide_short_help = true)]
     pub max_depth: Option<u32>,
-    /// Seed: another number, other noise; the same number and options, the same picture to the last bit
+    /// Seed of the noise: the same seed and options give the same picture to the last bit
     #[arg(long, value_name = "S", default_value_t = 0, whole = 0..=u64::MAX, help_heading = "Method")]
     pub seed: u64,
-    /// Noise of the frames: 'vary' gives frame N the seed S + N, so that what noise is left moves; 'same' gives all of them
-    /// the seed S, so that it stays in place
+    /// Noise of the frames: 'vary' gives frame N the seed S + N, so that the remaining noise changes; 'same' gives all
+    /// frames the seed S, so that it stays in place
     #[arg(long, value_enum, default_value_t, help_heading = "Method")]
+    #[arg(hide_short_help = true)]
     pub frame_seed: FrameSeed,
 
-    /// Stop after so many seconds of rendering; the running iteration is given up, but the first is finished
+    /// Stop after this many seconds; the running iteration is discarded, unless it is the first
     #[arg(long, value_name = "SECONDS", between = (Excluded(0.0), Unbounded), help_heading = "When to stop")]
     pub time: Option<f64>,
-    /// Stop after so many iterations [default: 64, if nothing else says when to stop]
+    /// Stop after this many iterations [default: 64, if nothing else says when to stop]
     #[arg(long, value_name = "N", whole = 1_u64..=MAX_TERMS, help_heading = "When to stop")]
     pub iterations: Option<u64>,
-    /// Stop when the estimated relative error (the root of relMSE) is this small; 0.05 is 5 %
+    /// Stop at this estimated relative error (the root of relMSE); 0.05 is 5 %
     #[arg(long, value_name = "E", between = (Excluded(0.0), Excluded(1.0)), help_heading = "When to stop")]
     pub target_error: Option<f64>,
     /// Render only the iterations i with i mod N = I, for one of N machines
     #[arg(long, value_name = "I/N", help_heading = "Running")]
+    #[arg(hide_short_help = true)]
     pub shard: Option<Shard>,
 
-    /// Width in pixels; without a height the camera's aspect is kept [default: the scene's, else 1280]
+    /// Width in pixels; alone it keeps the camera's aspect ratio [default: the scene's, else 1280]
     #[arg(long, value_name = "W", whole = 1..=MAX_SIZE, help_heading = "Picture")]
     pub width: Option<u32>,
-    /// Height in pixels; without a width the camera's aspect is kept
+    /// Height in pixels; alone it keeps the camera's aspect ratio
     #[arg(long, value_name = "H", whole = 1..=MAX_SIZE, help_heading = "Picture")]
     pub height: Option<u32>,
-    /// Render a window of the picture alone: left edge, top edge, width and height, in pixels, or in shares such as
-    /// 0.25,0,0.5,1 [default: the scene's, else all]
+    /// Render only a window of the picture: left edge, top edge, width and height, in pixels, or in fractions such as
+    /// 0.25,0,0.5,1 [default: the scene's, else the whole picture]
     #[arg(long, value_name = "X,Y,W,H", help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
     pub crop: Option<CropChoice>,
-    /// Pixel filter and its width in pixels, as Blender counts it: 'box' [1], 'gaussian' [1.5] or 'blackman-harris' [1.5]
+    /// Pixel filter and its width in pixels, as in Blender: 'box' [1], 'gaussian' [1.5] or 'blackman-harris' [1.5]
     /// [default: box 1]
     #[arg(long, num_args = 1..=2, action = clap::ArgAction::Set, value_names = ["box|gaussian|blackman-harris", "WIDTH"])]
     #[arg(help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
     pub filter: Option<Vec<String>>,
-    /// Camera by name [default: the scene's first]
+    /// Name of the camera [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     pub camera: Option<String>,
 
@@ -152,9 +156,10 @@ pub struct RenderOptions {
     #[serde(flatten)]
     pub scene: SceneOptions,
 
-    /// No finish at all: the picture is the estimator's own, at the usual single bandwidth
-    #[arg(long, conflicts_with_all = ["model", "denoise"], help_heading = "Finish")]
-    pub no_combine: bool,
+    /// Do not finish the picture: it stays the method's own estimate, at one bandwidth
+    #[arg(long, alias = "no-combine", conflicts_with_all = ["model", "denoise"], help_heading = "Finish")]
+    #[serde(rename = "no-combine")]
+    pub no_finish: bool,
     /// How the estimate becomes the picture.
     #[command(flatten)]
     #[serde(flatten)]
@@ -175,13 +180,42 @@ impl RenderOptions {
         Ok(CameraRequest { camera: self.camera.clone(), width: self.width, height: self.height, crop, filter })
     }
 
-    /// The settings of the requested render. With `--method auto`, the settings of the default method, which pilots use to
-    /// weigh effects.
+    /// The picture and its method, for the pipeline.
+    ///
+    /// # Errors
+    /// Options contradict each other.
+    pub fn picture_request(&self) -> Result<PictureRequest<'_>> {
+        Ok(PictureRequest {
+            camera: self.camera_request()?,
+            method: self.method_request()?,
+            photons: self.photons,
+            max_depth: self.max_depth,
+            switches: self.scene.switches(),
+        })
+    }
+
+    /// The method with its settings, or the settings that `auto` chooses from.
+    ///
+    /// # Errors
+    /// Options contradict each other.
+    pub fn method_request(&self) -> Result<MethodRequest<'_>> {
+        let settings = self.settings()?;
+        Ok(match self.method.0 {
+            Some(_) => MethodRequest::Named(settings),
+            None => MethodRequest::Auto(AutoRequest {
+                fallback: settings,
+                settings_of: Box::new(|candidate, size| self.candidate_settings(candidate, size)),
+                finish: self.pilot_finish(),
+            }),
+        })
+    }
+
+    /// Settings of the method; of the library's default method if `auto` chooses.
     ///
     /// # Errors
     /// Options contradict each other.
     pub fn settings(&self) -> Result<Settings> {
-        // Before `auto` has chosen, the default method stands in. No candidate takes an option that it does not take.
+        // The default method has every option that any candidate of `auto` has, so this finds all contradictions.
         let method = self.method.0.unwrap_or_default();
         let candidate =
             Candidate { method, guided: self.guide == Some(OnOff::On), indirect: self.indirect.unwrap_or_default() };
@@ -190,11 +224,11 @@ impl RenderOptions {
 
     /// The denoiser of the picture.
     fn denoiser(&self) -> DenoiserChoice {
-        if self.no_combine { DenoiserChoice::None } else { self.finish.denoise }
+        if self.no_finish { DenoiserChoice::None } else { self.finish.denoise }
     }
 
     /// The finish of the pilots of `auto`.
-    pub fn pilot_finish(&self) -> Finish {
+    fn pilot_finish(&self) -> Finish {
         Finish::for_pilots(self.denoiser())
     }
 
@@ -202,12 +236,12 @@ impl RenderOptions {
     ///
     /// # Errors
     /// The user chose a denoiser whose library is missing.
-    pub fn outlook_finish(&self) -> Result<Finish> {
+    pub fn forecast_finish(&self) -> Result<Finish> {
         Ok(Finish::new(Denoiser::open(self.denoiser())?.0, None))
     }
 
     /// Settings of a candidate of `auto`, for a picture of `size` pixels; `None` if the options exclude the candidate.
-    pub fn candidate_settings(&self, candidate: Candidate, size: (u32, u32)) -> Option<Settings> {
+    fn candidate_settings(&self, candidate: Candidate, size: (u32, u32)) -> Option<Settings> {
         let method = candidate.method;
         let guide = match self.guide {
             None => true,
@@ -220,7 +254,7 @@ impl RenderOptions {
         let levels = |settings: &Settings| self.finish.model.is_none() || settings.levels == required;
         let settings = self.settings_of(candidate, Some(method)).ok();
         let allowed = settings.filter(|settings| guide && indirect && levels(settings));
-        allowed.map(|settings| sized(settings, self.photons, size))
+        allowed.map(|settings| with_light_paths(settings, self.photons, size))
     }
 
     /// The seed of the rendered frame.

@@ -1,9 +1,10 @@
 //! Options about the run of a render: what is saved, how much memory and how many threads it takes, which layers it writes.
 
 use super::number::{Ranged, threads};
-use crate::film::Naming;
+use crate::error::Result;
+use crate::film::{Naming, Selection};
 use crate::pipeline::Saving;
-use crate::pipeline::memory::Cap;
+use crate::pipeline::memory::MemoryLimit;
 use serde::Serialize;
 use std::ops::Bound::{Excluded, Unbounded};
 use std::path::{Path, PathBuf};
@@ -12,32 +13,38 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct RunOptions {
-    /// Layers of the EXR: 'all', 'comp' (the picture, its parts, albedo, normal, depth, cryptomattes; half floats where
-    /// they serve), 'beauty', or names separated by commas
+    /// Layers of the EXR: 'all', 'comp' for compositing, 'beauty', or names separated by commas
+    ///
+    /// 'comp' has the picture, its parts, albedo, normal, depth and cryptomattes, in half floats if these suffice
     #[arg(long, value_name = "all|comp|beauty|LIST", default_value = "all", help_heading = "Output")]
     pub layers: String,
-    /// Names of the EXR's channels: 'blender' writes those that Blender's own renders have
+    /// Names of the EXR's channels: 'blender' writes the names of Blender's own renders
     #[arg(long, value_enum, default_value_t, help_heading = "Output")]
+    #[arg(hide_short_help = true)]
     pub exr_naming: Naming,
-    /// Save the state of the render every few minutes, so that --resume can go on; kept at the end, to extend the render
-    /// [default: beside the output, and removed at the end]
+    /// Save the state of the render to this file every few minutes, and keep it at the end, so that --resume can
+    /// continue or extend the render [default: beside the output, and removed at the end]
     #[arg(long, value_name = "FILE", help_heading = "Running", conflicts_with = "no_checkpoint")]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub checkpoint: Option<PathBuf>,
     /// Seconds between two saves
     #[arg(long, value_name = "SECONDS", default_value_t = 300.0, between = (Excluded(0.0), Unbounded))]
     #[arg(help_heading = "Running")]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub checkpoint_every: f64,
-    /// Save nothing
+    /// Save no state
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub no_checkpoint: bool,
-    /// Start anew although the checkpoint of a render that was stopped is there, and replace it
+    /// Start anew although there is the checkpoint of a render that was stopped, and replace it
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub overwrite: bool,
-    /// Go on from a checkpoint: the same options, and more --iterations or --time (both count from the start)
+    /// Continue from a checkpoint: with the same options, and more --iterations or --time (both count from the start)
     #[arg(long, value_name = "FILE", help_heading = "Running")]
     #[serde(skip)]
     pub resume: Option<PathBuf>,
@@ -45,21 +52,33 @@ pub struct RunOptions {
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     #[serde(skip)]
     pub threads: usize,
-    /// The most that photons, pixels and layers may take, in MiB, beside the scene itself. Where they need more, the light
-    /// paths of an iteration become fewer (with pm: the room of its map), and a warning says how many; what cannot fit is
-    /// refused [default: what the machine and its limits leave, and nothing becomes fewer]
+    /// Limit on the memory of photons, pixels and layers in MiB, without the scene itself [default: what the machine
+    /// and its limits leave]
+    ///
+    /// If they need more, an iteration has fewer light paths (with pm: its map is smaller), and a warning says how
+    /// many. What cannot fit is refused
     #[arg(long, value_name = "MIB", whole = 1..=u32::MAX, help_heading = "Running")]
+    #[arg(hide_short_help = true)]
     pub memory: Option<u32>,
     /// Leave clocks and the thread count out of the EXR's header, so that equal renders are equal files
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub reproducible: bool,
 }
 
 impl RunOptions {
-    /// The limit of `--memory`, if it is given.
-    pub fn cap(&self) -> Option<Cap> {
-        self.memory.map(|mib| Cap { bytes: u64::from(mib) << 20 })
+    /// The layers to deliver.
+    ///
+    /// # Errors
+    /// No layer has such a name.
+    pub fn selection(&self) -> Result<Selection> {
+        Selection::parse(&self.layers)
+    }
+
+    /// The cap on memory, if one is given.
+    pub fn memory_limit(&self) -> Option<MemoryLimit> {
+        self.memory.map(|mib| MemoryLimit { bytes: u64::from(mib) << 20 })
     }
 
     /// Where and how often the checkpoint is saved: in the file of `--checkpoint`, or beside `output`. `None` if nothing

@@ -2,7 +2,7 @@
 
 use super::frames::{Frames, numbered};
 use super::number::{Ranged, rgb, strength};
-use crate::pipeline::load::{Environment, Order};
+use crate::pipeline::load::{Environment, SceneRequest};
 use crate::plan::Switches;
 use crate::scene::gltf::{self, Glass, LightUnits};
 use serde::{Serialize, Serializer};
@@ -15,48 +15,57 @@ use std::str::FromStr;
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Light and glass")]
 pub struct SceneOptions {
-    /// Scene: .glb or .gltf, as Blender exports it, or a stage of USD (.usd, .usda, .usdc, .usdz)
+    /// Scene: .glb or .gltf, or a stage of USD (.usd, .usda, .usdc, .usdz)
     #[arg(value_name = "SCENE", help_heading = None::<&str>)]
     #[serde(rename = "scene", serialize_with = "lossy")]
     pub path: PathBuf,
-    /// Frames of the scene's animation, such as 5, 1-100 or 1-100,2. In the names of files, also in that of the scene,
-    /// '####' stands for the frame's number [default: the moment of the first key]
+    /// Frames of the scene's animation, such as 5, 1-100 or 1-100,2 [default: the time of the first key]
+    ///
+    /// '####' in the names of files, also of the scene, stands for the number of the frame
     #[arg(long, value_name = "A-B[,STEP]", help_heading = "Picture")]
     pub frames: Option<Frames>,
-    /// Frames a second, where the scene does not tell: frame N is at N / FPS seconds [default: 24]
+    /// Frames per second, if the scene does not say: frame N is at N / FPS seconds [default: 24]
     #[arg(long, value_name = "FPS", between = (Excluded(0.0), Unbounded), requires = "frames", help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
     pub frame_rate: Option<f64>,
     /// The file is one of a sequence, of which each has a frame to itself
     #[arg(skip)]
     #[serde(skip)]
     of_sequence: bool,
-    /// Light from all around: a latitude-longitude image (.exr or .hdr), or one colour R,G,B (radiance)
+    /// Environment light: a latitude-longitude image (.exr or .hdr), or one radiance R,G,B
     #[arg(long, value_name = "FILE|R,G,B")]
     pub env: Option<EnvironmentChoice>,
-    /// Turn the environment about the vertical, counter-clockwise seen from above (degrees)
+    /// Rotation of the environment about the vertical, counter-clockwise seen from above (degrees)
     #[arg(long, value_name = "DEG", between = (Unbounded, Unbounded), allow_negative_numbers = true)]
+    #[arg(hide_short_help = true)]
     pub env_rotation: Option<f64>,
-    /// Make the environment so many times as bright
+    /// Factor on the radiance of the environment
     #[arg(long, value_name = "S", value_parser = strength)]
+    #[arg(hide_short_help = true)]
     pub env_strength: Option<f64>,
-    /// Units of lamps: 'photometric' is what Blender's exporter writes unless told otherwise, 683 lumen to the watt
+    /// Units of lamps: 'auto' decides by the program that wrote the file; 'photometric' is the default of Blender's
+    /// exporter, 683 lumen per watt
     #[arg(long, value_enum, default_value_t)]
+    #[arg(hide_short_help = true)]
     pub light_units: LightUnits,
-    /// Glass whose file does not say whether it is solid: 'auto' makes closed meshes solid, so that they bend light,
-    /// and says so
+    /// Glass if the file does not say whether it is solid: 'auto' makes closed meshes solid, so that they refract
+    /// light, and says so
     #[arg(long, value_enum, default_value_t)]
+    #[arg(hide_short_help = true)]
     pub glass: Glass,
-    /// Switch effects off (-) or ask for them (+) by name, such as -dispersion,+volume: classes of light paths
-    /// (emission, direct, indirect, glossy, caustic, sds), and dispersion, volume (or medium), depth_of_field,
-    /// environment, alpha (cut-outs), textures. 'caustique plan' lists what a scene calls for [default: all that it
-    /// calls for]
+    /// Switch effects off (-) or on (+) by name, such as -dispersion,+volume [default: all that the scene calls for]
+    ///
+    /// Classes of light paths: emission, direct, indirect, glossy, caustic, sds. Others: dispersion, volume (or
+    /// medium), depth_of_field, environment, alpha (cut-outs), textures. 'caustique plan' lists the effects of a scene
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = "Effects")]
     pub effects: Option<Switches>,
-    /// Let the scene name files (buffers, textures, its environment) outside its own folder
+    /// Allow the scene to name files (buffers, textures, its environment) outside its own folder
     #[arg(long)]
+    #[arg(hide_short_help = true)]
     pub allow_outside: bool,
-    /// Take anything in the scene that is ignored or approximated as an error
+    /// Make an error of anything in the scene that is ignored or approximated
     #[arg(long)]
+    #[arg(hide_short_help = true)]
     pub strict: bool,
 }
 
@@ -108,13 +117,13 @@ impl SceneOptions {
         SceneOptions { path, frames: Some(Frames::one(frame)), of_sequence, ..self.clone() }
     }
 
-    /// The options as the pipeline takes them.
-    pub fn order(&self) -> Order {
+    /// The request for the pipeline.
+    pub fn request(&self) -> SceneRequest {
         let environment = self.env.clone().map(|choice| match choice {
             EnvironmentChoice::Color(color) => Environment::Color(color.into()),
             EnvironmentChoice::File(path) => Environment::File(path),
         });
-        Order {
+        SceneRequest {
             path: self.path.clone(),
             environment,
             rotation: self.env_rotation,

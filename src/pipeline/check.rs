@@ -1,19 +1,71 @@
-//! What a method cannot do in a scene, found before anything is rendered.
+//! The second step: whether a request fits its scene and the memory, found before anything is rendered.
 
+use super::layers;
+use super::memory::MemoryCheck;
+use super::request::{PictureRequest, Request};
+use crate::camera::Camera;
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::LEAST_ASKED;
 use crate::plan::Search;
 use crate::render::Settings;
-use crate::scene::Scene;
+use crate::render::output::layer_shape;
+use crate::scene::{Scene, View};
 use crate::transport::Indirect;
 use std::path::Path;
 
-/// Whether the method can do without what media scatter, or finds it.
+/// The camera and the settings of a picture that fits its scene.
+pub struct Checked {
+    /// The camera, of the size that is rendered.
+    pub camera: Camera,
+    /// Settings of the method; of the fallback if `auto` is still to choose.
+    pub settings: Settings,
+}
+
+/// Checks camera and method of a picture against the scene that was read from `path`.
 ///
 /// # Errors
-/// Media scatter, and the method gathers photons on surfaces only, or photons of caustics alone.
-pub fn media(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
+/// The scene has no such camera, or the method cannot render the scene.
+pub fn check_picture(picture: &PictureRequest<'_>, path: &Path, scene: &Scene) -> Result<Checked> {
+    let camera = scene.camera(&picture.camera)?;
+    let settings = picture.method.settings();
+    check_settings(settings, path, scene)?;
+    let settings = with_light_paths(settings.clone(), picture.photons, camera.size());
+    Ok(Checked { camera, settings })
+}
+
+/// Checks a render: its picture, its layers and its memory.
+///
+/// # Errors
+/// Errors of [`check_picture`]; the scene has no such layer; the render does not fit into memory.
+pub(super) fn check(request: &Request<'_>, scene: &Scene) -> Result<Checked> {
+    let checked = check_picture(&request.picture, &request.scene.path, scene)?;
+    let (shape, finishes) = (layer_shape(&checked.settings, scene), request.finish.is_some());
+    layers::check(&request.layers, &shape, finishes)?;
+    layers::check_names(&request.layers, &shape, finishes, request.naming)?;
+    let view = View::new(scene, &checked.camera);
+    let memory = MemoryCheck { view, method: request.picture.method.name(), finishes, limit: request.memory };
+    memory.fit(checked.settings.clone())?;
+    Ok(checked)
+}
+
+/// Settings with the number of light paths per iteration; `photons`: `None` for the default of a picture of this width
+/// and height.
+pub fn with_light_paths(settings: Settings, photons: Option<u32>, size: (u32, u32)) -> Settings {
+    Settings { photons: photons.unwrap_or(settings.default_photons(size)), ..settings }
+}
+
+/// Checks that a method can render the scene that was read from `path`.
+///
+/// # Errors
+/// The method does not render scattering media, or the initial bandwidth does not suit the scene.
+pub fn check_settings(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
+    check_media(settings, path, scene)?;
+    check_bandwidth(settings, path, scene)
+}
+
+/// Errors: media scatter, and the method stores photons on surfaces only.
+fn check_media(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let method = settings.method;
     let (option, hint) = match method.search() {
         _ if !scene.survey.scattering => return Ok(()),
@@ -27,27 +79,24 @@ pub fn media(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
     Err(Error::new(ErrorKind::Usage, path.display(), cause).hint(hint))
 }
 
-/// Whether photons within the bandwidth that was asked for tell of the light there.
-///
-/// # Errors
-/// It is smaller than positions in this scene can be told apart, or larger than the scene: what is found is then spread
-/// over an area of which the scene is nothing.
-pub fn bandwidth(path: &Path, settings: &Settings, scene: &Scene) -> Result<()> {
+/// Errors: the initial bandwidth is below what single precision resolves in this scene, or larger than the scene, so
+/// that most of the area of a density estimate lies outside.
+fn check_bandwidth(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let radius = scene.lights.sky().radius;
     let least = LEAST_ASKED * radius;
-    match settings.initial_bandwidth {
-        InitialBandwidth::Fixed(asked) if asked < least => {
-            let cause = format!(
-                "--initial-bandwidth {asked}: in a scene of radius {radius:.3} single precision does not tell such lengths apart"
-            );
-            let error = Error::new(ErrorKind::Usage, path.display(), cause);
-            Err(error.hint(format!("ask for {least:.1e} at least, or leave --initial-bandwidth out")))
-        }
-        InitialBandwidth::Fixed(asked) if asked > radius => {
-            let cause = format!("--initial-bandwidth {asked}: the scene has a radius of {radius:.3}");
-            let error = Error::new(ErrorKind::Usage, path.display(), cause);
-            Err(error.hint(format!("ask for {radius:.3} at most, or leave --initial-bandwidth out")))
-        }
-        _ => Ok(()),
-    }
+    let (cause, bound) = match settings.initial_bandwidth {
+        InitialBandwidth::Fixed(length) if length < least => (
+            format!(
+                "--initial-bandwidth {length}: in a scene of radius {radius:.3} single precision does not tell such lengths apart"
+            ),
+            format!("{least:.1e} at least"),
+        ),
+        InitialBandwidth::Fixed(length) if length > radius => (
+            format!("--initial-bandwidth {length}: the scene has a radius of {radius:.3}"),
+            format!("{radius:.3} at most"),
+        ),
+        _ => return Ok(()),
+    };
+    let error = Error::new(ErrorKind::Usage, path.display(), cause);
+    Err(error.hint(format!("ask for {bound}, or leave --initial-bandwidth out")))
 }

@@ -1,7 +1,7 @@
-//! Checkpoints: the state of a render in a file that is whole or not there, and that says what render it belongs to.
+//! Checkpoints: the state of a render and the identity of the render, in a file that is replaced atomically.
 //!
-//! A line that names the kind of file, and [`records`]: a JSON object, the state but for its pixels, and these in blocks,
-//! both as postcard packs them.
+//! The file holds a line that names its kind, then [`records`]: the [`Head`] as JSON, the state without its pixels, and
+//! the pixels in blocks, both in the format of postcard.
 
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
@@ -13,50 +13,40 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fs::File;
 use std::io::{BufReader, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The first bytes of every checkpoint.
 pub const MAGIC: &[u8; 23] = b"caustique checkpoint 6\n";
-/// What checkpoints of all versions begin with.
+/// The first bytes that checkpoints of all versions share.
 const KIND: &[u8] = b"caustique checkpoint ";
-/// Pixels packed together.
-pub(super) const BLOCK: usize = 2048;
-/// Options that may be others when a render goes on: when it stops, and how its files are written.
-const FREE: [&str; 8] = ["iterations", "time", "target-error", "layers", "exr-naming", "compression", "scene", "path"];
+/// Pixels per record.
+pub(super) const PIXELS_PER_RECORD: usize = 2048;
+/// Options that may differ when a render continues: its limits, and how its files are written.
+const FREE_OPTIONS: [&str; 8] =
+    ["iterations", "time", "target-error", "layers", "exr-naming", "compression", "scene", "path"];
 
-/// Where and how often a render is saved.
-#[derive(Clone, Debug)]
-pub struct Saving {
-    /// The file.
-    pub path: PathBuf,
-    /// Seconds between two saves.
-    pub every: f64,
-    /// It stays when the render is done, with its last state, so that the render can be extended.
-    pub keep: bool,
-}
-
-/// What render a checkpoint belongs to, and what has been decided about it.
+/// The identity of the render that a checkpoint or a shard belongs to, and the decisions made for it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Head {
-    /// Of the program.
+    /// Version of the program.
     pub version: String,
     /// Hash of the scene's files.
     pub scene: String,
-    /// What was asked for.
+    /// Options of the user.
     pub arguments: Value,
-    /// What auto has chosen, if it was asked.
+    /// The candidate that `auto` has chosen, if it has compared any.
     pub candidate: Option<Candidate>,
     /// The plan, for the header.
     pub plan: Value,
-    /// The render was done when this was saved, and its picture was about to be written.
+    /// Whether the render was done when the checkpoint was saved, and its picture was about to be written.
     #[serde(default)]
     pub finished: bool,
 }
 
-/// Saves a state; the file is replaced at once, or stays as it was.
+/// Writes a checkpoint. Replaces the file atomically.
 ///
 /// # Errors
-/// The file system.
+/// The file cannot be written.
 pub fn write(path: &Path, head: &Head, state: State<&[PixelAccumulator]>) -> Result<()> {
     let head = serde_json::to_vec(head).map_err(|cause| Error::new(ErrorKind::Io, path.display(), cause))?;
     let (state, pixels) = state.replace_pixels(());
@@ -66,19 +56,19 @@ pub fn write(path: &Path, head: &Head, state: State<&[PixelAccumulator]>) -> Res
             .write_all(MAGIC)
             .and_then(|()| Record::new(&head).write(file))
             .and_then(|()| Record::new(&state).write(file))
-            .and_then(|()| records::write_blocks(file, pixels, BLOCK))
-            .and_then(|()| records::end(file));
+            .and_then(|()| records::write_blocks(file, pixels, PIXELS_PER_RECORD))
+            .and_then(|()| records::write_end(file));
         written.map_err(|cause| atomic::failure(path, &cause))
     })
 }
 
-/// Checks that a render that starts anew may save itself to `path`; `remedy` says how one goes on, or
-/// overwrites.
+/// Checks that a new render may replace the file at `path` by its own checkpoint. `remedy`: how to continue the render of
+/// the existing checkpoint, or to overwrite it.
 ///
 /// # Errors
-/// The file there is no checkpoint, or, unless `overwrite`, that of a render that was not finished.
+/// The file is no checkpoint, or, unless `overwrite` is set, the checkpoint of a render that was not finished.
 pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<()> {
-    // A device takes anything, and keeps nothing.
+    // A device, such as /dev/null, loses nothing.
     if !path.is_file() {
         return Ok(());
     }
@@ -101,7 +91,7 @@ pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<(
 /// Reads a checkpoint.
 ///
 /// # Errors
-/// There is no file, it is none of ours, of another version of the program, or damaged.
+/// The file is missing, is no checkpoint, was written by another version of the program, or is damaged.
 pub fn read(path: &Path) -> Result<(Head, State)> {
     let error = |cause: &str| Error::new(ErrorKind::Io, path.display(), cause);
     let missing =
@@ -130,24 +120,24 @@ pub fn read(path: &Path) -> Result<(Head, State)> {
     Ok((head, state.replace_pixels(pixels).0))
 }
 
-/// Whether a checkpoint is of the render that is asked for.
+/// Checks that a checkpoint belongs to a render. `scene`: hash of the render's scene files.
 ///
 /// # Errors
-/// Its scene or an option is another.
+/// The scene or an option differs.
 pub fn check(path: &Path, head: &Head, scene: Option<&str>, arguments: &Value) -> Result<()> {
     let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
     if Some(head.scene.as_str()) != scene {
         let cause = "is of another scene, or the scene's files have changed since";
         return Err(error(cause.into()).hint("give the same scene, or start anew without --resume"));
     }
-    if let Some((key, there, here)) = difference(&head.arguments, arguments, &FREE) {
+    if let Some((key, there, here)) = difference(&head.arguments, arguments, &FREE_OPTIONS) {
         let cause = format!("was rendered with another --{key}: {there} there, {here} here");
         return Err(error(cause).hint("give the same options, or start anew without --resume"));
     }
     Ok(())
 }
 
-/// The first option, in their order by name, that is not the same there and here, and what it is; some are free.
+/// The first option by name, not in `free`, whose values `there` and `here` differ, with both values.
 pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(String, Value, Value)> {
     let none = Map::new();
     let (there, here) = (there.as_object().unwrap_or(&none), here.as_object().unwrap_or(&none));
@@ -159,8 +149,8 @@ pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(
     })
 }
 
-/// A hash of all that was read of a scene: its files, or what a converter has made of them, and the environment that the
-/// command line names. `None` of a scene that comes through a pipe, and is gone.
+/// A hash of a scene: of its files, or of the .glb that they were `converted` to, and of the environment that the options
+/// name. `None` if the scene came through a pipe and cannot be read again.
 ///
 /// # Errors
 /// The scene cannot be read.

@@ -1,9 +1,13 @@
-//! From pixels to what is written: layers, finished, and the header that tells of all.
+//! The last step: from pixel sums to the layers and the header of the EXR, finished.
 
-use super::facts::Facts;
+use super::facts::SceneFacts;
+use super::finish::OpenFinish;
 use super::layers;
-use super::worst::{Seen, Worst};
-use super::{Ready, Watch};
+use super::observer::{Event, Observer};
+use super::request::Request;
+use super::run::Iterated;
+use super::shard::ShardSums;
+use super::worst::{Visible, Worst};
 use crate::error::{Error, Result};
 use crate::estimator::PixelAccumulator;
 use crate::film::{LayerSet, Naming, Selection};
@@ -13,157 +17,229 @@ use crate::render::{Accuracy, CONFIDENCE, Clock, HistoryEntry, Rendered, Techniq
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
-/// What an error is of, where it is not the estimate's (the header's `error_of`).
+/// Value of the header's key `error_of` if the error is that of the finished picture.
 pub const FINISHED_PICTURE: &str = "finished picture";
 
 /// A picture with its layers and its header.
 pub struct Delivery {
-    /// The layers that were asked for, finished; unfinished with what a finish reads, where that failed.
+    /// The layers of the request, finished. If the finish failed, the unfinished layers with all that a finish reads.
     pub set: LayerSet,
-    /// The header's attributes.
+    /// Attributes of the EXR.
     pub attributes: Attributes,
-    /// Pictures per sampling technique, if they were asked for.
+    /// Pictures per sampling technique, if the request has them.
     pub techniques: Vec<TechniquePicture>,
-    /// What finished the picture, and what it did.
-    pub finished: Option<(String, Finished)>,
-    /// The error of the finished picture and what half of it costs, where its quarters tell.
+    /// Network and denoiser that have finished the picture.
+    pub finished_by: Option<String>,
+    /// Error of the finished picture, and the cost of halving it. `None` if the picture has no quarters.
     pub reached: Option<Reached>,
-    /// Where that error is.
+    /// Where the error is largest.
     pub worst: Option<Worst>,
-    /// Seconds from the last iteration to here.
+    /// Seconds from the last iteration to the delivery.
     pub finishing: f64,
-    /// Which light photons have hardly brought, where that is most of the error.
+    /// A warning if light that hardly any photon has brought is most of the error.
     pub unseen: Option<String>,
-    /// Why the picture is not finished, though that was asked for.
+    /// Why the finish failed.
     pub refusal: Option<Error>,
-    /// What other shards are joined with, where this is one.
-    pub tail: Option<super::shard::Tail>,
-    /// Checkpoint that is no longer needed once the picture is written.
+    /// Pixel sums, if the render is a shard.
+    pub sums: Option<ShardSums>,
+    /// A checkpoint that is no longer needed once the picture is written.
     pub spent_checkpoint: Option<PathBuf>,
 }
 
-/// How a picture is written, and what is told of it.
-pub(super) struct Writing<'a> {
-    pub facts: &'a Facts,
+/// The choice of layers and the contents of the header.
+pub(super) struct Contents<'a> {
+    pub facts: &'a SceneFacts,
     pub selection: &'a Selection,
     pub naming: Naming,
     pub plan: &'a Value,
     pub arguments: &'a Value,
-    /// Leave clocks and the number of threads out of the header.
+    /// Whether the header leaves out clocks and the number of threads.
     pub reproducible: bool,
-    /// What else the header is to tell.
+    /// Further keys of the header.
     pub more: Map<String, Value>,
+    /// Whether the render is a shard, which keeps its pixel sums and has no layers for absent light.
+    pub is_shard: bool,
 }
 
-/// Makes the layers that were asked for, and finishes them; `watch` sees them before that. Returns the pixels, if they
-/// are to be kept.
+/// Delivers a render.
+///
+/// # Errors
+/// The layers cannot be made, or the observer rejects the estimate. A finish that fails is no error:
+/// [`Delivery::refusal`].
+pub(super) fn deliver_render(
+    request: &Request<'_>,
+    Iterated { rendered, head, mut finish, spent_checkpoint }: Iterated,
+    facts: SceneFacts,
+    observer: &mut dyn Observer,
+) -> Result<Delivery> {
+    let part = rendered.settings.is_shard().then(|| rendered.shard_result());
+    let contents = Contents {
+        facts: &facts,
+        selection: &request.layers,
+        naming: request.naming,
+        plan: &head.plan,
+        arguments: &request.arguments,
+        reproducible: request.reproducible,
+        more: Map::new(),
+        is_shard: part.is_some(),
+    };
+    let (delivery, pixels) = deliver(contents, rendered, finish.as_mut(), Some(observer))?;
+    let sums = part.map(|part| ShardSums { head, facts, part, pixels });
+    Ok(Delivery { sums, spent_checkpoint, ..delivery })
+}
+
+/// Makes the layers, finishes them and writes the header. Returns also the pixel sums of a shard.
+///
+/// # Errors
+/// Errors of [`deliver_render`].
 pub(super) fn deliver(
-    writing: Writing<'_>,
-    mut rendered: Rendered,
-    (ready, watch): (Option<&mut Ready>, Option<&mut dyn Watch>),
-    keep: bool,
+    contents: Contents<'_>,
+    rendered: Rendered,
+    finish: Option<&mut OpenFinish>,
+    observer: Option<&mut dyn Observer>,
 ) -> Result<(Delivery, Vec<PixelAccumulator>)> {
-    let Writing { facts, selection, naming, plan, arguments, reproducible, more } = writing;
-    let mut header = rendered.header((!reproducible).then_some(rayon::current_num_threads()));
-    let (rejections, unseen) = (rendered.rejections(), rendered.error.unseen);
-    let of_estimate = rendered.error.relative();
-    let settings = rendered.settings.clone();
+    let finishes = finish.is_some();
+    let mut header = contents.header(&rendered);
+    let (unseen, settings) = (rendered.error.unseen, rendered.settings.clone());
+    let error_of_estimate = rendered.error.relative();
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let finishes = ready.is_some();
-    let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
-    let mut set = rendered.layers(&facts.shape, wanted)?;
-    let mut attributes = layers::cryptomattes(&facts.named, &rendered, selection, naming, &mut set)?;
-    attributes.frame = Some(facts.frame);
-    attributes.moment = exr::Moment { number: facts.made_for.frame, rate: facts.made_for.frame_rate };
-    let techniques = std::mem::take(&mut rendered.techniques);
-    let history = std::mem::take(&mut rendered.stats.history);
-    let seen = if finishes { Seen::of(&rendered.pixels, &facts.named) } else { Seen::default() };
-    // The pixels are most of the memory, and all that is wanted of them is in the layers.
-    let pixels = if keep { rendered.pixels } else { Vec::new() };
-    header.insert("plan".into(), plan.clone());
-    header.insert("arguments".into(), arguments.clone());
-    let rejected = rejections.sentence().filter(|_| rejections.are_too_many());
-    let mut warnings: Vec<&String> = facts.warnings.iter().chain(&rejected).collect();
-    header.insert("warnings".into(), json!(warnings));
-    if let Some(number) = facts.made_for.frame {
-        header.insert("frame".into(), number.into());
-    }
-    if let Some(rate) = facts.made_for.frame_rate {
-        header.insert("frame_rate".into(), json!(rate));
-    }
-    header.insert("error_of".into(), "Noisy".into());
-    if let (Some(watch), true) = (watch, finishes) {
-        let mut attributes = attributes.clone();
+    let (mut layers, pixels) = Layers::make(&contents, rendered, finishes)?;
+    if let (Some(observer), true) = (observer, finishes) {
+        let mut attributes = layers.attributes.clone();
         attributes.insert(exr::ATTRIBUTE, &header)?;
-        watch.estimated(&set, &attributes);
+        observer.event(Event::Estimated { set: &layers.set, attributes: &attributes })?;
     }
-    let applied = ready.map(|ready| {
-        let mut account = ready.finish().apply(&mut set, |name| name == ERROR || selection.wants(name))?;
-        account.error = account.error.map(|error| FinishedError { unseen: unseen.squared, ..error });
-        Ok((ready.name(), ready.facts(&account), account))
-    });
+    let finished = finish.map(|finish| layers.finish(finish, contents.selection, unseen.squared)).transpose();
     let finishing = clock.seconds();
-    let (mut finished, refusal) = match applied.transpose() {
+    let (finished, refusal) = match finished {
         Ok(finished) => (finished, None),
         Err(error) => (None, Some(error)),
     };
-    let of_finished = finished.as_ref().and_then(|(_, _, account)| Reached::of(history, account.error));
-    let error = of_finished.as_ref().map(Reached::error).or(of_estimate);
+    let reached = finished.as_ref().and_then(|finished| Reached::of(layers.history, finished.error));
+    let error = reached.as_ref().map(Reached::error).or(error_of_estimate);
     let unseen = unseen.sentence(&settings).filter(|_| error.is_some_and(|error| unseen.dominates(error)));
-    if let Some(sentence) = &unseen {
-        warnings.push(sentence);
-        header.insert("warnings".into(), json!(warnings));
+    if let (Some(sentence), Some(warnings)) = (&unseen, header.get_mut("warnings").and_then(Value::as_array_mut)) {
+        warnings.push(sentence.as_str().into());
     }
-    let errors = finished.as_mut().and_then(|(_, _, account)| account.error_map.take());
-    let worst = errors.map(|errors| Worst::of(&errors.squared(), &errors.weight, &set, &seen));
-    layers::add_dark(selection, &facts.shape, finishes, &mut set)?;
-    // A render that is still to be finished keeps what that reads, and a shard has what it can have.
-    if keep {
-        set.layers.retain(|layer| selection.wants(&layer.name));
-    } else if refusal.is_none() {
-        set = selection.apply(set)?;
+    let set = contents.select(layers.set, finishes, refusal.is_some())?;
+    let (finished_by, combined, worst) = match finished {
+        Some(FinishedPicture { name, header, worst, .. }) => (Some(name), header, worst),
+        None => (None, Value::Null, None),
+    };
+    if let Some(reached) = &reached {
+        reached.write(&mut header, contents.reproducible);
     }
-    if let Some(reached) = &of_finished {
-        reached.tell(&mut header, reproducible);
+    header.extend(worst.as_ref().map(|worst| ("worst".to_owned(), json!(worst))));
+    header.insert("combined".into(), combined);
+    header.extend(contents.more);
+    if !contents.reproducible {
+        write_costs(&mut header, cpu_seconds() - cpu_start);
     }
-    if let Some(worst) = &worst {
-        header.insert("worst".into(), json!(worst));
-    }
-    header.insert("combined".into(), finished.as_ref().map_or(Value::Null, |(_, facts, _)| facts.clone()));
-    header.extend(more);
-    if !reproducible {
-        add_costs(&mut header, cpu_seconds() - cpu_start);
-    }
+    let mut attributes = layers.attributes;
     attributes.insert(exr::ATTRIBUTE, &header)?;
-    let finished = finished.map(|(name, _, account)| (name, account));
-    let reached = of_finished;
-    let (tail, spent_checkpoint) = (None, None);
+    let (techniques, sums, spent_checkpoint) = (layers.techniques, None, None);
     let delivery = Delivery {
         set,
         attributes,
         techniques,
-        finished,
+        finished_by,
         reached,
         worst,
         finishing,
         unseen,
         refusal,
-        tail,
+        sums,
         spent_checkpoint,
     };
     Ok((delivery, pixels))
 }
 
-/// How far a render has come.
+impl Contents<'_> {
+    /// The header of the estimate, before it is finished.
+    fn header(&self, rendered: &Rendered) -> Map<String, Value> {
+        let mut header = rendered.header((!self.reproducible).then_some(rayon::current_num_threads()));
+        let rejections = rendered.rejections();
+        let rejected = rejections.sentence().filter(|_| rejections.are_too_many());
+        let warnings: Vec<&String> = self.facts.warnings.iter().chain(&rejected).collect();
+        header.insert("plan".into(), self.plan.clone());
+        header.insert("arguments".into(), self.arguments.clone());
+        header.insert("warnings".into(), json!(warnings));
+        header.extend(self.facts.made_for.frame.map(|frame| ("frame".to_owned(), frame.into())));
+        header.extend(self.facts.made_for.frame_rate.map(|rate| ("frame_rate".to_owned(), json!(rate))));
+        header.insert("error_of".into(), "Noisy".into());
+        header
+    }
+
+    /// The layers of the request. A render that is still to be finished keeps all that a finish reads.
+    fn select(&self, mut set: LayerSet, finishes: bool, failed: bool) -> Result<LayerSet> {
+        layers::add_black(self.selection, &self.facts.shape, finishes, &mut set)?;
+        if self.is_shard {
+            set.layers.retain(|layer| self.selection.wants(&layer.name));
+        } else if !failed {
+            set = self.selection.apply(set)?;
+        }
+        Ok(set)
+    }
+}
+
+/// The layers of a render, and what else its pixels are needed for.
+struct Layers {
+    set: LayerSet,
+    attributes: Attributes,
+    techniques: Vec<TechniquePicture>,
+    history: Vec<HistoryEntry>,
+    visible: Visible,
+}
+
+/// A finished picture: network and denoiser, the header's key `combined`, and the error.
+struct FinishedPicture {
+    name: String,
+    header: Value,
+    error: Option<FinishedError>,
+    worst: Option<Worst>,
+}
+
+impl Layers {
+    /// Makes the layers of the request, and those that a finish reads. Returns also the pixel sums of a shard; other
+    /// pixel sums are freed, because they are most of the memory.
+    fn make(
+        contents: &Contents<'_>,
+        mut rendered: Rendered,
+        finishes: bool,
+    ) -> Result<(Layers, Vec<PixelAccumulator>)> {
+        let Contents { facts, selection, naming, .. } = contents;
+        let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
+        let mut set = rendered.layers(&facts.shape, wanted)?;
+        let mut attributes = layers::add_cryptomattes(&facts.names, &rendered, selection, *naming, &mut set)?;
+        attributes.frame = Some(facts.frame);
+        attributes.moment = exr::Moment { number: facts.made_for.frame, rate: facts.made_for.frame_rate };
+        let techniques = std::mem::take(&mut rendered.techniques);
+        let history = std::mem::take(&mut rendered.stats.history);
+        let visible = if finishes { Visible::of(&rendered.pixels, &facts.names) } else { Visible::default() };
+        let pixels = if contents.is_shard { rendered.pixels } else { Vec::new() };
+        Ok((Layers { set, attributes, techniques, history, visible }, pixels))
+    }
+
+    /// Finishes the picture. `unseen`: squared relative error by light that hardly any photon has brought.
+    fn finish(&mut self, finish: &mut OpenFinish, selection: &Selection, unseen: f64) -> Result<FinishedPicture> {
+        let mut finished = finish.finish().apply(&mut self.set, |name| name == ERROR || selection.wants(name))?;
+        finished.error = finished.error.map(|error| FinishedError { unseen, ..error });
+        let worst = finished.error_map.take();
+        let worst = worst.map(|map| Worst::of(&map.squared(), &map.weight, &self.set, &self.visible));
+        Ok(FinishedPicture { name: finish.name(), header: finish.header(&finished), error: finished.error, worst })
+    }
+}
+
+/// The error that a finished picture has reached, and how it falls.
 pub struct Reached {
     accuracy: Accuracy,
-    /// The last moment judged with the picture as it is.
+    /// The history, of which the last moment holds the error of the delivered picture.
     history: Vec<HistoryEntry>,
     last: HistoryEntry,
 }
 
 impl Reached {
-    /// By a history and what the finish has told at its end; `None` where nothing is known.
+    /// `error`: the error of the finished picture. Returns `None` if the history has no error of finished pictures.
     fn of(mut history: Vec<HistoryEntry>, error: Option<FinishedError>) -> Option<Reached> {
         let last = history.last_mut()?;
         if error.is_some() {
@@ -173,13 +249,12 @@ impl Reached {
         Some(Reached { accuracy: Accuracy::of(&history)?, history, last })
     }
 
-    /// Estimated relative error of the finished picture: the root of relMSE, trimmed of the worst half per cent of the
-    /// pixels.
+    /// Estimated relative error of the finished picture: the root of relMSE, without the worst 0.5 % of the pixels.
     pub fn error(&self) -> f64 {
         self.accuracy.error(self.last.iterations)
     }
 
-    /// Between what that lies in [`CONFIDENCE`] of all pictures.
+    /// Bounds of the error, which hold for a share [`CONFIDENCE`] of all renders.
     pub fn interval(&self) -> [f64; 2] {
         self.accuracy.interval(self.last.iterations)
     }
@@ -189,19 +264,19 @@ impl Reached {
         self.accuracy.rare
     }
 
-    /// How many times what the render has cost half of the error costs beside it; `None` where bias forbids it.
+    /// The additional cost of halving the error, over the cost of the render so far; `None` if bias forbids it.
     pub fn halving(&self) -> Option<f64> {
         let iterations = self.accuracy.iterations_to(0.5 * self.error())?;
         Some(iterations / self.last.iterations as f64 - 1.0)
     }
 
-    /// Seconds for half of the error, on top of those that the render has taken.
+    /// Additional seconds for half of the error.
     pub fn seconds_to_half(&self) -> Option<f64> {
         Some(self.halving()? * self.last.seconds)
     }
 
-    /// In place of the estimate's error, in the header.
-    fn tell(&self, header: &mut Map<String, Value>, reproducible: bool) {
+    /// Writes the error of the finished picture to the header, in place of the error of the estimate.
+    fn write(&self, header: &mut Map<String, Value>, reproducible: bool) {
         if let Some(noisy) = header.insert("error".into(), self.error().into()) {
             header.insert("error_noisy".into(), noisy);
         }
@@ -233,14 +308,15 @@ impl Reached {
     }
 }
 
-/// What the finish of a stored picture has told of its error, in its header; nothing where the picture has no quarters.
-pub fn tell_stored(header: &mut Map<String, Value>, account: &Finished) {
+/// Writes the error of a picture that was rendered before and is finished now to its header. Does nothing if the picture
+/// has no quarters.
+pub fn write_error_of_finish(header: &mut Map<String, Value>, finished: &Finished) {
     let iterations = header.get("iterations").and_then(Value::as_u64).unwrap_or(1).max(1);
     let last = header.get("history").and_then(Value::as_array).and_then(|moments| moments.last());
     let number = |key: &str| last.and_then(|last| last.get(key)).and_then(Value::as_f64);
     let timed = number("seconds").is_some();
     let unseen = header.get("unseen").and_then(|unseen| unseen.get("error")).and_then(Value::as_f64).unwrap_or(0.0);
-    let error = account.error.map(|error| FinishedError { unseen: unseen * unseen, ..error });
+    let error = finished.error.map(|error| FinishedError { unseen: unseen * unseen, ..error });
     let history = HistoryEntry {
         seconds: number("seconds").unwrap_or(0.0),
         cpu_seconds: number("cpu_seconds").unwrap_or(0.0),
@@ -250,12 +326,12 @@ pub fn tell_stored(header: &mut Map<String, Value>, account: &Finished) {
         finished: error,
     };
     if let Some(reached) = Reached::of(vec![history], error) {
-        reached.tell(header, !timed);
+        reached.write(header, !timed);
     }
 }
 
-/// What the layers and their finish have cost.
-fn add_costs(header: &mut Map<String, Value>, core_seconds: f64) {
+/// Writes the cost of the layers and their finish to the header.
+fn write_costs(header: &mut Map<String, Value>, core_seconds: f64) {
     if let Some(Value::Object(phases)) = header.get_mut("phases") {
         phases.insert("layers_and_finish".into(), core_seconds.into());
     }

@@ -1,6 +1,7 @@
-//! What a picture's file tells of its scene: plain data, so that it can be told without the scene.
+//! The facts of a scene that the layers and the header of its picture need, so that shards can be merged without the
+//! scene.
 
-use super::layers;
+use super::layers::SceneNames;
 use crate::film::output::Shape;
 use crate::image::exr;
 use crate::light::MAX_GROUPS;
@@ -12,41 +13,41 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 
-/// What layers, their names and the header need to know.
+/// The facts of a scene that the layers and the header of its picture need.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Facts {
-    /// What layers there are.
+pub struct SceneFacts {
+    /// The layers that the render has.
     pub shape: Shape,
-    /// What cryptomattes name.
-    pub(super) named: layers::Named,
-    /// Where the picture is in the whole one, and its camera.
+    /// Names for cryptomattes.
+    pub(super) names: SceneNames,
+    /// Position within the whole picture, and the matrices of the camera.
     pub frame: exr::Frame,
-    /// What reading the scene has warned of.
+    /// Warnings from reading the scene.
     pub warnings: Vec<String>,
-    /// The picture that the scene was made for.
+    /// Frame, frame rate and look that the scene asks for.
     pub made_for: PictureDefaults,
 }
 
-impl Facts {
-    /// Those of a render of a scene with these settings.
+impl SceneFacts {
+    /// The facts for a render of a scene with these settings.
     ///
     /// # Errors
     /// The scene has no such camera.
-    pub(super) fn new(scene: &Scene, request: &CameraRequest, settings: &Settings) -> Result<Facts> {
+    pub(super) fn new(scene: &Scene, request: &CameraRequest, settings: &Settings) -> Result<SceneFacts> {
         let whole = scene.whole_camera(request)?;
         let (width, height) = whole.size();
         let [x, y, ..] = scene.window(request, (width, height))?.unwrap_or_default();
         let [world_to_camera, world_to_ndc] = whole.matrices(scene.origin);
-        Ok(Facts {
+        Ok(SceneFacts {
             shape: layer_shape(settings, scene),
-            named: layers::Named::of(scene),
+            names: SceneNames::of(scene),
             frame: exr::Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc },
             warnings: scene.warnings.clone(),
             made_for: scene.picture,
         })
     }
 
-    /// Whether they can be of a picture that is made of this part: a file can say anything.
+    /// Whether the facts fit a shard: both may come from a damaged or forged file.
     pub(super) fn are_sound(&self, part: &ShardResult) -> bool {
         let Settings { method, levels, .. } = &part.settings;
         let Shape { levels: count, own, compared, groups, .. } = &self.shape;

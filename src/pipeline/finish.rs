@@ -1,33 +1,32 @@
-//! A finish that is ready: the denoiser found, the network loaded, its time known.
+//! Opens the finish of a render: finds the denoiser, loads the network, and reserves time for both.
 
 use crate::combine::{Combiner, Model, Runtime};
 use crate::error::{Error, Result};
-use crate::film::LayerSet;
-use crate::film::Size;
+use crate::film::{LayerSet, Size};
 use crate::finish::{Denoiser, DenoiserChoice, Finish, Finished, Quality};
 use crate::render::Clock;
 use serde_json::{Value, json};
 
-/// Share of a render's time that denoising the picture may take at more than the least quality.
-const SHARE: f64 = 0.07;
-/// Side of the picture by which the denoiser is timed.
-const TIMED: usize = 192;
-/// A finish is let to take no more of a render's time.
-const MOST: f64 = 0.5;
+/// Largest share of the time limit that one run of the denoiser may take at more than the lowest quality.
+const MAX_DENOISING_SHARE: f64 = 0.07;
+/// Width and height of the picture by which the denoiser is timed.
+const TIMED_SIDE: usize = 192;
+/// Largest share of the time limit that the finish may take.
+const MAX_FINISH_SHARE: f64 = 0.5;
 
-/// How the estimate is to become the picture.
-pub struct Order {
-    /// What makes the denoised picture.
+/// The finish that the user asks for.
+pub struct FinishRequest {
+    /// The denoiser.
     pub denoiser: DenoiserChoice,
-    /// The network that combines levels: a name that ships, or an ONNX file.
+    /// The network of equation (6), which combines bandwidth levels: the name of a built-in network, or an ONNX file.
     pub model: Option<String>,
 }
 
-/// A finish that is ready, and the network that was named.
-pub struct Ready {
+/// A finish whose libraries have been found and whose network has been loaded.
+pub struct OpenFinish {
     finish: Finish,
     model: Option<Network>,
-    /// What is missing, where our own denoiser takes the place of the usual one.
+    /// Why the preferred denoiser is missing, if the built-in one takes its place.
     pub missing: Option<Error>,
 }
 
@@ -37,19 +36,18 @@ struct Network {
     training: String,
 }
 
-/// Finds the libraries and loads the network; the current rayon pool says how many threads they get. `levels`: as many
-/// as the render will have.
+/// Finds the libraries and loads the network, with the threads of the current rayon pool. `levels`: the number of
+/// bandwidth levels of the render, if known.
 ///
 /// # Errors
-/// A library that was asked for by name is missing, or the network takes other levels.
-pub fn open(order: &Order, levels: Option<usize>) -> Result<Ready> {
-    let (denoiser, missing) = Denoiser::open(order.denoiser)?;
-    let opened = order.model.as_deref().map(|name| open_network(name, levels)).transpose()?;
+/// A library that the user asks for by name is missing, or the network combines another number of levels.
+pub fn open(request: &FinishRequest, levels: Option<usize>) -> Result<OpenFinish> {
+    let (denoiser, missing) = Denoiser::open(request.denoiser)?;
+    let opened = request.model.as_deref().map(|name| open_network(name, levels)).transpose()?;
     let (model, combiner) = opened.unzip();
-    Ok(Ready { finish: Finish::new(denoiser, combiner), model, missing })
+    Ok(OpenFinish { finish: Finish::new(denoiser, combiner), model, missing })
 }
 
-/// A network that takes so many levels, if that is known.
 fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)> {
     let model = Model::open(name)?;
     let runtime = Runtime::find().map_err(|mut error| {
@@ -68,23 +66,25 @@ fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)
     Ok((network, combiner))
 }
 
-impl Ready {
+impl OpenFinish {
     /// The finish itself.
     pub fn finish(&mut self) -> &mut Finish {
         &mut self.finish
     }
 
-    /// Chooses the quality for a render that may take so many seconds, and returns how many of them the finish will
-    /// take, with so many parts: by timing the denoiser on a small picture. This clock is a stop condition's: it
-    /// decides when a render ends and how well its one picture is denoised, nothing else.
+    /// Chooses the quality of the denoiser for a render with a time limit, and returns the seconds that the finish will
+    /// take. Both follow from timing the denoiser on a small picture. The clock decides when the render ends and how
+    /// well its one picture is denoised, nothing else.
+    ///
+    /// `limit`: seconds of the render; `pixels`: of the picture; `parts`: finished parts besides the picture.
     ///
     /// # Errors
     /// The denoiser fails.
-    pub fn reserve(&mut self, seconds: f64, pixels: usize, parts: usize) -> Result<f64> {
+    pub fn reserve_time(&mut self, limit: f64, pixels: usize, parts: usize) -> Result<f64> {
         let has_qualities = self.finish.has_qualities();
-        let small = Size { width: TIMED, height: TIMED };
+        let small = Size { width: TIMED_SIDE, height: TIMED_SIDE };
         let mut time = |quality: Quality| -> Result<f64> {
-            // The first run loads what the second finds ready.
+            // The first run also loads the library's weights.
             self.finish.warm_up(small, quality)?;
             let clock = Clock::start();
             self.finish.warm_up(small, quality)?;
@@ -94,35 +94,35 @@ impl Ready {
         let mut picture = (Quality::Fast, fast);
         if has_qualities {
             for quality in [Quality::High, Quality::Balanced] {
-                let seconds_taken = time(quality)?;
-                if seconds_taken <= SHARE * seconds {
-                    picture = (quality, seconds_taken);
+                let seconds = time(quality)?;
+                if seconds <= MAX_DENOISING_SHARE * limit {
+                    picture = (quality, seconds);
                     break;
                 }
             }
         }
         self.finish.quality = picture.0;
-        // The picture, half of it for its error, and its parts.
-        Ok((2.0 * picture.1 + fast * parts as f64).min(MOST * seconds))
+        // The picture, the half of its iterations that gives its error, and its parts.
+        Ok((2.0 * picture.1 + fast * parts as f64).min(MAX_FINISH_SHARE * limit))
     }
 
-    /// Finishes a picture that is looked at for some seconds: the quickest way, without its error and its parts.
+    /// Finishes a preview: at the lowest quality, without its error and its parts.
     ///
     /// # Errors
     /// See [`Finish::apply`].
-    pub fn preview(&mut self, set: &mut LayerSet) -> Result<()> {
+    pub fn apply_to_preview(&mut self, set: &mut LayerSet) -> Result<()> {
         let quality = std::mem::replace(&mut self.finish.quality, Quality::Fast);
         let applied = self.finish.apply(set, |_| false);
         self.finish.quality = quality;
         applied.map(|_| ())
     }
 
-    /// The finish alone.
+    /// The finish, without the name of its network.
     pub fn into_finish(self) -> Finish {
         self.finish
     }
 
-    /// For people.
+    /// Network and denoiser, for messages.
     pub fn name(&self) -> String {
         let denoiser = self.finish.denoiser();
         match &self.model {
@@ -131,8 +131,8 @@ impl Ready {
         }
     }
 
-    /// What the header says of it.
-    pub fn facts(&self, account: &Finished) -> Value {
+    /// The value of the header's key `combined`.
+    pub fn header(&self, finished: &Finished) -> Value {
         let quality = match self.finish.quality {
             Quality::High => "high",
             Quality::Balanced => "balanced",
@@ -142,10 +142,10 @@ impl Ready {
             "denoiser": self.finish.denoiser(),
             "quality": quality,
             "model": self.model.as_ref().map(|network| &network.name),
-            "levels": account.combined,
+            "levels": finished.combined,
             "training": self.model.as_ref().map(|network| &network.training),
-            "clamped": {"below_zero": account.clamped.below_zero, "too_bright": account.clamped.too_bright},
-            "error_at_half": account.error.map(|error| error.noise.max(0.0).sqrt()),
+            "clamped": {"below_zero": finished.clamped.below_zero, "too_bright": finished.clamped.too_bright},
+            "error_at_half": finished.error.map(|error| error.noise.max(0.0).sqrt()),
         })
     }
 }

@@ -1,4 +1,4 @@
-//! From a scene file and wishes about it to a scene.
+//! The first step: reads a scene file and builds the scene, with the environment and the effects of the request.
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::math::Rgb;
@@ -10,84 +10,85 @@ use crate::scene::{Scene, environment_file, gltf, usd};
 use crate::stop::Stop;
 use std::path::PathBuf;
 
-/// Room for Embree's library, and for each of its threads: it ends the process where they get none. A bound found by
+/// Bytes for Embree's library, and for each of its threads: Embree ends the process if they get none. Bounds found by
 /// lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
-const START_BYTES: u64 = 256 << 20;
-const THREAD_BYTES: u64 = 16 << 20;
+const EMBREE_BYTES: u64 = 256 << 20;
+const EMBREE_BYTES_PER_THREAD: u64 = 16 << 20;
 
-/// Most radiance of an environment: sums of the light of many pixels have to be single precision.
+/// Largest radiance of an environment (W/(sr m^2)), so that sums over many pixels do not overflow single precision.
 const MAX_RADIANCE: f32 = 1e30;
 
-/// A scene file and how it is read.
-pub struct Order {
+/// A scene file, and how it is read.
+pub struct SceneRequest {
     /// The file.
     pub path: PathBuf,
-    /// Light from all around in place of the scene's own.
+    /// The environment that replaces the scene's own.
     pub environment: Option<Environment>,
-    /// Turn of the environment about the vertical (degrees).
+    /// Rotation of the environment about the vertical (degrees).
     pub rotation: Option<f64>,
     /// Factor on the environment's radiance.
     pub strength: Option<f64>,
-    /// What the file leaves open.
+    /// Choices that the file leaves open.
     pub options: gltf::ReadOptions,
-    /// Effects to do without.
+    /// Effects that are switched off.
     pub off: EffectSet,
 }
 
-/// Light from all around.
+/// An environment light.
 pub enum Environment {
-    /// One radiance from everywhere.
+    /// The same radiance from all directions.
     Color(Rgb),
     /// A latitude-longitude image in a file.
     File(PathBuf),
-    /// The same as texels: finite and not negative.
+    /// Texels of a latitude-longitude image: finite and not negative.
     Image(EnvironmentSource),
 }
 
-/// A scene as it was asked for.
+/// A scene that has been read and built.
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
-    /// What it was built without.
+    /// Effects that were removed from it.
     pub removed: Removed,
 }
 
-/// Reads and builds the scene, with the environment that is asked for, without the effects that are off.
+/// Reads and builds a scene. Embree builds with `threads` threads.
 ///
 /// # Errors
-/// The file or what it names, by place; an environment that is changed and is not there; `stop` asks for an end.
-pub fn load(order: &Order, threads: usize, stop: &Stop) -> Result<Loaded> {
-    check_memory(order, threads)?;
-    let description = match usd::is_stage(&order.path) {
-        true => usd::read(&order.path, &order.options, stop)?,
-        false => gltf::read(&order.path, &order.options)?,
+/// The file, or a file that it names, is malformed; the request changes an environment that the scene does not have;
+/// `stop` is set.
+pub fn load(request: &SceneRequest, threads: usize, stop: &Stop) -> Result<Loaded> {
+    check_memory(request, threads)?;
+    let description = match usd::is_stage(&request.path) {
+        true => usd::read(&request.path, &request.options, stop)?,
+        false => gltf::read(&request.path, &request.options)?,
     };
-    build(description, order, threads)
+    build(description, request, threads)
 }
 
-/// Like [`load`], from the bytes of a file that would stand at the order's path.
+/// Builds a scene from the bytes of a .glb file. `request.path` names it in messages.
 ///
 /// # Errors
-/// Those of [`load`].
-pub fn load_bytes(bytes: &[u8], order: &Order, threads: usize) -> Result<Loaded> {
-    check_memory(order, threads)?;
-    build(gltf::read_bytes(bytes, &order.path, &order.options)?, order, threads)
+/// Errors of [`load`].
+pub fn load_bytes(bytes: &[u8], request: &SceneRequest, threads: usize) -> Result<Loaded> {
+    check_memory(request, threads)?;
+    build(gltf::read_bytes(bytes, &request.path, &request.options)?, request, threads)
 }
 
-fn check_memory(order: &Order, threads: usize) -> Result<()> {
-    memory::require(START_BYTES + threads as u64 * THREAD_BYTES, "Embree and its threads")
-        .map_err(|e| e.within(order.path.display()).hint("give the program more memory, or fewer --threads"))
+fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
+    memory::require(EMBREE_BYTES + threads as u64 * EMBREE_BYTES_PER_THREAD, "Embree and its threads")
+        .map_err(|e| e.within(request.path.display()).hint("give the program more memory, or fewer --threads"))
 }
 
-fn build(mut description: Description, order: &Order, threads: usize) -> Result<Loaded> {
-    environment(&mut description, order)?;
-    let removed = switch::off(&mut description, order.off);
+fn build(mut description: Description, request: &SceneRequest, threads: usize) -> Result<Loaded> {
+    set_environment(&mut description, request)?;
+    let removed = switch::off(&mut description, request.off);
     Ok(Loaded { scene: Scene::build(description, threads)?, removed })
 }
 
-/// The environment that is asked for, in place of the scene's own.
-fn environment(description: &mut Description, order: &Order) -> Result<()> {
-    if let Some(choice) = &order.environment {
+/// Replaces and changes the environment as the request says.
+fn set_environment(description: &mut Description, request: &SceneRequest) -> Result<()> {
+    if let Some(choice) = &request.environment {
         let source = match choice {
             Environment::Color(color) => EnvironmentSource::Color(*color),
             Environment::File(path) => environment_file::read(path, &mut description.warnings)?,
@@ -97,7 +98,7 @@ fn environment(description: &mut Description, order: &Order) -> Result<()> {
         description.environment_hidden_from_camera = false;
         description.environment_unknown = false;
     }
-    set_turn_and_strength(description, order)?;
+    set_rotation_and_strength(description, request)?;
     let Some(environment) = &description.environment else { return Ok(()) };
     let brightest = match &environment.source {
         EnvironmentSource::Color(color) => color.max_element(),
@@ -107,22 +108,22 @@ fn environment(description: &mut Description, order: &Order) -> Result<()> {
         return Ok(());
     }
     let cause = format!("its environment is brighter than {MAX_RADIANCE:e} W/(sr m^2)");
-    Err(Error::new(ErrorKind::Scene, order.path.display(), cause).hint("lower --env or --env-strength"))
+    Err(Error::new(ErrorKind::Scene, request.path.display(), cause).hint("lower --env or --env-strength"))
 }
 
-/// A turn and a strength also act on the scene's own environment.
-fn set_turn_and_strength(description: &mut Description, order: &Order) -> Result<()> {
-    let given = [("--env-rotation", order.rotation), ("--env-strength", order.strength)];
+/// Sets rotation and strength, also of the scene's own environment.
+fn set_rotation_and_strength(description: &mut Description, request: &SceneRequest) -> Result<()> {
+    let given = [("--env-rotation", request.rotation), ("--env-strength", request.strength)];
     let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
     let Some(environment) = &mut description.environment else {
         let error =
-            Error::new(ErrorKind::Usage, order.path.display(), format!("{option}: the scene has no environment"));
+            Error::new(ErrorKind::Usage, request.path.display(), format!("{option}: the scene has no environment"));
         return Err(error.hint("give one with --env"));
     };
-    if let Some(degrees) = order.rotation {
+    if let Some(degrees) = request.rotation {
         environment.rotation_deg = degrees as f32;
     }
-    if let Some(strength) = order.strength {
+    if let Some(strength) = request.strength {
         environment.strength = strength as f32;
     }
     Ok(())

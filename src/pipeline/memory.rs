@@ -1,5 +1,6 @@
-//! Whether a render fits into memory, asked before it begins.
+//! Estimates the memory of a render before it begins, and refuses a render that does not fit.
 
+use super::layers;
 use crate::error::{Error, Result};
 use crate::estimator::PixelAccumulator;
 use crate::estimator::rule::{adaptive, chi_squared, local};
@@ -8,6 +9,7 @@ use crate::finish::{BYTES_PER_PIXEL, BYTES_PER_PIXEL_OF_PART, scratch};
 use crate::memory;
 use crate::photon;
 use crate::plan::Search;
+use crate::render::output::layer_shape;
 use crate::render::{
     BandwidthRule, MAX_TECHNIQUES, PHOTON_BYTES, Settings, WHOLE_TILE, bytes_per_whole_tile, photons_per_path,
     sample_bytes,
@@ -17,189 +19,221 @@ use crate::transport::{MergePhoton, Splat};
 use std::fmt::Display;
 use std::mem::size_of;
 
-/// Bytes per photon that carries what its weights are made of: those of an iteration as traced, joined, and sorted
-/// beside the map of the last one.
+/// Bytes per photon that carries the terms of its MIS weight: as traced, joined and sorted in this iteration, and in the
+/// map of the last iteration.
 const MERGED_BYTES: u64 = 5 * size_of::<MergePhoton>() as u64 + 32;
 
-/// Bytes per vertex of a light path that sends light to the film: lists grow to twice what they hold, and are sorted.
+/// Bytes per vertex of a light path that sends light to the film: lists grow to twice their length, and are sorted.
 const SPLAT_BYTES: u64 = 2 * size_of::<Splat>() as u64 + 8;
 
 /// Bytes per pixel of a technique's weighted and unweighted picture.
-const PER_TECHNIQUE: u64 = 24;
+const BYTES_PER_TECHNIQUE: u64 = 24;
 
-/// Bytes that a render holds at its end, when pixels and layers of so many channels are there together.
-fn needed(
-    [(width, height), whole]: [(u32, u32); 2],
-    (channels, groups): (usize, usize),
-    settings: &Settings,
-    per_light_path: f64,
-) -> u64 {
-    let pixels = u64::from(width) * u64::from(height);
-    let light_paths = 1.0 + f64::from(u8::from(settings.levels.two_paths));
-    let method = settings.method;
-    let gathered = (f64::from(settings.photons) * per_light_path * PHOTON_BYTES as f64) as u64;
-    let (merged, photons) = match (method.takes_photon_count(), method.has_bandwidths()) {
-        _ if method.has_one_map() => (0, settings.photon_memory.min(gathered)),
-        (true, _) => (0, gathered),
-        (false, true) => ((light_paths * per_light_path * MERGED_BYTES as f64) as u64, 0),
-        (false, false) => (0, 0),
-    };
-    // As many of the whole picture's light paths reach a window as have its pixels.
-    let connects = method.walks_whole_picture() || method.search() == Search::ConnectionsAndMerging;
-    let splats = if connects { (light_paths * per_light_path * SPLAT_BYTES as f64) as u64 } else { 0 };
-    let [across, down] = [whole.0, whole.1].map(|side| u64::from(side.div_ceil(WHOLE_TILE)));
-    let tiles = if method.walks_whole_picture() { across * down * bytes_per_whole_tile() } else { 0 };
-    // At most: few of the pictures are there in a closed scene, none of the deepest in an open one.
-    let pictures = if settings.techniques { MAX_TECHNIQUES as u64 * PER_TECHNIQUE } else { 0 };
-    // Bandwidths of their own, and counts.
+/// Channels of the layers that a finish with a network reads.
+const FINISH_CHANNELS: usize = 37;
+
+/// Bytes of a finish whatever the size of the picture: the library of the denoiser and its network. A bound found by
+/// lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
+const FINISH_BYTES: u64 = 192 << 20;
+
+/// Fewest light paths per iteration that a limit on memory may leave.
+const MIN_PHOTONS: u32 = 1000;
+
+/// The sizes that the memory of a render depends on, besides its settings.
+#[derive(Clone, Copy)]
+struct Extent {
+    /// Width and height of the window that is rendered (pixels).
+    film: (u32, u32),
+    /// Width and height of the whole picture (pixels).
+    whole: (u32, u32),
+    /// Channels of all layers.
+    channels: usize,
+    /// Light groups.
+    groups: usize,
+    /// Photons per light path.
+    photons_per_path: f64,
+}
+
+impl Extent {
+    fn new(View { scene, camera }: View<'_>, settings: &Settings, channels: usize) -> Extent {
+        let [film, whole] = camera.sizes();
+        let groups = scene.lights.groups().names.len();
+        Extent { film, whole, channels, groups, photons_per_path: photons_per_path(scene, camera, settings) }
+    }
+
+    /// Bytes at the end of a render, when its pixels and its layers exist together.
+    fn bytes(&self, settings: &Settings) -> u64 {
+        let [across, down] = [self.whole.0, self.whole.1].map(|side| u64::from(side.div_ceil(WHOLE_TILE)));
+        let walks_whole_picture = settings.method.walks_whole_picture();
+        let tiles = if walks_whole_picture { across * down * bytes_per_whole_tile() } else { 0 };
+        pixels(self.film) * self.bytes_per_pixel(settings) + self.bytes_of_map(settings) + tiles
+    }
+
+    /// Bytes of the photon map.
+    fn bytes_of_map(&self, settings: &Settings) -> u64 {
+        let bytes = (f64::from(settings.photons) * self.photons_per_path * PHOTON_BYTES as f64) as u64;
+        match settings.method {
+            method if method.has_one_map() => settings.photon_memory.min(bytes),
+            method if method.takes_photon_count() => bytes,
+            _ => 0,
+        }
+    }
+
+    /// Bytes of a pixel: sums, bandwidths, layers, and the light paths that methods without a number of photons send
+    /// for each pixel.
+    fn bytes_per_pixel(&self, settings: &Settings) -> u64 {
+        let method = settings.method;
+        let vertices = (1.0 + f64::from(u8::from(settings.levels.two_paths))) * self.photons_per_path;
+        let merges = method.has_bandwidths() && !method.takes_photon_count() && !method.has_one_map();
+        let merged = if merges { (vertices * MERGED_BYTES as f64) as u64 } else { 0 };
+        // A window receives as many of the whole picture's light paths as it has pixels.
+        let connects = method.walks_whole_picture() || method.search() == Search::ConnectionsAndMerging;
+        let splats = if connects { (vertices * SPLAT_BYTES as f64) as u64 } else { 0 };
+        // An upper bound: most scenes leave some of the techniques without a picture.
+        let techniques = if settings.techniques { MAX_TECHNIQUES as u64 * BYTES_PER_TECHNIQUE } else { 0 };
+        bytes_of_bandwidths(settings)
+            + techniques
+            + (PixelAccumulator::bytes(settings.levels.count, self.groups) + sample_bytes(settings)) as u64
+            + (self.channels * size_of::<f32>()) as u64
+            + merged
+            + splats
+    }
+}
+
+fn pixels((width, height): (u32, u32)) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// Bytes of a pixel's bandwidths and photon counts.
+fn bytes_of_bandwidths(settings: &Settings) -> u64 {
     let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
     let state = match settings.bandwidth_rule() {
         Some(BandwidthRule::ChiSquared) => {
-            // Guided, the largest weight as well.
+            // Guided light paths also need the largest weight of each cell's photons.
             size_of::<chi_squared::Bandwidth>() + (cells + usize::from(settings.guided)) * size_of::<u32>()
         }
         Some(BandwidthRule::Adaptive) => size_of::<adaptive::Bandwidth>(),
         Some(BandwidthRule::Local) => size_of::<local::Bandwidth>(),
         Some(BandwidthRule::Memoryless) | None => 0,
     };
-    let apart = if settings.has_channels() { 3 } else { 1 };
-    // At most: a scene may have photons of one kind alone. Twice, because an iteration that is given up takes them back.
-    let own = 2 * (settings.levels.count * apart * photon::Kind::ALL.len() * state) as u64;
-    let per_pixel = own
-        + pictures
-        + (PixelAccumulator::bytes(settings.levels.count, groups) + sample_bytes(settings)) as u64
-        + (channels * size_of::<f32>()) as u64
-        + merged
-        + splats;
-    pixels * per_pixel + photons + tiles
+    let channels = if settings.has_channels() { 3 } else { 1 };
+    // An upper bound: a scene may have photons of one kind only. Twice, for iterations that are discarded.
+    2 * (settings.levels.count * channels * photon::Kind::ALL.len() * state) as u64
 }
 
-/// What a finish takes whatever the picture: the library of the denoiser and its network. A bound found by lowering
-/// `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
-const FINISH_BYTES: u64 = 192 << 20;
-
-/// What a finish takes beside pixels and layers; the denoiser works in tiles where there is no more.
-fn finish_bytes((width, height): (u32, u32), groups: usize) -> u64 {
-    let pixels = u64::from(width) * u64::from(height);
-    // Parts by effect, and those of light groups and their caustics.
+/// Bytes of a finish besides pixels and layers; the denoiser works in tiles if memory is short.
+fn finish_bytes(size: (u32, u32), groups: usize) -> u64 {
+    let pixels = pixels(size);
+    // The parts by effect, and for each light group its part and its caustics.
     let parts = (film::part_names().count() + 2 * groups) as u64;
     FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
 }
 
-/// Fewer light paths than this make no picture: a cap below is refused.
-const LEAST_PHOTONS: u32 = 1000;
-
-/// A limit that is asked for, on what photons and pixels take.
+/// A limit on the memory of photons, pixels and layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cap {
+pub struct MemoryLimit {
     /// Bytes.
     pub bytes: u64,
 }
 
-impl Cap {
-    /// Settings that keep to it, and what they do without, if anything. Only photons can be fewer: those of an iteration
-    /// where they are counted, and the room of the one map of `pm`; pixels and layers take what they take.
-    ///
-    /// # Errors
-    /// Not even the least fits.
-    pub fn plan(
-        self,
-        View { scene, camera }: View<'_>,
-        settings: Settings,
-        channels: usize,
-    ) -> Result<(Settings, Option<String>)> {
-        let planes = (channels, scene.lights.groups().names.len());
-        let per_light_path = photons_per_path(scene, camera, &settings);
-        self.keep(camera.sizes(), settings, planes, per_light_path)
-    }
-
-    fn keep(
-        self,
-        sizes: [(u32, u32); 2],
-        settings: Settings,
-        planes: (usize, usize),
-        per_light_path: f64,
-    ) -> Result<(Settings, Option<String>)> {
-        let needs = |settings: &Settings| needed(sizes, planes, settings, per_light_path);
-        let whole = needs(&settings);
+impl MemoryLimit {
+    /// Settings that keep to the limit, and a warning of what they go without. Only the photons can shrink: the light
+    /// paths per iteration, or the one map of `pm`.
+    fn fit(self, extent: Extent, settings: Settings, method: &str) -> Result<(Settings, Option<String>)> {
+        let whole = extent.bytes(&settings);
         if whole <= self.bytes {
             return Ok((settings, None));
         }
         let mib = self.bytes >> 20;
-        let pixels = needs(&Settings { photons: 0, ..settings.clone() });
+        let pixels = extent.bytes(&Settings { photons: 0, ..settings.clone() });
         let left = self.bytes.saturating_sub(pixels);
-        let least = (f64::from(LEAST_PHOTONS) * per_light_path * PHOTON_BYTES as f64) as u64;
+        let bytes_per_light_path = extent.photons_per_path * PHOTON_BYTES as f64;
+        let least = (f64::from(MIN_PHOTONS) * bytes_per_light_path) as u64;
         if !settings.method.takes_photon_count() || left < least {
             let least = if settings.method.takes_photon_count() { pixels + least } else { whole };
-            let cause = format!(
-                "{} x {} pixels with --method {} need {} MiB at least, and --memory allows {mib}",
-                sizes[0].0,
-                sizes[0].1,
-                settings.method.name(),
-                least.div_ceil(1 << 20)
-            );
-            let fewer =
-                "use a smaller --width and --height, --crop, fewer --levels, another --method, or more --memory";
-            return Err(Error::usage(cause).hint(fewer));
+            return Err(self.refuse(extent.film, method, least));
         }
         if settings.method.has_one_map() {
-            let told = format!(
-                "--memory {mib}: the photon map has room for {} MiB instead of {}",
-                left >> 20,
-                settings.photon_memory >> 20
-            );
-            return Ok((Settings { photon_memory: left, ..settings }, Some(told)));
+            let all = settings.photon_memory >> 20;
+            let warning = format!("--memory {mib}: the photon map has room for {} MiB instead of {all}", left >> 20);
+            return Ok((Settings { photon_memory: left, ..settings }, Some(warning)));
         }
-        let photons = (left as f64 / (per_light_path * PHOTON_BYTES as f64)) as u32;
-        let told = format!("--memory {mib}: {photons} light paths an iteration instead of {}", settings.photons);
-        Ok((Settings { photons, ..settings }, Some(told)))
+        let photons = (left as f64 / bytes_per_light_path) as u32;
+        let warning = format!("--memory {mib}: {photons} light paths an iteration instead of {}", settings.photons);
+        Ok((Settings { photons, ..settings }, Some(warning)))
+    }
+
+    /// The error of a render that needs more than the limit.
+    fn refuse(self, (width, height): (u32, u32), method: &str, least: u64) -> Error {
+        let (least, mib) = (least.div_ceil(1 << 20), self.bytes >> 20);
+        let cause = format!(
+            "{width} x {height} pixels with --method {method} need {least} MiB at least, and --memory allows {mib}"
+        );
+        Error::usage(cause)
+            .hint("use a smaller --width and --height, --crop, fewer --levels, another --method, or more --memory")
     }
 }
 
-/// Checks that the picture and its photons fit into what the machine leaves, and the finish, if there is to be one.
-///
-/// # Errors
-/// They need more memory than there is.
-pub fn check(view: View<'_>, settings: &Settings, channels: usize, finishes: bool) -> Result<()> {
-    let View { scene, camera } = view;
-    let size = camera.size();
-    let groups = scene.lights.groups().names.len();
-    let needed = needed(camera.sizes(), (channels, groups), settings, photons_per_path(scene, camera, settings));
-    let needed = needed + if finishes { finish_bytes(size, groups) } else { 0 };
-    let paths = if settings.method.takes_photon_count() {
-        let each = if settings.method.has_one_map() { "" } else { " an iteration" };
-        format!(" and {} light paths{each}", settings.photons)
-    } else {
-        format!(" with --method {}", settings.method.name())
-    };
-    let method = settings.method;
-    let fewer = match (method.takes_photon_count(), method.has_levels()) {
-        (true, _) => "fewer --photons",
-        (false, true) => "fewer --levels",
-        (false, false) => "--crop for a part of the picture",
-    };
-    refuse(needed, format_args!("{} x {} pixels{paths}", size.0, size.1), fewer)
+/// A render whose memory is checked.
+#[derive(Clone, Copy)]
+pub(super) struct MemoryCheck<'a> {
+    /// Scene and camera.
+    pub view: View<'a>,
+    /// Value of `--method`, for messages.
+    pub method: &'a str,
+    /// Whether the picture is finished.
+    pub finishes: bool,
+    /// The user's limit.
+    pub limit: Option<MemoryLimit>,
 }
 
-/// Channels of the layers that the combiner reads.
-const COMBINED_CHANNELS: usize = 37;
+impl MemoryCheck<'_> {
+    /// Settings that keep to the user's limit, and a warning of what they go without.
+    ///
+    /// # Errors
+    /// The render does not fit into the limit, or into the memory of the machine.
+    pub fn fit(&self, settings: Settings) -> Result<(Settings, Option<String>)> {
+        let channels = layers::channels(&layer_shape(&settings, self.view.scene));
+        let extent = Extent::new(self.view, &settings, channels);
+        let (settings, warning) = match self.limit {
+            Some(limit) => limit.fit(extent, settings, self.method)?,
+            None => (settings, None),
+        };
+        let finish = if self.finishes { finish_bytes(extent.film, extent.groups) } else { 0 };
+        let needed = extent.bytes(&settings) + finish;
+        let (paths, remedy) = self.describe(&settings);
+        let (width, height) = extent.film;
+        require(needed, format_args!("{width} x {height} pixels{paths}"), remedy)?;
+        Ok((settings, warning))
+    }
 
-/// Checks that several renders fit, that go on at the same time.
+    /// The light paths or the method of a render, and how it takes less memory.
+    fn describe(&self, settings: &Settings) -> (String, &'static str) {
+        let method = settings.method;
+        let is_chosen = method.name() == self.method;
+        if is_chosen && method.takes_photon_count() {
+            let each = if method.has_one_map() { "" } else { " an iteration" };
+            return (format!(" and {} light paths{each}", settings.photons), "fewer --photons");
+        }
+        let remedy =
+            if is_chosen && method.has_levels() { "fewer --levels" } else { "--crop for a part of the picture" };
+        (format!(" with --method {}", self.method), remedy)
+    }
+}
+
+/// Checks that several renders fit into memory at the same time.
 ///
 /// # Errors
-/// They need more memory than there is.
+/// They do not fit.
 pub fn check_all<'a>(view: View<'_>, all: impl Iterator<Item = &'a Settings>) -> Result<()> {
-    let View { scene, camera } = view;
-    let [(width, height), whole] = camera.sizes();
-    let each = |settings| {
-        needed([(width, height), whole], (COMBINED_CHANNELS, 0), settings, photons_per_path(scene, camera, settings))
-    };
-    refuse(all.map(each).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
+    let (width, height) = view.camera.size();
+    let bytes = |settings| Extent { groups: 0, ..Extent::new(view, settings, FINISH_CHANNELS) }.bytes(settings);
+    require(all.map(bytes).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
 }
 
-/// The error where `what` need more memory than there is.
-fn refuse(needed: u64, what: impl Display, fewer: &str) -> Result<()> {
-    memory::require(needed, what).map_err(|error| error.hint(format!("use a smaller --width and --height, or {fewer}")))
+/// Errors: `what` needs more bytes than there are.
+fn require(bytes: u64, what: impl Display, remedy: &str) -> Result<()> {
+    memory::require(bytes, what).map_err(|error| error.hint(format!("use a smaller --width and --height, or {remedy}")))
 }
 
 #[cfg(test)]
@@ -207,9 +241,12 @@ mod tests {
     use super::*;
     use crate::render::Method;
 
-    /// A finish takes what its pixels and parts take; the denoiser works in tiles.
+    fn extent(film: (u32, u32), whole: (u32, u32)) -> Extent {
+        Extent { film, whole, channels: 93, groups: 0, photons_per_path: 2.5 }
+    }
+
     #[test]
-    fn a_finish_is_counted_by_its_pixels_and_parts() {
+    fn a_finish_needs_memory_for_its_pixels_and_parts() {
         let [small, large] = [(320, 180), (1920, 1080)].map(|size| finish_bytes(size, 0) - FINISH_BYTES);
         assert!(large > 20 * small && large < 36 * small, "{small} {large}");
         assert_eq!(finish_bytes((320, 180), 3), finish_bytes((320, 180), 0) + 320 * 180 * 6 * BYTES_PER_PIXEL_OF_PART);
@@ -220,19 +257,20 @@ mod tests {
     fn the_largest_picture_does_not_overflow() {
         let none = Settings { photons: 0, ..Settings::default() };
         let some = Settings { photons: 1000, ..Settings::default() };
-        let one = needed([(1, 1); 2], (93, 0), &none, 2.5);
+        let one = extent((1, 1), (1, 1)).bytes(&none);
         assert!(one > 93 * 4);
-        assert_eq!(needed([(1 << 16, 1 << 16); 2], (93, 0), &some, 2.5), (one << 32) + 2500 * PHOTON_BYTES);
+        let largest = (1 << 16, 1 << 16);
+        assert_eq!(extent(largest, largest).bytes(&some), (one << 32) + 2500 * PHOTON_BYTES);
         let merged = Settings { method: Method::Vcm, ..none };
-        assert!(needed([(1, 1); 2], (93, 0), &merged, 2.5) > one);
+        assert!(extent((1, 1), (1, 1)).bytes(&merged) > one);
     }
 
-    /// Of a window, the methods that walk the light paths of the whole picture keep lists for all its tiles.
+    /// Methods that walk the light paths of the whole picture keep lists for all its tiles, also to render a window.
     #[test]
-    fn windows_are_counted_with_their_whole_picture() {
+    fn windows_need_memory_for_their_whole_picture() {
         let bytes = |method: Method, whole: u32| {
             let settings = Settings { method, photons: 1000, ..Settings::default() };
-            needed([(64, 64), (whole, whole)], (93, 0), &settings, 2.5)
+            extent((64, 64), (whole, whole)).bytes(&settings)
         };
         for method in [Method::Light, Method::Bdpt] {
             assert_eq!(bytes(method, 1 << 14) - bytes(method, 64), ((1 << 20) - 16) * bytes_per_whole_tile());
@@ -242,29 +280,31 @@ mod tests {
         }
     }
 
-    /// What is planned under a cap needs no more than it, and little less; what cannot be is refused with what it takes.
+    /// Settings that keep to a limit need at most the limit, and little less. A render that cannot keep to it is refused
+    /// with the memory that it needs.
     #[test]
-    fn plans_keep_to_their_cap() {
-        let sizes = [(64, 64); 2];
-        let plan = |bytes, settings: &Settings| Cap { bytes }.keep(sizes, settings.clone(), (93, 0), 2.5);
+    fn settings_keep_to_a_limit() {
+        let extent = extent((64, 64), (64, 64));
+        let fit =
+            |bytes, settings: &Settings| MemoryLimit { bytes }.fit(extent, settings.clone(), settings.method.name());
         for method in [Method::Sppm, Method::Cppm, Method::Pm, Method::Vcm] {
             let photon_memory = u64::MAX;
-            let asked = Settings { method, photons: 5_000_000, photon_memory, ..Settings::default() };
-            let needs = |settings: &Settings| needed(sizes, (93, 0), settings, 2.5);
-            let whole = needs(&asked);
-            let (kept, told) = plan(whole, &asked).expect("it fits");
-            assert_eq!((kept.photons, kept.photon_memory, told), (asked.photons, photon_memory, None));
-            let none = plan(1 << 20, &asked).expect_err("nothing fits");
+            let request = Settings { method, photons: 5_000_000, photon_memory, ..Settings::default() };
+            let needs = |settings: &Settings| extent.bytes(settings);
+            let whole = needs(&request);
+            let (kept, warning) = fit(whole, &request).expect("it fits");
+            assert_eq!((kept.photons, kept.photon_memory, warning), (request.photons, photon_memory, None));
+            let none = fit(1 << 20, &request).expect_err("nothing fits");
             assert!(none.cause.ends_with(" MiB at least, and --memory allows 1"), "{none}");
             assert_eq!(none.exit_code(), 2);
-            let half = plan(whole / 2, &asked);
+            let half = fit(whole / 2, &request);
             if method == Method::Vcm {
                 assert!(half.is_err(), "no photon of it can be left out");
                 continue;
             }
-            let (kept, told) = half.expect("some fit");
+            let (kept, warning) = half.expect("some fit");
             assert!(needs(&kept) <= whole / 2 && needs(&kept) > whole / 2 - 1000, "{}", method.name());
-            assert!(told.is_some_and(|told| told.contains(" instead of ")));
+            assert!(warning.is_some_and(|warning| warning.contains(" instead of ")));
         }
     }
 }

@@ -1,46 +1,52 @@
-//! Shards of one render, joined to the picture that one machine would have made.
+//! Merges the shards of one render to the picture that one machine would have rendered.
 
 use super::checkpoint::difference;
-use super::deliver::{Delivery, Writing, deliver};
-use super::facts::Facts;
-use super::finish;
+use super::deliver::{Contents, Delivery, deliver};
+use super::facts::SceneFacts;
+use super::finish::{self, FinishRequest};
 use super::layers;
-use super::shard::Open;
+use super::shard::ShardFile;
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
-use crate::film::Naming;
+use crate::film::{Naming, Selection};
 use crate::render::{Rendered, Settings, ShardResult};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// Options that shards of one render may have had otherwise: what each is written as, and which one it is.
-const FREE: [&str; 6] = ["shard", "layers", "exr-naming", "compression", "scene", "path"];
+/// Options, by their names in the header, that may differ between the shards of one render.
+const FREE_OPTIONS: [&str; 6] = ["shard", "layers", "exr-naming", "compression", "scene", "path"];
 
-/// Shards that belong together, in their order.
+/// The shards of one render, ordered by their index.
 pub struct Shards {
-    files: Vec<(PathBuf, Open)>,
+    files: Vec<(PathBuf, ShardFile)>,
+    /// Indices of missing shards.
     missing: Vec<u64>,
 }
 
-/// How the picture is made of them.
-pub struct Order {
-    /// How the estimate becomes the picture; `None`: not at all.
-    pub finish: Option<finish::Order>,
-    /// Layers that are wanted, see [`super::Order::layers`].
-    pub layers: String,
-    /// Names of channels, which the attributes of cryptomattes repeat.
+/// How shards are merged.
+pub struct MergeRequest {
+    /// How the picture is finished; `None`: it stays the unfinished estimate.
+    pub finish: Option<FinishRequest>,
+    /// Layers to deliver.
+    pub layers: Selection,
+    /// Style of channel names, which the cryptomatte attributes repeat.
     pub naming: Naming,
-    /// Leave clocks and the number of threads out of the header.
+    /// Whether the header leaves out clocks and the number of threads.
     pub reproducible: bool,
 }
 
-/// What happens next.
-pub enum Step<'a> {
-    /// The pixels of a file are read.
-    Reads(&'a Path),
-    /// All are joined; what the finish is to do without, if anything.
-    Finishes(&'a Rendered, Option<&'a Error>),
+/// An event of a merge.
+pub enum MergeEvent<'a> {
+    /// The pixel sums of a file are about to be read.
+    Reading(&'a Path),
+    /// The pixel sums are merged, and the finish is about to begin.
+    Finishing {
+        /// The merged render.
+        rendered: &'a Rendered,
+        /// Why the preferred denoiser is missing, if the built-in one takes its place.
+        missing: Option<&'a Error>,
+    },
 }
 
 /// Whether a file is a shard of a render.
@@ -48,63 +54,58 @@ pub enum Step<'a> {
 /// # Errors
 /// The file cannot be read, or is damaged.
 pub fn is_shard(path: &Path) -> Result<bool> {
-    Ok(Open::of(path)?.is_some())
+    Ok(ShardFile::open(path)?.is_some())
 }
 
 impl Shards {
-    /// Opens shards, and makes sure that they are all of one render, each there once and, unless `partial`, none
-    /// missing. Their pixels are not read yet.
+    /// Opens shards, without reading their pixels. Checks that all are of one render, that each occurs once, and,
+    /// unless `partial`, that none is missing.
     ///
     /// # Errors
-    /// The file that does not belong there and why, or the number of the one that is missing.
+    /// The file that does not belong to the others and why, or the number of a missing shard.
     pub fn open(paths: &[PathBuf], partial: bool) -> Result<Shards> {
-        let mut files: Vec<(PathBuf, Open)> = Vec::new();
+        let mut files: Vec<(PathBuf, ShardFile)> = Vec::new();
         for path in paths {
-            let Some(open) = Open::of(path)? else {
+            let Some(file) = ShardFile::open(path)? else {
                 let error = Error::new(ErrorKind::Usage, path.display(), "is no shard of a render");
                 return Err(error.hint("merge files that --shard I/N made, or whole renders of other seeds alone"));
             };
             if let Some((first, whole)) = files.first() {
-                check((first, whole), (path, &open))?;
+                check_same_render((first, whole), (path, &file))?;
             }
-            files.push((path.clone(), open));
+            files.push((path.clone(), file));
         }
-        files.sort_by_key(|(_, open)| open.part.settings.shard.index);
-        let index = |open: &Open| open.part.settings.shard.index;
-        if let Some([(a, open), (b, _)]) = files.windows(2).find(|pair| index(&pair[0].1) == index(&pair[1].1)) {
-            let cause = format!("is shard {} as {} is", index(open), a.display());
+        let index = |file: &ShardFile| file.part.settings.shard.index;
+        files.sort_by_key(|(_, file)| index(file));
+        if let Some([(a, file), (b, _)]) = files.windows(2).find(|pair| index(&pair[0].1) == index(&pair[1].1)) {
+            let cause = format!("is shard {} as {} is", index(file), a.display());
             return Err(Error::new(ErrorKind::Usage, b.display(), cause).hint("name each shard once"));
         }
-        let count = files.first().map_or(0, |(_, open)| open.part.settings.shard.count);
+        let count = files.first().map_or(0, |(_, file)| file.part.settings.shard.count);
         let missing: Vec<u64> =
-            (0..count).filter(|shard| files.binary_search_by_key(shard, |(_, open)| index(open)).is_err()).collect();
-        if let (false, Some(shard)) = (partial, missing.first()) {
-            let cause = match missing.len() {
-                1 => format!("shard {shard} of {count} is missing"),
-                many => format!("shard {shard} of {count} is missing, and {} more", many - 1),
-            };
-            let hint = format!("render it with --shard {shard}/{count}, or give --partial to do without");
-            return Err(Error::usage(cause).hint(hint));
+            (0..count).filter(|shard| files.binary_search_by_key(shard, |(_, file)| index(file)).is_err()).collect();
+        if !partial {
+            check_complete(&missing, count)?;
         }
         Ok(Shards { files, missing })
     }
 
-    /// What was asked for, but for the shard; null without any.
+    /// Options of the render, without the shard; null if there are no shards.
     pub fn arguments(&self) -> Value {
-        let mut arguments = self.files.first().map_or(Value::Null, |(_, open)| open.head.arguments.clone());
+        let mut arguments = self.files.first().map_or(Value::Null, |(_, file)| file.head.arguments.clone());
         arguments["shard"] = Value::Null;
         arguments
     }
 
-    /// What is known of the scene; `None` without any.
-    pub fn facts(&self) -> Option<&Facts> {
-        self.files.first().map(|(_, open)| &open.facts)
+    /// Facts of the scene; `None` if there are no shards.
+    pub fn facts(&self) -> Option<&SceneFacts> {
+        self.files.first().map(|(_, file)| &file.facts)
     }
 
-    /// What is to be known of them before they are joined: shards that ended early, and those that are missing.
+    /// Warnings of shards that ended early, and of missing shards.
     pub fn warnings(&self) -> Vec<String> {
-        let early = self.files.iter().filter_map(|(path, open)| {
-            let ShardResult { settings, stats, .. } = &open.part;
+        let early = self.files.iter().filter_map(|(path, file)| {
+            let ShardResult { settings, stats, .. } = &file.part;
             let iterations = stats.iterations;
             let total = settings.iterations_of_shard().filter(|total| iterations < *total)?;
             Some(format!("{}: ended after {iterations} of {total} iterations", path.display()))
@@ -114,79 +115,93 @@ impl Shards {
         early.chain(missing).collect()
     }
 
-    /// Joins them. At most the pixels of one picture and some blocks of another are in memory at once.
+    /// Merges the shards and delivers the picture. Memory holds the pixels of one picture and some blocks of another.
     ///
     /// # Errors
-    /// A file is damaged; a layer that is not there is asked for; the finish cannot be opened.
-    pub fn merge(self, order: &Order, mut watch: impl FnMut(Step<'_>)) -> Result<Delivery> {
+    /// A file is damaged; the render has no such layer; the finish cannot be opened.
+    pub fn merge(self, request: &MergeRequest, mut observe: impl FnMut(MergeEvent<'_>)) -> Result<Delivery> {
         let arguments = self.arguments();
         let none = || Error::usage("there is no shard");
         let Shards { mut files, missing } = self;
-        let parts: Vec<ShardResult> = files.iter().map(|(_, open)| open.part.clone()).collect();
+        let parts: Vec<ShardResult> = files.iter().map(|(_, file)| file.part.clone()).collect();
         let part = ShardResult::merge(&parts).ok_or_else(none)?;
         let (facts, plan) =
-            files.first().map(|(_, open)| (open.facts.clone(), open.head.plan.clone())).ok_or_else(none)?;
-        let selection = layers::selection(&order.layers, &facts.shape, order.finish.is_some())?;
-        let levels = part.settings.levels.count;
-        let mut ready = order.finish.as_ref().map(|finish| finish::open(finish, Some(levels))).transpose()?;
+            files.first().map(|(_, file)| (file.facts.clone(), file.head.plan.clone())).ok_or_else(none)?;
+        layers::check(&request.layers, &facts.shape, request.finish.is_some())?;
+        let levels = Some(part.settings.levels.count);
+        let mut finish = request.finish.as_ref().map(|wanted| finish::open(wanted, levels)).transpose()?;
         let mut pixels: Vec<PixelAccumulator> = Vec::new();
-        for (path, open) in &mut files {
-            watch(Step::Reads(path));
-            join(path, open, &mut pixels)?;
+        for (path, file) in &mut files {
+            observe(MergeEvent::Reading(path));
+            add_pixels(path, file, &mut pixels)?;
         }
         let names: Vec<String> = files.iter().map(|(path, _)| path.display().to_string()).collect();
         let mut more = Map::new();
-        if !(order.reproducible && missing.is_empty()) {
+        if !(request.reproducible && missing.is_empty()) {
             more.insert("merged".into(), json!({"shards": names, "missing": missing}));
         }
-        let writing = Writing {
+        let MergeRequest { layers: selection, naming, reproducible, .. } = request;
+        let contents = Contents {
             facts: &facts,
-            selection: &selection,
-            naming: order.naming,
+            selection,
+            naming: *naming,
             plan: &plan,
             arguments: &arguments,
-            reproducible: order.reproducible,
+            reproducible: *reproducible,
             more,
+            is_shard: false,
         };
         let rendered = part.with_pixels(pixels);
-        watch(Step::Finishes(&rendered, ready.as_ref().and_then(|ready| ready.missing.as_ref())));
-        deliver(writing, rendered, (ready.as_mut(), None), false).map(|(delivery, _)| delivery)
+        let missing = finish.as_ref().and_then(|finish| finish.missing.as_ref());
+        observe(MergeEvent::Finishing { rendered: &rendered, missing });
+        deliver(contents, rendered, finish.as_mut(), None).map(|(delivery, _)| delivery)
     }
 }
 
-/// Adds the pixels of a file to those of the others.
-fn join(path: &Path, open: &mut Open, pixels: &mut Vec<PixelAccumulator>) -> Result<()> {
+/// Errors: shards are missing.
+fn check_complete(missing: &[u64], count: u64) -> Result<()> {
+    let Some(shard) = missing.first() else { return Ok(()) };
+    let cause = match missing.len() {
+        1 => format!("shard {shard} of {count} is missing"),
+        many => format!("shard {shard} of {count} is missing, and {} more", many - 1),
+    };
+    let hint = format!("render it with --shard {shard}/{count}, or give --partial to do without");
+    Err(Error::usage(cause).hint(hint))
+}
+
+/// Adds the pixel sums of a file to the sums of the files before.
+fn add_pixels(path: &Path, file: &mut ShardFile, pixels: &mut Vec<PixelAccumulator>) -> Result<()> {
     let first = pixels.is_empty();
     let mut at = 0;
-    open.pixels(path, |block| {
+    file.pixels(path, |block| {
         let count = block.len();
         if first {
             pixels.extend(block);
         } else {
-            let own = pixels[at..at + count].par_iter_mut().with_min_len(256);
-            own.zip(block).for_each(|(own, other)| own.join(other));
+            let sums = pixels[at..at + count].par_iter_mut().with_min_len(256);
+            sums.zip(block).for_each(|(sum, other)| sum.join(other));
         }
         at += count;
     })
 }
 
-/// Whether two shards are of one render.
-fn check((first, whole): (&Path, &Open), (path, open): (&Path, &Open)) -> Result<()> {
+/// Errors: the second shard is not of the render of the first.
+fn check_same_render((first, whole): (&Path, &ShardFile), (path, file): (&Path, &ShardFile)) -> Result<()> {
     let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
     let first = first.display();
-    if open.head.scene != whole.head.scene {
+    if file.head.scene != whole.head.scene {
         return Err(error(format!("is of another scene than {first}")).hint("merge shards of one render"));
     }
-    if let Some((key, there, here)) = difference(&whole.head.arguments, &open.head.arguments, &FREE) {
+    if let Some((key, there, here)) = difference(&whole.head.arguments, &file.head.arguments, &FREE_OPTIONS) {
         let cause = format!("was rendered with another --{key} than {first}: {here} here, {there} there");
         return Err(error(cause).hint("merge shards of one render"));
     }
-    let of = |part: &ShardResult| {
+    let identity = |part: &ShardResult| {
         let Settings { shard, method, levels, .. } = part.settings;
         (part.size, shard.count, method, levels)
     };
-    if of(&open.part) != of(&whole.part) || open.head.candidate != whole.head.candidate {
-        let [here, there] = [open, whole].map(|of| {
+    if identity(&file.part) != identity(&whole.part) || file.head.candidate != whole.head.candidate {
+        let [here, there] = [file, whole].map(|of| {
             let ShardResult { settings, size: (width, height), .. } = &of.part;
             format!("one of {} shards by {} at {width} x {height}", settings.shard.count, settings.method.name())
         });

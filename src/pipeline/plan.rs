@@ -1,30 +1,40 @@
-//! The plan of a render, with what a pilot has measured.
+//! The fourth step: the plan of a render, with the figures that the pilots have estimated.
 
+use super::check::check_picture;
+use super::choose::{Chosen, choose};
+use super::layers;
+use super::load::Loaded;
+use super::memory::MemoryCheck;
+use super::request::{PictureRequest, Request};
+use crate::camera::Camera;
 use crate::choose::{Choice, PilotResult};
+use crate::error::Result;
 use crate::plan::switch::Removed;
 use crate::plan::{self, Plan, Switches};
-use crate::render::Method;
-use crate::scene::View;
+use crate::render::Settings;
+use crate::render::output::layer_shape;
+use crate::scene::{Scene, View};
+use std::path::Path;
 
-/// What decides what a plan says.
+/// What a plan depends on besides the scene.
 #[derive(Clone, Copy)]
-pub struct Asked<'a> {
-    /// What auto has chosen.
-    pub choice: Option<&'a Choice>,
-    /// Longest light path in segments.
+pub struct PlanInput<'a> {
+    /// The method, and how it was chosen.
+    pub chosen: &'a Chosen,
+    /// Longest light path in segments; `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Effects that are switched.
+    /// Effects that are switched on or off.
     pub switches: Switches,
 }
 
-/// The plan of a render by a method, of a scene that was built without what is `removed`.
-pub fn plan(asked: &Asked<'_>, method: Method, View { scene, camera }: View<'_>, removed: &Removed) -> Plan {
-    let Asked { choice, max_depth, switches } = *asked;
-    let method = choice.map_or(method, |choice| choice.candidate.method);
-    let because = choice.map_or("asked for".into(), why);
+/// The plan of a render of a scene that was built without the effects in `removed`.
+pub fn plan(PlanInput { chosen, max_depth, switches }: PlanInput<'_>, view: View<'_>, removed: &Removed) -> Plan {
+    let choice = chosen.choice.as_ref();
+    let method = chosen.settings.method;
+    let because = choice.map_or("asked for".into(), reason);
     let search = choice.map_or(method.search(), |choice| choice.settings.search());
-    let told = plan::PlanRequest { method: method.name(), because: &because, search, max_depth, switches, removed };
-    let mut plan = Plan::new(scene, camera, &told);
+    let request = plan::PlanRequest { method: method.name(), because: &because, search, max_depth, switches, removed };
+    let mut plan = Plan::new(view.scene, view.camera, &request);
     for weight in choice.iter().flat_map(|choice| &choice.weights) {
         let effect = &mut plan.effects[weight.effect as usize];
         if effect.present {
@@ -38,8 +48,77 @@ pub fn plan(asked: &Asked<'_>, method: Method, View { scene, camera }: View<'_>,
     plan
 }
 
-/// Why auto has chosen what it has.
-pub fn why(choice: &Choice) -> String {
+/// A picture with its method and its plan, not rendered.
+pub struct PlannedPicture {
+    /// The camera, of the size that is rendered.
+    pub camera: Camera,
+    /// The settings, and how they were chosen.
+    pub chosen: Chosen,
+    /// The plan, with the warnings of the scene in front.
+    pub plan: Plan,
+}
+
+/// Checks, chooses and plans a picture as a render does, without rendering it. `path`: where the scene was read from.
+///
+/// # Errors
+/// Errors of [`check_picture`].
+pub fn plan_picture(
+    mut picture: PictureRequest<'_>,
+    path: &Path,
+    loaded: &Loaded,
+    stop: impl Fn() -> bool,
+) -> Result<PlannedPicture> {
+    let Loaded { scene, removed } = loaded;
+    let checked = check_picture(&picture, path, scene)?;
+    let view = View::new(scene, &checked.camera);
+    let chosen = choose(&mut picture.method, checked.settings, view, |_| true, stop);
+    let PictureRequest { max_depth, switches, .. } = picture;
+    let mut plan = plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
+    plan.warnings.splice(0..0, scene.warnings.iter().cloned());
+    Ok(PlannedPicture { camera: checked.camera, chosen, plan })
+}
+
+/// A render with its plan, whose settings fit into memory.
+pub(super) struct Planned {
+    /// The settings.
+    pub settings: Settings,
+    /// The plan, without the warnings of the scene.
+    pub plan: Plan,
+}
+
+/// Fits a render into memory and plans it.
+///
+/// # Errors
+/// The render does not fit.
+pub(super) fn plan_render(
+    request: &Request<'_>,
+    chosen: &Chosen,
+    view: View<'_>,
+    removed: &Removed,
+) -> Result<Planned> {
+    let (method, finishes) = (chosen.settings.method.name(), request.finish.is_some());
+    let memory = MemoryCheck { view, method, finishes, limit: request.memory };
+    let (settings, less_memory) = memory.fit(chosen.settings.clone())?;
+    let PictureRequest { max_depth, switches, .. } = request.picture;
+    let mut plan = plan(PlanInput { chosen, max_depth, switches }, view, removed);
+    let shape = layer_shape(&settings, view.scene);
+    let black = layers::black(&request.layers, &shape, finishes);
+    plan.warnings.extend(less_memory);
+    plan.warnings.extend(warn_ungrouped_lights(view.scene, &settings));
+    plan.warnings.extend(black.iter().map(|name| format!("layer \"{name}\" is black: the render has no such light")));
+    Ok(Planned { settings, plan })
+}
+
+/// A warning if the scene has light groups and the method does not separate the light of groups.
+fn warn_ungrouped_lights(scene: &Scene, settings: &Settings) -> Option<String> {
+    let groups = scene.lights.groups().names.len();
+    let lost = groups > 0 && layer_shape(settings, scene).groups.is_empty();
+    let name = settings.method.name();
+    lost.then(|| format!("its {groups} light groups have no layers: --method {name} does not tell lights apart (auto, path, light, bdpt, bpm and vcm do)"))
+}
+
+/// The reason for the choice of `auto`, for people.
+pub fn reason(choice: &Choice) -> String {
     let because = choice.reason.map(|because| format!(", for {because}")).unwrap_or_default();
     let Some(trial) = choice.chosen_pilot() else { return format!("auto: {}{because}", choice.candidate.name()) };
     let mut others: Vec<&PilotResult> =
@@ -47,7 +126,7 @@ pub fn why(choice: &Choice) -> String {
     others.sort_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
     let error = |trial: &PilotResult| match trial.squared_error {
         squared if squared.is_infinite() => "nothing seen".into(),
-        // Below what the pilot's own noise can tell.
+        // Smaller than the noise of the pilot resolves.
         squared if squared == f64::MIN_POSITIVE => "too little to tell".into(),
         _ => percent(trial.error()),
     };
@@ -61,7 +140,7 @@ pub fn why(choice: &Choice) -> String {
     )
 }
 
-/// A share for people: two digits, `%` included.
+/// A share as a percentage with two significant digits, such as `3.1 %`.
 pub fn percent(x: f64) -> String {
     let p = 100.0 * x;
     if p >= 10.0 {

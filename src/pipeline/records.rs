@@ -1,34 +1,34 @@
-//! A file of records: bytes that say whether they are whole.
+//! Records: compressed blocks of bytes with a hash that reveals damage.
 //!
-//! A record is its length packed (four bytes, little endian), the BLAKE3 hash of what is packed, and the bytes packed by
-//! LZ4, whose first four are their length unpacked. A record of no bytes ends the file, so that one that was cut off is
-//! known.
+//! A record holds the length of its compressed bytes (four bytes, little endian), their BLAKE3 hash, and the bytes in the
+//! format of LZ4, which begin with their uncompressed length (four bytes). A record of length zero ends the file, so that
+//! a truncated file is recognised.
 
 use rayon::prelude::*;
 use std::io::{self, Read, Write};
 
-/// Most bytes of a record, packed or not: no file can ask for more memory than it has bytes for.
-const MOST: usize = 1 << 30;
-/// LZ4 packs no better.
-const RATIO: usize = 256;
+/// Most bytes of a record, compressed or not: limits the memory that a damaged file can demand.
+const MAX_BYTES: usize = 1 << 30;
+/// Largest compression ratio of LZ4.
+const MAX_RATIO: usize = 256;
 
-/// A record ready to be written.
+/// A compressed record.
 pub struct Record {
     hash: blake3::Hash,
     packed: Vec<u8>,
 }
 
 impl Record {
-    /// Packs some bytes.
+    /// Compresses bytes to a record.
     pub fn new(bytes: &[u8]) -> Record {
         let packed = lz4_flex::compress_prepend_size(bytes);
         Record { hash: blake3::hash(&packed), packed }
     }
 
-    /// Writes it.
+    /// Writes the record.
     ///
     /// # Errors
-    /// The file takes no more, or the record is too large.
+    /// The file cannot be written, or the record is too large.
     pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let length = u32::try_from(self.packed.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
         out.write_all(&length.to_le_bytes())?;
@@ -36,10 +36,10 @@ impl Record {
         out.write_all(&self.packed)
     }
 
-    /// Reads the next one; `None` at the end. It is not looked into.
+    /// Reads the next record without checking it; `None` at the end of the file.
     ///
     /// # Errors
-    /// The file cannot be read, ends too early or is damaged.
+    /// The file cannot be read, or is truncated.
     pub fn read(file: &mut impl Read) -> io::Result<Option<Record>> {
         let mut length = [0; 4];
         file.read_exact(&mut length)?;
@@ -57,35 +57,37 @@ impl Record {
         Ok(Some(Record { hash: hash.into(), packed }))
     }
 
-    /// Its bytes.
+    /// Checks the record and decompresses its bytes.
     ///
     /// # Errors
-    /// It is damaged.
+    /// The record is damaged.
     pub fn unpack(&self) -> io::Result<Vec<u8>> {
         let damaged = || io::Error::from(io::ErrorKind::InvalidData);
         let (length, _) = self.packed.split_first_chunk().ok_or_else(damaged)?;
         let length = u32::from_le_bytes(*length) as usize;
-        if blake3::hash(&self.packed) != self.hash || length > MOST.min(self.packed.len().saturating_mul(RATIO)) {
+        if blake3::hash(&self.packed) != self.hash
+            || length > MAX_BYTES.min(self.packed.len().saturating_mul(MAX_RATIO))
+        {
             return Err(damaged());
         }
         lz4_flex::decompress_size_prepended(&self.packed).map_err(|_| damaged())
     }
 }
 
-/// The record that ends a file.
+/// Writes the record that ends a file.
 ///
 /// # Errors
-/// The file takes no more.
-pub fn end(out: &mut impl Write) -> io::Result<()> {
+/// The file cannot be written.
+pub fn write_end(out: &mut impl Write) -> io::Result<()> {
     out.write_all(&[0; 4])
 }
 
-/// Writes things in blocks of so many, each a record, packed by all threads.
+/// Writes values as records of `block` values each, compressed by all threads.
 ///
 /// # Errors
-/// The file takes no more.
-pub fn write_blocks<T: serde::Serialize + Sync>(out: &mut impl Write, things: &[T], block: usize) -> io::Result<()> {
-    for batch in things.chunks(block * batch()) {
+/// The file cannot be written.
+pub fn write_blocks<T: serde::Serialize + Sync>(out: &mut impl Write, values: &[T], block: usize) -> io::Result<()> {
+    for batch in values.chunks(block * records_per_batch()) {
         let records: Vec<Record> = batch
             .par_chunks(block)
             .map(|block| postcard::to_allocvec(block).map(|bytes| Record::new(&bytes)).map_err(io::Error::other))
@@ -95,10 +97,11 @@ pub fn write_blocks<T: serde::Serialize + Sync>(out: &mut impl Write, things: &[
     Ok(())
 }
 
-/// Reads such blocks up to the end of the file, unpacked by all threads; `each` gets them in order.
+/// Reads the records of [`write_blocks`] up to the end of the file, decompressed by all threads. `each` receives the
+/// blocks in order.
 ///
 /// # Errors
-/// The file cannot be read or is damaged, and those of `each`.
+/// The file cannot be read or is damaged; errors of `each`.
 pub fn read_blocks<T: serde::de::DeserializeOwned + Send>(
     file: &mut impl Read,
     mut each: impl FnMut(Vec<T>) -> io::Result<()>,
@@ -106,7 +109,7 @@ pub fn read_blocks<T: serde::de::DeserializeOwned + Send>(
     let mut ended = false;
     while !ended {
         let mut records = Vec::new();
-        while records.len() < batch() && !ended {
+        while records.len() < records_per_batch() && !ended {
             match Record::read(file)? {
                 Some(record) => records.push(record),
                 None => ended = true,
@@ -121,8 +124,8 @@ pub fn read_blocks<T: serde::de::DeserializeOwned + Send>(
     Ok(())
 }
 
-/// Blocks in memory at once.
-fn batch() -> usize {
+/// Records in memory at the same time.
+fn records_per_batch() -> usize {
     2 * rayon::current_num_threads()
 }
 
@@ -130,10 +133,10 @@ fn batch() -> usize {
 mod tests {
     use super::*;
 
-    fn file(things: &[u64]) -> Vec<u8> {
+    fn file(values: &[u64]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        write_blocks(&mut bytes, things, 10).expect("memory");
-        end(&mut bytes).expect("memory");
+        write_blocks(&mut bytes, values, 10).expect("memory");
+        write_end(&mut bytes).expect("memory");
         bytes
     }
 
@@ -147,10 +150,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_again_and_every_bit_and_every_byte_is_missed() {
-        let things: Vec<u64> = (0..95).map(|i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
-        let bytes = file(&things);
-        assert_eq!(read(&bytes).expect("whole"), things);
+    fn records_are_read_as_written_and_reveal_damage_and_truncation() {
+        let values: Vec<u64> = (0..95).map(|i: u64| i.wrapping_mul(0x9e37_79b9_7f4a_7c15)).collect();
+        let bytes = file(&values);
+        assert_eq!(read(&bytes).expect("whole"), values);
         assert_eq!(read(&file(&[])).expect("empty"), Vec::<u64>::new());
         for at in 0..bytes.len() {
             assert!(read(&bytes[..at]).is_err(), "cut off at {at}");

@@ -1,59 +1,67 @@
-//! When a render is saved.
+//! Saves the checkpoints of a render, on time and at the end.
 
-use super::Watch;
-use super::checkpoint::{self, Head, Saving};
+use super::checkpoint::{self, Head};
+use super::observer::{Event, Observer};
+use super::request::Saving;
 use crate::error::{Error, ErrorKind, Result};
 use crate::render::{Clock, Session, StopReason, TimeSpent};
 use std::path::PathBuf;
 
-/// Saves a render every so often.
+/// Saves the checkpoints of one render.
 pub(super) struct Saver<'a> {
     saving: &'a Saving,
     head: Head,
     clock: Clock,
-    /// When it is due (seconds).
+    /// Time of the next save (seconds).
     next: f64,
-    /// It has failed, and said so.
+    /// Whether the last save failed, which has been reported.
     failed: bool,
-    /// The file is ours.
+    /// Whether the file is a checkpoint of this render.
     written: bool,
 }
 
 impl<'a> Saver<'a> {
-    /// `written`: the file is there already, for the render goes on from it.
+    /// `written`: whether the render continues from this file.
     pub fn new(saving: &'a Saving, head: Head, written: bool) -> Saver<'a> {
         Saver { saving, head, clock: Clock::start(), next: saving.every, failed: false, written }
     }
 
-    /// Saves the state if that is due; its time is the render's.
-    pub fn save_if_due(&mut self, session: &mut Session<'_>, watch: &mut dyn Watch) {
+    /// Saves the state if a save is due. The time of the save counts as time of the render.
+    pub fn save_if_due(&mut self, session: &mut Session<'_>, observer: &mut dyn Observer) -> Result<()> {
         if self.clock.seconds() < self.next {
-            return;
+            return Ok(());
         }
         let mut spent = TimeSpent::default();
-        spent.measure(|| self.save(session, watch));
+        let saved = spent.measure(|| self.save(session, observer));
         session.add_time(spent);
         self.next = self.clock.seconds() + self.saving.every;
+        saved
     }
 
-    /// After the last iteration: saves what was interrupted or is to be kept. Returns the file of a render that is
-    /// done, which is no longer needed once the picture is written.
-    pub fn finish(mut self, session: &Session<'_>, stop: StopReason, watch: &mut dyn Watch) -> Option<PathBuf> {
+    /// After the last iteration: saves the state of an interrupted render, or of one whose checkpoint the user keeps.
+    /// Returns the checkpoint that is no longer needed once the picture is written.
+    pub fn save_at_end(
+        mut self,
+        session: &Session<'_>,
+        stop: StopReason,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<PathBuf>> {
         self.head.finished = stop != StopReason::Interrupted;
         if self.saving.keep || !self.head.finished {
-            self.save(session, watch);
-            return None;
+            self.save(session, observer)?;
+            return Ok(None);
         }
-        self.written.then(|| self.saving.path.clone())
+        Ok(self.written.then(|| self.saving.path.clone()))
     }
 
-    fn save(&mut self, session: &Session<'_>, watch: &mut dyn Watch) {
+    /// Saves the state. A failure is reported once until a save succeeds again.
+    fn save(&mut self, session: &Session<'_>, observer: &mut dyn Observer) -> Result<()> {
         match self.write(session) {
             Ok(()) => (self.written, self.failed) = (true, false),
-            // Said once as long as it lasts.
-            Err(error) if !std::mem::replace(&mut self.failed, true) => watch.unsaved(&error),
+            Err(error) if !std::mem::replace(&mut self.failed, true) => observer.event(Event::SaveFailed(&error))?,
             Err(_) => {}
         }
+        Ok(())
     }
 
     fn write(&self, session: &Session<'_>) -> Result<()> {

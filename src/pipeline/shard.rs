@@ -1,12 +1,12 @@
-//! What the file of a shard holds behind its picture: the sums of its pixels, from which all shards together make the
-//! picture that one machine would have made, to the last bit.
+//! The pixel sums that the EXR of a shard holds behind its picture. The sums of all shards together give the picture that
+//! one machine would have rendered, to the last bit.
 //!
-//! Programs that read OpenEXR find a picture by its table of offsets and do not see what follows. Behind it come
-//! [`records`]: a JSON object, what else is known, and the pixels in blocks, both as postcard packs them. The last
-//! sixteen bytes are the length of all that (little endian) and a mark.
+//! Programs that read OpenEXR find a picture by its table of offsets and ignore the bytes that follow. Behind the picture
+//! come [`records`]: the [`Head`] as JSON, then [`SceneFacts`] and [`ShardResult`], then the pixels in blocks, in the format of
+//! postcard. The last sixteen bytes are the length of all this (little endian) and [`MARK`].
 
-use super::checkpoint::{BLOCK, Head};
-use super::facts::Facts;
+use super::checkpoint::{Head, PIXELS_PER_RECORD};
+use super::facts::SceneFacts;
 use super::records::{self, Record};
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::PixelAccumulator;
@@ -15,61 +15,61 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// The last bytes of a file with such a tail.
+/// The last bytes of a shard's file.
 pub const MARK: &[u8; 8] = b"caustqS4";
-/// The length and the mark.
-const END: i64 = 16;
+/// Bytes of the length and the mark.
+const END_BYTES: i64 = 16;
 
-/// What stands behind the picture.
-pub struct Tail {
-    /// What render it belongs to.
+/// The pixel sums of a shard, and all that a merge needs besides.
+pub struct ShardSums {
+    /// The identity of the render.
     pub head: Head,
-    /// What is known of its scene.
-    pub facts: Facts,
-    /// What it is besides its pixels.
+    /// Facts of the scene.
+    pub facts: SceneFacts,
+    /// Settings, size and counts of the shard.
     pub part: ShardResult,
-    /// Its pixels.
+    /// The pixel sums.
     pub pixels: Vec<PixelAccumulator>,
 }
 
-impl Tail {
-    /// Writes it behind all that has been written.
+impl ShardSums {
+    /// Writes the sums behind the picture.
     ///
     /// # Errors
-    /// The file takes no more.
+    /// The file cannot be written.
     pub fn write(&self, file: &mut (impl Write + Seek)) -> io::Result<()> {
         let start = file.stream_position()?;
         let head = serde_json::to_vec(&self.head)?;
         let rest = postcard::to_allocvec(&(&self.facts, &self.part)).map_err(io::Error::other)?;
         Record::new(&head).write(file)?;
         Record::new(&rest).write(file)?;
-        records::write_blocks(file, &self.pixels, BLOCK)?;
-        records::end(file)?;
-        let length = file.stream_position()? - start + END as u64;
+        records::write_blocks(file, &self.pixels, PIXELS_PER_RECORD)?;
+        records::write_end(file)?;
+        let length = file.stream_position()? - start + END_BYTES as u64;
         file.write_all(&length.to_le_bytes())?;
         file.write_all(MARK)
     }
 }
 
-/// A tail that is open, its pixels not read yet.
-pub struct Open {
-    /// What render it belongs to.
+/// The open file of a shard, whose pixel sums have not been read yet.
+pub struct ShardFile {
+    /// The identity of the render.
     pub head: Head,
-    /// What is known of its scene.
-    pub facts: Facts,
-    /// What it is besides its pixels.
+    /// Facts of the scene.
+    pub facts: SceneFacts,
+    /// Settings, size and counts of the shard.
     pub part: ShardResult,
     file: BufReader<File>,
 }
 
-impl Open {
-    /// Finds the tail of a file; `None` where it has none.
+impl ShardFile {
+    /// Opens a file; `None` if the file is no shard.
     ///
     /// # Errors
-    /// The file cannot be read, is damaged, or is of another version of the program.
-    pub fn of(path: &Path) -> Result<Option<Open>> {
+    /// The file cannot be read, is damaged, or was written by another version of the program.
+    pub fn open(path: &Path) -> Result<Option<ShardFile>> {
         let mut file = BufReader::new(File::open(path).map_err(|cause| Error::io(path, &cause))?);
-        let Some(start) = find(&mut file).map_err(|cause| Error::io(path, &cause))? else { return Ok(None) };
+        let Some(start) = find_records(&mut file).map_err(|cause| Error::io(path, &cause))? else { return Ok(None) };
         file.seek(start).map_err(|cause| Error::io(path, &cause))?;
         let mut record = || Record::read(&mut file).ok().flatten().and_then(|record| record.unpack().ok());
         let damaged = || damaged(path);
@@ -80,19 +80,19 @@ impl Open {
                 Error::new(ErrorKind::Usage, path.display(), cause).hint("merge it with the version that made it")
             );
         }
-        let (facts, part): (Facts, ShardResult) =
+        let (facts, part): (SceneFacts, ShardResult) =
             postcard::from_bytes(&record().ok_or_else(damaged)?).map_err(|_| damaged())?;
         let arguments = head.arguments.is_object();
         if !(part.is_sound() && facts.are_sound(&part) && arguments) {
             return Err(damaged());
         }
-        Ok(Some(Open { head, facts, part, file }))
+        Ok(Some(ShardFile { head, facts, part, file }))
     }
 
-    /// Reads the pixels, block by block in their order.
+    /// Reads the pixel sums in blocks, row by row from the top.
     ///
     /// # Errors
-    /// The file is damaged, or there are not as many as the picture has.
+    /// The file is damaged, or the number of its pixels is not that of its picture.
     pub fn pixels(&mut self, path: &Path, mut each: impl FnMut(Vec<PixelAccumulator>)) -> Result<()> {
         let (levels, groups) = (self.part.settings.levels.count, self.facts.shape.groups.len());
         let (width, height) = self.part.size;
@@ -113,13 +113,13 @@ fn damaged(path: &Path) -> Error {
     Error::new(ErrorKind::Io, path.display(), "the sums behind its picture are damaged").hint("render this shard again")
 }
 
-/// Where the tail begins, if there is one.
-fn find(file: &mut (impl Read + Seek)) -> io::Result<Option<SeekFrom>> {
+/// Position of the first record, if the file is a shard.
+fn find_records(file: &mut (impl Read + Seek)) -> io::Result<Option<SeekFrom>> {
     let length = file.seek(SeekFrom::End(0))?;
-    if length < END as u64 {
+    if length < END_BYTES as u64 {
         return Ok(None);
     }
-    file.seek(SeekFrom::End(-END))?;
+    file.seek(SeekFrom::End(-END_BYTES))?;
     let (mut tail, mut mark) = ([0; 8], [0; 8]);
     file.read_exact(&mut tail)?;
     file.read_exact(&mut mark)?;

@@ -1,10 +1,10 @@
-//! Where a picture's error is: the worst tiles, and the objects and kinds of light that hold most of it.
+//! Where the error of a picture is: the worst tiles, and the objects and kinds of light with the largest shares.
 //!
-//! A pixel's squared error is shared among the kinds of light by their noise, which their layers show as what differs
-//! from pixel to pixel where reflectance is divided out; edges of objects count as noise, so shares are about right and no
-//! more. An object is who covers most of a pixel.
+//! The squared error of a pixel is divided among the kinds of light in proportion to their noise. The noise of a kind is
+//! the difference between neighbouring pixels of its layer, divided by the albedo. Edges of objects count as noise, so the
+//! shares are approximate. A pixel belongs to the object that covers at least half of it.
 
-use super::layers::Named;
+use super::layers::SceneNames;
 use crate::estimator::PixelAccumulator;
 use crate::film::{LayerSet, Picture};
 use crate::finish::Windows;
@@ -13,16 +13,16 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Tiles along the longer side of a picture.
-const TILES: usize = 20;
-/// Tiles that are told.
-const TOLD: usize = 10;
-/// Objects and lights that are told hold at least this share.
-const LEAST: f64 = 0.05;
-/// Pixels to each side of the windows in which noise is measured.
+const TILES_ALONG: usize = 20;
+/// Most tiles that are reported.
+const MAX_TILES: usize = 10;
+/// Smallest share of the squared error for which an object and a kind of light are reported.
+const MIN_SHARE: f64 = 0.05;
+/// Pixels to each side of the windows in which noise is averaged.
 const REACH: usize = 7;
-/// Added to reflectance before it is divided out.
-const DARK: f32 = 0.01;
-/// Layers, and what they are to people.
+/// Added to the albedo before the division, so that black surfaces do not divide by zero.
+const ALBEDO_OFFSET: f32 = 0.01;
+/// Layers of the kinds of light, with their names for people.
 const LIGHTS: [(&str, &str); 4] = [
     ("Direct", "direct light"),
     ("Indirect", "indirect light"),
@@ -30,76 +30,76 @@ const LIGHTS: [(&str, &str); 4] = [
     ("Volume", "light from media"),
 ];
 
-/// What every pixel shows.
+/// The object and the material that each pixel shows.
 #[derive(Default)]
-pub(super) struct Seen {
-    /// Object and material that cover most of it.
+pub(super) struct Visible {
+    /// Indices of object and material; `None` if no object covers half of the pixel.
     of_pixels: Vec<Option<[u32; 2]>>,
     objects: Vec<String>,
     materials: Vec<String>,
 }
 
-impl Seen {
-    pub fn of(pixels: &[PixelAccumulator], named: &Named) -> Seen {
+impl Visible {
+    pub fn of(pixels: &[PixelAccumulator], names: &SceneNames) -> Visible {
         let most = |pixel: &PixelAccumulator| {
             let (instance, fraction) = pixel.coverage.fractions().next()?;
-            named.instances.get(instance as usize).copied().filter(|_| fraction >= 0.5)
+            names.instances.get(instance as usize).copied().filter(|_| fraction >= 0.5)
         };
-        Seen {
+        Visible {
             of_pixels: pixels.par_iter().map(most).collect(),
-            objects: named.objects.clone(),
-            materials: named.materials.clone(),
+            objects: names.objects.clone(),
+            materials: names.materials.clone(),
         }
     }
 
-    /// Object and material by name.
+    /// Names of an object and a material.
     fn names(&self, of: [u32; 2]) -> Option<[&str; 2]> {
         Some([self.objects.get(of[0] as usize)?, self.materials.get(of[1] as usize)?])
     }
 }
 
-/// Something that holds a share of the squared error.
+/// An object and a kind of light with their share of the squared error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Place {
-    /// Its share, 0 to 1.
+    /// Share of the squared error, 0 to 1.
     pub share: f64,
-    /// The object seen there; empty where it is none.
+    /// Name of the object; empty if there is none.
     pub object: String,
-    /// Its material.
+    /// Name of the material.
     pub material: String,
     /// The kind of light.
     pub light: String,
 }
 
-/// A tile.
+/// A tile of the picture with its share of the squared error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tile {
     /// Left edge in pixels.
     pub x: usize,
-    /// Upper edge.
+    /// Top edge in pixels.
     pub y: usize,
-    /// Pixels.
+    /// Width in pixels.
     pub width: usize,
-    /// Pixels.
+    /// Height in pixels.
     pub height: usize,
-    /// Its share of the squared error, and who holds most of that.
+    /// Share of the tile, with the object and the kind of light that hold most of it.
     #[serde(flatten)]
     pub place: Place,
 }
 
-/// Where the error is.
+/// Where the error of a picture is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Worst {
-    /// Objects and lights, the worst first.
+    /// Objects and kinds of light, the largest share first.
     pub by: Vec<Place>,
-    /// Tiles, the worst first.
+    /// Tiles, the largest share first.
     pub tiles: Vec<Tile>,
 }
 
-/// An object with its material, if there is one, and the index of a kind of light.
+/// Indices of object and material, if there is an object, and the index of a kind of light.
 type Holder = (Option<[u32; 2]>, usize);
 
-/// Squared errors of holders.
+/// Squared errors by holder.
 #[derive(Clone, Default)]
 struct Holders(BTreeMap<Holder, f64>);
 
@@ -110,7 +110,7 @@ impl Holders {
         }
     }
 
-    /// The worst first.
+    /// Holders, the largest squared error first.
     fn sorted(&self) -> Vec<(Holder, f64)> {
         let mut sorted: Vec<_> = self.0.iter().map(|(key, squared)| (*key, *squared)).collect();
         sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -119,13 +119,14 @@ impl Holders {
 }
 
 impl Worst {
-    /// By squared errors, what makes them relative, the layers of the kinds of light, and what is seen.
-    pub(super) fn of(squared: &Picture, weight: &[f32], set: &LayerSet, seen: &Seen) -> Worst {
+    /// `squared`: squared errors of the pixels; `weight`: factors that make them relative; `set`: the layers of the kinds
+    /// of light.
+    pub(super) fn of(squared: &Picture, weight: &[f32], set: &LayerSet, visible: &Visible) -> Worst {
         let relative: Vec<f64> =
             squared.iter().zip(weight).map(|(rgb, weight)| f64::from(rgb.iter().sum::<f32>() / 3.0 * weight)).collect();
-        let (size, shares) = (set.size(), shares(set));
-        let object = |i: usize| seen.of_pixels.get(i).copied().flatten();
-        let side = size.width.max(size.height).div_ceil(TILES).max(1);
+        let (size, shares) = (set.size(), noise_shares(set));
+        let object = |i: usize| visible.of_pixels.get(i).copied().flatten();
+        let side = size.width.max(size.height).div_ceil(TILES_ALONG).max(1);
         let across = size.width.div_ceil(side);
         let mut tiles = vec![(0.0, Holders::default()); across * size.height.div_ceil(side)];
         let mut whole = Holders::default();
@@ -137,7 +138,7 @@ impl Worst {
         }
         let total = relative.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let place = |(of, light): Holder, squared: f64| {
-            let [object, material] = of.and_then(|of| seen.names(of)).unwrap_or_default().map(String::from);
+            let [object, material] = of.and_then(|of| visible.names(of)).unwrap_or_default().map(String::from);
             Place { share: squared / total, object, material, light: LIGHTS[light].1.into() }
         };
         let by = whole.sorted().into_iter().map(|(key, squared)| place(key, squared));
@@ -151,17 +152,17 @@ impl Worst {
             Some(Tile { x, y, width, height, place: place(key, *sum) })
         };
         Worst {
-            by: by.filter(|place| place.share >= LEAST).collect(),
-            tiles: order.into_iter().filter_map(tile).take(TOLD).collect(),
+            by: by.filter(|place| place.share >= MIN_SHARE).collect(),
+            tiles: order.into_iter().filter_map(tile).take(MAX_TILES).collect(),
         }
     }
 }
 
-/// The share of each kind of light in a pixel's noise.
-fn shares(set: &LayerSet) -> Vec<[f32; LIGHTS.len()]> {
+/// Share of each kind of light in the noise of each pixel.
+fn noise_shares(set: &LayerSet) -> Vec<[f32; LIGHTS.len()]> {
     let size = set.size();
     let albedo = set.picture("albedo");
-    let albedo = |i: usize, c: usize| albedo.as_ref().map_or(1.0, |albedo| albedo[i][c].max(0.0) + DARK);
+    let albedo = |i: usize, c: usize| albedo.as_ref().map_or(1.0, |albedo| albedo[i][c].max(0.0) + ALBEDO_OFFSET);
     let all = vec![true; size.pixels()];
     let noise = |(layer, _): (&str, &str)| -> Option<Vec<[f32; 1]>> {
         let light = set.picture(layer)?;
@@ -186,9 +187,9 @@ mod tests {
     use super::*;
     use crate::film::{Layer, Size};
 
-    /// A lamp of glass on the left with rough caustics, a floor on the right with a little rough direct light.
+    /// A glass lamp on the left has noisy caustics, a floor on the right has slightly noisy direct light.
     #[test]
-    fn objects_and_lights_are_named_by_what_they_hold() {
+    fn objects_and_lights_are_reported_by_their_shares() {
         let (width, height) = (80, 40);
         let left = |i: usize| i % width < width / 2;
         let rough = |i: usize, of: f32| of * if (i * 7919) % 13 < 6 { 1.0 } else { 0.5 };
@@ -201,28 +202,28 @@ mod tests {
         ] {
             set.push(Layer::interleaved(name, "RGB", values)).expect("sizes agree");
         }
-        let seen = Seen {
+        let visible = Visible {
             of_pixels: (0..width * height).map(|i| Some(if left(i) { [0, 1] } else { [1, 0] })).collect(),
             objects: vec!["Lamp".into(), "Floor".into()],
             materials: vec!["Wood".into(), "Glass".into()],
         };
         let squared = light(&|i| if left(i) { 4.0 } else { 1.0 });
-        let worst = Worst::of(&squared, &vec![1.0; width * height], &set, &seen);
+        let worst = Worst::of(&squared, &vec![1.0; width * height], &set, &visible);
         let first = &worst.by[0];
         assert_eq!([&*first.object, &*first.material, &*first.light], ["Lamp", "Glass", "caustics"]);
         assert!((first.share - 0.8).abs() < 0.03, "{}", first.share);
         let second = &worst.by[1];
         assert_eq!([&*second.object, &*second.light], ["Floor", "direct light"]);
-        assert_eq!(worst.tiles.len(), TOLD);
+        assert_eq!(worst.tiles.len(), MAX_TILES);
         let tile = &worst.tiles[0];
         assert!((tile.width, tile.height) == (4, 4) && tile.x < 40 && tile.place.object == "Lamp");
         assert!((tile.place.share - 4.0 * 16.0 / (2.5 * 3200.0)).abs() < 1e-6, "{}", tile.place.share);
     }
 
     #[test]
-    fn a_picture_without_light_has_no_worst() {
+    fn a_black_picture_has_no_worst_places() {
         let set = LayerSet::new(3, 2);
-        let worst = Worst::of(&Picture::filled(set.size(), [0.0; 3]), &[1.0; 6], &set, &Seen::default());
+        let worst = Worst::of(&Picture::filled(set.size(), [0.0; 3]), &[1.0; 6], &set, &Visible::default());
         assert_eq!(worst, Worst { by: vec![], tiles: vec![] });
     }
 }

@@ -48,8 +48,10 @@ fn arguments(all: &[Value], plan: bool) -> Vec<&Value> {
 #[test]
 fn what_files_may_say_of_a_render() {
     let all = options();
-    let names: Vec<&Value> =
-        all.iter().filter(|option| option["stage"] == true).map(|option| &option["name"]).collect();
+    let of_stages = all.iter().filter(|option| option["stage"] == true);
+    let names: Vec<&Value> = of_stages
+        .flat_map(|option| std::iter::once(&option["name"]).chain(option["aliases"].as_array().into_iter().flatten()))
+        .collect();
     let shown = |option: &&Value| {
         ["method", "seed", "iterations", "time", "target_error", "denoise"].contains(&text(option, "name"))
     };
@@ -179,7 +181,7 @@ fn wrapped(words: &str, width: usize) -> Vec<String> {
 /// The help of an option with arguments of Python in place of options, without more than its first paragraph.
 fn python_help(all: &[Value], option: &Value) -> String {
     if option["python"] == "finish" {
-        return "False: no finish at all, the picture is the estimator's own, at the usual single bandwidth".into();
+        return "False: the picture is not finished, it is the method's own estimate, at one bandwidth".into();
     }
     let mut help = text(option, "help").split("\n\n").next().unwrap_or_default().to_string();
     let mut names: Vec<(&str, &str)> = all.iter().map(|other| (text(other, "option"), text(other, "python"))).collect();

@@ -251,34 +251,34 @@ fn inputs_are_not_overwritten() {
 /// A shard whose sums are not those that its facts promise, its checks put right, is damaged, and ends no program.
 #[test]
 fn forged_shards_are_refused() {
-    use caustique::pipeline::shard::{Open, Tail};
+    use caustique::pipeline::shard::{ShardFile, ShardSums};
     let folder = Folder::new();
     let names = shards(&folder, "--method vcm --iterations 4 --no-combine", 2);
-    let open = || Open::of(&folder.path(&names[0])).expect("it can be read").expect("it is a shard");
-    let forged = |change: &dyn Fn(&mut Tail)| {
+    let open = || ShardFile::open(&folder.path(&names[0])).expect("it can be read").expect("it is a shard");
+    let forged = |change: &dyn Fn(&mut ShardSums)| {
         let mut pixels = Vec::new();
         let mut whole = open();
         whole.pixels(&folder.path(&names[0]), |block| pixels.extend(block)).expect("it is whole");
-        let Open { head, facts, part, .. } = whole;
-        let mut tail = Tail { head, facts, part, pixels };
-        change(&mut tail);
+        let ShardFile { head, facts, part, .. } = whole;
+        let mut sums = ShardSums { head, facts, part, pixels };
+        change(&mut sums);
         let mut file = std::fs::File::create(folder.path("forged.exr")).expect("it can be made");
-        tail.write(&mut file).expect("it can be written");
+        sums.write(&mut file).expect("it can be written");
         folder.run("merge --partial forged.exr -o merged.exr --no-combine --layers all")
     };
     let few = || caustique::estimator::PixelAccumulator::new(1, 0, [0.0; 2]);
     let many = || caustique::estimator::PixelAccumulator::new(5, 0, [0.0; 2]).with_groups(3);
-    let changes: [&dyn Fn(&mut Tail); 10] = [
-        &|tail| tail.facts.shape.levels = 67,
-        &|tail| tail.facts.shape.own = 66,
-        &|tail| tail.facts.shape.compared = 9,
-        &|tail| tail.facts.shape.groups = vec!["a".into()],
-        &|tail| tail.facts.frame.corner = [u32::MAX, 7],
-        &|tail| tail.facts.frame.display = [0, 0],
-        &|tail| tail.head.arguments = serde_json::json!([1]),
-        &|tail| tail.pixels[7] = few(),
-        &|tail| tail.pixels[7] = many(),
-        &|tail| tail.part.settings.levels.count = 3,
+    let changes: [&dyn Fn(&mut ShardSums); 10] = [
+        &|sums| sums.facts.shape.levels = 67,
+        &|sums| sums.facts.shape.own = 66,
+        &|sums| sums.facts.shape.compared = 9,
+        &|sums| sums.facts.shape.groups = vec!["a".into()],
+        &|sums| sums.facts.frame.corner = [u32::MAX, 7],
+        &|sums| sums.facts.frame.display = [0, 0],
+        &|sums| sums.head.arguments = serde_json::json!([1]),
+        &|sums| sums.pixels[7] = few(),
+        &|sums| sums.pixels[7] = many(),
+        &|sums| sums.part.settings.levels.count = 3,
     ];
     for (i, change) in changes.into_iter().enumerate() {
         let outcome = forged(change);

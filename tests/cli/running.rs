@@ -247,7 +247,7 @@ fn a_combiner_that_fails_leaves_the_render() {
     let outcome = folder.run(&format!("{render} --layers beauty --model odd.onnx --progress none"));
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
     assert!(outcome.stderr.contains("odd.onnx"), "{}", outcome.stderr);
-    let hint = "hint: the unfinished render is in out.exr: 'caustique combine out.exr -o OUT.exr' finishes it\n";
+    let hint = "hint: the unfinished render is in out.exr: 'caustique finish out.exr -o OUT.exr' finishes it\n";
     assert!(outcome.stderr.ends_with(hint), "{}", outcome.stderr);
     assert_eq!(folder.files(), ["odd.onnx", "out.exr", "out.png"]);
     let (set, header) = folder.read("out.exr");

@@ -337,7 +337,7 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     assert!(help.stdout.contains("--model <compact|FILE.onnx>"));
     let commands = folder.run("--help").stdout;
     for (command, listed) in
-        [("combine", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", true), ("merge", true)]
+        [("finish", true), ("compare", true), ("converge", true), ("doctor", true), ("plan", true), ("merge", true)]
     {
         assert_eq!(commands.contains(&format!("\n  {command} ")), listed, "{command}");
     }
@@ -376,6 +376,8 @@ fn the_order_of_the_help() {
     for option in ["--time", "--iterations", "--target-error", "--width", "--output", "--png", "--method", "--env"] {
         assert!(short.contains(option), "{option}");
     }
+    let lines = short.lines().count();
+    assert!(lines <= 80, "the short help has {lines} lines");
 }
 
 #[test]
@@ -523,12 +525,14 @@ fn scattering_media_and_the_methods_that_refuse_them() {
 fn a_picture_larger_than_memory() {
     let folder = Folder::new();
     let outcome = folder.run("render scene.glb -o out.exr --width 32768 --height 32768 --no-combine");
-    let error = "32768 x 32768 pixels and 100000 light paths an iteration need about ";
+    let error = "32768 x 32768 pixels with --method auto need about ";
     assert!(outcome.stderr.starts_with(error), "{}", outcome.stderr);
-    let hint = "hint: use a smaller --width and --height, or fewer --photons\n";
+    let hint = "hint: use a smaller --width and --height, or --crop for a part of the picture\n";
     assert!(outcome.stderr.ends_with(hint), "{}", outcome.stderr);
     assert_eq!((outcome.code, folder.files()), (Some(1), vec![]));
-    for (method, remedy) in [("path", "--crop for a part of the picture"), ("vcm", "fewer --levels")] {
+    let remedies =
+        [("path", "--crop for a part of the picture"), ("vcm", "fewer --levels"), ("sppm", "fewer --photons")];
+    for (method, remedy) in remedies {
         let outcome = folder
             .run(&format!("render scene.glb -o out.exr --width 32768 --height 32768 --no-combine --method {method}"));
         let hint = format!("hint: use a smaller --width and --height, or {remedy}\n");

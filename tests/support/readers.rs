@@ -5,9 +5,9 @@ use super::promises;
 use caustique::combine::network::Network;
 use caustique::combine::{Model, Runtime};
 use caustique::error::Result;
-use caustique::film::Naming;
+use caustique::film::{Naming, Selection};
 use caustique::image::exr;
-use caustique::pipeline::merge::{Order, Shards};
+use caustique::pipeline::merge::{MergeRequest, Shards};
 use caustique::pipeline::{checkpoint, records, shard};
 use caustique::render::{Candidate, Control, Method, RenderInput, Session, Settings, StopReason, render};
 use caustique::scene::description::EnvironmentSource;
@@ -184,7 +184,7 @@ fn sealed(bytes: &[u8]) -> Vec<u8> {
     for content in [&bytes[..head], state, pixels] {
         records::Record::new(content).write(&mut out).expect("memory");
     }
-    records::end(&mut out).expect("memory");
+    records::write_end(&mut out).expect("memory");
     out
 }
 
@@ -212,10 +212,10 @@ fn shard(bytes: &[u8], folder: &Path) {
         let length = bytes.len() as u64 + 16;
         bytes.write_all(&length.to_le_bytes()).and_then(|()| bytes.write_all(shard::MARK)).expect("memory");
     }
-    let order = Order { finish: None, layers: "all".into(), naming: Naming::Plain, reproducible: true };
+    let request = MergeRequest { finish: None, layers: Selection::All, naming: Naming::Plain, reproducible: true };
     if let Some(shards) = told(Shards::open(&[file(folder, "fuzz.exr", &bytes)], true)) {
         shards.warnings();
-        told(shards.merge(&order, |_| {}));
+        told(shards.merge(&request, |_| {}));
     }
 }
 

@@ -17,7 +17,7 @@ import os
 from collections.abc import Sequence
 
 from . import _native
-from ._native import Error, Image, Progress, SceneWarning, __version__, combine, compare, merge, read
+from ._native import Error, Image, Progress, SceneWarning, __version__, compare, finish, merge, read
 from .glb import pack
 from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight
 
@@ -36,13 +36,16 @@ __all__ = [
     "SpotLight",
     "SunLight",
     "__version__",
-    "combine",
     "compare",
+    "finish",
     "libraries",
     "merge",
     "pack",
     "read",
 ]
+
+# The former name of `finish`.
+combine = finish
 
 
 class Scene(_native.Scene):

@@ -15,9 +15,9 @@ __all__ = [
     "Scene",
     "SceneWarning",
     "__version__",
-    "combine",
     "compare",
     "find_libraries",
+    "finish",
     "merge",
     "read",
 ]
@@ -211,7 +211,7 @@ def read(path: str | os.PathLike[str]) -> Image: ...
 def compare(
     image: _Picture, reference: _Picture, *, layer: str | None = None, relative: bool = False
 ) -> dict[str, Any]: ...
-def combine(image: Image, *, denoise: _Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
+def finish(image: Image, *, denoise: _Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
 def merge(
     paths: Sequence[str | os.PathLike[str]],
     *,

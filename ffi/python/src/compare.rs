@@ -1,8 +1,8 @@
-//! Errors of pictures, and pictures that are finished anew.
+//! Errors of pictures, and the finish of pictures that were rendered before.
 
 use crate::error::raised;
 use crate::image::{Image, picture};
-use crate::job::finish_order;
+use crate::job::finish_request;
 use crate::value::to_python;
 use crate::work::work;
 use caustique::film::take_plain_names;
@@ -45,27 +45,27 @@ pub fn compare<'py>(
 /// (ViewLayer.Combined) come back by ours, in our axes.
 #[pyfunction]
 #[pyo3(signature = (image, *, denoise = "auto", model = None, threads = 0))]
-pub fn combine(
+pub fn finish(
     py: Python<'_>,
     image: &Bound<'_, Image>,
     denoise: &str,
     model: Option<String>,
     threads: usize,
 ) -> PyResult<Image> {
-    let order = finish_order("combine", denoise, model)?;
+    let request = finish_request("finish", denoise, model)?;
     let image = image.get();
     let done = work(py, threads, |caller| {
-        let mut ready = open(&order, None)?;
-        let missing = ready.missing.take();
+        let mut opened = open(&request, None)?;
+        let missing = opened.missing.take();
         caller.warn(&missing.map(|error| super::job::missing(&error)).into_iter().collect::<Vec<_>>());
         let (mut set, mut attributes) = (image.set.clone(), image.attributes.clone());
         let left = |name: String| format!("layer \"{name}\" cannot be written under this name and is left out");
         caller.warn(&take_plain_names(&mut set).into_iter().map(left).collect::<Vec<_>>());
-        let account = ready.finish().apply(&mut set, |_| true)?;
+        let account = opened.finish().apply(&mut set, |_| true)?;
         let mut header = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-        header["combined"] = ready.facts(&account);
+        header["combined"] = opened.header(&account);
         attributes.insert(ATTRIBUTE, &header)?;
-        Ok(Image { set, attributes, tail: None })
+        Ok(Image { set, attributes, sums: None })
     })?;
     done.whole()
 }

@@ -7,13 +7,15 @@ use crate::keywords::{Keywords, choice};
 use crate::value::to_python;
 use crate::work::{Caller, work};
 use caustique::camera::Camera;
-use caustique::choose::choose;
 use caustique::error::Result;
 use caustique::finish::Finish;
 use caustique::options::{MethodChoice, RenderOptions, SceneOptions};
-use caustique::pipeline::{Loaded, Ready, check, finish, memory, plan, sized};
+use caustique::pipeline::check::check_settings;
+use caustique::pipeline::choose::{Chosen, choose};
+use caustique::pipeline::plan::{self, PlanInput};
+use caustique::pipeline::{Loaded, OpenFinish, finish, memory, with_light_paths};
 use caustique::plan::{Effect, Presence};
-use caustique::render::{Control, Method, Settings, TimeSpent};
+use caustique::render::{Control, Method, Settings};
 use caustique::report::crop::Look;
 use caustique::report::data;
 use caustique::report::entry::{Entry, Metric};
@@ -195,8 +197,7 @@ impl Comparison {
     ) -> Result<Value> {
         let built = &scene.loaded.scene;
         for of in &settings {
-            check::media(scene.path, of, built)?;
-            check::bandwidth(scene.path, of, built)?;
+            check_settings(of, scene.path, built)?;
         }
         let (entries, mut finishes) = self.entries((scene, camera), settings, told)?;
         memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings))?;
@@ -251,33 +252,27 @@ impl Comparison {
         settings: Vec<Settings>,
         told: &ErrorCoverage<'_>,
     ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
-        let built = &scene.loaded.scene;
+        let view = View::new(&scene.loaded.scene, camera);
         let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
         for (Run { name, options }, settings) in self.runs.iter().zip(settings) {
-            let mut settings = sized(settings, options.photons, camera.size());
-            let mut decided = TimeSpent::default();
-            let mut choice = None;
-            if options.method.0.is_none() {
-                let limited = RenderOptions { time: self.time(), ..options.clone() };
-                let make = |candidate| limited.candidate_settings(candidate, camera.size());
-                choice = choose(View::new(built, camera), &mut options.pilot_finish(), make, || told.caller.stops());
-            }
-            if let Some(choice) = &choice {
-                (settings, decided) = (choice.settings.clone(), choice.spent);
-            }
+            let settings = with_light_paths(settings, options.photons, camera.size());
+            let limited = RenderOptions { time: self.time(), ..options.clone() };
+            let mut method = limited.method_request()?;
+            let chosen = choose(&mut method, settings, view, |_| true, || told.caller.stops());
+            let decided = chosen.spent();
             let (max_depth, switches) = (self.common.max_depth, scene.asked.switches());
-            let asked = plan::Asked { choice: choice.as_ref(), max_depth, switches };
-            let plan = plan::plan(&asked, settings.method, View::new(built, camera), &scene.loaded.removed);
+            let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, &scene.loaded.removed);
+            let Chosen { settings, .. } = chosen;
             warnings
                 .extend(plan.warnings.into_iter().filter(|warning| !warnings.contains(warning)).collect::<Vec<_>>());
-            let order = (!options.no_combine).then(|| options.finish.order());
-            let mut ready = order.map(|order| finish::open(&order, Some(settings.levels.count))).transpose()?;
-            let missing = ready.as_mut().and_then(|ready| ready.missing.take());
-            warnings.extend(missing.map(|error| job::missing(&error)));
+            let request = (!options.no_finish).then(|| options.finish.request());
+            let opened = request.map(|request| finish::open(&request, Some(settings.levels.count))).transpose()?;
+            let missing = opened.as_ref().and_then(|finish| finish.missing.as_ref());
+            warnings.extend(missing.map(job::missing));
             let settings = Settings { iterations: None, time: None, ..settings };
-            let finish = ready.as_ref().map(Ready::name);
+            let finish = opened.as_ref().map(OpenFinish::name);
             entries.push(Entry { name: name.clone(), options: String::new(), settings, decided, finish });
-            finishes.push(ready.map(Ready::into_finish));
+            finishes.push(opened.map(OpenFinish::into_finish));
         }
         told.caller.warn(&warnings);
         Ok((entries, finishes))
@@ -296,7 +291,7 @@ impl Comparison {
             asked => asked,
         };
         let settings = Settings { method, iterations: ends.0, time: ends.1, target_error: None, ..settings };
-        let settings = sized(settings, None, camera.size());
+        let settings = with_light_paths(settings, None, camera.size());
         let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {
             told.tell(json!({"run": null, "iterations": iterations, "seconds": seconds}))
         });

@@ -9,7 +9,7 @@ use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
 use caustique::memory;
 use caustique::pipeline::Delivery;
-use caustique::pipeline::shard::Tail;
+use caustique::pipeline::shard::ShardSums;
 use numpy::ndarray::{Array3, ArrayView2, Axis};
 use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};
 use pyo3::exceptions::{PyKeyError, PyMemoryError};
@@ -32,15 +32,15 @@ pub struct Image {
     pub set: LayerSet,
     /// The header's attributes.
     pub attributes: Attributes,
-    /// What other shards are joined with, of the image of one.
-    pub tail: Option<Tail>,
+    /// The pixel sums of a shard, by which it is merged with the others.
+    pub sums: Option<ShardSums>,
 }
 
 impl Image {
-    /// What a render delivers, and why it is not finished, where that failed.
+    /// The image of a render, and the error of its finish if that failed.
     pub fn of(delivery: Delivery) -> (Image, Option<Error>) {
-        let Delivery { set, attributes, tail, refusal, .. } = delivery;
-        (Image { set, attributes, tail }, refusal)
+        let Delivery { set, attributes, sums, refusal, .. } = delivery;
+        (Image { set, attributes, sums }, refusal)
     }
 }
 
@@ -71,7 +71,7 @@ impl Image {
             Some(header) => Attributes::of(&to_json(header)?).map_err(raised)?,
             None => Attributes::default(),
         };
-        Ok(Image { set, attributes, tail: None })
+        Ok(Image { set, attributes, sums: None })
     }
 
     /// Height and width in pixels.
@@ -177,7 +177,7 @@ impl Image {
             () if is("exr") => {
                 let options = exr::Options { compression, ..exr::Options::default() };
                 exr::write_followed(&path, set, &self.attributes, options, |file| {
-                    self.tail.as_ref().map_or(Ok(()), |tail| tail.write(file))
+                    self.sums.as_ref().map_or(Ok(()), |tail| tail.write(file))
                 })
             }
             () if is("png") => png::write_tonemapped(&path, &set.beauty()?, exposure, curve),
@@ -192,7 +192,7 @@ impl Image {
 #[pyfunction]
 pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Image> {
     let (set, attributes) = py.detach(|| exr::read(&path)).map_err(raised)?;
-    Ok(Image { set, attributes, tail: None })
+    Ok(Image { set, attributes, sums: None })
 }
 
 /// A plane as it lies in memory.

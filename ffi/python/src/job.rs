@@ -6,7 +6,7 @@ use crate::keywords::{Keywords, choice};
 use caustique::error::Error;
 use caustique::options::catalogue::{OptionDescription, ValueKind, of_python, of_scene};
 use caustique::options::{FrameSeed, InvalidOption, RenderOptions, RunOptions, SceneOptions, parse};
-use caustique::pipeline::finish;
+use caustique::pipeline::FinishRequest;
 use pyo3::prelude::*;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -40,9 +40,9 @@ fn chosen(wanted: impl Fn(&OptionDescription) -> bool) -> Vec<OptionDescription>
     of_python().into_iter().filter(wanted).collect()
 }
 
-/// What is asked of a finish.
-pub fn finish_order(call: &str, denoise: &str, model: Option<String>) -> PyResult<finish::Order> {
-    Ok(finish::Order { denoiser: choice(&format!("{call}: denoise"), denoise)?, model })
+/// The finish that arguments of `call` ask for.
+pub fn finish_request(call: &str, denoise: &str, model: Option<String>) -> PyResult<FinishRequest> {
+    Ok(FinishRequest { denoiser: choice(&format!("{call}: denoise"), denoise)?, model })
 }
 
 /// The warning that our own denoiser takes the place of one that is missing.
@@ -77,7 +77,7 @@ pub fn take_scene(keywords: &mut Keywords<'_>, more: Vec<OsString>) -> PyResult<
 
 /// The options of a method with one level and no finish, as a comparison takes it.
 pub fn single(method: &str, has_levels: bool) -> PyResult<RenderOptions> {
-    let mut words = vec![format!("--method={method}"), "--no-combine".into()];
+    let mut words = vec![format!("--method={method}"), "--no-finish".into()];
     words.extend(has_levels.then(|| "--levels=1".to_string()));
     words.push("scene".into());
     let parsed = parse(words.into_iter().map(OsString::from));
@@ -121,7 +121,7 @@ fn words(keywords: &mut Keywords<'_>, entry: &OptionDescription) -> PyResult<Vec
     let given = match entry.kind {
         _ if keywords.has_taken(name) => None,
         ValueKind::Flag => {
-            // `finish=False` is `--no-combine`.
+            // `finish=False` is `--no-finish`.
             let flag = name != "finish";
             keywords.take::<bool>(name)?.filter(|on| *on == flag).map(|_| vec![OsString::from(option)])
         }

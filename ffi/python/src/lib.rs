@@ -23,7 +23,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::compare::{combine, compare};
+    use super::compare::{compare, finish};
     #[pymodule_export]
     use super::error::{Error, SceneWarning};
     #[pymodule_export]

@@ -1,14 +1,14 @@
-//! Shards of one render, joined.
+//! Merging the shards of one render.
 
 use crate::error::raised;
 use crate::image::Image;
-use crate::job::{self, finish_order};
+use crate::job::{self, finish_request};
 use crate::scene::delivered;
 use crate::work::work;
 use caustique::error::Error;
-use caustique::film::Naming;
-use caustique::pipeline::finish;
-use caustique::pipeline::merge::{Order, Shards, Step};
+use caustique::film::{Naming, Selection};
+use caustique::pipeline::FinishRequest;
+use caustique::pipeline::merge::{MergeEvent, MergeRequest, Shards};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -39,17 +39,18 @@ pub fn merge(
 ) -> PyResult<Image> {
     let shards = py.detach(|| Shards::open(&paths, partial)).map_err(raised)?;
     let arguments = shards.arguments();
-    let order = Order {
-        finish: asked_finish(&arguments, finish, denoise, model)?,
-        layers: layers.or_else(|| text(&arguments, "layers")).unwrap_or_else(|| "all".into()),
+    let layers = layers.or_else(|| text(&arguments, "layers")).unwrap_or_else(|| "all".into());
+    let request = MergeRequest {
+        finish: choose_finish(&arguments, finish, denoise, model)?,
+        layers: Selection::parse(&layers).map_err(raised)?,
         naming: Naming::Plain,
         reproducible: arguments["reproducible"] == true,
     };
     let done = work(py, threads, |caller| {
         caller.warn(&shards.warnings());
         let missing = |error: &Error| caller.warn(&[job::missing(error)]);
-        shards.merge(&order, |step| {
-            if let Step::Finishes(_, Some(error)) = step {
+        shards.merge(&request, |event| {
+            if let MergeEvent::Finishing { missing: Some(error), .. } = event {
                 missing(error);
             }
         })
@@ -57,19 +58,19 @@ pub fn merge(
     delivered(py, done.whole()?)
 }
 
-/// The finish that is asked for here, else by the shards.
-fn asked_finish(
+/// The finish that this call asks for, else the finish that the shards were rendered with.
+fn choose_finish(
     arguments: &Value,
     finish: Option<bool>,
     denoise: Option<String>,
     model: Option<String>,
-) -> PyResult<Option<finish::Order>> {
+) -> PyResult<Option<FinishRequest>> {
     let here = finish == Some(true) || denoise.is_some() || model.is_some();
     if finish == Some(false) || (!here && arguments["no-combine"] == true) {
         return Ok(None);
     }
     let denoise = denoise.or_else(|| text(arguments, "denoise")).unwrap_or_else(|| "auto".into());
-    finish_order("merge", &denoise, model.or_else(|| text(arguments, "model"))).map(Some)
+    finish_request("merge", &denoise, model.or_else(|| text(arguments, "model"))).map(Some)
 }
 
 fn text(arguments: &Value, name: &str) -> Option<String> {

@@ -8,21 +8,19 @@ use crate::keywords::Keywords;
 use crate::progress::Progress;
 use crate::value::{to_json, to_python};
 use crate::work::{Caller, warn, work};
-use caustique::choose::{Choice, choose};
-use caustique::error::{Error, Result};
+use caustique::error::Result;
 use caustique::film::Naming;
 use caustique::image::atomic;
 use caustique::options::SceneOptions;
-use caustique::pipeline::load::{self, Environment, load, load_bytes};
-use caustique::pipeline::{self, Auto, Delivery, Loaded, Order, Saving, Wait, Watch, check, checkpoint};
-use caustique::plan::Plan;
-use caustique::render::{Rendered, Settings};
+use caustique::pipeline::load::{Environment, load, load_bytes};
+use caustique::pipeline::plan::plan_picture;
+use caustique::pipeline::{self, Delivery, Event, Loaded, Observer, Request, Saving, SceneRequest, checkpoint};
 use caustique::scene::description::EnvironmentSource;
-use caustique::scene::{Scene as Built, View, gltf};
+use caustique::scene::gltf;
 use caustique::stop::Stop;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::{PyBool, PyBytes, PyDict};
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -72,11 +70,11 @@ impl Scene {
         }
         asked.path.clone_from(&path);
         let said = Said::of(py, bytes.is_none(), options)?;
-        let mut order = asked.order();
-        order.environment = array.or(order.environment);
+        let mut request = asked.request();
+        request.environment = array.or(request.environment);
         let done = work(py, threads, |_| match &bytes {
-            Some(bytes) => load_bytes(bytes, &order, rayon::current_num_threads()),
-            None => load(&order, rayon::current_num_threads(), &Stop::default()),
+            Some(bytes) => load_bytes(bytes, &request, rayon::current_num_threads()),
+            None => load(&request, rayon::current_num_threads(), &Stop::default()),
         })?;
         let loaded = done.whole()?;
         if asked.strict && !loaded.scene.warnings.is_empty() {
@@ -123,31 +121,23 @@ impl Scene {
                 "write caustique.pack's bytes and an environment's array to files, and read them",
             ));
         }
-        let settings = asked.settings().map_err(raised)?;
-        let request = asked.camera_request().map_err(raised)?;
+        let layers = run.selection().map_err(raised)?;
         let arguments = self.arguments(py, options)?;
         let progress = progress.map(Arc::new);
         let done = work(py, threads, |caller| {
-            let allowed = |candidate, size| asked.candidate_settings(candidate, size);
-            let auto = asked.method.0.is_none().then(|| Auto { allowed: &allowed, finish: asked.pilot_finish() });
-            let order = Order {
-                scene: self.order(),
-                camera: request,
-                settings,
-                photons: asked.photons,
-                max_depth: asked.max_depth,
-                switches: self.asked.switches(),
-                auto,
-                finish: (!asked.no_combine).then(|| asked.finish.order()),
-                layers: run.layers.clone(),
+            let request = Request {
+                scene: self.request(),
+                picture: asked.picture_request()?,
+                finish: (!asked.no_finish).then(|| asked.finish.request()),
+                layers,
                 naming: Naming::Plain,
                 arguments,
                 reproducible: run.reproducible,
-                memory: run.cap(),
+                memory: run.memory_limit(),
                 saving,
                 resume: run.resume.clone(),
             };
-            pipeline::render_loaded(order, &self.loaded, &mut Watcher { caller, progress })
+            pipeline::render_loaded(request, &self.loaded, &mut CallerReports { caller, progress })
         })?;
         let delivery = match (done.result, done.raised) {
             (Ok(delivery), None) => delivery,
@@ -170,24 +160,10 @@ impl Scene {
         let threads = keywords.take("threads")?.unwrap_or(0);
         let (asked, _) = job::take(&mut keywords, &job::of_plan(), &self.asked)?;
         keywords.finish()?;
-        let settings = asked.settings().map_err(raised)?;
-        let request = asked.camera_request().map_err(raised)?;
-        let Loaded { scene, removed } = &self.loaded;
         let done = work(py, threads, |caller| {
-            let camera = scene.camera(&request)?;
-            check::media(&self.path, &settings, scene)?;
-            let choice = match asked.method.0 {
-                Some(_) => None,
-                None => {
-                    let make = |candidate| asked.candidate_settings(candidate, camera.size());
-                    choose(View::new(scene, &camera), &mut asked.pilot_finish(), make, || caller.stops())
-                }
-            };
-            let (max_depth, switches) = (asked.max_depth, self.asked.switches());
-            let asked = pipeline::plan::Asked { choice: choice.as_ref(), max_depth, switches };
-            let mut plan = pipeline::plan::plan(&asked, settings.method, View::new(scene, &camera), removed);
-            plan.warnings.splice(0..0, scene.warnings.iter().cloned());
-            Ok(json!(plan))
+            let picture = asked.picture_request()?;
+            let planned = plan_picture(picture, &self.path, &self.loaded, || caller.stops())?;
+            Ok(json!(planned.plan))
         })?;
         to_python(py, &done.whole()?)
     }
@@ -228,9 +204,9 @@ impl Scene {
 }
 
 impl Scene {
-    /// Where it is from: for messages, and for what tells it from other scenes.
-    fn order(&self) -> load::Order {
-        load::Order {
+    /// Origin of the scene, for messages and for the identity of checkpoints and shards.
+    fn request(&self) -> SceneRequest {
+        SceneRequest {
             path: self.path.clone(),
             environment: self.said.environment.clone().map(Environment::File),
             rotation: None,
@@ -308,50 +284,38 @@ fn environment_array(given: &Bound<'_, PyAny>) -> PyResult<Option<Environment>> 
     Ok(Some(Environment::Image(EnvironmentSource::Image { width, height, texels })))
 }
 
-/// Tells Python how a render goes.
-struct Watcher<'a> {
+/// Passes the events of a render on to Python: warnings, and progress to the callback.
+struct CallerReports<'a> {
     caller: &'a Caller,
     progress: Option<Arc<Py<PyAny>>>,
 }
 
-impl Watch for Watcher<'_> {
-    fn waits(&mut self, _: Option<Wait>) {}
-
-    fn loaded(&mut self, _: &Built) -> Result<()> {
+impl Observer for CallerReports<'_> {
+    fn event(&mut self, event: Event<'_>) -> Result<()> {
+        match event {
+            Event::FinishOpened { missing } => {
+                self.caller.warn(&missing.map(job::missing).into_iter().collect::<Vec<_>>());
+            }
+            Event::Begins { plan, .. } => self.caller.warn(&plan.warnings),
+            Event::Progress(progress) => self.call_back(progress),
+            Event::SaveFailed(error) => {
+                self.caller.warn(&[format!("the state of the render is not saved: {error}; the render goes on")]);
+            }
+            _ => {}
+        }
         Ok(())
     }
 
     fn stop(&self) -> Stop {
         self.caller.stop()
     }
+}
 
-    fn chosen(&mut self, _: Option<&Choice>) -> Result<()> {
-        match self.caller.stops() {
-            true => {
-                Err(Error::new(caustique::error::ErrorKind::Interrupted, "", "interrupted before the first iteration"))
-            }
-            false => Ok(()),
-        }
-    }
-
-    fn finishes(&mut self, error: Option<&Error>) {
-        self.caller.warn(&error.map(job::missing).into_iter().collect::<Vec<_>>());
-    }
-
-    fn begins(&mut self, plan: &Plan, _: &Settings) {
-        self.caller.warn(&plan.warnings);
-    }
-
-    fn progress(&mut self, progress: &caustique::render::Progress) {
+impl CallerReports<'_> {
+    /// Calls the user's function, which stops the render by returning False.
+    fn call_back(&self, progress: &caustique::render::Progress) {
         let Some(callback) = self.progress.clone() else { return };
         let progress = Progress::from(progress);
-        self.caller
-            .ask(move |py| Ok(!callback.call1(py, (progress,))?.bind(py).is(pyo3::types::PyBool::new(py, false))));
+        self.caller.ask(move |py| Ok(!callback.call1(py, (progress,))?.bind(py).is(PyBool::new(py, false))));
     }
-
-    fn unsaved(&mut self, error: &Error) {
-        self.caller.warn(&[format!("the state of the render is not saved: {error}; the render goes on")]);
-    }
-
-    fn rendered(&mut self, _: &Rendered) {}
 }

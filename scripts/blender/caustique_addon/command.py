@@ -24,7 +24,7 @@ def method(settings):
     if off:
         words.append("--effects=" + ",".join(f"-{name}" for name in off))
     if settings.finish == "off":
-        words.append("--no-combine")
+        words.append("--no-finish")
     elif settings.finish != "auto":
         words += ["--denoise", settings.finish]
     return words + additional(settings.arguments)

@@ -13,10 +13,12 @@ use super::render::tell_plan;
 use super::signals::Interrupt;
 use super::{finish, say, scene};
 use caustique::camera::Camera;
-use caustique::choose::{Choice, choose};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::finish::Finish;
-use caustique::pipeline::{Loaded, Ready, check, memory, plan, sized};
+use caustique::pipeline::check::check_settings;
+use caustique::pipeline::choose::{Chosen, choose};
+use caustique::pipeline::plan::{self, PlanInput};
+use caustique::pipeline::{Loaded, OpenFinish, memory, with_light_paths};
 use caustique::plan::switch::Removed;
 use caustique::render::{Control, Settings};
 use caustique::report::crop::{Look, Window};
@@ -52,21 +54,19 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let view = View::new(&scene, &camera);
     let windows = windows(args, &camera)?;
     for run in &runs {
-        let (path, settings) = (&run.args.scene.path, &run.entry.settings);
-        let checked = check::media(path, settings, &scene).and_then(|()| check::bandwidth(path, settings, &scene));
-        checked.map_err(|mut error| {
+        check_settings(&run.entry.settings, &run.args.scene.path, &scene).map_err(|mut error| {
             error.place = format!("--run \"{}\"", run.entry.name);
             error
         })?;
     }
     let interrupt = Interrupt::listen()?;
-    let (runs, choices) = choose_all(args, runs, view, &interrupt)?;
+    let runs = choose_all(args, runs, view, &interrupt)?;
     interrupt.before_the_first_iteration(&args.output)?;
-    memory::check_all(view, runs.iter().map(|run| &run.entry.settings))?;
+    memory::check_all(view, runs.iter().map(|(run, _)| &run.entry.settings))?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
     let source = reference::source(args, view, &runs, &seeds, &mut notes)?;
-    let (entries, mut finishes) = open(args, runs, &choices, view, &removed)?;
+    let (entries, mut finishes) = open_finishes(args, runs, view, &removed)?;
     let renders = peers::all(args, view, threads, &interrupt, &mut notes)?;
     let peers = renders.as_ref().map_or_else(Vec::new, |renders| renders.peers.clone());
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
@@ -137,66 +137,64 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     Ok(windows)
 }
 
-/// Settles what follows from the picture's size, and chooses for the runs that leave it to auto, for the time and
-/// iterations of a run; says what.
+/// Settles the light paths of all runs and the method of runs by `auto`, with the limits of a run. Prints the choices.
 fn choose_all(
     args: &ConvergeArgs,
-    mut runs: Vec<Run>,
+    runs: Vec<Run>,
     view: View<'_>,
     interrupt: &Interrupt,
-) -> Result<(Vec<Run>, Vec<Option<Choice>>)> {
-    let choose_one = |run: &mut Run| {
+) -> Result<Vec<(Run, Chosen)>> {
+    let choose_one = |mut run: Run| {
         let Settings { max_depth, seed, .. } = run.entry.settings;
-        let limits = |settings| Settings { max_depth, seed, iterations: args.iterations, time: time(args), ..settings };
-        run.entry.settings = sized(run.entry.settings.clone(), run.args.photons, view.camera.size());
-        let make = |candidate| run.args.candidate_settings(candidate, view.camera.size()).map(limits);
-        if run.args.method.0.is_some() {
-            return Ok(None);
+        let (iterations, time) = (args.iterations, time(args));
+        let limits = move |settings| Settings { max_depth, seed, iterations, time, ..settings };
+        let settings = with_light_paths(run.entry.settings.clone(), run.args.photons, view.camera.size());
+        let chosen = {
+            let mut method = run.args.method_request()?.map_candidates(limits);
+            let work = || choose(&mut method, settings, view, |_| true, || interrupt.asked());
+            args.progress.during("choosing a method", work)
+        };
+        if let Some(choice) = &chosen.choice {
+            say(&format!("run \"{}\": {}", run.entry.name, plan::reason(choice)));
+            run.entry.decided = choice.spent;
         }
-        let mut finish = run.args.pilot_finish();
-        let tried = || choose(view, &mut finish, make, || interrupt.asked());
-        let Some(chosen) = args.progress.during("choosing a method", tried) else { return Ok(None) };
-        say(&format!("run \"{}\": {}", run.entry.name, plan::why(&chosen)));
         run.entry.settings = Settings { iterations: None, time: None, ..chosen.settings.clone() };
-        run.entry.decided = chosen.spent;
-        Ok(Some(chosen))
+        Ok((run, chosen))
     };
-    let choices = runs.iter_mut().map(choose_one).collect::<Result<_>>()?;
-    Ok((runs, choices))
+    runs.into_iter().map(choose_one).collect()
 }
 
-/// Opens the finishes and tells what methods miss.
-fn open(
+/// Opens the finishes of the runs, and prints the warnings of their plans, each once.
+fn open_finishes(
     args: &ConvergeArgs,
-    runs: Vec<Run>,
-    choices: &[Option<Choice>],
+    runs: Vec<(Run, Chosen)>,
     view: View<'_>,
     removed: &Removed,
 ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
-    let mut told = HashSet::new();
+    let mut printed = HashSet::new();
     let mut entries = Vec::new();
     let mut finishes = Vec::new();
-    for (Run { mut entry, args: options }, choice) in runs.into_iter().zip(choices) {
-        let asked = plan::Asked { choice: choice.as_ref(), max_depth: args.max_depth, switches: args.scene.switches() };
-        let plan = plan::plan(&asked, entry.settings.method, view, removed);
-        let new: Vec<String> = plan.warnings.into_iter().filter(|warning| told.insert(warning.clone())).collect();
+    for (Run { mut entry, args: options }, chosen) in runs {
+        let (max_depth, switches) = (args.max_depth, args.scene.switches());
+        let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
+        let new: Vec<String> = plan.warnings.into_iter().filter(|warning| printed.insert(warning.clone())).collect();
         tell_plan(&args.scene.path, &new);
         let place = format!("--run \"{}\"", entry.name);
         let levels = entry.settings.levels.count;
-        let ready = (!options.no_combine).then(|| finish::open(&options.finish, Some(levels))).transpose();
-        let ready = ready.map_err(|mut error| {
+        let opened = (!options.no_finish).then(|| finish::open(&options.finish, Some(levels))).transpose();
+        let opened = opened.map_err(|mut error| {
             if error.kind == ErrorKind::Usage {
                 error.place = place;
             }
             error
         })?;
-        entry.finish = ready.as_ref().map(Ready::name);
-        let missing = ready.as_ref().and_then(|ready| ready.missing.as_ref()).map(ToString::to_string);
-        if let Some(missing) = missing.filter(|missing| told.insert(missing.clone())) {
+        entry.finish = opened.as_ref().map(OpenFinish::name);
+        let missing = opened.as_ref().and_then(|finish| finish.missing.as_ref()).map(ToString::to_string);
+        if let Some(missing) = missing.filter(|missing| printed.insert(missing.clone())) {
             say(&format!("warning: {missing}; pictures are finished by our own denoiser"));
         }
         entries.push(entry);
-        finishes.push(ready.map(Ready::into_finish));
+        finishes.push(opened.map(OpenFinish::into_finish));
     }
     Ok((entries, finishes))
 }

@@ -34,7 +34,7 @@ pub struct ConvergeArgs {
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
     pub methods: Vec<MethodChoice>,
     /// A run by a name and the method options of 'caustique render', such as 'five levels: --method sppm --levels 5';
-    /// may be repeated. As there, the picture is finished unless --no-combine is given
+    /// may be repeated. As there, the picture is finished unless --no-finish is given
     #[arg(long = "run", value_name = "NAME: OPTIONS", allow_hyphen_values = true, help_heading = "Runs")]
     pub runs: Vec<String>,
     /// Estimates alone, no finished pictures

@@ -8,6 +8,7 @@ use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::MethodChoice;
+use caustique::pipeline::choose::Chosen;
 use caustique::plan::{Effect, Presence};
 use caustique::render::{Control, Method, Settings};
 use caustique::report::reference::{Halves, OwnError, Reference};
@@ -28,7 +29,7 @@ pub enum Source {
 pub fn source(
     args: &ConvergeArgs,
     view: View<'_>,
-    runs: &[Run],
+    runs: &[(Run, Chosen)],
     seeds: &[u64],
     notes: &mut Vec<String>,
 ) -> Result<Source> {
@@ -48,8 +49,8 @@ pub fn source(
             metric.name()
         ));
     }
-    let same = |run: &&Run| header["method"] == run.entry.settings.method.name();
-    if let Some(run) = runs.iter().find(same)
+    let same = |(run, _): &&(Run, Chosen)| header["method"] == run.entry.settings.method.name();
+    if let Some((run, _)) = runs.iter().find(same)
         && header["seed"].as_u64().is_some_and(|seed| seeds.contains(&seed))
     {
         let (name, seed) = (&run.entry.name, &header["seed"]);

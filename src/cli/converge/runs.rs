@@ -86,12 +86,12 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
         classes: args.scene.switches().classes(),
         iterations: None,
         time: None,
-        ..render.settings()?
+        ..render.picture_request()?.method.settings().clone()
     };
     let entry =
         Entry { name: name.into(), options: options.into(), settings, decided: TimeSpent::default(), finish: None };
     let mut job = render.job;
-    job.no_combine |= args.no_finish;
+    job.no_finish |= args.no_finish;
     Ok(Run { entry, args: job })
 }
 

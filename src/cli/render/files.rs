@@ -10,7 +10,7 @@ use caustique::image::exr::{self, Attributes};
 use caustique::image::{atomic, usd_layer};
 use caustique::options::EnvironmentChoice;
 use caustique::pipeline::checkpoint;
-use caustique::pipeline::shard::Tail;
+use caustique::pipeline::shard::ShardSums;
 use caustique::scene::gltf;
 use caustique::temporary;
 use std::ffi::OsStr;
@@ -21,10 +21,10 @@ use tempfile::TempDir;
 ///
 /// # Errors
 /// The EXR could not be written where it was asked for; the hint says where it is instead.
-pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, tail: Option<&Tail>) -> Result<()> {
+pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, sums: Option<&ShardSums>) -> Result<()> {
     let options = args.picture.exr_options(args.run.exr_naming);
     let into = |path: &Path| {
-        exr::write_followed(path, set, attributes, options, |file| tail.map_or(Ok(()), |tail| tail.write(file)))
+        exr::write_followed(path, set, attributes, options, |file| sums.map_or(Ok(()), |sums| sums.write(file)))
     };
     if output::is_stdout(&args.output) {
         // The header of a file is written last.

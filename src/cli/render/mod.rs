@@ -1,4 +1,4 @@
-//! `caustique render`: a scene in, an EXR and perhaps a PNG out.
+//! `caustique render`: renders a scene to an EXR, and to a PNG if the user asks for one.
 
 mod claim;
 mod files;
@@ -14,17 +14,14 @@ use super::finish::tell_missing;
 use super::progress::{Reporter, Turn, Waiting};
 use super::signals::Interrupt;
 use super::{output, say, scene};
-use caustique::choose::Choice;
-use caustique::error::{Error, Result};
+use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
-use caustique::image::exr;
-use caustique::pipeline::plan::why;
-use caustique::pipeline::{self, Auto, Delivery, Order, Wait, Watch, layers};
+use caustique::pipeline::plan::reason;
+use caustique::pipeline::{self, Delivery, Event, Observer, Phase, Request};
 use caustique::plan::Plan;
-use caustique::render::output::layer_shape_of;
-use caustique::render::{Progress, Rendered, Settings};
+use caustique::render::Settings;
+use caustique::scene::Scene;
 use caustique::scene::description::PictureDefaults;
-use caustique::scene::{Scene, Survey};
 use caustique::stop::Stop;
 use preview::Preview;
 use serde_json::json;
@@ -41,18 +38,15 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         Some(frames) => sequence::run(args, frames),
         None => {
             sequence::refuse_patterns(args)?;
-            one(args, None)
+            render_one(args, None)
         }
     })
 }
 
-/// Renders one picture: everything that can be wrong is found before the first light path.
-fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
-    let settings = args.settings()?;
-    // What is in the scene is not known yet.
-    let anything = Survey { environment: true, scattering: true, narrow_lobes: true, ..Survey::default() };
-    let groups = layers::groups_named(&args.run.layers);
-    layers::selection(&args.run.layers, &layer_shape_of(&settings, &anything, &groups), !args.job.no_combine)?;
+/// Renders one picture. Everything that can be wrong is found before the first light path.
+fn render_one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
+    let picture = args.picture_request()?;
+    let layers = args.run.selection()?;
     output::check_render(&args.output)?;
     args.picture.check()?;
     files::check_usd_layer(args)?;
@@ -60,76 +54,112 @@ fn one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
     args.preview.as_ref().map_or(Ok(()), |target| target.check(&args.output))?;
     files::check_checkpoint(args)?;
     techniques::prepare(args)?;
-    render(args, turn, settings)
-}
-
-fn render(args: &RenderArgs, turn: Option<Turn>, settings: Settings) -> Result<()> {
-    let allowed = |candidate, size| args.job.candidate_settings(candidate, size);
-    let auto = args.job.method.0.is_none().then(|| Auto { allowed: &allowed, finish: args.job.pilot_finish() });
-    let order = Order {
-        scene: args.job.scene.order(),
-        camera: args.job.camera_request()?,
-        settings,
-        photons: args.job.photons,
-        max_depth: args.job.max_depth,
-        switches: args.job.scene.switches(),
-        auto,
-        finish: (!args.job.no_combine).then(|| args.job.finish.order()),
-        layers: args.run.layers.clone(),
+    let request = Request {
+        scene: args.job.scene.request(),
+        picture,
+        finish: (!args.job.no_finish).then(|| args.job.finish.request()),
+        layers,
         naming: args.run.exr_naming,
         arguments: json!(args),
         reproducible: args.run.reproducible,
-        memory: args.run.cap(),
+        memory: args.run.memory_limit(),
         saving: args.saving(),
         resume: args.run.resume.clone(),
     };
-    let mut told = Telling {
-        args,
-        turn,
-        interrupt: None,
-        waiting: None,
-        reporter: None,
-        preview: None,
-        why: None,
-        summary: None,
-        seconds: 0.0,
-        estimate: None,
-        reason_if_black: String::new(),
-        made_for: PictureDefaults::default(),
-    };
-    let delivery = pipeline::render(order, &mut told)?;
-    told.deliver(delivery)
+    let mut reports = Reports::new(args, turn);
+    let delivery = pipeline::render(request, &mut reports).map_err(|error| reports.explain(error))?;
+    reports.deliver(delivery)
 }
 
-/// Tells people and programs how a render goes.
-struct Telling<'a> {
+/// Reports the progress of a render to people and programs, and writes its files.
+struct Reports<'a> {
     args: &'a RenderArgs,
     turn: Option<Turn>,
     interrupt: Option<Interrupt>,
     waiting: Option<Waiting>,
     reporter: Option<Reporter>,
     preview: Option<Preview<'a>>,
-    /// Why auto has chosen what it has.
-    why: Option<String>,
+    /// The reason for the choice of `auto`.
+    reason: Option<String>,
     summary: Option<Summary>,
-    /// Seconds that the render has taken.
+    /// Seconds of the render.
     seconds: f64,
     /// The file of the estimate, until the finished picture is written.
     estimate: Option<PathBuf>,
-    /// Why the picture is black, should it be.
+    /// An explanation, should the picture turn out black.
     reason_if_black: String,
-    /// The picture that the scene was made for.
+    /// Frame and look that the scene asks for.
     made_for: PictureDefaults,
 }
 
-impl Watch for Telling<'_> {
-    fn waits(&mut self, wait: Option<Wait>) {
-        let what = wait.map(|wait| match wait {
-            Wait::Reading => format!("reading {}", self.args.job.scene.path.display()),
-            Wait::Choosing => "choosing a method".into(),
-            Wait::Finishing => "finishing the picture".into(),
-        });
-        self.waiting = what.map(|what| Waiting::begin(self.args.progress, &what));
+impl Observer for Reports<'_> {
+    fn event(&mut self, event: Event<'_>) -> Result<()> {
+        match event {
+            Event::PhaseBegins(phase) => self.waiting = Some(Waiting::begin(self.args.progress, &self.describe(phase))),
+            Event::PhaseEnds => self.waiting = None,
+            Event::Loaded(scene) => self.loaded(scene)?,
+            Event::Chosen(choice) => self.reason = choice.map(reason),
+            Event::FinishOpened { missing } => tell_missing(missing),
+            Event::Begins { plan, settings } => self.begins(plan, settings),
+            Event::Resumed(iterations) if self.args.progress.for_people() => {
+                say(&format!("going on after {iterations} iterations"));
+            }
+            Event::Resumed(_) => {}
+            Event::Progress(progress) => {
+                self.reporter.as_mut().into_iter().for_each(|reporter| reporter.report(progress));
+            }
+            Event::Preview { picture, frame } => {
+                self.preview.as_mut().into_iter().for_each(|preview| preview.show(picture.clone(), Some(*frame)));
+            }
+            Event::SaveFailed(error) => {
+                say(&format!("warning: the state of the render is not saved: {error}; the render goes on"));
+            }
+            Event::Rendered(rendered) => {
+                self.reporter.take().into_iter().for_each(|mut reporter| reporter.finish());
+                self.summary = Some(Summary::of(rendered));
+                self.seconds = rendered.stats.time.seconds;
+            }
+            Event::Estimated { set, attributes } => {
+                self.estimate = files::write_estimate(self.args, set, attributes, self.seconds);
+            }
+        }
+        Ok(())
+    }
+
+    fn stop(&self) -> Stop {
+        Interrupt::stop()
+    }
+
+    fn wants_preview(&mut self) -> bool {
+        self.preview.as_mut().is_some_and(Preview::due)
+    }
+}
+
+impl<'a> Reports<'a> {
+    fn new(args: &'a RenderArgs, turn: Option<Turn>) -> Reports<'a> {
+        Reports {
+            args,
+            turn,
+            interrupt: None,
+            waiting: None,
+            reporter: None,
+            preview: None,
+            reason: None,
+            summary: None,
+            seconds: 0.0,
+            estimate: None,
+            reason_if_black: String::new(),
+            made_for: PictureDefaults::default(),
+        }
+    }
+
+    /// A phase, for people who wait.
+    fn describe(&self, phase: Phase) -> String {
+        match phase {
+            Phase::Reading => format!("reading {}", self.args.job.scene.path.display()),
+            Phase::Choosing => "choosing a method".into(),
+            Phase::Finishing => "finishing the picture".into(),
+        }
     }
 
     fn loaded(&mut self, scene: &Scene) -> Result<()> {
@@ -139,22 +169,9 @@ impl Watch for Telling<'_> {
         Ok(())
     }
 
-    fn stop(&self) -> Stop {
-        Interrupt::stop()
-    }
-
-    fn chosen(&mut self, choice: Option<&Choice>) -> Result<()> {
-        self.why = choice.map(why);
-        self.interrupt.as_ref().map_or(Ok(()), |interrupt| interrupt.before_the_first_iteration(&self.args.output))
-    }
-
-    fn finishes(&mut self, missing: Option<&Error>) {
-        tell_missing(missing);
-    }
-
     fn begins(&mut self, plan: &Plan, settings: &Settings) {
-        if let Some(why) = self.why.take().filter(|_| self.args.progress.for_people()) {
-            say(&format!("method: {why}"));
+        if let Some(reason) = self.reason.take().filter(|_| self.args.progress.for_people()) {
+            say(&format!("method: {reason}"));
         }
         self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         let RenderArgs { output, preview, picture, .. } = self.args;
@@ -163,76 +180,28 @@ impl Watch for Telling<'_> {
         self.reason_if_black.clone_from(&plan.reason_if_black);
     }
 
-    fn progress(&mut self, progress: &Progress) {
-        if let Some(reporter) = &mut self.reporter {
-            reporter.report(progress);
-        }
+    /// The error of a render that has no picture: a signal before the first iteration says that nothing is written.
+    fn explain(&self, error: Error) -> Error {
+        let interrupt = self.interrupt.as_ref().filter(|_| error.kind == ErrorKind::Interrupted);
+        interrupt.and_then(|interrupt| interrupt.before_the_first_iteration(&self.args.output).err()).unwrap_or(error)
     }
 
-    fn looks(&mut self) -> bool {
-        self.preview.as_mut().is_some_and(Preview::due)
-    }
-
-    fn picture(&mut self, picture: Result<LayerSet>, frame: &exr::Frame) {
-        if let Some(preview) = &mut self.preview {
-            preview.show(picture, Some(*frame));
-        }
-    }
-
-    fn resumed(&mut self, iterations: u64) {
-        if self.args.progress.for_people() {
-            say(&format!("going on after {iterations} iterations"));
-        }
-    }
-
-    fn unsaved(&mut self, error: &Error) {
-        say(&format!("warning: the state of the render is not saved: {error}; the render goes on"));
-    }
-
-    fn rendered(&mut self, rendered: &Rendered) {
-        if let Some(mut reporter) = self.reporter.take() {
-            reporter.finish();
-        }
-        self.summary = Some(Summary::of(rendered));
-        self.seconds = rendered.stats.time.seconds;
-    }
-
-    fn estimated(&mut self, set: &LayerSet, attributes: &exr::Attributes) {
-        self.estimate = files::write_estimate(self.args, set, attributes, self.seconds);
-    }
-}
-
-impl Telling<'_> {
-    /// Writes all files, and says what there is to say.
+    /// Writes all files, and reports how the render ended.
     fn deliver(self, delivery: Delivery) -> Result<()> {
-        let Telling { args, summary, preview, made_for, reason_if_black, estimate, .. } = self;
-        let Delivery { set, attributes, techniques, tail, .. } = &delivery;
+        let Reports { args, summary, preview, made_for, reason_if_black, estimate, .. } = self;
+        let Delivery { set, attributes, techniques, sums, .. } = &delivery;
         let Some(summary) = summary else { return Ok(()) };
         let talk = args.progress.for_people();
-        let written = files::write(args, set, attributes, tail.as_ref());
-        let described = files::write_usd_layer(args, set);
-        let pictured = args.picture.write_png(set, &made_for);
-        let debugged = techniques::write(args, techniques, &made_for);
+        let written = files::write(args, set, attributes, sums.as_ref())
+            .and(files::write_usd_layer(args, set))
+            .and(args.picture.write_png(set, &made_for))
+            .and(techniques::write(args, techniques, &made_for));
         if let Some(mut preview) = preview {
             preview.show(beauty(set), attributes.frame);
         }
-        if talk {
-            summary.tell();
-            if let Some((name, _)) = &delivery.finished {
-                tell_finish(name, &delivery, summary.told_of_finished());
-            }
-        }
-        if !reason_if_black.is_empty() && set.beauty().is_ok_and(|pixels| pixels.iter().flatten().all(|x| *x == 0.0)) {
-            say(&format!("warning: {}: the picture is black: {reason_if_black}", args.output.display()));
-        }
-        summary.tell_full();
-        tell_unseen(&args.output, &delivery);
-        summary.tell_rejected(&args.output, talk);
+        tell_end(args, &summary, &delivery, &reason_if_black);
         written?;
-        described?;
-        pictured?;
-        debugged?;
-        // The picture is safe, and nobody misses a file that is not there.
+        // A file that is already gone is no error: the picture is safe.
         let spent = [delivery.spent_checkpoint.as_deref(), estimate.as_deref()];
         spent.into_iter().flatten().for_each(|file| drop(std::fs::remove_file(file)));
         if talk {
@@ -241,21 +210,39 @@ impl Telling<'_> {
         if let Some(error) = delivery.refusal {
             let output = args.output.display();
             return Err(error.hint(format!(
-                "the unfinished render is in {output}: 'caustique combine {output} -o OUT.exr' finishes it"
+                "the unfinished render is in {output}: 'caustique finish {output} -o OUT.exr' finishes it"
             )));
         }
         summary.interrupted(args)
     }
 }
 
-/// The picture alone.
+/// Reports time, error and warnings of a render.
+fn tell_end(args: &RenderArgs, summary: &Summary, delivery: &Delivery, reason_if_black: &str) {
+    let talk = args.progress.for_people();
+    if talk {
+        summary.tell();
+        if let Some(name) = &delivery.finished_by {
+            tell_finish(name, delivery, summary.coverage_of_finished());
+        }
+    }
+    let is_black = || delivery.set.beauty().is_ok_and(|pixels| pixels.iter().flatten().all(|x| *x == 0.0));
+    if !reason_if_black.is_empty() && is_black() {
+        say(&format!("warning: {}: the picture is black: {reason_if_black}", args.output.display()));
+    }
+    summary.tell_full();
+    tell_unseen(&args.output, delivery);
+    summary.tell_rejected(&args.output, talk);
+}
+
+/// The beauty layer without the others.
 fn beauty(set: &LayerSet) -> Result<LayerSet> {
     let mut alone = LayerSet::new(set.width, set.height);
     alone.layers.extend(set.get("").cloned());
     Ok(alone)
 }
 
-/// Prints what a plan warns of.
+/// Prints the warnings of a plan.
 pub fn tell_plan(scene: &Path, warnings: &[String]) {
     for warning in warnings {
         say(&format!("warning: {}: {warning}", scene.display()));

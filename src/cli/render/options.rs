@@ -1,29 +1,30 @@
-//! Every option of `caustique render`: those of [`caustique::options`], and files that only the program writes.
+//! The options of `caustique render`: the library's ([`caustique::options`]), and files that only the program writes.
 
 use super::preview::Target;
 use crate::cli::output::PictureArgs;
 use crate::cli::progress::Form;
 use caustique::error::{Error, Result};
 use caustique::options::{RenderOptions, RunOptions, numbered, takes};
-use caustique::pipeline::Saving;
-use caustique::render::Settings;
+use caustique::pipeline::{MethodRequest, PictureRequest, Saving};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use std::path::PathBuf;
 
 /// Render a scene to a multichannel EXR, and to a PNG to look at.
 ///
-/// Without options: 64 iterations at 1280 pixels across, seen through the scene's first camera, by the method that
-/// suits the scene, denoised as far as its own errors allow. Ctrl-C gives up the running iteration and writes what
-/// there is; a second one ends at once.
+/// Without options: 64 iterations, 1280 pixels wide, through the scene's first camera, by a method that suits the scene,
+/// denoised as far as the estimated error allows. Ctrl-C discards the running iteration and writes the picture so far;
+/// a second Ctrl-C ends the program at once.
 ///
-/// An option given twice: the last one holds. -h shows what a person needs first, --help everything.
+/// If an option is given twice, the last one counts. -h shows the options that you need first, --help all.
 #[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_line_help = true)]
 pub struct RenderArgs {
-    /// EXR to write: the picture and every layer that made it; '-' writes to standard output. With --frames '####' in its
-    /// name stands for the frame's number. Needed unless the RenderProduct of a stage of USD has a productName
+    /// EXR to write: the picture and its layers; '-' is standard output
+    ///
+    /// With --frames, '####' in its name stands for the number of the frame. Needed unless the RenderProduct of a stage
+    /// of USD has a productName
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     #[arg(default_value = "", hide_default_value = true, value_parser = OsStringValueParser::new().map(PathBuf::from))]
     #[serde(skip)]
@@ -33,9 +34,10 @@ pub struct RenderArgs {
     #[serde(flatten)]
     pub job: RenderOptions,
 
-    /// Pass over frames whose output is there already, so that a run can go on and several machines share one
+    /// Skip frames whose output exists, so that a run can continue and several machines can share one
     #[arg(long, help_heading = "Running")]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub skip_existing: bool,
 
     #[command(flatten)]
@@ -47,39 +49,48 @@ pub struct RenderArgs {
     /// Also write a layer of USD: a RenderProduct that points to the EXR, and a RenderVar for each of its layers
     #[arg(long, value_name = "OUT.usda", help_heading = "Output")]
     #[serde(skip)]
+    #[arg(hide_short_help = true)]
     pub usd_layer: Option<PathBuf>,
 
-    /// Show the picture while it renders, denoised: a file that is rewritten every few seconds (.png: under --exposure
-    /// and --tonemap; .exr: linear light and alpha), or 'tev', that viewer on this machine
+    /// Show the picture while it renders: in a file that is rewritten every few seconds, or in the viewer 'tev'
+    ///
+    /// The preview is denoised. A .png has --exposure and --tonemap; an .exr has linear light and alpha. tev runs on
+    /// this machine
     #[arg(long, value_name = "FILE.png|FILE.exr|tev", help_heading = "Running")]
     #[serde(skip)]
     pub preview: Option<Target>,
-    /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG: how path, light, bdpt, bpm
-    /// or vcm share the light among their strategies. Weighted pictures sum to the layer Noisy
+    /// Also write a picture per sampling technique, weighted and unweighted, as EXR and PNG
+    ///
+    /// Shows how path, light, bdpt, bpm or vcm share the light among their techniques. Weighted pictures sum to the
+    /// layer Noisy
     #[arg(long, value_name = "DIR", help_heading = "Expert")]
     #[serde(skip)]
     pub debug_techniques: Option<PathBuf>,
-    /// Reports on stderr
+    /// Form of the reports on stderr
     #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
     #[serde(skip)]
     pub progress: Form,
 }
 
 impl RenderArgs {
-    /// The render asked for.
+    /// The picture and its method, for the pipeline.
     ///
     /// # Errors
-    /// Options that contradict each other.
-    pub fn settings(&self) -> Result<Settings> {
-        let settings = self.job.settings()?;
-        if self.debug_techniques.is_some() && !takes("debug_techniques", settings.method) {
-            return Err(self.job.no_effect("debug_techniques", self.job.method.0, "vcm"));
+    /// Options contradict each other.
+    pub fn picture_request(&self) -> Result<PictureRequest<'_>> {
+        let mut request = self.job.picture_request()?;
+        if self.debug_techniques.is_none() {
+            return Ok(request);
         }
-        if self.debug_techniques.is_some() && (self.run.checkpoint.is_some() || self.run.resume.is_some()) {
+        match &mut request.method {
+            MethodRequest::Named(settings) if takes("debug_techniques", settings.method) => settings.techniques = true,
+            _ => return Err(self.job.no_effect("debug_techniques", self.job.method.0, "vcm")),
+        }
+        if self.run.checkpoint.is_some() || self.run.resume.is_some() {
             let error = Error::usage("pictures per technique are not part of a checkpoint");
             return Err(error.hint("leave --debug-techniques out"));
         }
-        Ok(Settings { techniques: self.debug_techniques.is_some(), ..settings })
+        Ok(request)
     }
 
     /// Whether there is a name for the EXR: the command line's, or the stage's.

@@ -11,7 +11,7 @@ use caustique::options::{Frames, is_pattern, numbered};
 /// Renders the frames in order, and ends at the first that fails, as Blender does; those before are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     // What is wrong for all frames is no frame's fault.
-    args.settings()?;
+    args.picture_request()?;
     check(args, frames)?;
     let count = frames.iter().len();
     for (before, frame) in frames.iter().enumerate() {
@@ -56,7 +56,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         }
         // Of several frames some may not have been begun.
         one.run.resume = left.clone().or(one.run.resume.filter(|path| count == 1 || path.exists()));
-        super::one(&one, Some(Turn { frame, before, count })).map_err(|error| {
+        super::render_one(&one, Some(Turn { frame, before, count })).map_err(|error| {
             let of_left = left.filter(|left| error.place == left.display().to_string());
             let error = match of_left {
                 Some(left) => error.hint(format!("give the same options, or remove {}", left.display())),

@@ -73,7 +73,7 @@ impl Summary {
 
     /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, which levels
     /// tell.
-    pub fn told_of_finished(&self) -> ErrorCoverage {
+    pub fn coverage_of_finished(&self) -> ErrorCoverage {
         if self.has_one_bandwidth { ErrorCoverage::Noise } else { self.told }
     }
 

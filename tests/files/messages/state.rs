@@ -7,7 +7,7 @@ use caustique::combine::{Model, Runtime};
 use caustique::error::Result;
 use caustique::pipeline::checkpoint::{self, Head};
 use caustique::pipeline::records::{self, Record};
-use caustique::pipeline::shard::{self, Open};
+use caustique::pipeline::shard::{self, ShardFile};
 use caustique::render::{MAX_SHARDS, Shard};
 use caustique::scene::usd::answer;
 use serde_json::json;
@@ -63,7 +63,7 @@ fn head(version: &str) -> Vec<u8> {
 fn sealed(contents: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = Vec::new();
     contents.iter().for_each(|content| Record::new(content).write(&mut bytes).expect("memory"));
-    records::end(&mut bytes).expect("memory");
+    records::write_end(&mut bytes).expect("memory");
     bytes
 }
 
@@ -94,7 +94,7 @@ fn shards(said: &mut Said, folder: &Path) {
         let tail = sealed(&[head(version), vec![1, 2, 3]]);
         let length = (tail.len() as u64 + 16).to_le_bytes();
         fs::write(&path, [&tail[..], &length, shard::MARK].concat()).expect("it can be written");
-        said.case(what, &refused(Open::of(&path)));
+        said.case(what, &refused(ShardFile::open(&path)));
     }
 }
 

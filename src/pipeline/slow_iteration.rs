@@ -1,38 +1,39 @@
-//! Whether a render has the time for one iteration, told before it begins: the same view in a smaller picture is rendered
-//! once, with as much work for a pixel.
+//! A warning before a render whose time limit is too short for one iteration.
 
 use crate::camera::Camera;
 use crate::choose::{pilot_settings, window_cost_ratio};
 use crate::render::{RenderInput, Session, Settings};
 use crate::scene::View;
 
-/// Pixels of the smaller picture, at most.
-const PIXELS: f64 = 64.0 * 64.0;
-/// Its share of the picture, at most.
-const SHARE: f64 = 1.0 / 64.0;
-/// Warned of are iterations that take this many times what there is, and at least a second: the estimate is rough.
-const FACTOR: f64 = 1.25;
-const LEAST_SECONDS: f64 = 1.0;
+/// Most pixels of the picture that is timed.
+const MAX_PIXELS: f64 = 64.0 * 64.0;
+/// Largest share of the picture's pixels that is timed.
+const MAX_SHARE: f64 = 1.0 / 64.0;
+/// Estimated time of an iteration over the time limit above which a warning is given: the estimate is rough.
+const WARNING_RATIO: f64 = 1.25;
+/// Shortest estimated iteration that a warning is given for (seconds).
+const MIN_SECONDS: f64 = 1.0;
 
-/// The warning, if an iteration takes more time than there is.
-pub(super) fn warn(view: View<'_>, settings: &Settings) -> Option<String> {
+/// The warning, if an iteration takes longer than the render may.
+pub(super) fn warning(view: View<'_>, settings: &Settings) -> Option<String> {
     let time = settings.time?;
-    let seconds = seconds(view, settings)?;
+    let seconds = estimate_seconds(view, settings)?;
     let remedy = match settings.method.takes_photon_count() {
         true => "fewer --photons, a smaller --width or more --time",
         false => "a smaller --width or more --time",
     };
-    (seconds > (FACTOR * time).max(LEAST_SECONDS)).then(|| {
+    (seconds > (WARNING_RATIO * time).max(MIN_SECONDS)).then(|| {
         format!("one iteration takes about {seconds:.0} s, longer than the {time:.0} s there are to render: the picture comes late and has one iteration (ask for {remedy})")
     })
 }
 
-/// About how long an iteration takes. The smaller picture is no window: the light paths around one are counted.
-fn seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Option<f64> {
+/// Seconds of an iteration, estimated by one iteration of a smaller picture with the same work per pixel. The smaller
+/// picture shows the whole film; a factor accounts for light paths outside the film.
+fn estimate_seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Option<f64> {
     let count = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
     let pixels = |camera: &Camera| count(camera.size());
     let walked = camera.sizes().map(count)[usize::from(settings.method.walks_whole_picture())];
-    let pilot = camera.downscale((PIXELS.min(SHARE * walked) / pixels(camera)).sqrt());
+    let pilot = camera.downscale((MAX_PIXELS.min(MAX_SHARE * walked) / pixels(camera)).sqrt());
     let share = pixels(&pilot) / pixels(camera);
     let factor = window_cost_ratio(scene, camera, settings);
     let settings = Settings { guided: false, ..pilot_settings(settings, share) };

@@ -1,0 +1,97 @@
+//! The third step: the method. `auto` compares candidates.
+
+use super::layers;
+use super::observer::{Event, Observer, Phase, during};
+use super::request::{MethodRequest, Request};
+use crate::choose::{self, Choice};
+use crate::error::{Error, ErrorKind, Result};
+use crate::render::output::layer_shape;
+use crate::render::{Candidate, Settings, TimeSpent};
+use crate::scene::View;
+
+/// The settings of a render, and how they were chosen.
+pub struct Chosen {
+    /// The settings.
+    pub settings: Settings,
+    /// The candidate that `auto` has chosen, in this run or before the checkpoint.
+    pub candidate: Option<Candidate>,
+    /// The comparison of `auto` in this run. `None` if the user names the method, or the options leave nothing to compare.
+    pub choice: Option<Choice>,
+}
+
+impl Chosen {
+    /// Settings that were not chosen among candidates.
+    pub fn named(settings: Settings) -> Chosen {
+        Chosen { settings, candidate: None, choice: None }
+    }
+
+    /// Time that the comparison has taken.
+    pub fn spent(&self) -> TimeSpent {
+        self.choice.as_ref().map(|choice| choice.spent).unwrap_or_default()
+    }
+}
+
+/// Settles the method. `checked`: the settings if nothing is compared. `accepts` rejects candidates by their settings.
+/// Once `stop` returns true, the comparison ends as soon as it can, and its result is not to be used.
+pub fn choose(
+    method: &mut MethodRequest<'_>,
+    checked: Settings,
+    view: View<'_>,
+    accepts: impl Fn(&Settings) -> bool,
+    stop: impl Fn() -> bool,
+) -> Chosen {
+    let MethodRequest::Auto(auto) = method else { return Chosen::named(checked) };
+    let settings_of = |candidate| (auto.settings_of)(candidate, view.camera.size()).filter(&accepts);
+    match choose::choose(view, &mut auto.finish, settings_of, stop) {
+        Some(choice) => {
+            Chosen { settings: choice.settings.clone(), candidate: Some(choice.candidate), choice: Some(choice) }
+        }
+        None => Chosen::named(checked),
+    }
+}
+
+/// Settles the method of a render, among candidates whose pictures have the layers of the request.
+///
+/// # Errors
+/// The user has stopped the render.
+pub(super) fn choose_for_render(
+    request: &mut Request<'_>,
+    checked: Settings,
+    view: View<'_>,
+    observer: &mut dyn Observer,
+) -> Result<Chosen> {
+    let (layers, finishes) = (&request.layers, request.finish.is_some());
+    let has_layers = |of: &Settings| layers::check(layers, &layer_shape(of, view.scene), finishes).is_ok();
+    let method = &mut request.picture.method;
+    let chosen = if let MethodRequest::Auto(_) = method {
+        let stop = observer.stop();
+        during(Phase::Choosing, observer, |_| choose(method, checked, view, has_layers, || stop.requested()))?
+    } else {
+        choose(method, checked, view, has_layers, || false)
+    };
+    observer.event(Event::Chosen(chosen.choice.as_ref()))?;
+    refuse_stop(observer)?;
+    Ok(chosen)
+}
+
+/// The settings of a render that continues from a checkpoint, whose candidate `auto` has chosen before.
+pub(super) fn chosen_before(
+    method: &MethodRequest<'_>,
+    candidate: Option<Candidate>,
+    checked: Settings,
+    view: View<'_>,
+) -> Chosen {
+    let settings = match (method, candidate) {
+        (MethodRequest::Auto(auto), Some(candidate)) => (auto.settings_of)(candidate, view.camera.size()),
+        _ => None,
+    };
+    Chosen { settings: settings.unwrap_or(checked), candidate, choice: None }
+}
+
+/// Errors: the user has stopped the render before its first iteration.
+pub(super) fn refuse_stop(observer: &dyn Observer) -> Result<()> {
+    match observer.stop().requested() {
+        true => Err(Error::new(ErrorKind::Interrupted, "", "interrupted before the first iteration")),
+        false => Ok(()),
+    }
+}

@@ -1,0 +1,96 @@
+//! The interface through which a render reports its progress and learns that the user wants to stop.
+
+use crate::choose::Choice;
+use crate::error::{Error, Result};
+use crate::film::LayerSet;
+use crate::image::exr;
+use crate::plan::Plan;
+use crate::render::{Progress, Rendered, Settings};
+use crate::scene::Scene;
+use crate::stop::Stop;
+
+/// A part of a render that may take long and does not report how far it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Reading and building the scene.
+    Reading,
+    /// Comparing candidates for `auto`.
+    Choosing,
+    /// Making the layers and finishing the picture.
+    Finishing,
+}
+
+/// An event of a render. The variants stand in the order in which they occur.
+pub enum Event<'a> {
+    /// A phase begins.
+    PhaseBegins(Phase),
+    /// The current phase has ended.
+    PhaseEnds,
+    /// The scene has been read and built.
+    Loaded(&'a Scene),
+    /// The method is settled. Holds the choice of `auto` if it has compared candidates.
+    Chosen(Option<&'a Choice>),
+    /// The finish has been opened.
+    FinishOpened {
+        /// Why the preferred denoiser is missing, if the built-in one takes its place.
+        missing: Option<&'a Error>,
+    },
+    /// The first iteration is about to begin.
+    Begins {
+        /// What the render simulates, with its warnings.
+        plan: &'a Plan,
+        /// The final settings.
+        settings: &'a Settings,
+    },
+    /// The render continues from a checkpoint with this number of iterations.
+    Resumed(u64),
+    /// An iteration has ended.
+    Progress(&'a Progress),
+    /// The picture so far, see [`Observer::wants_preview`].
+    Preview {
+        /// The beauty layer alone (radiance), or why it could not be made.
+        picture: Result<LayerSet>,
+        /// Position within the whole picture.
+        frame: &'a exr::Frame,
+    },
+    /// A checkpoint could not be saved; the render continues.
+    SaveFailed(&'a Error),
+    /// The last iteration has ended. The pixel sums are still available.
+    Rendered(&'a Rendered),
+    /// The finish is about to begin. A file with these layers can be finished later if the process is killed meanwhile.
+    Estimated {
+        /// The estimate and all layers that a finish reads.
+        set: &'a LayerSet,
+        /// Attributes of the EXR.
+        attributes: &'a exr::Attributes,
+    },
+}
+
+/// Receives the events of a render: the command line or a host program.
+pub trait Observer {
+    /// Receives an event.
+    ///
+    /// # Errors
+    /// An error ends the render.
+    fn event(&mut self, event: Event<'_>) -> Result<()>;
+
+    /// The flag by which the user stops the render, also within an iteration.
+    fn stop(&self) -> Stop;
+
+    /// Whether to send an [`Event::Preview`] after the current iteration.
+    fn wants_preview(&mut self) -> bool {
+        false
+    }
+}
+
+/// Runs `work` between the begin and the end of a phase.
+pub(super) fn during<T>(
+    phase: Phase,
+    observer: &mut dyn Observer,
+    work: impl FnOnce(&mut dyn Observer) -> T,
+) -> Result<T> {
+    observer.event(Event::PhaseBegins(phase))?;
+    let done = work(observer);
+    observer.event(Event::PhaseEnds)?;
+    Ok(done)
+}

@@ -1,0 +1,112 @@
+//! A render that the user asks for, validated as far as that is possible without reading the scene.
+
+use super::finish::FinishRequest;
+use super::load::SceneRequest;
+use super::memory::MemoryLimit;
+use crate::film::{Naming, Selection};
+use crate::finish::Finish;
+use crate::plan::Switches;
+use crate::render::{Candidate, Settings};
+use crate::scene::CameraRequest;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Settings of a candidate for a picture of a width and height in pixels; `None` if the options exclude the candidate.
+pub type SettingsOf<'a> = Box<dyn Fn(Candidate, (u32, u32)) -> Option<Settings> + 'a>;
+
+/// The method that the user asks for.
+pub enum MethodRequest<'a> {
+    /// The user names a method; the settings are those of this method.
+    Named(Settings),
+    /// `auto` chooses the method.
+    Auto(AutoRequest<'a>),
+}
+
+/// What `auto` chooses from.
+pub struct AutoRequest<'a> {
+    /// Settings for the checks that precede the choice, and for the render if the options leave nothing to compare.
+    pub fallback: Settings,
+    /// Settings of each candidate.
+    pub settings_of: SettingsOf<'a>,
+    /// Finish of the pilots' pictures.
+    pub finish: Finish,
+}
+
+impl<'a> MethodRequest<'a> {
+    /// The request with changed settings of every candidate of `auto`.
+    pub fn map_candidates(self, change: impl Fn(Settings) -> Settings + 'a) -> MethodRequest<'a> {
+        match self {
+            MethodRequest::Auto(auto) => {
+                let settings_of = auto.settings_of;
+                let settings_of = Box::new(move |candidate, size| settings_of(candidate, size).map(&change));
+                MethodRequest::Auto(AutoRequest { settings_of, ..auto })
+            }
+            named => named,
+        }
+    }
+
+    /// Settings for the checks that precede the choice of a method.
+    pub fn settings(&self) -> &Settings {
+        match self {
+            MethodRequest::Named(settings) => settings,
+            MethodRequest::Auto(auto) => &auto.fallback,
+        }
+    }
+
+    /// Value of `--method`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            MethodRequest::Named(settings) => settings.method.name(),
+            MethodRequest::Auto(_) => "auto",
+        }
+    }
+}
+
+/// A picture and how its light is found: the part of a request that `plan` and `render` share.
+pub struct PictureRequest<'a> {
+    /// Camera and size.
+    pub camera: CameraRequest,
+    /// The method with its settings.
+    pub method: MethodRequest<'a>,
+    /// Light paths per iteration; `None`: the method's default for the size of the picture.
+    pub photons: Option<u32>,
+    /// Longest light path in segments; `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Effects that are switched on or off.
+    pub switches: Switches,
+}
+
+/// A render that the user asks for.
+pub struct Request<'a> {
+    /// The scene file and how it is read.
+    pub scene: SceneRequest,
+    /// Camera, size and method.
+    pub picture: PictureRequest<'a>,
+    /// How the picture is finished; `None`: it stays the unfinished estimate.
+    pub finish: Option<FinishRequest>,
+    /// Layers to deliver.
+    pub layers: Selection,
+    /// Style of channel names, which the cryptomatte attributes repeat.
+    pub naming: Naming,
+    /// Options as the user gave them, for the header.
+    pub arguments: Value,
+    /// Whether the header leaves out clocks and the number of threads.
+    pub reproducible: bool,
+    /// Limit on the memory of photons, pixels and layers.
+    pub memory: Option<MemoryLimit>,
+    /// Where the checkpoint is saved during the render; `None`: nowhere.
+    pub saving: Option<Saving>,
+    /// A checkpoint to continue from.
+    pub resume: Option<PathBuf>,
+}
+
+/// Where and how often the checkpoint of a render is saved.
+#[derive(Clone, Debug)]
+pub struct Saving {
+    /// The file.
+    pub path: PathBuf,
+    /// Seconds between two saves.
+    pub every: f64,
+    /// Whether the file stays, with the last state, when the render is done, so that the render can be extended.
+    pub keep: bool,
+}

@@ -1,0 +1,45 @@
+//! The checkpoint that a render continues from, and the identity of its scene for checkpoints and shards.
+
+use super::checkpoint::{self, Head};
+use super::load::Environment;
+use super::request::Request;
+use crate::error::Result;
+use crate::render::{Settings, State};
+use crate::scene::Scene;
+
+/// The identity of a render's scene, and the state that the render continues from.
+pub(super) struct Resumption {
+    /// Hash of the scene's files. `None` if nothing needs it, or if the scene came through a pipe and cannot be read
+    /// again.
+    pub scene: Option<String>,
+    /// The checkpoint, if the render continues from one.
+    pub saved: Option<(Head, State)>,
+}
+
+impl Resumption {
+    /// Reads the checkpoint of a request.
+    ///
+    /// # Errors
+    /// The checkpoint cannot be read, or belongs to another render.
+    pub fn read(request: &Request<'_>, scene: &Scene, settings: &Settings) -> Result<Resumption> {
+        let Some(path) = &request.resume else {
+            let is_stored = request.saving.is_some() || settings.is_shard();
+            let scene = if is_stored { hash(request, scene)? } else { None };
+            return Ok(Resumption { scene, saved: None });
+        };
+        let scene = hash(request, scene)?;
+        let (head, state) = checkpoint::read(path)?;
+        checkpoint::check(path, &head, scene.as_deref(), &request.arguments)?;
+        Ok(Resumption { scene, saved: Some((head, state)) })
+    }
+}
+
+/// A hash of the files that the scene is read from.
+fn hash(request: &Request<'_>, scene: &Scene) -> Result<Option<String>> {
+    let environment = match &request.scene.environment {
+        Some(Environment::File(path)) => Some(path.as_path()),
+        _ => None,
+    };
+    let allow_outside = request.scene.options.allow_outside;
+    checkpoint::hash(&request.scene.path, scene.converted.as_deref(), environment, allow_outside)
+}

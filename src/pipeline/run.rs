@@ -1,0 +1,167 @@
+//! The sixth step: the iterations of a render, with error estimates, previews and checkpoints between them.
+
+use super::checkpoint::Head;
+use super::choose::{Chosen, refuse_stop};
+use super::finish::OpenFinish;
+use super::finished_error;
+use super::observer::{Event, Observer};
+use super::prepare::Prepared;
+use super::request::Request;
+use super::resume::Resumption;
+use super::saver::Saver;
+use crate::error::{Error, ErrorKind, Result};
+use crate::finish::reads_for_picture;
+use crate::image::atomic::is_same_file;
+use crate::image::exr;
+use crate::render::{Control, Progress, RenderInput, Rendered, Session, State, StopReason, TimeSpent, drive};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// A render during its iterations.
+pub(super) struct Running<'a> {
+    session: Session<'a>,
+    between: BetweenIterations<'a>,
+    head: Head,
+}
+
+/// A render whose iterations have ended.
+pub(super) struct Iterated {
+    /// The pixel sums.
+    pub rendered: Rendered,
+    /// The identity of the render, for shards.
+    pub head: Head,
+    /// The finish that makes the picture.
+    pub finish: Option<OpenFinish>,
+    /// A checkpoint that is no longer needed once the picture is written.
+    pub spent_checkpoint: Option<PathBuf>,
+}
+
+impl<'a> Running<'a> {
+    /// Starts a session, or continues the one of a checkpoint.
+    ///
+    /// # Errors
+    /// The checkpoint is of a picture of another size or method.
+    pub fn start(
+        request: &'a Request<'_>,
+        stage: &'a RenderInput<'a>,
+        chosen: &Chosen,
+        Prepared { finish, target, plan, .. }: Prepared,
+        Resumption { scene, saved }: Resumption,
+        frame: exr::Frame,
+        observer: &mut dyn Observer,
+    ) -> Result<Running<'a>> {
+        // A scene that came through a pipe cannot be read again to continue.
+        let saving = request.saving.as_ref().filter(|_| scene.is_some());
+        let (session, plan) = match saved {
+            None => (Session::with_time_spent(stage, chosen.spent()), json!(plan)),
+            Some((head, state)) => (resume(request, stage, state, observer)?, head.plan),
+        };
+        let head = Head {
+            version: env!("CARGO_PKG_VERSION").into(),
+            scene: scene.unwrap_or_default(),
+            arguments: request.arguments.clone(),
+            candidate: chosen.candidate,
+            plan,
+            finished: false,
+        };
+        let saver = saving.map(|saving| {
+            let continues = request.resume.as_deref().is_some_and(|resume| is_same_file(resume, &saving.path));
+            Saver::new(saving, head.clone(), continues)
+        });
+        let between = BetweenIterations { finish, target, frame, saver };
+        Ok(Running { session, between, head })
+    }
+
+    /// Iterates until the settings, the error of the finished picture or the user end the render.
+    ///
+    /// # Errors
+    /// The observer rejects an event, or the user has stopped the render before its first iteration.
+    pub fn iterate(self, observer: &mut dyn Observer) -> Result<Iterated> {
+        let Running { mut session, mut between, head } = self;
+        let mut failed = None;
+        let stop = drive(&mut session, |progress, session| {
+            between.after_iteration(progress, session, observer).unwrap_or_else(|error| {
+                failed = Some(error);
+                Control::Stop
+            })
+        });
+        failed.map_or(Ok(()), Err)?;
+        if session.iterations() == 0 && stop == StopReason::Interrupted {
+            refuse_stop(observer)?;
+        }
+        let BetweenIterations { finish, saver, .. } = between;
+        let spent_checkpoint = match saver {
+            Some(saver) => saver.save_at_end(&session, stop, observer)?,
+            None => None,
+        };
+        Ok(Iterated { rendered: session.finish(stop), head, finish, spent_checkpoint })
+    }
+}
+
+/// Continues the session of a checkpoint.
+fn resume<'a>(
+    request: &Request<'_>,
+    stage: &'a RenderInput<'a>,
+    state: State,
+    observer: &mut dyn Observer,
+) -> Result<Session<'a>> {
+    observer.event(Event::Resumed(state.iterations()))?;
+    let path = request.resume.as_deref().unwrap_or("".as_ref());
+    let other = || Error::new(ErrorKind::Usage, path.display(), "is of a picture of another size or method");
+    Session::resume(stage, state).ok_or_else(other)
+}
+
+/// The work between two iterations.
+struct BetweenIterations<'a> {
+    finish: Option<OpenFinish>,
+    /// Error of the finished picture at which the render stops.
+    target: Option<f64>,
+    frame: exr::Frame,
+    saver: Option<Saver<'a>>,
+}
+
+impl BetweenIterations<'_> {
+    fn after_iteration<'a>(
+        &mut self,
+        progress: &Progress,
+        session: &mut Session<'a>,
+        observer: &mut dyn Observer,
+    ) -> Result<Control> {
+        let estimated = finished_error::estimate(session, self.finish.as_mut(), self.target);
+        // A denoiser that fails here fails again in the finish, which reports the error and keeps the estimate.
+        let (accuracy, failed) = estimated.map_or((None, true), |accuracy| (accuracy, false));
+        let progress = finished_error::add_to_progress(progress, session, accuracy, self.target);
+        observer.event(Event::Progress(&progress))?;
+        self.preview(session, observer)?;
+        if let Some(saver) = &mut self.saver {
+            saver.save_if_due(session, observer)?;
+        }
+        Ok(match self.target {
+            _ if failed || observer.stop().requested() => Control::Stop,
+            Some(target) if finished_error::is_reached(&progress, session, accuracy, target) => Control::Reached,
+            _ => Control::Continue,
+        })
+    }
+
+    /// Sends a preview if the observer wants one, finished at the lowest quality.
+    fn preview(&mut self, session: &mut Session<'_>, observer: &mut dyn Observer) -> Result<()> {
+        if !observer.wants_preview() {
+            return Ok(());
+        }
+        let BetweenIterations { finish, frame, .. } = self;
+        let mut spent = TimeSpent::default();
+        let sent = spent.measure(|| {
+            let wanted = |name: &str| name.is_empty() || (finish.is_some() && reads_for_picture(name));
+            let picture = session.layers(wanted).and_then(|mut set| {
+                if let Some(finish) = finish {
+                    finish.apply_to_preview(&mut set)?;
+                }
+                set.layers.retain(|layer| layer.name.is_empty());
+                Ok(set)
+            });
+            observer.event(Event::Preview { picture, frame })
+        });
+        session.add_time(spent);
+        sent
+    }
+}
