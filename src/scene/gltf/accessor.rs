@@ -1,5 +1,5 @@
-//! Numbers of accessors (specification, sections 3.6.2 and 2.8 of KHR_mesh_quantization): every range is checked before
-//! memory is taken.
+//! Reads accessors (specification, section 3.6.2; KHR_mesh_quantization, section 2.8). Every range is checked before memory
+//! is allocated.
 
 use super::document::{Document, at, get};
 use super::fault;
@@ -10,7 +10,7 @@ use gltf::json::validation::Checked;
 
 const DAMAGED: &str = "the file is damaged: export it again";
 
-/// Elements that lie `stride` bytes apart.
+/// Elements of `size` bytes, `stride` bytes apart.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -36,7 +36,7 @@ impl<'a> Elements<'a> {
             let needed = needed.map_or("more bytes than can be".into(), |n| format!("{n} bytes"));
             return Err(fault("", format!("{count} elements take {needed}, its buffer view has {have}")).hint(DAMAGED));
         }
-        // Both fit in memory now.
+        // The casts are exact, because both are at most the length of `view`.
         Ok(Elements { bytes: &view[offset as usize..], stride, size, count: count as usize })
     }
 
@@ -54,7 +54,7 @@ fn unsigned(component: ComponentType, bytes: &[u8]) -> u32 {
     }
 }
 
-/// A component as a float; normalised integers by the specification's equations (section 3.6.2.2).
+/// Converts a component to a float; normalised integers by the equations of section 3.6.2.2.
 fn float(component: ComponentType, normalized: bool, bytes: &[u8]) -> f32 {
     let (value, largest) = match (component, bytes) {
         (ComponentType::F32, &[a, b, c, d, ..]) => return f32::from_le_bytes([a, b, c, d]),
@@ -68,7 +68,7 @@ fn float(component: ComponentType, normalized: bool, bytes: &[u8]) -> f32 {
 }
 
 impl Document<'_> {
-    /// Number of components of an accessor's elements.
+    /// Number of components of an element of an accessor.
     pub(super) fn width(&self, index: usize) -> Result<usize> {
         match get(&self.accessors, index, "accessor")?.type_ {
             Checked::Valid(kind) => Ok(kind.multiplicity()),
@@ -76,7 +76,7 @@ impl Document<'_> {
         }
     }
 
-    /// Vectors of `N` floats, finite or not.
+    /// Reads vectors of `N` floats, which may be non-finite.
     pub(super) fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>> {
         let normalized = get(&self.accessors, index, "accessor")?.normalized;
         self.elements(
@@ -91,7 +91,8 @@ impl Document<'_> {
         )
     }
 
-    /// Displacements of so many vertices. That many elements the file may leave out: it has shown as many.
+    /// Reads the displacements of a morph target. They may be without data, because the number of vertices was already
+    /// checked.
     pub(super) fn deltas(&self, index: usize, vertices: usize) -> Result<Vec<[f32; 3]>> {
         let count = get(&self.accessors, index, "accessor")?.count.0;
         if count != vertices as u64 {
@@ -104,7 +105,7 @@ impl Document<'_> {
         deltas
     }
 
-    /// Vertex indices.
+    /// Reads vertex indices.
     pub(super) fn indices(&self, index: usize) -> Result<Vec<u32>> {
         self.elements(index, 1, 0, &unsigned, true)
     }
@@ -132,10 +133,10 @@ impl Document<'_> {
             return Err(fault(place(), format!("its elements have {have} components instead of {width}")).hint(DAMAGED));
         }
         let (count, size) = (accessor.count.0, width * component.size());
-        // After the count is known to be that of data.
-        let room = |count: usize| {
+        // Called only after the count was checked against the data.
+        let allocate = |count: usize| {
             let bytes = count as u64 * size_of::<T>() as u64;
-            let error = self.take(bytes, "its elements");
+            let error = self.count_bytes(bytes, "its elements");
             error.map_err(|e| e.hint("render fewer or simpler meshes, or with more memory"))?;
             memory::reserve(count, "elements")
         };
@@ -145,7 +146,7 @@ impl Document<'_> {
                 let stride = get(&self.views, view.value(), "buffer view")?.byte_stride.map(|s| s.0);
                 let offset = accessor.byte_offset.unwrap_or_default().0;
                 let elements = Elements::new(bytes, offset, count, size, stride).map_err(|e| e.within(place()))?;
-                let mut values = room(elements.count).map_err(|e| e.within(place()))?;
+                let mut values = allocate(elements.count).map_err(|e| e.within(place()))?;
                 values.extend(elements.iter().map(|bytes| decode(component, bytes)));
                 values
             }
@@ -155,7 +156,7 @@ impl Document<'_> {
                     return Err(fault(place(), cause).hint(DAMAGED));
                 };
                 self.zeros_left.set(left);
-                let mut values = room(count as usize).map_err(|e| e.within(place()))?;
+                let mut values = allocate(count as usize).map_err(|e| e.within(place()))?;
                 values.resize(count as usize, zero);
                 values
             }

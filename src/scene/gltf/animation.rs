@@ -1,22 +1,22 @@
-//! The moment of an animation: what its curves say at a time is put into the document, as if it stood there, before
-//! anything is read (specification, section 3.11; KHR_animation_pointer).
+//! Applies an animation at one time: the values of its curves are written into the document before the rest is read
+//! (specification, section 3.11; KHR_animation_pointer).
 //!
-//! All animations of a file play together, for exporters write one for each action or track. Frame N is at N / rate
+//! All animations of a file play together, because exporters write one for each action or track. Frame N is at N / rate
 //! seconds, as in Blender's exporter.
 
 use super::container::{self, malformed};
 use super::curve::{Curve, Sampler};
 use super::document::{Document, get, named};
 use super::extras::{self, SceneExtras};
-use super::pointer::{self, Nowhere};
+use super::pointer::{self, PointerError};
 use super::{FrameTime, fault};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::HashMap;
 
-/// Frames a second where neither the scene nor anyone else says how many: those of Blender's and film's default.
-const USUAL_RATE: f64 = 24.0;
+/// Frames per second if neither the scene nor the user sets a rate: the default of Blender and of film.
+const DEFAULT_RATE: f64 = 24.0;
 
 #[derive(Deserialize)]
 struct Animation {
@@ -34,22 +34,22 @@ struct Channel {
     target: Value,
 }
 
-/// Something that moves.
+/// An animated value.
 struct Track {
-    /// JSON pointer to it.
+    /// JSON pointer to the value.
     pointer: String,
-    /// Which animation, and which channel of it.
+    /// Animation and channel, for messages.
     place: String,
     curve: Curve,
 }
 
-/// Puts a frame, or the beginning of its animations, into a document. A picture that asks for no frame does without
-/// the animations that have a fault.
+/// Applies a frame to a document, or without a frame the time of the first key. Without a frame, invalid animations are
+/// skipped with a warning.
 ///
 /// # Errors
-/// A frame is asked for, and keys cannot be, or what moves does not exist.
-pub(super) fn pose(document: &mut Document, frame: Option<FrameTime>, warnings: &mut Vec<String>) -> Result<()> {
-    let faults = Faults { fatal: frame.is_some() };
+/// A frame is given, and an animation is invalid.
+pub(super) fn apply(document: &mut Document, frame: Option<FrameTime>, warnings: &mut Vec<String>) -> Result<()> {
+    let faults = FaultPolicy { fatal: frame.is_some() };
     let tracks = tracks(document, faults, warnings)?;
     let Some(start) = tracks.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
         if frame.is_some_and(|frame| !frame.of_sequence) {
@@ -65,30 +65,31 @@ pub(super) fn pose(document: &mut Document, frame: Option<FrameTime>, warnings: 
         }
     };
     for Track { pointer, place, curve } in &tracks {
-        let turns = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
-        match pointer::put(&mut document.raw, pointer, &curve.at(time, turns), container::is_read) {
+        let rotation = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
+        match pointer::put(&mut document.raw, pointer, &curve.at(time, rotation), container::is_supported) {
             Ok(()) => {}
-            Err(Nowhere::Missing) => {
+            Err(PointerError::Missing) => {
                 let cause = format!("it moves {pointer}, which does not exist");
-                faults.meet(fault(place, cause).hint("the file is damaged: export it again"), warnings)?;
+                faults.handle(fault(place, cause).hint("the file is damaged: export it again"), warnings)?;
             }
-            Err(Nowhere::Unread) => {
+            Err(PointerError::Unread) => {
                 warnings.push(format!("{place}: it moves {pointer}, which is not read: it stays as it is"));
             }
         }
     }
-    document.read_again()
+    document.reparse_animated()
 }
 
-/// What becomes of the faults of animations.
+/// Treatment of invalid animations.
 #[derive(Clone, Copy)]
-struct Faults {
-    /// They are errors; otherwise warnings.
+struct FaultPolicy {
+    /// Whether they are errors, instead of warnings.
     fatal: bool,
 }
 
-impl Faults {
-    fn meet(self, error: Error, warnings: &mut Vec<String>) -> Result<()> {
+impl FaultPolicy {
+    /// Returns the error, or turns it into a warning.
+    fn handle(self, error: Error, warnings: &mut Vec<String>) -> Result<()> {
         if self.fatal {
             return Err(error);
         }
@@ -97,35 +98,35 @@ impl Faults {
     }
 }
 
-/// Frames a second.
+/// Frames per second: of the scene, else of `frame`, else the default.
 fn rate(document: &Document, frame: FrameTime, warnings: &mut Vec<String>) -> Result<f64> {
     let index = document.default_scene()?;
     let said: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
-    let good = |rate: &f64| rate.is_finite() && *rate > 0.0;
-    // One that is none is told where the rest of the scene's extras are.
-    let said = said.frame_rate.map(|rate| {
+    let is_valid = |rate: &f64| rate.is_finite() && *rate > 0.0;
+    // The reader of the scene's extras rejects an invalid rate.
+    let rate = said.frame_rate.map(|rate| {
         let [frames, seconds] = rate.fraction().map(f64::from);
         frames / seconds
     });
-    Ok(said.filter(good).or(frame.rate.filter(good)).unwrap_or_else(|| {
+    Ok(rate.filter(is_valid).or(frame.rate.filter(is_valid)).unwrap_or_else(|| {
         warnings.push(format!(
-            "the file does not tell its frame rate: {USUAL_RATE} frames a second are assumed (--frame-rate decides)"
+            "the file does not tell its frame rate: {DEFAULT_RATE} frames a second are assumed (--frame-rate decides)"
         ));
-        USUAL_RATE
+        DEFAULT_RATE
     }))
 }
 
-/// All that moves, each once.
-fn tracks(document: &Document, faults: Faults, warnings: &mut Vec<String>) -> Result<Vec<Track>> {
+/// The animated values of all animations. If several animations move a value, the first one does.
+fn tracks(document: &Document, faults: FaultPolicy, warnings: &mut Vec<String>) -> Result<Vec<Track>> {
     let list = document.raw["animations"].as_array().map_or(&[][..], Vec::as_slice);
-    // By what it moves: the animation.
+    // The name of the animation that moves each pointer.
     let mut movers: HashMap<String, String> = HashMap::new();
     let mut tracks = Vec::new();
     for (i, raw) in list.iter().enumerate() {
         let animation = match Animation::deserialize(raw) {
             Ok(animation) => animation,
             Err(e) => {
-                faults.meet(malformed(format!("animation {i}"), &e), warnings)?;
+                faults.handle(malformed(format!("animation {i}"), &e), warnings)?;
                 continue;
             }
         };
@@ -139,14 +140,14 @@ fn tracks(document: &Document, faults: Faults, warnings: &mut Vec<String>) -> Re
                     continue;
                 }
                 Err(e) => {
-                    faults.meet(e.within(&place), warnings)?;
+                    faults.handle(e.within(&place), warnings)?;
                     continue;
                 }
             };
             match movers.get(&pointer) {
                 Some(first) if *first == name => {
                     let error = fault(&place, format!("it moves {pointer}, as another of its channels does"));
-                    faults.meet(error, warnings)?;
+                    faults.handle(error, warnings)?;
                     continue;
                 }
                 Some(first) => {
@@ -158,14 +159,14 @@ fn tracks(document: &Document, faults: Faults, warnings: &mut Vec<String>) -> Re
             };
             match curve(document, &animation.samplers, channel.sampler, &pointer) {
                 Ok(curve) => tracks.push(Track { curve, pointer, place }),
-                Err(e) => faults.meet(e.within(&place), warnings)?,
+                Err(e) => faults.handle(e.within(&place), warnings)?,
             }
         }
     }
     Ok(tracks)
 }
 
-/// The curve of a channel.
+/// Reads the curve of a channel, and checks the width of its values.
 fn curve(document: &Document, samplers: &[Sampler], index: usize, pointer: &str) -> Result<Curve> {
     let curve =
         Curve::read(document, get(samplers, index, "sampler")?).map_err(|e| e.within(format!("sampler {index}")))?;
@@ -181,7 +182,7 @@ fn curve(document: &Document, samplers: &[Sampler], index: usize, pointer: &str)
     Ok(curve)
 }
 
-/// JSON pointer to what a channel moves, if it names anything.
+/// JSON pointer to the value that a channel moves; `None` if the target is missing or unknown.
 fn target(document: &Document, target: &Value) -> Result<Option<String>> {
     let path = target["path"].as_str().unwrap_or_default();
     if path == "pointer" {

@@ -1,4 +1,4 @@
-//! From bytes to JSON and the binary chunk (specification, section 4.4), and what the document demands of its reader.
+//! Splits a file into JSON and the binary chunk (specification, section 4.4), and checks version and required extensions.
 
 use super::fault;
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
-/// Extensions that are read.
+/// Supported extensions.
 const SUPPORTED: [&str; 19] = [
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
@@ -30,12 +30,12 @@ const SUPPORTED: [&str; 19] = [
     "KHR_texture_transform",
 ];
 
-/// Whether an extension is read.
-pub(super) fn is_read(extension: &str) -> bool {
+/// Whether an extension is supported.
+pub(super) fn is_supported(extension: &str) -> bool {
     SUPPORTED.contains(&extension)
 }
 
-/// Splits a `.glb` into its JSON and binary chunks; a `.gltf` is all JSON.
+/// Splits a `.glb` into its JSON and its binary chunk; a `.gltf` is JSON alone.
 pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
     let (json, binary) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, &[][..]) };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
@@ -47,13 +47,13 @@ pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
     Ok((value, binary))
 }
 
-/// Makes whole numbers integers, however they are written: 4, 4.0 and 4e0 are the same (specification, section 2.7).
+/// Converts floats with an integral value to integers: 4, 4.0 and 4e0 are equivalent (specification, section 2.7).
 fn unify_integers(value: &mut Value) {
     match value {
         Value::Array(list) => list.iter_mut().for_each(unify_integers),
         Value::Object(object) => object.values_mut().for_each(unify_integers),
         Value::Number(number) if number.is_f64() => {
-            // Above 2^53 a double does not tell one integer from the next; and -0.0 has a sign to keep.
+            // Doubles above 2^53 do not represent every integer, and -0.0 must keep its sign.
             let whole =
                 |x: &f64| x.fract() == 0.0 && x.abs() <= (1u64 << 53) as f64 && x.to_bits() != (-0.0f64).to_bits();
             if let Some(x) = number.as_f64().filter(whole) {
@@ -64,7 +64,7 @@ fn unify_integers(value: &mut Value) {
     }
 }
 
-/// A little-endian word.
+/// Reads a little-endian 32-bit word.
 fn word(bytes: &[u8], at: usize) -> Option<usize> {
     let word = bytes.get(at..at.checked_add(4)?)?;
     Some(u32::from_le_bytes(word.try_into().ok()?) as usize)
@@ -95,7 +95,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8])> {
             b"BIN\0" if binary.is_none() => binary = Some(chunk),
             _ => {}
         }
-        // Chunks start at multiples of four.
+        // Chunks are aligned to four bytes.
         at = start + size.next_multiple_of(4);
     }
     match json {
@@ -104,8 +104,8 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8])> {
     }
 }
 
-/// Checks the version and the extensions that the document names. Unknown required ones are an error, optional ones
-/// warnings.
+/// Checks the version and the extensions of the document. An unsupported extension is an error if it is required, and a
+/// warning otherwise.
 pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> {
     let asset = &document["asset"];
     for key in ["version", "minVersion"] {
@@ -127,7 +127,7 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
         names.filter_map(|name| name.as_str().map(str::to_owned)).collect()
     };
     let required = listed("extensionsRequired");
-    let unknown: Vec<&String> = required.iter().filter(|name| !is_read(name)).collect();
+    let unknown: Vec<&String> = required.iter().filter(|name| !is_supported(name)).collect();
     if let Some(first) = unknown.first() {
         let names: Vec<String> = unknown.iter().map(|name| format!("\"{name}\"")).collect();
         let (word, are) = if unknown.len() == 1 { ("extension", "is") } else { ("extensions", "are") };
@@ -138,15 +138,15 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
         .hint(remedy(first)));
     }
     let mut used = listed("extensionsUsed");
-    collect(document, &mut used);
-    for name in used.iter().filter(|name| !is_read(name)) {
+    collect_extensions(document, &mut used);
+    for name in used.iter().filter(|name| !is_supported(name)) {
         warnings.push(format!("extension \"{name}\" is not supported: what it says is ignored"));
     }
     Ok(())
 }
 
-/// The fault of a part of the document whose data only a compression that is not read holds; `None` for other parts.
-pub(super) fn compressed(part: &Value) -> Option<Error> {
+/// The error for a part of the document with an unsupported compression extension; `None` for other parts.
+pub(super) fn compression_error(part: &Value) -> Option<Error> {
     let names = part["extensions"].as_object()?.keys();
     let name = names.into_iter().find(|name| name.ends_with("_compression"))?;
     let cause = format!("all its data is compressed by extension \"{name}\", which is not supported");
@@ -163,10 +163,10 @@ fn remedy(extension: &str) -> &'static str {
     }
 }
 
-/// Names of the extensions that stand anywhere in the document, listed or not. Extras are the user's own.
-fn collect(value: &Value, names: &mut BTreeSet<String>) {
+/// Adds the names of all extensions in the document, listed or not. Extras may have keys of any name.
+fn collect_extensions(value: &Value, names: &mut BTreeSet<String>) {
     match value {
-        Value::Array(list) => list.iter().for_each(|item| collect(item, names)),
+        Value::Array(list) => list.iter().for_each(|item| collect_extensions(item, names)),
         Value::Object(object) => {
             for (key, item) in object {
                 match (key.as_str(), item) {
@@ -174,12 +174,12 @@ fn collect(value: &Value, names: &mut BTreeSet<String>) {
                     ("extensions", Value::Object(extensions)) => {
                         for (name, extension) in extensions {
                             names.insert(name.clone());
-                            if is_read(name) {
-                                collect(extension, names);
+                            if is_supported(name) {
+                                collect_extensions(extension, names);
                             }
                         }
                     }
-                    _ => collect(item, names),
+                    _ => collect_extensions(item, names),
                 }
             }
         }
@@ -187,7 +187,7 @@ fn collect(value: &Value, names: &mut BTreeSet<String>) {
     }
 }
 
-/// What a value of a JSON document should have been.
+/// The error for a value of the wrong JSON type.
 pub(super) fn malformed(place: impl std::fmt::Display, cause: &serde_json::Error) -> Error {
     fault(place, cause).hint(DAMAGED)
 }

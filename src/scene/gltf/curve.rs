@@ -1,4 +1,4 @@
-//! Curves of an animation: keys over time, and what lies between them (specification, section 3.11 and appendix C).
+//! Curves of an animation: keys over time, and interpolation between them (specification, section 3.11 and appendix C).
 
 use super::document::{Document, get};
 use super::fault;
@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 const DAMAGED: &str = "the file is damaged: export the animation again";
 
-/// A sampler as it stands in the file.
+/// An animation sampler in the file.
 #[derive(Deserialize)]
 pub(super) struct Sampler {
     input: usize,
@@ -25,22 +25,22 @@ enum Interpolation {
     CubicSpline,
 }
 
-/// Keys at growing times.
+/// A curve with keys at increasing times.
 pub(super) struct Curve {
-    /// Seconds.
+    /// Times of the keys (seconds).
     times: Vec<f32>,
-    /// `width` numbers a key; of splines its tangent in, its value and its tangent out.
+    /// For each key, `width` numbers of its value; for splines the in-tangent, the value and the out-tangent.
     values: Vec<f32>,
-    /// Numbers of a value.
+    /// Number of components of a value.
     pub(super) width: usize,
     interpolation: Interpolation,
 }
 
 impl Curve {
-    /// Reads the keys of a sampler.
+    /// Reads the curve of a sampler.
     ///
     /// # Errors
-    /// Times that do not grow, a number that is not finite, or values that are not as many as the keys want.
+    /// Times do not increase, a number is not finite, or the number of values does not fit the number of keys.
     pub(super) fn read(document: &Document, sampler: &Sampler) -> Result<Curve> {
         let input = |e: crate::error::Error| e.within("input");
         let times: Vec<f32> = document.floats::<1>(sampler.input).map_err(input)?.into_iter().flatten().collect();
@@ -67,15 +67,14 @@ impl Curve {
         Ok(Curve { width: values.len() / slots, times, values, interpolation: sampler.interpolation })
     }
 
-    /// When its first key is (seconds).
+    /// Time of the first key (seconds).
     pub(super) fn start(&self) -> f64 {
         f64::from(self.times[0])
     }
 
-    /// The value at a time (seconds); before the first key and after the last one it is theirs. `turns`: values are unit
-    /// quaternions.
-    pub(super) fn at(&self, time: f64, turns: bool) -> Vec<f64> {
-        // Files hold times in f32: what is a key's time but for rounding is that key's.
+    /// The value at a time (seconds), clamped to the first and last key. `rotation`: values are unit quaternions.
+    pub(super) fn at(&self, time: f64, rotation: bool) -> Vec<f64> {
+        // Files have times in f32, so a time that equals a key's time up to rounding counts as the key's.
         let after = self.times.partition_point(|key| f64::from(*key) <= time + 1e-6 * time.max(1.0));
         let Some(k) = after.checked_sub(1) else { return self.value(0) };
         if after == self.times.len() || self.interpolation == Interpolation::Step {
@@ -86,11 +85,11 @@ impl Curve {
         match self.interpolation {
             Interpolation::CubicSpline => {
                 let value = self.spline(k, step, s);
-                if turns { quaternion(&value).map_or(value, |unit| unit.to_array().to_vec()) } else { value }
+                if rotation { quaternion(&value).map_or(value, |unit| unit.to_array().to_vec()) } else { value }
             }
             _ => {
                 let (from, to) = (self.value(k), self.value(after));
-                match (turns, quaternion(&from), quaternion(&to)) {
+                match (rotation, quaternion(&from), quaternion(&to)) {
                     (true, Some(from), Some(to)) => from.slerp(to, s).to_array().to_vec(),
                     _ => from.iter().zip(&to).map(|(a, b)| a + (b - a) * s).collect(),
                 }
@@ -108,7 +107,8 @@ impl Curve {
         self.values[start..start + self.width].iter().map(|x| f64::from(*x)).collect()
     }
 
-    /// Hermite's cubic from key `k` to the next, which is `step` seconds later, at share `s` of the way (appendix C.5).
+    /// Cubic Hermite interpolation between key `k` and the next key, `step` seconds later, at parameter `s` in [0, 1]
+    /// (appendix C.5).
     fn spline(&self, k: usize, step: f64, s: f64) -> Vec<f64> {
         let (s2, s3) = (s * s, s * s * s);
         let parts = [
@@ -122,7 +122,7 @@ impl Curve {
 }
 
 impl Interpolation {
-    /// Values that a key holds.
+    /// Number of values per key.
     fn slots(self) -> usize {
         if self == Interpolation::CubicSpline { 3 } else { 1 }
     }
@@ -133,7 +133,7 @@ fn quaternion(value: &[f64]) -> Option<glam::DQuat> {
     glam::DVec4::from_array(four).try_normalize().map(glam::DQuat::from_vec4)
 }
 
-/// All numbers of an accessor, whatever its elements are.
+/// All numbers of an accessor, for elements of any width.
 fn flat(document: &Document, index: usize) -> Result<Vec<f32>> {
     get(&document.accessors, index, "accessor")?;
     Ok(match document.width(index)? {

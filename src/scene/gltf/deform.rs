@@ -2,7 +2,7 @@
 //! blend skinning).
 
 use super::document::{Document, get, named};
-use super::transform::{Worlds, affine, finite};
+use super::transform::{WorldTransforms, affine, is_finite};
 use super::{counted, fault};
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -43,7 +43,7 @@ impl Deformation {
     ///
     /// # Errors
     /// Weights that are no numbers; a skin, or a joint of it, that does not exist or stands nowhere.
-    pub(super) fn of(document: &Document, mesh: usize, node: usize, worlds: &Worlds) -> Result<Deformation> {
+    pub(super) fn of(document: &Document, mesh: usize, node: usize, worlds: &WorldTransforms) -> Result<Deformation> {
         let raw = document.part("nodes", node);
         let weights = raw.get("weights").or(document.part("meshes", mesh).get("weights"));
         let weights = weights.map_or(Ok(Vec::new()), |list| {
@@ -140,7 +140,7 @@ fn add(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut Mesh) 
 }
 
 /// Joint matrices: the inverse bind matrix, then the joint's own place in the world.
-fn joints(document: &Document, raw: &Value, worlds: &Worlds) -> Result<Vec<DAffine3>> {
+fn joints(document: &Document, raw: &Value, worlds: &WorldTransforms) -> Result<Vec<DAffine3>> {
     let skin = Skin::deserialize(raw).map_err(|e| fault("", e).hint(EXPORT))?;
     let binds = skin.inverse_bind_matrices.map(|index| document.floats::<16>(index)).transpose()?;
     if binds.as_ref().is_some_and(|binds| binds.len() < skin.joints.len()) {
@@ -151,7 +151,7 @@ fn joints(document: &Document, raw: &Value, worlds: &Worlds) -> Result<Vec<DAffi
         let bind = bind
             .ok_or_else(|| fault(format!("inverse bind matrix {i}"), "its last row is not 0, 0, 0, 1").hint(EXPORT))?;
         let joint = worlds.of(node)? * bind;
-        if !finite(&joint) {
+        if !is_finite(&joint) {
             return Err(
                 fault(format!("joint {i}"), "its transform is not finite").hint("look at its scale and position")
             );

@@ -1,4 +1,4 @@
-//! A glTF document in parts with types, its raw JSON beside them for extensions and extras.
+//! A glTF document: its parts as typed lists, and its raw JSON for extensions and extras.
 
 use super::container::{self, malformed};
 use super::{fault, uri};
@@ -12,11 +12,11 @@ use std::borrow::Cow;
 use std::cell::Cell;
 use std::fmt::Display;
 
-/// The most elements that a file may have without data. An accessor without a buffer view has such elements, most of which
-/// a sparse accessor is meant to replace.
+/// Maximum number of elements without data in a file. Accessors without a buffer view have them; they are zero unless a
+/// sparse accessor replaces them.
 const MAX_ZEROS: u64 = 1 << 20;
 
-/// A parsed document. Indices in it are not checked yet: `get` does that.
+/// A parsed document. `get` checks indices when they are used.
 pub(super) struct Document<'a> {
     pub(super) raw: Value,
     pub(super) folder: Folder<'a>,
@@ -29,31 +29,31 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<json::Image>,
     pub(super) textures: Vec<json::Texture>,
     pub(super) samplers: Vec<json::texture::Sampler>,
-    /// Number of further elements that the file may have without data.
+    /// Number of elements without data that the file may still have.
     pub(super) zeros_left: Cell<u64>,
-    /// Bytes that were taken since memory was last asked for.
-    unasked: Cell<u64>,
+    /// Bytes that were allocated since the last check of free memory.
+    unchecked_bytes: Cell<u64>,
     buffers: Vec<Cow<'a, [u8]>>,
 }
 
 impl<'a> Document<'a> {
-    /// Blender's exporter wrote it, perhaps with more from ours: the world is left out.
+    /// Whether Blender's exporter wrote the file, which does not export the world. Our own exporter uses it, too.
     pub(super) fn is_by_blender(&self) -> bool {
         self.blender_version().is_some()
     }
 
-    /// First two numbers of the version of Blender's exporter, if it wrote the file; the newest if it does not say one.
+    /// Major and minor version of Blender's exporter, if it wrote the file. A missing version counts as the newest.
     pub(super) fn blender_version(&self) -> Option<[u32; 2]> {
         let version = self.raw["asset"]["generator"].as_str()?.strip_prefix("Khronos glTF Blender I/O")?;
         let mut numbers = version.trim_start().trim_start_matches('v').split('.').map(|n| n.parse().ok());
         Some([numbers.next().flatten().unwrap_or(u32::MAX), numbers.next().flatten().unwrap_or(0)])
     }
 
-    /// Parses a file and loads its buffers; other files are looked for in `folder`.
+    /// Parses a file and loads its buffers from `folder`.
     pub(super) fn parse(bytes: &'a [u8], folder: Folder<'a>, warnings: &mut Vec<String>) -> Result<Document<'a>> {
         let (mut raw, binary) = container::split(bytes)?;
         container::check(&raw, warnings)?;
-        // A scene without nodes is valid glTF; the crate wants the list.
+        // A scene without nodes is valid glTF, but the crate requires the list.
         for scene in raw.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
             if let Some(scene) = scene.as_object_mut() {
                 scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
@@ -73,23 +73,23 @@ impl<'a> Document<'a> {
             raw,
             folder,
             zeros_left: Cell::new(MAX_ZEROS),
-            unasked: Cell::new(0),
+            unchecked_bytes: Cell::new(0),
             buffers: Vec::new(),
         };
         document.buffers = document.load_buffers(&described, binary)?;
         Ok(document)
     }
 
-    /// Counts bytes that are about to be taken for `what`, and asks whether there are so many once they are many: a file
-    /// of many parts can name the same data in all of them.
-    pub(super) fn take(&self, bytes: u64, what: impl Display) -> Result<()> {
-        let unasked = self.unasked.get().saturating_add(bytes);
-        self.unasked.set(unasked);
-        if unasked < memory::MIN_CHECKED_BYTES {
+    /// Counts bytes that are about to be allocated for `what`, and checks free memory whenever the count gets large. A
+    /// small file can use the same data in many parts, so each allocation alone may be small.
+    pub(super) fn count_bytes(&self, bytes: u64, what: impl Display) -> Result<()> {
+        let unchecked = self.unchecked_bytes.get().saturating_add(bytes);
+        self.unchecked_bytes.set(unchecked);
+        if unchecked < memory::MIN_CHECKED_BYTES {
             return Ok(());
         }
-        self.unasked.set(0);
-        memory::require(unasked, what)
+        self.unchecked_bytes.set(0);
+        memory::require(unchecked, what)
     }
 
     fn load_buffers(&self, list: &[json::Buffer], binary: &'a [u8]) -> Result<Vec<Cow<'a, [u8]>>> {
@@ -102,7 +102,7 @@ impl<'a> Document<'a> {
             };
             let (promised, there) = (buffer.byte_length.0, bytes.len());
             if promised > there as u64 {
-                if let Some(error) = container::compressed(&self.raw["buffers"][i]) {
+                if let Some(error) = container::compression_error(&self.raw["buffers"][i]) {
                     return Err(error.within(place));
                 }
                 return Err(fault(place, format!("{promised} bytes are promised, {there} are there"))
@@ -113,15 +113,15 @@ impl<'a> Document<'a> {
         list.iter().enumerate().map(load).collect()
     }
 
-    /// The bytes that a URI stands for.
+    /// The bytes at a URI.
     pub(super) fn bytes_of(&self, uri: &str) -> Result<Vec<u8>> {
         uri::load(uri, self.folder, |bytes| {
-            let error = self.take(bytes, "files that the scene names");
+            let error = self.count_bytes(bytes, "files that the scene names");
             error.map_err(|e| e.hint("name each file once, or render with more memory"))
         })
     }
 
-    /// Index of the scene that is shown.
+    /// Index of the default scene.
     pub(super) fn default_scene(&self) -> Result<usize> {
         let Some(value) = self.raw.get("scene") else { return Ok(0) };
         let index = value.as_u64().and_then(|i| usize::try_from(i).ok());
@@ -129,14 +129,14 @@ impl<'a> Document<'a> {
         get(&self.scenes, index, "scene").map(|_| index)
     }
 
-    /// Reads what may have been moved in the raw JSON.
-    pub(super) fn read_again(&mut self) -> Result<()> {
+    /// Parses nodes and cameras again, after an animation has changed the raw JSON.
+    pub(super) fn reparse_animated(&mut self) -> Result<()> {
         self.nodes = parts(&self.raw, "nodes")?;
         self.cameras = parts(&self.raw, "cameras")?;
         Ok(())
     }
 
-    /// The raw JSON of part `index` of a list of the document; `null` if there is none.
+    /// The raw JSON of item `index` in a list of the document; `null` if there is none.
     pub(super) fn part(&self, list: &str, index: usize) -> &Value {
         &self.raw[list][index]
     }
@@ -160,12 +160,12 @@ impl<'a> Document<'a> {
     }
 }
 
-/// `accessor 12`.
+/// A place in an error message: `accessor 12`.
 pub(super) fn at(kind: &str, index: usize) -> String {
     format!("{kind} {index}")
 }
 
-/// `mesh "water"`, or `mesh 3` without a name.
+/// A place in an error message: `mesh "water"`, or `mesh 3` without a name.
 pub(super) fn named(kind: &str, name: Option<&str>, index: usize) -> String {
     match name.filter(|name| !name.is_empty()) {
         Some(name) => format!("{kind} \"{name}\""),
@@ -173,7 +173,7 @@ pub(super) fn named(kind: &str, name: Option<&str>, index: usize) -> String {
     }
 }
 
-/// The item at `index`.
+/// The item at `index`, or an error.
 pub(super) fn get<'l, T>(list: &'l [T], index: usize, kind: &str) -> Result<&'l T> {
     list.get(index).ok_or_else(|| {
         let cause = match list.len() {
@@ -184,7 +184,7 @@ pub(super) fn get<'l, T>(list: &'l [T], index: usize, kind: &str) -> Result<&'l 
     })
 }
 
-/// An extension of a part of the document, and its type.
+/// Parses the extension `name` of a part of the document, if there is one.
 pub(super) fn extension<T: DeserializeOwned>(part: &Value, name: &str, place: impl Display) -> Result<Option<T>> {
     match part.get("extensions").and_then(|e| e.get(name)) {
         None => Ok(None),
@@ -192,7 +192,7 @@ pub(super) fn extension<T: DeserializeOwned>(part: &Value, name: &str, place: im
     }
 }
 
-/// The parts in a list of the document.
+/// Parses the items of a list of the document.
 fn parts<T: DeserializeOwned>(raw: &Value, list: &str) -> Result<Vec<T>> {
     let items = match raw.get(list) {
         None => return Ok(Vec::new()),
@@ -207,8 +207,8 @@ fn parts<T: DeserializeOwned>(raw: &Value, list: &str) -> Result<Vec<T>> {
     items.iter().enumerate().map(part).collect()
 }
 
-/// Keys whose numbers are 64-bit integers, or floats.
-const WIDE: [&str; 16] = [
+/// Keys whose values are 64-bit integers or floats.
+const WIDE_KEYS: [&str; 16] = [
     "count",
     "byteLength",
     "byteOffset",
@@ -227,10 +227,10 @@ const WIDE: [&str; 16] = [
     "ymag",
 ];
 
-/// A part without its extensions and extras, which the crate cannot parse in every place where they may stand; and
-/// without numbers that the crate would cut down to 32 bits.
+/// A part without extensions and extras, which the crate cannot parse everywhere. Rejects integers that the crate would
+/// truncate to 32 bits.
 fn core(value: &Value, place: &str) -> Result<Value> {
-    let wide = |key: &str| WIDE.contains(&key);
+    let wide = |key: &str| WIDE_KEYS.contains(&key);
     Ok(match value {
         Value::Object(object) => {
             let mut kept = Map::new();

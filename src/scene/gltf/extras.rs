@@ -1,5 +1,5 @@
-//! `extras.caustique`: what glTF cannot say. Each kind of part has its keys; an unknown one is a warning with a
-//! suggestion.
+//! `extras.caustique`: properties that glTF cannot express. Each kind of part has its own keys; an unknown key gives a
+//! warning with a suggestion.
 
 use super::container::malformed;
 use super::fault;
@@ -28,7 +28,7 @@ pub(super) struct SceneExtras {
     pub(super) frame_rate: Option<Rate>,
 }
 
-/// Frames in a second: a whole number, or a fraction.
+/// Frames per second: a whole number or a fraction.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "a whole number, or two for a fraction as in [24000, 1001]")]
 pub(super) enum Rate {
@@ -46,7 +46,7 @@ impl Rate {
     }
 }
 
-/// To whom something is visible; light meets it either way.
+/// Visibility to cameras; other rays hit the object in any case.
 #[derive(Deserialize)]
 #[serde(default)]
 pub(super) struct Visible {
@@ -59,7 +59,7 @@ impl Default for Visible {
     }
 }
 
-/// Light from infinity: a colour or a file.
+/// Extras of an environment: a colour or a file.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct EnvironmentExtras {
@@ -102,13 +102,13 @@ impl Medium {
     }
 }
 
-/// How a material lies on opaque surfaces, or others on it.
+/// Contact between a material and opaque surfaces that touch it.
 #[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Contact {
-    /// With a film of air between.
+    /// A film of air is between them.
     Air,
-    /// Without.
+    /// No air is between them.
     Optical,
 }
 
@@ -151,7 +151,7 @@ pub(super) struct LightExtras {
     pub(super) light_group: Option<String>,
 }
 
-/// Keys of each kind; those of nested objects follow a dot.
+/// Keys of each kind of part; keys of nested objects follow a dot.
 pub(super) const SCENE: &[&str] = &[
     "environment",
     "environment.color",
@@ -191,7 +191,7 @@ pub(super) const NODE: &[&str] = &[
     "light_group",
 ];
 
-/// `extras.caustique` of a part of the document; the default if there is none.
+/// Reads `extras.caustique` of a part of the document; the default if there are none.
 pub(super) fn read<T: Default + DeserializeOwned>(part: &Value, place: &str) -> Result<T> {
     match part.get("extras").and_then(|extras| extras.get("caustique")) {
         None | Some(Value::Null) => Ok(T::default()),
@@ -203,7 +203,7 @@ pub(super) fn read<T: Default + DeserializeOwned>(part: &Value, place: &str) -> 
     }
 }
 
-/// Warns of keys in `extras.caustique` that are not `known`.
+/// Adds a warning for each key in `extras.caustique` that is not in `known`.
 pub(super) fn check_keys(part: &Value, known: &[&str], place: &str, warnings: &mut Vec<String>) {
     if let Some(value) = part.get("extras").and_then(|extras| extras.get("caustique")) {
         check_object(value, "", known, place, warnings);

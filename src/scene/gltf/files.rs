@@ -1,4 +1,4 @@
-//! The files that a scene file names, whether it uses them or not.
+//! Lists and hashes the files that a scene file names, used or not.
 
 use super::container;
 use super::uri;
@@ -7,8 +7,8 @@ use crate::scene::folder::Folder;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// A hash of the scene file at `scene` and of the files that it names and that are there, in its folder unless they may
-/// lie outside.
+/// Hash of the scene file at `scene` and of the existing files that it names. Files outside the scene's folder are
+/// skipped unless `allow_outside`.
 ///
 /// # Errors
 /// The scene file cannot be read.
@@ -16,15 +16,15 @@ pub fn hash(scene: &Path, allow_outside: bool) -> Result<String> {
     let bytes = std::fs::read(scene).map_err(|cause| Error::io(scene, &cause))?;
     let mut hasher = blake3::Hasher::new();
     hasher.update(&bytes);
-    let beside = files(&bytes, scene, allow_outside);
-    for bytes in beside.iter().filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok()) {
+    let named = files(&bytes, scene, allow_outside);
+    for bytes in named.iter().filter(|path| path.is_file()).filter_map(|path| std::fs::read(path).ok()) {
         hasher.update(&bytes);
     }
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// The files that the bytes of a scene file at `scene` name, in its folder unless they may lie outside; whether they
-/// are there is not looked at. None of what is no glTF.
+/// The files that a scene file with these bytes names, existing or not. Files outside the scene's folder are skipped
+/// unless `allow_outside`. Empty if the bytes are not glTF.
 pub fn files(bytes: &[u8], scene: &Path, allow_outside: bool) -> Vec<PathBuf> {
     let mut found = Vec::new();
     if let Ok((json, _)) = container::split(bytes) {
@@ -33,7 +33,7 @@ pub fn files(bytes: &[u8], scene: &Path, allow_outside: bool) -> Vec<PathBuf> {
     found
 }
 
-/// The values of keys that name files: `uri` of buffers and images, `file` of an environment.
+/// Adds the values of keys that name files: `uri` of buffers and images, `file` of an environment.
 fn collect(json: &Value, folder: Folder, found: &mut Vec<PathBuf>) {
     match json {
         Value::Array(values) => values.iter().for_each(|value| collect(value, folder, found)),

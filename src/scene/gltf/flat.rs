@@ -1,11 +1,11 @@
-//! Meshes on nodes whose scale is zero along an axis: what a ball becomes is a disc, the limit of small scales.
+//! Flattens meshes on nodes whose scale is zero along an axis: a ball becomes a disc, the limit for small scales.
 
 use super::mesh::drop_degenerate;
 use crate::geometry::Mesh;
 use crate::math::{DMat3, Vec3};
 
-/// The mesh through a transform that cannot be inverted; `None` where it leaves no triangle with an area. Faces have
-/// their own normals then: those of vertices lie across the plane, or nowhere.
+/// Applies a transform that cannot be inverted to a mesh. `None` if no triangle with an area remains. Vertex normals are
+/// removed, because the transformed ones would not be those of the plane.
 pub(super) fn flattened(mesh: &Mesh, transform: &DMat3) -> Option<Mesh> {
     let mut flat = mesh.clone();
     for p in &mut flat.positions {

@@ -35,7 +35,7 @@ pub(super) fn read(
     // Without a buffer view its positions would all be zero.
     let has_data = |a: &json::Accessor| a.buffer_view.is_some() || a.sparse.is_some();
     let positions = reader.accessor(&Semantic::Positions).and_then(|index| document.accessors.get(index));
-    if let Some(error) = positions.filter(|a| !has_data(a)).and_then(|_| container::compressed(raw)) {
+    if let Some(error) = positions.filter(|a| !has_data(a)).and_then(|_| container::compression_error(raw)) {
         return Err(error.within(place));
     }
     let mode = match source.mode {

@@ -1,12 +1,12 @@
-//! Reads glTF 2.0 (`.glb`, `.gltf`) as Blender exports it, and as others do, into a [`Description`].
+//! Reads glTF 2.0 files (`.glb`, `.gltf`) from Blender and other programs into a [`Description`].
 //!
-//! The specification: <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>. The `gltf` crate names the parts of
-//! a document; what they say about indices, ranges and bytes is checked here, because files come from anywhere: a fault
-//! is an error that names its place, and whatever is ignored or approximated is a warning.
+//! The specification is at <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>. The `gltf` crate defines the types
+//! of a document. Indices, ranges and lengths are checked here, because files come from untrusted sources. An invalid file
+//! gives an error that names the place in the file; a feature that is ignored or approximated gives a warning.
 //!
-//! Data flows one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `animation` (which puts a
-//! moment of its curves into the document) -> `nodes` (the hierarchy), which calls for meshes, materials and textures as
-//! it meets them, so that what no node uses is not even decoded.
+//! Data flow one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `animation` (applies the
+//! chosen time to the document) -> `nodes` (the hierarchy). `nodes` reads meshes, materials and textures on demand, so data
+//! that no node uses are not decoded.
 
 mod accessor;
 mod animation;
@@ -39,7 +39,7 @@ use serde::Serialize;
 use std::fmt::Display;
 use std::path::Path;
 
-/// What the numbers of punctual lights mean.
+/// Units of the intensities of punctual lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -57,7 +57,7 @@ pub enum LightUnits {
     Photometric,
 }
 
-/// What a transmissive mesh without a volume extension is.
+/// Treatment of transmissive meshes without a volume extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -71,56 +71,56 @@ pub enum Glass {
     Thin,
 }
 
-/// A frame of the animations in a file.
+/// A frame of an animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTime {
-    /// Its number: frame N is N / rate seconds after the start.
+    /// Frame number; frame N is at N / rate seconds.
     pub number: u32,
-    /// Frames a second of files that do not tell theirs; 24 if this does not either.
+    /// Frames per second, for files without a frame rate of their own; 24 if `None`.
     pub rate: Option<f64>,
-    /// The file is that of this frame alone, and may well be still.
+    /// Whether the file is one of a sequence with a file per frame, so that a missing animation needs no warning.
     pub of_sequence: bool,
 }
 
-/// How to read what a file leaves open.
+/// Choices for properties that a file may leave open.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ReadOptions {
     /// Units of punctual lights.
     pub light_units: LightUnits,
-    /// Glass without a volume extension.
+    /// Treatment of glass without a volume extension.
     pub glass: Glass,
-    /// Files that the scene names may lie outside its own folder.
+    /// Whether the scene may name files outside its own folder.
     pub allow_outside: bool,
-    /// The frame that is shown; otherwise that at the first key of all animations.
+    /// The frame to read; `None`: the time of the first key of all animations.
     pub frame: Option<FrameTime>,
 }
 
-/// Reads the scene file at `path`; buffers, textures and the environment that it names are looked for beside it, and
-/// nowhere outside its folder unless `options` allow it.
+/// Reads the scene file at `path`. The buffers, textures and environment that it names must be in its folder, unless
+/// `options` allow other files.
 ///
 /// # Errors
-/// The file or one that it names cannot be read, is damaged, or requires an extension that is not supported. The place
-/// in the error names the file and the part of it.
+/// The file, or one that it names, cannot be read, is damaged, or requires an unsupported extension. The error names the
+/// file and the place in it.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
     let bytes = std::fs::read(path)
         .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
     read_bytes(&bytes, path, options)
 }
 
-/// Like [`read`], from the bytes of a file that stands (or would stand) at `path`.
+/// [`read`] from the bytes of a file; files that the scene names are relative to `path`.
 ///
 /// # Errors
-/// Those of [`read`].
+/// As for [`read`].
 pub fn read_bytes(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
     nodes::describe(bytes, path, options).map_err(|e| e.within(path.display()))
 }
 
-/// `1 vertex`, `2 vertices`.
+/// A number with its noun: `1 vertex`, `2 vertices`.
 fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
-/// A fault of the scene file at a place in it.
+/// An error at a place in the scene file.
 fn fault(place: impl Display, cause: impl Display) -> Error {
     Error::new(ErrorKind::Scene, place, cause)
 }

@@ -9,7 +9,7 @@ use super::materials::{Library, tangent_coordinates};
 use super::mesh::FARTHEST;
 use super::shells;
 use super::topology::Solid;
-use super::transform::{Worlds, can_be_inverted, compose, finite, local};
+use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
 use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -37,12 +37,12 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
     let mut warnings = Vec::new();
     let folder = Folder::of(path, options.allow_outside);
     let mut document = Document::parse(bytes, folder, &mut warnings)?;
-    animation::pose(&mut document, options.frame, &mut warnings)?;
+    animation::apply(&mut document, options.frame, &mut warnings)?;
     let mut reader = Reader {
         document: &document,
         library: Library::new(options.glass),
         meshes: HashMap::new(),
-        worlds: Worlds::new(&document),
+        worlds: WorldTransforms::new(&document),
         bounds: Vec::new(),
         clips: Vec::new(),
         divisors: None,
@@ -113,7 +113,7 @@ struct Reader<'r> {
     library: Library,
     /// By mesh of the file, and the node that gives it a shape of its own.
     meshes: HashMap<(usize, Option<usize>), Vec<Part>>,
-    worlds: Worlds<'r, 'r>,
+    worlds: WorldTransforms<'r, 'r>,
     /// Local bounds of the meshes read.
     bounds: Vec<(DVec3, DVec3)>,
     /// Clip planes of the cameras.
@@ -208,7 +208,7 @@ impl Reader<'_> {
                 EnvironmentSource::Color(color)
             }
             (None, Some(file)) => {
-                let file = uri::local(file).and_then(|file| self.document.folder.file(file.as_ref()));
+                let file = uri::require_path(file).and_then(|file| self.document.folder.file(file.as_ref()));
                 let file = file.map_err(|e| e.within("environment"))?;
                 environment_file::read(&file, &mut self.out.warnings)?
             }
@@ -240,7 +240,7 @@ impl Reader<'_> {
             }
             let raw = document.part("nodes", index);
             let to_world = parent * local(raw, &place)?;
-            if !finite(&to_world) {
+            if !is_finite(&to_world) {
                 return Err(fault(place, "its transform is not finite").hint("look at its scale and position"));
             }
             let shown = shown
@@ -316,7 +316,7 @@ impl Reader<'_> {
         let mut flat = 0;
         for copy in copies {
             let to_world = to_world * copy;
-            let turns = can_be_inverted(&to_world);
+            let turns = is_invertible(&to_world);
             for &Part { mesh, material } in parts {
                 self.check_reach(mesh, &to_world, place)?;
                 let (mesh, to_world) = if turns {
@@ -344,7 +344,7 @@ impl Reader<'_> {
         let Some(flat) = flattened(&self.out.meshes[mesh as usize], transform) else { return Ok(None) };
         let bytes = flat.positions.len() as u64 * VERTEX_BYTES + flat.triangles.len() as u64 * TRIANGLE_BYTES;
         let what = "meshes on nodes whose scale is zero along an axis";
-        self.document.take(bytes, what).map_err(|e| e.within(place))?;
+        self.document.count_bytes(bytes, what).map_err(|e| e.within(place))?;
         self.bounds.push(self.bounds[mesh as usize]);
         self.out.meshes.push(flat);
         Ok(Some(self.out.meshes.len() as u32 - 1))
@@ -448,7 +448,7 @@ impl Reader<'_> {
         let copy = |i: usize| {
             let three = |v: &Option<Vec<[f32; 3]>>| v.as_ref().map(|v| v[i].map(f64::from));
             let turn = turns.as_ref().map(|v| v[i].map(f64::from));
-            let copy = compose(three(&moves), turn, three(&scales)).filter(finite);
+            let copy = compose(three(&moves), turn, three(&scales)).filter(is_finite);
             copy.ok_or_else(|| within(fault("", format!("the transform of copy {i} is not finite"))))
         };
         let mut copies = memory::reserve(n, "copies").map_err(within)?;

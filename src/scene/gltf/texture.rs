@@ -247,7 +247,7 @@ fn check_room(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<
         }
     }
     document
-        .take(needed, format_args!("{width} x {height} texels"))
+        .count_bytes(needed, format_args!("{width} x {height} texels"))
         .map_err(|e| e.hint("save the image smaller, or render with more memory"))?;
     Ok(jpeg.is_some_and(|jpeg| !jpeg.ends))
 }

@@ -8,8 +8,8 @@ use serde_json::Value;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-/// Transform of a node against its parent: a matrix, or translation, rotation and scale (specification, section 3.5.3),
-/// with all the digits of the file.
+/// Transform of a node relative to its parent, from a matrix, or from translation, rotation and scale (specification,
+/// section 3.5.3), read from the raw JSON in f64.
 pub(super) fn local(raw: &Value, place: &str) -> Result<DAffine3> {
     fn numbers<const N: usize>(raw: &Value, key: &str, place: &str) -> Result<Option<[f64; N]>> {
         let Some(value) = raw.get(key) else { return Ok(None) };
@@ -26,43 +26,43 @@ pub(super) fn local(raw: &Value, place: &str) -> Result<DAffine3> {
     compose(t, r, s).ok_or_else(|| fault(place, "its rotation is not a quaternion"))
 }
 
-/// A matrix of 16 numbers, column by column. `None`: its last row is not 0, 0, 0, 1.
+/// The transform of a column-major 4 x 4 matrix. `None` if the last row is not 0, 0, 0, 1.
 pub(super) fn affine(m: [f64; 16]) -> Option<DAffine3> {
     let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
     let transform = DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) };
     ([m[3], m[7], m[11], m[15]] == [0.0, 0.0, 0.0, 1.0]).then_some(transform)
 }
 
-/// Scale, then rotation (a quaternion, made unit), then translation. `None`: the rotation has no direction.
+/// Composes scale, then rotation (a quaternion, normalised), then translation. `None` if the quaternion is zero.
 pub(super) fn compose(t: Option<[f64; 3]>, r: Option<[f64; 4]>, s: Option<[f64; 3]>) -> Option<DAffine3> {
     let rotation = glam::DVec4::from_array(r.unwrap_or([0.0, 0.0, 0.0, 1.0])).try_normalize()?;
     let (t, s) = (DVec3::from_array(t.unwrap_or([0.0; 3])), DVec3::from_array(s.unwrap_or([1.0; 3])));
     Some(DAffine3::from_scale_rotation_translation(s, glam::DQuat::from_vec4(rotation), t))
 }
 
-pub(super) fn finite(transform: &DAffine3) -> bool {
+pub(super) fn is_finite(transform: &DAffine3) -> bool {
     transform.matrix3.is_finite() && transform.translation.is_finite()
 }
 
-/// Whether f32 can hold the inverse of a transform.
-pub(super) fn can_be_inverted(transform: &DAffine3) -> bool {
+/// Whether a transform has an inverse that f32 can represent.
+pub(super) fn is_invertible(transform: &DAffine3) -> bool {
     let inverse = transform.matrix3.inverse();
     transform.matrix3.determinant() != 0.0
         && inverse.is_finite()
         && inverse.to_cols_array().iter().all(|x| x.abs() < f64::from(f32::MAX).sqrt())
 }
 
-/// Transforms of nodes against the world, whatever scene they stand in.
-pub(super) struct Worlds<'d, 'a> {
+/// World transforms of nodes in any scene of the document.
+pub(super) struct WorldTransforms<'d, 'a> {
     document: &'d Document<'a>,
-    /// Of each node.
+    /// Parent of each node.
     parents: Vec<Option<usize>>,
-    /// Those that have been asked for, and those above them: joints share their ancestors.
+    /// Cache of world transforms by node, because joints share their ancestors.
     known: RefCell<HashMap<usize, DAffine3>>,
 }
 
-impl<'d, 'a> Worlds<'d, 'a> {
-    pub(super) fn new(document: &'d Document<'a>) -> Worlds<'d, 'a> {
+impl<'d, 'a> WorldTransforms<'d, 'a> {
+    pub(super) fn new(document: &'d Document<'a>) -> WorldTransforms<'d, 'a> {
         let mut parents = vec![None; document.nodes.len()];
         for (parent, node) in document.nodes.iter().enumerate() {
             for child in node.children.iter().flatten() {
@@ -71,28 +71,28 @@ impl<'d, 'a> Worlds<'d, 'a> {
                 }
             }
         }
-        Worlds { document, parents, known: RefCell::default() }
+        WorldTransforms { document, parents, known: RefCell::default() }
     }
 
-    /// Transform of a node against the world.
+    /// The world transform of a node.
     ///
     /// # Errors
-    /// There is no such node, it is its own ancestor, or a transform on the way is malformed.
+    /// The node does not exist or is its own ancestor, or a transform of an ancestor is invalid.
     pub(super) fn of(&self, node: usize) -> Result<DAffine3> {
         let mut known = self.known.borrow_mut();
-        let (mut way, mut at) = (Vec::new(), Some(node));
+        let (mut chain, mut at) = (Vec::new(), Some(node));
         while let Some(index) = at.filter(|index| !known.contains_key(index)) {
             get(&self.document.nodes, index, "node")?;
-            // A node has fewer ancestors than there are nodes.
-            if way.len() == self.parents.len() {
+            // A longer chain than the number of nodes is a cycle.
+            if chain.len() == self.parents.len() {
                 let error = fault(format!("node {node}"), "it is its own ancestor");
                 return Err(error.hint("the file is damaged: export it again"));
             }
-            way.push(index);
+            chain.push(index);
             at = self.parents[index];
         }
         let mut whole = at.and_then(|index| known.get(&index).copied()).unwrap_or(DAffine3::IDENTITY);
-        for index in way.into_iter().rev() {
+        for index in chain.into_iter().rev() {
             let name = self.document.nodes[index].name.as_deref();
             whole *= local(self.document.part("nodes", index), &named("node", name, index))?;
             known.insert(index, whole);

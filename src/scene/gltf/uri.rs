@@ -1,13 +1,12 @@
-//! Where the bytes of buffers and images are: data URIs and files beside the scene (RFC 2397, RFC 3986).
+//! Loads buffers and images from data URIs (RFC 2397) and files (RFC 3986).
 
 use super::fault;
 use crate::error::{Error, ErrorKind, Result};
 use crate::scene::folder::Folder;
 use std::path::PathBuf;
 
-/// The bytes that `uri` stands for; relative paths start at `folder`. `room` is asked for those of a file before they
-/// are read.
-pub(super) fn load(uri: &str, folder: Folder, room: impl FnOnce(u64) -> Result<()>) -> Result<Vec<u8>> {
+/// The bytes at `uri`; relative paths start at `folder`. `reserve` is called with the size of a file before it is read.
+pub(super) fn load(uri: &str, folder: Folder, reserve: impl FnOnce(u64) -> Result<()>) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((head, body)) = data.split_once(',') else {
             return Err(fault("", "its data URI has no comma").hint("export the scene again"));
@@ -24,32 +23,32 @@ pub(super) fn load(uri: &str, folder: Folder, room: impl FnOnce(u64) -> Result<(
         Error::new(ErrorKind::Io, "", format!("the file {path} cannot be read: {cause}"))
             .hint("put the file there, or export as .glb, which holds buffers and textures itself")
     };
-    // A device or a pipe might never end.
+    // Reading a device or a pipe may never end.
     let meta = std::fs::metadata(&path).map_err(cause)?;
     if !meta.is_file() {
         return Err(cause(std::io::Error::other("it is not a regular file")));
     }
-    room(meta.len())?;
+    reserve(meta.len())?;
     std::fs::read(&path).map_err(cause)
 }
 
-/// The file that a relative or absolute path in a URI names.
+/// The path of the file that a URI names.
 pub(super) fn path_of(uri: &str, folder: Folder) -> Result<PathBuf> {
     let path = match uri.strip_prefix("file://") {
         Some(path) => path,
-        None => without_scheme(uri)?,
+        None => require_no_scheme(uri)?,
     };
     let path = String::from_utf8(percent_decode(path)).map_err(|_| fault("", "its URI is not valid UTF-8"))?;
     folder.file(path.as_ref())
 }
 
-/// A name without a scheme, which is that of a file.
+/// Rejects a name with a URI scheme.
 ///
 /// # Errors
-/// It has one.
-fn without_scheme(name: &str) -> Result<&str> {
+/// The name has a scheme.
+fn require_no_scheme(name: &str) -> Result<&str> {
     match name.split_once(':') {
-        // One letter is a drive.
+        // A single letter is a drive.
         Some((s, _)) if s.len() > 1 && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)) => {
             let error = fault("", format!("a URI of scheme \"{s}\" cannot be read"));
             Err(error.hint("save what it names beside the scene file"))
@@ -58,15 +57,15 @@ fn without_scheme(name: &str) -> Result<&str> {
     }
 }
 
-/// A path, which is no URI: colons may stand in it.
+/// Rejects a path that is a URI. Colons alone are valid in paths.
 ///
 /// # Errors
-/// It is a URI all the same.
-pub(super) fn local(path: &str) -> Result<&str> {
-    if path.contains("://") { without_scheme(path) } else { Ok(path) }
+/// The path is a URI.
+pub(super) fn require_path(path: &str) -> Result<&str> {
+    if path.contains("://") { require_no_scheme(path) } else { Ok(path) }
 }
 
-/// `%41` is `A`; a percent sign without two digits stands for itself.
+/// Decodes `%41` to `A`; a percent sign without two hexadecimal digits stays.
 fn percent_decode(text: &str) -> Vec<u8> {
     let bytes = text.as_bytes();
     let digit = |i: usize| bytes.get(i).and_then(|b| char::from(*b).to_digit(16));
@@ -86,7 +85,7 @@ fn percent_decode(text: &str) -> Vec<u8> {
     out
 }
 
-/// RFC 4648, standard alphabet, with or without padding.
+/// Decodes base64 with the standard alphabet of RFC 4648, with or without padding.
 fn base64(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut held) = (0u32, 0);
@@ -106,7 +105,7 @@ fn base64(text: &str) -> Option<Vec<u8>> {
             out.push((bits >> held) as u8);
         }
     }
-    // Six bits left over are half a letter.
+    // Six remaining bits are an incomplete byte.
     (held < 6).then_some(out)
 }
 
@@ -116,7 +115,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn base64_of_the_rfc() {
+    fn base64_decodes_the_examples_of_the_rfc() {
         for (text, bytes) in [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9vYmE", "fooba"), ("Zm9vYmFy", "foobar")] {
             assert_eq!(base64(text).as_deref(), Some(bytes.as_bytes()));
         }
