@@ -1,2 +1,2 @@
-"""The suite of hard cases: scenes with an answer that a renderer must meet, their judge and its page. See
-docs/lab/hard-cases.md."""
+"""The suite of hard cases: scenes with answers that a renderer must meet, the tests of its pictures, and the page of
+results. See docs/lab/hard-cases.md."""

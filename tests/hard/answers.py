@@ -1,7 +1,8 @@
-"""The answers that cases must meet. Each judges a stage, which plays one case with one method, and says itself in JSON.
+"""The answers that cases must meet. An answer tests the pictures of a stage, which renders one case by one method, and
+has a form in JSON.
 
-`bound` and `resolves` are shares of the answer: what is allowed beside noise, and the most noise with which the case is
-decided (judge.py). `peers` tells whether other renderers can be asked.
+`bound` and `resolves` are shares of the answer: the deviation that is allowed besides noise, and the largest noise with
+which a case is decided (judge.py). `peers` is False for answers that other renderers cannot give.
 """
 
 import re
@@ -13,16 +14,16 @@ from .stage import Broken, read
 
 
 class Answer:
-    """What a case must meet; `derivation` says why, in words."""
+    """An answer that a case must meet; `derivation` gives the reason in words."""
 
     peers = True
 
     def judge(self, stage):
-        """The Verdict."""
+        """The Verdict on the pictures of a stage."""
         raise NotImplementedError
 
     def shown(self):
-        """The scenes whose pictures the page shows."""
+        """The labels of the scenes whose pictures the page shows."""
         raise NotImplementedError
 
     def document(self):
@@ -49,7 +50,7 @@ class Value(Answer):
 
 @dataclass(frozen=True)
 class Values(Answer):
-    """Scenes of a case, each with its own radiance: {scene: number}. The worst one counts."""
+    """Every pixel of each scene has the scene's radiance, {scene: number}. The worst scene counts."""
 
     values: dict
     derivation: str
@@ -69,7 +70,7 @@ class Values(Answer):
 
 @dataclass(frozen=True)
 class Equal(Answer):
-    """Scenes that look like a first one, within noise; `warned`: what the program must say of them."""
+    """All `scenes` look like the scene `like`, within noise; `warned`: a pattern that the program's warnings must match."""
 
     like: str
     scenes: tuple
@@ -93,7 +94,7 @@ class Equal(Answer):
 
 @dataclass(frozen=True)
 class Exact(Answer):
-    """Scenes whose pictures are those of a first one times a power of two, to the last bit: {scene: power}."""
+    """The picture of each scene is, to the last bit, the picture of `like` times a power of two: {scene: power}."""
 
     like: str
     powers: dict
@@ -126,7 +127,7 @@ class Black(Answer):
 
 @dataclass(frozen=True)
 class Warned(Answer):
-    """What has no right answer is said: the program's warning matches, and no pixel is outside of low to high."""
+    """The scene has no correct picture: a warning matches `match`, and all pixels are between `low` and `high`."""
 
     match: str
     low: float
@@ -150,8 +151,8 @@ class Warned(Answer):
 
 @dataclass(frozen=True)
 class Sweep(Answer):
-    """Scenes in order, {scene: what a model says of its mean}: what the model leaves changes smoothly, and the first
-    `falling` means fall."""
+    """A sequence of scenes, {scene: mean that a model predicts}: the difference from the model changes smoothly, and the
+    first `falling` means decrease."""
 
     model: dict
     derivation: str
@@ -169,7 +170,7 @@ class Sweep(Answer):
 
 @dataclass(frozen=True)
 class Refused(Answer):
-    """The program ends with an error whose text matches."""
+    """The program ends with an error whose text matches `match`."""
 
     match: str
     derivation: str
@@ -191,7 +192,7 @@ class Refused(Answer):
 
 @dataclass(frozen=True)
 class Threads(Answer):
-    """Files are equal whatever the number of threads."""
+    """Files are equal for all numbers of threads."""
 
     derivation: str
     counts: tuple = (1, 2, 3, 7)
@@ -212,8 +213,8 @@ class Threads(Answer):
 
 @dataclass(frozen=True)
 class Shards(Answer):
-    """Shards merged in any order are the picture of a render that was not divided, to the last bit; with `files` their
-    headers are equal as well, among orders."""
+    """Shards that are merged in any order give, to the last bit, the picture of an undivided render. With `files`, the
+    merged files of all orders are equal, including their headers."""
 
     derivation: str
     files: bool = False
@@ -243,7 +244,7 @@ class Shards(Answer):
 
 @dataclass(frozen=True)
 class Resumed(Answer):
-    """A render that goes on from a checkpoint, after it was killed, is the file of one that was not stopped."""
+    """A killed render that resumes from its checkpoint writes the same file as an uninterrupted one."""
 
     derivation: str
     scene: str = "scene"
@@ -254,7 +255,7 @@ class Resumed(Answer):
         saved, path = stage.picture("state").with_suffix(".checkpoint"), stage.picture("resumed")
         arguments = [a for a in stage.arguments(self.scene, 0) if a != "--no-checkpoint"]
         saved.unlink(missing_ok=True)
-        # A share of the time of the whole render, and longer where nothing had been saved by then.
+        # The kill comes after a share of the whole render's time, and later if nothing has been saved by then.
         after = 0.4 * stage.seconds
         for _ in range(8):
             code, said = stage.run(
@@ -277,7 +278,7 @@ class Resumed(Answer):
 
 
 def worst(verdicts):
-    """The verdict of several, {scene: verdict}: the one nearest to its limit, or beyond it."""
+    """The verdict on several scenes, {scene: verdict}: the one that is closest to its limit, or farthest beyond it."""
     label = max(verdicts, key=lambda label: (not verdicts[label].passed, verdicts[label].share))
     one = verdicts[label]
     return judge.Verdict(

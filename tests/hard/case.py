@@ -1,28 +1,28 @@
-"""A case: scenes, the methods that it concerns, and the answer that they must meet."""
+"""A case: scenes, the methods that render them, and the answer that the pictures must meet."""
 
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-#: The program's table of methods: tests/generated.rs writes the file.
+#: The program's table of methods, written by tests/generated.rs.
 _TABLE = json.loads((Path(__file__).parents[1] / "methods.json").read_text("utf-8"))
 #: All methods.
 ALL_METHODS = tuple(method["name"] for method in _TABLE)
-#: Methods that send a number of light paths of their own.
+#: Methods whose number of light paths is an option.
 PHOTON_METHODS = tuple(method["name"] for method in _TABLE if method["photons"])
-#: Methods of a case unless it says others: paths, connections, both with photons, and photons alone.
+#: The default methods of a case: camera paths, connections, connections with photons, and photons.
 METHODS = ("path", "bdpt", "vcm", "sppm")
 
-#: Seeds of cases whose pictures have next to no noise.
+#: Number of seeds for cases with little noise.
 FEW = 6
 
 
 @dataclass
 class Case:
-    """name: of files and on the command line; title: what it tests; scenes: {label: function that makes a Scene}.
+    """name: in files and on the command line; title: what the case tests; scenes: {label: function that makes a Scene}.
 
-    iterations, photons and options: of every method, or {method: ...} with those of the others at None.
-    fails: {method: why the program is known not to meet the answer}. long: whether the long form alone has it.
+    iterations, photons and options: one value for all methods, or {method: value} with the default under None.
+    fails: {method: reason of a known failure}. long: whether only --long runs the case.
     """
 
     name: str
@@ -44,12 +44,12 @@ class Case:
         return f"{self.name}.glb" if len(self.scenes) == 1 else f"{self.name}-{label}.glb"
 
     def of(self, key, method):
-        """What iterations, photons or options are with a method."""
-        said = getattr(self, key)
-        return said.get(method, said[None]) if isinstance(said, dict) else said
+        """The value of iterations, photons or options for a method."""
+        value = getattr(self, key)
+        return value.get(method, value[None]) if isinstance(value, dict) else value
 
     def document(self):
-        """All that others need to play the case, as JSON: NAME.json beside the scenes."""
+        """The case as JSON for other renderers, written as NAME.json beside the scenes."""
         return {
             "name": self.name,
             "family": self.family,

@@ -1,4 +1,4 @@
-"""12. Determinism: the same bytes from any number of threads, from shards merged in any order, and after a kill."""
+"""12. Determinism: equal bytes for any number of threads, for shards merged in any order, and after a kill."""
 
 from . import magnitude
 from .answers import Resumed, Shards, Threads
@@ -13,7 +13,7 @@ CASES = [
         "threads",
         "1, 2, 3 and 7 threads",
         SCENE,
-        Threads("What a pixel and a photon are follows from their numbers alone, and sums have a fixed order."),
+        Threads("Random numbers depend only on the indices of pixels and photons, and sums have a fixed order."),
         ALL_METHODS,
         size=24,
         iterations=2,
@@ -23,7 +23,7 @@ CASES = [
         "shards",
         "Three shards, merged in all six orders, and one whole render",
         SCENE,
-        Shards("Iterations are numbered; a sum has a fixed order whoever made its parts."),
+        Shards("Random numbers depend on the iteration's number, and sums do not depend on the order of their parts."),
         DIVIDED,
         size=16,
         iterations=6,
@@ -33,7 +33,7 @@ CASES = [
         "shards-files",
         "The files of shards that are merged in all six orders",
         SCENE,
-        Shards("With --reproducible a merge writes no clocks and no names.", files=True),
+        Shards("With --reproducible, a merge writes no times and no file names.", files=True),
         ("path", "vcm"),
         size=16,
         iterations=6,
@@ -42,7 +42,7 @@ CASES = [
         "resumed",
         "A render that is killed and resumed",
         SCENE,
-        Resumed("A checkpoint is the whole state."),
+        Resumed("A checkpoint contains the whole state of the render."),
         ("path", "sppm", "vcm", "cppm"),
         size=48,
         iterations={None: 60, "path": 200},

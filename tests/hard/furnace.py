@@ -1,4 +1,4 @@
-"""7. Furnaces: what is lit from everywhere alike, and takes no light away, looks like the light."""
+"""7. Furnaces: under uniform light, objects that absorb nothing have the radiance of the light."""
 
 from functools import partial
 
@@ -13,13 +13,13 @@ ROUGHNESS = (0.0, 0.05, 0.3, 1.0)
 
 
 def closed(albedo, emitted=1.0):
-    """A closed box whose walls all emit and reflect; the camera in it looks at a wall."""
+    """A closed box whose walls emit and reflect; the camera inside looks at a wall."""
     walls = shapes.box((-1, -1, -1), (1, 1, 1)).flipped()
     return s.Scene().add(walls, s.glowing(s.diffuse(albedo), emitted)).seen((0.1, 0.2, 0.3), (1, 0.1, 0), 30)
 
 
 def white(material, mesh=None):
-    """A sphere in a white environment, which the picture's middle shows."""
+    """A sphere (or `mesh`) in a white environment; the camera looks at its middle."""
     return s.Scene().within(1).add(mesh or shapes.sphere((0, 0, 0), 1), material).seen((0, 0.5, 4), (0, 0, 0), 12)
 
 
@@ -30,7 +30,7 @@ def mirrors():
     return lamp.add(walls, s.metal(1, 0)).seen((0.8, 0.7, 0.75), (-1, 0.1, 0), 60)
 
 
-#: Light is the same all over the wall, so that wide bandwidths blur nothing.
+#: The walls are uniform, so wide bandwidths do not blur anything.
 WIDE = {None: (), "sppm": ("--initial-bandwidth", "0.3"), "vcm": ("--initial-bandwidth", "0.3")}
 
 
@@ -67,10 +67,10 @@ def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, i
 
 
 def _with(material, layer, roughness, strength):
-    """A material below a layer (clearcoat or sheen) of this roughness and strength."""
+    """A material with a layer (clearcoat or sheen) of this roughness and strength on top."""
     key = {"clearcoat": "clearcoatFactor", "sheen": "sheenColorFactor"}[layer]
-    told = {key: strength, f"{layer}RoughnessFactor": roughness}
-    return {**material, "extensions": {**material.get("extensions", {}), f"KHR_materials_{layer}": told}}
+    values = {key: strength, f"{layer}RoughnessFactor": roughness}
+    return {**material, "extensions": {**material.get("extensions", {}), f"KHR_materials_{layer}": values}}
 
 
 CASES = [
@@ -80,8 +80,8 @@ CASES = [
         {"scene": mirrors},
         Value(
             1.0,
-            "Mirrors lose nothing, and a ray goes on until it meets the ball, but for a set of measure zero: radiance is the"
-            " ball's along every ray.",
+            "Mirrors lose nothing, and almost every ray continues until it hits the ball: radiance is the ball's along"
+            " every ray.",
             bound=0.005,
             resolves=0.1,
         ),

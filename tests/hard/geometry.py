@@ -1,4 +1,4 @@
-"""6. Geometry: what exporters write and should not, and what they may write and renderers trip over."""
+"""6. Geometry: faulty meshes that exporters write, and correct meshes that renderers often get wrong."""
 
 from dataclasses import replace
 from functools import partial
@@ -13,7 +13,7 @@ from .case import FEW, Case
 TITLE = "Geometry"
 EYE = ("path", "bdpt", "vcm", "sppm")
 GREY = s.diffuse((0.7, 0.6, 0.5))
-#: A triangle whose corners are one point, one whose corners are on a line, and one with a corner taken twice.
+#: A triangle whose corners coincide, one whose corners are collinear, and one that uses a corner twice.
 DEGENERATE = shapes.Mesh(
     np.array([[0, 0.2, 0], [0, 0.2, 0], [0, 0.2, 0], [0.1, 0.2, 0], [0.2, 0.2, 0]], float),
     np.array([[0, 1, 2], [0, 3, 4], [0, 0, 4]]),
@@ -21,7 +21,7 @@ DEGENERATE = shapes.Mesh(
 
 
 def stage(mesh, material=GREY, **node):
-    """A mesh under a lamp, on a floor."""
+    """A mesh (or None) on a floor under a light."""
     made = s.Scene().add(shapes.floor(1.5), s.diffuse(0.8)).add(shapes.ceiling(0.3, 2), s.emitter(6))
     return (made if mesh is None else made.add(mesh, material, **node)).seen((0, 1.2, 3), (0, 0.3, 0), 30)
 
@@ -31,7 +31,7 @@ def ball(rings=24, smooth=True):
 
 
 def slivers(count=1000):
-    """The floor as a fan of triangles as thin as 1 : 1000 and, beside it, needles of 1 : 10^6."""
+    """The floor as triangles with an aspect ratio of 1 : 1000, and needles of 1 : 10^6 between them."""
     x = np.linspace(-1.5, 1.5, count + 1)
     x = np.sort(np.concatenate([x, x[1:-1] + 1e-6]))
     near, far = (np.stack([x, np.zeros_like(x), np.full_like(x, z)], 1) for z in (1.5, -1.5))
@@ -43,31 +43,31 @@ def slivers(count=1000):
 
 
 def ground(*meshes):
-    """The ball over floors of a choice, which are one mesh."""
+    """The ball above floors that are joined to one mesh."""
     made = s.Scene().add(shapes.joined(*meshes), s.diffuse(0.8)).add(shapes.ceiling(0.3, 2), s.emitter(6))
     return made.add(ball(), GREY).seen((0, 1.2, 3), (0, 0.3, 0), 30)
 
 
 def floor_of(*meshes, eye=(0, 2, 0.01)):
-    """Floors of a choice in a white furnace, from above."""
+    """Floors that are joined to one mesh, in a white furnace, seen from above."""
     return s.Scene().within(1).add(shapes.joined(*meshes), s.diffuse(1)).seen(eye, (0, 0, 0), 20)
 
 
 def cracked():
-    """A closed box of grey walls with T-junctions: one wall is of squares whose corners the next ones do not have."""
+    """A closed box of grey walls with T-junctions: one wall has squares whose corners are not on the other walls."""
     top = shapes.grid(1, 7, 1.0).flipped()
     sides = shapes.box((-1, -1, -1), (1, 1, 1)).flipped().without([4, 5])
     return s.Scene().add(shapes.joined(sides, top), s.glowing(s.diffuse(0.5), 1)).seen((0.1, 0.2, 0.3), (1, 1, 0), 40)
 
 
 def normals(factor):
-    """The ball with normals so many times as long."""
+    """The ball with its normals multiplied by a factor."""
     made = ball()
     return stage(replace(made, normals=made.normals * factor))
 
 
 def broken(key, value):
-    """The ball with one number of an attribute that is none."""
+    """The ball with one value of an attribute replaced, for example by NaN."""
     made = ball()
     array = getattr(made, key).copy()
     array[7, 1] = value
@@ -75,18 +75,18 @@ def broken(key, value):
 
 
 def scaled(*factors):
-    """A flat-shaded ball around the origin on a node with these factors."""
+    """A flat-shaded ball around the origin, on a node with these scale factors."""
     return stage(shapes.sphere((0, 0, 0), 0.4, smooth=False).flat(), translation=[0, 0.5, 0], scale=list(factors))
 
 
 def mirrored():
-    """The same with its vertices mirrored, by hand."""
+    """The ball of `scaled`, with mirrored vertices instead of a scaled node."""
     made = shapes.sphere((0, 0.5, 0), 0.4, smooth=False).flat()
     return stage(shapes.Mesh(made.positions * (-1, 1, 1), made.triangles[:, ::-1]))
 
 
 def heap(copies):
-    """So many clear glass balls in one place."""
+    """`copies` clear glass balls in one place."""
     made = stage(None)
     for _ in range(copies):
         made = made.add(shapes.sphere((0, 0.5, 0), 0.4), s.glass(1.5))
@@ -98,8 +98,8 @@ def million():
     return floor_of(shapes.grid(1.5, 2237))
 
 
-SAME = "The surface is the same set of points."
-NOTHING = "A triangle without area is met by no ray."
+SAME = "Both surfaces are the same set of points."
+NOTHING = "No ray hits a triangle without area."
 
 CASES = [
     Case(
@@ -150,7 +150,7 @@ CASES = [
         "coplanar",
         "Two floors in one place",
         {"one": lambda: ground(shapes.floor(1.5)), "two": lambda: ground(shapes.floor(1.5), shapes.floor(1.5))},
-        Equal("one", ("two",), SAME + " Which of the two is met does not matter.", resolves=0.06),
+        Equal("one", ("two",), SAME + " It does not matter which of the two floors a ray hits.", resolves=0.06),
         EYE,
         iterations=4,
         seeds=FEW,
@@ -159,7 +159,7 @@ CASES = [
         "cracks",
         "A closed box with T-junctions, whose walls emit",
         {"scene": cracked},
-        Value(2.0, "L = 1 + L / 2. What gets out through a crack is missing.", bound=0.01, resolves=0.06),
+        Value(2.0, "L = 1 + L / 2. Light that escapes through a crack is missing.", bound=0.01, resolves=0.06),
         ("path", "bdpt", "vcm"),
         iterations={None: 32, "vcm": 80, "bdpt": 80},
         size=8,
@@ -171,7 +171,7 @@ CASES = [
         Equal(
             "unit",
             ("zero",),
-            "A normal without a direction says nothing, and the faces around it have theirs: the ball is smooth again.",
+            "A normal without a direction is replaced by the normals of the faces around it, which makes the ball smooth.",
             bound=0.005,
             warned="normal",
         ),
@@ -182,7 +182,7 @@ CASES = [
         "normals-long",
         "Normals of length 1000 and 0.001",
         {"unit": partial(normals, 1.0), "long": partial(normals, 1000.0), "short": partial(normals, 0.001)},
-        Equal("unit", ("long", "short"), "A normal is a direction; its length means nothing.", bound=1e-4),
+        Equal("unit", ("long", "short"), "A normal is a direction; its length has no meaning.", bound=1e-4),
         EYE,
         seeds=FEW,
     ),
@@ -192,7 +192,7 @@ CASES = [
         {"scene": partial(broken, "positions", np.nan)},
         Refused(
             "position.*(finite|nan|not a number)|(finite|nan|not a number).*position",
-            "Nothing can be drawn there, and a guess would be a silent fault.",
+            "The triangle has no place, and a guess would hide the fault.",
         ),
         ("path",),
     ),
@@ -203,8 +203,8 @@ CASES = [
         Equal(
             "whole",
             ("broken",),
-            "A normal that is none says nothing, and the faces around it have theirs: the ball is smooth again, and the"
-            " mesh is named.",
+            "A normal that is not a number is replaced by the normals of the faces around it, which makes the ball smooth,"
+            " and a warning names the mesh.",
             bound=0.005,
             warned="normal",
         ),
@@ -219,7 +219,7 @@ CASES = [
         Equal(
             "by-hand",
             ("x", "xyz"),
-            "A ball is symmetrical, and flat faces have a front whatever the node does.",
+            "A ball is symmetrical, and mirroring a node keeps the front of its faces.",
             bound=0.002,
             resolves=0.06,
         ),
@@ -242,7 +242,7 @@ CASES = [
             "without": partial(stage, None),
             "with": lambda: stage(None).add(shapes.Mesh(np.zeros((3, 3)), np.zeros((0, 3), int)), GREY),
         },
-        Exact("without", {"with": 0}, "Nothing is nothing."),
+        Exact("without", {"with": 0}, "A mesh without triangles has no effect."),
         EYE,
         seeds=2,
     ),
@@ -250,7 +250,7 @@ CASES = [
         "heap",
         "Many copies of a glass ball in one place",
         {"one": partial(heap, 1), "12": partial(heap, 12)},
-        Equal("one", ("12",), "Glass in the same glass is no border.", resolves=0.06),
+        Equal("one", ("12",), "The border between equal glasses has no effect.", resolves=0.06),
         EYE,
         iterations=4,
         seeds=FEW,

@@ -1,4 +1,4 @@
-"""5. Grazing: light and sight along surfaces, coarse meshes that shade smoothly, needle-thin light."""
+"""5. Grazing: light and views at grazing angles, coarse meshes with smooth shading, very thin lights."""
 
 from functools import partial
 from math import atan2, cos, hypot, pi, radians, sin
@@ -21,7 +21,7 @@ def low_sun():
 
 
 def reflected_sun():
-    """A floor that a low sun lights, and a mirror across its way, as high as sends the sun back over the whole floor."""
+    """A floor under a low sun, and a vertical mirror that reflects the sun onto the whole floor."""
     low, high = radians(90 - 89.9), 2 * sin(radians(90 - 89.9)) / cos(radians(90 - 89.9))
     mirror = shapes.quad((1, high / 2, 0), (0, high / 2, 0), (0, 0, 1))
     made = s.Scene().add(shapes.floor(1), s.diffuse(ALBEDO)).add(mirror, s.metal(1, 0.0))
@@ -40,12 +40,12 @@ def low_eye(material):
 
 
 def coarse(rings, material):
-    """A smooth-shaded sphere of so many rings in a white furnace."""
+    """A smooth-shaded sphere of `rings` rings in a white furnace."""
     return s.Scene().within(1).add(shapes.sphere((0, 0, 0), 1, rings), material).seen((0, 0.4, 6), (0, 0, 0), 12)
 
 
 def terminator(rings):
-    """A smooth-shaded matte sphere that a sun lights from the side: the terminator is in the picture's middle."""
+    """A smooth-shaded matte sphere under a sun from the side; the terminator is in the middle of the picture."""
     return (
         s.Scene()
         .add(shapes.sphere((0, 0, 0), 1, rings), s.diffuse(ALBEDO))
@@ -55,7 +55,7 @@ def terminator(rings):
 
 
 def slit(width):
-    """A lamp of this width, a metre long and of the radiance 1 / width, 10 cm above a floor."""
+    """A light of this width, one metre long, with the radiance 1 / width, 10 cm above a floor."""
     lamp = shapes.quad((0, 0.1, 0), (width / 2, 0, 0), (0, 0, 0.5))
     return (
         s.Scene()
@@ -66,7 +66,7 @@ def slit(width):
 
 
 def lit_by_slit(half=0.5, height=0.1):
-    """Radiance below the middle of slit(): albedo / pi times the integral of h² / r⁴ along it."""
+    """Radiance below the middle of slit(): albedo / pi times the integral of h² / r⁴ along the light."""
     r = hypot(half, height)
     return 0.5 / pi * (half / r**2 + atan2(half, height) / height)
 
@@ -78,7 +78,7 @@ CASES = [
         {"scene": low_sun},
         Value(
             ALBEDO / pi * 1e4 * cos(radians(ANGLE)),
-            "L = albedo / pi E cos. The direction in single precision is within 3e-8 of 1.7e-5, which is the bound.",
+            "L = albedo / pi E cos. Single precision rounds cos = 1.7e-5 by up to 3e-8, which gives the bound.",
             bound=0.004,
         ),
         size=8,
@@ -90,7 +90,7 @@ CASES = [
         {"scene": reflected_sun},
         Value(
             2 * ALBEDO / pi * 1e3 * cos(radians(89.9)),
-            "The sun's own light and as much from the mirror: L = 2 albedo / pi E cos.",
+            "The sun and its mirror image give equal light: L = 2 albedo / pi E cos.",
             bound=0.005,
             resolves=0.1,
         ),
@@ -131,7 +131,7 @@ CASES = [
         "coarse-white",
         "A smooth-shaded sphere of 6 rings in a white furnace",
         {"scene": partial(coarse, 6, s.diffuse(1))},
-        Value(1.0, WHITE + " Interpolated normals are no loss.", bound=0.01, resolves=0.05),
+        Value(1.0, WHITE + " Interpolated normals must not lose light.", bound=0.01, resolves=0.05),
         iterations=24,
     ),
     Case(
@@ -141,8 +141,8 @@ CASES = [
         Equal(
             "fine",
             ("coarse",),
-            "Both stand for the same sphere. The outline of the coarse one takes 1.1 % of the area, "
-            "and light ends a face too early at the terminator, where cosines are below 0.26: together below 6 %.",
+            "Both meshes approximate one sphere. The outline of the coarse one loses 1.1 % of the area, "
+            "and light ends one face too early at the terminator, where cosines are below 0.26: together below 6 %.",
             bound=0.06,
             resolves=0.05,
         ),
@@ -155,7 +155,7 @@ CASES = [
         {"scene": partial(slit, 1e-5)},
         Value(
             lit_by_slit(),
-            "A line lamp: albedo / pi times the integral of h² / r⁴ over its length.",
+            "A line light: albedo / pi times the integral of h² / r⁴ over its length.",
             bound=0.005,
             resolves=0.06,
         ),

@@ -1,10 +1,10 @@
 """Verdicts on pictures, as arrays (seeds, height, width, 3) of linear radiance.
 
-A statistical verdict takes the seeds' pictures as independent and asks whether several means (of each channel, and of
-each quarter of the picture) deviate by more than a stated bound plus noise. Noise is Student's t with as many degrees
-of freedom as there are seeds less one, at ERRORS divided by the number of means: what four standard errors are where
-the standard error is known. Noise may not hide a fault: where it exceeds what the case says it resolves, the case is
-undecided, and that fails.
+A statistical verdict treats the pictures of the seeds as independent. It tests whether several means (of each channel,
+and of each quarter of the picture) deviate by more than a stated bound plus noise. Noise is a quantile of Student's t,
+with one degree of freedom less than seeds, at the error rate ERRORS divided by the number of means; for a known standard
+error this rate corresponds to four standard errors. If the noise exceeds the limit `resolves` of the case, it could hide
+a fault: the case is undecided, and fails.
 """
 
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from functools import cache
 
 import numpy as np
 
-#: Probability that a verdict is wrong about a program that is right: that of four standard errors, both sides.
+#: Probability that a verdict rejects a correct program: two-sided, four standard errors of a normal distribution.
 ERRORS = 6.3e-5
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """passed: whether the answer is met; figure: what it rests on, in words; share: deviation over limit."""
+    """passed: whether the pictures meet the answer; figure: the numbers behind the verdict; share: deviation over limit."""
 
     passed: bool
     figure: str
@@ -27,8 +27,8 @@ class Verdict:
 
 @cache
 def student(freedom, errors):
-    """What Student's t exceeds in absolute value with the probability `errors`; freedom: degrees of it, at least 1."""
-    # With t = sqrt(freedom) tan(a) the density is in proportion to cos(a)^(freedom - 1).
+    """The value that |t| of Student's distribution exceeds with the probability `errors`; freedom: at least 1."""
+    # With t = sqrt(freedom) tan(a), the density is proportional to cos(a)^(freedom - 1).
     angle = np.linspace(0, np.pi / 2, 200001)
     mass = np.cumsum(np.cos(angle) ** (freedom - 1))
     beyond = 1 - mass / mass[-1]
@@ -36,7 +36,7 @@ def student(freedom, errors):
 
 
 def means(pictures):
-    """The means that are judged, (seeds, count): of the three channels, and of the four quarters."""
+    """The means of the three channels and of the four quarters, of shape (seeds, count)."""
     seeds, height, width, _ = pictures.shape
     rows, columns = np.array_split(np.arange(height), 2), np.array_split(np.arange(width), 2)
     quarters = [pictures[:, r][:, :, c].mean(axis=(1, 2, 3)) for r in rows for c in columns]
@@ -44,7 +44,7 @@ def means(pictures):
 
 
 def zero(values, scale, bound, resolves):
-    """Whether `values` (seeds, count) have means of zero but for `bound` and noise, both as shares of `scale`."""
+    """Whether the means of `values` (seeds, count) are zero within `bound` and noise, both as shares of `scale`."""
     values = np.asarray(values, float) / scale
     if not np.isfinite(values).all():
         return Verdict(False, "not a finite number", np.inf)
@@ -62,14 +62,14 @@ def zero(values, scale, bound, resolves):
 
 
 def value(pictures, answer, bound, resolves):
-    """Whether a picture is of the same radiance everywhere: `answer`, a number or three, above zero."""
+    """Whether all pixels have the radiance `answer`, a number or three, above zero."""
     answer = np.broadcast_to(np.asarray(answer, float), 3)
     return zero(means(pictures / answer) - 1, 1, bound, resolves)
 
 
 def equal(first, second, bound, resolves):
-    """Whether two pictures with the same seeds have the same means, as shares of the second's. Differences are taken
-    seed by seed, so noise that both have in common is none."""
+    """Whether pictures of two scenes with equal seeds have equal means, as shares of the second's. Differences are taken
+    seed by seed, so common noise cancels."""
     scale = float(np.mean(second))
     if not scale > 0:
         return Verdict(False, "the picture to compare with is black", np.inf)
@@ -77,7 +77,7 @@ def equal(first, second, bound, resolves):
 
 
 def exact(first, second, factor):
-    """Whether the first picture is the second times a power of two, to the last bit."""
+    """Whether the first picture is, to the last bit, the second one times `factor`, a power of two."""
     wanted = np.asarray(second) * np.float32(factor)
     if not np.any(wanted):
         return Verdict(False, "the picture to compare with is black", np.inf)
@@ -92,9 +92,9 @@ def black(pictures, most):
 
 
 def sweep(series, model, bound, resolves, falling=0):
-    """Whether a series of pictures changes smoothly: the mean of each, less what `model` says of it, is that of its
-    neighbours but for `bound` (of the largest mean) and noise, and of the first `falling` none is above the one
-    before it."""
+    """Whether the means of a series of pictures change smoothly: the difference of each mean from `model` is the average
+    of its neighbours', within `bound` (a share of the largest mean) and noise. The first `falling` means must not
+    increase."""
     rows = np.stack([pictures.mean(axis=(1, 2, 3)) for pictures in series], axis=1)
     scale = float(rows.mean(axis=0).max())
     if not scale > 0:
@@ -112,12 +112,12 @@ def sweep(series, model, bound, resolves, falling=0):
 
 
 def same(files):
-    """Whether all of these bytes are equal; files: {what it is: bytes}."""
+    """Whether all files have equal bytes; files: {description: bytes}."""
     first, *others = files
     differ = [name for name in others if files[name] != files[first]]
     return Verdict(
         not differ,
-        f"{len(files)} files alike" if not differ else f"unlike {first}: {', '.join(differ)}",
+        f"{len(files)} equal files" if not differ else f"different from {first}: {', '.join(differ)}",
         float(len(differ)),
     )
 

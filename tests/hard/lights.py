@@ -1,4 +1,4 @@
-"""2. Lights: as small as points, as weak and as strong as numbers go, many, and black."""
+"""2. Lights: very small, very weak, very strong, many, and black ones."""
 
 from functools import partial
 from math import atan, pi, radians, cos, sin, sqrt
@@ -15,28 +15,28 @@ ALBEDO, HEIGHT = 0.8, 2.0
 
 
 def ground(field_deg=0.5):
-    """A Lambertian floor, of whose middle a small patch is seen from the side."""
+    """A Lambertian floor; the camera sees a small patch in its middle, from the side."""
     return s.Scene().add(shapes.floor(5), s.diffuse(ALBEDO)).seen((3, 3, 0), (0, 0, 0), field_deg)
 
 
 def form_factor(half, height):
-    """That of a point to a parallel square above it, with edges of twice `half` [e.g. Howell, B-3, four corners]."""
+    """The form factor from a point to a parallel square above it, with edges of 2 `half` [e.g. Howell, B-3, four times]."""
     x = half / height
     return 4 * x / sqrt(1 + x * x) * atan(x / sqrt(1 + x * x)) / pi
 
 
 def lit_by_square(radiance, half):
-    """Radiance of the floor below a square lamp: albedo times radiance times form factor."""
+    """Radiance of the floor below a square light: albedo times radiance times form factor."""
     return ALBEDO * radiance * form_factor(half, HEIGHT)
 
 
 def shrinking(half):
-    """A square lamp with the intensity of one of a metre and radiance 1, whatever its size."""
+    """A square light of any size with the intensity of a square metre of radiance 1."""
     return ground().add(shapes.ceiling(half, HEIGHT), s.emitter(0.25 / half**2))
 
 
 def strong(power):
-    """The floor, a glass sphere on it, and a lamp of radiance 2^power."""
+    """A floor, a glass sphere on it, and a light of radiance 2^power."""
     return (
         s.Scene()
         .add(shapes.floor(1.5), s.diffuse(ALBEDO))
@@ -47,7 +47,7 @@ def strong(power):
 
 
 def many(count):
-    """count x count tiny lamps in a square of 2 m, with the power of a square of radiance 1."""
+    """count x count tiny lights in a square of 2 m, with the total power of this square at radiance 1."""
     at = (np.arange(count) + 0.5) / count * 2 - 1
     x, z = (v.ravel() for v in np.meshgrid(at, at))
     half = 0.05 / count
@@ -59,13 +59,13 @@ def many(count):
 
 
 def crowd(black):
-    """Four lamps, and with `black` one that emits nothing, seen from below through a sphere of glass."""
+    """Four lights, and a black square that, with `black`, is a light of strength zero."""
     made = s.Scene().add(shapes.floor(1.5), s.diffuse(ALBEDO)).seen((0, 1.5, 3), (0, 0.2, 0), 30)
     for i in range(4):
         lamp = shapes.quad((0.6 * i - 0.9, HEIGHT, 0), (0.1, 0, 0), (0, 0, 0.1))
         made = made.add(lamp, s.emitter(2.0 + i))
     dark = shapes.quad((0, HEIGHT, 0.6), (0.3, 0, 0), (0, 0, 0.3))
-    # A strength of zero, as an exporter writes it for a lamp that is turned down.
+    # Exporters write a strength of zero for lights that are switched off.
     lamp = {
         **s.diffuse(0),
         "emissiveFactor": [1, 1, 1],
@@ -75,7 +75,7 @@ def crowd(black):
 
 
 def sunny(angle_deg):
-    """A sun 60 degrees from the zenith; irradiance across it is 3."""
+    """A sun 60 degrees from the zenith; its perpendicular irradiance is 3."""
     return ground().sun((-sin(radians(60)), -cos(radians(60)), 0), 3.0, angle_deg)
 
 
@@ -122,7 +122,7 @@ CASES = [
         "light-strength",
         "A caustic by lights of radiance 2^-40 and 2^40 (about 1e-12 and 1e12), to the last bit",
         {"2^0": partial(strong, 0), **{label: partial(strong, p) for label, p in POWERS.items()}},
-        Exact("2^0", POWERS, "Light transport is linear; a power of two changes exponents alone."),
+        Exact("2^0", POWERS, "Light transport is linear; a power of two changes only exponents."),
         ("path", "bdpt", "vcm", "sppm", "ppm", "appm", "cppm", "bpm", "pm", "light"),
         seeds=1,
     ),
@@ -132,8 +132,8 @@ CASES = [
         {"delta": partial(sunny, 0), "half": partial(sunny, 0.5)},
         Values(
             {"delta": SUN, "half": SUN},
-            "L = albedo / pi E cos 60°. A disc of uniform radiance has the irradiance of "
-            "its middle on every plane that it is wholly above.",
+            "L = albedo / pi E cos 60°. A disc of uniform radiance above the horizon gives every plane the irradiance "
+            "of its middle.",
         ),
         size=8,
     ),
@@ -143,8 +143,8 @@ CASES = [
         {"delta": partial(pane, 0), "half": partial(pane, 0.5)},
         Values(
             {"delta": PANE, "half": PANE},
-            "Perpendicular Fresnel reflectance is R = 0.04; with all inner reflections a pane passes (1 - R) / (1 + R)."
-            " L = albedo / pi E times that. The floor's own light that the pane returns is below 0.05 %.",
+            "Perpendicular Fresnel reflectance is R = 0.04; with all inner reflections a pane transmits (1 - R) / (1 + R)."
+            " L = albedo / pi E times this. The pane returns less than 0.05 % of the floor's light.",
             resolves=0.1,
         ),
         ("vcm", "sppm"),
@@ -159,8 +159,8 @@ CASES = [
         {"scene": partial(many, 317)},
         Value(
             lit_by_square(1.0, 1.0),
-            "Lamps this dense are an even square: the sum over them is the integral but for "
-            "1e-5. Albedo times the form factor.",
+            "The sum over lights this dense equals the integral over the square within "
+            "1e-5. L = albedo times the form factor.",
             bound=0.005,
             resolves=0.06,
         ),
@@ -174,7 +174,7 @@ CASES = [
         "light-black",
         "A light of radiance zero among four bright ones",
         {"without": partial(crowd, False), "with": partial(crowd, True)},
-        Equal("without", ("with",), "What emits nothing adds nothing: it is a black surface."),
+        Equal("without", ("with",), "A light that emits nothing is a black surface."),
         seeds=FEW,
     ),
 ]

@@ -1,4 +1,4 @@
-"""1. Scale and place: a scene that is a thousand times as large, or far from the origin, looks the same."""
+"""1. Scale and place: a scaled scene, or a scene far from the origin, looks the same."""
 
 from . import scene as s
 from . import shapes
@@ -10,7 +10,7 @@ METHODS = ("path", "bdpt", "vcm", "sppm")
 
 
 def room():
-    """An open room of two metres: a coloured wall, a lamp, a glass sphere that throws a caustic, a rough metal one."""
+    """An open room of two metres with coloured walls, a light, a glass sphere with its caustic, and a rough metal sphere."""
     sides = shapes.box((-1, 0, -1), (1, 2, 1)).flipped().without([8, 9])
     return (
         s.Scene()
@@ -30,15 +30,15 @@ def _scales(factors):
 
 
 def _places(metres):
-    """Rooms on a node that stands so far away, in a direction that is along no axis."""
+    """A room at the origin, and one on a node far away, in a direction that is not along an axis."""
     return {"here": room, "there": lambda: room().moved((metres, 0.3 * metres, -0.6 * metres))}
 
 
-SAME = "Radiance does not depend on the unit of length: without media nothing in the scene has a length of its own."
-PLACE = "Physics is the same everywhere. Single precision holds {0} to {1} there, which is the bound's reason."
-#: Exponents of two; of powers above one, and of one below.
+SAME = "Radiance does not depend on the unit of length, because without media no property of the scene has a length."
+PLACE = "Radiance does not depend on the place. Single precision rounds {0} to {1}, which gives the bound."
+#: Exponents of two by label, for enlarged and for reduced rooms.
 LARGE, SMALL = {"2^1": 1, "2^10": 10, "2^20": 20}, {"2^-10": -10}
-EXACT = SAME + " A power of two changes exponents alone, so no rounding."
+EXACT = SAME + " A power of two changes only exponents, not rounding."
 
 
 def _binary(name, title, powers, **more):
@@ -92,7 +92,7 @@ CASES = [
             "here",
             ("there",),
             PLACE.format("1,300 km", "6 cm") + " A renderer that composes matrices in double "
-            "precision and moves the origin loses nothing, which is what is asked.",
+            "precision and moves the origin loses nothing, which this case requires.",
             bound=0.02,
             resolves=0.1,
         ),

@@ -1,4 +1,4 @@
-"""11. Media: none at all, as dense as stone, without absorption, and scattering forwards and backwards alone."""
+"""11. Media: of density zero, very dense, without absorption, and with strong forward and backward scattering."""
 
 from functools import partial
 from math import exp, pi
@@ -17,7 +17,7 @@ EYE = METHODS[:3]
 
 
 def cloud(of, half=0.5, eye=(0, 0, 4), field_deg=8):
-    """A box of a medium without a border of its own, in a white environment; the eye sees its middle."""
+    """A box of a medium with an invisible border, in a white environment; the camera sees its middle."""
     return (
         s.Scene()
         .within(1)
@@ -27,14 +27,14 @@ def cloud(of, half=0.5, eye=(0, 0, 4), field_deg=8):
 
 
 def lantern(of):
-    """A point light of 1 W/sr a metre above a matte floor, in the middle of a ball of a medium, of radius 0.3."""
+    """A point light of 1 W/sr one metre above a matte floor, inside a ball of a medium with radius 0.3."""
     made = s.Scene().add(shapes.floor(1.5), s.diffuse(0.5))
     made = made.add(shapes.sphere((0, 1, 0), 0.3, 64), s.glass(1.0, medium=of))
     return made.point((0, 1, 0), 1.0).seen((1, 0.5, 0), (0, 0, 0), 1)
 
 
 def lit(of):
-    """A lamp, a floor and a box of a medium, or none."""
+    """A light, a floor, and a box of the medium `of`, if it is not None."""
     made = (
         s.Scene()
         .add(shapes.floor(1.5), s.diffuse(0.8))
@@ -45,28 +45,28 @@ def lit(of):
 
 
 def half_space(albedo):
-    """Radiance of a half-space that scatters evenly, in a white furnace, seen along its normal:
-    1 - H(1) sqrt(1 - albedo) [Chandrasekhar 1950, the albedo of a plane; by reciprocity the furnace shows it]."""
+    """Radiance of a half-space with isotropic scattering, in a white furnace, seen along its normal:
+    1 - H(1) sqrt(1 - albedo) [Chandrasekhar 1950; by reciprocity this is the plane albedo]."""
     node, weight = np.polynomial.legendre.leggauss(64)
     mu, weight = (node + 1) / 2, weight / 2
     at = np.append(mu, 1.0)
     h = np.ones_like(at)
     for _ in range(2000):
-        # 1 / H = sqrt(1 - albedo) + albedo / 2 times the integral of mu' H(mu') / (mu + mu'), which converges for all.
+        # The iteration of 1 / H = sqrt(1 - albedo) + albedo / 2 times the integral of mu' H(mu') / (mu + mu') converges
+        # for every albedo.
         h = 1 / (np.sqrt(1 - albedo) + albedo / 2 * (weight * mu * h[:-1] / (at[:, None] + mu)).sum(axis=1))
     return float(1 - h[-1] * np.sqrt(1 - albedo))
 
 
 G = (0.0, 0.999, -0.999)
-FIREFLIES = (
-    "Connections between vertices this close together leave fireflies: some pixels are 50 instead of 1 after 32 iterations."
-)
+FIREFLIES = "Connections between vertices this close together leave fireflies: some pixels are 50 instead of 1 after 32 iterations."
 PEAK = (
     "The phase function's peak at g = 0.999 is 1e-3 radians wide: hardly a photon arrives within it, and most of the"
     " light is missing at 80,000 photons."
 )
 FINER = (
-    " Free paths are shorter than positions resolve, half a µm: the medium is taken to be as dense as those, and named."
+    " Mean free paths are shorter than the resolution of positions, half a µm: a warning names the medium, and the"
+    " densest medium that positions resolve replaces it."
 )
 CLEAR = s.medium(0, 0)
 
@@ -86,7 +86,7 @@ CASES = [
         {f"{depth:g}": partial(cloud, s.medium(depth, 0)) for depth in (0.001, 1, 20)},
         Values(
             {f"{depth:g}": exp(-depth) for depth in (0.001, 1, 20)},
-            "Beer and Lambert: exp(-depth), along rays that differ in length by less than the bound.",
+            "Beer-Lambert law: exp(-depth), along rays that differ in length by less than the bound.",
             bound=0.06,
         ),
         ("path", "bdpt", "vcm", "sppm"),
@@ -98,7 +98,7 @@ CASES = [
         "media-colour",
         "A box with different absorption of red, green and blue",
         {"scene": partial(cloud, s.medium((0.1, 1, 3), 0))},
-        Value([exp(-0.1), exp(-1), exp(-3)], "Beer and Lambert by channel.", bound=0.01),
+        Value([exp(-0.1), exp(-1), exp(-3)], "Beer-Lambert law for each channel.", bound=0.01),
         METHODS,
         iterations=8,
         photons=2000,
@@ -114,7 +114,8 @@ CASES = [
         Values(
             {"scatters": 1.0, "absorbs": exp(-0.7)},
             WHITE
-            + " An absorbing way of 0.7 leaves exp(-0.7). Photons' kernels reach out of the box, within the bound.",
+            + " An absorbing path of length 0.7 leaves exp(-0.7). Kernels of photons reach out of the box, within the"
+            " bound.",
             bound=0.03,
             resolves=0.25,
         ),
@@ -126,7 +127,9 @@ CASES = [
         "media-lamp-inside",
         "A point light inside an absorbing ball",
         {"scene": partial(lantern, s.medium(2, 0))},
-        Value(0.5 / pi * exp(-0.6), "Albedo / pi times I / d², and exp(-2 0.3) of the way in the ball.", bound=0.005),
+        Value(
+            0.5 / pi * exp(-0.6), "Albedo / pi times I / d², times exp(-2 0.3) for the path in the ball.", bound=0.005
+        ),
         METHODS,
         size=8,
         seeds=FEW,
@@ -157,8 +160,8 @@ CASES = [
             {f"{a:g}": partial(cloud, s.medium((1 - a) * density, a * density)) for a in (0.5, 0.9)},
             Values(
                 {f"{a:g}": half_space(a) for a in (0.5, 0.9)},
-                "So dense, a metre is as good as infinite depth: a plane in "
-                "a white furnace shows 1 - H(1) sqrt(1 - albedo), with Chandrasekhar's H for even scattering."
+                "At this density, a metre acts like a half-space, whose radiance in "
+                "a white furnace is 1 - H(1) sqrt(1 - albedo), with Chandrasekhar's H for isotropic scattering."
                 + FINER
                 * (density > 1e2),
                 bound=0.01,

@@ -1,4 +1,4 @@
-"""The page of cases: pictures, verdicts with their figures, answers and why they are right; one file."""
+"""The page of results, one file: pictures, verdicts with their numbers, answers with their derivations."""
 
 import base64
 import html
@@ -14,7 +14,7 @@ WORDS = {
     "known": "known to fail",
     "failed": "FAILED",
     "passed": "passes, although known to fail",
-    "cannot": "cannot be told",
+    "cannot": "cannot be translated",
 }
 STYLE = """body{font:15px/1.45 sans-serif;max-width:72em;margin:2em auto;padding:0 1em;color:#222;background:#fff}
 table{border-collapse:collapse;margin:.5em 0}td,th{padding:.2em .7em .2em 0;text-align:left;vertical-align:top}
@@ -32,7 +32,7 @@ def page(results):
     return (
         f"<!doctype html><html lang=en><meta charset=utf-8><title>Hard cases</title><style>{STYLE}</style>"
         f"<h1>Hard cases</h1><p>{_counts(results)}. A verdict compares a deviation with a stated bound and with noise "
-        "at the error rate of four standard errors; pictures are those of the first seed, on a scale of their own."
+        "at the error rate of four standard errors. Pictures are of the first seed, each scaled to its brightest pixel."
         f"</p>{_overview(results)}{''.join(body)}</html>"
     )
 
@@ -46,7 +46,7 @@ def _counts(results):
 
 
 def _overview(results):
-    """A table: who meets which answer."""
+    """The table of verdicts by case and method."""
     methods = list(dict.fromkeys(r.method for r in results))
     rows = {}
     for result in results:
@@ -92,7 +92,7 @@ def _figures(result):
 
 
 def png(picture):
-    """Linear light from 0 to 1 as the data of a PNG."""
+    """A picture of linear values from 0 to 1 as a data URL of a PNG."""
     bytes_ = np.uint8(np.round(255 * np.clip(np.nan_to_num(picture), 0, 1) ** (1 / 2.2)))
     out = io.BytesIO()
     Image.fromarray(bytes_).save(out, "png")
@@ -103,5 +103,5 @@ def _word(state):
     return f"<span class=word style='background:{COLOURS[state]}'>{WORDS[state]}</span>"
 
 
-def _text(what):
-    return html.escape(str(what), quote=True)
+def _text(value):
+    return html.escape(str(value), quote=True)

@@ -1,7 +1,7 @@
-"""Other renderers on the cases, by their drivers in scripts/compare/peers.
+"""Cases rendered by other renderers, through their drivers in scripts/compare/peers.
 
-What a driver says that it cannot translate is no failure: the case does not concern the peer. A budget is seconds for
-each seed; a verdict that noise leaves open is said as such, and a longer budget settles it.
+A case that a driver cannot translate is not a failure of the peer. The budget is the seconds of each picture; an
+undecided verdict needs a longer budget.
 """
 
 import subprocess
@@ -18,22 +18,23 @@ PEERS = {
     "luxcore-vm": ("luxcore_driver.py", "bidirvm"),
     "cycles": ("cycles_driver.py", "path"),
 }
-#: Segments of a path where a renderer needs a limit: more than any case has with a weight above its bound.
+#: Limit on the segments of a path, for renderers that need one; longer paths are below the bound of every case.
 DEPTH = 1000
-PATIENCE = 120
+#: Seconds that a driver may take besides its budget.
+TIMEOUT = 120
 
 __all__ = ["PEERS", "CannotTranslate", "PeerStage"]
 
 
 class PeerStage(Stage):
-    """Plays one case with one peer."""
+    """Renders one case by one peer."""
 
     def __init__(self, folder, case, peer, budget, threads=1):
         super().__init__("", folder, case, peer, threads)
         self.budget = budget
 
     def render(self, label, seed, *more, name=None, threads=None):
-        """Renders a scene into the file that is returned."""
+        """Renders a scene; returns the file of the picture."""
         driver, mode = PEERS[self.method]
         path, size = self.picture(name or f"{label}-{seed}"), self.case.size
         options = {"mode": mode, "width": size, "height": size, "budget": self.budget, "threads": self.threads}
@@ -44,14 +45,14 @@ class PeerStage(Stage):
                 command,
                 capture_output=True,
                 text=True,
-                timeout=PATIENCE + self.budget,
+                timeout=TIMEOUT + self.budget,
                 check=False,
                 env=caller.environment(driver),
             )
         except subprocess.TimeoutExpired:
-            raise Broken(f"did not end within {PATIENCE + self.budget:g} s") from None
-        told = caller.answer(done.stdout)
-        if done.returncode or told is None:
-            raise Broken((done.stderr.strip() or "the driver said nothing")[-300:])
-        self.seconds += told.get("seconds", 0.0)
+            raise Broken(f"did not end within {TIMEOUT + self.budget:g} s") from None
+        answer = caller.answer(done.stdout)
+        if done.returncode or answer is None:
+            raise Broken((done.stderr.strip() or "the driver has printed no answer")[-300:])
+        self.seconds += answer.get("seconds", 0.0)
         return path

@@ -14,7 +14,7 @@ EYE = ("path", "bdpt", "vcm")
 
 
 def reflectance(cos_i, ior):
-    """Fresnel's, unpolarised, for light that arrives at `cos_i`; ior: that of the other side over that of this one."""
+    """Unpolarised Fresnel reflectance at the cosine `cos_i`; ior: index of the other side over the index of this side."""
     sin2 = (1 - cos_i**2) / ior**2
     if sin2 >= 1:
         return 1.0
@@ -25,7 +25,7 @@ def reflectance(cos_i, ior):
 
 
 def stage(*solids):
-    """Solids (mesh, material) on a floor with a lamp above."""
+    """Solids (mesh, material) on a floor under a light."""
     made = s.Scene().add(shapes.floor(1.5), s.diffuse((0.8, 0.6, 0.4))).add(shapes.ceiling(0.3, 2), s.emitter(6))
     for mesh, material in solids:
         made = made.add(mesh, material)
@@ -41,7 +41,7 @@ def furnace(*solids, eye=(0, 0.5, 4), field_deg=12):
 
 
 def outdoors(material):
-    """A floor under a white sky, a black post on it, and a ball between them and the eye."""
+    """A floor with a black post under a white sky, and a ball of `material`, if any, in front of the post."""
     made = s.Scene().within(1).add(shapes.floor(1.5), s.diffuse((0.8, 0.6, 0.4)))
     made = made.add(shapes.box((-0.1, 0, -0.6), (0.1, 0.8, -0.5)), s.diffuse(0))
     return (made.add(ball(), material) if material else made).seen((0, 1.5, 3), (0, 0.3, 0), 30)
@@ -56,7 +56,7 @@ def block(half):
 
 
 def under_water(angle_deg):
-    """The eye in a tank of glass (1.5), below a face that light of radiance 1 waits behind, at so many degrees."""
+    """A camera inside a block of glass (1.5), `angle_deg` from the normal of its upper face, below light of radiance 1."""
     tank = shapes.box((-2, -2, -2), (2, 0, 2))
     lamp = shapes.ceiling(60, 3)
     eye = (-tan(radians(angle_deg)) * 0.2, -0.2, 0)
@@ -70,20 +70,21 @@ def under_water(angle_deg):
 
 
 def guide(bounces, ior=1.5, angle_deg=30.0):
-    """A rod of glass, 1 cm across, so long that light at `angle_deg` from its axis meets its sides so many times;
-    before a lamp of radiance 1, with the eye before the other end."""
+    """A glass rod, 1 cm wide, between a light of radiance 1 and the camera. Its length is such that light at `angle_deg`
+    to its axis hits its sides `bounces` times."""
     inside = asin(sin(radians(angle_deg)) / ior)
     half = 0.005
     length = 2 * half * bounces / tan(inside)
     rod = shapes.box((-half, -half, -length), (half, half, 0))
     lamp = shapes.quad((0, 0, -length - 0.001), (1, 0, 0), (0, 1, 0))
-    # Sight enters at the middle; from the side, so that every reflection is at the rod's upper and lower face.
+    # The view direction is in a vertical plane, so all reflections are at the rod's upper and lower face.
     eye = (0, sin(radians(angle_deg)) * 0.1, cos(radians(angle_deg)) * 0.1)
     return s.Scene().add(rod, s.glass(ior)).add(lamp, s.emitter(1)).seen(eye, (0, 0, 0), 0.5)
 
 
 def nested(gap):
-    """Glass with water in it, and a ball of glass in the water. gap: between glass and water; 0 is coincident."""
+    """A block of glass with water inside, and a ball of glass in the water; gap: between glass and water, 0 if they
+    coincide."""
     return [
         (block(0.5), s.glass(1.5, priority=1)),
         (block(0.4 - gap), s.glass(1.33, priority=2)),
@@ -92,7 +93,7 @@ def nested(gap):
 
 
 def shell(inner):
-    """A tumbler: a block of glass whose inside, of faces turned in, is `inner`'s border."""
+    """A tumbler: a block of glass with a cavity of half the edge `inner`, whose faces point inwards."""
     return shapes.joined(block(0.5), block(inner).flipped())
 
 
@@ -132,7 +133,7 @@ CASES = [
         Equal(
             "without",
             ("with",),
-            "Reflectance is 2.5e-9 and light is bent by less than 1e-3 at all but the outline.",
+            "Reflectance is 2.5e-9, and light is bent by less than 1e-3, except at the outline.",
             bound=0.01,
             resolves=0.05,
         ),
@@ -165,7 +166,7 @@ CASES = [
         Equal(
             "1",
             ("0.8",),
-            "glTF's index is 1 or more. The nearest that is allowed is taken, and said.",
+            "glTF allows indices of 1 or more. The nearest allowed index is used, with a warning.",
             bound=0.0,
             warned="index of refraction of 0.8",
         ),
@@ -205,8 +206,8 @@ CASES = [
             "not closed",
             0.9999 / 2.25,
             2.2501,
-            "What is inside of an open solid is undefined. Radiance may be off by n² "
-            "where a ray enters glass and leaves through the hole, by no more, and the mesh is named.",
+            "The inside of an open solid is undefined. If a ray enters glass and leaves through the hole, radiance may "
+            "be wrong by up to n², and a warning names the mesh.",
         ),
         EYE,
     ),
@@ -214,7 +215,7 @@ CASES = [
         "mesh-inverted",
         "A glass box whose faces point inwards, in a white furnace",
         {"scene": lambda: furnace((block(0.3).flipped(), s.glass(1.5)))},
-        Value(1.0, WHITE + " Nor does which way a face was wound.", bound=0.005),
+        Value(1.0, WHITE + " The orientation of faces does not matter.", bound=0.005),
         EYE,
         seeds=FEW,
     ),
@@ -224,7 +225,7 @@ CASES = [
         {"scene": lambda: furnace((shapes.sphere((0, 0, 0), 1), s.glass(1.5)), eye=(0, 0.1, 0.3), field_deg=40)},
         Value(
             2.25,
-            "At equilibrium the basic radiance L / n² is the same everywhere, so radiance in glass is n² = 2.25.",
+            "At equilibrium the basic radiance L / n² is constant, so radiance in glass is n² = 2.25.",
             bound=0.005,
         ),
         EYE,
@@ -236,10 +237,10 @@ CASES = [
         {"scene": lantern},
         Value(
             1 / pi,
-            "Every ray of the light meets the ball along its normal, and what is reflected passes the middle again: all"
-            " light gets out, unbent. Light between walls finds the ball as transparent as nothing, for radiance is the"
-            " same all around. L = albedo / pi I / r² / (1 - albedo). Of 64 rings of facets the outer sphere is nearer"
-            " than its radius by up to 0.12 %.",
+            "Every ray of the light hits the ball along its normal, and reflected light passes the middle again, so all"
+            " light leaves the ball unbent. The ball does not change the light between the walls, because their radiance is"
+            " uniform. L = albedo / pi I / r² / (1 - albedo). The facets of the outer sphere are up to 0.12 % closer than"
+            " its radius.",
             bound=0.005,
             resolves=0.05,
         ),
@@ -254,8 +255,8 @@ CASES = [
         {"scene": partial(guide, 60)},
         Value(
             (1 - GUIDE) / (1 + GUIDE),
-            "The rod's sides reflect everything, so unfolded it is a pane: it passes "
-            "(1 - R) / (1 + R) of the lamp's radiance, with Fresnel's R at 30°.",
+            "The rod's sides reflect everything, so it acts like a pane: it transmits "
+            "(1 - R) / (1 + R) of the light's radiance, with the Fresnel reflectance R at 30°.",
             bound=0.005,
         ),
         EYE,

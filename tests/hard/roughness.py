@@ -1,4 +1,4 @@
-"""3. Roughness: from mirrors to matte, without a seam where another method or lobe takes over."""
+"""3. Roughness: from mirrors to matte surfaces, without a step where the technique or the lobe changes."""
 
 from functools import partial
 from math import pi
@@ -13,13 +13,13 @@ from .case import FEW, Case
 TITLE = "Roughness"
 EYE = ("path", "bdpt", "vcm", "sppm")
 TINY = (1e-6, 1e-5, 1e-4, 1e-3)
-#: Roughness whose GGX alpha is 0.2, where eye paths leave lobes to photons.
+#: Roughness whose GGX alpha is 0.2, above which photons replace camera paths.
 OWNER = 0.2**0.5
 
 
 def plate(roughness, half=0.4, height=2.0):
-    """White metal that the eye sees along its normal, and a square lamp around the eye, which is no obstacle: what
-    shows is the share of the lobe that the lamp takes up."""
+    """White metal, seen along its normal, below a square light around the camera, which blocks no light: radiance is the
+    share of the lobe that the light covers."""
     return (
         s.Scene()
         .add(shapes.floor(0.2), s.metal(1, roughness))
@@ -29,8 +29,8 @@ def plate(roughness, half=0.4, height=2.0):
 
 
 def lobe_share(alpha, half=0.4, height=2.0, count=800):
-    """What plate() shows but for light that facets hand on: the integral of the GGX reflection at normal view over the
-    lamp, D(h) G2(o, i) / (4 cos o cos i) cos i, as a sum over `count`² parts; Smith's height-correlated G2.
+    """The radiance of plate() without scattering between facets: the integral of the GGX reflection at normal view over
+    the light, D(h) G2(o, i) / (4 cos o cos i) cos i, as a sum over `count`² parts; Smith's height-correlated G2.
     """
     at = (np.arange(count) + 0.5) / count * 2 * half - half
     x, z = np.meshgrid(at, at)
@@ -44,7 +44,7 @@ def lobe_share(alpha, half=0.4, height=2.0, count=800):
 
 
 def behind_glass(roughness):
-    """A pane of glass before a step from dark to bright, under a grey sky."""
+    """A pane of glass in front of an edge from dark to bright, under a grey sky."""
     pane = shapes.box((-1, -1, -0.05), (1, 1, 0.05))
     card = shapes.quad((1.0, 0, -1), (1, 0, 0), (0, 2, 0))
     return (
@@ -57,7 +57,7 @@ def behind_glass(roughness):
 
 
 def mirror(roughness):
-    """A metal ball under a sky with a card."""
+    """A metal ball under a grey sky with a bright card."""
     card = shapes.quad((1.5, 1, 1), (0, 0, 1), (0, 1, 0)).flipped()
     return (
         s.Scene()
@@ -76,7 +76,7 @@ def lobes(roughness):
     return {f"{r:g}": partial(plate, r) for r in roughness}
 
 
-#: At these the light that facets hand on is below the bound: the lobe's own albedo is that near to 1.
+#: At these roughnesses, scattering between facets is below the bound, because the albedo of the lobe is close to 1.
 SHARP = (0.05, 0.1, 0.2, 0.3, 0.4)
 SWEEP = tuple(round(float(r), 3) for r in np.linspace(0.2, 1, 9))
 SEAM = tuple(round(OWNER + step, 4) for step in (-0.006, -0.004, -0.002, 0.0, 0.002, 0.004, 0.006))
@@ -89,7 +89,7 @@ CASES = [
         Equal(
             "0",
             tuple(f"{r:g}" for r in TINY),
-            "The lobe tends to a delta: at an alpha of 1e-6 it is narrower than a pixel by far.",
+            "The lobe tends to a delta function: at an alpha of 1e-6 it is far narrower than a pixel.",
             bound=0.005,
             resolves=0.05,
         ),
@@ -102,7 +102,13 @@ CASES = [
         "rough-delta-glass",
         "Glass of roughness 1e-6 to 1e-3 looks clear",
         _tiny(behind_glass),
-        Equal("0", tuple(f"{r:g}" for r in TINY), "As metal's.", bound=0.005, resolves=0.05),
+        Equal(
+            "0",
+            tuple(f"{r:g}" for r in TINY),
+            "As for metal, the lobe tends to a delta function.",
+            bound=0.005,
+            resolves=0.05,
+        ),
         EYE,
         iterations=4,
         photons=5000,
@@ -115,7 +121,7 @@ CASES = [
         Values(
             {f"{r:g}": lobe_share(r * r) for r in SHARP},
             "GGX with Smith's height-correlated shadowing, integrated "
-            "over the lamp. White metal has no Fresnel effect. Light between facets adds less than 1 %.",
+            "over the light. White metal has no Fresnel effect. Scattering between facets adds less than 1 %.",
             bound=0.01,
             resolves=0.05,
         ),
@@ -130,8 +136,8 @@ CASES = [
         lobes(SWEEP),
         Sweep(
             {f"{r:g}": lobe_share(r * r) for r in SWEEP},
-            "A wider lobe has less of itself within the lamp. What the integral leaves, light between facets, is a"
-            " smooth function of alpha.",
+            "The light covers a smaller share of a wider lobe. The difference from the integral, scattering between"
+            " facets, is a smooth function of alpha.",
             bound=0.01,
         ),
         EYE,

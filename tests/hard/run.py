@@ -1,4 +1,4 @@
-"""The command line, the gate and its summary."""
+"""Runs the hard cases, writes the page of results, and fails if a case fails without a known reason."""
 
 import argparse
 import json
@@ -18,8 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass
 class Result:
-    """What became of a case with a method. state: met, failed, known (fails as it is known to), passed (although it
-    is known to fail) or cannot (a peer that cannot be told the scene); seconds: of its renders."""
+    """The result of a case with a method. state: met, failed, known (a known failure), passed (although a failure is
+    known) or cannot (a peer's driver cannot translate the scene); seconds: total time of the renders."""
 
     case: object
     method: str
@@ -31,7 +31,7 @@ class Result:
 
 
 def play(stage):
-    """Plays a stage's case with its method."""
+    """Renders a stage's case by its method, and tests the answer."""
     case, method = stage.case, stage.method
     try:
         verdict = case.answer.judge(stage)
@@ -50,8 +50,8 @@ def play(stage):
     return Result(case, method, state, verdict, stage.seconds, stage.commands, shown)
 
 
-def chosen(options):
-    """The cases of the command line; a name takes those that begin with it."""
+def select(options):
+    """The cases that the command line selects; a name selects all cases that begin with it."""
     known = families.cases()
     if not options.only:
         return [case for case in known if options.long or not case.long]
@@ -63,25 +63,29 @@ def chosen(options):
 
 def parser():
     made = argparse.ArgumentParser(prog="tests/hard-cases.sh", description=__doc__)
-    made.add_argument("--long", action="store_true", help="the cases that take long as well")
-    made.add_argument("--only", nargs="+", metavar="NAME", help="the cases whose names begin so")
+    made.add_argument("--long", action="store_true", help="also run the long cases")
+    made.add_argument("--only", nargs="+", metavar="NAME", help="only cases whose names begin with one of these")
     made.add_argument(
         "--with",
         dest="peers",
         metavar="LIST",
         type=names(PEERS),
         default=[],
-        help=f"other renderers, of {', '.join(PEERS)}, which scripts/compare/setup.sh peers installs",
+        help=f"other renderers, among {', '.join(PEERS)}; scripts/compare/setup.sh peers installs them",
     )
-    made.add_argument("--budget", type=float, default=1.0, help="seconds of a peer for a picture [default: 1]")
-    made.add_argument("--methods", metavar="LIST", type=names(()), help="these methods alone, separated by commas")
-    made.add_argument("--list", action="store_true", help="print the names of the cases and end")
-    made.add_argument("--scenes", action="store_true", help="write the scenes and their answers, and end")
-    made.add_argument("--table", action="store_true", help="write the table of docs/lab/hard-cases.md, and end")
-    made.add_argument("--threads", type=int, default=1, help="of a render [default: 1]")
-    made.add_argument("--jobs", type=int, default=os.cpu_count(), help="renders at a time [default: all cores]")
-    made.add_argument("--program", type=Path, default=ROOT / "target/release/caustique", help="caustique")
-    made.add_argument("-o", "--output", type=Path, default=ROOT / "out/hard", help="folder [default: out/hard]")
+    made.add_argument("--budget", type=float, default=1.0, help="seconds of a peer's picture [default: 1]")
+    made.add_argument("--methods", metavar="LIST", type=names(()), help="only these methods, separated by commas")
+    made.add_argument("--list", action="store_true", help="only print the names of the cases")
+    made.add_argument("--scenes", action="store_true", help="only write the scenes and their answers")
+    made.add_argument("--table", action="store_true", help="only write the table of docs/lab/hard-cases.md")
+    made.add_argument("--threads", type=int, default=1, help="threads of a render [default: 1]")
+    made.add_argument(
+        "--jobs", type=int, default=os.cpu_count(), help="number of simultaneous renders [default: all cores]"
+    )
+    made.add_argument("--program", type=Path, default=ROOT / "target/release/caustique", help="the program caustique")
+    made.add_argument(
+        "-o", "--output", type=Path, default=ROOT / "out/hard", help="folder of the output [default: out/hard]"
+    )
     return made
 
 
@@ -91,7 +95,7 @@ def line(result):
 
 
 def stages_of(case, options):
-    """A case with every method and peer that is asked for."""
+    """The stages of a case: one for each selected method and peer."""
     folder, threads = options.output, options.threads
     own = [
         Stage(options.program, folder, case, method, threads)
@@ -103,13 +107,13 @@ def stages_of(case, options):
 
 
 def names(known):
-    """What takes a list of names with commas between them."""
+    """A parser of comma-separated names, which must be among `known` if it is not empty."""
 
     def take(text):
         found = [name for name in text.split(",") if name]
         wrong = [name for name in found if known and name not in known]
         if wrong:
-            raise argparse.ArgumentTypeError(f"'{wrong[0]}' is not among {', '.join(known)}")
+            raise argparse.ArgumentTypeError(f"'{wrong[0]}' is not one of {', '.join(known)}")
         return found
 
     return take
@@ -120,7 +124,7 @@ def main(arguments=None):
     if options.table:
         table.write()
         return 0
-    cases = chosen(options)
+    cases = select(options)
     if options.list:
         print("\n".join(f"{case.name:32} {case.title}" for case in cases))
         return 0
@@ -139,7 +143,7 @@ def main(arguments=None):
 
 
 def finish(results, folder, seconds):
-    """Writes the page and the figures, prints the summary; the exit code."""
+    """Writes the page and results.json, and prints the summary; returns the exit code."""
     (folder / "index.html").write_text(page.page(results))
     (folder / "results.json").write_text(
         json.dumps(
@@ -166,7 +170,7 @@ def finish(results, folder, seconds):
                 "FAILED "
                 + line(result)
                 + (
-                    " (although it is known to fail: take the reason out of its case)"
+                    " (although it is known to fail: remove the reason from its case)"
                     if result.state == "passed"
                     else ""
                 )

@@ -1,4 +1,4 @@
-"""Scenes as glTF, from meshes and a few materials, in the terms of docs/scene-format.md."""
+"""Scenes of meshes and a few materials, written as glTF with the keys of docs/scene-format.md."""
 
 from dataclasses import dataclass, field, replace
 
@@ -17,7 +17,7 @@ def diffuse(albedo):
 
 
 def metal(colour, roughness):
-    """GGX facets of this reflectance; their alpha is the squared roughness."""
+    """A metal with GGX facets of this reflectance; alpha is the squared roughness."""
     return {
         "pbrMetallicRoughness": {
             "baseColorFactor": [*_rgb(colour), 1],
@@ -59,7 +59,7 @@ def emitter(radiance):
 
 
 def glowing(material, radiance):
-    """A material that emits as well."""
+    """The material with emission added."""
     rgb = np.array(_rgb(radiance), float)
     strength = float(rgb.max())
     if strength == 0:
@@ -83,9 +83,9 @@ def _extras(keys):
 
 @dataclass(frozen=True)
 class Scene:
-    """objects: (mesh, material, keys of its node); lights: (light of KHR_lights_punctual, matrix of its node, keys);
-    camera: (eye, target, vertical field of view in degrees, up); keys: those of the scene; root: the matrix of a node
-    that everything stands on."""
+    """objects: (mesh, material, entries of the node); lights: (light of KHR_lights_punctual, matrix of the node, keys);
+    camera: (eye, target, vertical field of view in degrees, up); keys: of the scene; root: the matrix of a node above
+    all others."""
 
     objects: tuple = ()
     lights: tuple = ()
@@ -94,16 +94,16 @@ class Scene:
     root: np.ndarray | None = None
 
     def add(self, mesh, material, **node):
-        """With one more object. `node`: entries of its node, such as scale."""
+        """The scene with another object; `node`: entries of its node, such as scale."""
         return replace(self, objects=(*self.objects, (mesh, material, node)))
 
     def sun(self, direction, irradiance, angle_deg=0.0):
-        """With a sun that shines along `direction`; irradiance: W/m² across it."""
+        """The scene with a sun that shines along `direction`; irradiance: perpendicular, in W/m²."""
         light = {"type": "directional", "color": [1, 1, 1], "intensity": irradiance}
         return self._lit(light, (0, 0, 0), direction, {"angle_deg": angle_deg} if angle_deg else {})
 
     def point(self, place, intensity):
-        """With a point light; intensity: W/sr."""
+        """The scene with a point light; intensity: in W/sr."""
         light = {"type": "point", "color": [1, 1, 1], "intensity": intensity}
         return self._lit(light, place, (0, 0, -1), {})
 
@@ -112,31 +112,32 @@ class Scene:
         return replace(self, lights=(*self.lights, (light, matrix, keys)))
 
     def seen(self, eye, target, field_deg, up=(0, 1, 0)):
-        """With this camera."""
+        """The scene with this camera."""
         return replace(self, camera=(eye, target, field_deg, up))
 
     def within(self, radiance):
-        """With light of this radiance from everywhere."""
+        """The scene with an environment of this radiance."""
         return replace(self, keys={**self.keys, "environment": {"color": _rgb(radiance)}})
 
     def scaled(self, factor):
-        """All lengths times a factor, radiance kept. Single precision throughout, so powers of two are exact."""
+        """The scene with all lengths multiplied by a factor, at equal radiance. It computes in single precision, so powers
+        of two are exact."""
         objects = tuple(
             (replace(mesh, positions=np.float32(mesh.positions) * np.float32(factor)), material, node)
             for mesh, material, node in self.objects
         )
         eye, target, *rest = self.camera
         eye, target = (tuple(float(np.float32(c) * np.float32(factor)) for c in v) for v in (eye, target))
-        # The view keeps its direction to the last bit.
+        # The direction of the view stays equal to the last bit.
         lights = tuple((light, _moved(matrix, factor), keys) for light, matrix, keys in self.lights)
         return replace(self, objects=objects, lights=lights, camera=(eye, target, *rest))
 
     def moved(self, offset):
-        """Everything on a node that stands at `offset`."""
+        """The scene on a node that is translated by `offset`."""
         return self.under(_translation(offset))
 
     def under(self, matrix):
-        """Everything on a node with this matrix."""
+        """The scene on a node with this matrix."""
         return replace(self, root=matrix)
 
     def write(self, path):
@@ -145,7 +146,7 @@ class Scene:
 
 
 def _across(direction):
-    """An up vector that is not along `direction`."""
+    """An up vector that is not parallel to `direction`."""
     return (0, 1, 0) if abs(direction[1]) < 0.9 * np.linalg.norm(direction) else (0, 0, -1)
 
 
@@ -173,7 +174,7 @@ def _moved(matrix, factor):
 
 
 class _Writer:
-    """The glTF document of a scene, while it grows."""
+    """The glTF document of a scene, under construction."""
 
     def __init__(self, scene):
         self.buffer = bytearray()
@@ -229,8 +230,8 @@ class _Writer:
             attributes["NORMAL"] = self._accessor(mesh.normals.astype("<f4"), "VEC3", FLOAT)
         indices = self._accessor(mesh.triangles.astype("<u4").ravel(), "SCALAR", UNSIGNED)
         materials = self.document.get("materials", [])
-        worn = materials.index(material) if material in materials else self._append("materials", material)
-        part = {"attributes": attributes, "indices": indices, "material": worn}
+        index = materials.index(material) if material in materials else self._append("materials", material)
+        part = {"attributes": attributes, "indices": indices, "material": index}
         return self._append("nodes", {"mesh": self._append("meshes", {"primitives": [part]}), **node})
 
     def _accessor(self, values, kind, component):
@@ -249,5 +250,5 @@ def _finite(values):
 
 
 def _columns(matrix):
-    """A 4 x 4 matrix as glTF writes it."""
+    """A 4 x 4 matrix in glTF's column-major order."""
     return [float(v) for v in np.asarray(matrix).T.ravel()]

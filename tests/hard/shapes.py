@@ -14,21 +14,21 @@ class Mesh:
     normals: np.ndarray | None = None
 
     def flipped(self):
-        """The same surface, seen from behind."""
+        """The surface with front and back exchanged."""
         return replace(self, triangles=self.triangles[:, ::-1], normals=None if self.normals is None else -self.normals)
 
     def without(self, triangles):
-        """The mesh with holes where these triangles are."""
+        """The mesh without these triangles."""
         return replace(self, triangles=np.delete(self.triangles, triangles, axis=0))
 
     def flat(self):
-        """The mesh without normals: a vertex for every corner, so that nothing is shared."""
+        """The mesh without normals and without shared vertices: one vertex for every corner."""
         corners = self.triangles.ravel()
         return Mesh(self.positions[corners], np.arange(corners.size).reshape(-1, 3))
 
 
 def joined(*meshes):
-    """One mesh of several, all with normals or all without."""
+    """One mesh from several, which all have normals or all have none."""
     starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
     normals = None if meshes[0].normals is None else np.concatenate([mesh.normals for mesh in meshes])
     return Mesh(
@@ -39,19 +39,19 @@ def joined(*meshes):
 
 
 def quad(middle, right, up):
-    """A parallelogram around `middle` with the half edges `right` and `up`; its front is where right x up points."""
+    """A parallelogram around `middle` with the half edges `right` and `up`; its front normal is right x up."""
     middle, right, up = (np.asarray(v, float) for v in (middle, right, up))
     corners = np.array([middle - right - up, middle + right - up, middle + right + up, middle - right + up])
     return Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
 def floor(half, height=0.0):
-    """A square in a horizontal plane that faces up, with edges of twice `half`."""
+    """A horizontal square that faces up, with edges of 2 `half`."""
     return quad((0, height, 0), (half, 0, 0), (0, 0, -half))
 
 
 def ceiling(half, height):
-    """A square in a horizontal plane that faces down."""
+    """A horizontal square that faces down, with edges of 2 `half`."""
     return quad((0, height, 0), (half, 0, 0), (0, 0, half))
 
 
@@ -67,7 +67,7 @@ def grid(half, count, height=0.0):
 
 
 def box(low, high):
-    """A closed box that faces out; its faces share no vertices."""
+    """A closed box that faces outwards; its faces share no vertices."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     middle, half, sides = (low + high) / 2, (high - low) / 2, []
     for axis in range(3):
@@ -79,7 +79,7 @@ def box(low, high):
 
 
 def sphere(middle, radius, rings=24, smooth=True):
-    """A closed sphere of 2 rings² quads around the vertical, its poles shared; smooth normals, or none."""
+    """A closed sphere of `rings` rings of 2 `rings` faces around the vertical; with smooth normals, or without normals."""
     polar = np.linspace(0, np.pi, rings + 1)[1:-1]
     around = np.arange(2 * rings) * np.pi / rings
     t, p = np.meshgrid(polar, around, indexing="ij")

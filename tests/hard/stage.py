@@ -1,4 +1,4 @@
-"""Where cases are played: runs the program, and keeps the pictures of a case while it is judged."""
+"""Runs the program on a case, and keeps the case's pictures while they are tested."""
 
 import subprocess
 import time
@@ -10,15 +10,15 @@ import OpenEXR
 from .case import PHOTON_METHODS
 
 #: Seconds after which a render counts as hanging.
-PATIENCE = 60
+TIMEOUT = 60
 
 
 class Broken(Exception):
-    """A render that ended with an error, or not at all; the message is what the program said."""
+    """A render has ended with an error, or not at all; the text is the program's message."""
 
 
 class Stage:
-    """Plays one case with one method. folder: where scenes and pictures go."""
+    """Renders one case by one method; folder: of scenes and pictures."""
 
     def __init__(self, program, folder, case, method, threads=1):
         self.program, self.folder, self.case, self.method, self.threads = (
@@ -32,7 +32,7 @@ class Stage:
         (self.folder / "pictures").mkdir(parents=True, exist_ok=True)
 
     def scene(self, label):
-        """The path of a scene of the case, which Case.write() has written."""
+        """The path of a scene of the case (Case.write() writes it)."""
         return self.folder / self.case.file(label)
 
     def picture(self, name):
@@ -45,23 +45,23 @@ class Stage:
             path.unlink()
 
     def run(self, *arguments, stop_after=None):
-        """Runs the program; (exit code, what it said on stderr). stop_after: seconds until it is killed."""
+        """Runs the program; returns its exit code and its stderr. stop_after: seconds after which it is killed."""
         command = [str(self.program), *map(str, arguments)]
         self.commands.append(command)
         started = time.monotonic()
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
             try:
-                said = process.communicate(timeout=stop_after or PATIENCE)[1]
+                said = process.communicate(timeout=stop_after or TIMEOUT)[1]
             except subprocess.TimeoutExpired:
                 process.kill()
                 said = process.communicate()[1]
                 if stop_after is None:
-                    raise Broken(f"did not end within {PATIENCE} s: {' '.join(command)}") from None
+                    raise Broken(f"did not end within {TIMEOUT} s: {' '.join(command)}") from None
         self.seconds += time.monotonic() - started
         return process.returncode, said
 
     def arguments(self, label, seed, threads=None):
-        """The arguments of a render of a scene, but for its output."""
+        """The arguments of a render of a scene, without its output."""
         case, size = self.case, str(self.case.size)
         photons = ["--photons", case.of("photons", self.method)] if self.method in PHOTON_METHODS else []
         return [
@@ -91,7 +91,7 @@ class Stage:
         ]
 
     def render(self, label, seed, *more, name=None, threads=None):
-        """Renders a scene into the file that is returned."""
+        """Renders a scene; returns the file of the picture."""
         path = self.picture(name or f"{label}-{seed}")
         code, said = self.run(*self.arguments(label, seed, threads), *more, "-o", path)
         self.said += said
@@ -100,14 +100,14 @@ class Stage:
         return path
 
     def pictures(self, label):
-        """The pictures of a scene, one for each seed of the case: (seeds, height, width, 3)."""
+        """The pictures of a scene for all seeds of the case, of shape (seeds, height, width, 3)."""
         if label not in self.kept:
             self.kept[label] = np.stack([read(self.render(label, seed)) for seed in range(self.case.seeds)])
         return self.kept[label]
 
 
 def read(path):
-    """The root picture of an EXR: (height, width, 3), single precision."""
+    """The root layer of an EXR, of shape (height, width, 3), in single precision."""
     channels = OpenEXR.File(str(path)).channels()
     if "RGBA" in channels:
         return channels["RGBA"].pixels[..., :3]
