@@ -1,5 +1,4 @@
-//! Meshes in the shape of a moment: morph targets (specification, section 3.7.2.2), then skins (section 3.7.3.3: linear
-//! blend skinning).
+//! Deforms meshes by morph targets (specification, section 3.7.2.2), then by skins (section 3.7.3.3: linear blend skinning).
 
 use super::document::{Document, get, named};
 use super::transform::{WorldTransforms, affine, is_finite};
@@ -14,14 +13,14 @@ use serde_json::Value;
 
 const EXPORT: &str = "the file is damaged: export it again";
 
-/// What a node does to the shape of its mesh.
+/// The deformation of a mesh by its node.
 #[derive(Default)]
 pub(super) struct Deformation {
-    /// Of the morph targets; none: all zero.
+    /// Weights of the morph targets; empty if all are zero.
     weights: Vec<f64>,
-    /// Of the skin: from where the mesh was bound, to the world about `center`.
+    /// Joint matrices of the skin: from the bind pose to world space relative to `center`.
     joints: Option<Vec<DAffine3>>,
-    /// Where in the world a skinned mesh has its origin: a translation.
+    /// World transform of a skinned mesh: a translation to the first joint.
     pub(super) center: Option<DAffine3>,
 }
 
@@ -33,16 +32,16 @@ struct Skin {
     inverse_bind_matrices: Option<usize>,
 }
 
-/// Whether a node has a shape of its mesh to itself.
-pub(super) fn is_own(raw: &Value) -> bool {
+/// Whether a node deforms its mesh, so that the deformed mesh is not shared.
+pub(super) fn is_deformed(raw: &Value) -> bool {
     raw.get("skin").is_some() || raw.get("weights").is_some()
 }
 
 impl Deformation {
-    /// Of mesh `mesh` on node `node`.
+    /// The deformation of mesh `mesh` by node `node`.
     ///
     /// # Errors
-    /// Weights that are no numbers; a skin, or a joint of it, that does not exist or stands nowhere.
+    /// The weights are not numbers, the skin or a joint does not exist, or a joint has no finite transform.
     pub(super) fn of(document: &Document, mesh: usize, node: usize, worlds: &WorldTransforms) -> Result<Deformation> {
         let raw = document.part("nodes", node);
         let weights = raw.get("weights").or(document.part("meshes", mesh).get("weights"));
@@ -59,10 +58,10 @@ impl Deformation {
         Ok(Deformation { weights, joints: Some(joints), center: Some(center) })
     }
 
-    /// Gives a mesh its shape. `place`: where the primitive is in the file.
+    /// Deforms a mesh; `place` names the primitive in messages.
     ///
     /// # Errors
-    /// Targets, joints or weights that do not fit the mesh.
+    /// Morph targets, joints or weights do not fit the mesh.
     pub(super) fn apply(
         &self,
         document: &Document,
@@ -93,26 +92,26 @@ impl Deformation {
             let cause = format!("{} weights are for {} morph targets", self.weights.len(), targets.len());
             return Err(fault(place, cause).hint(EXPORT));
         }
-        let mut stale = false;
+        let mut stale_normals = false;
         for (i, (target, &weight)) in targets.iter().zip(&self.weights).enumerate().filter(|(_, (_, w))| **w != 0.0) {
             let within = |e: crate::error::Error| e.within(format!("{place}, target {i}"));
-            add(document, target, weight, mesh).map_err(within)?;
-            stale |= target.positions.is_some() && target.normals.is_none() && !mesh.normals.is_empty();
+            add_target(document, target, weight, mesh).map_err(within)?;
+            stale_normals |= target.positions.is_some() && target.normals.is_none() && !mesh.normals.is_empty();
             let others = raw["targets"][i].as_object().into_iter().flat_map(|target| target.keys());
             for other in others.filter(|key| !["POSITION", "NORMAL", "TANGENT"].contains(&key.as_str())) {
                 warnings.push(format!("{place}: {other} of its morph targets is ignored"));
             }
         }
         mesh.normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
-        if stale {
+        if stale_normals {
             warnings.push(format!("{place}: its morph targets move no normals: shading is that of the base shape"));
         }
         Ok(())
     }
 }
 
-/// Adds a morph target to a shape.
-fn add(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut Mesh) -> Result<()> {
+/// Adds a weighted morph target to a mesh.
+fn add_target(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut Mesh) -> Result<()> {
     let moved = |values: &mut [Vec3], deltas: Vec<[f32; 3]>| {
         for (value, delta) in values.iter_mut().zip(deltas) {
             *value = (value.as_dvec3() + weight * Vec3::from_array(delta).as_dvec3()).as_vec3();
@@ -133,13 +132,13 @@ fn add(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut Mesh) 
                 *tangent = turned.normalize_or_zero().extend(tangent.w);
             }
         }
-        // They are made from the texture where they are wanted.
+        // Tangents are computed from texture coordinates if the material needs them.
         None => mesh.tangents.clear(),
     }
     Ok(())
 }
 
-/// Joint matrices: the inverse bind matrix, then the joint's own place in the world.
+/// Joint matrices: the inverse bind matrix, followed by the world transform of the joint.
 fn joints(document: &Document, raw: &Value, worlds: &WorldTransforms) -> Result<Vec<DAffine3>> {
     let skin = Skin::deserialize(raw).map_err(|e| fault("", e).hint(EXPORT))?;
     let binds = skin.inverse_bind_matrices.map(|index| document.floats::<16>(index)).transpose()?;
@@ -161,7 +160,7 @@ fn joints(document: &Document, raw: &Value, worlds: &WorldTransforms) -> Result<
     skin.joints.iter().enumerate().map(joint).collect()
 }
 
-/// Moves a mesh with its joints.
+/// Applies linear blend skinning to a mesh.
 fn skin(
     document: &Document,
     primitive: &Primitive,
@@ -213,20 +212,20 @@ fn skin(
             loose += 1;
             joints.first().copied().unwrap_or_default()
         };
-        place_vertex(mesh, i, &matrix);
+        transform_vertex(mesh, i, &matrix);
     }
     if loose > 0 {
         let loose = counted(loose, "vertex has", "vertices have");
         warnings.push(format!("{place}: {loose} no weight of any joint, and the first joint moves them"));
     }
-    // A mirrored skeleton turns the winding, and the front stays the front.
+    // A mirrored skeleton flips the winding, so that the front stays the front.
     if joints.first().is_some_and(|joint| joint.matrix3.determinant() < 0.0) {
         mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     }
     Ok(())
 }
 
-fn place_vertex(mesh: &mut Mesh, i: usize, matrix: &DAffine3) {
+fn transform_vertex(mesh: &mut Mesh, i: usize, matrix: &DAffine3) {
     let p = &mut mesh.positions[i];
     *p = matrix.transform_point3(p.as_dvec3()).as_vec3();
     if let Some(n) = mesh.normals.get_mut(i) {
@@ -238,7 +237,7 @@ fn place_vertex(mesh: &mut Mesh, i: usize, matrix: &DAffine3) {
     }
 }
 
-/// The transposed inverse of a matrix but for a positive factor, also where there is no inverse: it takes normals along.
+/// The inverse transpose of a matrix up to a positive factor, defined for singular matrices, too. It transforms normals.
 fn cofactors(m: &DMat3) -> DMat3 {
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };

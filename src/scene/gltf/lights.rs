@@ -1,4 +1,4 @@
-//! KHR_lights_punctual and cameras.
+//! Reads punctual lights (KHR_lights_punctual) and cameras.
 
 use super::clipping::Clip;
 use super::document::{Document, get, named};
@@ -18,13 +18,14 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Luminous efficacy (lm/W) with which Blender's exporter turns watts into lumens.
 const EFFICACY: f32 = 683.0;
-/// The version of Blender's exporter that began to.
+/// First version of Blender's exporter that writes lumens.
 const FIRST_PHOTOMETRIC: [u32; 2] = [3, 6];
-/// Less light than this is too dark to see (W/m2): a picture of Blender's defaults shows about 1.
-const FAINTEST: f64 = 0.02;
-/// Lights and vertices that are looked at to judge how bright a scene is.
-const MAX_JUDGED_LIGHTS: usize = 64;
-const MAX_JUDGED_POINTS: usize = 4096;
+/// Minimum visible irradiance (W/m2). Blender's default scene has about 1.
+const MIN_IRRADIANCE: f64 = 0.02;
+/// Maximum number of lights in the estimate of a scene's brightness.
+const MAX_SAMPLED_LIGHTS: usize = 64;
+/// Maximum number of vertices in the estimate of a scene's brightness.
+const MAX_SAMPLED_POINTS: usize = 4096;
 
 /// A light of KHR_lights_punctual.
 #[derive(Deserialize)]
@@ -64,23 +65,23 @@ fn one() -> f32 {
     1.0
 }
 
-/// What divides intensities to make them radiometric.
+/// Divisors that convert intensities in the file to radiometric units.
 #[derive(Clone, Copy)]
 pub(super) struct Divisors {
-    /// Of suns, to W/m2.
+    /// For suns, to W/m2.
     sun: f32,
-    /// Of points and spots, to W/sr.
+    /// For points and spots, to W/sr.
     lamp: f32,
 }
 
 impl Divisors {
     const RADIOMETRIC: Divisors = Divisors { sun: 1.0, lamp: 1.0 };
     const PHOTOMETRIC: Divisors = Divisors { sun: EFFICACY, lamp: EFFICACY };
-    /// Blender's own numbers: the power of a point or spot light in all directions.
+    /// For Blender's own units: the power of a point or spot light over the whole sphere.
     const WATTS: Divisors = Divisors { sun: 1.0, lamp: 4.0 * PI };
 }
 
-/// What divides intensities to make them radiometric; and whether that is a guess.
+/// The divisors for the lights of a file, and whether the units are a guess.
 pub(super) fn divisors(
     document: &Document,
     units: LightUnits,
@@ -106,18 +107,18 @@ pub(super) fn divisors(
     }
 }
 
-/// Takes the lights of a whole scene for watts after all where they would light nothing as lumens: Blender's exporter
-/// leaves the factor out in its lighting mode "Unitless", and no file says its mode.
+/// Takes intensities for watts instead of lumens, if as lumens they would be too dark to see. Blender's exporter omits the
+/// factor in its lighting mode "Unitless", and files do not state the mode.
 pub(super) fn reconsider_units(out: &mut Description) {
     let Some(guessed) = out.guessed_units.as_mut().filter(|guessed| guessed.photometric) else { return };
     let glows = out.materials.iter().any(|material| material.emission.max_element() > 0.0);
     if glows || out.environment.as_ref().is_some_and(|environment| environment.strength > 0.0) {
-        // What else shines has a brightness to compare with: the plan tells.
+        // The plan compares lights with the emissive surfaces and the environment.
         return;
     }
     let points = sample_vertices(&out.meshes, &out.instances);
-    let total: f64 = out.lights.iter().take(MAX_JUDGED_LIGHTS).map(|light| typical_irradiance(light, &points)).sum();
-    if !(FAINTEST / f64::from(EFFICACY)..FAINTEST).contains(&total) {
+    let total: f64 = out.lights.iter().take(MAX_SAMPLED_LIGHTS).map(|light| typical_irradiance(light, &points)).sum();
+    if !(MIN_IRRADIANCE / f64::from(EFFICACY)..MIN_IRRADIANCE).contains(&total) {
         return;
     }
     guessed.photometric = false;
@@ -129,7 +130,7 @@ pub(super) fn reconsider_units(out: &mut Description) {
     ));
 }
 
-/// What a light gives at the median distance of the points (W/m2); infinite without points, which tell nothing.
+/// Irradiance of a light at the median distance of the points (W/m2); infinite without points.
 fn typical_irradiance(light: &PunctualLight, points: &[DVec3]) -> f64 {
     let intensity = f64::from(light.intensity.max_element());
     let mut distances: Vec<f64> = points.iter().map(|p| p.distance_squared(light.to_world.translation)).collect();
@@ -143,10 +144,10 @@ fn typical_irradiance(light: &PunctualLight, points: &[DVec3]) -> f64 {
     }
 }
 
-/// Some vertices of a scene, in the world, spread evenly over its objects.
+/// World positions of some vertices, spread evenly over the objects of a scene.
 fn sample_vertices(meshes: &[Mesh], instances: &[PlacedMesh]) -> Vec<DVec3> {
-    let each = (MAX_JUDGED_POINTS / instances.len().max(1)).max(1);
-    let step = instances.len().div_ceil(MAX_JUDGED_POINTS).max(1);
+    let each = (MAX_SAMPLED_POINTS / instances.len().max(1)).max(1);
+    let step = instances.len().div_ceil(MAX_SAMPLED_POINTS).max(1);
     let mut points = Vec::new();
     for placed in instances.iter().step_by(step) {
         let positions = &meshes[placed.mesh as usize].positions;
@@ -156,7 +157,7 @@ fn sample_vertices(meshes: &[Mesh], instances: &[PlacedMesh]) -> Vec<DVec3> {
     points
 }
 
-/// The light that stands on a node.
+/// Reads the light of a node, which is given by its name and raw JSON.
 pub(super) fn light(
     document: &Document,
     index: usize,
@@ -214,7 +215,8 @@ pub(super) fn light(
     Ok(PunctualLight { name, to_world, intensity, kind, radius, hidden_from_camera, light_group })
 }
 
-/// `blend`: the share of the cone's 1 - cos that its edge takes, which then is Blender's.
+/// Checks the cone of a spot. `blend` is the share of the edge in the cone's 1 - cos, as in Blender; the edge then has
+/// Blender's falloff.
 fn cone(spot: &Spot, blend: Option<f32>, place: &str, warnings: &mut Vec<String>) -> Result<PunctualKind> {
     let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
     if !(inner.is_finite() && outer.is_finite()) {
@@ -236,7 +238,7 @@ fn cone(spot: &Spot, blend: Option<f32>, place: &str, warnings: &mut Vec<String>
     }
 }
 
-/// The camera that stands on a node.
+/// Reads the camera of a node, which is given by its name and raw JSON.
 pub(super) fn camera(
     document: &Document,
     index: usize,

@@ -1,4 +1,4 @@
-//! One material: the specification's section 5.19 and the KHR_materials_* extensions, checked and put into our terms.
+//! Reads a material (specification, section 5.19, and the KHR_materials_* extensions), and checks its values.
 
 use super::container::malformed;
 use super::document::{Document, extension};
@@ -12,7 +12,7 @@ use crate::texture::TextureRef;
 use serde::Deserialize;
 use serde_json::Value;
 
-/// Defines what JSON holds: every field has its default and may be left out.
+/// Defines a JSON object whose fields are all optional and have defaults.
 macro_rules! record {
     ($(#[$doc:meta])* $name:ident { $($field:ident: $kind:ty = $default:expr,)* }) => {
         $(#[$doc])*
@@ -88,20 +88,20 @@ record! { Anisotropy {
 }}
 record! { Dispersion { dispersion: f32 = 0.0, }}
 
-/// A material, and whether the file itself says that its meshes are solid or thin.
+/// A material, and whether the file declares its meshes solid or thin.
 pub(super) struct Loaded {
     pub(super) material: Material,
-    /// `Some(true)`: a volume extension with a thickness, or a medium inside. `Some(false)`: a volume extension without
-    /// thickness.
+    /// `Some(true)` for a volume extension with a thickness, or a medium inside; `Some(false)` for a volume extension
+    /// without thickness.
     pub(super) solid: Option<bool>,
-    /// It has an occlusion texture, which is not read: occlusion is simulated.
+    /// Whether the material has an occlusion texture, which is ignored because occlusion is simulated.
     pub(super) occlusion: bool,
 }
 
 /// Reads material `index`.
 ///
 /// # Errors
-/// A number is not finite, or a texture cannot be had.
+/// A number is not finite, or a texture cannot be read.
 pub(super) fn read(
     document: &Document,
     index: usize,
@@ -146,7 +146,7 @@ pub(super) fn read(
     reader.surface(&mut material)?;
     reader.coatings(&mut material)?;
     let solid = reader.transmission(&mut material)?;
-    // Section 3.9.5. The back faces of glass are those of its other side.
+    // Section 3.9.5. Transmissive surfaces are not culled, because their back faces are visible from inside.
     material.culled = !material.double_sided && !material.transmits() && !material.null_bsdf;
     Ok(Loaded { material, solid, occlusion: core.occlusion_texture.is_some() })
 }
@@ -168,9 +168,9 @@ impl Reader<'_> {
         if x.is_finite() { Ok(x) } else { Err(fault(self.place, format!("{name} is not finite"))) }
     }
 
-    /// A number in `[0, most]`; others are moved there, with a warning.
-    fn range(&mut self, x: f32, most: f32, name: &str) -> Result<f32> {
-        let inside = self.finite(x, name)?.clamp(0.0, most);
+    /// Clamps a number to `[0, max]`, with a warning if it changes.
+    fn range(&mut self, x: f32, max: f32, name: &str) -> Result<f32> {
+        let inside = self.finite(x, name)?.clamp(0.0, max);
         if inside != x {
             self.warnings.push(format!("{}: {name} is {x}; {inside} is used", self.place));
         }
@@ -188,9 +188,9 @@ impl Reader<'_> {
         Ok(x)
     }
 
-    fn color(&mut self, c: [f32; 3], most: f32, name: &str) -> Result<Rgb> {
+    fn color(&mut self, c: [f32; 3], max: f32, name: &str) -> Result<Rgb> {
         let [r, g, b] = c;
-        Ok(Rgb::new(self.range(r, most, name)?, self.range(g, most, name)?, self.range(b, most, name)?))
+        Ok(Rgb::new(self.range(r, max, name)?, self.range(g, max, name)?, self.range(b, max, name)?))
     }
 
     fn texture(&mut self, info: Texture, usage: Use, name: &str) -> Result<Option<TextureRef>> {
@@ -199,8 +199,8 @@ impl Reader<'_> {
         self.textures.reference(self.document, &info, usage, &place, self.warnings).map(Some)
     }
 
-    /// KHR_materials_pbrSpecularGlossiness: a dielectric whose reflectance at normal incidence is the specular colour,
-    /// which KHR_materials_ior's legacy index 0 (Fresnel's factor is 1 before the specular colour) expresses.
+    /// KHR_materials_pbrSpecularGlossiness: a dielectric with the specular colour as reflectance at normal incidence. The
+    /// legacy index 0 of KHR_materials_ior expresses this, because it makes the Fresnel factor 1.
     fn specular_glossiness(&mut self, material: &mut Material) -> Result<()> {
         const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
         let Some(old) = self.extension::<SpecularGlossiness>(NAME)? else { return Ok(()) };
@@ -280,7 +280,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Transmission, and what fills the solid; whether the file itself says that it is one.
+    /// Reads transmission and the medium of a solid. Returns whether the file declares meshes of the material solid.
     fn transmission(&mut self, material: &mut Material) -> Result<Option<bool>> {
         if let Some(e) = self.extension::<Transmission>("KHR_materials_transmission")? {
             material.transmission = self.unit(e.transmission_factor, "transmissionFactor")?;
@@ -320,10 +320,10 @@ impl Reader<'_> {
         Ok(solid)
     }
 
-    /// sigma_a = -ln(c) / d: after distance d the colour c is left (KHR_materials_volume).
+    /// The medium with sigma_a = -ln(c) / d, which transmits the colour c over the distance d (KHR_materials_volume).
     fn absorption(&mut self, distance: f32, color: [f32; 3]) -> Result<Option<MediumParameters>> {
-        /// What passes is never nothing: sigma_a stays finite.
-        const LEAST: f32 = 1e-6;
+        /// Minimum transmitted share, which keeps sigma_a finite.
+        const MIN_COLOR: f32 = 1e-6;
         let c = self.color(color, 1.0, "attenuationColor")?;
         if c == Rgb::ONE || distance == f32::INFINITY {
             return Ok(None);
@@ -333,10 +333,11 @@ impl Reader<'_> {
                 .push(format!("{}: attenuationDistance {distance} is not positive: nothing is absorbed", self.place));
             return Ok(None);
         }
-        if c.min_element() < LEAST {
-            self.warnings.push(format!("{}: attenuationColor is raised to {LEAST}, absorption is finite", self.place));
+        if c.min_element() < MIN_COLOR {
+            self.warnings
+                .push(format!("{}: attenuationColor is raised to {MIN_COLOR}, absorption is finite", self.place));
         }
-        let sigma_a = -c.max(Rgb::splat(LEAST)).map(f32::ln) / distance;
+        let sigma_a = -c.max(Rgb::splat(MIN_COLOR)).map(f32::ln) / distance;
         if !sigma_a.is_finite() {
             return Err(fault(self.place, "its absorption is not finite"));
         }

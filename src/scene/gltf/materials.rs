@@ -1,4 +1,5 @@
-//! The materials that a scene uses, each once, or twice where its closed meshes are solid and its open ones thin.
+//! The materials that a scene uses. A material is listed once, or twice if its closed meshes are solid and its open ones
+//! thin.
 
 use super::document::{Document, get, named};
 use super::material::{self, Loaded};
@@ -11,16 +12,17 @@ use crate::material::Material;
 use crate::texture::TextureRef;
 use std::collections::HashMap;
 
-/// Loads materials as meshes call for them.
+/// Loads materials when meshes need them.
 pub(super) struct Library {
     glass: Glass,
-    /// Those called for.
+    /// The materials in use.
     pub(super) list: Vec<Material>,
     pub(super) textures: Textures,
+    /// Materials that were read, by index in the file.
     loaded: HashMap<Option<usize>, Loaded>,
-    /// By material of the file and whether it is solid.
+    /// Index in `list`, by index in the file and whether the mesh is solid.
     known: HashMap<(Option<usize>, bool), u32>,
-    /// Materials with an occlusion texture.
+    /// Number of materials with an occlusion texture.
     pub(super) occluded: usize,
 }
 
@@ -30,8 +32,9 @@ impl Library {
         Library { glass, list, textures, loaded: HashMap::new(), known: HashMap::new(), occluded: 0 }
     }
 
-    /// The material of a mesh that bounds `bounds`.
-    pub(super) fn wear(
+    /// Index in `list` of the material `index` for a mesh. `bounds` is the topology of the mesh, which decides whether glass
+    /// is solid.
+    pub(super) fn material_for_mesh(
         &mut self,
         document: &Document,
         index: Option<usize>,
@@ -102,7 +105,7 @@ fn place(document: &Document, index: Option<usize>) -> Result<String> {
     Ok(named("material", get(list, i, "material")?["name"].as_str(), i))
 }
 
-/// The specification's default (section 3.9.1), for primitives without a material.
+/// The default material of the specification (section 3.9.1), for primitives without a material.
 fn default() -> Material {
     Material { name: "default".into(), culled: true, ..Material::default() }
 }
@@ -118,8 +121,8 @@ fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &m
     }
 }
 
-/// The set of texture coordinates along which a material wants tangents, and their transform: a normal map that is
-/// turned turns its relief (specification, section 3.9.3).
+/// The texture coordinates that define the tangents of a material, with the transform of the normal map, which also rotates
+/// its tangent space (specification, section 3.9.3). `None` if the material needs no tangents.
 pub(super) fn tangent_coordinates(material: &Material) -> Option<TextureRef> {
     let set = material.anisotropy_texture.map_or(0, |t| t.set);
     let plain = TextureRef { texture: 0, set, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };

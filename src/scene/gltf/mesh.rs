@@ -1,4 +1,4 @@
-//! Primitives to triangle meshes.
+//! Reads primitives as triangle meshes.
 
 use super::deform::Deformation;
 use super::document::{Document, get, named};
@@ -10,14 +10,13 @@ use gltf::json;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-/// Larger coordinates (m) leave no room for the square of an area in f32.
-pub(super) const FARTHEST: f64 = 1e9;
+/// Maximum coordinate (m). Squared areas of larger triangles would overflow f32.
+pub(super) const MAX_COORDINATE: f64 = 1e9;
 
-/// Reads primitive `primitive` of mesh `index`, in the shape that a node gives it. `None`: it has nothing to render, and a
-/// warning says why.
+/// Reads primitive `primitive` of mesh `index`, deformed by a node. `None` if it has nothing to render, with a warning.
 ///
 /// # Errors
-/// Anything it names is missing, out of range or not finite.
+/// Data of the primitive are missing, out of range or not finite.
 pub(super) fn read(
     document: &Document,
     index: usize,
@@ -32,7 +31,7 @@ pub(super) fn read(
     let source = get(&parent.primitives, primitive, "primitive")?;
     let raw = &document.part("meshes", index)["primitives"][primitive];
     let reader = Reader { document, source, place: &place };
-    // Without a buffer view its positions would all be zero.
+    // Without a buffer view, all positions would be zero.
     let has_data = |a: &json::Accessor| a.buffer_view.is_some() || a.sparse.is_some();
     let positions = reader.accessor(&Semantic::Positions).and_then(|index| document.accessors.get(index));
     if let Some(error) = positions.filter(|a| !has_data(a)).and_then(|_| container::compression_error(raw)) {
@@ -77,7 +76,7 @@ fn kind(mode: Mode) -> &'static str {
     if mode == Mode::Points { "points" } else { "lines" }
 }
 
-/// Corners of the triangles (specification, section 3.7.2.1).
+/// Vertex indices of the triangles (specification, section 3.7.2.1).
 fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => {
@@ -89,7 +88,7 @@ fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
     }
 }
 
-/// Takes out the triangles without area, which no ray can hit; their number.
+/// Removes triangles without area, which no ray can hit. Returns their number.
 pub(super) fn drop_degenerate(mesh: &mut Mesh) -> usize {
     let before = mesh.triangles.len();
     let positions = &mesh.positions;
@@ -122,7 +121,7 @@ impl Reader<'_> {
         for (i, p) in positions.iter().enumerate() {
             let cause = if !p.is_finite() {
                 "is not finite"
-            } else if f64::from(p.abs().max_element()) > FARTHEST {
+            } else if f64::from(p.abs().max_element()) > MAX_COORDINATE {
                 "is too far from the origin"
             } else {
                 continue;
@@ -134,7 +133,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// An attribute with one value for each vertex; values that are not finite are made `fallback`, with a warning.
+    /// Reads an attribute with one value per vertex. Non-finite values are replaced by `fallback`, with a warning.
     fn vertex_values<const N: usize>(
         &self,
         semantic: &Semantic,
@@ -186,7 +185,7 @@ impl Reader<'_> {
                 *c = c.clamp(Vec4::ZERO, Vec4::ONE);
             }
         }
-        // Without normals the specification wants given tangents ignored.
+        // The specification requires that tangents without normals are ignored.
         if !mesh.normals.is_empty() {
             let tangents = self.vertex_values::<4>(&Semantic::Tangents, n, [0.0; 4], warnings)?;
             mesh.tangents = tangents.into_iter().map(Vec4::from_array).collect();
@@ -209,9 +208,9 @@ impl Reader<'_> {
 mod tests {
     use super::*;
 
-    /// The specification's own formulas: strips {i, i + (1 + i % 2), i + (2 - i % 2)}, fans {i + 1, i + 2, 0}.
+    /// The formulas of the specification: strips {i, i + (1 + i % 2), i + (2 - i % 2)}, fans {i + 1, i + 2, 0}.
     #[test]
-    fn strips_and_fans() {
+    fn strips_and_fans_become_triangles() {
         let order = [10, 11, 12, 13, 14];
         assert_eq!(triangles(Mode::TriangleStrip, &order), [[10, 11, 12], [11, 13, 12], [12, 13, 14]]);
         assert_eq!(triangles(Mode::TriangleFan, &order), [[11, 12, 10], [12, 13, 10], [13, 14, 10]]);

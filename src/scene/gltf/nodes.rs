@@ -1,4 +1,4 @@
-//! The node hierarchy: transforms composed in f64, and what stands on the nodes.
+//! Reads the node hierarchy: transforms composed in f64, and the meshes, lights and cameras of the nodes.
 
 use super::clipping::{self, Clip};
 use super::deform::Deformation;
@@ -6,7 +6,7 @@ use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, Rate, SceneExtras};
 use super::flat::flattened;
 use super::materials::{Library, tangent_coordinates};
-use super::mesh::FARTHEST;
+use super::mesh::MAX_COORDINATE;
 use super::shells;
 use super::topology::Solid;
 use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
@@ -24,15 +24,14 @@ use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Bytes that a mesh takes each time it is placed, in our lists and in Embree's: 957 MiB were taken by 2^20 copies of a
-/// triangle.
-const PLACED_BYTES: u64 = 1000;
-
-/// Bytes of a vertex with all that it may have, and of a triangle, in our lists and in Embree's.
+/// Memory per instance of a mesh in bytes, Embree included. Measured: 2^20 instances of a triangle take 957 MiB.
+const INSTANCE_BYTES: u64 = 1000;
+/// Maximum memory per vertex in bytes, Embree included.
 const VERTEX_BYTES: u64 = 128;
+/// Maximum memory per triangle in bytes, Embree included.
 const TRIANGLE_BYTES: u64 = 128;
 
-/// Turns the bytes of a file into a description.
+/// Reads the bytes of a file into a description.
 pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
     let mut warnings = Vec::new();
     let folder = Folder::of(path, options.allow_outside);
@@ -66,7 +65,7 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
     Ok(out)
 }
 
-/// KHR_node_visibility.
+/// The extension KHR_node_visibility.
 #[derive(Deserialize)]
 struct Visibility {
     #[serde(default = "visible")]
@@ -77,48 +76,49 @@ fn visible() -> bool {
     true
 }
 
-/// A reference to a light.
+/// A node's reference to a light of KHR_lights_punctual.
 #[derive(Deserialize)]
 struct LightReference {
     light: u32,
 }
 
-/// EXT_mesh_gpu_instancing.
+/// The extension EXT_mesh_gpu_instancing.
 #[derive(Deserialize)]
 struct Instancing {
     attributes: HashMap<String, u32>,
 }
 
-/// A primitive that is ready to be placed.
+/// A primitive with its material, by their indices in the description.
 #[derive(Clone, Copy)]
 struct Part {
     mesh: u32,
     material: u32,
 }
 
-/// A primitive that has been read.
-struct Worn {
+/// A primitive that was read, with its material.
+struct MaterialMesh {
+    /// Index of the primitive in its mesh.
     primitive: usize,
     mesh: Mesh,
-    /// Its material in the file.
-    of_file: Option<usize>,
-    /// Index into the library.
+    /// Index of the material in the file.
+    file_material: Option<usize>,
+    /// Index of the material in the library.
     material: u32,
-    /// What it bounds, with the other primitives unless it is closed alone.
+    /// Topology of the primitive if it is closed alone, otherwise of the whole mesh.
     bounds: Solid,
 }
 
 struct Reader<'r> {
     document: &'r Document<'r>,
     library: Library,
-    /// By mesh of the file, and the node that gives it a shape of its own.
+    /// Parts of the meshes that were read, by index of the mesh, and of the node if it deforms the mesh.
     meshes: HashMap<(usize, Option<usize>), Vec<Part>>,
     worlds: WorldTransforms<'r, 'r>,
-    /// Local bounds of the meshes read.
+    /// Local bounds of each mesh in `out`.
     bounds: Vec<(DVec3, DVec3)>,
     /// Clip planes of the cameras.
     clips: Vec<Clip>,
-    /// What divides intensities, once it is known.
+    /// Unit conversion of punctual lights, once it is known.
     divisors: Option<lights::Divisors>,
     options: ReadOptions,
     scene: SceneExtras,
@@ -131,7 +131,7 @@ impl Reader<'_> {
         let index = document.default_scene()?;
         let roots = match document.scenes.get(index) {
             Some(scene) => scene.nodes.iter().map(|n| n.value()).collect(),
-            None => self.orphans(),
+            None => self.root_nodes(),
         };
         let place = named("scene", document.part("scenes", index)["name"].as_str(), index);
         let raw = document.part("scenes", index);
@@ -146,7 +146,7 @@ impl Reader<'_> {
         self.walk(roots)
     }
 
-    /// The picture that the file was made for.
+    /// Checks and copies the settings of the picture.
     fn picture(&mut self, place: &str) -> Result<()> {
         let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, frame, frame_rate, .. } = self.scene;
         if resolution.is_some_and(|size| size.contains(&0)) {
@@ -163,19 +163,19 @@ impl Reader<'_> {
             return Err(fault(place, cause));
         }
         let frame_rate = frame_rate.map(Rate::fraction);
-        // The EXR's attribute has a numerator with a sign.
+        // The numerator of EXR's attribute is signed.
         if frame_rate.is_some_and(|rate| rate.contains(&0) || rate[0] > i32::MAX as u32) {
             let cause = "extras.caustique.frame_rate must be one or two whole numbers above zero, below 2^31";
             return Err(fault(place, cause));
         }
-        // The frame that is shown, if one is asked for.
+        // A requested frame replaces the frame in the file.
         let frame = self.options.frame.map_or(frame, |frame| i32::try_from(frame.number).ok());
         self.out.picture = PictureDefaults { resolution, exposure, tonemap, film_transparent, crop, frame, frame_rate };
         Ok(())
     }
 
-    /// Nodes that are nobody's child: a file may have no scene.
-    fn orphans(&self) -> Vec<usize> {
+    /// Nodes without a parent: the roots of a file without a scene.
+    fn root_nodes(&self) -> Vec<usize> {
         let nodes = &self.document.nodes;
         let mut child = vec![false; nodes.len()];
         for index in nodes.iter().flat_map(|n| n.children.iter().flatten()) {
@@ -201,7 +201,7 @@ impl Reader<'_> {
                 if !(color.is_finite() && color.min_element() >= 0.0) {
                     return Err(fault("environment", "its color must be finite and not negative"));
                 }
-                // Said to be dark.
+                // A black environment is none.
                 if color == Rgb::ZERO {
                     return Ok(());
                 }
@@ -225,7 +225,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Visits the nodes in the file's order, parents first, each once: nodes make trees (specification, section 3.5.2).
+    /// Visits each node once, in the file's order, parents first. Nodes must form trees (specification, section 3.5.2).
     fn walk(&mut self, roots: Vec<usize>) -> Result<()> {
         let document = self.document;
         let mut seen = vec![false; document.nodes.len()];
@@ -289,15 +289,15 @@ impl Reader<'_> {
             let name = Some(name).filter(known).or(mesh_name.filter(known)).unwrap_or_else(|| place.into());
             let said = extras::read::<ObjectExtras>(raw, place)?;
             let shape = Deformation::of(document, mesh, index, &self.worlds).map_err(|e| e.within(place))?;
-            // Where the node of a skinned mesh stands says nothing: its joints do.
+            // A skinned mesh ignores the transform of its node (specification, section 3.7.3.3).
             let to_world = shape.center.unwrap_or(to_world);
-            let parts = self.parts(mesh, deform::is_own(raw).then_some(index), &shape)?;
+            let parts = self.parts(mesh, deform::is_deformed(raw).then_some(index), &shape)?;
             self.place(&parts, name, self.copies(raw, place)?, to_world, &said, place)?;
         }
         Ok(())
     }
 
-    /// Places the parts of a mesh, once for each of `copies`.
+    /// Adds instances of the parts of a mesh, one for each of `copies`.
     fn place(
         &mut self,
         parts: &[Part],
@@ -310,16 +310,16 @@ impl Reader<'_> {
         if parts.is_empty() {
             return Ok(());
         }
-        self.check_room(copies.len(), parts.len()).map_err(|e| e.within(place))?;
+        self.check_memory(copies.len(), parts.len()).map_err(|e| e.within(place))?;
         let object = self.out.objects.len() as u32;
         self.out.objects.push(name.clone());
         let mut flat = 0;
         for copy in copies {
             let to_world = to_world * copy;
-            let turns = is_invertible(&to_world);
+            let invertible = is_invertible(&to_world);
             for &Part { mesh, material } in parts {
                 self.check_reach(mesh, &to_world, place)?;
-                let (mesh, to_world) = if turns {
+                let (mesh, to_world) = if invertible {
                     (mesh, to_world)
                 } else if let Some(mesh) = self.flattened(mesh, &to_world.matrix3, place)? {
                     (mesh, DAffine3::from_translation(to_world.translation))
@@ -339,7 +339,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Index of a mesh of its own for one on a node whose transform leaves it a plane; `None` where it leaves less.
+    /// Adds a flattened copy of a mesh for a transform that is singular, and returns its index. `None` if the copy has no
+    /// area.
     fn flattened(&mut self, mesh: u32, transform: &DMat3, place: &str) -> Result<Option<u32>> {
         let Some(flat) = flattened(&self.out.meshes[mesh as usize], transform) else { return Ok(None) };
         let bytes = flat.positions.len() as u64 * VERTEX_BYTES + flat.triangles.len() as u64 * TRIANGLE_BYTES;
@@ -355,7 +356,7 @@ impl Reader<'_> {
         let far = |i: usize| {
             let corner = DVec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), low, high);
             let reach = to_world.transform_point3(corner).abs().max_element();
-            reach.is_nan() || reach > FARTHEST
+            reach.is_nan() || reach > MAX_COORDINATE
         };
         if (0..8).any(far) {
             return Err(fault(place, "it reaches too far from the origin").hint("look at its scale and position"));
@@ -363,19 +364,19 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The primitives of a mesh with their materials, read at the first call; `owner`: the node whose shape of it is none
-    /// other's.
+    /// The primitives of a mesh with their materials, read at the first call. `owner` is the node that deforms the mesh, if
+    /// one does.
     fn parts(&mut self, index: usize, owner: Option<usize>, shape: &Deformation) -> Result<Vec<Part>> {
         if let Some(parts) = self.meshes.get(&(index, owner)) {
             return Ok(parts.clone());
         }
-        let (mut worn, whole) = self.worn(index, shape)?;
+        let (mut meshes, whole) = self.material_meshes(index, shape)?;
         let source = get(&self.document.meshes, index, "mesh")?;
         let is_glass = |material: u32| self.library.list[material as usize].is_solid_glass();
-        let glass = worn.iter_mut().filter(|part| is_glass(part.material) && part.bounds.closed).collect();
-        check_shells(glass, whole, &named("mesh", source.name.as_deref(), index), &mut self.out.warnings);
+        let glass = meshes.iter_mut().filter(|part| is_glass(part.material) && part.bounds.closed).collect();
+        orient_shells(glass, whole, &named("mesh", source.name.as_deref(), index), &mut self.out.warnings);
         let mut parts = Vec::new();
-        for Worn { mut mesh, material, .. } in worn {
+        for MaterialMesh { mut mesh, material, .. } in meshes {
             if mesh.tangents.is_empty()
                 && let Some(coordinates) = tangent_coordinates(&self.library.list[material as usize])
             {
@@ -391,8 +392,8 @@ impl Reader<'_> {
         Ok(parts)
     }
 
-    /// The primitives of a mesh that have triangles, and what all of them bound together.
-    fn worn(&mut self, index: usize, shape: &Deformation) -> Result<(Vec<Worn>, Solid)> {
+    /// Reads the primitives of a mesh that have triangles, and the topology of all of them together.
+    fn material_meshes(&mut self, index: usize, shape: &Deformation) -> Result<(Vec<MaterialMesh>, Solid)> {
         let document = self.document;
         let source = get(&document.meshes, index, "mesh")?;
         let mut read: Vec<(usize, Mesh)> = Vec::new();
@@ -401,9 +402,9 @@ impl Reader<'_> {
                 read.push((i, mesh));
             }
         }
-        // A solid may wear several materials: what counts for glass is the surface as a whole.
+        // A solid may have several materials, so the surface as a whole decides whether it is closed.
         let whole = topology::solid(&read.iter().map(|(_, m)| m).collect::<Vec<_>>());
-        let mut worn = Vec::new();
+        let mut meshes = Vec::new();
         let alone = read.len() == 1;
         for (i, mut mesh) in read {
             let own = if alone { whole } else { topology::solid(&[&mesh]) };
@@ -419,36 +420,38 @@ impl Reader<'_> {
                 self.out.warnings.push(format!("{place}: it has no triangle to render"));
                 continue;
             }
-            let of_file = source.primitives[i].material.map(|m| m.value());
+            let file_material = source.primitives[i].material.map(|m| m.value());
             let bounds = if own.closed { own } else { whole };
             let material = self
                 .library
-                .wear(document, of_file, &mesh, bounds, &mut self.out.warnings)
+                .material_for_mesh(document, file_material, &mesh, bounds, &mut self.out.warnings)
                 .map_err(|e| if e.place.is_empty() { e.within(&place) } else { e })?;
-            worn.push(Worn { primitive: i, mesh, of_file, material, bounds });
+            meshes.push(MaterialMesh { primitive: i, mesh, file_material, material, bounds });
         }
-        Ok((worn, whole))
+        Ok((meshes, whole))
     }
 
-    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing): itself without the extension.
+    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), relative to the node. Without the extension, the
+    /// identity alone.
     fn copies(&self, raw: &Value, place: &str) -> Result<Vec<DAffine3>> {
         const NAME: &str = "EXT_mesh_gpu_instancing";
         let Some(instancing) = extension::<Instancing>(raw, NAME, place)? else { return Ok(vec![DAffine3::IDENTITY]) };
         let within = |e: crate::error::Error| e.within(format!("{place}, {NAME}"));
         let index = |key: &str| instancing.attributes.get(key).map(|i| *i as usize);
         let read3 = |key: &str| index(key).map(|i| self.document.floats::<3>(i)).transpose().map_err(within);
-        let (moves, scales) = (read3("TRANSLATION")?, read3("SCALE")?);
-        let turns = index("ROTATION").map(|i| self.document.floats::<4>(i)).transpose().map_err(within)?;
-        let counts = [moves.as_ref().map(Vec::len), scales.as_ref().map(Vec::len), turns.as_ref().map(Vec::len)];
+        let (translations, scales) = (read3("TRANSLATION")?, read3("SCALE")?);
+        let rotations = index("ROTATION").map(|i| self.document.floats::<4>(i)).transpose().map_err(within)?;
+        let counts =
+            [translations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len)];
         let n = counts.iter().flatten().copied().max().unwrap_or(0);
         if counts.iter().flatten().any(|c| *c != n) {
             return Err(within(fault("", "its attributes differ in length")));
         }
-        self.check_room(n, 1).map_err(within)?;
+        self.check_memory(n, 1).map_err(within)?;
         let copy = |i: usize| {
             let three = |v: &Option<Vec<[f32; 3]>>| v.as_ref().map(|v| v[i].map(f64::from));
-            let turn = turns.as_ref().map(|v| v[i].map(f64::from));
-            let copy = compose(three(&moves), turn, three(&scales)).filter(is_finite);
+            let rotation = rotations.as_ref().map(|v| v[i].map(f64::from));
+            let copy = compose(three(&translations), rotation, three(&scales)).filter(is_finite);
             copy.ok_or_else(|| within(fault("", format!("the transform of copy {i} is not finite"))))
         };
         let mut copies = memory::reserve(n, "copies").map_err(within)?;
@@ -458,10 +461,10 @@ impl Reader<'_> {
         Ok(copies)
     }
 
-    /// Checks that so many copies of a mesh in so many parts fit beside what is placed already.
-    fn check_room(&self, copies: usize, parts: usize) -> Result<()> {
+    /// Checks that there is memory for `copies` instances of a mesh of `parts` parts, besides the present instances.
+    fn check_memory(&self, copies: usize, parts: usize) -> Result<()> {
         let placed = (copies as u64).saturating_mul(parts as u64).saturating_add(self.out.instances.len() as u64);
-        let bytes = placed.saturating_mul(PLACED_BYTES);
+        let bytes = placed.saturating_mul(INSTANCE_BYTES);
         if bytes < memory::MIN_CHECKED_BYTES {
             return Ok(());
         }
@@ -470,11 +473,11 @@ impl Reader<'_> {
     }
 }
 
-/// Makes the shells of solids bound what they were meant to, and says which were turned the other way. Primitives of one
-/// material are one glass, and looked at together.
-fn check_shells(mut glass: Vec<&mut Worn>, whole: Solid, name: &str, warnings: &mut Vec<String>) {
-    while let Some(of_file) = glass.first().map(|part| part.of_file) {
-        let (mut same, others) = glass.into_iter().partition::<Vec<_>, _>(|part| part.of_file == of_file);
+/// Flips inner shells of glass solids that face the wrong way, and adds warnings about flipped and inverted shells.
+/// Primitives of one material are one solid.
+fn orient_shells(mut glass: Vec<&mut MaterialMesh>, whole: Solid, name: &str, warnings: &mut Vec<String>) {
+    while let Some(material) = glass.first().map(|part| part.file_material) {
+        let (mut same, others) = glass.into_iter().partition::<Vec<_>, _>(|part| part.file_material == material);
         glass = others;
         let numbers: Vec<String> = same.iter().map(|part| part.primitive.to_string()).collect();
         let noun = if numbers.len() == 1 { "primitive" } else { "primitives" };
@@ -482,17 +485,17 @@ fn check_shells(mut glass: Vec<&mut Worn>, whole: Solid, name: &str, warnings: &
         let mut open = false;
         if same.iter().any(|part| !part.mesh.closed) {
             open = !topology::solid(&same.iter().map(|part| &part.mesh).collect::<Vec<_>>()).closed;
-            // Others make these whole, and are of another material.
+            // Primitives of another material close the open ones.
             same.retain(|part| part.mesh.closed || !open);
         }
-        let found = shells::turn_inner(&mut same.into_iter().map(|part| &mut part.mesh).collect::<Vec<_>>());
-        if found.inverted > 0 || (open && whole.volume < 0.0) {
+        let report = shells::flip_inner(&mut same.into_iter().map(|part| &mut part.mesh).collect::<Vec<_>>());
+        if report.inverted > 0 || (open && whole.volume < 0.0) {
             warnings.push(format!(
                 "{place}: its faces look inwards, so the inside of the glass is outside: flip its normals"
             ));
         }
-        if found.turned > 0 {
-            let shells = counted(found.turned, "closed shell lies", "closed shells lie");
+        if report.flipped > 0 {
+            let shells = counted(report.flipped, "closed shell lies", "closed shells lie");
             warnings.push(format!(
                 "{place}: {shells} inside another and looked the same way, which would make no hollow: turned over (flip the normals of one of the two)"
             ));

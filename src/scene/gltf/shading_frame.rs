@@ -1,10 +1,10 @@
-//! Normals and tangents that a file does not give.
+//! Computes normals and tangents that a file lacks.
 
 use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::texture::TextureRef;
 
-/// Gives zero normals the direction of the faces around them (weighted by area); their number.
+/// Replaces zero normals by the area-weighted mean normal of the adjacent faces. Returns the number of replaced normals.
 pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
     if mesh.normals.iter().all(|n| *n != Vec3::ZERO) {
         return 0;
@@ -22,9 +22,9 @@ pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
     repaired
 }
 
-/// Makes tangents along growing u of `coordinates`: the mean over the faces around a vertex, weighted by
-/// the corners' angles, made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF
-/// names, faces that are mirrored in the texture do not mix with others: a vertex between both kinds becomes two.
+/// Computes tangents in the direction of increasing u of `coordinates`: the angle-weighted mean over the adjacent faces,
+/// made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF prescribes, faces that are
+/// mirrored in the texture do not contribute to the tangents of others: a vertex between both kinds is split.
 pub(super) fn make_tangents(mesh: &mut Mesh, coordinates: &TextureRef) {
     let set = usize::from(coordinates.set);
     if mesh.uvs[set].is_empty() {
@@ -56,7 +56,7 @@ pub(super) fn make_tangents(mesh: &mut Mesh, coordinates: &TextureRef) {
             let (a, b) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
             let angle = if a == Vec3::ZERO || b == Vec3::ZERO { 0.0 } else { a.angle_between(b) };
             sums[t[k] as usize] += along_u * angle;
-            // v runs down the image: glTF's bitangent, w cross(n, t), points where v falls.
+            // v increases downwards in the image, and glTF's bitangent, w cross(n, t), points to decreasing v.
             signs[t[k] as usize] = -sign;
         }
     }
@@ -77,7 +77,7 @@ fn area([a, b, c]: [Vec2; 3]) -> f32 {
     (b - a).perp_dot(c - a)
 }
 
-/// Appends a copy of vertex `i`; its index.
+/// Appends a copy of vertex `i`, and returns its index.
 fn split(mesh: &mut Mesh, i: u32) -> u32 {
     fn repeat<T: Copy>(values: &mut Vec<T>, i: usize) {
         if let Some(&value) = values.get(i) {

@@ -1,4 +1,4 @@
-//! Images and textures: images are decoded and kept once, as deep as their file has them.
+//! Reads textures. Each image is decoded once, and keeps the bit depth of its file.
 
 use super::document::{Document, get, named};
 use super::fault;
@@ -14,24 +14,24 @@ use std::collections::HashMap;
 use std::io::Cursor;
 use std::sync::Arc;
 
-/// Largest width or height of a texture.
-const MOST_TEXELS: u32 = 32_768;
-/// Most memory that decoding one image may take: 16384 x 16384 RGBA.
-const MOST_BYTES: u64 = 1 << 30;
+/// Maximum width and height of a texture.
+const MAX_SIDE: u32 = 32_768;
+/// Maximum memory for decoding an image, in bytes: 16384 x 16384 RGBA.
+const MAX_BYTES: u64 = 1 << 30;
 
-/// What an image is read for.
+/// Interpretation of an image.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Use {
     /// Colours, sRGB-encoded.
     Color,
-    /// Numbers.
+    /// Linear numbers.
     Data,
-    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness) times a factor, whose bits these are, turned
-    /// into roughness in G.
+    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness), converted to roughness in G. The field has
+    /// the bits of the f32 factor of glossiness.
     Glossiness(u32),
 }
 
-/// `textureInfo` of the specification (section 5.30), with a normal texture's scale.
+/// `textureInfo` of the specification (section 5.30), with the scale of normal textures.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Info {
@@ -48,7 +48,7 @@ fn one() -> f32 {
     1.0
 }
 
-/// KHR_texture_transform.
+/// The extension KHR_texture_transform.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 struct Transform {
@@ -65,8 +65,8 @@ impl Default for Transform {
 }
 
 impl Transform {
-    /// Translation, rotation and scale as one matrix. Counter-clockwise with v running down, as the extension's text
-    /// and its example of the lower left quadrant have it (its GLSL, read by columns, turns the other way).
+    /// Translation, rotation and scale as one matrix. The rotation is counter-clockwise with v downwards, as in the
+    /// extension's text and its example of the lower left quadrant (its column-major GLSL rotates the other way).
     fn matrix(&self) -> [[f32; 3]; 2] {
         let (s, c) = self.rotation.sin_cos();
         let [x, y] = self.scale;
@@ -74,13 +74,14 @@ impl Transform {
     }
 }
 
-/// Loads textures as materials call for them.
+/// Loads textures when materials need them.
 #[derive(Default)]
 pub(super) struct Textures {
-    /// Those called for.
+    /// The textures in use.
     pub(super) list: Vec<Texture>,
-    /// By image, sampler and use.
+    /// Index in `list`, by image, sampler and use.
     known: HashMap<(usize, Option<usize>, Use), u32>,
+    /// Decoded images, by index in the file.
     images: HashMap<usize, Decoded>,
 }
 
@@ -94,7 +95,7 @@ struct Decoded {
 }
 
 impl Textures {
-    /// A use of a texture.
+    /// Loads the texture of a `textureInfo`, and returns a reference to it; `place` names it in messages.
     pub(super) fn reference(
         &mut self,
         document: &Document,
@@ -182,7 +183,7 @@ impl Textures {
     }
 }
 
-/// Decodes an image; one that is cut off has the texels that are there, and a warning.
+/// Decodes an image. A truncated JPEG keeps the texels in the file, with a warning.
 fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<String>) -> Result<Decoded> {
     const HINT: &str = "save the image again as PNG or JPEG";
     let broken = |cause: String| Error::new(ErrorKind::Image, "", cause).hint(HINT);
@@ -191,20 +192,20 @@ fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<Str
         return Err(broken("it is neither PNG nor JPEG".into()));
     };
     let mut limits = Limits::default();
-    limits.max_image_width = Some(MOST_TEXELS);
-    limits.max_image_height = Some(MOST_TEXELS);
-    limits.max_alloc = Some(MOST_BYTES);
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    limits.max_alloc = Some(MAX_BYTES);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);
-    let cut = check_room(document, bytes, format)?;
-    // A decoder's own fault must not end the program.
+    let truncated = check_size(document, bytes, format)?;
+    // A panic of a decoder must not end the program.
     let decoded = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| reader.decode()));
     let decoded = decoded.map_err(|_| broken("it cannot be decoded: the decoder failed".into()))?;
     let image = decoded.map_err(|e| broken(format!("it cannot be decoded: {e}")))?;
     if image.width() == 0 || image.height() == 0 {
         return Err(broken("it has no texels".into()));
     }
-    if cut {
+    if truncated {
         warnings
             .push(format!("{place}: the file of the image is cut off: what is missing of it is grey (copy it again)"));
     }
@@ -223,26 +224,26 @@ fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<Str
     Ok(Decoded { width, height, channels, data: Arc::new(data) })
 }
 
-/// Checks that the image fits as it is decoded: a few bytes can stand for a gigabyte of one colour. Returns whether its
-/// file is cut off, which the decoder of JPEG does not tell.
-fn check_room(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<bool> {
-    // What is wrong with it, or larger than any image is taken, the decoder tells.
+/// Checks that the decoded image fits in memory, because a few bytes can expand to a gigabyte. Returns whether the file of
+/// a JPEG is truncated, which its decoder does not report.
+fn check_size(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<bool> {
+    // The decoder itself rejects invalid and too large images.
     let Ok(decoder) = ImageReader::with_format(Cursor::new(bytes), format).into_decoder() else { return Ok(false) };
     let (width, height) = decoder.dimensions();
-    if width > MOST_TEXELS || height > MOST_TEXELS {
+    if width > MAX_SIDE || height > MAX_SIDE {
         return Ok(false);
     }
     let mut needed = decoder.total_bytes();
-    let jpeg = (format == ImageFormat::Jpeg).then(|| Jpeg::survey(bytes));
+    let jpeg = (format == ImageFormat::Jpeg).then(|| JpegMarkers::scan(bytes));
     if let Some(jpeg) = &jpeg {
-        // Each block of 8 x 8 texels has a bit at least; half of a file may be lost.
+        // A block of 8 x 8 texels takes at least one bit; half of a file may be missing.
         let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
         if (bytes.len() as u64).saturating_mul(16) < blocks {
             let cause = format!("it is cut off: {} bytes do not hold {width} x {height} texels", bytes.len());
             return Err(Error::new(ErrorKind::Image, "", cause).hint("copy or save the image again"));
         }
         if jpeg.progressive {
-            // 16 bits a coefficient, of all blocks at a time.
+            // The decoder keeps 16-bit coefficients of all blocks.
             needed = needed.saturating_mul(3);
         }
     }
@@ -252,23 +253,23 @@ fn check_room(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<
     Ok(jpeg.is_some_and(|jpeg| !jpeg.ends))
 }
 
-/// What the markers of a JPEG say (ITU T.81, annex B).
-struct Jpeg {
+/// Properties of a JPEG from its markers (ITU T.81, annex B).
+struct JpegMarkers {
     progressive: bool,
-    /// Its last marker is there.
+    /// Whether the file has its end marker.
     ends: bool,
 }
 
-impl Jpeg {
-    fn survey(bytes: &[u8]) -> Jpeg {
-        let mut jpeg = Jpeg { progressive: false, ends: false };
+impl JpegMarkers {
+    fn scan(bytes: &[u8]) -> JpegMarkers {
+        let mut jpeg = JpegMarkers { progressive: false, ends: false };
         let mut at = 2;
-        // Zero follows a byte of data that looks like a marker; restarts (D0 to D7) have no length.
+        // A zero byte follows 0xff in entropy-coded data. Restart markers (D0 to D7) have no length.
         let is_marker = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0x00 | 0x01 | 0xd0..=0xd7 | 0xff);
         while let Some(found) = bytes.get(at..).and_then(|rest| rest.windows(2).position(is_marker)) {
             at += found;
             match bytes[at + 1] {
-                0xd9 => return Jpeg { ends: true, ..jpeg },
+                0xd9 => return JpegMarkers { ends: true, ..jpeg },
                 0xc2 | 0xc6 | 0xca | 0xce => jpeg.progressive = true,
                 _ => {}
             }
@@ -287,7 +288,7 @@ fn wrap(mode: &Checked<WrappingMode>) -> Wrap {
     }
 }
 
-/// A texture is looked at from near and far: the nearest texel only where the file asks for it when magnified.
+/// Whether a texture is filtered linearly. There are no mipmaps, so the magnification filter decides, if the file has one.
 fn linear(sampler: &Sampler) -> bool {
     match (&sampler.mag_filter, &sampler.min_filter) {
         (Some(Checked::Valid(mag)), _) => *mag == MagFilter::Linear,
@@ -300,9 +301,9 @@ fn linear(sampler: &Sampler) -> bool {
 mod tests {
     use super::*;
 
-    /// The extension's example: the lower left quadrant of the image, turned.
+    /// The example of the extension: the rotated lower left quadrant of the image.
     #[test]
-    fn transform_of_the_specification() {
+    fn the_transform_of_the_specification_maps_to_the_lower_left_quadrant() {
         let transform =
             Transform { offset: [0.0, 1.0], rotation: std::f32::consts::FRAC_PI_2, scale: [0.5, 0.5], tex_coord: None };
         let reference = TextureRef { texture: 0, set: 0, transform: transform.matrix() };

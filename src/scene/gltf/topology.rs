@@ -1,28 +1,25 @@
-//! Whether triangles bound a solid.
+//! Checks whether triangles bound a solid.
 
 use crate::geometry::Mesh;
 use crate::math::Vec3;
 use std::collections::HashMap;
 
-/// What a set of triangles bounds.
+/// Topology of a set of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Solid {
-    /// Every edge, vertices welded by position, is shared by exactly two triangles that run along it in opposite
-    /// directions.
+    /// Whether exactly two triangles share every edge, in opposite directions. Vertices at equal positions count as one.
     pub(super) closed: bool,
-    /// Every edge is shared by two triangles, but some run along it in the same direction: part of the faces is turned
-    /// over.
+    /// Whether two triangles share every edge, but some in the same direction, because part of the faces is flipped.
     pub(super) flipped: bool,
-    /// Edges of one triangle alone: the rims of holes.
+    /// Number of edges with only one triangle: the boundary of holes.
     pub(super) rim: usize,
-    /// Volume inside (m3); negative when the front faces look inwards. Meaningless for an open surface.
+    /// Enclosed volume (m3); negative if the front faces point inwards. Meaningless for an open surface.
     pub(super) volume: f64,
 }
 
-/// Looks at all triangles of `meshes` together. Triangles whose corners fall together bound nothing and are passed
-/// over.
+/// Topology of all triangles of `meshes` together. Triangles with two corners at one position are skipped.
 pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
-    let (places, count) = welded(meshes);
+    let (places, count) = weld(meshes);
     let faces = || {
         meshes.iter().zip(&places).flat_map(|(mesh, places)| {
             let welded = move |corners: &[u32; 3]| (corners.map(|i| places[i as usize]), corners.map(|i| i as usize));
@@ -36,15 +33,15 @@ pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
         let [p, q, r] = corners.map(|i| mesh.positions[i].as_dvec3() - origin);
         volume += p.dot(q.cross(r)) / 6.0;
     }
-    let rims = Rims::of(count, || faces().flat_map(|(_, [a, b, c], _)| [(a, b), (b, c), (c, a)]));
-    Solid { closed: rims.opposite, flipped: rims.paired && !rims.opposite, rim: rims.alone, volume }
+    let edges = Edges::count(count, || faces().flat_map(|(_, [a, b, c], _)| [(a, b), (b, c), (c, a)]));
+    Solid { closed: edges.opposite, flipped: edges.paired && !edges.opposite, rim: edges.single, volume }
 }
 
-/// A number for the place of each vertex, the same for all vertices there, and how many there are.
-pub(super) fn welded(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
-    // Room for all at once: a table that grows is there twice.
+/// Numbers the distinct positions. Returns the number of each vertex's position, and the count of positions.
+pub(super) fn weld(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
+    // Allocated at full size, because a growing table takes twice the memory for a while.
     let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(meshes.iter().map(|m| m.positions.len()).sum());
-    // Negative zero is zero.
+    // Adding zero turns -0.0 into 0.0.
     let key = |p: &Vec3| p.to_array().map(|x| (x + 0.0).to_bits());
     let mut place = |p: &Vec3| {
         let next = known.len() as u32;
@@ -54,24 +51,24 @@ pub(super) fn welded(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
     (places, known.len())
 }
 
-/// How triangles meet in the edges between their places.
-struct Rims {
-    /// There are edges, and each is of two triangles.
+/// How triangles share edges.
+struct Edges {
+    /// Two triangles share every edge, and there are edges.
     paired: bool,
-    /// The same, and these run along it in opposite directions.
+    /// Two triangles share every edge in opposite directions, and there are edges.
     opposite: bool,
-    /// Edges of one triangle.
-    alone: usize,
+    /// Number of edges with one triangle.
+    single: usize,
 }
 
-impl Rims {
-    /// Edges by their lower place and their direction, in lists of the higher places that stand one after the other (a
-    /// counting sort): four bytes an edge, and no sort but that of the few edges at a place.
-    fn of<E: Iterator<Item = (u32, u32)>>(places: usize, edges: impl Fn() -> E) -> Rims {
+impl Edges {
+    /// Counts directed edges between numbered positions. A counting sort groups edges by their lower position and their
+    /// direction, so an edge takes four bytes, and only the few edges at a position are sorted.
+    fn count<E: Iterator<Item = (u32, u32)>>(places: usize, edges: impl Fn() -> E) -> Edges {
         let list = |(i, j): (u32, u32)| 2 * i.min(j) as usize + usize::from(i < j);
         let mut ends = vec![0usize; 2 * places + 1];
         edges().for_each(|edge| ends[list(edge) + 1] += 1);
-        // Where lists begin, until they are filled.
+        // The start of each list; becomes the end while the lists are filled.
         let mut total = 0;
         for end in &mut ends {
             total += *end;
@@ -83,17 +80,17 @@ impl Rims {
             highs[*end] = edge.0.max(edge.1);
             *end += 1;
         }
-        let mut rims = Rims { paired: total > 0, opposite: total > 0, alone: 0 };
+        let mut counted = Edges { paired: total > 0, opposite: total > 0, single: 0 };
         let mut start = 0;
         for end in ends.chunks_exact(2) {
-            rims.at_place(&mut highs[start..end[1]], end[0] - start);
+            counted.add_edges_at(&mut highs[start..end[1]], end[0] - start);
             start = end[1];
         }
-        rims
+        counted
     }
 
-    /// Adds the edges from one place up to higher ones, the first `down` of which are run along downwards.
-    fn at_place(&mut self, highs: &mut [u32], down: usize) {
+    /// Adds the edges between one position and the higher positions `highs`. The first `down` edges lead downwards.
+    fn add_edges_at(&mut self, highs: &mut [u32], down: usize) {
         let (down, up) = highs.split_at_mut(down);
         down.sort_unstable();
         up.sort_unstable();
@@ -104,7 +101,7 @@ impl Rims {
         highs.sort_unstable();
         for edge in highs.chunk_by(|a, b| a == b) {
             self.paired &= edge.len() == 2;
-            self.alone += usize::from(edge.len() == 1);
+            self.single += usize::from(edge.len() == 1);
         }
     }
 }
@@ -123,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn closed_open_inverted() {
+    fn closed_open_flipped_and_inverted_surfaces_are_distinguished() {
         let whole = tetrahedron(0.0);
         let found = solid(&[&whole]);
         assert!(found.closed && (found.volume - 1.0 / 6.0).abs() < 1e-12);
@@ -139,18 +136,18 @@ mod tests {
         inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         let found = solid(&[&inside_out]);
         assert!(found.closed && found.volume < 0.0);
-        // A second tetrahedron turned over on the first, so that edges run twice each way.
+        // The first tetrahedron and its flipped copy: every edge occurs twice in each direction.
         let both = solid(&[&whole, &inside_out]);
         assert!(!both.closed && !both.flipped && both.rim == 0);
-        // The same triangles twice: four on every edge.
+        // Every triangle twice: four triangles share every edge.
         assert!(!solid(&[&whole, &whole]).closed);
         assert!(solid(&[&whole, &tetrahedron(5.0)]).closed);
         assert!(!solid(&[]).closed);
     }
 
-    /// Vertices split for normals or texture seams are one place; a triangle folded onto an edge changes nothing.
+    /// Vertices that are split for normals or texture seams count as one. A degenerate triangle changes nothing.
     #[test]
-    fn split_vertices_are_welded() {
+    fn vertices_at_one_position_are_welded() {
         let whole = tetrahedron(0.0);
         let mut split = Mesh::default();
         for triangle in &whole.triangles {
