@@ -1,8 +1,8 @@
-//! Two methods that share little must agree: photons against path tracing, tile by tile, on scenes that path tracing
-//! can do.
+//! Photon mapping and path tracing share little code, and must agree tile by tile on scenes that path tracing can
+//! render.
 //!
-//! Standard errors come from independent passes (photons correlate pixels); the family-wise error rate is 0.1 % a scene
-//! (Sidak over tiles). A planted bug, one tile brighter by a stated share, must be rejected.
+//! Standard errors come from independent renders, because photons correlate pixels. The family-wise error rate is 0.1 %
+//! per scene (Sidak over tiles). A planted bug, one brighter tile, must be rejected.
 
 use crate::support;
 
@@ -24,8 +24,8 @@ fn mean(c: Rgb) -> f64 {
     f64::from(c.element_sum()) / 3.0
 }
 
-/// Photons of all indirect light, and photons of caustics alone, guided, beside eye paths that go on.
-const WAYS: [(Indirect, bool); 2] = [(Indirect::Photons, false), (Indirect::Paths, true)];
+/// Photons for all indirect light; and guided photons for caustics only, with camera paths that continue.
+const INDIRECT_MODES: [(Indirect, bool); 2] = [(Indirect::Photons, false), (Indirect::Paths, true)];
 
 fn by_photons(
     scene: &Scene,
@@ -70,7 +70,7 @@ fn by_paths(scene: &Scene, paths: u64, seeds: u64) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Tiles in which two sets of seeds differ by more than chance and `bias` (relative) allow.
+/// The tiles in which two sets of renders differ by more than noise and `bias` (relative) allow.
 fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {
     support::tiles::disagreeing(a, b, t_critical(1e-3, TILES, (a.len().min(b.len()) - 1) as f64), bias)
 }
@@ -79,7 +79,7 @@ fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, plante
     println!("{what}: photons {:.5}, paths {:.5}", average(photons), average(paths));
     let found = disagreeing(photons, paths, bias);
     assert!(found.is_empty(), "{what}: {found:#?}");
-    // The bug: one tile brighter, as when its light counts twice in part.
+    // The planted bug: one tile is brighter, as if a part of its light counted twice.
     let mut wrong = photons.to_vec();
     for seed in &mut wrong {
         seed[5] *= 1.0 + planted;
@@ -87,18 +87,18 @@ fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, plante
     assert!(!disagreeing(&wrong, paths, bias).is_empty(), "{what}: a tile brighter by {planted} goes unnoticed");
 }
 
-/// Plastic and rough metal in a room: layered lobes that gather and go on, wide and narrow.
+/// Plastic and rough metal in a room: wide and narrow layered lobes, at which camera paths gather photons or continue.
 #[test]
 fn glossy_room() {
     let scene = build(glossy_balls());
     let paths = by_paths(&scene, 64, 10);
-    for way in WAYS {
-        check(&format!("glossy room, {way:?}"), &by_photons(&scene, way, 20_000, 0.05, 8, 10), &paths, 0.015, 0.15);
+    for mode in INDIRECT_MODES {
+        check(&format!("glossy room, {mode:?}"), &by_photons(&scene, mode, 20_000, 0.05, 8, 10), &paths, 0.015, 0.15);
     }
 }
 
-/// A lamp behind glass, seen in varnished walls and sharp metal: found by eye paths that go on, which here are enough,
-/// and by photons.
+/// A lamp behind glass, seen in varnished walls and sharp metal. Photons find it, and so do camera paths that continue,
+/// which suffice here.
 #[test]
 fn lamp_behind_glass_in_a_varnished_room() {
     let varnish = Material { base_color: [0.5, 0.4, 0.3, 1.0], metallic: 0.0, roughness: 0.35, ..Material::default() };
@@ -108,12 +108,12 @@ fn lamp_behind_glass_in_a_varnished_room() {
     add(&mut description, "metal", sphere(Vec3::new(0.3, 0.5, 0.0), 0.5, 64), metal);
     let scene = build(description);
     let paths = by_paths(&scene, 256, 10);
-    for way in WAYS {
-        check(&format!("varnish, {way:?}"), &by_photons(&scene, way, 20_000, 0.06, 12, 10), &paths, 0.02, 0.2);
+    for mode in INDIRECT_MODES {
+        check(&format!("varnish, {mode:?}"), &by_photons(&scene, mode, 20_000, 0.06, 12, 10), &paths, 0.02, 0.2);
     }
 }
 
-/// Smooth and rough glass under a large lamp, which path tracing can run into.
+/// Smooth and rough glass under a large lamp, which paths can hit.
 #[test]
 fn glass_room() {
     let mut description = lit_room(matte(0.5, 0.0));
@@ -122,12 +122,12 @@ fn glass_room() {
     add(&mut description, "rough", sphere(Vec3::new(0.45, 0.45, 0.3), 0.4, 64), rough);
     let scene = build(description);
     let paths = by_paths(&scene, 128, 10);
-    for way in WAYS {
-        check(&format!("glass room, {way:?}"), &by_photons(&scene, way, 40_000, 0.04, 8, 10), &paths, 0.02, 0.2);
+    for mode in INDIRECT_MODES {
+        check(&format!("glass room, {mode:?}"), &by_photons(&scene, mode, 40_000, 0.04, 8, 10), &paths, 0.02, 0.2);
     }
 }
 
-/// Everything lit from outside by a bright patch of sky, with a glass pane in the open.
+/// A scene lit by a bright patch of the sky, with a glass pane in the open.
 #[test]
 fn under_the_sky() {
     let mut description = Description::default();
@@ -152,7 +152,7 @@ fn under_the_sky() {
     description.cameras.push(look_at(DVec3::new(1.2, 1.4, 2.2), DVec3::new(0.0, 0.2, 0.0), 40.0));
     let scene = build(description);
     let paths = by_paths(&scene, 128, 16);
-    for way in WAYS {
-        check(&format!("sky, {way:?}"), &by_photons(&scene, way, 60_000, 0.04, 8, 16), &paths, 0.02, 0.2);
+    for mode in INDIRECT_MODES {
+        check(&format!("sky, {mode:?}"), &by_photons(&scene, mode, 60_000, 0.04, 8, 16), &paths, 0.02, 0.2);
     }
 }

@@ -1,10 +1,9 @@
-//! Closed forms: what the estimators must give, known without rendering.
+//! Compares renders with closed forms.
 //!
-//! Every check is a t test over independent seeds at a family-wise error rate of 0.1 % for the file (Sidak over
-//! [`TESTS`] checks), plus the stated bias of the closed form itself. Each check is also shown to have power: it
-//! rejects the same expectation shifted by [`Check::detects`], which is smaller than what the bugs it guards against
-//! would do (a Fresnel factor forgotten, an eta squared in the wrong direction, direct light counted twice, a photon
-//! left out).
+//! Every check is a t test over independent seeds, at a family-wise error rate of 0.1 % for the file (Sidak over
+//! [`TESTS`] checks), plus the stated bias of the closed form. Each check must also reject the expectation shifted by
+//! [`Check::detects`]. This shift is smaller than the effect of the bugs that the check guards against (a missing
+//! Fresnel factor, an eta squared in the wrong direction, direct light counted twice, a missing photon).
 
 use crate::support;
 
@@ -22,10 +21,11 @@ use support::scenes::{
 };
 use support::stats::Check;
 
-/// Checks in this file that share the error rate.
+/// Number of checks in this file, which share the error rate.
 const TESTS: usize = 40;
 
-/// Means over a `size x size` picture, one render a seed; one list per level, the smallest bandwidth first.
+/// Means over a `size x size` picture, one render per seed, and one list per bandwidth level, the smallest bandwidth
+/// first.
 fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec<f64>; 5] {
     let camera = scene.camera(&square(size)).expect("a camera");
     let mut means: [Vec<f64>; 5] = Default::default();
@@ -41,7 +41,7 @@ fn by_photons(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> [Vec
     means
 }
 
-/// The same by path tracing with `paths` paths per pixel.
+/// Means over a `size x size` picture by path tracing with `paths` paths per pixel, one per seed.
 fn by_paths(scene: &Scene, size: u32, paths: u64, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
     let camera_paths = camera_paths(scene, &camera);
@@ -73,7 +73,7 @@ fn settings(iterations: u64, photons: u32, radius: f32) -> Settings {
 fn sun(intensity: f32) -> PunctualLight {
     PunctualLight {
         name: "sun".into(),
-        // Shines along -Z of its node: straight down.
+        // Emits along -Z of its node: straight down.
         to_world: DAffine3::from_quat(glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
         intensity: Rgb::splat(intensity),
         kind: PunctualKind::Sun { angle: 0.0 },
@@ -92,13 +92,13 @@ fn uniform_environment(radiance: f32) -> Option<EnvironmentDescription> {
     Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 })
 }
 
-/// Fresnel reflectance of ior n at normal incidence, and transmittance of a slab of it with all its inner reflections.
+/// Transmittance at normal incidence of a slab of index n with all its internal reflections.
 fn slab(n: f64) -> f64 {
     let f = ((n - 1.0) / (n + 1.0)).powi(2);
     (1.0 - f) / (1.0 + f)
 }
 
-/// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho).
+/// In a closed box whose walls emit e and reflect rho, radiance is e / (1 - rho) everywhere and in every direction.
 #[test]
 fn furnace_box() {
     let (rho, e) = (0.5, 0.5);
@@ -106,7 +106,7 @@ fn furnace_box() {
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(rho, e));
     description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
     let scene = build(description);
-    // The picture stays clear of the edges, where a kernel loses what lies on the other wall.
+    // The picture excludes the edges, where kernels miss photons on the other wall.
     let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 1e-3, detects: 0.02 };
     let levels = by_photons(&scene, &settings(4, 20_000, 0.2), 8, 40);
     check.run(TESTS, "furnace, level 1", &levels[0]);
@@ -114,7 +114,7 @@ fn furnace_box() {
     check.run(TESTS, "furnace, paths", &by_paths(&scene, 8, 64, 40));
 }
 
-/// Irradiance under a point light: I cos / d^2, of which a diffuse plane sends back rho / pi.
+/// The irradiance under a point light is I cos / d^2. A diffuse plane reflects rho / pi of it.
 #[test]
 fn point_light_over_a_plane() {
     let (rho, intensity, height) = (0.6, 3.0, 2.0);
@@ -124,14 +124,14 @@ fn point_light_over_a_plane() {
     description.cameras.push(look_at(DVec3::new(0.0, 1.0, 0.0), DVec3::ZERO, 0.5));
     let scene = build(description);
     let expected = f64::from(rho) / std::f64::consts::PI * f64::from(intensity) / (height * height);
-    // The camera sees 9 mm around the foot: the closed form varies by 2e-5 there.
+    // The camera sees 9 mm around the point below the light. The closed form varies by 2e-5 there.
     let check = Check { expected, bias: 1e-4, detects: 1e-3 };
     check.run(TESTS, "point light, photons", &by_photons(&scene, &settings(4, 100, 0.05), 4, 4)[0]);
     check.run(TESTS, "point light, paths", &by_paths(&scene, 4, 4, 4));
 }
 
-/// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2, for every strategy of direct
-/// light.
+/// The irradiance under a uniform sphere is that of a point light at its centre: pi L R^2 / d^2, by all techniques of
+/// direct light.
 #[test]
 fn sphere_light_over_a_plane() {
     let (rho, radiance, radius, height) = (0.5, 4.0, 0.5, 1.0);
@@ -141,13 +141,13 @@ fn sphere_light_over_a_plane() {
     description.cameras.push(look_at(DVec3::new(0.9, 0.4, 0.0), DVec3::ZERO, 0.5));
     let scene = build(description);
     let expected = f64::from(rho * radiance * (radius / height).powi(2));
-    // 256 segments: the inscribed polyhedron is smaller by 3e-4.
+    // The polyhedron of 256 segments is smaller than the sphere by 3e-4.
     let check = Check { expected, bias: 1e-3, detects: 0.015 };
     check.run(TESTS, "sphere light, photons", &by_photons(&scene, &settings(500, 0, 0.05), 8, 40)[0]);
     check.run(TESTS, "sphere light, paths", &by_paths(&scene, 8, 500, 40));
 }
 
-/// A light under a mirror is two lights: a point light beside an infinite mirror, over a plane.
+/// A point light beside an infinite mirror, over a plane, lights the plane like two lights.
 #[test]
 fn point_light_beside_a_mirror() {
     let mut description = Description::default();
@@ -159,22 +159,23 @@ fn point_light_beside_a_mirror() {
     description.lights.push(point_light(DVec3::new(0.0, 1.0, 0.0), intensity));
     description.cameras.push(look_at(DVec3::new(0.3, 0.5, 0.0), DVec3::ZERO, 1.0));
     let scene = build(description);
-    // The foot of the light: I / 1, and from the image at x = -2: distance sqrt(5), cosine 1 / sqrt(5).
+    // Below the light the irradiance is I / 1; from the image at x = -2 the distance is sqrt(5) and the cosine 1 /
+    // sqrt(5).
     let irradiance = f64::from(intensity) * (1.0 + 5f64.powf(-1.5));
     let expected = f64::from(rho) / std::f64::consts::PI * irradiance;
     let check = Check { expected, bias: 2e-3, detects: 0.01 };
     check.run(TESTS, "mirror", &by_photons(&scene, &settings(4, 100_000, 0.1), 4, 24)[4]);
 }
 
-/// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab
-/// (specular-diffuse-specular).
+/// The sun shines straight down through a glass slab on to a plane (a caustic), which is seen directly or through
+/// another slab (specular-diffuse-specular).
 #[test]
 fn sun_through_a_slab_seen_directly_and_through_a_slab() {
     let (rho, e, n) = (0.5, 3.0, 1.5);
     for (through, what) in [(false, "caustic"), (true, "caustic behind glass")] {
         let mut description = Description::default();
         add(&mut description, "plane", floor(0.5), matte(rho, 0.0));
-        // High above, so that what the plane sends back into the slab returns too thinly to matter (1e-3).
+        // High above, so that little of the light that the plane reflects comes back from the slab (1e-3).
         add(&mut description, "slab", cuboid(Vec3::new(-0.5, 4.0, -0.5), Vec3::new(0.5, 4.1, 0.5), false), glass(n));
         description.lights.push(sun(e));
         if through {
@@ -184,17 +185,17 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         description.cameras.push(look_at(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, 0.5));
         let scene = build(description);
         let (slabs, transmitted) = (if through { 3 } else { 1 }, slab(f64::from(n)));
-        // Slab and pane reflect into each other what the other sends back, on the sun's way and on the eye's, whose
-        // camera is between them.
+        // Slab and pane reflect each other's light, on the path of the sun and on the camera path, because the camera
+        // is between them.
         let between = if through { 1.0 - (1.0 - transmitted).powi(2) } else { 1.0 };
         let expected = f64::from(rho * e) / std::f64::consts::PI * transmitted.powi(slabs) / between.powi(2);
-        // A slab forgotten would be 8 %.
+        // Ignoring a slab would change the result by 8 %.
         let check = Check { expected, bias: 4e-3, detects: if through { 0.06 } else { 0.03 } };
         check.run(TESTS, what, &by_photons(&scene, &settings(4, 100_000, 0.25), 16, 20)[4]);
     }
 }
 
-/// Radiance of a lamp seen straight through a slab that absorbs: slab transmittance with sigma d on every crossing.
+/// Radiance of a lamp seen through an absorbing slab: the transmittance of the slab, with absorption at every crossing.
 #[test]
 fn lamp_seen_through_absorbing_glass() {
     let (n, sigma, depth, radiance) = (1.5, 2.0, 0.25, 5.0);
@@ -218,8 +219,8 @@ fn lamp_seen_through_absorbing_glass() {
     check.run(TESTS, "absorbing slab, paths", &by_paths(&scene, 8, 1000, 24));
 }
 
-/// A white matte sphere inside clear glass under a uniform sky: radiance is the sky's everywhere. Photons cross the
-/// interface with the adjoint, eye paths with 1/eta^2: with either factor wrong, light inside is off by eta^2 = 2.25.
+/// A white diffuse sphere in clear glass under a uniform sky has the radiance of the sky. Photons cross the interface
+/// with the adjoint BSDF, camera paths with 1/eta^2. If either factor is wrong, light inside is off by eta^2 = 2.25.
 #[test]
 fn white_sphere_in_glass_under_a_uniform_sky() {
     let mut description = Description::default();
@@ -228,14 +229,14 @@ fn white_sphere_in_glass_under_a_uniform_sky() {
     description.environment = uniform_environment(1.0);
     description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 12.0));
     let scene = build(description);
-    // Curvature: the disc's area against the sphere's within the kernel is r^2 / (4 R^2) = 2.5e-3.
+    // The error by curvature: the area of the kernel disc differs from that of the sphere by r^2 / (4 R^2) = 2.5e-3.
     let check = Check { expected: 1.0, bias: 5e-3, detects: 0.03 };
     check.run(TESTS, "sphere in glass, photons", &by_photons(&scene, &settings(2, 100_000, 0.05), 8, 24)[4]);
     check.run(TESTS, "sphere in glass, paths", &by_paths(&scene, 8, 64, 24));
 }
 
-/// A black sheet of alpha 0.5 halves direct light; an index-matched clear box does nothing to it. Neither is a bounce:
-/// all of it stays direct light, counted once.
+/// A black sheet of alpha 0.5 halves direct light, and a clear box of matched index has no effect. Neither counts as a
+/// bounce: the light stays direct light and counts once.
 #[test]
 fn cut_outs_and_matched_boundaries_are_no_bounces() {
     let (rho, intensity) = (0.5, 2.0);
@@ -274,8 +275,8 @@ fn cut_outs_and_matched_boundaries_are_no_bounces() {
     }
 }
 
-/// The two eye paths of a pixel share nothing but photons: without any, the errors of level 1 and level 2 under a soft
-/// shadow are uncorrelated over 64 seeds, and those of levels 2 and 3, which share a path, are not.
+/// The two camera paths of a pixel share only photons. Without photons, the errors of levels 1 and 2 in a soft shadow
+/// are uncorrelated over 64 seeds, and those of levels 2 and 3, which share a path, are correlated.
 #[test]
 fn the_two_eye_paths_are_independent() {
     let mut description = Description::default();
@@ -296,7 +297,7 @@ fn the_two_eye_paths_are_independent() {
             values[i * seeds as usize + seed as usize] = std::array::from_fn(|k| pixel.mean(k).x);
         }
     }
-    // Per-pixel deviations from the mean over seeds, then one correlation over all of them.
+    // Deviations of each pixel from its mean over seeds, then one correlation over all of them.
     let (mut sums, mut count) = ([[0.0f64; 3]; 3], 0.0);
     for pixel in values.chunks(seeds as usize) {
         let means: [f64; 3] = std::array::from_fn(|k| pixel.iter().map(|v| v[k]).sum::<f64>() / seeds as f64);

@@ -1,9 +1,9 @@
-//! Methods made of whole paths: against closed forms where they can, and against each other tile by tile.
+//! Compares the methods that weigh techniques of whole paths (MIS) with closed forms, and with each other tile by tile.
 //!
-//! Closed forms are t tests over independent seeds, and tiles are compared by Welch's t statistic over seeds; the
-//! family-wise error rate is 0.1 % for a scene (Sidak over methods and tiles), plus the stated bias of the kernel for
-//! methods that merge. Every comparison is shown to have power: a tile brighter by a stated share is rejected, and so
-//! are the bugs planted in the arithmetic of weights (`tests/physics/mis.rs`).
+//! Closed forms are t tests over independent seeds. Tiles are compared by Welch's t statistic over seeds. The
+//! family-wise error rate is 0.1 % per scene (Sidak over methods and tiles), plus the stated bias of the kernel for
+//! methods that merge. Every comparison must reject a tile that is brighter by a stated share. Bugs in the weights are
+//! planted in `tests/physics/mis.rs`.
 
 use crate::support;
 
@@ -21,7 +21,7 @@ use support::scenes::{
 use support::stats::{Check, ERROR_RATE, t_critical};
 use support::tiles::{SIZE, TILES, average};
 
-/// The methods that weigh techniques.
+/// The methods that use multiple importance sampling.
 fn all() -> Vec<Method> {
     Method::ALL.iter().copied().filter(|method| method.has_techniques()).collect()
 }
@@ -51,8 +51,8 @@ fn value(rendered: &Rendered, level: usize, index: usize) -> f64 {
 
 // ---------------------------------------------------------------- closed forms
 
-/// Means over an 8 x 8 picture by each method, 12 seeds.
-fn hold(check: Check, what: &str, scene: &Scene, methods: &[Method], iterations: u64, radius: f32) {
+/// Checks the means over an 8 x 8 picture for each method, with 12 seeds.
+fn check_all(check: Check, what: &str, scene: &Scene, methods: &[Method], iterations: u64, radius: f32) {
     for &method in methods {
         let mean = |seed| {
             let rendered = render(scene, method, 8, &settings(iterations, radius, seed));
@@ -67,7 +67,7 @@ fn floor(half: f32) -> caustique::geometry::Mesh {
     quad(Vec3::new(-half, 0.0, -half), Vec3::Z * (2.0 * half), Vec3::X * (2.0 * half))
 }
 
-/// Cosine over distance squared from a point at height `y`, off by `x` and `z`.
+/// Cosine over squared distance, for a light at height `y` above a point that is `x` and `z` away.
 fn lambert(x: f64, y: f64, z: f64) -> f64 {
     y / (x * x + y * y + z * z).powf(1.5)
 }
@@ -89,7 +89,7 @@ fn sun(intensity: f32) -> PunctualLight {
     }
 }
 
-/// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho).
+/// In a closed box whose walls emit e and reflect rho, radiance is e / (1 - rho) everywhere and in every direction.
 #[test]
 fn furnace_box() {
     let (rho, e) = (0.5, 0.5);
@@ -98,11 +98,11 @@ fn furnace_box() {
     description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
     let scene = build(description);
     let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 };
-    hold(check, "furnace", &scene, &all(), 400, 0.1);
-    hold(check, "furnace", &scene, &[Method::Mlt], 100, 0.1);
+    check_all(check, "furnace", &scene, &all(), 400, 0.1);
+    check_all(check, "furnace", &scene, &[Method::Mlt], 100, 0.1);
 }
 
-/// Irradiance under a uniform sphere is that of a point at its centre: pi L R^2 / d^2.
+/// The irradiance under a uniform sphere is that of a point light at its centre: pi L R^2 / d^2.
 #[test]
 fn sphere_light_over_a_plane() {
     let (rho, radiance, radius, height) = (0.5, 4.0, 0.5, 1.0);
@@ -114,12 +114,13 @@ fn sphere_light_over_a_plane() {
     let half = 0.4 * 30f64.to_radians().tan();
     let facing = f64::from(rho * radiance * radius * radius);
     let expected = mean_over_square(half, |x, z| facing * lambert(x, 1.0, z));
-    // 128 segments: the inscribed polyhedron is smaller by 1e-3; kernels average the irradiance's curvature.
+    // The polyhedron of 128 segments is smaller than the sphere by 1e-3, and kernels average the curvature of the
+    // irradiance.
     let check = Check { expected, bias: 2.5e-3, detects: 0.1 };
-    hold(check, "sphere light", &scene, &all(), 1500, 0.06);
+    check_all(check, "sphere light", &scene, &all(), 1500, 0.06);
 }
 
-/// A point light over a plane, and its mirror image: what a path tracer cannot find.
+/// A point light over a plane and its mirror image, which a path tracer cannot find.
 #[test]
 fn point_light_beside_a_mirror() {
     let mut description = Description::default();
@@ -134,10 +135,11 @@ fn point_light_beside_a_mirror() {
     let half = 0.5 * 30f64.to_radians().tan();
     let expected = mean_over_square(half, |x, z| scale * (lambert(x, 1.0, z) + lambert(x + 2.0, 1.0, z)));
     let check = Check { expected, bias: 2.5e-3, detects: 0.08 };
-    hold(check, "mirror", &scene, &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm], 1000, 0.05);
+    check_all(check, "mirror", &scene, &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm], 1000, 0.05);
 }
 
-/// The sun straight down through a glass slab on to a plane (a caustic), seen directly and through another slab.
+/// The sun shines straight down through a glass slab on to a plane (a caustic), which is seen directly or through
+/// another slab.
 #[test]
 #[ignore = "long"]
 fn sun_through_a_slab_seen_directly_and_through_a_slab() {
@@ -162,11 +164,11 @@ fn sun_through_a_slab_seen_directly_and_through_a_slab() {
         } else {
             &[Method::Light, Method::Bdpt, Method::Bpm, Method::Vcm]
         };
-        hold(check, what, &scene, methods, 2000, 0.1);
+        check_all(check, what, &scene, methods, 2000, 0.1);
     }
 }
 
-/// Radiance of a lamp seen straight through a slab that absorbs.
+/// Radiance of a lamp seen straight through an absorbing slab.
 #[test]
 fn lamp_seen_through_absorbing_glass() {
     let (n, sigma, depth, radiance) = (1.5, 2.0, 0.25, 5.0);
@@ -182,13 +184,13 @@ fn lamp_seen_through_absorbing_glass() {
     let a = f64::from(-sigma * depth).exp();
     let expected = f64::from(radiance) * (1.0 - f).powi(2) * a / (1.0 - f * f * a * a);
     let check = Check { expected, bias: 1e-4, detects: 0.03 };
-    hold(check, "absorbing slab", &scene, &all(), 400, 0.1);
+    check_all(check, "absorbing slab", &scene, &all(), 400, 0.1);
 }
 
 // ---------------------------------------------------------------- agreement
 
-/// A white matte sphere inside clear glass under a uniform sky: radiance is the sky's everywhere. With either side's
-/// factor of eta^2 wrong, light inside is off by 2.25.
+/// A white diffuse sphere in clear glass under a uniform sky has the radiance of the sky. If a factor of eta^2 is wrong
+/// on either side, light inside is off by 2.25.
 #[test]
 #[ignore = "long"]
 fn white_sphere_in_glass_under_a_uniform_sky() {
@@ -200,11 +202,12 @@ fn white_sphere_in_glass_under_a_uniform_sky() {
     description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 12.0));
     let scene = build(description);
     let check = Check { expected: 1.0, bias: 5e-3, detects: 0.1 };
-    hold(check, "path and bdpt, sphere in glass", &scene, &[Method::Path, Method::Bdpt], 64, 0.05);
-    hold(check, "merging, sphere in glass", &scene, &[Method::Bpm, Method::Vcm], 1536, 0.05);
+    check_all(check, "path and bdpt, sphere in glass", &scene, &[Method::Path, Method::Bdpt], 64, 0.05);
+    check_all(check, "merging, sphere in glass", &scene, &[Method::Bpm, Method::Vcm], 1536, 0.05);
 }
 
-/// Twenty rather than ten with as many paths in all: Student's t allows two thirds of the deviation.
+/// Twenty instead of ten seeds, with the same total number of paths: Student's t then allows two thirds of the
+/// deviation.
 const SEEDS: u64 = 20;
 
 fn tiles(rendered: &Rendered, level: usize) -> Vec<f64> {
@@ -217,14 +220,15 @@ fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], tests: usize, bias: f64) -> Vec<S
 }
 
 fn by(scene: &Scene, (method, iterations): (Method, u64), radius: f32, max_depth: u32) -> Vec<Vec<f64>> {
-    // One map of pm must be large for its bandwidths to be small.
+    // The one map of pm must be large for its bandwidths to be small.
     let photons = if method == Method::Pm { 400_000 } else { 10_000 };
     let settings = |seed| Settings { photons, max_depth, ..settings(iterations, radius, seed) };
     let seeds = if method == Method::Pm { SEEDS / 2 } else { SEEDS };
     (0..seeds).map(|seed| tiles(&render(scene, method, SIZE, &settings(seed)), 0)).collect()
 }
 
-/// All `methods` against the first, tile by tile; a tile brighter by `planted` must be noticed.
+/// Compares all `methods` with the first, tile by tile. A tile that is brighter by the share `planted` must be
+/// rejected.
 fn agree(what: &str, scene: &Scene, methods: &[(Method, u64)], radius: f32, bias: f64, planted: f64) {
     let reference = by(scene, methods[0], radius, u32::MAX);
     println!("{what}: {:?} {:.5}", methods[0].0, average(&reference));
@@ -256,7 +260,7 @@ fn agree_with(
     }
 }
 
-/// Plastic and rough metal in a room: layered lobes, wide and narrow.
+/// Plastic and rough metal in a room: wide and narrow layered lobes.
 #[test]
 #[ignore = "long"]
 fn glossy_room() {
@@ -267,8 +271,8 @@ fn glossy_room() {
     agree("glossy room", &scene, &methods, 0.04, 0.02, 0.15);
 }
 
-/// Smooth and rough glass, with a lens in front of the camera. Light tracing sees nothing behind smooth glass, so it
-/// stays out.
+/// Smooth and rough glass, and a lens in front of the camera. Without light tracing, which sees nothing behind smooth
+/// glass.
 #[test]
 #[ignore = "long"]
 fn glass_room() {
@@ -284,7 +288,7 @@ fn glass_room() {
     agree("glass room", &scene, &methods, 0.04, 0.02, 0.2);
 }
 
-/// Everything lit from outside by a bright patch of sky and a sun of finite size, with rough metal in the open.
+/// A scene lit by a bright patch of the sky and a sun of finite size, with rough metal in the open.
 #[test]
 #[ignore = "long"]
 fn under_the_sky() {
@@ -292,7 +296,7 @@ fn under_the_sky() {
     add(&mut description, "floor", floor(1.5), matte(0.5, 0.0));
     let block = cuboid(Vec3::new(-0.6, 0.0, -0.6), Vec3::new(-0.1, 0.7, -0.1), false);
     add(&mut description, "block", block, matte(0.6, 0.0));
-    // Narrow enough for light paths to be aimed at it.
+    // Narrow enough for aimed light paths.
     let metal = Material { metallic: 1.0, roughness: 0.4, ..Material::default() };
     add(&mut description, "ball", sphere(Vec3::new(0.4, 0.35, 0.1), 0.35, 64), metal);
     let (width, height) = (32, 16);
@@ -319,7 +323,7 @@ fn under_the_sky() {
     agree("under the sky", &scene, &methods, 0.05, 0.03, 0.2);
 }
 
-/// Parallel projection, and paths of four segments at most.
+/// An orthographic camera, and paths of at most four segments.
 #[test]
 fn short_paths_seen_in_parallel() {
     let mut description = lit_room(matte(0.6, 0.0));
@@ -332,8 +336,8 @@ fn short_paths_seen_in_parallel() {
     agree_with("parallel", &scene, &reference, &methods, (0.04, 4), 0.02, 0.15);
 }
 
-/// Caustics of a point light seen in a mirror and through glass, which only photons find: against progressive photon
-/// mapping. Counting photons twice would double most tiles.
+/// Caustics of a point light seen in a mirror and through glass, which only photons find, compared with progressive
+/// photon mapping. Counting photons twice would double most tiles.
 #[test]
 fn caustics_behind_glass() {
     let mut description = Description::default();
@@ -358,8 +362,8 @@ fn caustics_behind_glass() {
     agree_with("behind glass", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.3);
 }
 
-/// All of the floor lies under water, so that nothing is lit but through it and seen but through it; the lamp is so
-/// large that a path tracer, which must run into it, is the judge.
+/// The whole floor is under water, so that all light passes the surface twice. The lamp is so large that a path tracer,
+/// which must hit it, is the reference.
 #[test]
 fn under_water() {
     let mut description = Description::default();
@@ -381,7 +385,7 @@ fn under_water() {
     agree_with("under water", &scene, &reference, &methods, (radius, u32::MAX), 0.03, 0.2);
 }
 
-/// Classical photon mapping, too, with a map so large that its bandwidths are small.
+/// Classical photon mapping agrees, too, with a map so large that its bandwidths are small.
 #[test]
 fn one_large_photon_map() {
     let scene = small_room();
@@ -402,7 +406,7 @@ fn small_room() -> Scene {
     build(description)
 }
 
-/// Five levels from one light pass: each agrees with path tracing.
+/// All five levels of one set of light paths agree with path tracing.
 #[test]
 fn levels_agree() {
     let scene = small_room();
@@ -418,7 +422,7 @@ fn levels_agree() {
     }
 }
 
-/// A picture per technique: the weighted ones sum to the method's own image, on a room with a lamp that can be hit.
+/// The weighted pictures of all techniques sum to the picture of the method, in a room with a lamp that can be hit.
 #[test]
 fn techniques_share_the_picture() {
     let mut description = lit_room(matte(0.6, 0.0));
@@ -456,14 +460,14 @@ fn techniques_share_the_picture() {
                 "{method:?}, {levels}, pixel {i}: {sum} {image}"
             );
         }
-        // Deposits out, weights would show: the strategies overlap.
+        // With splats left out, the weights would show: the techniques overlap.
         let share = sums.iter().sum::<f64>() / alone;
         assert_eq!(share < 0.9, !matches!(method, Method::Light), "{method:?}: {share}");
     }
 }
 
-/// The same bits from one thread and from three, on a picture that tiles do not fill; and shards make the whole,
-/// to the last bit.
+/// A picture that does not fill its tiles has the same bits with one thread and with three, and shards join to the bits
+/// of the whole.
 #[test]
 fn threads_and_shards_change_nothing() {
     let scene = small_room();
@@ -479,7 +483,7 @@ fn threads_and_shards_change_nothing() {
         };
         let whole = with(1);
         assert!(whole == with(3), "{method:?}: threads change the picture");
-        // Its iterations depend on each other.
+        // The iterations of cppm depend on each other, so it has no shards.
         if method == Method::Cppm {
             continue;
         }

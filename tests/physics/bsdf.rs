@@ -1,7 +1,7 @@
-//! The scattering model: sample, density and value agree; energy is kept; directions can be exchanged.
+//! The BSDF model: samples, densities and values agree, energy is conserved, and directions can be exchanged.
 //!
-//! Statistical checks run at a family-wise error rate of 0.1 % (Sidak over the checks of a test) with fixed seeds.
-//! Planted bugs are rejected by the same checks.
+//! Statistical checks have a family-wise error rate of 0.1 % (Sidak over the checks of a test) and fixed seeds. The
+//! same checks reject planted bugs.
 
 use crate::support;
 
@@ -18,7 +18,7 @@ const ERROR_RATE: f64 = 1e-3;
 
 static TABLES: LazyLock<EnergyTables> = LazyLock::new(|| EnergyTables::new([1.33, 1.5, 2.4, 1.1, f32::INFINITY]));
 
-/// Uniform numbers by counting, all of them hashes.
+/// Uniform numbers: hashes of a counter.
 struct Uniform(u64);
 
 impl Uniform {
@@ -44,7 +44,7 @@ fn thin(alpha: f32) -> Parameters {
     Parameters { thin: true, ..glass(alpha, 1.5) }
 }
 
-/// Named parameters, all without loss: a furnace tells what is missing.
+/// Named parameters of surfaces that lose no energy, for furnace tests.
 fn white() -> Vec<(String, Parameters)> {
     let mut list = vec![("matte".to_string(), Parameters::default())];
     for alpha in [0.0, 0.002, 0.02, 0.1, 0.25, 0.5, 1.0f32] {
@@ -93,7 +93,7 @@ fn white() -> Vec<(String, Parameters)> {
     list
 }
 
-/// The same and coloured ones.
+/// [`white`] and coloured surfaces.
 fn all() -> Vec<(String, Parameters)> {
     let mut list = white();
     let tinted: Vec<_> = list
@@ -117,7 +117,7 @@ fn outgoing(mu: f32, phi: f32) -> Vec3 {
 
 const COSINES: [f32; 6] = [1.0, 0.4, 0.1, 0.02, -0.7, -0.05];
 
-/// Mean weight of directions drawn: the albedo. The points are Roberts' R3 sequence.
+/// Mean weight of sampled directions: the albedo. The points are Roberts' R3 sequence.
 fn drawn_albedo(bsdf: &Bsdf, wo: Vec3, transport: Transport, side: u32) -> Rgb {
     let mut sum = glam::DVec3::ZERO;
     for k in 0..side * side {
@@ -131,22 +131,21 @@ fn drawn_albedo(bsdf: &Bsdf, wo: Vec3, transport: Transport, side: u32) -> Rgb {
     (sum / f64::from(side * side)).as_vec3()
 }
 
-/// How far a white surface is from white, at worst over [`COSINES`] and, where facets are wider one way, over azimuths.
+/// Largest deviation of a white surface from albedo 1, over [`COSINES`] and, for anisotropic surfaces, over azimuths.
 fn furnace_error(p: &Parameters) -> f32 {
     let bsdf = bsdf(p, &TABLES);
     let azimuths: &[f32] = if p.alpha_x == p.alpha_y { &[0.7] } else { &[0.05, 0.7, 1.5, 4.0] };
     let worst = |worst: f32, wo: Vec3| {
         let off = |side| (drawn_albedo(&bsdf, wo, Transport::Importance, side) - Rgb::ONE).abs().max_element();
-        // More points where few leave a doubt.
+        // More points where few are not accurate enough.
         let coarse = off(128);
         worst.max(if coarse > 0.003 { off(512) } else { coarse })
     };
     azimuths.iter().flat_map(|&phi| COSINES.map(|mu| outgoing(mu, phi))).fold(0.0, worst)
 }
 
-/// A surface that loses nothing, under a white sky, is white: within 0.5 %, whatever its roughness and what lies on
-/// top, from both sides; within 1.5 % in every direction where facets are wider one way, and within 5 % where they are
-/// thirty times as wide.
+/// A surface that loses no energy is white under a white sky, from both sides: within 0.5 % for every roughness and
+/// cover; within 1.5 % in every direction for anisotropic roughness; within 5 % for a ratio of alphas of thirty.
 #[test]
 fn white_furnace() {
     let allowed = |stretch: f32| match stretch {
@@ -161,12 +160,12 @@ fn white_furnace() {
         .map(|(name, error, _)| format!("{name}: off by {error}"))
         .collect();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    // A surface that loses 1 % is not taken for white.
+    // A surface that loses 1 % is rejected.
     let grey = Parameters { base_color: Rgb::splat(0.99), ..metal(0.5) };
     assert!(furnace_error(&grey) > 0.005);
 }
 
-/// What a triad test needs of a BSDF, so that bugs can be planted between.
+/// The functions of a BSDF that the tests need. Implementations can plant bugs.
 trait Scatter {
     fn sample(&self, wo: Vec3, set: LobeSet, lobe: f32, u: Vec2) -> Option<BsdfSample>;
     fn pdf(&self, wo: Vec3, wi: Vec3, set: LobeSet) -> f32;
@@ -185,7 +184,7 @@ impl Scatter for Bsdf<'_> {
     }
 }
 
-/// Cells of the sphere: equal steps of the cosine and of the azimuth.
+/// Numbers of cells of the sphere, with equal steps of the cosine and of the azimuth.
 const CELLS: (usize, usize) = (24, 16);
 
 fn direction(z: f64, phi: f64) -> Vec3 {
@@ -193,7 +192,7 @@ fn direction(z: f64, phi: f64) -> Vec3 {
     Vec3::new((r * phi.cos()) as f32, (r * phi.sin()) as f32, z as f32)
 }
 
-/// Integral over a cell, halved where a finer rule disagrees.
+/// Integral over a cell, which is halved if a finer rule disagrees.
 fn integrate(f: &dyn Fn(Vec3) -> f64, z: (f64, f64), phi: (f64, f64), depth: u32) -> f64 {
     let rule = |n: usize| {
         let mut sum = 0.0;
@@ -216,9 +215,9 @@ fn integrate(f: &dyn Fn(Vec3) -> f64, z: (f64, f64), phi: (f64, f64), depth: u32
         .sum()
 }
 
-/// P-value of "directions drawn follow the density", and the largest relative difference between a weight and
-/// `f |cos| / pdf`. Directions not drawn, and those of delta lobes, are a cell of their own, so that the density's
-/// integral is tested too.
+/// P-value of the hypothesis that sampled directions follow the density, and the largest relative difference between a
+/// weight and `f |cos| / pdf`. Invalid samples and delta lobes have their own cell, so that the integral of the density
+/// is tested, too.
 fn triad(bsdf: &dyn Scatter, wo: Vec3, set: LobeSet, draws: usize, seed: u64) -> (f64, f32) {
     let (rows, columns) = CELLS;
     let mut counts = vec![0.0; rows * columns + 1];
@@ -259,7 +258,7 @@ fn triad(bsdf: &dyn Scatter, wo: Vec3, set: LobeSet, draws: usize, seed: u64) ->
     (chi_squared_p(&counts, &expected), difference)
 }
 
-/// Parameters whose densities are wide enough to be integrated over cells in little time.
+/// Parameters whose densities are wide enough to integrate over cells quickly.
 fn triads() -> Vec<(String, Parameters)> {
     let rough = |p: &Parameters| p.alpha_x == 0.0 || p.alpha_x.min(p.alpha_y) >= 0.1;
     let mut list: Vec<_> = all().into_iter().filter(|(_, p)| rough(p)).collect();
@@ -277,7 +276,7 @@ fn directions_follow_their_density() {
         let bsdf = bsdf(&p, &TABLES);
         for mu in [0.9, 0.04, -0.4f32] {
             for set in [LobeSet::ALL, LobeSet::BROAD, LobeSet::SHARP, LobeSet::SHARP | LobeSet::DELTA] {
-                // A set that holds the same lobes as ALL says nothing new.
+                // A set with the same lobes as ALL tests nothing new.
                 if bsdf.lobes().intersects(set) && (set == LobeSet::ALL || bsdf.lobes() & set != bsdf.lobes()) {
                     cases.push((name.clone(), bsdf, outgoing(mu, 2.0), set));
                 }
@@ -298,7 +297,7 @@ fn directions_follow_their_density() {
     assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), cases.len(), failures.join("\n"));
 }
 
-/// Bugs that others have made, planted between the model and its test.
+/// Known bugs of other renderers, planted between the model and its test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Bug {
     None,
@@ -361,7 +360,7 @@ fn planted_bugs_in_densities_are_found() {
     assert!(found(coated, Bug::DeltaShareForgotten), "DeltaShareForgotten passes");
 }
 
-/// Pairs of directions: every side, grazing ones too.
+/// Pairs of directions on all sides, grazing ones included.
 fn pairs(count: usize, seed: u64) -> Vec<(Vec3, Vec3)> {
     let mut uniform = Uniform(seed << 32);
     let mut one = || {
@@ -408,8 +407,8 @@ impl Scatter for WithoutEta<'_> {
 #[test]
 fn directions_can_be_exchanged() {
     for (name, p) in all() {
-        // The half vector of refraction by an index near 1 is a small difference: its rounding shows where the lobe is
-        // narrow.
+        // For an index near 1 the half vector of refraction is a small difference, whose rounding errors matter in
+        // narrow lobes.
         let allowed = if p.alpha_x.min(p.alpha_y) < 0.05 { 0.2 } else { 1e-2 };
         let worst = asymmetry(&bsdf(&p, &TABLES), &p);
         assert!(worst < allowed, "{name}: off by {worst}");
@@ -418,7 +417,8 @@ fn directions_can_be_exchanged() {
     assert!(asymmetry(&WithoutEta(bsdf(&p, &TABLES)), &p) > 0.5, "a missing eta^2 passes");
 }
 
-/// Smooth glass, water to air: Fresnel's and Snell's numbers, and the factor 1/eta^2, from both sides and both ways.
+/// Smooth glass and water: the values of Fresnel's and Snell's equations and the factor 1/eta^2, from both sides and in
+/// both directions.
 #[test]
 fn smooth_glass_by_the_book() {
     let p = glass(0.0, 1.5);
@@ -426,7 +426,7 @@ fn smooth_glass_by_the_book() {
     assert_eq!(bsdf.lobes(), LobeSet::DELTA);
     for (transport, radiance) in [(Transport::Radiance, true), (Transport::Importance, false)] {
         for (wo, eta) in [(outgoing(0.6, 0.0), 1.5f32), (-outgoing(0.9, 0.0), 1.0 / 1.5)] {
-            // Fresnel's equations in angles (not as the model writes them).
+            // Fresnel's equations in angles, unlike in the model.
             let theta_o = wo.z.abs().acos();
             let theta_i = (theta_o.sin() / eta).asin();
             let s = ((theta_o - theta_i).sin() / (theta_o + theta_i).sin()).powi(2);
@@ -451,7 +451,7 @@ fn smooth_glass_by_the_book() {
             assert_eq!(seen, [true; 2]);
         }
     }
-    // Beyond the critical angle (41.8 degrees) all is reflected.
+    // Beyond the critical angle (41.8 degrees) all light is reflected.
     let wo = -outgoing(0.7, 0.3);
     for k in 0..16 {
         let lobe = (k as f32 + 0.5) / 16.0;
@@ -480,7 +480,7 @@ fn reflectance_at_normal_incidence_is_the_extensions() {
     near(mirror(Parameters { clearcoat: 0.5, base_color: Rgb::ZERO, ..Parameters::default() }), Rgb::splat(0.02));
 }
 
-/// Classes: every lobe is in one, and asking for the classes one by one gives what asking for all gives.
+/// Every lobe is in exactly one class: values of single classes sum to the value of all classes.
 #[test]
 fn classes_share_the_lobes_out() {
     assert_eq!(bsdf(&metal(DELTA_ALPHA * 0.9), &TABLES).lobes(), LobeSet::DELTA);
@@ -489,7 +489,7 @@ fn classes_share_the_lobes_out() {
     assert_eq!(bsdf(&plastic(0.1, 1.5), &TABLES).lobes(), LobeSet::SMOOTH);
     assert_eq!(bsdf(&plastic(0.0, 1.5), &TABLES).lobes(), LobeSet::DELTA | LobeSet::BROAD);
     assert_eq!(bsdf(&glass(0.5, 1.0), &TABLES).lobes(), LobeSet::DELTA);
-    // Rough glass of nearly matching index hardly turns light.
+    // Rough glass of a nearly matched index deflects light little.
     assert_eq!(bsdf(&glass(0.5, 1.5), &TABLES).lobes(), LobeSet::BROAD);
     assert_eq!(bsdf(&glass(0.5, 1.1), &TABLES).lobes(), LobeSet::SHARP);
     assert_eq!(bsdf(&glass(0.5, 1.0 / 1.1), &TABLES).lobes(), LobeSet::SHARP);
@@ -517,13 +517,13 @@ fn classes_share_the_lobes_out() {
     }
 }
 
-/// The albedo that roulette goes by is near the true one.
+/// The albedo estimate for Russian roulette is near the true albedo.
 #[test]
 fn albedo_is_near_the_truth() {
     let mut faults = Vec::new();
     for (name, p) in all() {
         let bsdf = bsdf(&p, &TABLES);
-        // Of stretched glass what a side reflects is known by a coarser table.
+        // For anisotropic glass, the albedo of reflection is from a coarser table.
         let within = if p.transmission > 0.0 && p.alpha_x != p.alpha_y { 0.2 } else { 0.12 };
         for mu in [1.0, 0.5, -0.5] {
             let wo = outgoing(mu, 1.0);
@@ -536,7 +536,7 @@ fn albedo_is_near_the_truth() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Nothing that a file or a ray can bring makes a value that is not finite.
+/// No parameter of a file and no ray gives a value that is not finite.
 #[test]
 fn extremes_stay_finite() {
     let mut uniform = Uniform(77 << 32);

@@ -1,7 +1,7 @@
-//! Cameras as light paths meet them, windows of pictures, and very wide views.
+//! Orthographic cameras connected to light paths, crop windows, and very wide views.
 //!
-//! Tests of agreement compare channels of tiles, or means, by independent seeds; see `support/channels.rs` and
-//! `support/stats.rs` for the error rate and the planted errors that are told.
+//! Tests of agreement compare the channels of tiles, or means, over independent seeds. See `support/channels.rs` and
+//! `support/stats.rs` for error rates and planted errors.
 
 use crate::support;
 
@@ -21,7 +21,7 @@ fn rendered(scene: &Scene, view: &CameraRequest, (method, iterations): (Method, 
     render(scene, &camera, &settings, |_, _| Control::Continue)
 }
 
-/// A floor, a mirror that lights it and a lamp, seen in parallel from a slant.
+/// A floor, a mirror that lights it and a lamp, seen at an angle by an orthographic camera.
 fn in_parallel(aperture_radius: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-1.5, 0.0, 1.5), 3.0 * Vec3::X, -3.0 * Vec3::Z), matte(0.7, 0.0));
@@ -37,10 +37,10 @@ fn in_parallel(aperture_radius: f32) -> Scene {
     build(description)
 }
 
-/// Light paths meet an orthographic camera, with a lens and without, as often as rays of its own meet lights: all that
-/// they can bring, and weights sum to one.
+/// Light paths connected to an orthographic camera, with and without a lens, agree with paths from the camera, and
+/// weights sum to one.
 #[test]
-fn light_paths_meet_orthographic_cameras() {
+fn light_paths_connect_to_orthographic_cameras() {
     for aperture_radius in [0.0, 0.3] {
         let scene = in_parallel(aperture_radius);
         let by = |method, iterations, count| {
@@ -53,8 +53,8 @@ fn light_paths_meet_orthographic_cameras() {
     }
 }
 
-/// A caustic of a point light, which no path from the camera finds, is as bright to an orthographic camera as to one
-/// that looks at the same square from so far that its rays are parallel.
+/// A caustic of a point light, which no camera path finds, is as bright for an orthographic camera as for a perspective
+/// camera so far away that its rays are nearly parallel.
 #[test]
 fn caustics_are_as_bright_from_far_away() {
     let scene = |parallel: bool| {
@@ -87,10 +87,10 @@ fn caustics_are_as_bright_from_far_away() {
     }
 }
 
-/// A window's pixels are those of the whole picture, to the bit, by methods that know no photons; wherever it begins
-/// and whatever the filter.
+/// The pixels of a crop window are those of the whole picture, to the bit, for methods without photons, any position
+/// and any filter.
 #[test]
-fn windows_are_the_whole_picture_there() {
+fn crop_windows_have_the_pixels_of_the_whole_picture() {
     let mut description = lit_room(matte(0.6, 0.0));
     add(&mut description, "ball", sphere(Vec3::new(0.2, 0.4, 0.0), 0.4, 32), glass(1.5));
     description.cameras[0].aperture_radius = 0.02;
@@ -115,8 +115,8 @@ fn windows_are_the_whole_picture_there() {
     }
 }
 
-/// A view of nearly half the space: bandwidths follow what a pixel can see, not the film, which is 229 times as wide as
-/// it is far away.
+/// In a view of nearly 180 degrees, bandwidths follow the footprint of a pixel, not the width of the film, which is 229
+/// times its distance.
 #[test]
 fn wide_views_keep_their_light() {
     let mut description = lit_room(matte(0.5, 0.0));

@@ -1,5 +1,5 @@
-//! Every light path is in one class, every class has one owner, and what is switched off is what is missing: on random
-//! paths, and in pictures.
+//! Every light path is in one class, every class has one owner, and an effect that is switched off is missing from the
+//! picture and nothing else is: tested on random paths and in pictures.
 
 use crate::support;
 
@@ -11,8 +11,8 @@ use caustique::math::{DVec3, Vec3};
 use caustique::scene::{Description, Scene};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere};
 
-/// A room with everything: plastic, rough metal, glass and a mirror, lit by a lamp that paths run into, and by a point
-/// if that is asked for.
+/// A room with plastic, rough metal, glass and a mirror, and a lamp that paths can hit; with `point`, also a point
+/// light.
 fn room(point: bool) -> Scene {
     let mut room = Description::default();
     add(&mut room, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));

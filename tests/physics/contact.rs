@@ -1,9 +1,8 @@
-//! Surfaces that lie exactly on each other: glass on a floor, a liquid in a glass, boxes in a stack; and panes that
-//! rounding can hardly tell from their backs.
+//! Surfaces that coincide: glass on a floor, a liquid in a glass, boxes in a stack; and panes whose faces are closer
+//! than rounding errors.
 //!
-//! Furnaces are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its
-//! checks), and every check has to reject a furnace that is off by 5 % (photons: 12 %). What is black is black in every
-//! pixel, without any error rate.
+//! Furnaces are t tests over independent seeds at a family-wise error rate of 0.1 % per test (Sidak over its checks).
+//! Every check must reject a furnace that is off by 5 % (photons: 12 %). Black pixels must be exactly black.
 
 use crate::support;
 
@@ -21,7 +20,7 @@ const ERROR_RATE: f64 = 1e-3;
 const SEEDS: u64 = 8;
 const METHODS: [Method; 4] = [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm];
 
-/// Under a sky of radiance 1.
+/// An empty scene under a sky of radiance 1.
 fn white_sky() -> Description {
     let source = EnvironmentSource::Color(Rgb::ONE);
     Description {
@@ -36,8 +35,8 @@ fn picture(scene: &Scene, camera: &Camera, method: Method, iterations: u64, seed
     rendered.pixels.iter().map(|pixel| pixel.mean(0).element_sum() / 3.0).collect()
 }
 
-/// The mean of a picture is 1; photons are found at fewer places than paths, so that they take more of them and tell 12
-/// % instead of 5 %.
+/// Checks that the mean of a picture is 1. Photon methods have more noise, so they use more photons, and their planted
+/// error is 12 % instead of 5 %.
 fn is_white(what: &str, scene: &Scene, methods: &[Method]) {
     let camera = scene.camera(&square(16)).expect("a camera");
     let critical = t_critical(sidak(ERROR_RATE, methods.len()), 1, SEEDS as f64 - 1.0);
@@ -60,7 +59,7 @@ fn is_white(what: &str, scene: &Scene, methods: &[Method]) {
     }
 }
 
-/// Both meshes as one.
+/// Joins two meshes into one.
 fn joined(a: Mesh, b: Mesh) -> Mesh {
     let first = a.positions.len() as u32;
     let mut mesh = a;
@@ -69,7 +68,7 @@ fn joined(a: Mesh, b: Mesh) -> Mesh {
     mesh
 }
 
-/// Rounded as transforms round: at a height that no float is.
+/// A transform to a height that no float represents, so that coordinates are rounded.
 fn placed() -> DAffine3 {
     DAffine3::from_scale_rotation_translation(
         DVec3::new(1.1, 0.7, 1.3),
@@ -78,14 +77,14 @@ fn placed() -> DAffine3 {
     )
 }
 
-/// A block of glass on a black floor with a strong lamp below: nothing of it is seen. Rays that start a little past a
-/// plane skipped the floor in 31 to 45 % of the pixels.
+/// A block of glass on a black floor hides a strong lamp below the floor. When rays started a little beyond a plane,
+/// they skipped the floor in 31 to 45 % of the pixels.
 #[test]
 fn nothing_below_a_floor_is_seen_through_glass_that_stands_on_it() {
     for (name, on) in [("as modelled", DAffine3::IDENTITY), ("placed", placed())] {
         let mut description = Description::default();
         let at = |p: DVec3| on.transform_point3(p).as_vec3();
-        // The floor has corners of its own: the two planes agree but for rounding.
+        // The floor has other corners than the block, so that the two planes differ by rounding errors.
         let (corner, x, z) =
             (at(DVec3::new(-3.0, 0.0, -3.0)), at(DVec3::new(3.0, 0.0, -3.0)), at(DVec3::new(-3.0, 0.0, 3.0)));
         add(&mut description, "floor", quad(corner, z - corner, x - corner), matte(0.0, 0.0));
@@ -104,7 +103,7 @@ fn nothing_below_a_floor_is_seen_through_glass_that_stands_on_it() {
     }
 }
 
-/// The check above sees a hole of a tenth of the block.
+/// The check above detects a hole of a tenth of the block.
 #[test]
 fn what_is_below_a_hole_is_seen() {
     let mut description = Description::default();
@@ -117,8 +116,8 @@ fn what_is_below_a_hole_is_seen() {
     assert!(picture(&scene, &camera, Method::Path, 4, 1).into_iter().any(|light| light > 0.0));
 }
 
-/// Glass filled with a liquid up to faces that both share, on a white floor: 2.16 where the second of two faces was
-/// skipped.
+/// A glass filled with a liquid, whose faces coincide with those of the glass, on a white floor. When the second of two
+/// coinciding faces was skipped, the mean was 2.16.
 #[test]
 fn a_liquid_in_a_glass_on_a_floor_is_no_lamp() {
     let mut description = white_sky();
@@ -131,7 +130,7 @@ fn a_liquid_in_a_glass_on_a_floor_is_no_lamp() {
     is_white("liquid in a glass", &build(description), &METHODS);
 }
 
-/// Blocks in a stack: of one glass, of two, and of one mesh.
+/// Stacks of blocks: of one glass, of two glasses, and of one mesh.
 #[test]
 fn stacks_of_blocks_are_no_lamps() {
     let block = |k: i32| {
@@ -157,7 +156,7 @@ fn stacks_of_blocks_are_no_lamps() {
         add(d, "stack", joined(joined(block(0), block(1)), block(2)), glass(1.5));
     }));
     is_white("one mesh", &one, &METHODS);
-    // Rough glass is connected to from outside and from within: what lies on its surfaces is crossed by shadow rays.
+    // Shadow rays connect to rough glass from outside and from inside, so they cross coinciding surfaces.
     let rough = stack(Box::new(move |d| {
         for (k, ior) in [1.3, 1.5, 1.8].into_iter().enumerate() {
             add(d, "block", block(k as i32), Material { roughness: 0.3, ..glass(ior) });
@@ -166,8 +165,8 @@ fn stacks_of_blocks_are_no_lamps() {
     is_white("three rough glasses", &rough, &METHODS);
 }
 
-/// Thin panes far from the origin: 16 and 41 roundings thick. A start that is 32 roundings past a plane is behind both
-/// faces, and gave 0.46.
+/// Thin panes far from the origin, 16 and 41 rounding errors thick. When rays started 32 rounding errors beyond a
+/// plane, they skipped both faces, and the mean was 0.46.
 #[test]
 fn panes_far_away_are_panes() {
     for (away, thickness) in [(900.0, 1e-3), (3000.0, 1e-2)] {
@@ -181,8 +180,8 @@ fn panes_far_away_are_panes() {
     }
 }
 
-/// A pane that single precision has no room for where it is (its sides are 3 roundings of 0.24 mm apart in a scene of
-/// kilometres) is named, one with room is not.
+/// The plan reports a pane that is too thin for single precision at its position (3 rounding errors of 0.24 mm in a
+/// scene of kilometres), and does not report a thicker one.
 #[test]
 fn panes_too_thin_to_tell_are_named() {
     for (thickness, named) in [(7e-4, true), (0.02, false)] {
@@ -197,7 +196,7 @@ fn panes_too_thin_to_tell_are_named() {
     }
 }
 
-/// A square on the ground.
+/// A square in the plane y = 0.
 fn square_of(low: f32, high: f32) -> Mesh {
     quad(Vec3::new(low, -2.0, low), Vec3::Z * (high - low), Vec3::X * (high - low))
 }
@@ -212,8 +211,9 @@ fn mean_of(scene: &Scene, method: Method, iterations: u64) -> (f64, f64) {
     mean_and_error(&(1..=SEEDS).map(mean).collect::<Vec<_>>())
 }
 
-/// All of `methods` see `scenes[0]` as bright as each of the others that should look like it, to 1 % and noise, and tell
-/// it from the last one, which should not, or, by photons, whose noise the last one may hide in, from what is off by 15 %.
+/// Checks by all `methods` that `scenes[0]` has the brightness of all other scenes but the last, within 1 % and noise,
+/// and differs from the last. Photon methods have too much noise for the last scene; they must reject an error of 15 %
+/// instead.
 fn look_alike(what: &str, scenes: &[Scene], methods: &[Method]) {
     let checks = methods.len() * (scenes.len() - 1);
     let critical = t_critical(sidak(ERROR_RATE, checks), 1, SEEDS as f64 - 1.0);
@@ -231,7 +231,7 @@ fn look_alike(what: &str, scenes: &[Scene], methods: &[Method]) {
     }
 }
 
-/// A block of glass `gap` above a table, seen through its side, under a sky and a lamp beside it.
+/// A block of glass `gap` above a table, seen through its side, under a sky with a lamp beside it.
 fn block_on(table: Material, gap: f32, optical_contact: bool) -> Scene {
     let mut description = white_sky();
     add(&mut description, "table", quad(Vec3::new(-3.0, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0), table);
@@ -243,8 +243,8 @@ fn block_on(table: Material, gap: f32, optical_contact: bool) -> Scene {
     build(description)
 }
 
-/// The picture does not change when a glass is lifted off its table by a hair. Where table and glass were taken to be
-/// one, there was no total reflection at its foot.
+/// A glass on a table looks as if it were lifted by a hair. When table and glass counted as in optical contact, there
+/// was no total internal reflection at its foot.
 #[test]
 fn a_glass_on_a_table_looks_as_just_above_it() {
     let metal = Material { base_color: [0.7, 0.7, 0.7, 1.0], roughness: 0.4, ..mirror() };
@@ -254,7 +254,7 @@ fn a_glass_on_a_table_looks_as_just_above_it() {
     }
 }
 
-/// A lamp that touches the foot of a glass shines through the glass's surface, as one just below it.
+/// A lamp that touches the foot of a glass shines through its surface, like a lamp just below it.
 #[test]
 fn a_lamp_that_touches_a_glass_shines_as_from_below_it() {
     let of = |gap: f32, optical_contact: bool| {
@@ -271,7 +271,7 @@ fn a_lamp_that_touches_a_glass_shines_as_from_below_it() {
     look_alike("lamp below a glass", &[of(0.0, false), of(1e-4, false), of(0.0, true)], &METHODS);
 }
 
-/// A room full of fog: the fog's faces lie on the walls, or stand behind them.
+/// A room full of fog, whose faces coincide with the walls or are behind them.
 fn foggy_room(beyond: f32, density: f32) -> Scene {
     let mut description = Description::default();
     let (low, high) = (Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 1.0));
@@ -285,15 +285,15 @@ fn foggy_room(beyond: f32, density: f32) -> Scene {
     build(description)
 }
 
-/// Fog that ends on the walls of a room is there for cameras, lamps and points within it; where the search for the
-/// solids around a point stopped at the walls, it was not.
+/// Fog that ends on the walls of a room surrounds cameras, lamps and points in the room. It did not when the search for
+/// the solids around a point stopped at the walls.
 #[test]
 fn fog_that_ends_on_walls_is_there() {
     let scenes = [foggy_room(0.0, 1.0), foggy_room(0.05, 1.0), foggy_room(0.0, 0.1)];
     look_alike("fog", &scenes, &[Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm]);
 }
 
-/// A point light in dark glass under a lid that touches the glass: absorption counts from the light on.
+/// A point light in dark glass, under a lid that touches the glass: absorption starts at the light.
 #[test]
 fn a_point_light_in_glass_under_a_touching_lid_is_in_the_glass() {
     let of = |gap: f32, sigma: f32| {

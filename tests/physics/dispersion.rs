@@ -1,8 +1,8 @@
-//! Dispersion: against Snell's law wavelength by wavelength, and methods against each other.
+//! Compares dispersion with Snell's law wavelength by wavelength, and methods with each other.
 //!
 //! Statistical tests have a family-wise error rate of 0.1 % each (Sidak over their checks), plus the stated bias of
-//! kernels. Every check has to reject a planted error: glass that does not disperse, colours put together as if they
-//! were independent, a picture brighter by a stated share.
+//! kernels. Every check must reject a planted error: glass without dispersion, colours combined as if they were
+//! independent, or a picture that is brighter by a stated share.
 
 use crate::support;
 
@@ -25,12 +25,12 @@ use support::channels::{self, SIZE, agree, disagreeing};
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{ERROR_RATE, chi_squared_p, mean_and_error, sidak, t_critical};
 
-/// Glass of this index at 587.6 nm and of this Abbe number.
+/// Glass of this index of refraction at 587.6 nm and this Abbe number.
 fn dispersive(ior: f32, abbe: f32) -> Material {
     Material { dispersion: 20.0 / abbe, ..glass(ior) }
 }
 
-/// KHR_materials_dispersion's index, here in double precision.
+/// The index of refraction of KHR_materials_dispersion in double precision.
 fn cauchy(ior: f64, abbe: f64, nm: f64) -> f64 {
     let b = (ior - 1.0) / (abbe * (486.1f64.powi(-2) - 656.3f64.powi(-2)));
     (ior + b * (nm.powi(-2) - 587.6f64.powi(-2))).max(1.0)
@@ -38,7 +38,7 @@ fn cauchy(ior: f64, abbe: f64, nm: f64) -> f64 {
 
 // ---------------------------------------------------------------- indices and colours
 
-/// The Abbe number is what it is defined to be, and no index is below that of the vacuum.
+/// The Abbe number of the indices is the given one, and no index is below 1.
 #[test]
 fn indices_follow_the_abbe_number() {
     for (ior, abbe) in [(1.5f32, 59.0f32), (2.417, 55.3), (1.6, 5.0), (1.33, 55.0)] {
@@ -58,8 +58,8 @@ fn indices_follow_the_abbe_number() {
     }
 }
 
-/// Mean of `f` over the spectrum, by midpoints.
-fn over_hues(f: impl Fn(f32) -> Rgb) -> [f64; 3] {
+/// Mean of `f` over the spectrum by the midpoint rule.
+fn over_spectrum(f: impl Fn(f32) -> Rgb) -> [f64; 3] {
     let n = 1 << 16;
     let mut sum = [0.0; 3];
     for i in 0..n {
@@ -71,10 +71,10 @@ fn over_hues(f: impl Fn(f32) -> Rgb) -> [f64; 3] {
     sum
 }
 
-/// The mean over all wavelengths is white, nothing is negative or above 3, and colours are in their order.
+/// The mean weight over all wavelengths is white, weights are between 0 and 3, and colours have the order of a prism.
 #[test]
 fn weights_are_white_on_average() {
-    for mean in over_hues(|u| observer::sample(u).1) {
+    for mean in over_spectrum(|u| observer::sample(u).1) {
         assert!((mean - 1.0).abs() < 1e-6, "{mean}");
     }
     let mut last = 0.0;
@@ -84,7 +84,7 @@ fn weights_are_white_on_average() {
         assert!(weight.min_element() >= 0.0 && weight.max_element() < 3.05, "{nm}: {weight}");
         assert!((weight.element_sum() - 3.0).abs() < 0.02, "{nm}: {weight}");
         last = nm;
-        // Blue, green and red where a prism shows them.
+        // Blue, green and red are at the wavelengths where a prism shows them.
         let strongest = weight.max_position();
         match nm {
             430.0..480.0 => assert_eq!(strongest, 2, "{nm}: {weight}"),
@@ -95,7 +95,7 @@ fn weights_are_white_on_average() {
     }
 }
 
-/// In one pass, too, white is not far from white; over passes the rest vanishes fast.
+/// The mean weight of one iteration is nearly white, and the mean over iterations converges fast.
 #[test]
 fn the_wavelengths_of_a_pass_are_nearly_white() {
     let of_pass = |pass| {
@@ -114,7 +114,7 @@ fn the_wavelengths_of_a_pass_are_nearly_white() {
     assert!((mean - Rgb::ONE).abs().max_element() < 0.01, "{mean}");
 }
 
-/// Paths of one channel draw their bands in proportion to what they weigh there, and all carry the same.
+/// Paths of one channel draw bands in proportion to the weights in that channel, so all have the same weight.
 #[test]
 fn paths_of_one_channel_carry_the_same() {
     for channel in 0..3 {
@@ -127,7 +127,7 @@ fn paths_of_one_channel_carry_the_same() {
         let mut counts = vec![0.0; usize::from(BANDS)];
         for i in 0..n {
             let draws = Stream::new(5, 0, Domain::Test, i).vertex(channel as u32);
-            // Whatever band it starts from.
+            // The result does not depend on the initial band.
             let taken = wavelength((i % 8) as u8).sample_in_channel(channel, draws.one(Purpose::Wavelength));
             let band = (0..BANDS).find(|&band| wavelength(band).wavelength().band == taken.band).expect("a band");
             counts[usize::from(band)] += 1.0;
@@ -138,14 +138,15 @@ fn paths_of_one_channel_carry_the_same() {
         let wrong: Vec<f64> = weights.iter().map(|w| 0.9 * w + 0.1 * total / f64::from(BANDS)).collect();
         assert!(chi_squared_p(&counts, &expected(&wrong)) < 1e-6, "channel {channel}: bands half blind go unnoticed");
     }
-    // Over all offsets they carry what white light has.
-    let mean =
-        over_hues(|u| Rgb::from_array([0, 1, 2].map(|c| WavelengthSample::new(u).sample_in_channel(c, 0.5).weight.x)));
+    // The mean over all offsets is the weight of white light.
+    let mean = over_spectrum(|u| {
+        Rgb::from_array([0, 1, 2].map(|c| WavelengthSample::new(u).sample_in_channel(c, 0.5).weight.x))
+    });
     assert!(mean.iter().all(|m| (m - 1.0).abs() < 1e-4), "{mean:?}");
 }
 
-/// Mean of what two paths bring together whose wavelengths are drawn independently. What either carries besides depends
-/// on its wavelength, as behind a prism: here it is there or not.
+/// Mean contribution of two connected subpaths with independent wavelengths. `carried` is a further factor of both
+/// subpaths, 0 or 1, that depends on the wavelength as behind a prism.
 fn put_together(carried: impl Fn(f32) -> bool, weight: impl Fn(&Wavelength, &Wavelength) -> Rgb) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let passes = 512;
@@ -168,7 +169,7 @@ fn put_together(carried: impl Fn(f32) -> bool, weight: impl Fn(&Wavelength, &Wav
 #[test]
 fn two_paths_put_together_have_one_wavelength() {
     let carried = |nm: f32| nm > 530.0 && nm < 610.0;
-    let expected = over_hues(|u| {
+    let expected = over_spectrum(|u| {
         let (nm, weight) = observer::sample(u);
         if carried(nm) { weight } else { Rgb::ZERO }
     });
@@ -176,14 +177,14 @@ fn two_paths_put_together_have_one_wavelength() {
     let meeting = |eye: &Wavelength, light: &Wavelength| eye.connection_factor(light.band).unwrap_or(Rgb::ZERO);
     let found = put_together(carried, meeting);
     assert!(off(found) < 0.02, "{found:?} {expected:?}");
-    // The bugs: colours multiplied as if wavelengths were independent; bands that meet, but with a colour that counts
-    // twice.
+    // The planted bugs: colours multiplied as if wavelengths were independent; and equal bands connected with the
+    // colour counted twice.
     assert!(off(put_together(carried, |_, _| Rgb::ONE)) > 0.2, "a product of colours goes unnoticed");
     let twice = |eye: &Wavelength, light: &Wavelength| {
         if eye.band == light.band { Rgb::splat(f32::from(BANDS)) } else { Rgb::ZERO }
     };
     assert!(off(put_together(carried, twice)) > 0.2, "a colour counted twice goes unnoticed");
-    // White light meets all.
+    // White subpaths are connected to all others.
     let eye = WavelengthSample::new(0.3).wavelength();
     assert_eq!(eye.connection_factor(Band::WHITE), Some(Rgb::ONE));
     assert_eq!(Band::of(None), Band::WHITE);
@@ -194,7 +195,7 @@ fn two_paths_put_together_have_one_wavelength() {
 const ABBE: f32 = 12.0;
 const IOR: f32 = 1.6;
 
-/// An equilateral prism about the z axis: its faces look left (up), right (up) and down.
+/// An equilateral prism along the z axis. Its faces look left (up), right (up) and down.
 fn prism_mesh(half: f32) -> Mesh {
     let (s, c) = (0.5, 0.75f32.sqrt());
     let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y - c / 3.0, z);
@@ -203,18 +204,18 @@ fn prism_mesh(half: f32) -> Mesh {
     Mesh { positions: positions.collect(), triangles, closed: true, ..Mesh::default() }
 }
 
-/// Angle above the x axis of light that arrives at the left face at an angle `arriving` above it and leaves by the
-/// right face; `None` if it does not.
+/// Angle above the x axis of light that leaves the right face, if it arrives at the left face at an angle `arriving`
+/// above the x axis. `None` if it does not leave there.
 fn through_prism(index: f64, arriving: f64) -> Option<f64> {
     let half = 30f64.to_radians();
-    // From the left face's inward normal, which points down.
+    // The angle with the inward normal of the left face, which points down.
     let first = ((arriving + half).sin() / index).asin();
     let second = 2.0 * half - first;
     let sin = index * second.sin();
     (sin < 1.0).then(|| half - sin.asin())
 }
 
-/// Fresnel's transmittance of unpolarised light through both faces.
+/// Fresnel transmittance of unpolarised light through both faces.
 fn prism_transmittance(index: f64, arriving: f64) -> f64 {
     let half = 30f64.to_radians();
     let face = |outside: f64, inside: f64| {
@@ -233,7 +234,7 @@ fn prism_scene(material: Material) -> Scene {
     build(description)
 }
 
-/// Follows a path by what is let through.
+/// A visitor that follows only transmission.
 #[derive(Default)]
 struct Straight {
     surfaces: u32,
@@ -256,10 +257,10 @@ impl<'a> Visitor<'a> for Straight {
     }
 }
 
-/// Angle at which a ray of some wavelength leaves the prism.
+/// Angle at which a ray of this wavelength leaves the prism.
 fn deviated(scene: &Scene, wavelength: WavelengthSample, arriving: f64) -> f64 {
     let direction = DVec3::new(arriving.cos(), arriving.sin(), 0.0).as_vec3();
-    // Into the middle of the left face.
+    // Starts into the middle of the left face.
     let start = PathStart {
         origin: Vec3::new(-0.25, 0.75f32.sqrt() / 6.0, 0.0) - 3.0 * direction,
         direction,
@@ -282,8 +283,8 @@ fn deviated(scene: &Scene, wavelength: WavelengthSample, arriving: f64) -> f64 {
     panic!("no path gets through the prism");
 }
 
-/// Every wavelength has its angle of minimum deviation, D with n = sin((A + D) / 2) / sin(A / 2), and leaves where
-/// Snell says at the angle of another.
+/// Every wavelength has its angle of minimum deviation D, with n = sin((A + D) / 2) / sin(A / 2), and at the angle of
+/// another wavelength it leaves as Snell's law predicts.
 #[test]
 fn a_prism_bends_each_wavelength_by_its_index() {
     let scene = prism_scene(dispersive(IOR, ABBE));
@@ -293,7 +294,7 @@ fn a_prism_bends_each_wavelength_by_its_index() {
         let wavelength = WavelengthSample::new((f32::from(k as u8) + 0.5) / 40.0);
         let nm = f64::from(wavelength.wavelength().nm);
         let index = cauchy(f64::from(IOR), f64::from(ABBE), nm);
-        // Symmetric: inside it flies along the base.
+        // At minimum deviation the path inside is parallel to the base.
         let arriving = (index * 0.5).asin() - 30f64.to_radians();
         let deviation = arriving - deviated(&scene, wavelength, arriving);
         let found = (0.5 * (60f64.to_radians() + deviation)).sin() / 0.5;
@@ -307,8 +308,8 @@ fn a_prism_bends_each_wavelength_by_its_index() {
     assert!(wrong > 0.02, "glass that does not disperse goes unnoticed: {wrong}");
 }
 
-/// A sun through the prism on to a screen: photons land in the direction of their wavelength, of its colour, and each
-/// channel's mean direction is the integral's.
+/// The sun shines through the prism on to a screen. Photons land where their wavelength is refracted to, with its
+/// colour, and the mean direction of each channel is that of the integral.
 #[test]
 fn photons_behind_a_prism_land_where_their_colour_belongs() {
     let arriving = 24f64.to_radians();
@@ -345,11 +346,11 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
             for photon in photons.surface.iter().flatten().filter(|photon| photon.depth == 3) {
                 let d = -photon.wi;
                 let angle = f64::from(d.y).atan2(f64::from(d.x));
-                // Up goes what has come in by the base.
+                // Light that enters by the base goes up.
                 if d.x < 0.1 || angle > 0.0 {
                     continue;
                 }
-                // The wavelength whose light leaves at this angle; blue is bent most.
+                // The wavelength that leaves at this angle, by bisection. Blue is deflected most.
                 let (mut low, mut high) = (390.0f64, 720.0f64);
                 for _ in 0..50 {
                     let middle = 0.5 * (low + high);
@@ -361,7 +362,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
                     let color = photon.flux * (3.0 / photon.flux.element_sum());
                     assert!((color - weight).abs().max_element() < 0.03, "{low} nm: {color} for {weight}");
                 }
-                // It landed where a ray of that angle does.
+                // The photon is where a ray of that angle hits the screen.
                 assert!((photon.p.x - 3.0).abs() < 1e-4);
                 assert!((f64::from(photon.p.y) - 3.0 * angle.tan()).abs() < 0.8, "{}", photon.p);
                 for (c, (flux, moment)) in flux.iter_mut().zip(&mut moment).enumerate() {
@@ -375,7 +376,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
         }
         means
     };
-    // By midpoints over the spectrum.
+    // The midpoint rule over the spectrum.
     let n = 4000;
     let (mut flux, mut moment) = ([0.0f64; 3], [0.0f64; 3]);
     for i in 0..n {
@@ -394,7 +395,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
         let fault = |c: usize| {
             let (mean, error) = mean_and_error(&means[c]);
             println!("channel {c}: {mean:.5} +- {error:.5}, expected {:.5}", expected[c]);
-            // The faces' shares of each other's light vary with the angle by less.
+            // Interreflection between the faces changes less with the angle than this.
             (mean - expected[c]).abs() > critical * error + 5e-4
         };
         (0..3).filter(|&c| fault(c)).count()
@@ -403,7 +404,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
     assert_eq!(faults(&trace(glass(IOR))), 3, "glass that does not disperse goes unnoticed");
 }
 
-/// The weight of a wavelength, by bisection.
+/// The weight of a wavelength (nm), by bisection.
 fn color_of(nm: f64) -> Rgb {
     let (mut low, mut high) = (0.0f32, 1.0f32);
     for _ in 0..30 {
@@ -433,7 +434,7 @@ fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rend
 
 const SEEDS: u64 = 10;
 
-/// Pictures by seed.
+/// Renders one picture per seed.
 fn seeds(scene: &Scene, method: Method, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
     channels::seeds(method, SEEDS, |seed| render(scene, method, SIZE, &of(seed)))
 }
@@ -450,7 +451,7 @@ fn sun(direction: DVec3, angle_deg: f32, irradiance: f32) -> PunctualLight {
     }
 }
 
-/// A wedge from `low` to `high` that grows by `slope` along x.
+/// A wedge from `low` to `high` whose height grows by `slope` along x.
 fn wedge(low: Vec3, high: Vec3, slope: f32) -> Mesh {
     let mut mesh = cuboid(low, high, false);
     for p in mesh.positions.iter_mut().filter(|p| p.y > 0.5 * (low.y + high.y)) {
@@ -459,8 +460,8 @@ fn wedge(low: Vec3, high: Vec3, slope: f32) -> Mesh {
     mesh
 }
 
-/// The sun shines through a hole in a roof, which a wedge of glass covers, and leaves a rainbow on the floor; it is
-/// seen from below the roof, maybe through a second wedge.
+/// The sun shines through a hole in a roof, which a wedge of glass covers, and makes a rainbow on the floor. The camera
+/// is below the roof; with `behind_glass`, behind a second wedge.
 fn rainbow(material: impl Fn(f32) -> Material, behind_glass: bool) -> Scene {
     let mut description = Description::default();
     let floor = quad(Vec3::new(-3.0, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 6.0);
@@ -481,7 +482,7 @@ fn rainbow(material: impl Fn(f32) -> Material, behind_glass: bool) -> Scene {
     build(description)
 }
 
-/// Glass whose colours part widely.
+/// Glass with strong dispersion.
 fn strong(ior: f32) -> Material {
     dispersive(ior, 3.0)
 }
@@ -496,8 +497,8 @@ fn plus(settings: Settings) -> Settings {
     settings
 }
 
-/// The rainbow on the floor, where all methods find it; light tracing, which shares no wavelengths with anyone, with
-/// least noise.
+/// The rainbow on the floor is found by all methods. Light tracing, which needs no equal wavelengths, has the least
+/// noise.
 #[test]
 fn a_rainbow_agrees() {
     let scene = rainbow(strong, false);
@@ -518,7 +519,7 @@ fn a_rainbow_agrees() {
     agree("rainbow, cppm plus", &other, &light, 0.02, 0.4);
 }
 
-/// The rainbow seen through dispersive glass: light paths and eye paths both have a wavelength, and meet if it is one.
+/// The rainbow seen through dispersive glass: light subpaths and camera subpaths both have a wavelength.
 #[test]
 #[ignore = "long"]
 fn a_rainbow_behind_dispersive_glass_agrees() {
@@ -564,7 +565,7 @@ fn a_rainbow_in_fog_agrees() {
     agree("rainbow in fog, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
-/// Rough glass that disperses: lobes that light samples and photons meet.
+/// Rough dispersive glass, at which lights are sampled and photons are gathered.
 #[test]
 fn rough_dispersive_glass_agrees() {
     let mut description = Description::default();
@@ -589,7 +590,7 @@ fn rough_dispersive_glass_agrees() {
 
 // ---------------------------------------------------------------- white stays white
 
-/// Clear glass that disperses, smooth or rough, under a white sky: it cannot be seen.
+/// Clear dispersive glass, smooth or rough, is invisible under a white sky.
 #[test]
 fn furnace() {
     for roughness in [0.0, 0.5] {
@@ -600,7 +601,7 @@ fn furnace() {
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
         description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 36.0));
         let scene = build(description);
-        // Rough glass gathers: a photon map of the sky would be all noise.
+        // Rough glass gathers photons: a photon map of the sky would be only noise.
         let methods = [Method::Path, Method::Bdpt, Method::Sppm];
         for &method in &methods[..if roughness > 0.0 { 2 } else { 3 }] {
             let mut means: [Vec<f64>; 3] = Default::default();
@@ -614,7 +615,7 @@ fn furnace() {
             for (c, means) in means.iter().enumerate() {
                 let (mean, error) = mean_and_error(means);
                 println!("furnace, roughness {roughness}, {method:?}, channel {c}: {mean:.5} +- {error:.5}");
-                // Rough interfaces take what they lose from the tables of one index.
+                // The energy compensation of rough interfaces uses tables of one index for all wavelengths.
                 let bias = if roughness > 0.0 { 0.01 } else { 1e-3 };
                 let passes = |expected: f64| (mean - expected).abs() < critical * error + bias;
                 assert!(passes(1.0), "roughness {roughness}, {method:?}, channel {c}: {mean} +- {error}");
@@ -628,8 +629,8 @@ fn bytes(rendered: &Rendered) -> Vec<[u64; 3]> {
     rendered.pixels.iter().map(|pixel| pixel.mean(0).to_array().map(f64::to_bits)).collect()
 }
 
-/// Dispersion of nothing, of what does not refract, and of what nobody wears changes no bit; the same bits come from
-/// any number of threads.
+/// Dispersion of zero, of a material that does not refract, and of an unused material does not change any bit. The bits
+/// do not depend on the number of threads.
 #[test]
 fn without_dispersion_no_bit_changes() {
     let scene = |first: Material, unused: bool| {
@@ -667,7 +668,7 @@ fn without_dispersion_no_bit_changes() {
     }
 }
 
-/// Glass that disperses next to nothing takes wavelengths and shows the plain picture.
+/// Glass of very weak dispersion uses wavelengths, and gives nearly the picture without dispersion.
 #[test]
 fn little_dispersion_is_nearly_none() {
     let none = rainbow(glass, true);

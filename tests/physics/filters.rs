@@ -1,8 +1,8 @@
-//! Pixel filters: what eye paths and light paths bring to a pixel is weighed by the same function.
+//! Pixel filters: camera paths and light paths are weighted by the same function.
 //!
-//! A strip of a plane is lit, the rest is black; its straight edge runs along the columns of the picture. The mean of a
-//! column is the share of the filter that lies on the lit side. T tests over columns at a family-wise error rate of 0.1 %
-//! (Sidak); the box filter in place of another is rejected.
+//! A strip of a plane is lit, with a straight edge along the columns of the picture. The mean of a column is the share
+//! of the filter on the lit side. T tests over columns at a family-wise error rate of 0.1 % (Sidak). A box filter in
+//! place of another filter must be rejected.
 
 use crate::support;
 
@@ -19,14 +19,15 @@ use support::stats::{ERROR_RATE, mean_and_error, t_critical};
 const SIDE: u32 = 16;
 const SEEDS: u64 = 10;
 
-/// Looked at from above; a pixel is `WIDTH / SIDE` wide, and what is lit begins at `EDGE` pixels from the left.
+/// The plane is seen from above. A pixel is `WIDTH / SIDE` wide, and the lit part begins at `EDGE` pixels from the
+/// left.
 const WIDTH: f32 = 2.0;
 const EDGE: f32 = 7.3;
 
 fn strip() -> Scene {
     let mut description = Description::default();
     let left = (EDGE / SIDE as f32 - 0.5) * WIDTH;
-    // The camera's right is the world's -x.
+    // The right of the camera is -x.
     let lit = quad(Vec3::new(-left - 4.0, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 4.0);
     add(&mut description, "strip", lit, matte(0.5, 0.0));
     description.lights.push(PunctualLight {
@@ -43,7 +44,7 @@ fn strip() -> Scene {
     build(description)
 }
 
-/// Means of the columns by seed.
+/// Means of the columns, one list per seed.
 fn columns(scene: &Scene, method: Method, filter: Filter) -> Vec<Vec<f64>> {
     let camera = scene.camera(&CameraRequest { filter, ..square(SIDE) }).expect("a camera");
     (0..SEEDS)
@@ -58,7 +59,7 @@ fn columns(scene: &Scene, method: Method, filter: Filter) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Share of the filter of column `x` that lies on what is lit.
+/// Share of the filter of column `x` on the lit side.
 fn expected(filter: Filter, x: u32) -> f64 {
     let radius = filter.radius();
     let steps = 4000;
@@ -68,7 +69,7 @@ fn expected(filter: Filter, x: u32) -> f64 {
     (0..steps).map(at).filter(lit).map(|d| f64::from(filter.density(d) * step)).sum()
 }
 
-/// Columns whose mean is not what the filter says.
+/// The columns whose mean is not the share of the filter.
 fn wrong(found: &[Vec<f64>], filter: Filter) -> Vec<String> {
     let critical = t_critical(ERROR_RATE, SIDE as usize, SEEDS as f64 - 1.0);
     let fault = |x: u32| {

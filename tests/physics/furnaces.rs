@@ -1,10 +1,10 @@
-//! White furnaces: under a sky of radiance 1 what reflects and transmits all light cannot be seen, whatever its lobes
-//! and whatever the method. Steep normal maps, which no closed form covers, look the same by all methods.
+//! White furnaces: under a sky of radiance 1, surfaces that reflect or transmit all light are invisible, for all lobes
+//! and methods. Steep normal maps, which have no closed form, look the same by all methods.
 //!
-//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its
-//! checks). Besides noise they allow for what energy tables are off by (0.5 %, and 2 % where facets are wider one way)
-//! and, where photons are gathered, for kernels on a curved surface (3 %); every check has to reject a furnace that is
-//! off by 5 % (photons: 20 %, as few as `bpm` has 40 %, those that frosted glass has focused on itself 90 %).
+//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % per test (Sidak over its checks).
+//! Besides noise they allow for the error of energy tables (0.5 %, and 2 % for anisotropic roughness) and, where
+//! photons are gathered, for kernels on a curved surface (3 %). Every check must reject a furnace that is off by 5 %
+//! (photons: 20 %; 40 % for the few photons of `bpm`; 90 % for photons that frosted glass focuses on itself).
 
 use crate::support;
 
@@ -20,7 +20,7 @@ use support::stats::{mean_and_error, sidak, t_critical};
 
 const ERROR_RATE: f64 = 1e-3;
 const SEEDS: u64 = 16;
-/// All methods but light tracing, which sees nothing in mirrors.
+/// All methods except light tracing, which sees nothing in mirrors.
 const METHODS: [Method; 9] = [
     Method::Path,
     Method::Bdpt,
@@ -41,7 +41,7 @@ fn white_sky() -> Description {
     }
 }
 
-/// Everything that scatters, without loss.
+/// Materials of all kinds that lose no energy.
 fn white() -> Vec<(&'static str, Material)> {
     let shell = |roughness: f32| Material { roughness, thin: true, transmission: 1.0, ..matte(1.0, 0.0) };
     let plastic = |roughness: f32| Material { roughness, specular: 1.0, ..matte(1.0, 0.0) };
@@ -68,7 +68,7 @@ fn by_photons(method: Method) -> bool {
     method.gathers() || matches!(method, Method::Bpm | Method::Pm)
 }
 
-/// Means of pictures, a seed each.
+/// Means of pictures, one per seed.
 fn means(scene: &Scene, method: Method) -> Vec<f64> {
     let camera = scene.camera(&square(12)).expect("a camera");
     let by_photons = by_photons(method);
@@ -125,12 +125,12 @@ fn nothing_white_is_seen_under_a_white_sky() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// A floor of steep bumps seen at a slant, so that many of their normals face away from the eye. The methods, which
-/// scatter at it from either side, find the same light: a mean of 0.71, where it was 0.61 with those normals black.
+/// A floor with a steep normal map seen at an angle, so that many normals face away from the camera. All methods agree
+/// on a mean of 0.71, which was 0.61 when those normals were black.
 #[test]
 fn steep_normal_maps_look_the_same_by_all_methods() {
     let mut description = white_sky();
-    // Texels of normals that lean to four sides by 60 degrees.
+    // Texels of normals that tilt by 60 degrees to four sides.
     let texel = |lean: Vec2| [0.5 + 0.43 * lean.x, 0.5 + 0.43 * lean.y, 0.75, 1.0];
     let texels = Texels::Floats([Vec2::X, Vec2::Y, -Vec2::X, -Vec2::Y].map(texel).to_vec());
     let wrap = [Wrap::Repeat; 2];
@@ -140,7 +140,7 @@ fn steep_normal_maps_look_the_same_by_all_methods() {
     floor.uvs[0] = vec![Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X];
     floor.tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 4];
     add(&mut description, "floor", floor, Material { normal_texture: Some((bumps, 1.0)), ..matte(0.8, 0.0) });
-    // Light that the floor sends on to something else.
+    // A wall that receives light from the floor.
     add(&mut description, "wall", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Y * 1.0), matte(0.8, 0.0));
     description.cameras.push(look_at(DVec3::new(0.0, 0.35, 1.6), DVec3::new(0.0, 0.1, 0.0), 40.0));
     let scene = build(description);

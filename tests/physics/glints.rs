@@ -1,4 +1,4 @@
-//! Lamps behind glass, shown by sharp lobes: photons and eye paths share that light out, and together bring all of it.
+//! Lamps behind glass, seen in sharp lobes: photons and camera paths share this light, and together carry all of it.
 
 use crate::support;
 
@@ -15,14 +15,14 @@ use support::stats::{mean_and_error, t_critical};
 const SIZE: u32 = 16;
 const SEEDS: u64 = 8;
 const ERROR_RATE: f64 = 1e-3;
-/// Relative: rays that are lost on edges, energy tables, and photons that are missing beyond the walls.
+/// Allowed relative bias: rays lost at edges, errors of energy tables, and photons missing beyond the walls.
 const BIAS: f64 = 0.01;
-/// What is told: a tenth of the light.
+/// A relative error that must be detected.
 const DETECTS: f64 = 0.1;
 
-/// A closed room whose walls give 1/2 and reflect 1/2, so that there is 1 everywhere and in every direction, also below
-/// a pane of glass that keeps the floor from the ceiling; the floor is of white metal, sharp enough that eye paths go
-/// on from it, and seen from the side: a cosine that is forgotten in the weights shows.
+/// A closed room whose walls emit 1/2 and reflect 1/2, so that radiance is 1 everywhere, also below a pane of glass
+/// between floor and ceiling. The floor is white metal, sharp enough that camera paths continue, and seen from the
+/// side, so that a forgotten cosine in the weights would show.
 fn furnace(roughness: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
@@ -33,7 +33,8 @@ fn furnace(roughness: f32) -> Scene {
     build(description)
 }
 
-/// Mean radiance of the picture: at the own level, and what of it photons and such eye paths share.
+/// Mean radiance of the picture at the smallest bandwidth level, and the part of it that photons and such camera paths
+/// share.
 fn mean(scene: &Scene, settings: &Settings) -> (f64, f64) {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let rendered = render(scene, &camera, settings, |_, _| Control::Continue);
@@ -45,8 +46,8 @@ fn mean(scene: &Scene, settings: &Settings) -> (f64, f64) {
     (all / pixels, shared / pixels)
 }
 
-/// All of the light is there, whatever photons bring of it: with small bandwidths hardly any, with large ones nearly
-/// all.
+/// All light is found with any share of photons: with small bandwidths nearly no photons, with large ones nearly only
+/// photons.
 #[test]
 fn all_light_is_there_once() {
     for (roughness, radius) in [(0.3, 0.02), (0.3, 0.2), (0.15, 0.3)] {
@@ -81,8 +82,8 @@ fn all_light_is_there_once() {
     }
 }
 
-/// A ball of metal in that room, smaller than the first bandwidth: most photons within it are of other sides of the
-/// ball, or beyond it.
+/// A ball of metal in that room, smaller than the initial bandwidth: most photons in the kernel are on other sides of
+/// the ball or beyond it.
 fn ball() -> Scene {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.5));
@@ -95,8 +96,8 @@ fn ball() -> Scene {
 
 const BALL: f32 = 0.09;
 
-/// Metal has no broad lobes, and yet bandwidths there follow the photons that it shows: rules that count photons find
-/// out what is missing around a ball, and from iteration to iteration less is.
+/// Metal has no broad lobes, and yet its bandwidths follow the photons that it reflects: rules with photon statistics
+/// reduce the missing light around a ball from iteration to iteration.
 #[test]
 fn bandwidths_shrink_on_metal() {
     let scene = ball();
@@ -131,8 +132,8 @@ fn bandwidths_shrink_on_metal() {
     }
 }
 
-/// A small lamp over metal and a small pane between them, which most light paths miss: of most iterations the map is
-/// empty.
+/// A small lamp over metal with a small pane between them, which most light paths miss, so that the map is empty in
+/// most iterations.
 fn pane() -> Scene {
     let mut description = Description::default();
     let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness: 0.35, ..Material::default() };
@@ -144,8 +145,8 @@ fn pane() -> Scene {
     build(description)
 }
 
-/// Eye paths leave photons their share whether any have come this time or not: few light paths bring as much as many,
-/// and as paths alone.
+/// Camera paths leave photons their share even in iterations without photons: few light paths give the same mean as
+/// many, and as paths alone.
 #[test]
 #[ignore = "long"]
 fn empty_maps_bring_nothing_and_take_nothing() {
@@ -176,5 +177,5 @@ fn empty_maps_bring_nothing_and_take_nothing() {
     }
 }
 
-/// What that test tells: a fifth of the light.
+/// A relative error that the test must detect.
 const PLANTED: f64 = 0.2;

@@ -1,8 +1,8 @@
-//! Guided emission keeps the light, whatever it has learnt, and finds what unguided emission does not; and the choice
-//! among ways to render.
+//! Guided emission does not change the mean, whatever it has learned, and finds light that unguided emission misses.
+//! Also tests the choice of `auto`.
 //!
-//! The light is compared by t tests over independent passes at a family-wise error rate of 0.1 %; each rejects paths
-//! whose flux forgets the guide.
+//! Means are compared by t tests over independent iterations at a family-wise error rate of 0.1 %. Each test must
+//! reject paths whose flux ignores the guide.
 
 use crate::support;
 
@@ -28,7 +28,7 @@ use support::stats::{mean_and_error, t_critical};
 
 const PASSES: u64 = 48;
 const PATHS: u32 = 4096;
-/// A ball of glass, a mirror, and beside them.
+/// A ball of glass, a mirror, and places beside them.
 const REGIONS: [(Vec3, f32); 4] = [
     (Vec3::new(-0.5, 0.4, 0.0), 0.3),
     (Vec3::new(0.6, 0.3, 0.2), 0.25),
@@ -43,7 +43,7 @@ fn targets(description: &mut Description) {
     description.cameras.push(look_at(DVec3::new(0.0, 1.5, 4.0), DVec3::new(0.0, 0.3, 0.0), 40.0));
 }
 
-/// Scenes of one kind of light each, and one of all.
+/// Scenes with one kind of light each, and one with all kinds.
 fn lit() -> Vec<(&'static str, Scene)> {
     type Light = fn(&mut Description);
     let lamp: Light = |d| {
@@ -80,7 +80,8 @@ fn lit() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Flux that light paths send through the regions, pass by pass; `honest`: as they carry it.
+/// Flux of light paths through the regions, one value per iteration. If `honest` is false, the flux ignores the guide
+/// (the planted bug).
 fn flux(scene: &Scene, guide: Option<&Guide>, region: Option<Region>, first: u64, honest: bool) -> Vec<[f64; 4]> {
     let initial_media = InitialMedia::new(scene, Vec3::new(0.0, 1.5, 4.0));
     let pass = |pass| {
@@ -108,7 +109,7 @@ fn guided_light_is_the_same_light() {
     let critical = t_critical(1e-3, 5 * scenes.len() * REGIONS.len(), (PASSES - 1) as f64);
     for (name, scene) in &scenes {
         let mut guide = Guide::new(&scene.lights, true).expect("something to aim at");
-        // What it has learnt is nonsense, and must not matter.
+        // Meaningless training data must not change the mean.
         let error: Vec<f64> = (0..guide.cells()).map(|cell| ((cell * 7 + 3) % 11) as f64).collect();
         let ones = vec![1.0; error.len()];
         guide.learn(&error, &ones, &ones);
@@ -140,8 +141,8 @@ fn guided_light_is_the_same_light() {
     }
 }
 
-/// Of cells whose photons leave errors, those of nine times the error get three times the paths, those of nine times
-/// the cost a third; a fifth stays unguided.
+/// Cells with nine times the error get three times the light paths, and cells with nine times the cost a third. A fifth
+/// of the paths stays unguided.
 #[test]
 fn cells_follow_the_error_they_leave() {
     let scene = &lit()[2].1;
@@ -159,17 +160,17 @@ fn cells_follow_the_error_they_leave() {
     guide.learn(&[0.0, 9.0, 1.0], &[1.0; 3], &[1.0; 3]);
     let [unguided, first, second] = share(&guide, 1);
     assert!((unguided - 0.2).abs() < 0.01, "{unguided}");
-    // A tenth of the guided paths keeps to the lamps' power.
+    // A tenth of the guided paths follows the power of the lights.
     assert!((first - 0.8 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.8 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
-    // Nothing seen: nothing learnt.
+    // Without any error, nothing is learned.
     let before = share(&guide, 2);
     guide.learn(&[1.0, 0.0, 0.0], &[1.0; 3], &[1.0; 3]);
     assert_eq!(before, share(&guide, 2));
-    // The same error by paths of nine times the cost: a third of the paths.
+    // The same error from paths of nine times the cost: a third of the paths.
     guide.learn(&[0.0, 1.0, 1.0], &[1.0; 3], &[1.0, 1.0, 9.0]);
     let [_, first, second] = share(&guide, 3);
     assert!((first - 0.8 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.8 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
-    // Where light paths are for all light, a fifth goes to what makes caustics, however much that matters.
+    // If light paths carry all light, a fifth goes to objects that make caustics, regardless of their error.
     let mut guide = Guide::new(&scene.lights, true).expect("something to aim at");
     guide.learn(&[0.0, 9.0, 1.0], &[1.0; 3], &[1.0; 3]);
     let [unguided, first, second] = share(&guide, 4);
@@ -177,7 +178,7 @@ fn cells_follow_the_error_they_leave() {
     assert!((first - 0.2 * (0.9 * 0.75 + 0.05)).abs() < 0.01 && (second - 0.2 * (0.9 * 0.25 + 0.05)).abs() < 0.01);
 }
 
-/// Light of a part of the picture and the variance of all of it, summed over pixels, after twelve iterations of one
+/// Mean of a part of the light and the variance of all light, summed over pixels, after twelve iterations with one
 /// level.
 fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&PixelAccumulator) -> DVec3) -> (f64, f64) {
     let camera = scene.camera(&square(16)).expect("a camera");
@@ -190,8 +191,8 @@ fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&PixelAcc
     (light, variance)
 }
 
-/// Two lamps in rooms of their own, the camera in one: light paths are the more those of the lamp that is seen, and the
-/// picture is less noisy after as many.
+/// Two lamps in separate rooms, and the camera in one. Guiding sends more light paths from the lamp that is visible,
+/// and the picture has less noise after the same number of paths.
 #[test]
 fn lamps_have_budgets_of_their_own() {
     let scene = {
@@ -217,12 +218,12 @@ fn lamps_have_budgets_of_their_own() {
     };
     let ((light, unguided), (same, guided)) = (picture(false), picture(true));
     assert!((light / same - 1.0).abs() < 0.2, "{light} and {same}");
-    // By power one path in fifteen is the seen lamp's, guided ones are three in four.
+    // By power, one path in fifteen comes from the visible lamp; with guiding, three in four.
     assert!(unguided > 4.0 * guided, "{unguided} and {guided}");
 }
 
-/// Rules that count photons find the light of unguided paths by guided ones: means of 16 seeds, Welch's test, one false
-/// alarm in a thousand runs.
+/// Rules with photon statistics find the same light with guided paths as with unguided ones: means of 16 seeds, Welch's
+/// test, one false alarm in a thousand.
 #[test]
 fn rules_that_count_photons_can_be_guided() {
     let scene = room_with(0.15);
@@ -246,7 +247,8 @@ fn rules_that_count_photons_can_be_guided() {
     }
 }
 
-/// A small ball far below a lamp: the noise of its caustic with and without the guide, after as many light paths.
+/// A small ball far below a lamp: the noise of its caustic with and without guiding, after the same number of light
+/// paths.
 #[test]
 fn the_caustic_of_a_small_ball_is_found() {
     let scene = small_ball();
@@ -259,7 +261,7 @@ fn the_caustic_of_a_small_ball_is_found() {
     for indirect in [Indirect::Photons, Indirect::Paths] {
         let (caustic, guided) = variance(true, indirect);
         assert!(caustic > 0.0);
-        // Of 20,000 paths to all sides 0.1 meet the ball; guided ones do in thousands.
+        // Of 20,000 unguided paths 0.1 hit the ball on average; of guided ones thousands do.
         assert!(unguided > 10.0 * guided, "{indirect:?}: {unguided} and {guided}");
     }
 }
@@ -277,7 +279,7 @@ fn glass_room() -> Scene {
     room_with(0.4)
 }
 
-/// Grey walls and a camera between them.
+/// Grey walls with the camera between them.
 fn room() -> Description {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 3.0), true), matte(0.5, 0.0));
@@ -285,7 +287,7 @@ fn room() -> Description {
     description
 }
 
-/// A ball of glass of a radius under a lamp.
+/// The room with a ball of glass of this radius under a lamp.
 fn room_with(radius: f32) -> Scene {
     let mut description = room();
     add(&mut description, "lamp", quad(Vec3::new(-0.2, 1.98, -0.2), Vec3::X * 0.4, Vec3::Z * 0.4), matte(0.0, 20.0));
@@ -293,7 +295,7 @@ fn room_with(radius: f32) -> Scene {
     build(description)
 }
 
-/// The room with a point light, and nothing that focuses it.
+/// The room with a point light, without objects that focus light.
 fn matte_room() -> Scene {
     let mut description = room();
     description.lights.push(point_light(DVec3::new(0.0, 1.5, 0.0), 1.0));
@@ -309,7 +311,7 @@ fn weight(weights: &[EffectWeight], effect: Effect) -> Option<EffectWeight> {
     weights.iter().find(|weight| weight.effect == effect).copied()
 }
 
-/// What is chosen among the ways that are allowed.
+/// The choice of `auto` among the allowed candidates.
 fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(Candidate) -> bool + Sync) -> Choice {
     let camera = scene.camera(&square(24)).expect("a camera");
     let settings =
@@ -320,7 +322,7 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(C
     pool.install(|| choose(View::new(scene, &camera), &mut finish, make, || false)).expect("a choice")
 }
 
-/// The same arguments, the same choice and the same expectations to the last bit, on any number of threads.
+/// The choice and the predicted errors do not depend on the number of threads, to the bit.
 #[test]
 fn the_choice_does_not_depend_on_threads() {
     let scene = matte_room();
@@ -340,8 +342,8 @@ fn the_choice_does_not_depend_on_threads() {
     assert_eq!(bits(&one), bits(&three));
 }
 
-/// The shares of effects make up the picture, and are those of a longer render, within a quarter: six iterations find
-/// no more. Caustics in the glass are no share of those beside it.
+/// The weights of effects sum to the picture and agree with those of a longer render within a quarter, the noise of six
+/// iterations. Caustics seen in the glass do not count as caustics beside it.
 #[test]
 fn effects_are_weighed() {
     let scene = glass_room();
@@ -366,8 +368,8 @@ fn effects_are_weighed() {
     }
 }
 
-/// A lamp without size shines into a clear ball of cloudy glass. What scatters once in there no connection finds, and
-/// `vcm` merges photons on surfaces alone: it says so, and `auto` takes photons in media.
+/// A point light shines into a clear ball of cloudy glass. No connection finds light that scatters once in it, and
+/// `vcm` merges photons only on surfaces: it prints a warning, and `auto` chooses photons in media.
 #[test]
 fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
     let cloudy = |size: bool, ior: f32| {
@@ -396,8 +398,8 @@ fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
     assert_eq!(methods.map(|method| finds(&cloudy(false, 1.0), method)), [true, true]);
 }
 
-/// What is switched off is weighed as if it were not: that is what the picture lacks. Media have a part of the light
-/// where they scatter; those that only absorb take of all others, and are not weighed.
+/// Effects that are switched off are weighed as if they were on, because this is the light that the picture lacks.
+/// Scattering media have a share of the light. Media that only absorb are not weighed.
 #[test]
 fn what_is_left_out_is_weighed_too() {
     let weights = |scene: &Scene, off: ClassSet| {
@@ -410,7 +412,7 @@ fn what_is_left_out_is_weighed_too() {
             .expect("a choice")
             .weights
     };
-    // Where there is glass its light needs photons as well, and to leave this one out saves nothing.
+    // Glass needs photons, too, so leaving out this effect saves nothing where there is glass.
     for (scene, saves) in [(glass_room(), false), (matte_room(), true)] {
         let [whole, off] = [ClassSet::NONE, ClassSet::of(Effect::Indirect)]
             .map(|off| weight(&weights(&scene, off), Effect::Indirect).expect("indirect light"));
@@ -429,9 +431,8 @@ fn what_is_left_out_is_weighed_too() {
     }
 }
 
-/// What is a property of the scene is weighed by the scene without it: as much as two long renders tell, or not at all
-/// where noise hides it. A wall of two greys, the sky through an open roof, and a lens so small that nobody sees its
-/// blur.
+/// Properties of the scene are weighed against the scene without them: the weight agrees with two long renders, or is
+/// `None` if noise hides it. A wall of two greys, the sky through an open roof, and a lens too small for visible blur.
 #[test]
 fn properties_of_the_scene_are_weighed() {
     let mut description = Description::default();
@@ -479,7 +480,7 @@ fn properties_of_the_scene_are_weighed() {
     assert!(lens.error_if_off.is_none_or(|error| error < 0.02) && lens.energy.is_none(), "{lens:?}");
 }
 
-/// Once it is asked to stop, a pilot does no more than the few iterations that all ways begin with.
+/// After a stop request, a pilot runs only the few iterations with which all candidates begin.
 #[test]
 fn a_pilot_can_be_stopped() {
     let scene = matte_room();
@@ -499,12 +500,12 @@ fn a_pilot_can_be_stopped() {
     };
     let (stopped, whole) = (asked(true), asked(false));
     println!("asked {stopped} times where the answer is to stop, {whole} times where it is not");
-    // Once a candidate in each of two rounds.
+    // One stop per candidate in each of two rounds.
     assert!(stopped <= 6 && whole > 24, "{stopped}, {whole}");
 }
 
-/// Where one light path in half a million comes by the glass, unguided ones have no noise that a pilot could see, nor
-/// the light: guided ones have, and the picture as a whole has the more of it.
+/// If one light path in half a million hits the glass, unguided candidates have neither the light nor visible noise in
+/// a pilot. Guided ones have both, so the picture has more noise.
 #[test]
 fn caustics_are_left_to_guided_light_paths() {
     let mut description = Description::default();
@@ -533,7 +534,7 @@ fn caustics_are_left_to_guided_light_paths() {
     assert_eq!(unguided.candidate, Candidate::DEFAULT);
 }
 
-/// What a scene does not call for is not tried, and a short render tries nothing.
+/// Candidates that the scene does not need are not tried, and a short render tries none.
 #[test]
 fn only_what_is_called_for_is_tried() {
     let scene = matte_room();
@@ -541,11 +542,11 @@ fn only_what_is_called_for_is_tried() {
     let tried: Vec<Method> = matte_only.pilots.iter().map(|trial| trial.candidate.method).collect();
     assert_eq!(tried, [Method::Vcm, Method::Path, Method::Bdpt]);
     assert!(matte_only.pilots.iter().all(|trial| !trial.candidate.guided));
-    // Where nothing has narrow lobes no photons of caustics are sent.
+    // Without narrow lobes, no photons of caustics are traced.
     let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
     let photons = |narrow_lobes| of_caustics.photon_classes(&Survey { narrow_lobes, ..Survey::default() });
     assert!(photons(false).is_empty() && photons(true).has(PathClass::IndirectFocus));
-    // Nothing but indirect light asks for photons; direct light costs its connections.
+    // Only indirect light needs photons here, and direct light costs connections.
     let choice = auto_among(&scene, 2, 20_000, |candidate| candidate.method != Method::Bdpt);
     let saved = |effect: Effect| weight(&choice.weights, effect).and_then(|w| w.saved);
     let whole = choice.chosen_pilot().map(|trial| trial.seconds_per_iteration);

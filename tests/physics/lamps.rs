@@ -1,7 +1,8 @@
-//! Lamps as Blender has them: without a body, hidden from cameras, shining into a cone. Closed forms, by all methods.
+//! Lamps with Blender's features: pass-through lamps, lamps hidden from cameras, lamps that emit into a cone. Closed
+//! forms, for all methods.
 //!
-//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for each test (Sidak over its
-//! checks), and each has to reject a picture that is off by the share it declares.
+//! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % per test (Sidak over its checks).
+//! Each must reject a picture that is off by the share it declares.
 
 use crate::support;
 
@@ -17,7 +18,8 @@ use support::stats::{mean_and_error, sidak, t_critical};
 
 const ERROR_RATE: f64 = 1e-3;
 const SEEDS: u64 = 12;
-/// Every family: eye paths, both, both with merging, photons; and light paths, few of which come to a narrow view.
+/// Every family of methods: camera paths, both subpaths, both with merging, photons, and light paths, few of which
+/// reach a narrow view.
 const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm, Method::Light];
 
 fn white_sky() -> Option<EnvironmentDescription> {
@@ -43,9 +45,9 @@ fn seen(scene: &Scene, method: Method) -> (f64, f64) {
     mean_and_error(&(1..=SEEDS).map(mean).collect::<Vec<_>>())
 }
 
-/// All methods but light tracing see `expected`, to `bias` (relative) and noise, and would tell it from what is off by
-/// `told`.
-fn check(what: &str, scene: &Scene, expected: f64, bias: f64, told: f64) {
+/// Checks that all methods except light tracing give `expected` within `bias` (relative) and noise. An error of
+/// `detects` (relative) must be rejected.
+fn check(what: &str, scene: &Scene, expected: f64, bias: f64, detects: f64) {
     let methods = &METHODS[..4];
     let critical = t_critical(sidak(ERROR_RATE, methods.len()), 1, SEEDS as f64 - 1.0);
     for &method in methods {
@@ -53,11 +55,11 @@ fn check(what: &str, scene: &Scene, expected: f64, bias: f64, told: f64) {
         println!("{what}, {method:?}: {mean:.5} +- {error:.5}, {expected:.5}");
         let passes = |expected: f64| (mean - expected).abs() <= critical * error + bias * expected.abs();
         assert!(passes(expected), "{what}, {method:?}: {mean} +- {error}, expected {expected}");
-        assert!(!passes((1.0 - told) * expected), "{what}, {method:?}: cannot tell {told} ({mean} +- {error})");
+        assert!(!passes((1.0 - detects) * expected), "{what}, {method:?}: cannot tell {detects} ({mean} +- {error})");
     }
 }
 
-/// All methods see what the first of them does, to 1 % and noise, and would tell it from what is off by a fifth.
+/// Checks that all methods agree with the first, within 1 % and noise. An error of a fifth must be rejected.
 fn agree(what: &str, scene: &Scene, methods: &[Method]) {
     let found: Vec<(f64, f64)> = methods.iter().map(|&method| seen(scene, method)).collect();
     println!("{what}: {found:?}");
@@ -70,7 +72,7 @@ fn agree(what: &str, scene: &Scene, methods: &[Method]) {
     }
 }
 
-/// A floor under a white sky, which a lamp of radiance 1 hangs over that shines on it or away from it.
+/// A floor under a white sky, with a lamp of radiance 1 above it that emits towards it or away from it.
 fn below_a_lamp(null_bsdf: bool, toward: bool) -> Scene {
     let mut description = Description { environment: white_sky(), ..Description::default() };
     add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
@@ -81,24 +83,25 @@ fn below_a_lamp(null_bsdf: bool, toward: bool) -> Scene {
     build(description)
 }
 
-/// A lamp without a body takes no light away: the floor reflects half of a white sky, and of what the lamp sends.
+/// A pass-through lamp blocks no light: the floor reflects half of a white sky and of the lamp's light.
 #[test]
-fn lamps_without_a_body_let_light_through() {
+fn pass_through_lamps_block_no_light() {
     check("away", &below_a_lamp(true, false), 0.5, 3e-3, 0.1);
     let lamp = 0.5 / PI * below_a_square(0.5, 0.5);
     check("toward", &below_a_lamp(true, true), 0.5 + lamp, 3e-3, 0.1);
 }
 
-/// One with a body takes most of the sky away.
+/// An ordinary lamp blocks most of the sky.
 #[test]
-fn bodies_block_light() {
+fn ordinary_lamps_block_light() {
     let (mean, error) = seen(&below_a_lamp(false, false), Method::Path);
     assert!(mean + 4.0 * error < 0.4, "{mean} +- {error}");
 }
 
-/// Seen from its front in front of a sky its radiance adds to that, and from behind it is not there.
+/// Seen from the front, the radiance of a pass-through lamp adds to that of the sky behind it. From behind it is
+/// invisible.
 #[test]
-fn lamps_without_a_body_are_seen_before_what_is_behind_them() {
+fn pass_through_lamps_add_to_the_light_behind_them() {
     for (z, expected) in [(1.0, 3.0), (-1.0, 1.0)] {
         let mut description = Description { environment: white_sky(), ..Description::default() };
         let lamp = quad(Vec3::new(-0.5, -0.5, 0.0), Vec3::X, Vec3::Y);
@@ -112,9 +115,9 @@ fn lamps_without_a_body_are_seen_before_what_is_behind_them() {
     }
 }
 
-/// In a room with fog, a mirror, glass and a lamp without a body all methods that know fog agree.
+/// In a room with fog, a mirror, glass and a pass-through lamp, all methods that support fog agree.
 #[test]
-fn all_methods_see_lamps_without_a_body_alike() {
+fn all_methods_agree_on_pass_through_lamps() {
     let mut description = lit_room(matte(0.5, 0.0));
     description.materials[1].null_bsdf = true;
     description.materials[1].double_sided = true;
@@ -135,7 +138,7 @@ fn all_methods_see_lamps_without_a_body_alike() {
     }
 }
 
-/// Irradiance in the middle below a square of radiance 1 and half side a, at height h.
+/// Irradiance below the centre of a square of radiance 1 and half side `a` at height `h`.
 fn below_a_square(a: f64, h: f64) -> f64 {
     let x = a / h;
     let root = (1.0 + x * x).sqrt();
@@ -153,14 +156,14 @@ fn cameras_look_through_lamps_that_are_hidden_from_them() {
     let bright = seen(&build(description.clone()), Method::Path).0;
     assert!((bright - 2.0).abs() < 1e-6, "not hidden, the lamp itself is seen: {bright}");
     description.instances[1].hidden_from_camera = true;
-    // 0.4 % less at the corners of the view.
+    // The corners of the view are darker by 0.4 %.
     check("through", &build(description), 0.5 / PI * 2.0 * below_a_square(0.5, 1.0), 6e-3, 0.05);
 }
 
-/// In a room with a hidden lamp and a hidden white box, which both reflect in what is seen, all methods agree: what is
-/// hidden from cameras sends nothing to them by any way, and light to everything else.
+/// In a room with a hidden lamp and a hidden white box, both visible in reflections, all methods agree: objects hidden
+/// from cameras send light to everything except directly to the camera.
 #[test]
-fn hidden_bodies_send_light_to_all_but_cameras() {
+fn objects_hidden_from_cameras_send_light_to_everything_else() {
     let mut description = lit_room(matte(0.5, 0.0));
     add(&mut description, "box", cuboid(Vec3::new(-0.5, 0.3, 0.4), Vec3::new(0.5, 1.2, 1.0), false), matte(0.9, 0.0));
     let shown = seen(&build(description.clone()), Method::Path);
@@ -173,8 +176,8 @@ fn hidden_bodies_send_light_to_all_but_cameras() {
     agree("hidden", &scene, &METHODS);
 }
 
-/// A screen that glTF culls looks to a camera behind it like one that is hidden from cameras, and before it like any
-/// other. All methods agree that it shades the room all the same.
+/// A screen with back-face culling is invisible for a camera behind it, like an object hidden from cameras, and visible
+/// from the front. All methods agree that it shades the room in both cases.
 #[test]
 fn cameras_look_through_back_faces_that_are_culled() {
     let room = |culled: bool, hidden: bool, front: bool| {
@@ -185,7 +188,7 @@ fn cameras_look_through_back_faces_that_are_culled() {
         description.instances[2].hidden_from_camera = hidden;
         build(description)
     };
-    // By the same random numbers, so that only rounding differs.
+    // The random numbers are equal, so only rounding differs.
     let alike = |a: &Scene, b: &Scene| {
         let [a, b] = [a, b].map(|scene| seen(scene, Method::Path).0);
         (a - b).abs() < 2e-3 * b
@@ -197,7 +200,7 @@ fn cameras_look_through_back_faces_that_are_culled() {
     agree("culled", &culled, &METHODS);
 }
 
-/// A sky and the disc of a sun light a floor, and cameras see neither.
+/// A sky and the disc of a sun light a floor, and both are invisible for cameras.
 #[test]
 fn cameras_see_no_hidden_light_from_infinity() {
     let mut description = Description { environment: white_sky(), ..Description::default() };
@@ -223,12 +226,12 @@ fn cameras_see_no_hidden_light_from_infinity() {
     }
 }
 
-/// Below a small lamp that spreads its light into a cone there is more of it than below a Lambertian one: by
-/// tan h / (tan h - h) on the axis, h the half angle.
+/// Below a small lamp that emits into a cone of half angle h, the irradiance is larger than below a Lambertian lamp, by
+/// tan h / (tan h - h) on the axis.
 #[test]
 fn spreads_keep_the_flux() {
     let (half, near) = (30f64.to_radians(), 0.3);
-    // The view is as large as the lamp.
+    // The view has the size of the lamp.
     let side = (2.0 * near * 4f64.to_radians().tan()) as f32;
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), matte(0.5, 0.0));
@@ -236,12 +239,12 @@ fn spreads_keep_the_flux() {
     add(&mut description, "lamp", lamp, Material { spread: half as f32, ..matte(0.0, 1000.0) });
     description.cameras.push(look_at(DVec3::new(0.0, near, 0.0), DVec3::ZERO, 8.0));
     let on_axis = 0.5 / PI * 1000.0 * f64::from(side).powi(2) * half.tan() / (half.tan() - half);
-    // Two points of a square are 0.5214 of its side apart on average, and radiance falls with the tangent.
+    // Two points of a square have a mean distance of 0.5214 of its side, and the radiance falls with the tangent.
     let expected = on_axis * (1.0 - 0.5214 * f64::from(side) / half.tan());
     check("spread", &build(description), expected, 6e-3, 0.05);
 }
 
-/// The same light by all methods where a lamp that spreads little is seen in a mirror and through glass.
+/// All methods agree if a lamp with a narrow cone is seen in a mirror and through glass.
 #[test]
 fn all_methods_see_spreads_alike() {
     let mut description = lit_room(matte(0.5, 0.0));

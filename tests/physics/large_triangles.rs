@@ -1,7 +1,7 @@
-//! Points of large triangles near the origin: positions there look exact, and the triangle that they are on is not.
+//! Points of large triangles near the origin: their coordinates look exact, but the triangle is not.
 //!
-//! A matt plane under parallel light is as bright everywhere, without noise: reflectance / pi times irradiance times the
-//! cosine. What is darker is shaded by itself.
+//! A diffuse plane under parallel light has the radiance reflectance / pi times irradiance times cosine everywhere,
+//! without noise. Darker pixels are shaded by the plane itself.
 
 use crate::support;
 
@@ -13,15 +13,15 @@ use glam::DQuat;
 use std::f64::consts::PI;
 use support::scenes::{add, build, look_at, matte, quad, square};
 
-/// Least and largest value of the picture of a plane that is turned about x and z, reaches `half` to each side, and is
-/// seen from a little above a point beside the origin; over what it should be.
+/// Smallest and largest pixel over the expected value, for a plane with this orientation that extends `half` to each
+/// side, seen from a little above a point beside the origin.
 fn extremes(half: f32, method: Method, turn: DQuat) -> (f64, f64) {
     let mut description = Description::default();
     let along = |v: DVec3| (turn * v).as_vec3() * (2.0 * half);
     let (a, b) = (along(DVec3::Z), along(DVec3::X));
     add(&mut description, "plane", quad(-0.5 * (a + b), a, b), matte(0.5, 0.0));
     let normal = turn * DVec3::Y;
-    // Aslant, so that cosines matter, but well above the horizon.
+    // At an angle, so that cosines matter, but well above the horizon.
     let light = (normal + turn * DVec3::new(0.3, 0.0, 0.2)).normalize();
     description.lights.push(PunctualLight {
         name: "sun".into(),
@@ -60,8 +60,8 @@ fn a_large_tilted_plane_does_not_shade_itself() {
     }
 }
 
-/// A small square in the sun just above a wide floor shades what it should: the rays of the floor start off it by the
-/// error of its height, not by that of its corners.
+/// A small square in the sun just above a wide floor casts its whole shadow: rays start off the floor by the error of
+/// its height, not by that of its corners.
 #[test]
 fn a_small_shadow_on_a_wide_floor_is_whole() {
     for half in [1.0, 100.0, 1e4] {
@@ -80,7 +80,7 @@ fn a_small_shadow_on_a_wide_floor_is_whole() {
             hidden_from_camera: false,
             light_group: None,
         });
-        // From below the square, where all of the floor that is seen is in its shadow.
+        // From below the square, where all of the visible floor is in its shadow.
         description.cameras.push(look_at(DVec3::new(0.0, 5e-4, 0.03), DVec3::new(0.0, 0.0, 0.005), 0.5));
         let scene = build(description);
         let camera = scene.camera(&square(8)).expect("a camera");

@@ -1,5 +1,5 @@
-//! Light told apart by groups of lights. Each group has a colour of its own and nothing in the scene mixes colours, so
-//! that whatever is put down to the wrong group shows, exactly.
+//! Light groups. Each group has its own colour and nothing in the scene mixes colours, so that light in the wrong group
+//! is detected exactly.
 
 use crate::support;
 
@@ -13,8 +13,8 @@ use caustique::scene::description::{
 };
 use support::scenes::{add, build, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
-/// A floor with a ball of glass and a mirror, seen at an angle: a glowing panel (red), a lamp with a size and a spot
-/// (green), the sky and a sun (blue).
+/// A floor with a ball of glass and a mirror, seen at an angle. An emissive panel is red, a sphere light and a spot are
+/// green, the sky and a sun are blue.
 fn coloured() -> Description {
     let mut scene = Description::default();
     add(&mut scene, "floor", quad(Vec3::new(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0), matte(0.8, 0.0));
@@ -67,7 +67,7 @@ fn each_group_has_its_colour_and_nothing_else_in_all_pixels_by_all_methods() {
         for (index, pixel) in rendered.pixels.iter().enumerate() {
             let (all, caustic) = (pixel.mean(own), pixel.parts().caustic / f64::from(pixel.iterations));
             for (group, seen) in seen.iter_mut().enumerate() {
-                // Its colour is the channel of its place.
+                // The colour of a group is the channel of its index.
                 for ((light, whole), seen) in pixel.group(group).into_iter().zip([all, caustic]).zip(seen) {
                     let what = format!("{method:?}, pixel {index}, group {group}: {light} of {whole}");
                     assert!((light[group] - whole[group]).abs() <= 2e-6 * whole[group], "{what}");
@@ -76,13 +76,13 @@ fn each_group_has_its_colour_and_nothing_else_in_all_pixels_by_all_methods() {
                 }
             }
         }
-        // There is light to be told apart; few paths find the caustics of a small lamp.
+        // Every group has light, but few paths find the caustics of a small lamp.
         let found = seen.map(|[all, caustic]| all > 0.0 && (caustic > 0.0 || method == Method::Path));
         assert_eq!(found, [true; 3], "{method:?}: {seen:?}");
     }
 }
 
-/// What is in no group is in no layer, and the other methods have none.
+/// Lights without a group are in no layer, and the other methods have no layers of groups.
 #[test]
 fn light_of_no_group_is_left_out_and_layers_bear_the_names() {
     let mut description = coloured();

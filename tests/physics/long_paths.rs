@@ -1,8 +1,8 @@
-//! Light that has been scattered very often: snow, milk, clouds, white rooms. Closed forms of furnaces.
+//! Light that scatters very often: snow, milk, clouds, white rooms. Closed forms of furnaces.
 //!
 //! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % for the file (Sidak over [`TESTS`]).
-//! What the old rule, a survival of 0.95 at every bounce after the 64th, gave is noted at each; a planted error of a
-//! stated size is rejected.
+//! The comments state the results of the former Russian roulette, a survival of 0.95 at every bounce after the 64th. A
+//! planted error of a stated size is rejected.
 
 use crate::support;
 
@@ -18,7 +18,7 @@ use support::stats::{mean_and_error, t_critical};
 const ERROR_RATE: f64 = 1e-3;
 const TESTS: usize = 8;
 
-/// Mean over the picture, for each seed.
+/// Mean over the picture, one per seed.
 fn means(scene: &Scene, settings: &Settings, size: u32, seeds: u64) -> Vec<f64> {
     let camera = scene.camera(&square(size)).expect("a camera");
     let mean = |seed| {
@@ -34,7 +34,7 @@ fn settings(method: Method, iterations: u64) -> Settings {
     Settings { method, levels: Levels::new(1), iterations: Some(iterations), ..Settings::default() }
 }
 
-/// The mean is what is expected but for a relative `bias`, and not that shifted by `detects`.
+/// Checks that the mean is `expected` within a relative `bias`, and that `expected` shifted by `detects` is rejected.
 fn check(what: &str, values: &[f64], expected: f64, (bias, detects): (f64, f64)) {
     let (mean, error) = mean_and_error(values);
     let critical = t_critical(ERROR_RATE, TESTS, values.len() as f64 - 1.0);
@@ -46,8 +46,8 @@ fn check(what: &str, values: &[f64], expected: f64, (bias, detects): (f64, f64))
     }
 }
 
-/// A closed box whose walls give radiance 1 and reflect rho: 1 / (1 - rho). The old rule gave 233 of 1,000 from the
-/// white walls, its second moment `sum_n (rho^2 / 0.95)^n` being infinite.
+/// A closed box whose walls emit 1 and reflect rho: 1 / (1 - rho). The former roulette gave 233 instead of 1,000,
+/// because its second moment `sum_n (rho^2 / 0.95)^n` is infinite.
 #[test]
 fn furnace_of_white_walls() {
     let mut description = Description::default();
@@ -57,9 +57,8 @@ fn furnace_of_white_walls() {
     check("white walls", &means(&scene, &settings(Method::Path, 16), 8, 16), 1000.0, (1e-3, 0.1));
 }
 
-/// A ball of a medium that absorbs nothing, under a uniform sky, cannot be seen, however dense it is: nearly all light
-/// comes back from within a few mean free paths, some goes all through. The old rule gave 1.39 at an optical depth of
-/// 100 and 0.73 at 10^6.
+/// A ball of a medium without absorption is invisible under a uniform sky, at any density: nearly all light returns
+/// from within a few mean free paths. The former roulette gave 1.39 at an optical depth of 100 and 0.73 at 10^6.
 #[test]
 fn furnace_of_dense_media() {
     for (density, g, iterations) in [(100.0, 0.0, 16), (1e6, 0.0, 32), (100.0, 0.9, 16)] {
@@ -76,9 +75,8 @@ fn furnace_of_dense_media() {
     }
 }
 
-/// The same ball in a glass, in a scene a thousand times as wide: the light paths that come there are those that are
-/// sent there. They ended where the medium scattered them first, all but one in some hundred thousand: 0.20 by photons,
-/// which is light scattered once.
+/// The same ball in a glass, in a scene a thousand times as wide, where light paths must be aimed at it. When nearly
+/// all of them ended at their first scattering in the medium, photon methods gave 0.20, the light scattered once.
 #[test]
 fn milk_in_a_wide_scene_is_lit() {
     let mut description = Description::default();
@@ -89,8 +87,8 @@ fn milk_in_a_wide_scene_is_lit() {
     description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
     description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 30.0));
     let scene = build(description);
-    // Photons have all light but that which comes straight from the sky: it grows inwards over a mean free path, and so
-    // does the bias with a kernel as wide.
+    // Photons carry all light except the direct light of the sky. It increases inwards over a mean free path, and so
+    // does the bias of a kernel of that width.
     let initial = InitialBandwidth::Fixed(0.025);
     let by_photons = Settings { initial_bandwidth: initial, photons: 20_000, ..settings(Method::Sppm, 8) };
     check("milk in a wide scene", &means(&scene, &by_photons, 8, 12), 1.0, (0.04, 0.2));

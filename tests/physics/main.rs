@@ -1,4 +1,5 @@
-//! The physics: estimators against closed forms, each other and planted faults. Every file declares its error rate.
+//! Tests of the physics: estimators against closed forms, each other and planted bugs. Every file declares its error
+//! rate.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! Light straight from many lamps, under a sky: what a point gets is known in closed form, whichever lamp is asked.
+//! Direct light of many lamps and a sky: the irradiance has a closed form.
 
 use crate::support;
 
@@ -12,10 +12,10 @@ use support::scenes::{add, build, matte, point_light, quad};
 use support::stats::{mean_and_error, t_critical};
 
 const SKY: f32 = 0.02;
-/// Error rate of the eight points, either way of choosing.
+/// Error rate of the eight points, for each way to choose lights.
 const RATE: f64 = 1e-4;
 
-/// Lamps of 20 by 20 cm in a grid 2 m above a floor, facing it, and point lights in the gaps, with a dim sky.
+/// Lamps of 20 by 20 cm in a grid 2 m above a floor, facing it, point lights in the gaps, and a dim sky.
 fn hall() -> (Description, Vec<[DVec3; 4]>, Vec<(DVec3, f64)>) {
     let mut description = Description::default();
     let floor = quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0);
@@ -40,7 +40,7 @@ fn hall() -> (Description, Vec<[DVec3; 4]>, Vec<(DVec3, f64)>) {
     (description, panels, points)
 }
 
-/// Irradiance at `p`, facing up, from a polygon of radiance 1 whose corners go round as seen from there \[Lambert
+/// Irradiance at `p`, facing up, from a polygon of radiance 1 with counter-clockwise corners as seen from `p` \[Lambert
 /// 1760\].
 fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
     let n = corners.len();
@@ -51,8 +51,8 @@ fn polygon(p: DVec3, corners: &[DVec3]) -> f64 {
     0.5 * (0..n).map(edge).sum::<f64>().abs()
 }
 
-/// Irradiance at `p` on the floor, estimated `n` times; `share` says by which probability each is divided, over the
-/// true one.
+/// `n` estimates of the irradiance at `p` on the floor. Each is divided by `share`, the probability used over the true
+/// one.
 fn estimates(scene: &Scene, receiver: &Receiver, n: u64, share: impl Fn(&DirectSample) -> f64) -> Vec<f64> {
     let one = |i: u64| {
         let draws = Stream::new(11, 0, Domain::Test, i).vertex(1);
@@ -67,7 +67,7 @@ fn estimates(scene: &Scene, receiver: &Receiver, n: u64, share: impl Fn(&DirectS
 }
 
 #[test]
-fn irradiance_is_that_of_all_lamps_and_the_nearest_are_asked_most() {
+fn irradiance_is_correct_and_near_lamps_are_sampled_most() {
     let (description, panels, points) = hall();
     let scene = build(description);
     let critical = t_critical(RATE, 8, 50_000.0);
@@ -77,13 +77,13 @@ fn irradiance_is_that_of_all_lamps_and_the_nearest_are_asked_most() {
         let lamps: f64 =
             (0..6).flat_map(|i| [f64::from(i) + 1.0; 6]).zip(&panels).map(|(l, c)| l * polygon(p, c)).sum();
         let bulbs: f64 = points.iter().map(|(at, i)| i * (*at - p).y / (*at - p).length().powi(3)).sum();
-        // The lamps hide nothing here: no shadow ray is asked.
+        // The lamps block nothing here, so no shadow rays are needed.
         let expected = lamps + bulbs + PI * f64::from(SKY);
         let receiver = Receiver { n: Vec3::Y, ..Receiver::anywhere(p.as_vec3()) };
         let values = estimates(&scene, &receiver, 50_000, |_| 1.0);
         let (mean, error) = mean_and_error(&values);
         assert!((mean - expected).abs() < critical * error, "at {p}: {mean} +- {error}, expected {expected}");
-        // By power alone, as points in media are lit.
+        // Lights chosen only by power, as for points in media.
         let by_power = Receiver { in_medium: true, ..receiver };
         let powers = estimates(&scene, &by_power, 50_000, |_| 1.0);
         let (mean, power_error) = mean_and_error(&powers);
@@ -92,7 +92,7 @@ fn irradiance_is_that_of_all_lamps_and_the_nearest_are_asked_most() {
             "at {p}: {mean} +- {power_error}, expected {expected}"
         );
         least = least.min((power_error / error).powi(2));
-        // Planted: the sky divided by the probability of choosing it for emission.
+        // The planted bug: the sky divided by the probability of choosing it for emission.
         let sky = (0..).zip(scene.lights.emitters()).find(|(_, e)| e.is_infinite()).map_or(0, |(i, _)| i);
         let chosen = f64::from(scene.lights.choice_ratio(&receiver, sky));
         let wrong = |light: &DirectSample| if light.target.is_none() { chosen } else { 1.0 };

@@ -1,4 +1,4 @@
-//! Materials at a surface as the glTF specification says, and scattering in world space with shading normals.
+//! Materials at surface points as the glTF specification defines them, and world-space BSDFs with shading normals.
 
 use crate::support;
 
@@ -88,13 +88,13 @@ fn factors_textures_and_vertex_colours_multiply() {
     near(p.sheen_alpha, (0.5f32 * 0.4).powi(2));
     near(material.alpha(&surface, &textures), 0.5 * 0.5 * 0.4);
     assert_eq!(material.emitted(&surface, &textures), Rgb::new(1.0, 0.5, 1.5));
-    // What a texture should not hold is kept from the model.
+    // Invalid texels are clamped.
     let bad =
         Material { base_color_texture: reference(1), metallic_roughness_texture: reference(1), ..material.clone() };
     let p = bad.parameters(&surface, &textures, 1.5);
     assert_eq!((p.base_color, p.metallic), (Rgb::new(0.0, 1.0, 0.0), 0.0));
     assert!(p.alpha_x <= 1.0);
-    // A texture that is not there is white.
+    // A missing texture is white.
     let missing = Material { base_color_texture: reference(9), ..Material::default() };
     assert_eq!(missing.parameters(&self::surface(), &textures, 1.5).base_color, Rgb::ONE);
 }
@@ -127,13 +127,13 @@ fn normal_maps_turn_the_frame_and_stay_on_the_side() {
     assert!((n - Vec3::new(half, 0.0, half)).length() < 1e-5, "{n}");
     let n = with(1).shading_frame(&surface(), &textures).n;
     assert!(n.z > 0.0 && n.is_normalized(), "{n}");
-    // Without tangents there is no frame to read it in.
+    // Without tangents the normal map is ignored.
     let bare = Surface { tangent: Vec4::ZERO, ..surface() };
     assert_eq!(with(0).shading_frame(&bare, &textures).n, Vec3::Z);
 }
 
-/// What a mirrored node shows is the mirror image: the frame that a normal map and anisotropy make, through random
-/// turns with and without a reflection, for a mesh in one place and for one that two nodes share.
+/// A mirrored node shows the mirror image: the frame of a normal map with anisotropy, under random rotations with and
+/// without a reflection, for a mesh with one instance and with two.
 #[test]
 fn frames_of_mirrored_nodes_are_mirror_images() {
     let material = Material {
@@ -171,9 +171,9 @@ fn frames_of_mirrored_nodes_are_mirror_images() {
     }
 }
 
-/// Of thirty glasses of one roughness nothing is tabulated before two of them meet; then the two rows around that
-/// roughness are, of both sides, and of 1.5, by which facets' loss is known. They are what they would have been had they
-/// been there from the start, whoever asks first.
+/// Of thirty glasses of one roughness, no row is computed before two of them touch. Then the two rows adjacent to that
+/// roughness are computed for both sides, and for index 1.5, which gives the loss of facets. Their values do not depend
+/// on when or by which thread they are computed.
 #[test]
 fn rows_are_tabulated_when_they_are_asked_for() {
     let glass = |i: usize| {
@@ -193,17 +193,17 @@ fn rows_are_tabulated_when_they_are_asked_for() {
     assert_eq!(tables.row_count(), 2 * 2 + 2);
 }
 
-/// What makes the shading of a direction.
+/// Creates the shading for a viewing direction.
 type Shade<'a> = &'a dyn Fn(Vec3) -> Shading<'static>;
 
-/// Calls `check` with a shading normal that leans and what makes the shading of a direction.
+/// Calls `check` with a tilted shading normal and a function that creates the shading for a viewing direction.
 fn tilted(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, Shade<'_>)) {
     let n = Vec3::new(0.5, 0.1, 0.8).normalize();
     let bsdf = support::bsdf(p, tables);
     check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo));
 }
 
-/// [`tilted`], and once more as by a steep normal map on a surface whose interpolated normal leans, too.
+/// [`tilted`], and again with a steep normal map on a surface whose interpolated normal is tilted, too.
 fn tilted_and_mapped(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, Shade<'_>)) {
     tilted(p, tables, &check);
     let (n, smooth) = (Vec3::new(0.8, 0.1, 0.5).normalize(), Vec3::new(-0.1, 0.05, 1.0).normalize());
@@ -219,10 +219,9 @@ fn direction(k: u64) -> Vec3 {
     Vec3::new(r * phi.cos(), r * phi.sin(), z)
 }
 
-/// Seen from the side, a steep normal map is as bright as from the front where it is matte: where its normal faces away
-/// from the viewer it is not black. Light that comes from behind the normal stays out, and all light that comes is
-/// scattered, whichever way it goes: white stays white, to what 400,000 draws of bounded weights say (five standard
-/// errors).
+/// A diffuse surface with a steep normal map is as bright from the side as from the front, also where its normal faces
+/// away from the viewer. Light from behind the normal is not scattered; all other light is, in both transport modes:
+/// white stays white, within five standard errors of 400,000 samples.
 #[test]
 fn steep_normals_are_not_black_from_the_side() {
     let tables = EnergyTables::new([1.5]);
@@ -238,7 +237,7 @@ fn steep_normals_are_not_black_from_the_side() {
         let u = |k: u64, salt: u64| (mix(mix(k) ^ salt) >> 40) as f32 / 16_777_216.0;
         let drawn =
             |k: u64| shading(front).sample(Transport::Importance, LobeSet::ALL, u(k, 7), Vec2::new(u(k, 8), u(k, 9)));
-        // Veach's factor counts what leaves per geometric cosine: taken back, each draw carries the albedo.
+        // Veach's adjoint is per geometric cosine. Divided by it, each sample has the albedo as its weight.
         let carried = |s: caustique::bsdf::BsdfSample| {
             let (cos_s, cos_g) = (s.wi.dot(n).abs(), s.wi.z.abs());
             f64::from(s.weight.x * cos_s / cos_g * front.z / front.dot(n))
@@ -252,9 +251,9 @@ fn steep_normals_are_not_black_from_the_side() {
     });
 }
 
-/// Metal under a steep normal map is black from nowhere: what its facets send into the surface is mirrored out of it. So
-/// white metal is white, to what 40,000 draws say (five standard errors); without the map's relief a fifth of it is
-/// black. A mirror sends light from the lamp to the eye as it sends sight from the eye to the lamp.
+/// Metal with a steep normal map has no black spots: light that facets reflect into the surface is mirrored out of it.
+/// White metal is white within five standard errors of 40,000 samples; without the correction a fifth of it would be
+/// black. A mirror is symmetric between lamp and camera.
 #[test]
 fn steep_metal_is_not_black() {
     let tables = EnergyTables::new([1.5]);
@@ -274,7 +273,7 @@ fn steep_metal_is_not_black() {
         assert!((mean - 1.0).abs() < 5.0 * error + 5e-3, "{wo}: {mean} +- {error}");
     }
     assert!(seen(shading(&metal, Vec3::Z)).0 < 0.8);
-    // The facet's mirror direction is below the surface: mirrored at it, it is where the lamp stands.
+    // The mirror direction of the facet is below the surface. Mirrored at the surface it is the direction of the lamp.
     let wo = Vec3::Z;
     let below = n * (2.0 * n.dot(wo)) - wo;
     let lamp = Vec3::new(below.x, below.y, -below.z);
@@ -286,13 +285,13 @@ fn steep_metal_is_not_black() {
     let lit = shading(&mirror, lamp).with_normal_map(Vec3::Z);
     let draw = |u| lit.sample(Transport::Importance, LobeSet::ALL, u, Vec2::splat(0.5));
     let to_eye = [0.25, 0.75].map(draw).into_iter().flatten().find(|s| (s.wi - wo).length() < 1e-5).expect("the eye");
-    // Of two ways each is taken in half of the draws, and carries what it has per geometric cosine.
+    // One of two directions is sampled with the probability 1/2, and its weight is per geometric cosine.
     assert!((0.5 * to_eye.weight.x - wo.z / lamp.z).abs() < 1e-4 && to_eye.pdf_w == 0.5, "{to_eye:?}");
 }
 
-/// Diffuse light under a steep normal map is shadowed by its relief \[Conty Estevez 2019\]: of light whose cosine with the
-/// surface is 0.1, a facet that leans by 60 degrees sees 2 / (1 + sqrt(1 + 3/8 tan^2)). White under an even white sky it
-/// is as bright as in Cycles 4.5, which renders 0.943, 0.744, 0.565, 0.421 for leans of 20, 45, 60 and 70 degrees.
+/// Diffuse light on a steep normal map is shadowed \[Conty Estevez 2019\]: for light whose cosine with the surface is
+/// 0.1, a facet tilted by 60 degrees receives 2 / (1 + sqrt(1 + 3/8 tan^2)). White under a uniform white sky is as
+/// bright as in Cycles 4.5, which renders 0.943, 0.744, 0.565, 0.421 for tilts of 20, 45, 60 and 70 degrees.
 #[test]
 fn relief_shadows_its_own_diffuse_light() {
     let tables = EnergyTables::new([1.5]);
@@ -321,8 +320,8 @@ fn relief_shadows_its_own_diffuse_light() {
     }
 }
 
-/// A normal map is the base's: a clear coat on black reflects as it does without, from all sides and by either way of
-/// transport, and one on white makes no light.
+/// A normal map does not affect a clear coat: on black the coat reflects as without the map, from all directions and in
+/// both transport modes, and on white it adds no energy.
 #[test]
 fn a_clear_coat_keeps_its_own_normal() {
     let tables = EnergyTables::new([1.5]);
@@ -360,9 +359,9 @@ fn a_clear_coat_keeps_its_own_normal() {
     }
 }
 
-/// With shading normals, light and eye still see one function: exchanging directions exchanges what each way of
-/// transport carries, per geometric cosine \[Veach 1997, 5.3\]; nothing leaks through an opaque surface; photons are
-/// weighed to match.
+/// With shading normals, both transport modes evaluate the same function: exchanging directions exchanges radiance and
+/// importance per geometric cosine \[Veach 1997, 5.3\]. No light leaks through an opaque surface, and photons are
+/// weighted consistently.
 #[test]
 fn shading_normals_keep_light_and_eye_agreed() {
     let tables = EnergyTables::new([1.5]);
@@ -391,7 +390,7 @@ fn shading_normals_keep_light_and_eye_agreed() {
             }
         });
     }
-    // The check has power: plain f |cos_s| both ways does not satisfy it.
+    // The check is sensitive: f |cos_s| in both modes does not satisfy it.
     tilted(&Parameters::default(), &tables, |n, _| {
         let (wo, wi) = (Vec3::new(0.3, 0.2, 0.93).normalize(), Vec3::new(-0.6, 0.3, 0.74).normalize());
         let f = |i: Vec3| i.dot(n).abs();
@@ -399,7 +398,7 @@ fn shading_normals_keep_light_and_eye_agreed() {
     });
 }
 
-/// Drawn weights estimate the integral of [`Shading::eval_cos`], in both ways of transport: a t test at 0.1 %.
+/// The mean weight of samples is the integral of [`Shading::eval_cos`], in both transport modes: a t test at 0.1 %.
 #[test]
 fn drawn_weights_are_the_integral() {
     let tables = EnergyTables::new([1.5]);
@@ -430,7 +429,7 @@ fn drawn_weights_are_the_integral() {
                         })
                     })
                     .collect();
-                // Uniform directions of the sphere, on a grid.
+                // A grid of uniform directions of the sphere.
                 let n = 600;
                 let mut integral = 0.0;
                 for i in 0..n {

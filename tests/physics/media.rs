@@ -1,8 +1,8 @@
-//! Participating media: against closed forms, and methods against each other.
+//! Compares participating media with closed forms, and methods with each other.
 //!
-//! Closed forms are t tests over independent seeds and tiles Welch's t tests, at a family-wise error rate of 0.1 % for
-//! each test (Sidak over its checks), plus the stated bias of closed form or kernel. Every check has to reject a
-//! planted error of a stated size.
+//! Closed forms are t tests over independent seeds, tiles Welch's t tests, at a family-wise error rate of 0.1 % per
+//! test (Sidak over its checks), plus the stated bias of closed form or kernel. Every check must reject a planted error
+//! of a stated size.
 
 use crate::support;
 
@@ -20,8 +20,8 @@ use support::stats::{Check, ERROR_RATE, chi_squared_p, sidak};
 
 // ---------------------------------------------------------------- phase function
 
-/// P-values of chi-squared tests of drawn cosines against the density's integrals, for several asymmetries; and the
-/// largest deviation of the mean cosine from g. `bent` plants a bug: cosines drawn for another asymmetry.
+/// P-values of chi-squared tests of sampled cosines against the integrals of the density, for several asymmetries, and
+/// the largest deviation of the mean cosine from g. `bent` plants a bug: cosines sampled for another asymmetry.
 fn phase_tests(bent: f32) -> (f64, f64) {
     const CELLS: usize = 64;
     const DRAWS: u64 = 200_000;
@@ -71,17 +71,17 @@ fn phase_function_is_sampled_normalised_and_symmetric() {
     let phase = HenyeyGreenstein { g: 0.6 };
     let (a, b) = (Vec3::new(0.6, 0.8, 0.0), phase.sample(Vec3::Y, Vec2::new(0.3, 0.4)));
     assert!((phase.pdf_w(a, b) - phase.pdf_w(b, a)).abs() < 1e-6);
-    // Forward is where it came from not.
+    // Forward is the direction opposite to `wo`.
     assert!(phase.pdf_w(a, -a) > 10.0 * phase.pdf_w(a, a));
 }
 
-/// Relative deviations over an even grid of the numbers that a direction is drawn from: of the mean of 1 - cos from 1 -
-/// g, the greatest of 1 - cos from the inverse of the distribution, and of the density at the angles drawn.
+/// Relative deviations over a uniform grid of sample points: of the mean of 1 - cos from 1 - g, of 1 - cos from the
+/// inverse of the distribution (largest), and of the density at the sampled angles (largest).
 fn forward_errors(g: f32, draw: impl Fn(&HenyeyGreenstein, Vec3, Vec2) -> Vec3) -> [f64; 3] {
     // A power of two, so that all numbers are exact.
     const STEPS: u32 = 1 << 22;
     let phase = HenyeyGreenstein { g };
-    // An axis, so that no rounding of it is among the angles.
+    // Along an axis, so that the direction has no rounding error.
     let (wo, g) = (Vec3::NEG_Z, f64::from(g));
     let ahead = if g < 0.0 { DVec3::NEG_Z } else { DVec3::Z };
     let (mut mean, mut worst) = (0.0, [0.0f64; 2]);
@@ -104,8 +104,8 @@ fn forward_errors(g: f32, draw: impl Fn(&HenyeyGreenstein, Vec3, Vec2) -> Vec3) 
     [mean / (1.0 - g.abs()) - 1.0, worst[0], worst[1]]
 }
 
-/// Up to the sharpest. By cosines, which take steps of 6e-8 where their median is 1 - 1.5 (1 - g)^2, most directions
-/// were drawn straight ahead.
+/// Phase functions keep their mean cosine up to the largest asymmetry. When cosines were sampled, in steps of 6e-8
+/// while their median is 1 - 1.5 (1 - g)^2, most directions were exactly forward.
 #[test]
 fn sharp_phase_functions_keep_their_mean_cosine() {
     let by_cosine = |phase: &HenyeyGreenstein, wo: Vec3, u: Vec2| {
@@ -134,7 +134,7 @@ fn fog(sigma_a: impl Into<[f32; 3]>, sigma_s: impl Into<[f32; 3]>, g: f32) -> Me
     MediumParameters { sigma_a: Rgb::from(sigma_a.into()), sigma_s: Rgb::from(sigma_s.into()), g }
 }
 
-/// A mesh of this holds a medium and nothing else: light passes its surface unbent.
+/// Material of a mesh that only contains a medium: its surface is invisible.
 fn holds(medium: MediumParameters) -> Material {
     Material { medium: Some(medium), ..glass(1.0) }
 }
@@ -143,7 +143,7 @@ fn settings(iterations: u64, seed: u64) -> Settings {
     Settings { seed, levels: Levels::new(1), iterations: Some(iterations), ..Settings::default() }
 }
 
-/// With bandwidth levels for methods that gather photons in media.
+/// Settings of a photon method that gathers photons in media.
 fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
     let initial = InitialBandwidth::Fixed(radius);
     Settings { photons, initial_bandwidth: initial, levels: Levels::new(5), ..settings(iterations, seed) }
@@ -157,7 +157,7 @@ fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rend
     rendered
 }
 
-/// Mean over the picture of every channel, for each seed.
+/// Mean over the picture of every channel, one per seed.
 fn means(scene: &Scene, method: Method, size: u32, seeds: u64, of: impl Fn(u64) -> Settings) -> [Vec<f64>; 3] {
     let mut means: [Vec<f64>; 3] = Default::default();
     for seed in 0..seeds {
@@ -188,12 +188,12 @@ impl ByChannel {
     }
 }
 
-/// Methods that follow paths through media by chance.
+/// Methods that trace paths through media.
 const WHOLE_PATHS: [Method; 3] = [Method::Path, Method::Bdpt, Method::Vcm];
 
 // ---------------------------------------------------------------- closed forms
 
-/// A lamp seen through fog in the open and through fog in a mesh: exp(-sigma d).
+/// A lamp seen through fog that fills space, and through fog in a mesh: exp(-sigma d).
 #[test]
 fn beer_lambert() {
     let (sigma_a, sigma_s) = ([0.1, 0.5, 0.0], [0.2, 0.5, 0.3]);
@@ -227,8 +227,8 @@ fn beer_lambert() {
     }
 }
 
-/// A medium that absorbs nothing under a uniform sky cannot be seen, whatever its phase function and however its
-/// channels differ.
+/// A medium without absorption is invisible under a uniform sky, for any phase function and any differences between
+/// channels.
 #[test]
 fn furnace() {
     for (sigma_s, g) in [([1.5; 3], 0.0), ([2.5, 1.0, 0.4], 0.7)] {
@@ -246,8 +246,7 @@ fn furnace() {
     }
 }
 
-/// A closed box whose walls give radiance e and reflect rho, full of fog that absorbs nothing: e / (1 - rho)
-/// everywhere.
+/// A closed box whose walls emit e and reflect rho, full of fog without absorption: e / (1 - rho) everywhere.
 #[test]
 fn furnace_box_full_of_fog() {
     let mut description = Description::default();
@@ -261,16 +260,16 @@ fn furnace_box_full_of_fog() {
         check.run(&format!("foggy furnace, {method:?}"), &means(&scene, method, 8, 8, |seed| settings(100, seed)));
     }
     for method in [Method::Sppm, Method::Cppm] {
-        // On walls, kernels lose what they would hold behind an edge.
+        // Kernels at walls miss photons beyond the edges.
         let check = ByChannel { expected: [1.0; 3], bias: 0.015, detects: 0.12 };
         let means = means(&scene, method, 24, 8, |seed| photons(20_000, 0.06, 8, seed));
         check.run(&format!("foggy furnace, {method:?}"), &means);
     }
 }
 
-/// What a medium that absorbs nothing scatters to the eye where radiance is 1 everywhere: what it takes on the way, the
-/// mean of `1 - exp(-sigma t)` over a picture from within a box of half width `half`.
-fn taken_on_the_way(scene: &Scene, size: u32, sigma: f32, half: f32) -> f64 {
+/// Light that a medium without absorption scatters to the camera where radiance is 1: the mean of `1 - exp(-sigma t)`
+/// over a picture, from inside of a box of half width `half`.
+fn single_scattered_share(scene: &Scene, size: u32, sigma: f32, half: f32) -> f64 {
     let camera = scene.camera(&square(size)).expect("a camera");
     let n = size * 8;
     let taken = |i: u32| {
@@ -282,8 +281,8 @@ fn taken_on_the_way(scene: &Scene, size: u32, sigma: f32, half: f32) -> f64 {
     (0..n * n).map(taken).sum::<f64>() / f64::from(n * n)
 }
 
-/// Kernels a third as wide as the box that holds the fog, be it of walls or a mesh of the medium's own: what they would
-/// hold behind its border is made up for. Divided by the volume of the whole ball, it was 0.865 instead of 0.899,
+/// Kernels a third as wide as the box of fog, bounded by walls or by a mesh of the medium: the part of a kernel beyond
+/// the boundary is compensated. Divided by the volume of the whole ball, the means were 0.865 instead of 0.899, and
 /// 0.495 instead of 0.536.
 #[test]
 #[ignore = "long"]
@@ -302,7 +301,7 @@ fn kernels_that_reach_behind_borders_lose_nothing() {
         }
         description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 100.0));
         let scene = build(description);
-        let expected = sigma.map(|sigma| taken_on_the_way(&scene, 12, sigma, half));
+        let expected = sigma.map(|sigma| single_scattered_share(&scene, 12, sigma, half));
         let check = ByChannel { expected, bias: 0.02, detects: 0.09 };
         for kernel in [KernelChoice::Box, KernelChoice::Gaussian] {
             let mut values: [Vec<f64>; 3] = Default::default();
@@ -319,9 +318,8 @@ fn kernels_that_reach_behind_borders_lose_nothing() {
     }
 }
 
-/// Light of a point scattered once on its way through a medium without end, by Simpson's rule on the airlight integral
-/// `sigma_s int p(cos) I exp(-sigma_t (t + d(t))) / d(t)^2 dt`, the mean over a square picture of half width `slope` at
-/// distance 1.
+/// Single scattering of a point light in an infinite medium, by Simpson's rule on the airlight integral `sigma_s int
+/// p(cos) I exp(-sigma_t (t + d(t))) / d(t)^2 dt`, as a mean over a square picture of half width `slope` at distance 1.
 fn airlight(medium: &MediumParameters, light: DVec3, intensity: f64, slope: f64) -> [f64; 3] {
     let n = 24;
     let g = f64::from(medium.g);
@@ -352,27 +350,27 @@ fn airlight(medium: &MediumParameters, light: DVec3, intensity: f64, slope: f64)
 fn single_scattering_of_a_point_light() {
     let medium = fog([0.1, 0.3, 0.6], [0.6, 0.8, 0.2], 0.4);
     let mut description = Description { medium: Some(medium), ..Description::default() };
-    // Far behind the camera: a scene must have a size.
+    // A square far behind the camera, because a scene must have a size.
     add(&mut description, "mark", quad(Vec3::new(-1.0, -1.0, 6.0), Vec3::X * 2.0, Vec3::Y * 2.0), matte(0.0, 0.0));
     let light = DVec3::new(0.5, 0.3, -2.0);
     description.lights.push(point_light(light, 7.0));
     description.cameras.push(look_at(DVec3::ZERO, -DVec3::Z, 20.0));
     let scene = build(description);
     let expected = airlight(&medium, light, 7.0, 10f64.to_radians().tan());
-    // Light tracing alone has no bound near the camera.
+    // Without light tracing, whose variance is not bounded near the camera.
     for method in WHOLE_PATHS {
         let check = ByChannel { expected, bias: 2e-3, detects: 0.06 };
         let one = |seed| Settings { max_depth: 2, ..settings(400, seed) };
         check.run(&format!("airlight, {method:?}"), &means(&scene, method, 8, 8, one));
     }
-    // Next-event estimation alone: what has scattered once before is the photons'.
+    // Only next-event estimation: light scattered twice is carried by photons.
     let one = |seed| Settings { max_depth: 2, ..photons(100, 0.1, 400, seed) };
     let check = ByChannel { expected, bias: 2e-3, detects: 0.06 };
     check.run("airlight, sppm", &means(&scene, Method::Sppm, 8, 8, one));
 }
 
-/// Air close to a lamp, where the inverse square would rule the noise of points drawn by transmittance: near enough on
-/// one side of the picture for points drawn by the angle, too far on the other.
+/// Air close to a lamp, where the inverse square would dominate the noise of transmittance sampling. The lamp is near
+/// enough for equiangular sampling on one side of the picture and too far on the other.
 #[test]
 fn air_close_to_a_point_light() {
     let medium = fog([0.05, 0.1, 0.15], [0.1, 0.1, 0.05], 0.3);
@@ -390,7 +388,7 @@ fn air_close_to_a_point_light() {
 
 // ---------------------------------------------------------------- agreement
 
-/// Pictures by seed.
+/// Renders one picture per seed.
 fn seeds(scene: &Scene, method: Method, seeds: u64, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
     channels::seeds(method, seeds, |seed| render(scene, method, SIZE, &of(seed)))
 }
@@ -424,7 +422,7 @@ fn god_rays_agree() {
     }
 }
 
-/// A ball of clear glass in fog under a lamp: light through the ball lights the fog behind it.
+/// A ball of clear glass in fog under a lamp: light through the ball illuminates the fog behind it.
 #[test]
 fn a_glass_ball_in_fog_agrees() {
     let mut description = Description::default();
@@ -443,7 +441,7 @@ fn a_glass_ball_in_fog_agrees() {
     agree("ball in fog, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
-/// A coloured medium that scatters and absorbs, in a block of rough glass and in one whose surface is nothing.
+/// A coloured medium that scatters and absorbs, in a block of rough glass and in a mesh with an invisible surface.
 #[test]
 fn coloured_media_in_meshes_agree() {
     let mut description = Description::default();
@@ -465,7 +463,7 @@ fn coloured_media_in_meshes_agree() {
     agree("coloured media, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
-/// A point light's caustic in fog, which no eye path can run into: light tracing finds it, and so must photons.
+/// The caustic of a point light in fog, which no camera path can hit: light tracing and photons must agree.
 #[test]
 fn a_volumetric_caustic_agrees() {
     let mut description = Description::default();
@@ -474,7 +472,7 @@ fn a_volumetric_caustic_agrees() {
     add(&mut description, "ball", sphere(Vec3::new(0.0, 1.2, 0.0), 0.4, 96), glass(1.5));
     description.lights.push(point_light(DVec3::new(0.3, 2.4, 0.1), 6.0));
     description.medium = Some(fog([0.02; 3], [0.4, 0.3, 0.2], 0.2));
-    // The ball is above the picture: what it shows, no connection finds.
+    // The ball is above the picture, because no connection finds the light that it shows.
     description.cameras.push(look_at(DVec3::new(0.0, 0.8, 2.6), DVec3::new(0.0, 0.15, 0.0), 25.0));
     let scene = build(description);
     let light = seeds(&scene, Method::Light, 10, |seed| settings(48, seed));

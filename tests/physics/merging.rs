@@ -1,9 +1,8 @@
-//! What merging is and is not, as the third talk of the 2013 course has it: one more way to sample a path, as noisy as
-//! the plain one until its photons are used again; and no help where the surface that gathers is glossy.
+//! Limits of merging, as in the third talk of the 2013 course: merging is one more technique, as noisy as the unmerged
+//! one until photons are reused, and it does not help on glossy surfaces.
 //!
-//! Variances are compared by their ratio. With hits as rare as here the relative error of a variance is 1 / sqrt(hits),
-//! stated with each test; limits are five of those away, so that a test fails by chance less than once in a million
-//! runs.
+//! Variances are compared by their ratio. With few hits the relative error of a variance is 1 / sqrt(hits), stated with
+//! each test. Limits are five errors away, so that a test fails by chance less than once in a million runs.
 
 use crate::support;
 
@@ -27,7 +26,7 @@ fn variance(pixel: &PixelAccumulator) -> f64 {
 /// Mean and variance of one iteration at one pixel.
 fn moments(scene: &Scene, settings: &Settings) -> (f64, f64) {
     let camera = scene.camera(&square(1)).expect("a camera");
-    // Passes this small are faster alone.
+    // Iterations this small are faster with one thread.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let rendered = one.install(|| render(scene, &camera, settings, |_, _| Control::Continue));
     let pixel = &rendered.pixels[0];
@@ -37,9 +36,9 @@ fn moments(scene: &Scene, settings: &Settings) -> (f64, f64) {
 const LAMP: f32 = 0.2;
 const ITERATIONS: u64 = 120_000;
 
-/// A lamp that shines up into a mirror, and below them a matte floor on which the mirror throws its light: next-event
-/// estimation sees the lamp's black back. A path finds the light by scattering into it, a photon by landing near the
-/// point seen.
+/// A lamp that shines up into a mirror, and below both a diffuse floor that the mirror illuminates. Next-event
+/// estimation sees the black back of the lamp. A camera path finds the light by scattering into it, a photon by landing
+/// near the visible point.
 fn lamp_in_a_mirror() -> Scene {
     let mut description = Description::default();
     let (x, z) = (Vec3::X, Vec3::Z);
@@ -51,10 +50,10 @@ fn lamp_in_a_mirror() -> Scene {
     build(description)
 }
 
-/// With the kernel's disc as large as the lamp, a photon of one light path for one eye path lands in the disc as often
-/// as the eye path runs into the lamp, and brings as much (the floor is white, so that no roulette interferes): the
-/// same mean, the same variance. A hundred light paths cut the variance to a hundredth (a little more: they are
-/// stratified) and cost less than a hundred eye paths.
+/// If the kernel disc has the size of the lamp and there is one light path per camera path, a photon lands in the disc
+/// as often as the camera path hits the lamp, with the same contribution (the floor is white, so there is no roulette):
+/// equal mean and variance. A hundred light paths divide the variance by a hundred (a little more, because they are
+/// stratified) and cost less than a hundred camera paths.
 #[test]
 fn merging_without_reuse_is_as_noisy_as_path_tracing() {
     let scene = lamp_in_a_mirror();
@@ -74,10 +73,10 @@ fn merging_without_reuse_is_as_noisy_as_path_tracing() {
     let merged = moments(&scene, &settings(Method::Sppm, 1, ITERATIONS));
     let reused = moments(&scene, &settings(Method::Sppm, 100, ITERATIONS / 20));
     println!("mean and variance: paths {paths:?}, one photon {merged:?}, a hundred {reused:?}");
-    // Each hit brings the lamp's radiance.
+    // Each hit contributes the radiance of the lamp.
     let hits = paths.0 * ITERATIONS as f64;
     assert!(hits > 900.0, "{hits} hits");
-    // The disc is large: light varies by a few percent over it.
+    // The irradiance varies by a few percent over the large disc.
     let error = 5.0 * (2.0 / hits).sqrt() + 0.03;
     for (what, ratio) in
         [("means", merged.0 / paths.0), ("variances", merged.1 / paths.1), ("reused means", reused.0 / paths.0)]
@@ -86,11 +85,11 @@ fn merging_without_reuse_is_as_noisy_as_path_tracing() {
     }
     let gain = merged.1 / reused.1;
     assert!(gain > 100.0 * (1.0 - error), "a hundred photons cut the variance {gain} times");
-    // The bug that this test is for: a photon counted twice.
+    // The planted bug: a photon counted twice.
     assert!((2.0 * merged.0 / paths.0 - 1.0).abs() > error);
 }
 
-/// The light of a point lamp focused by a glass ball on to a floor.
+/// The light of a point lamp, focused by a glass ball on to a floor.
 fn caustic_on(floor: Material) -> Scene {
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0), floor);
@@ -101,8 +100,8 @@ fn caustic_on(floor: Material) -> Scene {
     build(description)
 }
 
-/// The stated limit of vertex connection and merging: at a glossy surface few photons come from where the lobe looks,
-/// and no other technique has them.
+/// A known limitation of vertex connection and merging: at a glossy surface few photons come from the directions of the
+/// lobe, and no other technique finds the light.
 #[test]
 fn caustics_on_glossy_surfaces_stay_noisy() {
     let relative_variance = |roughness: f32| {
@@ -130,11 +129,10 @@ fn caustics_on_glossy_surfaces_stay_noisy() {
     assert!(glossy > 4.0 * rough, "rough {rough}, glossy {glossy}");
 }
 
-/// What merging is taken to cost follows from how many vertices it finds. In a closed box whose walls shine and reflect
-/// alike those of light paths are equally dense on all of its 24 square metres, so that an eye path finds
-/// `eye light pixels pi r^2 / 24`, whatever the picture's size if the kernel shrinks with its pixels. Sixteen seeds
-/// tell the mean to half a percent (some 1,400 vertices are in view). Discs at the edges lose `8 r / (3 pi s)` of those
-/// of a wall of side s.
+/// The estimated cost of merging follows from the number of merged vertices. In a closed box with uniform emission and
+/// reflection, light vertices are uniform on its 24 square metres, so a camera path merges `eye light pixels pi r^2 /
+/// 24` of them, for every size of the picture if the kernel shrinks with its pixels. Sixteen seeds give the mean within
+/// half a percent (about 1,400 vertices are in view). Discs at edges lose `8 r / (3 pi s)` on a wall of side s.
 #[test]
 fn as_many_are_merged_as_are_there() {
     const SEEDS: u64 = 16;

@@ -1,10 +1,9 @@
-//! The oracle of multiple importance sampling: every weight again, from explicit densities of whole paths.
+//! An independent check of MIS weights: every weight is computed again from the explicit densities of whole paths.
 //!
-//! A recorder sees each contribution that the walks make on random paths in a few scenes, one of them foggy. The oracle
-//! walks the same paths by the same draws, writes down every vertex, multiplies densities per area for every strategy
-//! that could have made the path, and must find the weight that the recursion gave. Then the recursion is run by hand
-//! over the same vertices for all strategies of a path: the weights must sum to one, and no longer do when a bug is
-//! planted in it.
+//! A recorder sees each contribution of random paths in a few scenes, one of them foggy. The check traces the same
+//! paths with the same draws, records every vertex, multiplies the densities per area of every technique that could
+//! sample the path, and must reproduce the weight of the recursion. Then the recursion is run over the same vertices
+//! for all techniques of a path. The weights must sum to one, and must not if a bug is planted.
 
 mod sums;
 
@@ -32,11 +31,11 @@ use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_l
 
 const SIZE: u32 = 16;
 const TOLERANCE: f64 = 1e-4;
-/// Photons that are taken to share an eye path.
+/// The assumed number of photons that share a camera path.
 const SHARING: f32 = 7.0;
 
 /// How a vertex scatters.
-// As in the library: no box for each vertex.
+// As in the library, vertices are not boxed.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy)]
 enum Scatters<'s> {
@@ -50,18 +49,18 @@ impl Scatters<'_> {
     }
 }
 
-/// A vertex as a walk has met it.
+/// A vertex as recorded by a walk.
 #[derive(Clone, Copy)]
 struct Met<'s> {
     p: Vec3,
     ng: Vec3,
     scatters: Scatters<'s>,
-    /// What the last segment went through.
+    /// Medium of the last segment.
     medium: Option<MediumParameters>,
-    /// Back along the walk.
+    /// Direction back along the walk.
     wo: Vec3,
     distance: f32,
-    /// How the walk went on.
+    /// The sampled direction, if the walk continued.
     onward: Option<(Vec3, bool, f32)>,
     emitted: Option<EmissionDensity>,
 }
@@ -76,7 +75,7 @@ impl Met<'_> {
     }
 }
 
-/// Writes down a walk.
+/// Records a walk.
 struct Notes<'a> {
     scene: &'a Scene,
     met: Vec<Met<'a>>,
@@ -143,21 +142,21 @@ struct Node<'s> {
     scatters: Scatters<'s>,
     to_light: Vec3,
     to_eye: Vec3,
-    /// Cosines for arrivals from the light's and from the eye's side (two surfaces where a photon is merged).
+    /// Cosines of arrivals from the light's side and from the camera's side (on two surfaces if a photon was merged).
     cos: [f64; 2],
     delta: bool,
-    /// Density of the direction that a walk has drawn here, towards the light or away. In single precision a grazing
-    /// direction has too few digits to evaluate it again.
+    /// Density of the direction that a walk has sampled here, and whether it is towards the light. A grazing direction
+    /// has too few digits in f32 to evaluate the density again.
     drawn: Option<(bool, f32)>,
 }
 
-/// A whole path, from the light to the eye.
+/// A whole path, from the light to the camera.
 struct Whole<'s> {
     light: EmissionDensity,
     nodes: Vec<Node<'s>>,
-    /// Squared lengths: `distance2[j]` is that of the segment before node `j`; one more to the camera.
+    /// Squared lengths: `distance2[j]` is that of the segment before node `j`; the last is that to the camera.
     distance2: Vec<f64>,
-    /// What they go through.
+    /// Media of the segments.
     media: Vec<Option<MediumParameters>>,
     /// Density per solid angle of the rays of one pixel.
     camera_pdf_w: f64,
@@ -167,15 +166,16 @@ struct Whole<'s> {
 enum Candidate {
     Hit,
     NextEvent,
-    /// After this many nodes from the light.
+    /// A connection after this number of nodes from the light.
     Connect(usize),
     Camera,
-    /// At this node, from 0.
+    /// A merge at this node.
     Merge(usize),
 }
 
 impl<'s> Whole<'s> {
-    /// Appends vertices of a walk, in the order from the light to the eye, each with the segment that the walk came by.
+    /// Appends the vertices of a walk in the order from the light to the camera, each with the segment by which the
+    /// walk arrived.
     fn append<'m>(&mut self, met: impl Iterator<Item = &'m Met<'s>>, eye_side: bool)
     where
         's: 'm,
@@ -191,8 +191,8 @@ impl<'s> Whole<'s> {
         self.media.push(medium);
     }
 
-    /// Mean over channels of the density of flying segment `j` and stopping at a vertex of its medium, or of getting
-    /// through.
+    /// Mean over channels of the density of flying along segment `j` and stopping at a vertex of its medium, or of
+    /// passing.
     fn flies(&self, j: usize, stops: bool) -> f64 {
         let Some(medium) = self.media[j].filter(|m| m.sigma_s != Rgb::ZERO) else { return 1.0 };
         let distance = self.distance2[j].sqrt();
@@ -203,12 +203,12 @@ impl<'s> Whole<'s> {
         (0..3).map(channel).sum::<f64>() / 3.0
     }
 
-    /// Whether the vertex at the start or end of a segment is in a medium; light and eye are not.
+    /// Whether a vertex is in a medium. Light and camera are not.
     fn in_medium(&self, node: usize) -> bool {
         self.nodes.get(node).is_some_and(|node| node.scatters.in_medium())
     }
 
-    /// Flight along segment `j`, from the light to the eye.
+    /// Flight densities of segment `j`, from the light to the camera.
     fn flight(&self, j: usize) -> FlightDensity {
         let starts = j > 0 && self.in_medium(j - 1);
         FlightDensity { forward: self.flies(j, self.in_medium(j)) as f32, reverse: self.flies(j, starts) as f32 }
@@ -244,7 +244,7 @@ impl<'s> Whole<'s> {
         f64::from(Shading::new(frame, ng, bsdf, from).pdf(to, transport, LobeSet::ALL))
     }
 
-    /// Density per area of node `j` walked to from the light.
+    /// Density per area of node `j`, sampled from the light.
     fn light_pdf_a(&self, j: usize) -> f64 {
         let cos = self.nodes[j].cos[0] * self.flies(j, self.in_medium(j));
         match j {
@@ -260,12 +260,12 @@ impl<'s> Whole<'s> {
         pdf * self.nodes[j].cos[1] / self.distance2[j + 1] * self.flies(j + 1, self.in_medium(j))
     }
 
-    /// No vertex between this one and the eye might have sent the eye path elsewhere.
+    /// Whether no vertex between this one and the camera could have scattered the camera path elsewhere.
     fn is_clear(&self, m: usize) -> bool {
         self.nodes[m + 1..].iter().all(|node| node.delta)
     }
 
-    /// Number of samples times density of the path by a strategy, of merges what they are worth.
+    /// Number of samples times density of the path by a technique. For merges, times the share of independent photons.
     fn density(&self, strategy: Candidate, which: &TechniqueSet, light_paths: f64, eta: f64) -> f64 {
         let k = self.nodes.len();
         let smooth = |j: usize| !self.nodes[j].delta;
@@ -301,7 +301,7 @@ impl<'s> Whole<'s> {
         self.density(strategy, which, light_paths, eta) / sum
     }
 
-    /// Weights of all strategies by the recursion.
+    /// Weights of all techniques by the recursion.
     fn recursive(
         &self,
         which: &TechniqueSet,
@@ -413,24 +413,24 @@ impl<'s> Whole<'s> {
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Bug {
-    /// The cosine of an arrival forgotten.
+    /// The cosine of an arrival is missing.
     Cosine,
-    /// Forward and reverse densities exchanged.
+    /// Forward and reverse densities are exchanged.
     Reverse,
-    /// Merges counted where none are made.
+    /// Merges are counted where there are none.
     DirectMerged,
-    /// Flight through media forgotten.
+    /// Free-flight densities are missing.
     FlightDensity,
-    /// Lights chosen for a point as they are for emission.
+    /// Lights are chosen for next-event estimation with the probabilities of emission.
     Chosen,
-    /// Merges at the vertices of light paths taken for independent, those of eye paths not.
+    /// Merges at the vertices of light paths count as independent; those of camera paths do not.
     NothingShared,
 }
 
 const BUGS: [Bug; 6] =
     [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::FlightDensity, Bug::Chosen, Bug::NothingShared];
 
-/// What the library has said.
+/// The contributions that the library has reported.
 #[derive(Default)]
 struct Said(Vec<(Technique, Vec3, Ratios)>);
 
@@ -440,14 +440,14 @@ impl Record for Said {
     }
 }
 
-/// The node that a walk has gone through.
+/// The node at a vertex through which a walk has passed.
 fn passed<'s>(met: &Met<'s>, eye_side: bool) -> Node<'s> {
     let (onward, delta, pdf) = met.onward.unwrap_or((Vec3::ZERO, false, 0.0));
     let (to_light, to_eye) = if eye_side { (onward, met.wo) } else { (met.wo, onward) };
     Node { delta, drawn: Some((eye_side, pdf)), ..node(met, met, to_light, to_eye) }
 }
 
-/// A node whose light side was met as `light` and whose eye side as `eye`, which scatters.
+/// A node that was reached as `light` from the light's side and as `eye` from the camera's side, and scatters.
 fn node<'s>(light: &Met<'s>, eye: &Met<'s>, to_light: Vec3, to_eye: Vec3) -> Node<'s> {
     let cos = |w: Vec3, met: &Met| if met.scatters.in_medium() { 1.0 } else { f64::from(w.dot(met.ng).abs()) };
     Node {
@@ -465,11 +465,11 @@ struct Tally {
     techniques: std::collections::BTreeMap<&'static str, usize>,
     sums: usize,
     bugs: [f64; BUGS.len()],
-    /// Weights of paths with vertices in media.
+    /// Number of weights of paths with vertices in media.
     in_media: usize,
 }
 
-/// A scene, and what its paths are put together by.
+/// A scene and the data that weights need.
 struct Lab<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
@@ -477,7 +477,7 @@ struct Lab<'a> {
     shared: Bidirectional<'a>,
     levels: MergeLevels,
     eta: Eta,
-    /// The same, as the oracle counts merges.
+    /// The same number as the explicit densities count merges.
     oracle: f64,
 }
 
@@ -504,18 +504,18 @@ impl<'a> Lab<'a> {
         };
         let eta = Eta::new(radius * radius, 2.0 * pixels).sharing(SHARING);
         let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
-        // Wider than eta says, so that enough is merged: weights know nothing of distances.
+        // Wider than eta implies, so that many photons are merged. Weights do not depend on distances.
         let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
         Lab { scene, camera, initial_media, shared, levels, eta, oracle }
     }
 
-    /// Sum of the weights of all strategies of a path by the recursion.
+    /// Sum of the weights of all techniques of a path by the recursion.
     fn sum(&self, whole: &Whole<'_>, bug: Option<Bug>) -> f64 {
         let Bidirectional { techniques, light_paths, .. } = self.shared;
         whole.recursive(&techniques, f64::from(light_paths), (self.eta, self.oracle), bug).iter().sum()
     }
 
-    /// All whole paths that a random pair of paths is put together to.
+    /// All whole paths that a random pair of subpaths is combined to.
     fn paths(&self, path: u32, mut each: impl FnMut(Technique, Candidate, &Whole<'_>, Ratios)) {
         let Lab { scene, camera, initial_media, shared, ref levels, .. } = *self;
         let (camera_paths, pixels) = (shared.camera_paths, shared.light_paths);
@@ -609,8 +609,8 @@ impl<'a> Lab<'a> {
                             EmissionDensity { direct: 1.0, start: 1.0, onward, cos: 1.0, infinite: false, delta: true }
                         }
                         Some(target) => {
-                            // The lamp is flat and of one brightness, but each of its triangles has a probability of
-                            // its own.
+                            // The lamp is flat and has uniform radiance, but each of its triangles has its own
+                            // probability.
                             let lamp = emitters.iter().find_map(|emitter| match emitter {
                                 Emitter::Triangle { instance, primitive, corners: [a, b, c], .. } => {
                                     let (n, to) = (b.cross(*c), target - *a);
@@ -622,7 +622,7 @@ impl<'a> Lab<'a> {
                                 _ => None,
                             });
                             let lamp = lamp.expect("a lamp");
-                            // Shadow rays end a little off the lamp: back along its normal.
+                            // Shadow rays end a little off the lamp, along its normal.
                             let p = target - lamp.ng * (target - lamp.p).dot(lamp.ng);
                             distance2 = f64::from(p.distance_squared(met.p));
                             let emitted = scene.lights.emitted(&scene.materials, &met.receiver(), &lamp, -sample.wi);
@@ -673,7 +673,7 @@ impl<'a> Lab<'a> {
     }
 }
 
-/// The kind of a strategy.
+/// The name of a technique.
 fn name(strategy: Candidate) -> &'static str {
     match strategy {
         Candidate::Hit => "hit",
@@ -684,7 +684,7 @@ fn name(strategy: Candidate) -> &'static str {
     }
 }
 
-/// Compares all that happens on `paths` random pairs of paths.
+/// Compares all contributions of `paths` random pairs of subpaths.
 fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
@@ -724,10 +724,10 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
     let media = scene.survey.scattering;
     assert_eq!(tally.in_media > tally.weights / 4, media, "{what}: {} paths through media", tally.in_media);
     for (bug, worst) in BUGS.into_iter().zip(tally.bugs) {
-        // Some need a scene that has what they forget.
+        // Some bugs need a scene with the feature that they ignore.
         let possible = match bug {
             Bug::FlightDensity => media,
-            // The triangles of a lamp are chosen alike for emission and for a point.
+            // The triangles of a lamp have equal probabilities for emission and for next-event estimation.
             Bug::Chosen => {
                 let emitters = scene.lights.emitters();
                 emitters.len() > 1 && emitters.iter().any(Emitter::is_infinite)
@@ -780,7 +780,7 @@ fn under_an_environment() {
     check("environment", &build(outdoors()), 0.1, 4000);
 }
 
-/// A lamp as well, so that every point has probabilities of its own to choose between them.
+/// With a lamp, so that every point has its own probabilities of choosing a light.
 #[test]
 fn lamp_under_an_environment() {
     let mut description = outdoors();
@@ -804,8 +804,8 @@ fn outdoors() -> Description {
     description
 }
 
-/// Coloured fog in a room with a mirror and a ball of clear glass: vertices in the medium, segments through it, and
-/// nothing in the ball.
+/// Coloured fog in a room with a mirror and a ball of clear glass: vertices in the medium, segments through it, and no
+/// medium in the ball.
 #[test]
 fn lamp_in_fog() {
     let mut description = room();
@@ -818,7 +818,7 @@ fn lamp_in_fog() {
     check("fog", &build(description), 0.1, 2000);
 }
 
-/// The same without a size of the lamp.
+/// Coloured fog with a point light.
 #[test]
 fn point_light_in_fog() {
     let mut description = room();

@@ -1,4 +1,4 @@
-//! Spots down to a thousandth of a degree: what they send and what arrives, in closed form.
+//! Closed forms of the flux and irradiance of spots down to a thousandth of a degree.
 
 use crate::support;
 
@@ -30,15 +30,15 @@ fn scene(inner: f32, outer: f32, edge: SpotEdge, radius: f32) -> Scene {
     build(description)
 }
 
-/// Solid angle of the cone, that of the edge weighted by the mean over its ramp: the flux for intensity 1.
+/// Flux for intensity 1: the solid angle of the cone, with the edge weighted by the mean of its ramp.
 fn flux(inner: f64, outer: f64, mean: f64) -> f64 {
     let cap = |angle: f64| 2.0 * (0.5 * angle).sin().powi(2);
     std::f64::consts::TAU * (cap(inner) + (cap(outer) - cap(inner)) * mean)
 }
 
-/// The flux that light paths leave with, and the irradiance of next-event estimation integrated over the floor,
-/// whatever the angle. With cosines, and borders at least 1e-6 apart in them, a spot that is all edge had the solid
-/// angle of 0.08 degrees: at 0.05 degrees 2.7 times its flux, at 0.001 degrees 6,600 times.
+/// The flux of light paths, and the irradiance of next-event estimation integrated over the floor, are correct for
+/// every angle. With cosines that had to differ by at least 1e-6, a spot that is all edge had the solid angle of 0.08
+/// degrees: 2.7 times the flux at 0.05 degrees, 6,600 times at 0.001 degrees.
 #[test]
 fn narrow_spots_send_what_they_should() {
     for degrees in [0.001f32, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 30.0] {
@@ -54,11 +54,11 @@ fn narrow_spots_send_what_they_should() {
             let starts: Vec<_> = (0..paths).filter_map(|index| pass.emit(&scene, &initial_media, index)).collect();
             let sent: f64 = starts.iter().map(|start| f64::from(start.start.throughput.x)).sum();
             assert!((sent / expected - 1.0).abs() < 1e-3, "{degrees} {share}: sends {sent} of {expected}");
-            // Rounding moves a direction by 1e-7 or so.
+            // Rounding errors move a direction by about 1e-7.
             let widest =
                 starts.iter().map(|start| start.start.direction.cross(Vec3::NEG_Y).length()).fold(0.0, f32::max);
             assert!(widest < outer.sin() * 1.001 + 2e-7 && widest > 0.5 * outer.sin(), "{degrees} {share}: {widest}");
-            // Points of the floor, uniform over a disc a little wider than the cone.
+            // Uniform points of a disc on the floor that is a little wider than the cone.
             let radius = 1.02 * f64::from(outer).tan();
             let (n, area) = (40_000u64, std::f64::consts::PI * radius * radius);
             let mut arrives = 0.0;
@@ -82,8 +82,8 @@ fn narrow_spots_send_what_they_should() {
     }
 }
 
-/// Directions of light paths in the edge lie as densely as the intensity there says: a tenth of the ramp at a time, by
-/// a chi-squared test at an error rate of 0.1 %.
+/// Directions of light paths in the edge have the density of the intensity: in tenths of the ramp, by a chi-squared
+/// test at an error rate of 0.1 %.
 #[test]
 fn edges_are_sampled_as_they_shine() {
     for (edge, integral) in [
@@ -110,8 +110,8 @@ fn edges_are_sampled_as_they_shine() {
     }
 }
 
-/// Below the middle of a disc of radius r, at height h, a spot of intensity I has the irradiance
-/// I (2 / r^2) (1 - h / sqrt(h^2 + r^2)), by next-event estimation and by light paths.
+/// Below the centre of a disc of radius r, at height h, a spot of intensity I has the irradiance I (2 / r^2) (1 - h /
+/// sqrt(h^2 + r^2)), by next-event estimation and by light paths.
 #[test]
 fn spots_shine_from_a_disc() {
     let radius = 0.8;
@@ -139,6 +139,6 @@ fn spots_shine_from_a_disc() {
         }
     }
     let irradiance = flux / (std::f64::consts::PI * f64::from(within).powi(2));
-    // 2 % less at the rim of the circle in which paths are counted; noise of 0.6 %.
+    // 2 % less at the rim of the circle in which light paths are counted, and a noise of 0.6 %.
     assert!((irradiance / expected - 1.0).abs() < 0.03, "{irradiance} of {expected}");
 }

@@ -1,4 +1,4 @@
-//! Solids inside each other, as many as there are, and where paths start among them.
+//! Nested solids in any number, and the initial medium stacks of paths.
 
 use crate::support;
 
@@ -16,14 +16,14 @@ use caustique::transport::{CameraPaths, Indirect, InitialMedia, Interior, LightP
 use support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
-/// Shells of two glasses in turn, each in the one before, under a uniform sky.
+/// Nested shells of two alternating glasses under a uniform sky.
 fn shells(count: u32) -> Scene {
     let mut description = Description::default();
     for i in 0..count {
         let radius = 1.0 - 0.6 * i as f32 / count as f32;
-        // Concentric ones would send rays to the middle back unbent.
+        // Rays to the common centre of concentric shells would not be refracted.
         let center = Vec3::new(0.1, 0.05, 0.0) * (1.0 - radius);
-        // Flat facets: shading normals would lose light of their own.
+        // Flat facets, because shading normals would lose light.
         let mesh = Mesh { normals: Vec::new(), ..sphere(center, radius, 24) };
         add(&mut description, &format!("shell {i}"), mesh, glass(if i % 2 == 0 { 1.5 } else { 1.4 }));
     }
@@ -33,8 +33,8 @@ fn shells(count: u32) -> Scene {
     build(description)
 }
 
-/// Clear glass under a uniform sky cannot be seen. With room for six solids, and a seventh in the place of the sixth,
-/// seven shells gave 1.21. A t test over seeds with an error rate of 0.1 % over nine checks.
+/// Nested shells of clear glass are invisible under a uniform sky. With a stack of at most six solids, seven shells
+/// gave 1.21. A t test over seeds with an error rate of 0.1 % over nine checks.
 #[test]
 fn furnace_of_nested_shells() {
     for count in [7, 12, 40] {
@@ -63,9 +63,9 @@ fn furnace_of_nested_shells() {
     }
 }
 
-/// Glass that is there in part is there for a ray as a whole: in a furnace it cannot be seen, and a slab lets through what
-/// its share lets through, (1 - R) / (1 + R) = 12/13, and all of the rest. Faces that were skipped one by one gave 1.046
-/// and 1.130. A t test over seeds with an error rate of 0.1 % over all checks.
+/// A ray passes or enters glass of partial alpha as a whole: in a furnace the glass is invisible, and a slab transmits
+/// its alpha times (1 - R) / (1 + R) = 12/13 plus all of the rest. When faces were skipped one by one, the means were
+/// 1.046 and 1.130. A t test over seeds with an error rate of 0.1 % over all checks.
 #[test]
 fn glass_with_alpha_is_there_as_a_whole_or_not() {
     for alpha in [0.0f32, 0.3, 0.7] {
@@ -102,8 +102,8 @@ fn glass_with_alpha_is_there_as_a_whole_or_not() {
     }
 }
 
-/// From within, the solids are found again, and leaving them in any order leaves the others: forty steps out along a
-/// ray.
+/// All solids around a point are found from inside, and leaving them in any order leaves the others on the stack: forty
+/// steps along a ray.
 #[test]
 fn all_solids_around_a_point_are_known() {
     let scene = shells(40);
@@ -117,7 +117,7 @@ fn all_solids_around_a_point_are_known() {
         interior = crossing.interior;
     }
     assert_eq!(interior, Interior::default());
-    // Entered in order and left in the same: the first one entered goes first, from under all others.
+    // Entered in order and left in the same order: the first one is removed from the bottom of the stack.
     for instance in 0..40 {
         interior = interior.crossing(&scene, instance, true).interior;
     }
@@ -138,8 +138,8 @@ fn basin() -> Description {
     description
 }
 
-/// A lamp that crosses the surface of the water starts its light where it is, and so does one of glowing glass that
-/// gives light to both sides. Both were in one place as a whole, what the middle of each triangle was in.
+/// Light from a lamp that crosses the water surface, and from a ball of emissive glass that emits to both sides, starts
+/// in the medium at its own position. It started in the medium at the centre of each triangle.
 #[test]
 fn light_starts_where_its_lamp_is() {
     let mut description = basin();
@@ -161,7 +161,7 @@ fn light_starts_where_its_lamp_is() {
             () if p.x > 0.0 && within_ball => Some(2),
             () => None,
         };
-        // The ball's facets are no sphere: at the rim either may be right.
+        // The ball has flat facets, so at the rim both media are correct.
         if p.x > 0.0 && (p - Vec3::new(0.9, 1.0, 0.0)).normalize().dot(d).abs() < 0.4 {
             continue;
         }
@@ -175,7 +175,7 @@ fn light_starts_where_its_lamp_is() {
     assert!(wet > 300 && inside > 300 && outside > 600, "{wet} {inside} {outside}");
 }
 
-/// The rays of an orthographic camera before a basin start in the water and above it.
+/// Rays of an orthographic camera in front of a basin start in the water or above it.
 #[test]
 fn rays_start_where_the_film_is() {
     let mut description = basin();
@@ -201,8 +201,8 @@ fn rays_start_where_the_film_is() {
     }
 }
 
-/// Two solids that overlap, of one priority, are filled alike whichever is entered first, and by the inner one where one
-/// lies within the other; a plan names the pair that does, and no pair that is ordered.
+/// Overlapping solids of equal priority have the same medium in any order of entry, and the medium of the inner one if
+/// one contains the other. A plan reports overlapping pairs of equal priority, and no others.
 #[test]
 fn overlaps_do_not_depend_on_the_direction() {
     let boxes = |higher: i32| {

@@ -1,4 +1,4 @@
-//! Media without an end that absorb nothing: paths wander about for ever unless roulette ends them.
+//! Infinite media without absorption, in which paths end only by Russian roulette.
 
 use crate::support;
 
@@ -10,7 +10,7 @@ use support::channels::SIZE;
 use support::scenes::{add, build, look_at, matte, point_light, quad, square};
 use support::stats::Check;
 
-/// A floor under a point light in a medium that fills all space; with `far`, an object lies many mean free paths away.
+/// A floor under a point light in an infinite medium; with `far`, an object is many mean free paths away.
 fn foggy(far: bool) -> Scene {
     let medium = MediumParameters { sigma_a: Rgb::ZERO, sigma_s: Rgb::ONE, g: 0.0 };
     let mut description = Description { medium: Some(medium), ..Description::default() };
@@ -23,7 +23,7 @@ fn foggy(far: bool) -> Scene {
     build(description)
 }
 
-/// Light paths leave some dozens of photons, where there were thousands; so do eye paths.
+/// Light paths store some dozens of photons instead of thousands, and camera paths end as early.
 #[test]
 fn paths_that_leave_everything_end() {
     let scene = foggy(false);
@@ -34,8 +34,8 @@ fn paths_that_leave_everything_end() {
     assert!(gathered > 1.0 && gathered < 100.0, "{gathered}");
 }
 
-/// Something far away makes the scene so wide that hardly a path leaves it: no roulette, and the same light. Both have the
-/// same random numbers, so that their noise is nearly the same, too.
+/// A far object makes the scene so wide that hardly any path leaves it, so there is no roulette, and the mean is the
+/// same. Both renders have the same random numbers, so their noise is similar, too.
 #[test]
 fn roulette_takes_no_light() {
     let (near, far) = (foggy(false), foggy(true));

@@ -1,9 +1,9 @@
-//! Classical photon mapping against closed forms.
+//! Compares classical photon mapping with closed forms.
 //!
-//! Every check is a t test over independent seeds (each with a map of its own) at a family-wise error rate of 0.1 % for
-//! the file, plus a stated bias: nearest neighbours of points as regular as emission draws them give up to 1 / 2k too
-//! little. Each also rejects an expectation shifted by a little more, which is less than what a wrong number of light
-//! paths or direct light counted twice would do.
+//! Every check is a t test over independent seeds (each with its own map) at a family-wise error rate of 0.1 % for the
+//! file, plus a stated bias: k nearest neighbours of low-discrepancy photons give up to 1 / 2k too little. Each check
+//! must reject a slightly larger shift, which is smaller than the effect of a wrong number of light paths or of direct
+//! light counted twice.
 
 use crate::support;
 
@@ -43,7 +43,7 @@ fn mean(rendered: &Rendered) -> f64 {
     rendered.pixels.iter().map(|p| p.mean(0).x).sum::<f64>() / rendered.pixels.len() as f64
 }
 
-/// Checks the mean over seeds against `expected`; `detects` is a relative shift that is told.
+/// Checks the mean over seeds against `expected`. A relative shift by `detects` must be rejected.
 fn check(what: &str, values: &[f64], expected: f64, bias: f64, detects: f64) {
     let (mean, error) = mean_and_error(values);
     println!("{what}: {mean:.6} +- {error:.6}, expected {expected:.6}");
@@ -55,8 +55,8 @@ fn check(what: &str, values: &[f64], expected: f64, bias: f64, detects: f64) {
     }
 }
 
-/// A closed box whose walls give radiance e and reflect rho: everywhere and in every direction there is e / (1 - rho).
-/// The picture stays clear of the edges.
+/// In a closed box whose walls emit e and reflect rho, radiance is e / (1 - rho) everywhere and in every direction. The
+/// picture excludes the edges.
 fn furnace(degrees: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));
@@ -71,8 +71,8 @@ fn furnace_box() {
     check("furnace", &values, 1.0, 5e-3, 0.025);
 }
 
-/// A view of a tenth of a degree is narrower than the photons are apart, and has its light all the same: without
-/// photons there would be three quarters of it.
+/// A view of a tenth of a degree, which is narrower than the distance between photons, has all its light. Without
+/// photons a quarter would be missing.
 #[test]
 fn a_magnified_view_has_its_photons() {
     let scene = furnace(0.1);
@@ -88,9 +88,9 @@ fn a_magnified_view_has_its_photons() {
     }
 }
 
-/// In a closed box that reflects nine tenths a light path ends at one surface in ten: it leaves nine photons, the first
-/// surface none. A sample of light paths tells so (four standard errors of 2048 geometric numbers, 6e-5), and a render
-/// has as many.
+/// In a closed box that reflects nine tenths, a light path ends at every tenth surface on average: it stores nine
+/// photons, and none at the first surface. The forecast from a sample of light paths agrees (four standard errors of
+/// 2048 geometric numbers, 6e-5), and so does a render.
 #[test]
 fn photons_are_forecast() {
     let mut description = Description::default();
@@ -108,7 +108,7 @@ fn photons_are_forecast() {
     }
 }
 
-/// Where the memory ends, light is divided by the light paths that were traced.
+/// If memory limits the number of photons, flux is divided by the number of traced light paths.
 #[test]
 fn a_full_map_is_no_darker() {
     let scene = furnace(40.0);
@@ -129,14 +129,14 @@ fn a_full_map_is_no_darker() {
     check("full", &values, 1.0, 5e-3, 0.03);
 }
 
-/// The sun straight down through a glass slab on to a plane: a uniform caustic.
+/// The sun shines straight down through a glass slab on to a plane: a uniform caustic.
 #[test]
 fn sun_through_a_slab() {
     let (rho, e, n) = (0.5f32, 3.0f32, 1.5f64);
     let mut description = Description::default();
     let floor = quad(Vec3::new(-0.5, 0.0, -0.5), Vec3::Z, Vec3::X);
     add(&mut description, "plane", floor, matte(rho, 0.0));
-    // High above, so that what the plane sends back into the slab returns too thinly to matter (1e-3).
+    // High above, so that little of the light that the plane reflects comes back from the slab (1e-3).
     add(&mut description, "slab", cuboid(Vec3::new(-0.5, 4.0, -0.5), Vec3::new(0.5, 4.1, 0.5), false), glass(n as f32));
     description.lights.push(PunctualLight {
         name: "sun".into(),
@@ -156,7 +156,7 @@ fn sun_through_a_slab() {
     check("caustic", &values, expected, 6e-3, 0.02);
 }
 
-/// All iterations and all shards see the same map, whatever the threads.
+/// All iterations and shards use the same map, for any number of threads.
 #[test]
 fn threads_and_shards_change_nothing() {
     let scene = furnace(40.0);

@@ -1,7 +1,7 @@
-//! Progressive photon mapping of every rule and kernel: against closed forms and against path tracing.
+//! Progressive photon mapping with every rule and kernel, compared with closed forms and with path tracing.
 //!
-//! t tests over independent seeds at a family-wise error rate of 0.1 % a test function (Sidak), plus stated biases of
-//! kernels; each rejects a planted bug.
+//! T tests over independent seeds at a family-wise error rate of 0.1 % per test (Sidak), plus stated biases of kernels.
+//! Each test must reject a planted bug.
 
 use crate::support;
 
@@ -47,10 +47,10 @@ fn picture(scene: &Scene, size: u32, settings: &Settings) -> Rendered {
     rendered
 }
 
-/// A blue lamp beside a red one that is a hundred thousand times as strong starts one light path in so many: the sample
-/// that sets the flux of blue photons sees none of them, and blue light is there all the same. Walls that reflect half
-/// of it hold as much again after the first bounce as the lamp gives: 4 pi I, by some forty starts of equal flux (four
-/// standard errors of their number, 6e-5).
+/// A red lamp is a hundred thousand times as strong as a blue one, so one light path in a hundred thousand starts at
+/// the blue lamp. The sample that sets the flux of photons has no blue photon, and yet blue light is correct. Walls
+/// that reflect half of the light store, after the first bounce, as much flux as the lamp emits: 4 pi I, from about
+/// forty light paths of equal flux (four standard errors of their number, 6e-5).
 #[test]
 fn lights_too_rare_for_the_sample_keep_their_channel() {
     let mut description = Description::default();
@@ -74,8 +74,8 @@ fn lights_too_rare_for_the_sample_keep_their_channel() {
     assert!(photons.surface.iter().flatten().all(|photon| photon.flux.x == 0.0));
 }
 
-/// In a closed box whose walls give radiance e and reflect rho there is e / (1 - rho) everywhere: a uniform field of
-/// photons, whatever the bandwidth. The picture stays clear of the edges.
+/// In a closed box whose walls emit e and reflect rho, radiance is e / (1 - rho) everywhere: a uniform field of photons
+/// without bias at any bandwidth. The picture excludes the edges.
 #[test]
 fn a_uniform_field_has_no_bias_at_any_bandwidth() {
     let (rho, e) = (0.5, 0.5);
@@ -111,7 +111,7 @@ fn a_uniform_field_has_no_bias_at_any_bandwidth() {
     }
 }
 
-/// A room with a glass ball under a lamp that paths run into: all agree with path tracing, tile by tile.
+/// In a room with a glass ball under a lamp that paths can hit, all variants agree with path tracing, tile by tile.
 #[test]
 #[ignore = "long"]
 fn all_agree_with_path_tracing() {
@@ -154,10 +154,10 @@ fn all_agree_with_path_tracing() {
     }
 }
 
-/// The bias of the memoryless rule after 128 iterations is the mean over its bandwidths of the closed form's, and its
-/// variance the sum over iterations of theirs over the squared number of iterations \[Knaus and Zwicker 2011, 3\], if
-/// they are independent: it is told by the quarters of iterations, which are, though eye paths draw from sequences. The
-/// averaged maps of a bandwidth that never shrinks keep its bias.
+/// After 128 iterations, the bias of the memoryless rule is the mean of the closed form over its bandwidths. Its
+/// variance is the sum of the variances of the iterations over the squared number of iterations \[Knaus and Zwicker
+/// 2011, 3\], if iterations are independent. Quarters are independent although camera paths use sequences, so they give
+/// the variance. A bandwidth that never shrinks keeps its bias.
 #[test]
 fn errors_are_the_sums_over_bandwidths() {
     let scene = Field::Square.scene();
@@ -218,8 +218,8 @@ fn errors_are_the_sums_over_bandwidths() {
     }
 }
 
-/// Where merging alone finds light, VCM's bias after eight iterations is the mean over its bandwidths of the closed
-/// form's. A first iteration without photons, an eighth of the light, is found.
+/// Where only merging finds light, the bias of VCM after eight iterations is the mean of the closed form over its
+/// bandwidths. A planted first iteration without photons, which loses an eighth of the light, is detected.
 #[test]
 fn merging_alone_has_the_bias_of_its_bandwidths() {
     let scene = Field::Point.scene();
@@ -255,9 +255,9 @@ fn merging_alone_has_the_bias_of_its_bandwidths() {
     assert!((ratio * (1.0 - 1.0 / n as f64) - 1.0).abs() > critical * error, "an empty iteration goes unnoticed");
 }
 
-/// The curves of the first talk: in a uniform field the squared radius at fixed points falls as the product of
-/// `(N + alpha M) / (N + M)`, the count grows as what falls into it, and the error falls. 5 % covers the spread of
-/// counts about their means over 64 points.
+/// The curves of the first talk of the course: in a uniform field, the squared radius at fixed points falls as the
+/// product of `(N + alpha M) / (N + M)`, the photon count grows accordingly, and the error falls. 5 % covers the spread
+/// of counts over 64 points.
 #[test]
 fn measurement_points_follow_the_talks_curves() {
     let mut description = Description::default();
@@ -282,7 +282,7 @@ fn measurement_points_follow_the_talks_curves() {
     let (mut last_radius2, mut last_error) = (1.0, f64::INFINITY);
     for n in [1, 8, 64, 512] {
         let (radius2, error) = at(n);
-        // The first iteration keeps a share alpha of its photons, and its area; from then on it is the memoryless
+        // The first iteration keeps the share alpha of its photons and of its area. Later ones follow the memoryless
         // product.
         let expected = alpha * radius2_factor(n, alpha);
         println!("{n} iterations: squared radius {radius2:.4}, expected {expected:.4}, error {error:.4}");

@@ -1,4 +1,4 @@
-//! Shadow rays that end on a triangle: the triangle must not block the ray, wherever its two ends are.
+//! A shadow ray that ends on a triangle is not blocked by it, for any positions of its two ends.
 
 use crate::support;
 
@@ -11,7 +11,7 @@ use caustique::trace::Ray;
 use glam::DQuat;
 use support::scenes::{add_at, build, matte};
 
-/// Uniform numbers of [0, 1), a fixed sequence.
+/// Uniform numbers in [0, 1), a fixed sequence.
 struct Uniform(u64);
 
 impl Uniform {
@@ -20,7 +20,7 @@ impl Uniform {
         (mix(self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Between powers of ten.
+    /// A random number between two powers of ten.
     fn power(&mut self, low: f64, high: f64) -> f64 {
         10f64.powf(low + (high - low) * self.next())
     }
@@ -32,7 +32,7 @@ impl Uniform {
     }
 }
 
-/// A triangle that emits from its front, of any size and at any place, often around the origin.
+/// A triangle of random size and position, often around the origin, that emits from its front.
 fn lone_light(uniform: &mut Uniform) -> (Scene, f64) {
     let size = uniform.power(-3.0, 3.0);
     let place = if uniform.next() < 0.3 { DVec3::ZERO } else { uniform.direction() * uniform.power(-2.0, 3.0) };
@@ -45,8 +45,8 @@ fn lone_light(uniform: &mut Uniform) -> (Scene, f64) {
     (build(description), size)
 }
 
-/// Counts of segments that end on a light and that it blocks: as light sampling ends them, as connections end them, and
-/// as they would end if the bound knew nothing of their length.
+/// Counts the shadow rays that the light at their end blocks: with the ends of light sampling, with the ends of
+/// connections, and with an error bound that does not depend on the length of the ray.
 fn blocked(scenes: u64, receivers: u64) -> ([u64; 3], u64) {
     let mut uniform = Uniform(17);
     let (mut blocked, mut all) = ([0; 3], 0);
@@ -84,6 +84,6 @@ fn no_triangle_blocks_the_shadow_rays_that_end_on_it() {
     println!("{sampled}, {connected}, {by_place_alone} of {all}");
     assert!(all > 20_000);
     assert_eq!((sampled, connected), (0, 0), "blocked of {all}");
-    // The test sees lights that block themselves.
+    // The test detects lights that block themselves.
     assert!(by_place_alone > all / 50, "{by_place_alone} of {all}");
 }

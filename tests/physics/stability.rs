@@ -1,7 +1,7 @@
-//! Numbers at their limits: what is not finite is rejected, counted and told; sums and bandwidths keep their digits
-//! over a million iterations; weights of densities of any size sum to one.
+//! Numerical limits: values that are not finite are rejected, counted and reported; sums and bandwidths keep their
+//! digits over a million iterations; MIS weights sum to one for densities of any size.
 //!
-//! Bounds on errors are stated beside each check, and each check is shown to reject what it guards against.
+//! The bounds on errors are stated beside each check, and each check must reject the bug that it guards against.
 
 mod crowds;
 mod exact;

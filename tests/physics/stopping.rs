@@ -1,4 +1,4 @@
-//! When renders stop by their estimated error.
+//! Renders that stop at an estimated error, and other stop conditions.
 
 use crate::support;
 
@@ -19,7 +19,7 @@ fn rendered(scene: &Scene, settings: &Settings) -> Rendered {
     render(scene, &camera, settings, |_, _| Control::Continue)
 }
 
-/// A floor under a point lamp and a lit panel, all `scale` times as bright.
+/// A floor under a point lamp and an emissive panel, both `scale` times as bright.
 fn lit(scale: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-2.0, 0.0, 2.0), 4.0 * Vec3::X, -4.0 * Vec3::Z), matte(0.5, 0.0));
@@ -32,8 +32,8 @@ fn lit(scale: f32) -> Scene {
     build(description)
 }
 
-/// Lamps a thousandth or a thousand times as bright: the same error after the same number of iterations, by every
-/// method.
+/// With lamps a thousandth or a thousand times as bright, all methods have the same error after the same number of
+/// iterations.
 #[test]
 fn errors_do_not_depend_on_the_unit_of_radiance() {
     let scenes = [1.0, 1.0 / 1024.0, 1024.0].map(lit);
@@ -56,8 +56,7 @@ fn errors_do_not_depend_on_the_unit_of_radiance() {
     }
 }
 
-/// A point lamp in a glass ball is found by no path that starts at the eye: the picture stays black, and nothing is
-/// known of its error.
+/// No camera path finds a point lamp in a glass ball: the picture stays black, and its error is unknown.
 #[test]
 fn a_black_picture_is_not_finished() {
     let mut description = Description::default();
@@ -71,14 +70,14 @@ fn a_black_picture_is_not_finished() {
     let dark = rendered(&scene, &settings);
     assert!(dark.pixels.iter().all(|pixel| pixel.mean(0) == DVec3::ZERO));
     assert_eq!((dark.stop, dark.stats.iterations, dark.error.relative()), (StopReason::Iterations, 40, None));
-    // Photons find it.
+    // Photons find the light.
     let seen = rendered(&scene, &Settings { method: Method::Sppm, photons: 3000, ..settings });
     assert!(seen.error.relative().is_some());
     assert_eq!(seen.stop, StopReason::Error);
 }
 
-/// What is certain from the start ends after two iterations in every quarter, and so does the black picture of a scene
-/// without lights.
+/// A picture without noise ends after two iterations per quarter, and so does the black picture of a scene without
+/// lights.
 #[test]
 fn a_least_number_of_iterations() {
     for emission in [1.0, 0.0] {
@@ -97,8 +96,8 @@ fn a_least_number_of_iterations() {
     }
 }
 
-/// A picture that is off by a tenth everywhere: 0.01 / 1.01 above the floor that its reference's mean sets, whatever
-/// the unit; the papers' relMSE depends on it.
+/// A picture that is off by a tenth everywhere has the error 0.01 / 1.01 with the floor of the reference's mean, for
+/// any unit of radiance. The relMSE of the papers depends on the unit.
 #[test]
 fn comparisons_above_a_relative_floor() {
     let layers = |value: f32| {
@@ -116,8 +115,8 @@ fn comparisons_above_a_relative_floor() {
     }
 }
 
-/// An iteration that is given up in its midst, by any method, leaves no trace: the render goes on from what was
-/// finished, to the bits of one that nobody has disturbed.
+/// An aborted iteration of any method has no effect: the render continues from the finished iterations, to the bits of
+/// an undisturbed render.
 #[test]
 fn iterations_are_given_up_as_a_whole() {
     let scene = lit(1.0);
@@ -144,7 +143,7 @@ fn iterations_are_given_up_as_a_whole() {
     assert!(aborted > 11, "hardly an iteration was given up: {aborted}");
 }
 
-/// Three iterations, with something done after the first.
+/// Renders three iterations and calls `between` after the first.
 fn rendered_by<'a>(stage: &'a RenderInput<'a>, between: impl FnOnce(&mut Session<'a>)) -> Rendered {
     let mut session = Session::new(stage);
     session.step();
@@ -155,7 +154,7 @@ fn rendered_by<'a>(stage: &'a RenderInput<'a>, between: impl FnOnce(&mut Session
     session.finish(StopReason::Iterations)
 }
 
-/// A first iteration is finished whatever the clock says; one that is asked to end is not.
+/// The deadline does not end the first iteration, but a stop request does.
 #[test]
 fn the_first_iteration_ends_by_request_alone() {
     let scene = lit(1.0);

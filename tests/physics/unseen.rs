@@ -1,4 +1,4 @@
-//! Errors of pictures to which photons have hardly come: fixed seeds, known answers.
+//! Estimated errors of pictures with almost no photons: fixed seeds, known results.
 
 use crate::support;
 
@@ -14,8 +14,8 @@ use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, point
 const SIZE: u32 = 16;
 const ITERATIONS: u64 = 16;
 
-/// A dial under a pane, and 0.3 mm of it in the picture. Half of its light comes from a point lamp beside it, the other
-/// half from one above the pane, which photons alone bring.
+/// A dial under a pane, of which the picture shows 0.3 mm. Half of its light comes from a point lamp beside it, the
+/// other half from one above the pane, which only photons carry.
 fn dial() -> Scene {
     let mut description = Description::default();
     let dial = quad(Vec3::new(-0.5, 0.0, 0.5), Vec3::X, -Vec3::Z);
@@ -28,7 +28,7 @@ fn dial() -> Scene {
     build(description)
 }
 
-/// A lamp in a room, and a ball of glass.
+/// A room with a lamp and a ball of glass.
 fn room() -> Scene {
     let mut description = lit_room(matte(0.6, 0.0));
     add(&mut description, "ball", sphere(Vec3::new(0.0, 0.5, 0.3), 0.4, 32), glass(1.5));
@@ -48,7 +48,7 @@ fn settings(method: Method, initial: InitialBandwidth) -> Settings {
     }
 }
 
-/// A render, and what its end has told of the finished picture.
+/// A render, and the estimated accuracy of the finished picture.
 fn rendered(scene: &Scene, settings: &Settings) -> (Rendered, Accuracy) {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let stage = RenderInput::new(scene, &camera, settings);
@@ -69,8 +69,9 @@ fn mean(rendered: &Rendered) -> f64 {
     sum.y / rendered.pixels.len() as f64
 }
 
-/// Kernels of a footprint, and of 10 um, meet no photon: half of the light is missing. The interval holds that half, and
-/// the sentence names it. A planted fault, counts that say that photons have come, tells less than a fifth.
+/// Kernels of the size of a pixel footprint, and of 10 um, contain no photon: half of the light is missing. The error
+/// interval includes it, and a message names it. With the planted bug of counts that report photons, the estimated
+/// error is below a fifth.
 #[test]
 fn light_that_no_photon_has_brought_is_in_the_interval() {
     let scene = dial();
@@ -99,8 +100,8 @@ fn light_that_no_photon_has_brought_is_in_the_interval() {
     }
 }
 
-/// With kernels that find photons next to nothing is added to the error of a room. It is not most of the error of the
-/// dial, to which some seven photons come: over seeds, 2 / (7 + 2) of the squared error is expected.
+/// With kernels that contain photons, almost nothing is added to the error of a room, and less than the rest to the
+/// error of the dial, which about seven photons reach: over seeds, 2 / (7 + 2) of the squared error is expected.
 #[test]
 fn errors_are_as_they_were_where_photons_come() {
     let nearest = InitialBandwidth::Nearest(20);
@@ -122,7 +123,7 @@ fn errors_are_as_they_were_where_photons_come() {
     assert!(2.0 * unseen < estimated, "{unseen} {estimated}");
 }
 
-/// Counts of shards, and of a render that was interrupted, are those of the whole.
+/// Counts of shards join to those of the whole render, and so do those of an interrupted render.
 #[test]
 fn counts_join() {
     let scene = room();

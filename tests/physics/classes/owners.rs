@@ -1,4 +1,4 @@
-//! Random paths, read from the eye and from the lights: their class, and who would count them.
+//! The classes and owners of random paths, traced from the camera and from lights.
 
 use super::room;
 use caustique::bsdf::{LobeSet, Transport};
@@ -11,7 +11,7 @@ use caustique::transport::{
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
-/// A path from the camera: letters as in the table of classes, and whether its light has no size.
+/// A path from the camera, with the letters of the table of classes, and whether its light is a point.
 type Whole = (String, bool);
 
 fn letter(event: Event) -> char {
@@ -28,12 +28,12 @@ fn event(letter: char) -> Event {
     Event::ALL.into_iter().find(|event| self::letter(*event) == letter).expect("it is one of them")
 }
 
-/// Writes down what happens on a walk, and every path that it could be a part of.
+/// Records the events of a walk, and every path that the walk could be a part of.
 struct Scribe<'a> {
     scene: &'a Scene,
     sofar: String,
     last: Option<LobeSet>,
-    /// From a light, which has no size if so.
+    /// For a walk from a light: whether the light is a point.
     from_light: Option<bool>,
     found: &'a mut HashSet<Whole>,
 }
@@ -45,8 +45,8 @@ impl Scribe<'_> {
         }
     }
 
-    /// Paths whose last vertex of this walk is one with some events: lit straight from a light of either kind, or
-    /// connected to the camera.
+    /// Records the paths that end at the last vertex of this walk with these events: by next-event estimation to either
+    /// kind of light, or by connection to the camera.
     fn ends(&mut self, events: &[Event]) {
         for event in events {
             let path = format!("{}{}", self.sofar, letter(*event));
@@ -83,7 +83,7 @@ impl<'a> Visitor<'a> for Scribe<'_> {
     }
 }
 
-/// Paths of random walks through a scene from its camera and its lights.
+/// Finds the paths of random walks from the camera and from lights.
 fn random_paths(scene: &Scene, walks: u32, found: &mut HashSet<Whole>) {
     let camera = scene.camera(&crate::support::scenes::square(64)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
@@ -112,13 +112,13 @@ fn delta(path: &str) -> bool {
     path.chars().all(|c| "CM".contains(c))
 }
 
-/// Who would count a path, once for each time, as the estimators go about it: which lobes eye paths go on with, where
-/// they are lit, where they gather, which photons are left there. Nothing here knows of classes.
+/// The owners that count a path, one entry per count, from the rules of the estimators: the lobes at which camera paths
+/// continue, are lit and gather, and the vertices at which photons are stored. Independent of the classes.
 fn counted(search: Search, (path, sizeless): &Whole) -> Vec<Owner> {
     let sizeless = *sizeless;
     let mut owners = Vec::new();
     if delta(path) {
-        // Nobody sees a light without size in a mirror.
+        // A point light is invisible in a mirror.
         return if sizeless { owners } else { vec![Owner::Hits] };
     }
     let lit = path.ends_with(['S', 'B', 'V']);
@@ -153,11 +153,11 @@ fn counted(search: Search, (path, sizeless): &Whole) -> Vec<Owner> {
     owners
 }
 
-/// Paths that are not counted exactly once, by the owner of their class.
+/// Paths that are not counted exactly once by the owner of their class.
 fn faults(paths: &HashSet<Whole>, search: Search, counted: impl Fn(&Whole) -> Vec<Owner>) -> Vec<String> {
     let class = |whole: &Whole| PathClass::of(whole.0.chars().map(event), whole.1);
-    // Without photons nobody finds a light without size by a mirror; eye paths that go on are not for media that
-    // scatter; a map holds none of them.
+    // Without photons, no technique finds a point light by a mirror, and camera paths that continue do not support
+    // scattering media, so these paths are excluded.
     let invisible = |(path, sizeless): &Whole| {
         *sizeless && (delta(path) || (search == Search::CameraPaths && path.ends_with(['C', 'M'])))
     };
@@ -169,7 +169,7 @@ fn faults(paths: &HashSet<Whole>, search: Search, counted: impl Fn(&Whole) -> Ve
 
 const SEARCHES: [Search; 3] = [Search::CameraPaths, Search::Photons, Search::PathsAndPhotons];
 
-/// Of the scenes that are shipped, and of a room with everything.
+/// Random paths of the shipped scenes and of the room.
 fn all_paths() -> HashSet<Whole> {
     let mut found = HashSet::new();
     random_paths(&room(true), 20_000, &mut found);
@@ -188,7 +188,7 @@ fn random_paths_have_one_class_and_one_owner() {
     for (path, sizeless) in &paths {
         let class = PathClass::of(path.chars().map(event), *sizeless);
         *numbers.entry(class).or_insert(0u32) += 1;
-        // From both sides, wherever they meet.
+        // Classified from both ends, for every vertex where the two subpaths meet.
         for (at, _) in path.char_indices().filter(|(_, c)| "SBV".contains(*c)) {
             let sight = path[..=at].chars().map(event).fold(CameraSuffix::START, CameraSuffix::then);
             let beam = path[at + 1..].chars().rev().map(event).fold(LightPrefix::start(*sizeless), LightPrefix::then);
@@ -203,7 +203,7 @@ fn random_paths_have_one_class_and_one_owner() {
     }
 }
 
-/// A class owned twice, by none, or by another is found.
+/// Finds classes with two owners, without an owner, or with the wrong one.
 #[test]
 fn planted_faults_are_found() {
     let paths = all_paths();
@@ -217,25 +217,25 @@ fn planted_faults_are_found() {
         !faults(&paths, search, counted).is_empty()
     };
     assert!(!has(search, &|_, _| {}));
-    // Sharp lobes gather light that the eye path goes on to find.
+    // The bug: sharp lobes gather light that the camera path also finds when it continues.
     assert!(has(search, &|(path, sizeless), owners| {
         if path == "SC" && !sizeless {
             owners.push(Owner::Photons);
         }
     }));
-    // Photons of direct light.
+    // The bug: photons of direct light.
     assert!(has(search, &|(path, _), owners| {
         if path == "B" {
             owners.push(Owner::Photons);
         }
     }));
-    // Eye paths end at polished surfaces.
+    // The bug: camera paths end at polished surfaces.
     assert!(has(search, &|(path, _), owners| {
         if path.starts_with('M') {
             owners.clear();
         }
     }));
-    // Eye paths that go on count the caustics that they run into.
+    // The bug: camera paths that continue count the caustics that they hit.
     assert!(has(Search::PathsAndPhotons, &|(path, sizeless), owners| {
         if path == "BC" && !sizeless {
             owners.push(Owner::Lit);
@@ -243,8 +243,7 @@ fn planted_faults_are_found() {
     }));
 }
 
-/// Every method has at most one owner for every class, and no class that photons or connections could bring is without
-/// one.
+/// Every method has at most one owner per class, and every class that photons or connections can carry has an owner.
 #[test]
 fn every_class_has_an_owner_in_every_plan() {
     let searches = [

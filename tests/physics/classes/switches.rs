@@ -1,4 +1,4 @@
-//! Pictures with some classes alone, without them, and with all.
+//! Pictures with only some classes, without them, and with all.
 
 use super::room;
 use crate::support::scenes::square;
@@ -53,7 +53,7 @@ fn parts(parts: &Parts) -> [DVec3; 5] {
     [parts.emission, parts.direct, parts.caustic, parts.indirect, parts.volume]
 }
 
-/// The largest difference between what two pictures add up to and a third, part by part, relative to the mean.
+/// The largest difference between the sum of two pictures and a third, over the parts, relative to the mean.
 fn apart(a: &Rendered, b: &Rendered, sum: &Rendered) -> f64 {
     let mut worst = 0f64;
     let mean = sum.pixels.iter().map(|p| p.mean(0).element_sum() / 3.0).sum::<f64>() / sum.pixels.len() as f64;
@@ -65,8 +65,9 @@ fn apart(a: &Rendered, b: &Rendered, sum: &Rendered) -> f64 {
     worst
 }
 
-/// With the same random numbers a picture is the sum of one class and all others, in every part. A render of photons
-/// alone for caustics draws other numbers where surfaces would also scatter broadly; those are compared below.
+/// With the same random numbers, the picture of one class plus the picture of all others is the whole picture, in every
+/// part. A render with photons only for caustics draws other numbers at surfaces with broad lobes; it is compared
+/// below.
 #[test]
 fn a_class_and_all_others_are_the_whole() {
     let scene = room(true);
@@ -94,14 +95,15 @@ fn a_class_and_all_others_are_the_whole() {
             // Light paths connected to the camera do not find what is behind glass.
             if method != Method::Light || effect != Effect::Sds {
                 assert!(light(&one) > 0.0 && light(&others) < light(&whole), "{method:?} {effect:?}");
-                // The class counted twice.
+                // The planted bug: the class counts twice.
                 assert!(apart(&one, &whole, &whole) > 1e-3, "{method:?} {effect:?}: twice goes unnoticed");
             }
         }
     }
 }
 
-/// The rules that count photons, and the one map: a part that is switched off is empty, and the others are there.
+/// For rules with photon statistics and for one photon map: a part that is switched off is empty, and the others are
+/// not.
 #[test]
 fn every_method_leaves_out_what_is_switched_off() {
     let scene = room(true);
@@ -114,7 +116,7 @@ fn every_method_leaves_out_what_is_switched_off() {
         assert!(sum(|p| p.direct) > 0.0 && sum(|p| p.indirect) > 0.0, "{method:?}");
         let layers = rendered.layers(&layer_shape(&rendered.settings, &scene), |_| true).expect("there are layers");
         assert!(layers.get("Caustic").is_none() && layers.get("Emission").is_none() && layers.get("Direct").is_some());
-        // Nothing is left for photons.
+        // No light remains for photons.
         let lit = without(&[Effect::Caustic, Effect::Sds, Effect::Indirect, Effect::Glossy, Effect::Volume]);
         let rendered = picture(&scene, 16, &settings(method, Indirect::Photons, lit));
         let sum =
@@ -124,8 +126,8 @@ fn every_method_leaves_out_what_is_switched_off() {
     }
 }
 
-/// What is left is the same to the last bit where a bandwidth does not depend on it; without what photons bring none is
-/// traced, and without what only surfaces scatter on light paths end early.
+/// The remaining light has the same bits if bandwidths do not depend on the switched-off light. Without effects that
+/// photons carry no photon is traced, and without effects of surfaces light paths end early.
 #[test]
 fn photons_that_nobody_wants_are_not_traced() {
     let scene = room(true);
@@ -153,15 +155,15 @@ fn photons_that_nobody_wants_are_not_traced() {
     assert_eq!(paths.stats.light_paths, 0);
 }
 
-/// Tiles of some classes alone, by several seeds.
-fn by(scene: &Scene, way: (Method, Indirect), effect: Effect, iterations: u64, photons: u32) -> Vec<Vec<f64>> {
+/// Tiles of one effect, by several seeds.
+fn by(scene: &Scene, method: (Method, Indirect), effect: Effect, iterations: u64, photons: u32) -> Vec<Vec<f64>> {
     let of = |seed| {
         let settings = Settings {
             seed,
             photons,
             iterations: Some(iterations),
             initial_bandwidth: InitialBandwidth::Fixed(0.04),
-            ..settings(way.0, way.1, only(effect))
+            ..settings(method.0, method.1, only(effect))
         };
         let rendered = picture(scene, SIZE, &settings);
         tiles(|index| rendered.pixels[index].mean(0).element_sum() / 3.0)
@@ -169,7 +171,7 @@ fn by(scene: &Scene, way: (Method, Indirect), effect: Effect, iterations: u64, p
     (0..10).map(of).collect()
 }
 
-/// Whether the means of whole pictures differ by more than chance and 3 % allow.
+/// Whether the means of whole pictures differ by more than noise and 3 %.
 fn differ(a: &[Vec<f64>], b: &[Vec<f64>]) -> bool {
     let of = |images: &[Vec<f64>]| {
         mean_and_error(&images.iter().map(|tiles| tiles.iter().sum::<f64>() / TILES as f64).collect::<Vec<_>>())
@@ -178,14 +180,14 @@ fn differ(a: &[Vec<f64>], b: &[Vec<f64>]) -> bool {
     (a - b).abs() > t_critical(1e-3, 1, 9.0) * error_a.hypot(error_b) + 0.03 * b
 }
 
-/// Each class alone is the same light whoever brings it: photons, paths, or all weighed against each other. Were one
-/// carried twice or by nobody, it would be twice as bright or dark.
+/// Each class alone has the same light by photons, by paths, and by MIS. A class that is carried twice or not at all
+/// would be twice as bright or black.
 #[test]
 fn a_class_is_the_same_light_by_every_method() {
     let scene = room(false);
     let critical = t_critical(1e-3, TILES, 9.0);
     for effect in CLASSES {
-        // Paths seldom run into what makes a caustic.
+        // Paths rarely hit the lights of caustics.
         let passes = match effect {
             Effect::Caustic => 192,
             Effect::Sds => 768,
@@ -193,15 +195,15 @@ fn a_class_is_the_same_light_by_every_method() {
         };
         let paths = by(&scene, (Method::Path, Indirect::Photons), effect, passes, 0);
         assert!(average(&paths) > 1e-4, "{effect:?} is dark");
-        for way in
+        for method in
             [(Method::Sppm, Indirect::Photons), (Method::Sppm, Indirect::Paths), (Method::Vcm, Indirect::Photons)]
         {
-            let mut others = by(&scene, way, effect, 8, 15_000);
-            println!("{effect:?}: paths {:.5}, {way:?} {:.5}", average(&paths), average(&others));
+            let mut others = by(&scene, method, effect, 8, 15_000);
+            println!("{effect:?}: paths {:.5}, {method:?} {:.5}", average(&paths), average(&others));
             let found = disagreeing(&others, &paths, critical, 0.03);
-            assert!(found.is_empty() && !differ(&others, &paths), "{effect:?} {way:?}: {found:#?}");
+            assert!(found.is_empty() && !differ(&others, &paths), "{effect:?} {method:?}: {found:#?}");
             others.iter_mut().flatten().for_each(|tile| *tile *= 2.0);
-            assert!(differ(&others, &paths), "{effect:?} {way:?}: twice goes unnoticed");
+            assert!(differ(&others, &paths), "{effect:?} {method:?}: twice goes unnoticed");
         }
     }
 }

@@ -1,17 +1,18 @@
-//! A million whole paths, in scenes whose densities are as far apart as lamps of dust, slits, sharp lobes, thick media
-//! and glass that hardly bends make them: the weights of all strategies of each sum to one within 1e-5, and with a bug
-//! planted they do not.
+//! The MIS weights of all techniques of a path sum to one within 1e-5, for a million whole paths in scenes with very
+//! different densities: tiny lamps, slits, sharp lobes, thick media, glass of weak refraction. With a planted bug they
+//! do not.
 
 use super::*;
 use rayon::prelude::*;
 
-/// Whole paths of each scene.
+/// Number of whole paths per scene.
 const EACH: usize = 125_000;
 const TOLERANCE: f64 = 1e-5;
-/// Pairs of paths whose sums are looked at between two counts of all.
+/// Number of pairs of subpaths between two checks of the total count.
 const BATCH: u32 = 512;
 
-/// Largest error of a sum over [`EACH`] whole paths, and with a bug in one path of so many.
+/// Largest deviation of a sum from one over [`EACH`] whole paths; and the same with a planted bug, for one path in
+/// [`BATCH`].
 fn worst(what: &str, scene: &Scene, radius: f32, bug: Bug) -> [f64; 2] {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
@@ -110,7 +111,7 @@ fn a_sun_beside_a_lamp() {
 
 #[test]
 fn bandwidths_of_a_millionth_and_of_the_room() {
-    // Hardly anything is merged within a millionth.
+    // Almost no photon is merged within a millionth.
     for (radius, bug) in [(1e-6, Bug::Cosine), (1.0, Bug::NothingShared)] {
         let mut description = lit(0.8);
         add(&mut description, "glass", sphere(Vec3::new(0.4, 0.4, 0.2), 0.3, 64), glass(1.5));

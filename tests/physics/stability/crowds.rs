@@ -1,4 +1,4 @@
-//! Photons: none, one, fewer than are asked for, and a million in one point.
+//! Photon maps with no photon, one photon, fewer photons than requested, and a million photons at one point.
 
 use caustique::math::Vec3;
 use caustique::photon::{MAX_NEIGHBOURS, Near, Nearest, Photon, PhotonMap};
@@ -7,7 +7,7 @@ fn photon(p: Vec3, flux: f32) -> Photon {
     Photon { p, wi: Vec3::Z, ng: Vec3::Z, flux: Vec3::splat(flux), depth: 2, ..Photon::default() }
 }
 
-/// Photons that a query visits.
+/// Number of photons that a query visits.
 fn visited(map: &PhotonMap, p: Vec3, radius2: f32) -> u64 {
     let mut count = 0;
     map.within(p, radius2, |_, _| count += 1);
@@ -29,7 +29,7 @@ fn none_one_and_fewer_than_are_asked_for() {
     }
 }
 
-/// What is not finite is left out and counted; the others are found where they are.
+/// Photons that are not finite are left out and counted; the others are found.
 #[test]
 fn photons_that_are_not_finite_are_counted() {
     let broken = [(Vec3::NAN, 1.0), (Vec3::X, f32::INFINITY), (Vec3::Y * f32::INFINITY, 1.0), (Vec3::X, f32::NAN)];
@@ -42,8 +42,8 @@ fn photons_that_are_not_finite_are_counted() {
     assert_eq!(visited(&map, Vec3::ZERO, 1e9), 996);
 }
 
-/// A million photons in one point: a query there visits each once, one beside visits none, what is kept for the next
-/// query is bounded, and the nearest are found at once.
+/// With a million photons at one point, a query there visits each photon once, a query beside it visits none, the cache
+/// for the next query is bounded, and the nearest photons are found quickly.
 #[test]
 fn a_million_in_one_point() {
     const MILLION: u64 = 1_000_000;
@@ -53,7 +53,7 @@ fn a_million_in_one_point() {
     let beside = p + Vec3::Y * 0.01;
     assert_eq!(visited(&map, p, 1e-4), MILLION);
     assert_eq!(visited(&map, beside, 0.9e-4), 0);
-    // An eighth of the photons in leaves of 96 bytes, and a seventh of those in nodes of 192: no query looks at more.
+    // Leaves of 96 bytes hold eight photons, and nodes of 192 bytes eight leaves or nodes: no query reads more.
     let bytes = map.bytes() as u64 - 1_000_100 * size_of::<Photon>() as u64;
     assert!(bytes < (MILLION / 8 + 20) * (96 + 32), "{bytes}");
     let mut near = Near::default();

@@ -1,8 +1,8 @@
-//! Numbers of twice the digits of f64 \[Dekker 1971; Knuth, TAOCP 2, 4.2.2\]: sums and products to about 2^-100.
+//! Numbers with twice the digits of f64 \[Dekker 1971; Knuth, TAOCP 2, 4.2.2\]: sums and products to about 2^-100.
 
 use std::ops::{Add, Div, Mul, Sub};
 
-/// A sum of two f64 that do not overlap.
+/// A sum of two f64 whose digits do not overlap.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Exact {
     high: f64,
@@ -18,7 +18,7 @@ impl Exact {
         self.high + self.low
     }
 
-    /// How far `value` is from this, relative.
+    /// Relative error of `value`.
     pub fn error_of(self, value: f64) -> f64 {
         ((Exact::new(value) - self).value() / self.value()).abs()
     }
@@ -29,7 +29,7 @@ impl Exact {
     }
 }
 
-/// A sum and what its rounding has taken.
+/// A sum and its rounding error.
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let from_b = sum - a;
@@ -68,7 +68,7 @@ impl Mul for Exact {
 impl Div for Exact {
     type Output = Exact;
 
-    /// By two steps of long division.
+    /// Two steps of long division.
     fn div(self, other: Exact) -> Exact {
         let first = self.high / other.high;
         let rest = self - other * Exact::new(first);
@@ -78,7 +78,7 @@ impl Div for Exact {
     }
 }
 
-/// A third, ten times a tenth, and a sum whose terms cancel but for the last digit.
+/// A third, ten times a tenth, and a sum whose terms cancel except for the last digit.
 #[test]
 fn it_has_the_digits_that_f64_lacks() {
     let third = Exact::new(1.0) / Exact::new(3.0);

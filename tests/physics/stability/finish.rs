@@ -1,4 +1,4 @@
-//! The finished picture stays where the bounds of the finish allow, whatever estimate it is made of.
+//! The finished picture obeys the bounds of the finish for every estimate.
 
 use caustique::film::{Picture, Size};
 use caustique::finish::bound::{LIMIT, REACH, spread};
@@ -7,7 +7,7 @@ use caustique::random::{Domain, Purpose, Stream};
 
 const NONE: f32 = f32::NAN;
 
-/// A picture whose channels differ, with standard errors of a tenth; the guides are those of a flat grey wall.
+/// A picture with different channels and standard errors of a tenth; the guides are those of a flat grey wall.
 fn estimate(size: Size, of: impl Fn(usize) -> f32 + Sync + Send) -> Estimate {
     let draw = |index: usize| Stream::new(31, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel);
     let mean = Picture::from_fn(size, |i| [of(i), 0.5 * of(i), of(i) * (0.9 + 0.2 * draw(i))]);
@@ -16,8 +16,8 @@ fn estimate(size: Size, of: impl Fn(usize) -> f32 + Sync + Send) -> Estimate {
     Estimate { mean, deviation, albedo: Some(albedo), normal: Some(normal), alpha: None }
 }
 
-/// Pixels of a picture that break a bound: each channel is a number, between zero and the brightest estimate around,
-/// and no further from its own estimate than the limit, where there is one.
+/// The pixels of a picture that violate a bound: each channel must be a number between zero and the brightest estimate
+/// around, and, if there is a limit, within that distance of its own estimate.
 fn outside(estimate: &Estimate, picture: &Picture) -> Vec<usize> {
     let (size, spread) = (picture.size(), spread(estimate));
     let breaks = |index: usize, c: usize| {
@@ -30,8 +30,8 @@ fn outside(estimate: &Estimate, picture: &Picture) -> Vec<usize> {
     (0..size.pixels()).filter(|&index| (0..3).any(|c| breaks(index, c))).collect()
 }
 
-/// Constant and black pictures, edges and sparks of a million to one, values as large and as small as f32 holds, and
-/// estimates that are no numbers, in pictures of a pixel, a row, a column and more, by every denoiser.
+/// Constant and black pictures, edges and fireflies of a million to one, the largest and smallest values of f32, and
+/// estimates that are NaN, in pictures of one pixel, one row, one column and more, with every denoiser.
 #[test]
 fn no_denoiser_leaves_the_bounds() {
     let sizes = [(1, 1), (1, 30), (30, 1), (24, 17)].map(|(width, height)| Size { width, height });
@@ -66,8 +66,8 @@ fn no_denoiser_leaves_the_bounds() {
     }
 }
 
-/// Means over windows beside pixels a million million times as bright as the rest, as squared errors are: what has left
-/// a window leaves the rounding of f64 behind, 2^-50 of all that the picture holds. In f32 it would leave 2^-24 of it.
+/// Means over sliding windows beside pixels that are 10^12 times as bright, as in squared errors: a pixel that has left
+/// the window leaves only the rounding error of f64, 2^-50 of the largest value. In f32 it would leave 2^-24.
 #[test]
 fn windows_forget_what_has_left_them() {
     let (size, reach) = (Size { width: 64, height: 48 }, 3);

@@ -1,4 +1,4 @@
-//! Samples that are not finite: rejected, counted by cause, told, and joined over shards and checkpoints.
+//! Samples that are not finite are rejected, counted by cause, reported, and joined over shards and checkpoints.
 
 use crate::support::scenes::{add, build, look_at, matte, point_light, quad, square};
 use caustique::math::{DVec3, Vec3};
@@ -10,8 +10,8 @@ use caustique::scene::{Description, Scene};
 const SIZE: u32 = 32;
 const ITERATIONS: u64 = 16;
 
-/// A floor, a wall, and a point light in their corner, so strong that what falls on what is near is more than f32 holds,
-/// and so are connections across the corner; elsewhere nothing is.
+/// A floor, a wall, and a point light in their corner, so strong that light on near surfaces overflows f32, and so do
+/// connections across the corner; elsewhere nothing does.
 fn corner(intensity: f32) -> Scene {
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0), matte(0.5, 0.0));
@@ -34,7 +34,7 @@ fn by(rejections: &Rejections, cause: &str) -> u64 {
     rejections.header()[cause].as_u64().expect("a count")
 }
 
-/// All that a render tells of it.
+/// The rejections that a render reports; checks that they are consistent.
 fn checked(rendered: &Rendered) -> Rejections {
     let own = rendered.settings.levels.picture_level();
     for pixel in &rendered.pixels {
@@ -49,8 +49,8 @@ fn checked(rendered: &Rendered) -> Rejections {
     rejections
 }
 
-/// Where the lamp is not so bright nothing is rejected; where it is, some samples are, and the rest of the picture
-/// stays. Of methods that connect and merge, the causes are theirs.
+/// With a weaker lamp nothing is rejected. With the strong one some samples are, and the rest of the picture is
+/// unaffected. Methods that connect and merge have their own causes.
 #[test]
 fn what_overflows_is_counted_by_cause() {
     let (dim, bright) = (corner(1e29), corner(2.5e37));
@@ -74,7 +74,7 @@ fn what_overflows_is_counted_by_cause() {
     }
 }
 
-/// A lamp whose flux is more than f32 holds sends no light path anywhere, and that is told.
+/// A lamp whose flux overflows f32 emits no light path, and this is reported.
 #[test]
 fn light_paths_that_cannot_begin_are_counted() {
     let mut description = Description::default();
@@ -90,7 +90,7 @@ fn light_paths_that_cannot_begin_are_counted() {
     }
 }
 
-/// Shards join to the counts of the whole, and so do the halves of a render that was saved and went on.
+/// Shards join to the counts of the whole render, and so does a render that was saved and continued.
 #[test]
 fn counts_join_over_shards_and_checkpoints() {
     let scene = corner(2.5e37);

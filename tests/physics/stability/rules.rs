@@ -1,4 +1,4 @@
-//! Rules for bandwidths over a million iterations, against the same recursions with twice the digits of f64.
+//! Bandwidth rules over a million iterations, compared with the same recursions with twice the digits of f64.
 
 use super::exact::Exact;
 use caustique::estimator::rule::adaptive::Adaptive;
@@ -15,7 +15,7 @@ use wide::f32x8;
 
 const MILLION: u64 = 1_000_000;
 
-/// The product of the memoryless rules at every iteration: to 1e-12.
+/// The memoryless rules agree with their product in every iteration within 1e-12.
 #[test]
 fn memoryless_rules_follow_their_product() {
     for alpha in [memoryless::ALPHA, volume::ALPHA] {
@@ -35,7 +35,7 @@ fn memoryless_rules_follow_their_product() {
     }
 }
 
-/// Local statistics where every iteration finds a photon: to 1e-9. Radii kept in f32 would be off by 1e-6 and more.
+/// Local statistics with one photon per iteration agree within 1e-9. With radii in f32 the error would be above 1e-6.
 #[test]
 fn local_statistics_follow_their_recursion() {
     let rule = LocalStatistics { alpha: 2.0 / 3.0 };
@@ -57,7 +57,7 @@ fn local_statistics_follow_their_recursion() {
     assert!(in_f32 > 1e-6, "{in_f32:e}");
 }
 
-/// A photon in the frame of +Z: its distance as a share of the radius, and its direction as a share of a turn.
+/// A photon in the frame of +Z: its distance as a share of the radius, and its azimuth as a share of the circle.
 fn found(radius2: f32, distance: f32, turn: f32) -> FoundPhotons {
     let (sin, cos) = (std::f32::consts::TAU * turn).sin_cos();
     let distance = distance * radius2.sqrt();
@@ -65,17 +65,17 @@ fn found(radius2: f32, distance: f32, turn: f32) -> FoundPhotons {
     FoundPhotons::one((frame.t * cos + frame.b * sin) * distance, distance * distance, 1.0, ThinningKey::new(1.0, 0.5))
 }
 
-/// The chi-squared rule word for word, counts as integers, for two annuli of six sectors.
+/// The chi-squared rule with integer counts, for two annuli of six sectors.
 struct Oracle {
     counts: [u64; 12],
     radius2: Exact,
     bound: Exact,
-    /// Reductions so far.
+    /// Number of reductions.
     reductions: u32,
 }
 
 impl Oracle {
-    /// By the bound as it is rounded, the quantile of twelve cells and that of six.
+    /// Adds a photon. Arguments: its cell, the rounded bound, and the critical values for twelve cells and for six.
     fn after(&mut self, cell: usize, bound: f64, critical: [f64; 2]) {
         self.counts[cell] += 1;
         let passes = |counts: &[u64], critical: f64| {
@@ -94,10 +94,10 @@ impl Oracle {
     }
 }
 
-/// A million photons, one an iteration, in a field that looks uniform now and not then; sectors are empty for long. The
-/// rule decides as exact counts do each time; each reduction rounds radius and bound once, by 2^-24 and what their
-/// factors are off by, 1.2e-7 together. The rule for photons that differ in weight, of which none does here, agrees to
-/// the bit.
+/// A million photons, one per iteration, in a field that is uniform in some phases and not in others, with sectors that
+/// are empty for long. The rule decides as exact counts do in every iteration. Each reduction rounds radius and bound
+/// once, with errors of 2^-24 and of their factors, together 1.2e-7. The rule for photons of different weights, here
+/// all equal, agrees to the bit.
 #[test]
 fn the_chi_squared_rule_decides_as_exact_counts_do() {
     let settings = ChiSquaredSettings { significance: 1e-3, ..ChiSquaredSettings::default() };
@@ -107,10 +107,10 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
     let (mut alike, mut alike_counts) = ([thinned.begin(1.0, 10.0, 0)], [0u32; 13]);
     let bound = Exact::new(f64::from(LEAST_BOUND));
     let mut oracle = Oracle { counts: [0; 12], radius2: Exact::new(1.0), bound, reductions: 0 };
-    // Quantiles of 11 and 5 degrees of freedom at 1e-3.
+    // Quantiles for 11 and 5 degrees of freedom at 1e-3.
     let critical = [31.264_133_6, 20.515_005_7];
     for i in 1..=MILLION {
-        // In one sector alone, in the outer annulus alone, in the inner one seldom, and all over.
+        // Phases: in one sector, in the outer annulus, rarely in the inner one, and everywhere.
         let (sector, outer) = match i / 50_000 % 4 {
             0 => (0, i % 2),
             1 => (i % 6, 1),
@@ -120,7 +120,7 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
         let photon = found(ours[0].radius2, 0.5 + 0.4 * outer as f32, (sector as f32 + 0.5) / 6.0);
         let (mut tally, mut alike_tally) = Default::default();
         let least = f64::from(ours[0].bound);
-        // The lower half is numbered backwards.
+        // The lower half is numbered in reverse.
         let cell = 6 * outer + if sector < 3 { sector } else { 8 - sector };
         rule.count(&ours, &mut counts, &mut tally, &frame, &photon);
         rule.update(i, &mut ours, &mut counts, &mut tally);
@@ -136,8 +136,8 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
     assert!(oracle.reductions > 20 && errors.iter().all(|&error| error < allowed), "{errors:?}, {allowed:e}");
 }
 
-/// The adaptive rule in a field with curvature: the bandwidth that its sums say after a million iterations, to 1e-5,
-/// which is what sums of f32 contributions within a path leave.
+/// The adaptive rule in a field with curvature: after a million iterations the bandwidth agrees with its sums within
+/// 1e-5, the error of the f32 sums of contributions within a path.
 #[test]
 fn the_adaptive_rule_follows_its_sums() {
     let rule = Adaptive::<kernel::Box>::default();
@@ -176,7 +176,8 @@ fn the_adaptive_rule_follows_its_sums() {
     assert!(optimum.cbrt() > usual / 64.0 && optimum.cbrt() < 4.0 * usual, "a bound, not sums, sets the bandwidth");
 }
 
-/// Counts without photons, in one sector, and in one annulus: statistics are numbers, and what has no photons passes.
+/// For no photons, photons in one sector, and photons in one annulus, statistics are finite, and without photons the
+/// test passes.
 #[test]
 fn statistics_of_empty_sectors_are_numbers() {
     assert_eq!(ChiSquared::statistic(&[0; 12]), 0.0);

@@ -1,4 +1,4 @@
-//! Sums over iterations: those of pixels, of their squares, and as many terms as are allowed.
+//! Sums over iterations: values and squares of pixels, and the largest number of terms.
 
 use super::exact::Exact;
 use caustique::estimator::PixelAccumulator;
@@ -10,15 +10,16 @@ use caustique::transport::PixelSample;
 
 const MILLION: u32 = 1_000_000;
 
-/// Samples as pixels have them: most are dim, and few are a million times as bright.
+/// Samples like those of a pixel: most are dim, and a few are a million times as bright.
 fn sample(index: u32) -> f32 {
     let u = Stream::new(11, 1, Domain::Test, u64::from(index)).vertex(0).two(Purpose::Pixel);
     10f32.powf(6.0 * u.x.powi(8) - 3.0) * (0.5 + u.y)
 }
 
-/// Mean and variance of the mean of a million values, against sums of twice the digits. What is cut off each term is
-/// less than 2^-30 of the largest, 2^-30 N of the largest for the sum, of squares likewise; here that is a hundredth of
-/// what it may be, for cuts go either way. Sums in f32 miss the bound ten thousand times over.
+/// Mean and variance of the mean of a million values, compared with sums of twice the digits. Each term loses less than
+/// 2^-30 of the largest term, so a sum of N terms loses at most N times that, and likewise for squares. Here the error
+/// is a hundredth of this bound, because rounding errors have both signs. Sums in f32 exceed the bound ten thousand
+/// times.
 #[test]
 fn a_million_values_keep_their_digits() {
     let values: Vec<f32> = (0..MILLION).map(sample).collect();
@@ -49,10 +50,10 @@ fn a_million_values_keep_their_digits() {
     assert!(in_f32 > 1e4 * bounds[0], "{in_f32:e}");
 }
 
-/// As many terms as a render may have, each with all digits of its grid set, sum to the integer that they are.
+/// `MAX_TERMS` terms, each with all digits of its grid set, have the exact integer sum.
 #[test]
 fn as_many_terms_as_are_allowed_lose_no_digit() {
-    // Of a grid of whole numbers, and of the finer one of multiples of 2^-30.
+    // A grid of whole numbers, and the finer grid of multiples of 2^-30.
     let rounding = Grid::default().with_room_for(1.0).rounding();
     for unit in [1.0, 2f64.powi(-30)] {
         let term = (2f64.powi(29) - 1.0) * unit;
@@ -64,12 +65,12 @@ fn as_many_terms_as_are_allowed_lose_no_digit() {
         let expected = MAX_TERMS as f64 * term;
         assert!(sum.value() == expected && f64::from(plain) != expected, "{} {plain} {expected}", sum.value());
     }
-    // Two eye paths an iteration.
+    // Two camera paths per iteration.
     assert!(u32::try_from(2 * MAX_TERMS).is_ok(), "pixels count in 32 bits");
 }
 
-/// A pixel that sees nothing at all for a million iterations, one that sees light once, and one whose every sample is
-/// rejected: means are zero or what they must be, variances and errors are numbers, and counts are right.
+/// For a pixel without light for a million iterations, one with light once, and one whose samples are all rejected,
+/// means are zero or correct, variances and errors are finite, and counts are correct.
 #[test]
 fn pixels_that_see_nothing() {
     let pixel = |measure: &dyn Fn(u32) -> PixelSample| {

@@ -1,4 +1,4 @@
-//! Weights of paths whose densities are as far apart as f32 can hold, and those of guided starts.
+//! MIS weights of paths with densities over the whole range of f32, and weights of guided emission.
 
 use crate::support::scenes::{add, build, cuboid, glass, look_at, matte, quad, sphere, square};
 use caustique::camera::Camera;
@@ -11,14 +11,14 @@ use caustique::transport::{InitialMedia, LightPaths, TechniqueSet};
 
 const PATHS: u64 = 100_000;
 const LIGHT_PATHS: f32 = 1e6;
-/// Of a sum of weights from one.
+/// Allowed deviation of a sum of weights from one.
 const TOLERANCE: f64 = 1e-5;
 
-/// A path by its densities.
+/// A path described by its densities.
 struct Chain {
     light: EmissionDensity,
-    /// Of each vertex from the light: cosine (the same on both sides), densities of scattering to the eye and to the
-    /// light.
+    /// Per vertex from the light: cosine (equal on both sides), and densities of scattering towards the camera and
+    /// towards the light.
     vertices: Vec<[f32; 3]>,
     /// Squared lengths of segments, one more than vertices.
     distance2: Vec<f32>,
@@ -26,7 +26,7 @@ struct Chain {
 }
 
 impl Chain {
-    /// Of one to four vertices. Densities per area are from 10^-30 to 10^30.
+    /// A path of one to four vertices. Densities per area are from 10^-30 to 10^30.
     fn new(index: u64) -> Chain {
         let stream = Stream::new(41, 0, Domain::Test, index);
         let mut drawn = 0;
@@ -42,13 +42,13 @@ impl Chain {
         Chain { light, vertices, distance2, camera: draw(-10.0, 15.0) }
     }
 
-    /// Weights of all strategies; with a planted bug the cosines of light paths' arrivals are forgotten.
+    /// Weights of all techniques. The planted bug ignores the cosines at which light paths arrive.
     fn weights(&self, which: &TechniqueSet, eta: Eta, bug: bool) -> Vec<f32> {
         let (k, light) = (self.vertices.len(), &self.light);
         let [cos, to_eye, to_light] = [0, 1, 2].map(|part| move |j: usize| self.vertices[j][part]);
         let by_light = |j: usize| which.light_vertex_merge(j as u32 + 1);
         let by_camera = |j: usize| which.camera_vertex_merge((k - j) as u32, j + 1 == k);
-        // Densities per area of arriving at a vertex from either side.
+        // Densities per area of reaching a vertex from either side.
         let from_light = |j: usize| if j == 0 { light.onward } else { to_eye(j - 1) } * (cos(j) / self.distance2[j]);
         let from_camera =
             |j: usize| if j + 1 == k { self.camera } else { to_light(j + 1) } * (cos(j) / self.distance2[j + 1]);
@@ -87,7 +87,7 @@ impl Chain {
     }
 }
 
-/// Each weight is a number from 0 to 1 and all sum to one, whatever the densities and the bandwidth.
+/// Each weight is from 0 to 1 and all sum to one, for any densities and bandwidth.
 #[test]
 fn weights_of_any_densities_sum_to_one() {
     let techniques = TechniqueSet::VCM;
@@ -112,9 +112,9 @@ fn weights_of_any_densities_sum_to_one() {
     assert!(planted > 100.0 * TOLERANCE, "{planted:e}");
 }
 
-/// Guided and aimed starts: what their flux is multiplied by, the density of unguided starts over that of the mixture,
-/// has the mean 1 over a million of them, within four standard errors (6.3e-5 false alarms) and a ten-thousandth; the
-/// part that is not aimed is a share. Starts that are taken for twice as probable are seen.
+/// The flux of guided and aimed light paths is multiplied by the density of unguided emission over that of the mixture.
+/// Over a million starts, this factor has the mean 1 within four standard errors (6.3e-5 false alarms) and a
+/// ten-thousandth, and the unguided part has its share. Starts with a doubled probability are detected.
 #[test]
 fn guided_starts_share_out_all_light() {
     let mut description = Description::default();
