@@ -108,7 +108,7 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
 /// `root` of k times that; 0 where it is not known.
 fn enough<P: Located>(rule: InitialBandwidth, pilot: &PhotonMap<P>, root: impl Fn(f32) -> f32) -> f32 {
     let InitialBandwidth::Nearest(k) = rule else { return 0.0 };
-    let one = usual_radius2(pilot, k).sqrt() / root(k as f32);
+    let one = median_radius2(pilot, k).sqrt() / root(k as f32);
     if one.is_finite() { one } else { 0.0 }
 }
 
@@ -129,7 +129,7 @@ impl<const MAPS: usize> Bounds<MAPS> {
 }
 
 /// Median over photons of the squared distance to the k-th nearest; infinite where there are too few.
-pub fn usual_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
+pub fn median_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
     const SAMPLES: usize = 256;
     let mut nearest = Nearest::default();
     let every = map.photons().iter().step_by(map.photons().len().div_ceil(SAMPLES).max(1));

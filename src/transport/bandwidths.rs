@@ -1,31 +1,32 @@
-//! Bandwidths where camera paths gather: what gathering asks of those who set them, and tells them.
+//! The interface between gathering and bandwidth rules: a rule gives the radii at each vertex of a camera path, and
+//! counts the photons found there.
 
 use crate::math::Vec3;
 use crate::photon::{ByKind, Kind, PhotonMap, ThinningKey};
 use wide::f32x8;
 
-/// Most bandwidth levels of one camera path.
+/// Largest number of bandwidth levels of one camera path.
 pub const MAX_LEVELS: usize = 5;
 
-/// Bandwidths of the levels of one camera path: radii squared in ascending order.
+/// Squared radii of the levels of one camera path, in ascending order.
 #[derive(Clone, Copy, Debug)]
 pub struct LevelRadii {
     pub(super) radius2: [f32; MAX_LEVELS],
     pub(super) count: usize,
-    /// Largest radius squared beyond the camera path's first broad bounce.
-    pub(super) later2: f32,
-    /// The level of each radius.
+    /// Largest squared radius after the camera path's first broad bounce.
+    pub(super) indirect_cap2: f32,
+    /// The level that each radius belongs to.
     pub(super) order: [u8; MAX_LEVELS],
 }
 
 impl LevelRadii {
-    /// From radii squared in ascending order; at most [`MAX_LEVELS`].
+    /// Takes squared radii of at most [`MAX_LEVELS`] levels, in ascending order from level 0.
     #[inline]
     pub fn new(radius2: impl Iterator<Item = f32>) -> LevelRadii {
         let mut radii = LevelRadii {
             radius2: [0.0; MAX_LEVELS],
             count: 0,
-            later2: f32::INFINITY,
+            indirect_cap2: f32::INFINITY,
             order: std::array::from_fn(|level| level as u8),
         };
         for r in radius2.take(MAX_LEVELS) {
@@ -35,82 +36,84 @@ impl LevelRadii {
         radii
     }
 
-    /// The same, where beyond the path's first broad bounce no squared radius is larger than `later2`: a pixel that
-    /// sees no photons has a large one, and its path may come to where they are dense, which nobody sees sharply.
+    /// Caps squared radii at `indirect_cap2` after the path's first broad bounce. A pixel that sees few photons has a
+    /// large radius. Its path may arrive where photons are dense, and there a smaller one suffices.
     #[inline]
     #[must_use]
-    pub fn later(self, later2: f32) -> LevelRadii {
-        LevelRadii { later2, ..self }
+    pub fn capped_after_broad_bounce(self, indirect_cap2: f32) -> LevelRadii {
+        LevelRadii { indirect_cap2, ..self }
     }
 
-    /// The same, of these levels (each below [`MAX_LEVELS`]) in this order instead of from 0 up.
+    /// Assigns the radii to the levels in `order` (each below [`MAX_LEVELS`]).
     #[inline]
     #[must_use]
-    pub fn of(self, order: [u8; MAX_LEVELS]) -> LevelRadii {
+    pub fn with_order(self, order: [u8; MAX_LEVELS]) -> LevelRadii {
         LevelRadii { order, ..self }
     }
 }
 
-/// Up to eight photons that bring light to a vertex.
+/// Up to eight photons found around a vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct FoundPhotons {
-    /// Where they are from the vertex.
+    /// Positions relative to the vertex.
     pub offset: [f32x8; 3],
-    /// Their distances squared; infinite where there is none.
+    /// Squared distances from the vertex; infinite in unused lanes.
     pub distance2: f32x8,
-    /// What they add to the path's measure, mean of RGB, before it is divided by an area.
+    /// Radiance times area that each photon adds to the path's sample, mean of RGB.
     pub light: f32x8,
-    /// Their marks' bits, for those who ask for marks.
+    /// Bits of their thinning keys; zero unless [`PhotonCounter::NEEDS_THINNING_KEYS`].
     pub thinning_keys: [u32; 8],
 }
 
 impl FoundPhotons {
-    /// One photon.
+    /// A single photon, in the first lane.
     pub fn one(offset: Vec3, distance2: f32, light: f32, thinning_key: ThinningKey) -> FoundPhotons {
         FoundPhotons {
             thinning_keys: [thinning_key.bits(), 0, 0, 0, 0, 0, 0, 0],
-            offset: offset.to_array().map(|x| lane(x, 0.0)),
-            distance2: lane(distance2, f32::INFINITY),
-            light: lane(light, 0.0),
+            offset: offset.to_array().map(|x| first_lane(x, 0.0)),
+            distance2: first_lane(distance2, f32::INFINITY),
+            light: first_lane(light, 0.0),
         }
     }
 }
 
-/// A number in the first of eight places, and another in the others.
-pub(super) fn lane(x: f32, others: f32) -> f32x8 {
+/// A vector with `x` in the first lane and `others` in the other seven.
+pub(super) fn first_lane(x: f32, others: f32) -> f32x8 {
     f32x8::from([x, others, others, others, others, others, others, others])
 }
 
-/// Bandwidths where a camera path gathers.
-pub trait Bandwidths {
-    /// What counting needs to know of a vertex, whatever the kind.
-    type Place;
-    /// Who is told of the photons found at a vertex.
-    type Counter<'c>: Counter
+/// The bandwidths that one camera path gathers photons with.
+pub trait GatherBandwidths {
+    /// Frame of a vertex, as the counter needs it.
+    type Frame;
+    /// Counter of the photons found at a vertex.
+    type Counter<'c>: PhotonCounter
     where
         Self: 'c;
 
-    /// That of a vertex with geometric normal `ng`.
-    fn place(ng: Vec3) -> Self::Place;
+    /// The frame of a vertex with geometric normal `ng`.
+    fn frame(ng: Vec3) -> Self::Frame;
 
-    /// Those for photons of a kind at a vertex at `p` with geometric normal `ng`, after a path of some `length`.
-    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
-    /// Who is told of those.
-    fn counter<'c>(&'c mut self, kind: Kind, place: &'c Self::Place) -> Self::Counter<'c>;
+    /// Radii for photons of `kind` at a vertex at `p` with geometric normal `ng`, where the path has this `length`.
+    fn radii(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
+
+    /// The counter of the photons of `kind` that are found at a vertex.
+    fn counter<'c>(&'c mut self, kind: Kind, frame: &'c Self::Frame) -> Self::Counter<'c>;
 }
 
 /// Counts the photons found at one vertex.
-pub trait Counter {
-    /// Whether [`Counter::count`] is to be called.
+pub trait PhotonCounter {
+    /// Whether [`PhotonCounter::count`] is called at all.
     const COUNTS: bool = true;
-    /// Whether [`Counter::reach2`] may be larger than the largest bandwidth.
+    /// Whether [`PhotonCounter::reach2`] may exceed the largest bandwidth.
     const BEYOND: bool = false;
-    /// Whether photons' marks are asked for.
+    /// Whether [`FoundPhotons::thinning_keys`] is filled in.
     const NEEDS_THINNING_KEYS: bool = false;
 
-    /// Photons within reach.
+    /// Counts photons within reach.
     fn count(&mut self, photons: &FoundPhotons);
-    /// Radius squared within which photons are to be counted, at least `largest2`, that of the largest bandwidth.
+
+    /// Squared radius within which photons are counted; at least `largest2`, the largest bandwidth's.
     #[inline]
     fn reach2(&self, largest2: f32) -> f32 {
         largest2
@@ -118,26 +121,26 @@ pub trait Counter {
 }
 
 /// Counts nothing.
-impl Counter for () {
+impl PhotonCounter for () {
     const COUNTS: bool = false;
 
     #[inline]
     fn count(&mut self, _: &FoundPhotons) {}
 }
 
-/// The same all along the path.
-impl Bandwidths for &ByKind<LevelRadii> {
-    type Place = ();
+/// Constant radii along the path, without counts.
+impl GatherBandwidths for ByKind<LevelRadii> {
+    type Frame = ();
     type Counter<'c>
         = ()
     where
         Self: 'c;
 
     #[inline]
-    fn place(_: Vec3) {}
+    fn frame(_: Vec3) {}
 
     #[inline]
-    fn at(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
+    fn radii(&mut self, kind: Kind, _: &PhotonMap, _: Vec3, _: Vec3, _: f32) -> LevelRadii {
         self[kind as usize]
     }
 

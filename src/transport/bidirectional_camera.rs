@@ -3,13 +3,14 @@
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
 use super::bidirectional_light::{add, scatter};
-use super::camera_paths::{CameraPaths, Features, PixelSample};
+use super::camera_paths::CameraPaths;
 use super::cause::Cause;
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
 use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
 use super::photon_merge::{MergePhoton, merge_photons};
+use super::pixel_sample::{Features, PixelSample};
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, token, told};
 use super::shares::{connected, shares, wanted};
@@ -84,10 +85,10 @@ pub(super) fn record_medium(
     sample: &mut PixelSample,
 ) {
     match scattered {
-        None => sample.first = vertex.met.first,
+        None => sample.first = vertex.arrival.first,
         Some(scattered) => history.scattered(scattered.lobe),
     }
-    history.length += vertex.met.distance;
+    history.length += vertex.arrival.distance;
     if history.is_clear() {
         sample.features = Features { albedo: vertex.albedo(), normal: vertex.wo, depth: history.length };
     }
@@ -339,7 +340,7 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
         record_medium(&mut self.history, vertex, scattered, self.sample);
         self.depth = vertex.depth;
-        self.mis = self.mis.arrive(self.distance2(vertex.met.distance, scattered), 1.0).fly(vertex.flight);
+        self.mis = self.mis.arrive(self.distance2(vertex.arrival.distance, scattered), 1.0).fly(vertex.flight);
         if techniques.connect && vertex.depth < camera_paths.max_depth {
             self.connect_all(vertex);
         }

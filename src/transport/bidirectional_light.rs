@@ -1,12 +1,12 @@
 //! Light paths of the bidirectional methods: what one leaves behind.
 
 use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
-use super::camera_paths::PixelSample;
 use super::cause::Cause;
 use super::light::{Emitted, LightPaths};
 use super::light_vertex::{LightVertex, Scatterer};
 use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
+use super::pixel_sample::PixelSample;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::camera_token;
 use super::shares::{shares, wanted};
@@ -220,13 +220,13 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
-        self.arrive(&vertex.receiver(), vertex.met.distance, 1.0, vertex.flight, scattered);
+        self.arrive(&vertex.receiver(), vertex.arrival.distance, 1.0, vertex.flight, scattered);
         self.lobes = None;
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && !self.photons_only && vertex.depth < camera_paths.max_depth {
             if techniques.connect {
                 self.vertices.push(LightVertex {
-                    scatterer: Scatterer::Medium(vertex.met.p, vertex.phase()),
+                    scatterer: Scatterer::Medium(vertex.arrival.p, vertex.phase()),
                     wo: vertex.wo,
                     throughput: vertex.throughput,
                     depth: vertex.depth,
@@ -305,7 +305,7 @@ impl<'s> Bidirectional<'s> {
         let camera_paths = &self.camera_paths;
         let arena = vertices.bump();
         let mut start = emitted.start;
-        start.throughput *= pass.paths() as f32;
+        start.throughput *= pass.count() as f32;
         let mut visitor = LightWalk {
             shared: self,
             mis: MisState::light(&emitted.density),

@@ -30,7 +30,13 @@ const MAX_BORDERS: u32 = 32;
 
 impl Volume<'_> {
     /// The kernel's mass in the medium around `vertex`, by level.
-    pub(super) fn room<K: Kernel>(&self, _: K, scene: &Scene, vertex: &MediumVertex, medium: u32) -> [f32; MAX_LEVELS] {
+    pub(super) fn kernel_mass_inside<K: Kernel>(
+        &self,
+        _: K,
+        scene: &Scene,
+        vertex: &MediumVertex,
+        medium: u32,
+    ) -> [f32; MAX_LEVELS] {
         let radius2 = self.radii2();
         let reach = radius2.iter().fold(0.0, |largest: f32, &radius2| largest.max(radius2)).sqrt();
         let draws = vertex.draws;
@@ -43,7 +49,7 @@ impl Volume<'_> {
         };
         let ray = |k: usize| {
             let token = token(scene, draws, Purpose::Border);
-            Ray { origin: vertex.met.p, direction: direction(k), tmax: reach, token }
+            Ray { origin: vertex.arrival.p, direction: direction(k), tmax: reach, token }
         };
         let mut hits = [const { None }; RAYS];
         scene.tracer.intersect8(|k| Some(ray(k)), |k, hit| hits[k] = Some(hit));
@@ -56,7 +62,7 @@ impl Volume<'_> {
                     *room -= (mass::<K>(to / radius) - mass::<K>(from / radius)) / RAYS as f32;
                 }
             };
-            leave(scene, ray(k), hit, vertex.met.interior, medium, &mut lost);
+            leave(scene, ray(k), hit, vertex.arrival.interior, medium, &mut lost);
         }
         room.map(|room| room.max(LEAST))
     }

@@ -3,7 +3,7 @@
 //!
 //! At a vertex the lobes fall into two sets that never share light: those that gather photons (`gather`), whose path
 //! ends here, and those the path goes on with (`onward`). Both are lit by one light sample. The second strategy of the
-//! gathering lobes is a ray of their own, traced with probability [`SECOND_STRATEGY`]; that of the onward lobes is the
+//! gathering lobes is a ray of their own, traced with probability [`BSDF_SAMPLE_PROBABILITY`]; that of the onward lobes is the
 //! path itself, which goes on with probability `survival`. A strategy tried with probability n has density n p in the
 //! balance heuristic.
 
@@ -18,7 +18,7 @@ use crate::scene::Scene;
 /// Probability of tracing the gathering lobes' own ray. They are wide, so the light sample is nearly always the better
 /// one; the ray bounds what remains near large lights. One in sixteen instead of one in eight changes the estimated
 /// error of no scene of ours by more than 0.6 %, and saves 3 %.
-pub const SECOND_STRATEGY: f32 = 0.0625;
+pub const BSDF_SAMPLE_PROBABILITY: f32 = 0.0625;
 
 /// Balance heuristic of a density against another.
 #[inline]
@@ -40,8 +40,8 @@ pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, 
     if scene.lights.is_empty() {
         return Rgb::ZERO;
     }
-    let mut light = next_event(scene, vertex, [(gather, SECOND_STRATEGY), (onward, survival)]);
-    if !gather.is_empty() && vertex.draws().one(Purpose::SecondTechnique) < SECOND_STRATEGY {
+    let mut light = next_event(scene, vertex, [(gather, BSDF_SAMPLE_PROBABILITY), (onward, survival)]);
+    if !gather.is_empty() && vertex.draws().one(Purpose::SecondTechnique) < BSDF_SAMPLE_PROBABILITY {
         light += second_strategy(scene, vertex, gather);
     }
     light
@@ -90,7 +90,7 @@ fn second_strategy<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> 
     let interior = *vertex.interiors()[usize::from(sample.transmitted)];
     let (origin, token) = (vertex.ray_origin(sample.wi), token(scene, draws, Purpose::SecondAlpha));
     let start = Start { origin, direction: sample.wi, interior, leaving: vertex.touching(), token };
-    let weight = |pdf_light: f32| balance(SECOND_STRATEGY * sample.pdf_w, pdf_light) / SECOND_STRATEGY;
+    let weight = |pdf_light: f32| balance(BSDF_SAMPLE_PROBABILITY * sample.pdf_w, pdf_light) / BSDF_SAMPLE_PROBABILITY;
     let (mut light, mut reach) = (Rgb::ZERO, f32::INFINITY);
     match next_surface(scene, start) {
         End::Surface(arrival) => {

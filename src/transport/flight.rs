@@ -117,7 +117,7 @@ impl<V> Split<'_, V> {
             next_event,
             wavelength: self.wavelength,
             survival_scale: self.survival_scale,
-            met,
+            arrival: met,
         }
     }
 }
@@ -145,7 +145,7 @@ impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
             {
                 let share = balance(lamp.pdf(at.distance), collisions.pdf(at.distance));
                 let vertex = self.vertex(span, at, draws, opacity, share);
-                self.visitor.lit(&vertex, self.scattered);
+                self.visitor.medium_next_event(&vertex, self.scattered);
             }
         }
         Passage::Left(left)

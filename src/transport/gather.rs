@@ -1,187 +1,125 @@
-//! Photons gathered at a vertex, eight at a time.
+//! Kernel density estimation at a vertex of a camera path: photons on surfaces, all levels of a kind from one query.
 
-use super::bandwidths::{Counter, FoundPhotons, MAX_LEVELS, lane};
+use super::bandwidths::{FoundPhotons, GatherBandwidths, PhotonCounter};
+use super::cause::Cause;
+use super::gathering_walk::{GatheringWalk, Onward};
+use super::glint::GlintGather;
+use super::photon_batch::Batch;
 use super::vertex::Vertex;
-use crate::bsdf::{Gathering, LobeSet};
-use crate::math::{Rgb, Vec3};
-use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
-use bumpalo::Bump;
-use wide::{CmpEq, CmpLt, f32x8};
+use crate::bsdf::LobeSet;
+use crate::math::Rgb;
+use crate::photon::{Kernel, Kind, Near, Photon, PhotonMap};
+use crate::plan::{Event, LightPrefix, Part};
+use crate::spectrum::Wavelength;
+use std::f32::consts::FRAC_1_PI;
 
-/// What a worker keeps from camera path to camera path of one pass.
-#[derive(Default)]
-pub struct Scratch {
-    /// What the vertices of a path need.
-    pub(super) arena: Bump,
-    /// Photons near the last vertices.
-    pub(super) near: ByKind<Near<Photon>>,
-    /// Photons in media near the last vertices there.
-    pub(super) near_volume: Near<VolumePhoton>,
-    /// Room for those that are waiting for their BSDF.
-    pub(super) waiting: Waiting,
-}
-
-/// Photons that are waiting, copied as they are: it takes two stores, and their columns are had by shuffles when eight
-/// are together.
-#[derive(Default)]
-pub(super) struct Waiting {
-    photons: [Photon; 8],
-    count: usize,
-}
-
-impl Waiting {
-    #[inline(always)]
-    fn push(&mut self, photon: &Photon) {
-        self.photons[self.count] = *photon;
-        self.count += 1;
-    }
-
-    /// Their positions, directions, normals and fluxes, component by component.
-    #[inline(always)]
-    fn columns(&self) -> [[f32x8; 3]; 4] {
-        let photons = self.photons.each_ref();
-        let rows = photons.map(|Photon { p, wi, ng, .. }| [p.x, p.y, p.z, wi.x, wi.y, wi.z, ng.x, ng.y]);
-        let [px, py, pz, wx, wy, wz, nx, ny] = f32x8::transpose(rows.map(f32x8::from));
-        // The last four numbers are the second half of a row that begins with others, which is one load.
-        let rows = photons.map(|Photon { wi, ng, flux, .. }| [wi.y, wi.z, ng.x, ng.y, ng.z, flux.x, flux.y, flux.z]);
-        let [.., nz, red, green, blue] = f32x8::transpose(rows.map(f32x8::from));
-        [[px, py, pz], [wx, wy, wz], [nx, ny, nz], [red, green, blue]]
-    }
-}
-
-/// Places of eight.
-const LANES: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-
-/// Dot products of eight vectors with eight, added up as `Vec3::dot` does.
-#[inline(always)]
-fn dot(a: &[f32x8; 3], b: &[f32x8; 3]) -> f32x8 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Photons of one kind waiting for their BSDF, and the sums of those that have had it.
-pub(super) struct Batch<'a, 's, K> {
-    kernel: std::marker::PhantomData<K>,
-    radii: &'s [f32],
-    p: Vec3,
-    throughput: Rgb,
-    gathering: Gathering<'a>,
-    /// For photons that no camera path that goes on could find; `None` where it is the same.
-    unreachable: Option<Gathering<'a>>,
-    waiting: &'s mut Waiting,
-    /// By level, of every eighth photon.
-    sums: [[f32x8; 3]; MAX_LEVELS],
-}
-
-impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
-    /// Radii squared, ascending; `set` are the lobes that see photons, `all` those that see the ones nothing else
-    /// finds.
+impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
+    /// Adds radiance from the photons around a vertex \[post-reconstruction 2021, (2) and (3)\]: for the lobes in
+    /// `broad`, and for those in `onward` where photons share light with the continued path.
     #[inline]
-    pub fn new(
-        _: K,
-        radii: &'s [f32],
-        waiting: &'s mut Waiting,
-        vertex: &Vertex<'a, '_>,
-        set: LobeSet,
-        all: LobeSet,
-    ) -> Batch<'a, 's, K> {
-        let shading = vertex.shading;
-        Batch {
-            kernel: std::marker::PhantomData,
-            radii,
-            p: vertex.surface.p,
-            throughput: vertex.throughput,
-            gathering: shading.gathering(set),
-            unreachable: (set != all).then(|| shading.gathering(all)),
-            waiting,
-            sums: [[f32x8::ZERO; 3]; MAX_LEVELS],
-        }
-    }
-
-    /// Adds a photon at a distance squared within reach.
-    #[inline(always)]
-    pub fn push<C: Counter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
-        if photon.flags == PhotonFlags::UNREACHABLE && self.unreachable.is_some() {
-            return self.push_unreachable(photon, distance2, counter);
-        }
-        self.waiting.push(photon);
-        if self.waiting.count == 8 {
-            self.flush(counter);
-        }
-    }
-
-    /// Adds a photon that no camera path could find: few, and out of the way of the others.
-    #[inline(never)]
-    fn push_unreachable<C: Counter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
-        let Some(gathering) = &self.unreachable else { return };
-        let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
-        let found = FoundPhotons::one(
-            photon.p - self.p,
-            distance2,
-            (light * self.throughput).element_sum() / 3.0,
-            photon.thinning_key,
-        );
-        self.add::<C>(&light.to_array().map(|light| lane(light, 0.0)), found.distance2);
-        if C::COUNTS && light != Rgb::ZERO {
-            counter.count(&found);
-        }
-    }
-
-    #[inline(never)]
-    fn flush<C: Counter>(&mut self, counter: &mut C) {
-        let [p, wi, ng, flux] = self.waiting.columns();
-        let there = LANES.cmp_lt(f32x8::splat(self.waiting.count as f32));
-        let from = self.p.to_array().map(f32x8::splat);
-        let offset = [p[0] - from[0], p[1] - from[1], p[2] - from[2]];
-        // As the map has found it.
-        let distance2 = there.blend(dot(&offset, &offset), f32x8::splat(f32::INFINITY));
-        // Where none waits, what is left of another has no cosine, so that it brings nothing.
-        let cosine = there & dot(&wi, &ng).abs();
-        let f = self.gathering.photons8(wi, cosine);
-        let found = [f[0] * flux[0], f[1] * flux[1], f[2] * flux[2]];
-        self.add::<C>(&found, distance2);
-        if C::COUNTS {
-            let weight = self.throughput.to_array().map(f32x8::splat);
-            let light = found[0].mul_add(weight[0], found[1].mul_add(weight[1], found[2] * weight[2]));
-            // Photons that bring nothing do not count [CPPM 2020, 7.2].
-            let dark = light.cmp_eq(f32x8::ZERO);
-            counter.count(&FoundPhotons {
-                offset,
-                distance2: dark.blend(f32x8::splat(f32::INFINITY), distance2),
-                light: light * (1.0 / 3.0),
-                thinning_keys: if C::NEEDS_THINNING_KEYS {
-                    self.waiting.photons.map(|photon| photon.thinning_key.bits())
-                } else {
-                    [0; 8]
-                },
-            });
-        }
-        self.waiting.count = 0;
-    }
-
-    /// Adds what photons bring to the levels that hold them.
-    #[inline(always)]
-    fn add<C: Counter>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
-        // What is within reach is within the largest.
-        if K::BOX && !C::BEYOND && self.radii.len() == 1 {
-            self.sums[0].iter_mut().zip(light).for_each(|(sum, light)| *sum += *light);
-            return;
-        }
-        for (sums, &radius2) in self.sums.iter_mut().zip(self.radii) {
-            let within = distance2.cmp_lt(f32x8::splat(radius2));
-            let weight = if K::BOX { f32x8::ONE } else { f32x8::from((distance2 / radius2).to_array().map(K::weight)) };
-            for (sum, light) in sums.iter_mut().zip(light) {
-                // What is not there is infinitely far away, and its product not a number: masked last.
-                *sum += within & if K::BOX { *light } else { *light * weight };
+    pub fn gather(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, onward: Onward) {
+        // Light of a delta light at sharp lobes belongs to the class of broad ones.
+        let suffix = self.suffix.then(Event::Broad);
+        let frame = B::frame(vertex.surface.ng);
+        for (kind, prefix) in [(Kind::Indirect, LightPrefix::SCATTERED), (Kind::Caustic, LightPrefix::FOCUSED)] {
+            let class = suffix.class_with(prefix);
+            let photons = &self.photons[kind as usize];
+            // Even an empty map takes its share of the light: the weights of continued paths count it.
+            let shares = onward.lobes.intersects(LobeSet::SHARP) && photons.paths() > 0;
+            if (photons.photons().is_empty() && !shares) || !self.classes.has(class) {
+                continue;
             }
+            // Caustics that surfaces scatter again before the camera sees them are indirect light.
+            let caustic = kind == Kind::Caustic && (!PATHS || class.part() == Part::Caustic);
+            self.gather_kind(kind, caustic, vertex, &frame, broad, onward);
         }
     }
 
-    /// The sums by level.
-    #[inline]
-    pub fn finish<C: Counter>(&mut self, counter: &mut C) -> [Rgb; MAX_LEVELS] {
-        if self.waiting.count > 0 {
-            self.flush(counter);
+    // Compiled once for both kinds and all callers, because it is by far the largest function here.
+    #[inline(never)]
+    fn gather_kind(
+        &mut self,
+        kind: Kind,
+        caustic: bool,
+        vertex: &Vertex<'_, '_>,
+        frame: &B::Frame,
+        broad: LobeSet,
+        onward: Onward,
+    ) {
+        let (p, ng) = (vertex.surface.p, vertex.surface.ng);
+        let photons = &self.photons[kind as usize];
+        let mut radii = self.bandwidths.radii(kind, photons, p, ng, self.length);
+        if PATHS && self.scattered_broadly {
+            let largest2 = radii.radius2[radii.count.saturating_sub(1)];
+            let factor = (radii.indirect_cap2 / largest2).min(1.0);
+            radii.radius2.iter_mut().for_each(|radius2| *radius2 *= factor);
         }
-        self.sums.map(|sums| Rgb::from(sums.map(f32x8::reduce_add)))
+        let sharp = onward.lobes & LobeSet::SHARP;
+        let shared = kind == Kind::Caustic
+            && !sharp.is_empty()
+            && self.classes.has(self.suffix.then(Event::Sharp).class_with(LightPrefix::FOCUSED));
+        let mut glints = shared.then(|| self.glints.gather(self.kernel, vertex.shading, ng, onward, &radii, photons));
+        let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
+        let Some(&largest) = radii.last() else { return };
+        let longest = self.max_depth - vertex.depth;
+        let mut counter = self.bandwidths.counter(kind, frame);
+        let reach2 = counter.reach2(largest);
+        // Bandwidth rules count the photons that broad lobes see. Metal has no broad lobes, so glints count there.
+        let counts = <B::Counter<'_> as PhotonCounter>::COUNTS && broad.is_empty();
+        if let Some(glints) = glints.as_mut().filter(|_| counts) {
+            glints.extend_reach(reach2);
+        }
+        let mut batch = Batch::new(self.kernel, radii, self.waiting, vertex, broad, broad | sharp);
+        let near = &mut self.near[kind as usize];
+        let push = |photon: &Photon, distance2| {
+            if u32::from(photon.depth) <= longest {
+                if let Some(glints) = &mut glints {
+                    let light = glints.push(photon, distance2);
+                    if counts && light != Rgb::ZERO {
+                        let light = (light * vertex.throughput).element_sum() / 3.0;
+                        counter.count(&FoundPhotons::one(photon.p - p, distance2, light, photon.thinning_key));
+                    }
+                }
+                batch.push(photon, distance2, &mut counter);
+            }
+        };
+        match &vertex.wavelength {
+            None => photons.gather(near, p, ng, reach2, push),
+            Some(wavelength) => gather_dispersed(photons, near, vertex, wavelength, reach2, push),
+        }
+        let sums = batch.finish(&mut counter);
+        let into = if caustic { &mut self.sample.caustic_photons } else { &mut self.sample.indirect_photons };
+        let mut finite = true;
+        for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {
+            let light = vertex.throughput * (FRAC_1_PI / radius2) * sum;
+            finite &= light.is_finite();
+            into[usize::from(level)] += light;
+        }
+        for (level, sum) in order.into_iter().zip(glints.into_iter().flat_map(GlintGather::finish)) {
+            let light = vertex.throughput * sum;
+            finite &= light.is_finite();
+            self.sample.indirect_photons[usize::from(level)] += light;
+        }
+        if !finite {
+            self.sample.reject(Cause::Photons);
+        }
     }
+}
+
+/// Visits the photons around a vertex whose path has a wavelength: those whose wavelength is compatible, with their flux
+/// weighted. Not inlined, so that the common case stays small.
+#[inline(never)]
+fn gather_dispersed(
+    photons: &PhotonMap,
+    near: &mut Near<Photon>,
+    vertex: &Vertex<'_, '_>,
+    wavelength: &Wavelength,
+    reach2: f32,
+    mut push: impl FnMut(&Photon, f32),
+) {
+    photons.gather(near, vertex.surface.p, vertex.surface.ng, reach2, |photon, distance2| {
+        if let Some(weight) = wavelength.connection_factor(photon.band) {
+            push(&Photon { flux: photon.flux * weight, ..*photon }, distance2);
+        }
+    });
 }

@@ -1,88 +1,90 @@
-//! Light of lamps that have a size, sent by perfect mirrors and clear glass to the sharp lobes of a vertex X. Camera paths
-//! that go on find it, and so do photons: each well where the other does not. A bulb behind glass that a varnished door
-//! shows is met by one camera path in thousands, which then is a bright spot; the photons around X know of it. A sharp
-//! highlight is found by every other camera path and blurred by photons.
+//! Glints: light of lights with a size that perfect mirrors and clear glass send to the sharp lobes of a vertex X.
+//! Continued camera paths find it, and so do photons, each well where the other does not. One camera path in thousands
+//! hits a bulb behind glass that a varnished door reflects, which makes a bright spot; the photons around X find it
+//! reliably. A sharp highlight is found by every other camera path, and photons would blur it.
 //!
-//! Both are weighed by the balance heuristic, as vertex merging and unidirectional sampling are \[Georgiev et al. 2012,
-//! (10)\]. A camera path goes from X along a direction with a density `pdf` per solid angle. Light paths leave the lamp
-//! along the same ray with a density e per area that faces it and per solid angle; as mirrors and clear glass keep the
-//! area times the solid angle of light, they come to X along it with `e cos` per area and solid angle. So within the
-//! squared radius r^2 of X there are, of n light paths,
+//! The balance heuristic weighs both, as vertex merging and unidirectional sampling in \[Georgiev et al. 2012, (10)\]. A
+//! camera path leaves X along a direction with density `pdf` per solid angle. Light paths leave the light along the same
+//! line with density e per area facing it and per solid angle. Mirrors and clear glass keep the product of area and solid
+//! angle, so light paths arrive at X with density `e cos` per area and solid angle. Of n light paths there are
 //!
 //! `n pi r^2 e cos / pdf`
 //!
-//! photons for every camera path. What one of them brings is bounded, however small r is. Weights need only be the same
-//! function of the whole path on either side: of e both know the leading power of two ([`PhotonFlags::density`]).
+//! photons within the radius r around X for every camera path. The contribution of one of them is bounded, however small
+//! r is. Both sides must compute the same weight for a path, so both use e rounded down to a power of two
+//! ([`PhotonFlags::density`]).
 
 use super::bandwidths::{LevelRadii, MAX_LEVELS};
+use super::gathering_walk::Onward;
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec3};
 use crate::photon::{Kernel, Photon, PhotonFlags, PhotonMap};
 use std::f32::consts::PI;
 
-/// Share of the area in which other photons are gathered: merging is one of two strategies, and as small a kernel
-/// suffices.
-const AREA: f32 = 1.0 / 4.0;
+/// Kernel area for glints over the kernel area of other photons. It is smaller because photons are only one of two
+/// techniques here.
+const AREA_RATIO: f32 = 1.0 / 4.0;
 
-/// How many photons are merged at a vertex: `n pi r^2` by level.
+/// Number of light paths times kernel area at a vertex, by level: `n pi r^2`.
 #[derive(Clone, Copy, Debug)]
-struct Merged {
+struct MergeAreas {
     areas: [f32; MAX_LEVELS],
-    /// The level of each.
+    /// The level of each area.
     order: [u8; MAX_LEVELS],
+    /// Number of areas; 0 where no photons are gathered.
     count: usize,
-    /// Probability of going on by the sharp lobes.
+    /// Probability that the path continues by the sharp lobes.
     going: f32,
 }
 
-impl Merged {
-    const NOTHING: Merged = Merged { areas: [0.0; MAX_LEVELS], order: [0; MAX_LEVELS], count: 0, going: 1.0 };
+impl MergeAreas {
+    const NONE: MergeAreas = MergeAreas { areas: [0.0; MAX_LEVELS], order: [0; MAX_LEVELS], count: 0, going: 1.0 };
 }
 
-/// What a camera path knows of its last X.
+/// State of a camera path from which the weights of glints follow.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glints {
     /// At the last vertex that is not a perfect mirror or clear glass.
-    here: Merged,
-    /// At X, if the path has come from there by a sharp lobe and delta lobes alone since.
-    at: Merged,
-    /// Cosine over density of the direction in which it has left X.
+    here: MergeAreas,
+    /// At X, if the path left it by a sharp lobe and met delta lobes only since.
+    at: MergeAreas,
+    /// Cosine over density of the direction in which the path left X.
     onward: f32,
 }
 
 impl Glints {
-    pub const NONE: Glints = Glints { here: Merged::NOTHING, at: Merged::NOTHING, onward: 0.0 };
+    pub const NONE: Glints = Glints { here: MergeAreas::NONE, at: MergeAreas::NONE, onward: 0.0 };
 
-    /// At a vertex where nothing is merged, unless [`Glints::merge`] says otherwise.
+    /// The path arrives at a vertex. Glints are not gathered there unless [`Glints::gather`] is called.
     #[inline]
     pub fn arrive(&mut self) {
         self.here.count = 0;
     }
 
-    /// Photons of a map are merged at this vertex, from which the path goes on by `onward`, sharp lobes and delta ones,
-    /// with a probability.
+    /// Starts to gather photons of `map` at the sharp lobes of this vertex. The path continues by `onward`, its sharp and
+    /// delta lobes.
     #[inline]
-    pub fn merge<'s, K: Kernel>(
+    pub fn gather<'s, K: Kernel>(
         &mut self,
         _: K,
-        (shading, ng): (&'s Shading<'s>, Vec3),
-        (onward, going): (LobeSet, f32),
+        shading: &'s Shading<'s>,
+        ng: Vec3,
+        onward: Onward,
         radii: &LevelRadii,
         map: &PhotonMap,
-    ) -> Merging<'s, K> {
+    ) -> GlintGather<'s, K> {
         let paths = map.paths() as f32;
         let count = if map.paths() == 0 { 0 } else { radii.count };
-        let radius2 = radii.radius2.map(|radius2| AREA * radius2);
+        let radius2 = radii.radius2.map(|radius2| AREA_RATIO * radius2);
         let areas = radius2.map(|radius2| paths * PI * radius2);
-        self.here = Merged { areas, order: radii.order, count, going };
+        self.here = MergeAreas { areas, order: radii.order, count, going: onward.probability };
         let reach2 = count.checked_sub(1).map_or(0.0, |last| radius2[last]);
-        Merging {
+        GlintGather {
             kernel: std::marker::PhantomData,
             shading,
             ng,
             onward,
-            going,
             paths,
             radius2,
             largest: PI * reach2,
@@ -91,7 +93,7 @@ impl Glints {
         }
     }
 
-    /// The path goes on from a vertex.
+    /// The path leaves a vertex with geometric normal `ng` along `sample`.
     #[inline]
     pub fn scatter(&mut self, ng: Vec3, sample: &BsdfSample) {
         if sample.lobe.intersects(LobeSet::SHARP) {
@@ -102,46 +104,46 @@ impl Glints {
         }
     }
 
-    /// Whether photons are merged, too, of the light that the path runs into now.
+    /// Whether photons, too, find the light that the path hits now.
     #[inline]
-    pub fn shared(&self) -> bool {
+    pub fn are_shared(&self) -> bool {
         self.at.count > 0
     }
 
-    /// Levels, and the weight of this path in each, where it has run into light of some density.
+    /// Levels, and the weight of the camera path at each, if it hits light of this density.
     #[inline]
-    pub fn weights(&self, density: &EmissionDensity) -> impl Iterator<Item = (usize, f32)> {
+    pub fn path_weights(&self, density: &EmissionDensity) -> impl Iterator<Item = (usize, f32)> {
         let density = PhotonFlags::from_area_light(density.ray_density()).density();
-        let Merged { areas, order, count, .. } = self.at;
+        let MergeAreas { areas, order, count, .. } = self.at;
         let onward = self.onward;
         (0..count).map(move |k| (usize::from(order[k]), 1.0 / (1.0 + areas[k] * density * onward)))
     }
 }
 
-/// Photons being merged at the sharp lobes of a vertex.
-pub(super) struct Merging<'s, K> {
+/// Sums of the photons gathered at the sharp lobes of one vertex.
+pub(super) struct GlintGather<'s, K> {
     kernel: std::marker::PhantomData<K>,
     shading: &'s Shading<'s>,
     ng: Vec3,
-    onward: LobeSet,
-    going: f32,
+    onward: Onward,
     paths: f32,
     radius2: [f32; MAX_LEVELS],
     /// Area of the largest kernel.
     largest: f32,
+    /// Squared radius within which photons are evaluated.
     reach2: f32,
     sums: [Rgb; MAX_LEVELS],
 }
 
-impl<K: Kernel> Merging<'_, K> {
-    /// Looks at photons as far away as this (squared), although those beyond the kernels bring nothing now.
+impl<K: Kernel> GlintGather<'_, K> {
+    /// Evaluates photons up to this squared distance, for bandwidth rules that count beyond the kernels.
     #[inline]
-    pub fn look_beyond(&mut self, reach2: f32) {
+    pub fn extend_reach(&mut self, reach2: f32) {
         self.reach2 = self.reach2.max(reach2);
     }
 
-    /// Adds a photon at a distance squared, if it is one of these. Returns what it would bring to the largest kernel
-    /// from within, before it is divided by an area.
+    /// Adds a photon at this squared distance, if it came directly from a light with a size. Returns its light within the
+    /// largest kernel, before division by an area.
     #[inline(always)]
     pub fn push(&mut self, photon: &Photon, distance2: f32) -> Rgb {
         if distance2 < self.reach2 && photon.flags.density() > 0.0 { self.add(photon, distance2) } else { Rgb::ZERO }
@@ -149,25 +151,25 @@ impl<K: Kernel> Merging<'_, K> {
 
     #[inline(never)]
     fn add(&mut self, photon: &Photon, distance2: f32) -> Rgb {
-        let Merging { shading, ng, onward, .. } = *self;
-        let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, onward);
+        let GlintGather { shading, ng, onward, .. } = *self;
+        let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, onward.lobes);
         let cosine = photon.cosine();
-        let (cos, pdf) = (photon.wi.dot(ng).abs(), pdf * self.going);
-        // What is no number goes on, for the sample to be rejected by.
+        let (cos, pdf) = (photon.wi.dot(ng).abs(), pdf * onward.probability);
+        // NaN fails these tests and goes on, so that the sample is rejected.
         if pdf <= 0.0 || cosine <= 0.0 || cos <= 0.0 {
             return Rgb::ZERO;
         }
-        // Area within which a photon is expected for every camera path.
-        let one_each = pdf / (self.paths * photon.flags.density() * cos);
+        // Area in which one photon is expected for every camera path.
+        let area_per_photon = pdf / (self.paths * photon.flags.density() * cos);
         let light = photon.flux * f / cosine;
         for (sum, radius2) in self.sums.iter_mut().zip(self.radius2) {
             if distance2 < radius2 {
                 let kernel = if K::BOX { 1.0 } else { K::weight(distance2 / radius2) };
-                // The weight over pi r^2, which is bounded however small the kernel.
-                *sum += light * (kernel / (one_each + PI * radius2));
+                // The weight over pi r^2; bounded however small the kernel is.
+                *sum += light * (kernel / (area_per_photon + PI * radius2));
             }
         }
-        light * (self.largest / (one_each + self.largest))
+        light * (self.largest / (area_per_photon + self.largest))
     }
 
     /// Radiance by level, in the order of radii.
@@ -189,10 +191,10 @@ mod tests {
     const PATHS: u32 = 5000;
     const GOING: f32 = 0.6;
 
-    /// For the same path the weights of either strategy sum to one: at all bandwidths, seen from anywhere, of metal and
-    /// varnish, with a bent shading normal.
+    /// The weights of both techniques sum to one for a path: at all bandwidths, view directions, for metal and varnish,
+    /// with a tilted shading normal.
     #[test]
-    fn weights_sum_to_one() {
+    fn weights_of_paths_and_photons_sum_to_one() {
         let tables = EnergyTables::new([1.5]);
         let metal = Parameters {
             base_color: Rgb::splat(0.8),
@@ -203,7 +205,8 @@ mod tests {
             ..Parameters::default()
         };
         let varnish = Parameters { metallic: 0.0, specular: 1.0, ..metal };
-        let onward = LobeSet::SHARP | LobeSet::DELTA;
+        let lobes = LobeSet::SHARP | LobeSet::DELTA;
+        let onward = Onward { lobes, probability: GOING };
         let mut least = [1.0f32; 2];
         for parameters in [metal, varnish] {
             let interface = Interface::new(&parameters, &tables);
@@ -212,12 +215,9 @@ mod tests {
                 let draws = Stream::new(1, 0, Domain::Test, i).vertex(0);
                 let wo = crate::math::warp::hemisphere_cosine(draws.two(Purpose::Pixel));
                 let shading = Shading::new(Frame::from_normal(Vec3::new(0.1, 0.0, 1.0).normalize()), Vec3::Z, bsdf, wo);
-                let Some(sample) = shading.sample(
-                    Transport::Radiance,
-                    onward,
-                    draws.one(Purpose::Lobe),
-                    draws.two(Purpose::Direction),
-                ) else {
+                let Some(sample) =
+                    shading.sample(Transport::Radiance, lobes, draws.one(Purpose::Lobe), draws.two(Purpose::Direction))
+                else {
                     continue;
                 };
                 let density = 10f32.powf(8.0 * draws.one(Purpose::Lens) - 4.0);
@@ -240,15 +240,15 @@ mod tests {
                 let mut glints = Glints::NONE;
                 let map = PhotonMap::build(vec![photon]).of_paths(PATHS);
                 let radii = LevelRadii::new(LEVELS.into_iter());
-                let mut merging = glints.merge(kernel::Box, (&shading, Vec3::Z), (onward, GOING), &radii, &map);
+                let mut merging = glints.gather(kernel::Box, &shading, Vec3::Z, onward, &radii, &map);
                 merging.push(&photon, 0.0);
                 let merged = merging.finish();
-                let found = sample.wi.z.abs().recip() * shading.eval_cos(sample.wi, Transport::Radiance, onward);
+                let found = sample.wi.z.abs().recip() * shading.eval_cos(sample.wi, Transport::Radiance, lobes);
                 glints.scatter(Vec3::Z, &sample);
-                let weights: Vec<(usize, f32)> = glints.weights(&density).collect();
+                let weights: Vec<(usize, f32)> = glints.path_weights(&density).collect();
                 assert_eq!(weights.len(), LEVELS.len());
                 for ((level, weight), radius2) in weights.into_iter().zip(LEVELS) {
-                    let other = (merged[level] * (PI * AREA * radius2) / found).x;
+                    let other = (merged[level] * (PI * AREA_RATIO * radius2) / found).x;
                     assert!((weight + other - 1.0).abs() < 1e-4, "{weight} {other}");
                     least = [least[0].min(weight), least[1].min(other)];
                 }
@@ -257,14 +257,15 @@ mod tests {
         assert!(least[0] < 0.01 && least[1] < 0.01, "{least:?}");
     }
 
-    /// Photons bring nothing where nobody knows how many to expect.
+    /// Photons contribute only if the number of light paths and the density of emission are known.
     #[test]
-    fn unknown_photons_are_not_merged() {
+    fn photons_of_unknown_density_are_not_gathered() {
         let mut glints = Glints::NONE;
         let tables = EnergyTables::new([1.5]);
         let parameters = Parameters { metallic: 1.0, alpha_x: 0.1, alpha_y: 0.1, ..Parameters::default() };
         let interface = Interface::new(&parameters, &tables);
         let shading = Shading::new(Frame::from_normal(Vec3::Z), Vec3::Z, Bsdf::new(&parameters, &interface), Vec3::Z);
+        let sharp = Onward { lobes: LobeSet::SHARP, probability: GOING };
         let known = Photon {
             wi: Vec3::Z,
             ng: Vec3::Z,
@@ -277,14 +278,14 @@ mod tests {
         {
             let map = PhotonMap::build(vec![photon]).of_paths(paths);
             let radii = LevelRadii::new(LEVELS.into_iter());
-            let mut merging = glints.merge(kernel::Box, (&shading, Vec3::Z), (LobeSet::SHARP, GOING), &radii, &map);
+            let mut merging = glints.gather(kernel::Box, &shading, Vec3::Z, sharp, &radii, &map);
             merging.push(&photon, 0.0);
             assert_eq!(merging.finish()[0].x > 0.0, merges);
         }
     }
 
-    /// Powers of two stay, others are rounded down, what is beyond the range is at its ends; no density is taken for
-    /// none or for a delta light.
+    /// Powers of two are exact, other densities are rounded down and clamped to the range; none is taken for zero or for
+    /// a delta light.
     #[test]
     fn densities_are_known_to_a_factor_of_two() {
         for exponent in -62..63 {

@@ -136,7 +136,7 @@ impl<'a> LightPaths<'a> {
     }
 
     /// Number of light paths.
-    pub fn paths(&self) -> u32 {
+    pub fn count(&self) -> u32 {
         self.paths
     }
 
@@ -340,13 +340,13 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        self.within = vertex.met.interior.host(self.scene).is_some();
+        self.within = vertex.arrival.interior.host(self.scene).is_some();
         if !self.arrives(scattered) {
             return Next::Stop;
         }
         if scattered.is_some() {
             self.photons.volume.push(VolumePhoton {
-                p: vertex.met.p,
+                p: vertex.arrival.p,
                 wi: vertex.wo,
                 flux: vertex.arriving * self.scale,
                 medium: vertex.medium_id(self.scene),

@@ -5,10 +5,11 @@
 
 use super::bidirectional::{Record, Technique};
 use super::bidirectional_camera::{record_medium, record_surface};
-use super::camera_paths::{CameraPaths, PixelSample};
+use super::camera_paths::CameraPaths;
 use super::cause::Cause;
 use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
+use super::pixel_sample::PixelSample;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::token;
 use super::shares::{shares, wanted};

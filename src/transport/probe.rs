@@ -112,8 +112,8 @@ impl<'a> Visitor<'a> for FindVolumePoint {
     }
 
     fn medium(&mut self, vertex: &MediumVertex, _: Option<Scattered>) -> Next {
-        let length = self.length + vertex.met.distance;
-        self.found.get_or_insert(GatherPoint { p: vertex.met.p, ng: NO_NORMAL, length });
+        let length = self.length + vertex.arrival.distance;
+        self.found.get_or_insert(GatherPoint { p: vertex.arrival.p, ng: NO_NORMAL, length });
         Next::Stop
     }
 }

@@ -218,12 +218,12 @@ impl ScatterPoint for MediumVertex {
 
     #[inline]
     fn receiver(&self) -> Receiver {
-        Receiver { p: self.met.p, n: Vec3::ZERO, in_medium: true }
+        Receiver { p: self.arrival.p, n: Vec3::ZERO, in_medium: true }
     }
 
     #[inline]
     fn p(&self) -> Vec3 {
-        self.met.p
+        self.arrival.p
     }
 
     #[inline]
@@ -277,12 +277,12 @@ impl ScatterPoint for MediumVertex {
 
     #[inline]
     fn ray_origin(&self, _: Vec3) -> Vec3 {
-        self.met.p
+        self.arrival.p
     }
 
     #[inline]
     fn interiors(&self) -> [&Interior; 2] {
-        [&self.met.interior; 2]
+        [&self.arrival.interior; 2]
     }
 
     #[inline]

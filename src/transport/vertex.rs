@@ -60,7 +60,7 @@ impl Vertex<'_, '_> {
 /// A vertex of a path in a medium.
 pub struct MediumVertex {
     /// What the walk has met.
-    pub met: MediumArrival,
+    pub arrival: MediumArrival,
     /// Unit direction back along the path.
     pub wo: Vec3,
     /// Weight of the path up to here, the scattering coefficient included: what is left is to multiply by the phase
@@ -89,19 +89,19 @@ impl MediumVertex {
     /// Where it scatters to.
     #[inline]
     pub fn phase(&self) -> HenyeyGreenstein {
-        self.met.medium.phase()
+        self.arrival.medium.phase()
     }
 
     /// Share of light that is scattered, not absorbed.
     pub fn albedo(&self) -> Rgb {
-        let sigma_t = self.met.medium.sigma_t();
-        Rgb::select(sigma_t.cmpgt(Rgb::ZERO), self.met.medium.sigma_s / sigma_t, Rgb::ZERO)
+        let sigma_t = self.arrival.medium.sigma_t();
+        Rgb::select(sigma_t.cmpgt(Rgb::ZERO), self.arrival.medium.sigma_s / sigma_t, Rgb::ZERO)
     }
 
     /// Which medium this is: the index of its material, or `u32::MAX` for the one that fills the scene.
     #[inline]
     pub fn medium_id(&self, scene: &Scene) -> u32 {
-        self.met.interior.material(scene).unwrap_or(u32::MAX)
+        self.arrival.interior.material(scene).unwrap_or(u32::MAX)
     }
 }
 
@@ -148,7 +148,7 @@ pub trait Visitor<'a> {
     /// A second vertex in the same medium, of a walk that splits, at which nothing but its share of next-event
     /// estimation is to be measured.
     #[inline]
-    fn lit(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
+    fn medium_next_event(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
         let _ = (vertex, scattered);
     }
     /// `sample` is drawn at `vertex`, and the path goes on.

@@ -114,7 +114,7 @@ impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
         Next::Continue(LobeSet::ALL)
     }
 
-    fn lit(&mut self, _: &MediumVertex, _: Option<Scattered>) {
+    fn medium_next_event(&mut self, _: &MediumVertex, _: Option<Scattered>) {
         self.passed();
     }
 

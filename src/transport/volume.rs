@@ -53,7 +53,7 @@ impl<'a> Volume<'a> {
         let radius2 = self.radii2();
         let largest2 = radius2.iter().fold(0.0, |largest: f32, &radius2| largest.max(radius2));
         let phase = vertex.phase();
-        self.photons.gather(near, vertex.met.p, NO_NORMAL, largest2, |photon, distance2| {
+        self.photons.gather(near, vertex.arrival.p, NO_NORMAL, largest2, |photon, distance2| {
             if photon.medium != medium || u32::from(photon.depth) > longest {
                 return;
             }
@@ -107,7 +107,7 @@ mod tests {
         let (interior, first) = (Interior::default(), None);
         let met = MediumArrival { p: Vec3::splat(0.5), medium, interior, weight: Rgb::ONE, distance: 1.0, first };
         MediumVertex {
-            met,
+            arrival: met,
             wo: Vec3::Y,
             throughput: Rgb::new(1.0, 2.0, 0.5),
             arriving: Rgb::ONE,

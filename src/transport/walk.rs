@@ -237,7 +237,7 @@ impl<'a> Path<'a> {
         let vertex = MediumVertex {
             wo: -self.direction,
             throughput: arriving * met.medium.sigma_s,
-            met,
+            arrival: met,
             arriving,
             depth,
             from: self.origin,
@@ -267,8 +267,8 @@ impl<'a> Path<'a> {
         visitor.scatter_medium(&vertex, &sample);
         self.throughput = vertex.throughput * sample.weight / survival;
         self.scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * survival });
-        (self.origin, self.direction) = (vertex.met.p, sample.wi);
-        (self.interior, self.in_medium, self.leaving) = (vertex.met.interior, true, None);
+        (self.origin, self.direction) = (vertex.arrival.p, sample.wi);
+        (self.interior, self.in_medium, self.leaving) = (vertex.arrival.interior, true, None);
         Some(())
     }
 

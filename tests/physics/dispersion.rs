@@ -339,7 +339,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
         for seed in 0..seeds {
             let pass = LightPaths::new(seed, 0, Domain::Light, 40_000, 3);
             let mut photons = Photons::default();
-            for index in 0..pass.paths() {
+            for index in 0..pass.count() {
                 light_path(&scene, &Bump::new(), &initial_media, &pass, index, &mut photons);
             }
             let (mut flux, mut moment) = ([0.0f64; 3], [0.0f64; 3]);

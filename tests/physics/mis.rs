@@ -101,12 +101,12 @@ impl<'a> Visitor<'a> for Notes<'a> {
 
     fn medium(&mut self, v: &MediumVertex, _: Option<Scattered>) -> Next {
         self.met.push(Met {
-            p: v.met.p,
+            p: v.arrival.p,
             ng: Vec3::ZERO,
             scatters: Scatters::Medium(v.phase()),
-            medium: Some(v.met.medium),
+            medium: Some(v.arrival.medium),
             wo: v.wo,
-            distance: v.met.distance,
+            distance: v.arrival.distance,
             onward: None,
             emitted: None,
         });

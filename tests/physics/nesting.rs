@@ -153,7 +153,7 @@ fn light_starts_where_its_lamp_is() {
     let initial_media = InitialMedia::of(&scene, &camera);
     let pass = LightPaths::new(0, 1, Domain::Light, 4096, 8);
     let (mut wet, mut inside, mut outside) = (0, 0, 0);
-    for emitted in (0..pass.paths()).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
+    for emitted in (0..pass.count()).filter_map(|index| pass.emit(&scene, &initial_media, index)) {
         let (p, d) = (emitted.start.origin, emitted.start.direction);
         let within_ball = (p - Vec3::new(0.9, 1.0, 0.0)).dot(d) < 0.0;
         let expected = match () {

@@ -14,7 +14,7 @@ use serde::de::DeserializeOwned;
 
 /// A rule whose bandwidths follow from the photons found so far. One bandwidth per level of a pixel; the levels of one
 /// camera path are counted and updated together.
-pub trait CountingRule: Sync {
+pub trait CountingRule: Clone + Sync {
     /// State of a level of a pixel, kept between iterations.
     type Bandwidth: Copy + Send + Sync + Serialize + DeserializeOwned;
     /// What is kept beside it.

@@ -253,7 +253,7 @@ impl<'a> Passes<'a> {
             photons.reserve(self.left.iter().map(|left| left.photons.len()).sum());
             self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
         }
-        let walked = self.pairs.len() as u64 * u64::from(passes[0].paths());
+        let walked = self.pairs.len() as u64 * u64::from(passes[0].count());
         let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
         let gathered = sample_buffer::add(
             &self.samples,

@@ -1,10 +1,11 @@
-//! From settings to the passes that they ask for: the one place that knows which pass a method is.
+//! The one place that knows the integrator of each method.
 
 use super::bidirectional::Passes;
-use super::counting::Counting;
 use super::integrator::Integrator;
 use super::metropolis::Metropolis;
 use super::path::Paths;
+use super::photon_tracer::PhotonTracer;
+use super::pixel_bandwidths::{Counted, Scheduled};
 use super::pm::Pm;
 use super::sppm::Sppm;
 use crate::camera::Camera;
@@ -29,7 +30,7 @@ pub(in crate::render) fn integrator<'a>(
     let pairs = |techniques| Box::new(Passes::new(scene, camera, settings, initial_media, techniques));
     match settings.method {
         Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => {
-            gathering(Sppm::new(scene, camera, settings, initial_media), settings)
+            sppm(PhotonTracer::new(scene, camera, settings, initial_media), settings)
         }
         Method::Pm => Box::new(Pm::new(scene, camera, settings, initial_media)),
         Method::Path => Box::new(Paths::new(settings.camera_paths(scene, camera, initial_media), settings)),
@@ -41,32 +42,48 @@ pub(in crate::render) fn integrator<'a>(
     }
 }
 
-/// Progressive photon mapping by the rule that the settings say.
-fn gathering<'a>(sppm: Sppm<'a>, settings: &'a Settings) -> Box<dyn Integrator + 'a> {
+/// Progressive photon mapping with the bandwidth rule and the kernel of the settings.
+fn sppm<'a>(tracer: PhotonTracer<'a>, settings: &'a Settings) -> Box<dyn Integrator + 'a> {
     use BandwidthRule as Rule;
-    match (settings.bandwidth_rule(), settings.kernel) {
-        // Photons of equal flux are as dense as the light.
-        (Some(Rule::ChiSquared), _) if sppm.guide().is_some() && !settings.has_channels() => {
-            counting(sppm, settings, Thinned::new(&settings.chi_squared), kernel::Box)
+    match settings.bandwidth_rule() {
+        // Photons of equal flux need no thinning: they are as dense as the light.
+        Some(Rule::ChiSquared) if tracer.guide().is_some() && !settings.has_channels() => {
+            counted(tracer, settings, Thinned::new(&settings.chi_squared), kernel::Box)
         }
-        (Some(Rule::ChiSquared), _) => counting(sppm, settings, ChiSquared::new(&settings.chi_squared), kernel::Box),
-        (Some(Rule::Adaptive), KernelChoice::Box) => adaptive(sppm, settings, kernel::Box),
-        (Some(Rule::Adaptive), KernelChoice::Epanechnikov) => adaptive(sppm, settings, kernel::Epanechnikov),
-        (Some(Rule::Adaptive), KernelChoice::Gaussian) => adaptive(sppm, settings, kernel::Gaussian),
-        (Some(Rule::Local), _) => counting(sppm, settings, LocalStatistics { alpha: settings.alpha }, kernel::Box),
-        (Some(Rule::Memoryless) | None, _) => Box::new(sppm),
+        Some(Rule::ChiSquared) => counted(tracer, settings, ChiSquared::new(&settings.chi_squared), kernel::Box),
+        Some(Rule::Adaptive) => match settings.kernel {
+            KernelChoice::Box => adaptive(tracer, settings, kernel::Box),
+            KernelChoice::Epanechnikov => adaptive(tracer, settings, kernel::Epanechnikov),
+            KernelChoice::Gaussian => adaptive(tracer, settings, kernel::Gaussian),
+        },
+        Some(Rule::Local) => counted(tracer, settings, LocalStatistics { alpha: settings.alpha }, kernel::Box),
+        Some(Rule::Memoryless) | None => match settings.kernel {
+            KernelChoice::Box => memoryless(tracer, settings, kernel::Box),
+            KernelChoice::Epanechnikov => memoryless(tracer, settings, kernel::Epanechnikov),
+            KernelChoice::Gaussian => memoryless(tracer, settings, kernel::Gaussian),
+        },
     }
 }
 
-fn adaptive<'a, K: Kernel + Default>(sppm: Sppm<'a>, settings: &'a Settings, kernel: K) -> Box<dyn Integrator + 'a> {
-    counting(sppm, settings, Adaptive::<K>::default(), kernel)
+fn memoryless<'a>(tracer: PhotonTracer<'a>, settings: &'a Settings, kernel: impl Kernel) -> Box<dyn Integrator + 'a> {
+    Box::new(Sppm::new(tracer, settings, Scheduled::new(settings), kernel))
 }
 
-fn counting<'a>(
-    sppm: Sppm<'a>,
+fn adaptive<'a, K: Kernel + Default>(
+    tracer: PhotonTracer<'a>,
+    settings: &'a Settings,
+    kernel: K,
+) -> Box<dyn Integrator + 'a> {
+    counted(tracer, settings, Adaptive::<K>::default(), kernel)
+}
+
+fn counted<'a>(
+    tracer: PhotonTracer<'a>,
     settings: &'a Settings,
     rule: impl CountingRule + 'a,
     kernel: impl Kernel,
 ) -> Box<dyn Integrator + 'a> {
-    Box::new(Counting::new(sppm, settings, rule, kernel))
+    let kinds = settings.bandwidth_kinds(&tracer.camera_paths().scene.survey);
+    let bandwidths = Counted::new(settings, kinds, tracer.map_count(), rule);
+    Box::new(Sppm::new(tracer, settings, bandwidths, kernel))
 }

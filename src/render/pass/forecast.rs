@@ -1,6 +1,6 @@
 //! What light paths will leave, told by a few of them before there is any memory for all.
 
-use super::sppm::trace_photons;
+use super::photon_tracer::trace_photons;
 use crate::camera::Camera;
 use crate::photon::kind;
 use crate::random::Domain;

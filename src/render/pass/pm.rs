@@ -13,8 +13,8 @@
 //! number of paths that were traced.
 
 use super::integrator::{Integrator, Work};
+use super::photon_tracer::trace_range;
 use super::sample_buffer::{self, SampleBuffer};
-use super::sppm::trace_some;
 use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
 use crate::estimator::{InitialBandwidth, PixelAccumulator};
@@ -26,7 +26,7 @@ use crate::render::clock::cpu_seconds;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::{
-    Bandwidths, CameraPaths, Indirect, InitialMedia, LevelRadii, LightPaths, Photons, Scratch, light_path,
+    CameraPaths, GatherBandwidths, Indirect, InitialMedia, LevelRadii, LightPaths, Photons, Scratch, light_path,
 };
 use bumpalo::Bump;
 
@@ -45,10 +45,10 @@ fn trace(
     most: usize,
 ) -> (ByKind<Vec<Photon>>, u32, u64) {
     let (mut photons, mut traced, mut lost): (ByKind<Vec<Photon>>, _, _) = (ByKind::default(), 0, 0);
-    while traced < pass.paths() {
-        let paths = traced..pass.paths().min(traced.saturating_add(BATCH));
+    while traced < pass.count() {
+        let paths = traced..pass.count().min(traced.saturating_add(BATCH));
         let end = paths.end;
-        let batch = trace_some(scene, initial_media, pass, paths);
+        let batch = trace_range(scene, initial_media, pass, paths);
         if kind::count(&photons) + kind::count(&batch.surface) > most {
             break;
         }
@@ -59,7 +59,7 @@ fn trace(
     // The memory ends within a batch: path by path.
     let mut arena = Bump::new();
     let mut path = Photons::default();
-    while traced < pass.paths() {
+    while traced < pass.count() {
         light_path(scene, &arena, initial_media, pass, traced, &mut path);
         arena.reset();
         if kind::count(&photons) + kind::count(&path.surface) > most {
@@ -70,7 +70,7 @@ fn trace(
         lost += std::mem::take(&mut path.lost);
         traced += 1;
     }
-    let more = pass.paths() as f32 / traced.max(1) as f32;
+    let more = pass.count() as f32 / traced.max(1) as f32;
     photons.iter_mut().flatten().for_each(|photon| photon.flux *= more);
     (photons, traced, lost)
 }
@@ -84,16 +84,16 @@ struct Neighbours<'a> {
     least: f32,
 }
 
-impl Bandwidths for Neighbours<'_> {
-    type Place = ();
+impl GatherBandwidths for Neighbours<'_> {
+    type Frame = ();
     type Counter<'c>
         = ()
     where
         Self: 'c;
 
-    fn place(_: Vec3) {}
+    fn frame(_: Vec3) {}
 
-    fn at(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
+    fn radii(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
         let cap = (SCREEN_CAP * span(self.camera, length)).max(self.least);
         let cap2 = cap * cap;
         let nearest = &mut self.nearest[kind as usize];
@@ -179,8 +179,9 @@ impl Integrator for Pm<'_> {
                 }
                 let starts = camera_paths.starts(places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
-                    let neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    samples.set(place.at, &camera_paths.sample(scratch, start, &maps, None, neighbours, kernel::Box));
+                    let mut neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
+                    samples
+                        .set(place.at, &camera_paths.sample(scratch, start, &maps, None, &mut neighbours, kernel::Box));
                 }
             },
         );

@@ -1,0 +1,222 @@
+//! The light paths of stochastic progressive photon mapping: photon maps of an iteration, and initial bandwidths from a
+//! pilot.
+
+use super::chunks::chunks;
+use super::guiding::learn_guide;
+use super::integrator::Work;
+use super::region::region;
+use super::volume::{Maps, VolumeMap};
+use crate::camera::Camera;
+use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths, median_radius2};
+use crate::estimator::{InitialBandwidth, PixelAccumulator};
+use crate::light::{Guide, Region};
+use crate::photon::{Kind, PhotonMap, kind};
+use crate::random::Domain;
+use crate::render::clock::{Phases, cpu_seconds};
+use crate::render::settings::Settings;
+use crate::scene::Scene;
+use crate::spectrum::IterationWavelengths;
+use crate::transport::{CameraPaths, EqualFlux, Indirect, InitialMedia, LightPaths, Photons, light_path};
+use bumpalo::Bump;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Traces all light paths of an iteration. Photons are in the order of paths and vertices.
+pub fn trace_photons(scene: &Scene, initial_media: &InitialMedia, paths: &LightPaths) -> Photons {
+    trace_range(scene, initial_media, paths, 0..paths.count())
+}
+
+/// Traces the light paths of an iteration whose indices lie in `range`.
+pub(super) fn trace_range(
+    scene: &Scene,
+    initial_media: &InitialMedia,
+    paths: &LightPaths,
+    range: Range<u32>,
+) -> Photons {
+    trace_by(paths, range, |arena, index, photons| {
+        light_path(scene, arena, initial_media, paths, index, photons);
+    })
+}
+
+/// Calls `light_path` for the light paths whose indices lie in `range`. Photons are in the order of paths.
+fn trace_by(
+    paths: &LightPaths,
+    range: Range<u32>,
+    light_path: impl Fn(&mut Bump, u32, &mut Photons) + Sync,
+) -> Photons {
+    let parts: Vec<Photons> = chunks(range.len() as u32)
+        .map_init(Bump::new, |arena, part| {
+            let mut photons = Photons::default();
+            for index in part.take_while(|index| !paths.is_given_up(*index)) {
+                light_path(arena, range.start + index, &mut photons);
+                arena.reset();
+            }
+            photons
+        })
+        .collect();
+    let mut photons = Photons::default();
+    for part in parts {
+        photons.lost += part.lost;
+        kind::append(&mut photons.surface, part.surface);
+        photons.volume.extend(part.volume);
+    }
+    photons
+}
+
+/// Pixels before the first iteration, with their initial bandwidths.
+pub(super) struct InitialPixels {
+    pub pixels: Vec<PixelAccumulator>,
+    /// Largest squared radius after a camera path's first broad bounce, before the radii shrink.
+    pub indirect_cap2: f32,
+}
+
+/// Traces the light paths of a render.
+pub(super) struct PhotonTracer<'a> {
+    camera_paths: CameraPaths<'a>,
+    settings: &'a Settings,
+    initial_media: &'a InitialMedia,
+    guide: Option<Guide>,
+    /// Region of interest of light from infinity.
+    region: Option<Region>,
+    /// Photons of equal flux, where the channels are traced separately.
+    equal_flux: Option<[Option<EqualFlux>; 3]>,
+}
+
+impl<'a> PhotonTracer<'a> {
+    /// Learns the guide, if the settings ask for one.
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        settings: &'a Settings,
+        initial_media: &'a InitialMedia,
+    ) -> PhotonTracer<'a> {
+        let camera_paths = settings.camera_paths(scene, camera, initial_media);
+        let guided = settings.guided && !settings.photon_classes(&scene.survey).is_empty();
+        let region = region(&camera_paths, settings.seed);
+        let guide = guided.then(|| learn_guide(&camera_paths, initial_media, settings, region)).flatten();
+        let of_channel = |channel| EqualFlux::new(scene, initial_media, channel);
+        let equal_flux = settings.has_channels().then(|| std::array::from_fn(of_channel));
+        PhotonTracer { camera_paths, settings, initial_media, guide, region, equal_flux }
+    }
+
+    /// Camera paths of the render.
+    pub fn camera_paths(&self) -> CameraPaths<'a> {
+        self.camera_paths
+    }
+
+    /// The guide of the light paths, if it is worth its cost.
+    pub fn guide(&self) -> Option<&Guide> {
+        self.guide.as_ref()
+    }
+
+    /// Number of photon maps of an iteration: one, or one for each channel.
+    pub fn map_count(&self) -> usize {
+        self.equal_flux.map_or(1, |channels| channels.len())
+    }
+
+    /// Traces the photons of iteration `i`: one map, or one for each channel.
+    pub fn maps(&self, i: u64, phases: &mut Phases) -> (Vec<Maps>, Work) {
+        let mut work = Work::default();
+        let maps = match &self.equal_flux {
+            None => {
+                let paths = self.light_paths(i, Domain::Light);
+                let trace = || trace_photons(self.camera_paths.scene, self.initial_media, &paths);
+                vec![self.timed_map(i, &paths, paths.count(), trace, phases, &mut work)]
+            }
+            Some(channels) => (0..).zip(channels).map(|(k, f)| self.channel_map(i, k, *f, phases, &mut work)).collect(),
+        };
+        (maps, work)
+    }
+
+    /// The photons of one channel, from a third of the light paths.
+    fn channel_map(&self, i: u64, channel: u64, flux: Option<EqualFlux>, phases: &mut Phases, work: &mut Work) -> Maps {
+        let Settings { seed, max_depth, photons, .. } = *self.settings;
+        let scene = self.camera_paths.scene;
+        // The channels share no random numbers.
+        let paths = LightPaths::new(seed, 3 * i + channel, Domain::Light, (photons / 3).max(1), max_depth)
+            .with(IterationWavelengths::new(seed, i))
+            .stopped_by(&self.settings.stop)
+            .wanting(self.settings.photon_classes(&scene.survey), Indirect::Photons);
+        let trace = || {
+            flux.map_or(Photons::default(), |flux| {
+                trace_by(&paths, 0..paths.count(), |arena, index, photons| {
+                    flux.light_path(scene, arena, self.initial_media, &paths, index, photons);
+                })
+            })
+        };
+        self.timed_map(i, &paths, 0, trace, phases, work)
+    }
+
+    /// Traces photons, builds their map, and adds times and counts to `phases` and `work`. `expected_paths` is the number
+    /// of light paths from which glints derive the expected number of photons; 0 if glints are not gathered.
+    fn timed_map(
+        &self,
+        i: u64,
+        paths: &LightPaths,
+        expected_paths: u32,
+        trace: impl FnOnce() -> Photons,
+        phases: &mut Phases,
+        work: &mut Work,
+    ) -> Maps {
+        let start = cpu_seconds();
+        let photons = trace();
+        let traced = cpu_seconds();
+        let maps = self.build(photons, expected_paths, i);
+        phases.light += traced - start;
+        phases.map += cpu_seconds() - traced;
+        work.light_paths += u64::from(paths.count());
+        work.photons += maps.len();
+        work.rejected += maps.rejected();
+        work.counts.add(&maps.counts());
+        maps
+    }
+
+    /// Builds the maps of the photons of iteration `i`. Glints are gathered if photons of caustics are traced.
+    fn build(&self, photons: Photons, expected_paths: u32, i: u64) -> Maps {
+        let survey = &self.camera_paths.scene.survey;
+        let lost = photons.lost;
+        let volume = survey.scattering.then(|| VolumeMap::new(photons.volume, i, self.settings));
+        let [others, caustics] = photons.surface.map(PhotonMap::build);
+        let [_, has_caustics] = self.settings.bandwidth_kinds(survey);
+        let surface = [others, caustics.of_paths(if has_caustics { expected_paths } else { 0 })];
+        Maps { surface, volume, wavelengths: IterationWavelengths::new(self.settings.seed, i), lost }
+    }
+
+    fn light_paths(&self, i: u64, domain: Domain) -> LightPaths<'_> {
+        let Settings { seed, photons, max_depth, .. } = *self.settings;
+        LightPaths::new(seed, i, domain, photons, max_depth)
+            .guided(self.guide.as_ref())
+            .lighting(self.region)
+            .wanting(self.settings.photon_classes(&self.camera_paths.scene.survey), self.settings.indirect)
+            .with(IterationWavelengths::new(seed, i))
+            .stopped_by(&self.settings.stop)
+    }
+
+    /// The pixels before the first iteration. Initial bandwidths come from a pilot, if the settings derive them from
+    /// photons.
+    pub fn initial_pixels(&self) -> InitialPixels {
+        let Settings { initial_bandwidth: initial, max_initial_bandwidth: [surface, volume], seed, .. } =
+            *self.settings;
+        let (camera_paths, scene) = (&self.camera_paths, self.camera_paths.scene);
+        let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
+            trace_photons(scene, self.initial_media, &self.light_paths(0, Domain::PilotLight))
+        } else {
+            Photons::default()
+        };
+        let maps = pilot.surface.map(PhotonMap::build);
+        let bandwidths = initial_bandwidths(camera_paths, initial, surface, seed, maps.each_ref());
+        let indirect_cap2 = match (initial, self.settings.indirect) {
+            (InitialBandwidth::Nearest(k), Indirect::Paths) => median_radius2(&maps[Kind::Caustic as usize], k),
+            _ => f32::INFINITY,
+        };
+        let mut pixels: Vec<_> = bandwidths.into_iter().map(self.settings.pixel_factory(scene)).collect();
+        if scene.survey.scattering {
+            let pilot = PhotonMap::build(pilot.volume);
+            let bandwidths = initial_volume_bandwidths(camera_paths, initial, volume, seed, &pilot);
+            for (pixel, bandwidth) in pixels.iter_mut().zip(bandwidths) {
+                pixel.volume_bandwidth = bandwidth;
+            }
+        }
+        InitialPixels { pixels, indirect_cap2 }
+    }
+}

@@ -1,0 +1,398 @@
+//! Camera paths that gather photons: one path samples its pixel at every bandwidth level.
+//!
+//! The rules below assign each path of light to one technique, so that it is counted once. X is the vertex where photons
+//! may be gathered, seen from the light:
+//! - a light, then X: next-event estimation at X and its BSDF sample ([`direct_light`]), for all lobes of X;
+//! - a light, at least one bounce, then X: photons, for the broad lobes of X; the continued camera path, for its sharp
+//!   lobes;
+//! - a delta light, delta bounces only, then X: photons also for the sharp lobes of X, because no continued path could
+//!   find that light;
+//! - another light, delta bounces only, then the sharp lobes of X: both, weighted ([`super::glint`]).
+//!
+//! With [`Indirect::Paths`] photons find caustics only, and the camera path also continues by the broad lobes of X.
+//! Between its last broad bounce and a light there is then at least one vertex:
+//! - if one of these vertices scatters broadly, next-event estimation there and the camera path find the light;
+//! - if all have narrow lobes only, photons of caustics find it at every vertex of the camera path, for broad lobes. The
+//!   camera path itself does not count such light.
+//!
+//! An X in a medium is treated as one with broad lobes only. Each segment has one in every medium that it crosses, and
+//! continues to the surface behind ([`super::flight`]).
+
+use super::bandwidths::GatherBandwidths;
+use super::camera_paths::{CameraPathStart, CameraPaths, Indirect};
+use super::cause::Cause;
+use super::direct::{BSDF_SAMPLE_PROBABILITY, balance, direct_light, next_event};
+use super::glint::Glints;
+use super::pass_through::PassThroughHit;
+use super::photon_batch::{Scratch, Waiting};
+use super::pixel_sample::{Features, PixelSample};
+use super::scattering_vertex::ScatterPoint;
+use super::segment::FirstHit;
+use super::shares::leads;
+use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::volume::Volume;
+use super::walk::walk;
+use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::light::{EmissionDensity, Receiver};
+use crate::math::{Rgb, Vec3};
+use crate::medium::FlightDensity;
+use crate::photon::{ByKind, Kernel, Near, Photon, PhotonMaps, VolumePhoton};
+use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, Part};
+use crate::random::Purpose;
+use crate::scene::Scene;
+
+/// Smallest probability of continuing by broad lobes, and by the others, at a vertex that has both.
+const MIN_CHANCE: f32 = 0.1;
+
+/// The lobes by which a path may continue, and the probability that it does.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Onward {
+    pub lobes: LobeSet,
+    pub probability: f32,
+}
+
+/// Visitor of a camera path that gathers. `PATHS`: the path continues by broad lobes ([`Indirect::Paths`]).
+pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
+    pub kernel: K,
+    pub scene: &'a Scene,
+    pub photons: &'a PhotonMaps,
+    pub near: &'a mut ByKind<Near<Photon>>,
+    pub volume: Option<Volume<'a>>,
+    pub near_volume: &'a mut Near<VolumePhoton>,
+    pub waiting: &'a mut Waiting,
+    pub bandwidths: &'a mut B,
+    pub max_depth: u32,
+    pub sample: PixelSample,
+    /// Length of the path so far.
+    pub length: f32,
+    /// Class of the path up to the last vertex.
+    pub suffix: CameraSuffix,
+    /// Lobes of the last vertex.
+    pub lobes: LobeSet,
+    pub classes: ClassSet,
+    /// The path has had a broad bounce.
+    pub scattered_broadly: bool,
+    pub glints: Glints,
+    /// The last vertex.
+    pub last: Receiver,
+}
+
+impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
+    /// Adds the light `arriving` from a light that the path has hit. `pdf_light` is the density with which next-event
+    /// estimation at the last vertex would have sampled it, `density` the density of light paths that start there.
+    #[inline]
+    fn hit_light(
+        &mut self,
+        arriving: Rgb,
+        pdf_light: f32,
+        scattered: Option<Scattered>,
+        density: impl FnOnce() -> Option<EmissionDensity>,
+    ) {
+        if PATHS && self.scattered_broadly && scattered.is_some_and(|s| !s.lobe.intersects(LobeSet::BROAD)) {
+            // A caustic: photons find it.
+            return;
+        }
+        let class = self.suffix.class_at_light(false);
+        if !self.classes.has(class) {
+            return;
+        }
+        if !arriving.is_finite() {
+            return self.sample.reject(Cause::Emission);
+        }
+        let weighted = match scattered {
+            Some(s) if !s.lobe.intersects(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
+            // Next-event estimation cannot reach through a perfect mirror or clear glass, but photons may.
+            Some(_) if self.glints.are_shared() => {
+                for (level, weight) in density().iter().flat_map(|density| self.glints.path_weights(density)) {
+                    self.sample.indirect_photons[level] += arriving * weight;
+                }
+                return;
+            }
+            _ => arriving,
+        };
+        *match class.part() {
+            Part::Emission => &mut self.sample.emission,
+            Part::Direct => &mut self.sample.direct,
+            _ => &mut self.sample.indirect,
+        } += weighted;
+    }
+
+    /// Class of the path as it arrives at the next vertex.
+    #[inline]
+    fn suffix_on_arrival(&self, scattered: Option<Scattered>) -> CameraSuffix {
+        scattered.map_or(self.suffix, |scattered| self.suffix.then(Event::of(scattered.lobe, self.lobes)))
+    }
+
+    /// `broad` and `onward`, each empty if its class of direct light is switched off.
+    #[inline]
+    fn lit_lobes(&self, broad: LobeSet, onward: LobeSet) -> (LobeSet, LobeSet) {
+        let on =
+            |event: Event| self.classes.is_all() || self.classes.has(self.suffix.then(event).class_at_light(false));
+        let only = |set: LobeSet, event: Event| if on(event) { set } else { LobeSet::empty() };
+        (only(broad, Event::Broad), only(onward, Event::Sharp))
+    }
+
+    /// Whether direct light in a medium is switched on.
+    #[inline]
+    fn lit_in_medium(&self, suffix: CameraSuffix) -> bool {
+        self.classes.has(suffix.then(Event::Medium).class_at_light(false))
+    }
+
+    /// Whether continuing by the lobes in `set` of the last vertex can reach light of a class that is switched on.
+    #[inline]
+    fn leads(&self, set: LobeSet) -> bool {
+        self.classes.is_all() || leads(self.suffix, self.lobes, set, self.classes)
+    }
+
+    /// Adds direct light at a surface vertex.
+    #[inline]
+    fn add_direct(&mut self, light: Rgb) {
+        if !light.is_finite() {
+            self.sample.reject(Cause::DirectLight);
+        }
+        *if self.suffix.is_clear() { &mut self.sample.direct } else { &mut self.sample.indirect } += light;
+    }
+
+    /// Samples a vertex of a path that also continues by broad lobes: direct light, photons, and the lobes to continue
+    /// with.
+    #[inline]
+    fn sample_and_continue(&mut self, vertex: &Vertex<'_, '_>, broad: LobeSet, onward: LobeSet) -> Next {
+        let chance = match (broad.is_empty(), onward.is_empty()) {
+            (true, _) => 0.0,
+            (false, true) => 1.0,
+            (false, false) => {
+                let [broad, onward] = [broad, onward].map(|set| vertex.shading.albedo(set).max_element());
+                (broad / (broad + onward)).clamp(MIN_CHANCE, 1.0 - MIN_CHANCE)
+            }
+        };
+        if vertex.depth < self.max_depth {
+            let probability = |set: LobeSet, chance: f32| {
+                if chance > 0.0 { chance * vertex.survival_chosen(set, chance) } else { 0.0 }
+            };
+            // After a broad bounce, light that arrives by narrow lobes is a caustic of that bounce.
+            let seen = if self.scattered_broadly { LobeSet::empty() } else { onward };
+            let lit = self.lit_lobes(broad, seen);
+            if lit != (LobeSet::empty(), LobeSet::empty()) {
+                let sets = [(lit.0, probability(broad, chance)), (lit.1, probability(seen, 1.0 - chance))];
+                self.add_direct(vertex.throughput * next_event(self.scene, vertex, sets));
+            }
+            self.gather(vertex, broad, Onward { lobes: seen, probability: probability(seen, 1.0 - chance) });
+        }
+        if !self.leads(broad | onward) {
+            return Next::Stop;
+        }
+        if vertex.draws.one(Purpose::LobeChoice) < chance {
+            self.scattered_broadly = true;
+            Next::Choose(broad, chance)
+        } else {
+            Next::Choose(onward, 1.0 - chance)
+        }
+    }
+}
+
+impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for GatheringWalk<'_, B, K, PATHS> {
+    const SPLITS: bool = true;
+
+    #[inline]
+    fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
+        let (surface, shading) = (vertex.surface, vertex.shading);
+        if scattered.is_none() {
+            self.sample.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
+            self.last = Receiver::anywhere(vertex.from);
+        }
+        self.suffix = self.suffix_on_arrival(scattered);
+        self.length += vertex.distance;
+        let (lights, materials, from) = (&self.scene.lights, &self.scene.materials, self.last);
+        if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, surface, vertex.wo) {
+            let density = || Some(lights.emitted(materials, &from, surface, vertex.wo)?.1);
+            self.hit_light(vertex.throughput * radiance, pdf, scattered, density);
+        }
+        self.last = vertex.receiver();
+        let lobes = shading.bsdf.lobes();
+        let smooth = lobes & LobeSet::SMOOTH;
+        // Lights and other surfaces that scatter nothing have features, too.
+        if self.suffix.is_clear() && lobes != LobeSet::DELTA {
+            self.sample.features = Features {
+                albedo: shading.albedo(LobeSet::ALL),
+                normal: if shading.frame.n.dot(vertex.wo) < 0.0 { -shading.frame.n } else { shading.frame.n },
+                depth: self.length,
+            };
+        }
+        self.lobes = lobes;
+        if smooth.is_empty() {
+            return Next::Continue(lobes);
+        }
+        self.glints.arrive();
+        let broad = lobes & LobeSet::BROAD;
+        let onward = lobes & (LobeSet::SHARP | LobeSet::DELTA);
+        if PATHS {
+            return self.sample_and_continue(vertex, broad, onward);
+        }
+        if vertex.depth < self.max_depth {
+            let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
+            let lit = self.lit_lobes(broad, onward);
+            if lit != (LobeSet::empty(), LobeSet::empty()) {
+                self.add_direct(vertex.throughput * direct_light(self.scene, vertex, lit.0, lit.1, survival));
+            }
+            self.gather(vertex, broad, Onward { lobes: onward, probability: survival });
+        }
+        if self.leads(onward) { Next::Continue(onward) } else { Next::Stop }
+    }
+
+    fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
+        let (lights, materials, before) = (&self.scene.lights, &self.scene.materials, self.suffix);
+        let from =
+            if scattered.is_none() { Receiver::anywhere(hit.surface.p + hit.wo * hit.distance) } else { self.last };
+        self.suffix = self.suffix_on_arrival(scattered);
+        if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, &hit.surface, hit.wo) {
+            let density = || Some(lights.emitted(materials, &from, &hit.surface, hit.wo)?.1);
+            self.hit_light(hit.throughput * radiance, pdf, scattered, density);
+        }
+        self.suffix = before;
+    }
+
+    fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
+        // The first hit is in the medium with the probability that the medium stops the ray.
+        if scattered.is_none() && self.sample.first.is_none() && vertex.draws.one(Purpose::Roulette) < vertex.opacity {
+            self.sample.first = vertex.arrival.first;
+        }
+        if vertex.depth < self.max_depth {
+            let suffix = self.suffix_on_arrival(scattered);
+            let lit = self.lit_in_medium(suffix);
+            let direct = if lit {
+                vertex.throughput * direct_light(self.scene, vertex, LobeSet::BROAD, LobeSet::empty(), 0.0)
+            } else {
+                Rgb::ZERO
+            };
+            let gathered = self.gather_in_medium(vertex, suffix);
+            let sample = &mut self.sample;
+            let (light, photons) = if suffix.is_clear() {
+                (&mut sample.volume, &mut sample.volume_photons)
+            } else {
+                (&mut sample.indirect, &mut sample.indirect_photons)
+            };
+            *light += direct;
+            for (sum, gathered) in photons.iter_mut().zip(gathered.into_iter().flatten()) {
+                *sum += gathered;
+            }
+            if !direct.is_finite() {
+                sample.reject(Cause::DirectLight);
+            } else if !gathered.iter().flatten().all(|light| light.is_finite()) {
+                sample.reject(Cause::Photons);
+            }
+        }
+        Next::Stop
+    }
+
+    #[inline]
+    fn medium_next_event(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
+        let suffix = self.suffix_on_arrival(scattered);
+        if vertex.depth < self.max_depth && !self.scene.lights.is_empty() && self.lit_in_medium(suffix) {
+            let sets = [(LobeSet::BROAD, BSDF_SAMPLE_PROBABILITY), (LobeSet::empty(), 0.0)];
+            let light = vertex.throughput * next_event(self.scene, vertex, sets);
+            if !light.is_finite() {
+                self.sample.reject(Cause::DirectLight);
+            }
+            *if suffix.is_clear() { &mut self.sample.volume } else { &mut self.sample.indirect } += light;
+        }
+    }
+
+    #[inline]
+    fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, _: FlightDensity) {
+        let scene = self.scene;
+        self.suffix = self.suffix_on_arrival(scattered);
+        let last = self.last;
+        scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |radiance, direct, start, _| {
+            let onward = || scene.lights.entry_pdf_a(last.p, direction);
+            let density =
+                || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });
+            self.hit_light(throughput * radiance, direct, scattered, density);
+        });
+    }
+
+    #[inline]
+    fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
+        self.glints.scatter(vertex.surface.ng, sample);
+    }
+
+    fn lost(&mut self) {
+        self.sample.reject(Cause::Path);
+    }
+}
+
+impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
+    /// Radiance by level from the photons around a vertex of a medium, if their class is switched on.
+    #[inline]
+    fn gather_in_medium(
+        &mut self,
+        vertex: &MediumVertex,
+        suffix: CameraSuffix,
+    ) -> Option<[Rgb; super::bandwidths::MAX_LEVELS]> {
+        let longest = self.max_depth - vertex.depth;
+        let medium = vertex.medium_id(self.scene);
+        let wanted = self.classes.has(suffix.then(Event::Medium).class_with(LightPrefix::SCATTERED));
+        self.volume.filter(|_| wanted).map(|volume| {
+            let mut sums = volume.gather(self.kernel, self.near_volume, vertex, medium, longest);
+            if sums.iter().any(|&sum| sum != Rgb::ZERO) {
+                let masses = volume.kernel_mass_inside(self.kernel, self.scene, vertex, medium);
+                sums.iter_mut().zip(masses).for_each(|(sum, mass)| *sum /= mass);
+            }
+            sums
+        })
+    }
+}
+
+impl CameraPaths<'_> {
+    /// Traces one camera path and samples all levels of `bandwidths`, and of `volume` where media scatter, with
+    /// `kernel`. `scratch` must not have served photons of another iteration.
+    #[inline]
+    pub fn sample(
+        &self,
+        scratch: &mut Scratch,
+        start: &CameraPathStart,
+        photons: &PhotonMaps,
+        volume: Option<Volume<'_>>,
+        bandwidths: &mut impl GatherBandwidths,
+        kernel: impl Kernel,
+    ) -> PixelSample {
+        match self.indirect {
+            Indirect::Photons => self.sample_with::<_, _, false>(scratch, start, photons, volume, bandwidths, kernel),
+            Indirect::Paths => self.sample_with::<_, _, true>(scratch, start, photons, volume, bandwidths, kernel),
+        }
+    }
+
+    #[inline]
+    fn sample_with<B: GatherBandwidths, K: Kernel, const PATHS: bool>(
+        &self,
+        scratch: &mut Scratch,
+        (start, stream): &CameraPathStart,
+        photons: &PhotonMaps,
+        volume: Option<Volume<'_>>,
+        bandwidths: &mut B,
+        kernel: K,
+    ) -> PixelSample {
+        let mut visitor = GatheringWalk::<B, K, PATHS> {
+            kernel,
+            scene: self.scene,
+            photons,
+            near: &mut scratch.near,
+            volume,
+            near_volume: &mut scratch.near_volume,
+            waiting: &mut scratch.waiting,
+            bandwidths,
+            max_depth: self.max_depth,
+            sample: PixelSample::default(),
+            length: 0.0,
+            suffix: CameraSuffix::START,
+            lobes: LobeSet::empty(),
+            classes: self.classes,
+            scattered_broadly: false,
+            glints: Glints::NONE,
+            last: Receiver::anywhere(Vec3::ZERO),
+        };
+        walk(self.scene, &scratch.arena, start, *stream, Transport::Radiance, self.max_depth, &mut visitor);
+        let sample = visitor.sample;
+        scratch.arena.reset();
+        sample
+    }
+}

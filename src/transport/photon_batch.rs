@@ -1,0 +1,187 @@
+//! Photons gathered at a vertex, eight at a time.
+
+use super::bandwidths::{FoundPhotons, MAX_LEVELS, PhotonCounter, first_lane};
+use super::vertex::Vertex;
+use crate::bsdf::{Gathering, LobeSet};
+use crate::math::{Rgb, Vec3};
+use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
+use bumpalo::Bump;
+use wide::{CmpEq, CmpLt, f32x8};
+
+/// What a worker keeps from camera path to camera path of one pass.
+#[derive(Default)]
+pub struct Scratch {
+    /// What the vertices of a path need.
+    pub(super) arena: Bump,
+    /// Photons near the last vertices.
+    pub(super) near: ByKind<Near<Photon>>,
+    /// Photons in media near the last vertices there.
+    pub(super) near_volume: Near<VolumePhoton>,
+    /// Room for those that are waiting for their BSDF.
+    pub(super) waiting: Waiting,
+}
+
+/// Photons that are waiting, copied as they are: it takes two stores, and their columns are had by shuffles when eight
+/// are together.
+#[derive(Default)]
+pub(super) struct Waiting {
+    photons: [Photon; 8],
+    count: usize,
+}
+
+impl Waiting {
+    #[inline(always)]
+    fn push(&mut self, photon: &Photon) {
+        self.photons[self.count] = *photon;
+        self.count += 1;
+    }
+
+    /// Their positions, directions, normals and fluxes, component by component.
+    #[inline(always)]
+    fn columns(&self) -> [[f32x8; 3]; 4] {
+        let photons = self.photons.each_ref();
+        let rows = photons.map(|Photon { p, wi, ng, .. }| [p.x, p.y, p.z, wi.x, wi.y, wi.z, ng.x, ng.y]);
+        let [px, py, pz, wx, wy, wz, nx, ny] = f32x8::transpose(rows.map(f32x8::from));
+        // The last four numbers are the second half of a row that begins with others, which is one load.
+        let rows = photons.map(|Photon { wi, ng, flux, .. }| [wi.y, wi.z, ng.x, ng.y, ng.z, flux.x, flux.y, flux.z]);
+        let [.., nz, red, green, blue] = f32x8::transpose(rows.map(f32x8::from));
+        [[px, py, pz], [wx, wy, wz], [nx, ny, nz], [red, green, blue]]
+    }
+}
+
+/// Places of eight.
+const LANES: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+
+/// Dot products of eight vectors with eight, added up as `Vec3::dot` does.
+#[inline(always)]
+fn dot(a: &[f32x8; 3], b: &[f32x8; 3]) -> f32x8 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Photons of one kind waiting for their BSDF, and the sums of those that have had it.
+pub(super) struct Batch<'a, 's, K> {
+    kernel: std::marker::PhantomData<K>,
+    radii: &'s [f32],
+    p: Vec3,
+    throughput: Rgb,
+    gathering: Gathering<'a>,
+    /// For photons that no camera path that goes on could find; `None` where it is the same.
+    unreachable: Option<Gathering<'a>>,
+    waiting: &'s mut Waiting,
+    /// By level, of every eighth photon.
+    sums: [[f32x8; 3]; MAX_LEVELS],
+}
+
+impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
+    /// Radii squared, ascending; `set` are the lobes that see photons, `all` those that see the ones nothing else
+    /// finds.
+    #[inline]
+    pub fn new(
+        _: K,
+        radii: &'s [f32],
+        waiting: &'s mut Waiting,
+        vertex: &Vertex<'a, '_>,
+        set: LobeSet,
+        all: LobeSet,
+    ) -> Batch<'a, 's, K> {
+        let shading = vertex.shading;
+        Batch {
+            kernel: std::marker::PhantomData,
+            radii,
+            p: vertex.surface.p,
+            throughput: vertex.throughput,
+            gathering: shading.gathering(set),
+            unreachable: (set != all).then(|| shading.gathering(all)),
+            waiting,
+            sums: [[f32x8::ZERO; 3]; MAX_LEVELS],
+        }
+    }
+
+    /// Adds a photon at a distance squared within reach.
+    #[inline(always)]
+    pub fn push<C: PhotonCounter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
+        if photon.flags == PhotonFlags::UNREACHABLE && self.unreachable.is_some() {
+            return self.push_unreachable(photon, distance2, counter);
+        }
+        self.waiting.push(photon);
+        if self.waiting.count == 8 {
+            self.flush(counter);
+        }
+    }
+
+    /// Adds a photon that no camera path could find: few, and out of the way of the others.
+    #[inline(never)]
+    fn push_unreachable<C: PhotonCounter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
+        let Some(gathering) = &self.unreachable else { return };
+        let light = gathering.photon(photon.wi, photon.cosine()) * photon.flux;
+        let found = FoundPhotons::one(
+            photon.p - self.p,
+            distance2,
+            (light * self.throughput).element_sum() / 3.0,
+            photon.thinning_key,
+        );
+        self.add::<C>(&light.to_array().map(|light| first_lane(light, 0.0)), found.distance2);
+        if C::COUNTS && light != Rgb::ZERO {
+            counter.count(&found);
+        }
+    }
+
+    #[inline(never)]
+    fn flush<C: PhotonCounter>(&mut self, counter: &mut C) {
+        let [p, wi, ng, flux] = self.waiting.columns();
+        let there = LANES.cmp_lt(f32x8::splat(self.waiting.count as f32));
+        let from = self.p.to_array().map(f32x8::splat);
+        let offset = [p[0] - from[0], p[1] - from[1], p[2] - from[2]];
+        // As the map has found it.
+        let distance2 = there.blend(dot(&offset, &offset), f32x8::splat(f32::INFINITY));
+        // Where none waits, what is left of another has no cosine, so that it brings nothing.
+        let cosine = there & dot(&wi, &ng).abs();
+        let f = self.gathering.photons8(wi, cosine);
+        let found = [f[0] * flux[0], f[1] * flux[1], f[2] * flux[2]];
+        self.add::<C>(&found, distance2);
+        if C::COUNTS {
+            let weight = self.throughput.to_array().map(f32x8::splat);
+            let light = found[0].mul_add(weight[0], found[1].mul_add(weight[1], found[2] * weight[2]));
+            // Photons that bring nothing do not count [CPPM 2020, 7.2].
+            let dark = light.cmp_eq(f32x8::ZERO);
+            counter.count(&FoundPhotons {
+                offset,
+                distance2: dark.blend(f32x8::splat(f32::INFINITY), distance2),
+                light: light * (1.0 / 3.0),
+                thinning_keys: if C::NEEDS_THINNING_KEYS {
+                    self.waiting.photons.map(|photon| photon.thinning_key.bits())
+                } else {
+                    [0; 8]
+                },
+            });
+        }
+        self.waiting.count = 0;
+    }
+
+    /// Adds what photons bring to the levels that hold them.
+    #[inline(always)]
+    fn add<C: PhotonCounter>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
+        // What is within reach is within the largest.
+        if K::BOX && !C::BEYOND && self.radii.len() == 1 {
+            self.sums[0].iter_mut().zip(light).for_each(|(sum, light)| *sum += *light);
+            return;
+        }
+        for (sums, &radius2) in self.sums.iter_mut().zip(self.radii) {
+            let within = distance2.cmp_lt(f32x8::splat(radius2));
+            let weight = if K::BOX { f32x8::ONE } else { f32x8::from((distance2 / radius2).to_array().map(K::weight)) };
+            for (sum, light) in sums.iter_mut().zip(light) {
+                // What is not there is infinitely far away, and its product not a number: masked last.
+                *sum += within & if K::BOX { *light } else { *light * weight };
+            }
+        }
+    }
+
+    /// The sums by level.
+    #[inline]
+    pub fn finish<C: PhotonCounter>(&mut self, counter: &mut C) -> [Rgb; MAX_LEVELS] {
+        if self.waiting.count > 0 {
+            self.flush(counter);
+        }
+        self.sums.map(|sums| Rgb::from(sums.map(f32x8::reduce_add)))
+    }
+}

@@ -1,0 +1,58 @@
+//! The sample of one camera path: radiance by part and level, and the G-buffer.
+
+use super::bandwidths::MAX_LEVELS;
+use super::cause::Cause;
+use super::segment::FirstHit;
+use crate::math::{Rgb, Vec3};
+
+/// G-buffer of one camera path, at its first vertex that is not a perfect mirror or clear glass.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Features {
+    /// Directional albedo.
+    pub albedo: Rgb,
+    /// World-space shading normal on the side of the camera.
+    pub normal: Vec3,
+    /// Length of the path up to the vertex (scene units).
+    pub depth: f32,
+}
+
+/// What one camera path adds to its pixel. Radiance is linear RGB.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PixelSample {
+    /// Lights seen directly or through perfect mirrors and clear glass.
+    pub emission: Rgb,
+    /// Direct light at the first vertex that is not a perfect mirror or clear glass.
+    pub direct: Rgb,
+    /// All other light that the camera path finds and that photons do not find, too.
+    pub indirect: Rgb,
+    /// Radiance from photons of caustics, by level.
+    pub caustic_photons: [Rgb; MAX_LEVELS],
+    /// Radiance from all other photons, and from light that camera path and photons both find, by level.
+    pub indirect_photons: [Rgb; MAX_LEVELS],
+    /// Light whose first vertex (apart from clear ones) lies in a medium, found without photons.
+    pub volume: Rgb,
+    /// Light whose first vertex (apart from clear ones) lies in a medium, as far as it depends on a bandwidth, by level.
+    pub volume_photons: [Rgb; MAX_LEVELS],
+    /// G-buffer.
+    pub features: Features,
+    /// First visible hit.
+    pub first: Option<FirstHit>,
+    /// Why the sample has to be rejected: the source of its first value that is not finite.
+    pub rejection: Option<Cause>,
+}
+
+impl PixelSample {
+    /// Marks the sample as rejected; the first cause stays.
+    #[cold]
+    pub fn reject(&mut self, cause: Cause) {
+        self.rejection.get_or_insert(cause);
+    }
+
+    /// The radiance estimate of a level, all parts together.
+    #[inline]
+    pub fn radiance(&self, level: usize) -> Rgb {
+        let surfaces =
+            self.emission + self.direct + self.indirect + self.caustic_photons[level] + self.indirect_photons[level];
+        surfaces + (self.volume + self.volume_photons[level])
+    }
+}
