@@ -12,7 +12,7 @@ use super::path_history::PathHistory;
 use super::photon_merge::{MergePhoton, merge_photons};
 use super::pixel_sample::{Features, PixelSample};
 use super::scattering_vertex::ScatterPoint;
-use super::segment::{FirstHit, token, told};
+use super::segment::{FirstHit, token, with_camera_bit};
 use super::shares::{connected, shares, wanted};
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
@@ -37,7 +37,7 @@ pub struct CameraWalkContext<'a> {
 }
 
 /// Vertices between two looks at whether the iteration is given up.
-const LOOK: u32 = 64;
+const ABORT_CHECK_INTERVAL: u32 = 64;
 
 struct CameraWalk<'a, R> {
     shared: &'a Bidirectional<'a>,
@@ -153,18 +153,23 @@ impl<R: Record> CameraWalk<'_, R> {
         if !self.finds(technique, value) {
             return;
         }
-        let way = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
-        if !is_lit(way.left) {
+        let visibility = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
+        if !is_lit(visibility.transmittance) {
             return;
         }
         let reverse = vertex.reverse_pdf(light.wi, Transport::Importance);
-        let arrival_pdf_a = light.arrival_pdf_a * vertex.cos(light.wi) * way.flight.reverse;
-        let onward = pdf * way.flight.forward;
+        let arrival_pdf_a = light.arrival_pdf_a * vertex.cos(light.wi) * visibility.flight.reverse;
+        let onward = pdf * visibility.flight.forward;
         let ratios = mis::next_event(&self.mis, (onward, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
         let at = light.target.unwrap_or(light.wi);
         self.record.contribution(technique, value, at, ratios);
         for (class, share) in shares(vertex, seen, (light.wi, Transport::Radiance, f), classes).iter() {
-            self.add(technique, (class, scene.lights.group(light.light)), value * way.left * share, ratios);
+            self.add(
+                technique,
+                (class, scene.lights.group(light.light)),
+                value * visibility.transmittance * share,
+                ratios,
+            );
         }
     }
 
@@ -195,10 +200,10 @@ impl<R: Record> CameraWalk<'_, R> {
         }
         // Every pair of vertices has its own decisions at cut-outs.
         let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
-        let token = told(camera_paths.scene, bits as u32, false);
+        let token = with_camera_bit(camera_paths.scene, bits as u32, false);
         let end = Some(light.shadow_end(-d, distance));
-        let way = vertex.shadow_ray_to(camera_paths.scene, d, end, token, light.in_medium(), light.touching());
-        if !is_lit(way.left) {
+        let visibility = vertex.shadow_ray_to(camera_paths.scene, d, end, token, light.in_medium(), light.touching());
+        if !is_lit(visibility.transmittance) {
             return;
         }
         let (cos_eye, cos_light) = (vertex.cos(d), light.cos(d));
@@ -206,13 +211,13 @@ impl<R: Record> CameraWalk<'_, R> {
             &End {
                 mis: &light.mis,
                 reverse_pdf_w: light.reverse_pdf(-d),
-                arrival_pdf_a: pdf_eye * cos_light / distance2 * way.flight.forward,
+                arrival_pdf_a: pdf_eye * cos_light / distance2 * visibility.flight.forward,
                 merges: if light.in_medium() { Merges::ZERO } else { techniques.light_vertex_merge(light.depth) },
             },
             &End {
                 mis: &self.mis,
                 reverse_pdf_w: vertex.reverse_pdf(d, Transport::Importance),
-                arrival_pdf_a: pdf_light * cos_eye / distance2 * way.flight.reverse,
+                arrival_pdf_a: pdf_light * cos_eye / distance2 * visibility.flight.reverse,
                 merges: if S::IN_MEDIUM {
                     Merges::ZERO
                 } else {
@@ -222,7 +227,7 @@ impl<R: Record> CameraWalk<'_, R> {
         );
         self.record.contribution(technique, value, light.p(), ratios);
         for (class, share) in shares().iter() {
-            self.add(technique, (class, light.group), value * way.left * share, ratios);
+            self.add(technique, (class, light.group), value * visibility.transmittance * share, ratios);
         }
     }
 
@@ -250,7 +255,7 @@ impl<R: Record> CameraWalk<'_, R> {
     /// Whether the work of a path that has grown long is in vain.
     #[inline]
     fn is_given_up(&self, depth: u32) -> bool {
-        depth.is_multiple_of(LOOK) && self.shared.camera_paths.stop.is_some_and(Stop::should_abort)
+        depth.is_multiple_of(ABORT_CHECK_INTERVAL) && self.shared.camera_paths.stop.is_some_and(Stop::should_abort)
     }
 }
 

@@ -143,19 +143,19 @@ impl<R: Record> LightWalk<'_, '_, R> {
             return;
         }
         let token = camera_token(camera_paths.scene, draws, Purpose::ShadowAlpha);
-        let way = vertex.shadow_ray(camera_paths.scene, sample.wi, Some(sample.lens), token);
-        if !is_lit(way.left) {
+        let visibility = vertex.shadow_ray(camera_paths.scene, sample.wi, Some(sample.lens), token);
+        if !is_lit(visibility.transmittance) {
             return;
         }
         let ratios = if techniques.connect {
             let reverse = vertex.reverse_pdf(sample.wi, Transport::Radiance);
-            let arrival = pdf_a * vertex.cos(sample.wi) * way.flight.reverse;
+            let arrival = pdf_a * vertex.cos(sample.wi) * visibility.flight.reverse;
             mis::camera(&self.mis, arrival, *light_paths, reverse)
         } else {
             Ratios::ALONE
         };
         self.record.contribution(Technique::Camera { light: vertex.depth() }, value, sample.lens, ratios);
-        let value = value * way.left;
+        let value = value * visibility.transmittance;
         if value.max_element() > 0.0 {
             let Some(((x, y), weight)) = camera_paths.camera.sample_pixel(sample.film, || draws.two(Purpose::Splat))
             else {

@@ -1,10 +1,10 @@
 //! The part of a kernel's ball that lies in the medium whose photons it gathers.
 //!
-//! Next to a border the ball reaches into what holds no photons of the medium. Divided by the kernel's mass within it,
-//! not by that of all of the ball, the estimate is right for light that is the same all over the ball \[boundary
-//! kernels; Silverman 1986, "Density Estimation", 2.10\]. The mass is measured along rays: of the kernel `K` with
-//! radius r a ray that is in the medium from a to b has `int_a^b 3 t^2 K(t^2 / r^2) dt / r^3`, and the mean over all
-//! directions is the mass.
+//! Near a boundary of the medium, part of the ball holds no photons of it. The estimate is divided by the kernel's mass
+//! inside the medium instead of the mass of the whole ball, and is then unbiased for light that is constant over the
+//! ball \[boundary kernels; Silverman 1986, "Density Estimation", 2.10\]. Rays estimate the mass. For the kernel `K` of
+//! radius r, a ray that is inside from a to b has the mass `int_a^b 3 t^2 K(t^2 / r^2) dt / r^3`, and the mean over all
+//! directions is the mass of the ball.
 
 use super::bandwidths::MAX_LEVELS;
 use super::interior::Interior;
@@ -20,16 +20,16 @@ use crate::scene::contact::RaySurfaces;
 use crate::trace::{Hit, Ray};
 use std::f32::consts::TAU;
 
-/// Rays: to the corners of a cube that is turned at random. For every one there is its opposite, which makes planes
-/// through the centre exact.
+/// Number of rays. They point to the corners of a randomly rotated cube. Each has an opposite one, so that planes
+/// through the centre are exact.
 const RAYS: usize = 8;
-/// A smaller part is not told from none: photons there would count without a bound.
-const LEAST: f32 = 0.05;
-/// Borders that a ray looks at.
+/// Smallest mass inside the medium. A smaller divisor would give photons an unbounded weight.
+const MIN_MASS: f32 = 0.05;
+/// Largest number of boundaries that a ray crosses.
 const MAX_BORDERS: u32 = 32;
 
 impl Volume<'_> {
-    /// The kernel's mass in the medium around `vertex`, by level.
+    /// The kernel's mass inside the medium around `vertex`, by level.
     pub(super) fn kernel_mass_inside<K: Kernel>(
         &self,
         _: K,
@@ -53,26 +53,33 @@ impl Volume<'_> {
         };
         let mut hits = [const { None }; RAYS];
         scene.tracer.intersect8(|k| Some(ray(k)), |k, hit| hits[k] = Some(hit));
-        let mut room = [1.0; MAX_LEVELS];
+        let mut mass_inside = [1.0; MAX_LEVELS];
         for (k, hit) in hits.into_iter().enumerate() {
             let Some(hit) = hit else { continue };
             let mut lost = |from: f32, to: f32| {
-                for (room, &radius2) in room.iter_mut().zip(radius2) {
+                for (mass_inside, &radius2) in mass_inside.iter_mut().zip(radius2) {
                     let radius = radius2.sqrt();
-                    *room -= (mass::<K>(to / radius) - mass::<K>(from / radius)) / RAYS as f32;
+                    *mass_inside -= (mass::<K>(to / radius) - mass::<K>(from / radius)) / RAYS as f32;
                 }
             };
-            leave(scene, ray(k), hit, vertex.arrival.interior, medium, &mut lost);
+            for_each_part_outside(scene, ray(k), hit, vertex.arrival.interior, medium, &mut lost);
         }
-        room.map(|room| room.max(LEAST))
+        mass_inside.map(|mass_inside| mass_inside.max(MIN_MASS))
     }
 }
 
-/// Follows a ray behind `hit` and calls `lost` for all parts of it, as far as it goes, that are not in the medium.
-fn leave(scene: &Scene, ray: Ray, hit: Hit, interior: Interior, medium: u32, lost: &mut impl FnMut(f32, f32)) {
+/// Follows a ray beyond `hit` and calls `lost(from, to)` for every part of it that lies outside the medium.
+fn for_each_part_outside(
+    scene: &Scene,
+    ray: Ray,
+    hit: Hit,
+    interior: Interior,
+    medium: u32,
+    lost: &mut impl FnMut(f32, f32),
+) {
     let reach = ray.tmax;
     let mut along = RaySurfaces::new(ray, None);
-    let mut at = Whereabouts { interior, bodies: 0 };
+    let mut at = SurroundingSolids { interior, closed_meshes: 0 };
     let (mut met, mut outside) = (along.surface_at(scene, &hit, true), None);
     for _ in 0..MAX_BORDERS {
         let Some((surface, t)) = met else { break };
@@ -97,21 +104,21 @@ fn leave(scene: &Scene, ray: Ray, hit: Hit, interior: Interior, medium: u32, los
     }
 }
 
-/// Where a ray is.
-struct Whereabouts {
-    /// Among solids that light enters.
+/// The solids around the current point of a ray.
+struct SurroundingSolids {
+    /// Nested solids that light enters.
     interior: Interior,
-    /// In how many others.
-    bodies: u32,
+    /// Number of other closed meshes around the point.
+    closed_meshes: u32,
 }
 
-impl Whereabouts {
+impl SurroundingSolids {
     fn is_in(&self, scene: &Scene, medium: u32) -> bool {
-        self.bodies == 0 && self.interior.material(scene).unwrap_or(u32::MAX) == medium
+        self.closed_meshes == 0 && self.interior.material(scene).unwrap_or(u32::MAX) == medium
     }
 
-    /// Whether there may be something behind the surface: out of the body that holds all there is, a room, there is
-    /// nothing.
+    /// Crosses a surface. Returns false if nothing lies behind it: the ray leaves the closed mesh, such as a room, that
+    /// contains the scene.
     fn cross(&mut self, scene: &Scene, surface: &Surface, direction: Vec3) -> bool {
         let entering = direction.dot(surface.ng) < 0.0;
         if scene.materials.list[surface.material as usize].is_solid_glass() {
@@ -119,14 +126,14 @@ impl Whereabouts {
             return true;
         }
         let mesh = scene.shapes.instances[surface.instance as usize].mesh;
-        // What is open has light on both sides.
+        // An open mesh has the medium on both sides.
         if !scene.shapes.meshes[mesh as usize].closed {
             return true;
         }
         if entering {
-            self.bodies += 1;
-        } else if self.bodies > 0 {
-            self.bodies -= 1;
+            self.closed_meshes += 1;
+        } else if self.closed_meshes > 0 {
+            self.closed_meshes -= 1;
         } else {
             return false;
         }
@@ -134,8 +141,8 @@ impl Whereabouts {
     }
 }
 
-/// Nodes of Gauss-Legendre quadrature on [0, 1], and their weights: exact for polynomials up to degree 9, such as the
-/// box and Epanechnikov's kernel have.
+/// Nodes of Gauss-Legendre quadrature on [0, 1], and their weights. Exact for polynomials up to degree 9, as those of
+/// the box and Epanechnikov kernels.
 const NODES: [(f32, f32); 5] = [
     (0.046_910_08, 0.118_463_44),
     (0.230_765_35, 0.239_314_33),
@@ -144,7 +151,7 @@ const NODES: [(f32, f32); 5] = [
     (0.953_089_9, 0.118_463_44),
 ];
 
-/// Mass of a kernel within a share `x` of its radius, beyond which there is none.
+/// Mass of a kernel within the fraction `x` of its radius.
 fn mass<K: Kernel>(x: f32) -> f32 {
     if x >= 1.0 {
         return 1.0;
@@ -158,7 +165,7 @@ mod tests {
     use super::*;
     use crate::photon::kernel;
 
-    /// `x^3`, `5/2 x^3 - 3/2 x^5`, and for all that the mass of the ball is one.
+    /// The mass is `x^3` for the box, `5/2 x^3 - 3/2 x^5` for Epanechnikov's kernel, and 1 over the whole ball.
     #[test]
     fn masses_of_kernels() {
         for k in 0..=20 {

@@ -1,30 +1,30 @@
 //! Why samples are rejected.
 
-/// What has brought a sample something that is not finite.
+/// Source of a value in a sample that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The camera path itself: its weight.
+    /// The throughput of the camera path.
     Path,
-    /// A light that the camera path has run into.
+    /// A light that the camera path has hit.
     Emission,
     /// Next-event estimation, on surfaces or in media.
     DirectLight,
-    /// A light path's vertex connected to the camera path.
+    /// A light vertex connected to the camera path.
     Connection,
     /// Photons, gathered or merged.
     Photons,
-    /// A light path's vertex connected to the camera.
+    /// A light vertex connected to the camera.
     Splat,
-    /// Nothing alone: a weight, or the sum of what was finite.
+    /// A weight, or the sum of finite values.
     Sum,
 }
 
 impl Cause {
-    /// All of them, in their order.
+    /// All causes, in the order of their values.
     pub const ALL: [Cause; 7] =
         [Cause::Path, Cause::Emission, Cause::DirectLight, Cause::Connection, Cause::Photons, Cause::Splat, Cause::Sum];
 
-    /// Its name in headers.
+    /// Name of the cause in headers of pictures.
     pub fn name(self) -> &'static str {
         match self {
             Cause::Path => "path",

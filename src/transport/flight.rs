@@ -1,15 +1,16 @@
-//! How walks take media: by chance, or by splitting.
+//! How walks cross media: by random collisions, or by splitting.
 //!
-//! A walk by chance ([`Fly`]) draws where it is scattered and is there or goes past: paths as long as they come. A walk
-//! that splits ([`Split`]) shows its visitor one vertex in every medium on its way and goes on to the surface behind,
-//! attenuated. Such a vertex is measured, not scattered from; it suits camera paths that gather, for which a vertex in a
-//! medium is an end.
+//! A walk with collisions ([`Fly`]) samples the point where a medium scatters it, and continues from there. A walk that
+//! splits ([`Split`]) shows its visitor one vertex in every medium on its segment, and continues to the surface behind,
+//! attenuated. The visitor samples light at such a vertex, but the walk does not scatter there. Gathering camera paths
+//! split, because a vertex in a medium is their end.
 //!
-//! Such a vertex is drawn by how much of the ray is scattered where, as suits all light but that straight from a lamp
-//! nearby, which falls off with the distance squared. Where one is near there is a second vertex for that alone, drawn
-//! by the angle as seen from the lamp ([`Equiangular`]), and both share next-event estimation by the balance heuristic.
-//! They share its random numbers, too, so the lamp's point is the same for both. Given these numbers both densities are
-//! known, and the shares sum to one: nothing is biased, however lights are chosen.
+//! The vertex is sampled in proportion to the light that the medium scatters along the ray. This suits all light except
+//! direct light of a nearby light, which falls off with the squared distance. Near a light, a second vertex samples
+//! only direct light, uniformly in the angle as seen from the light ([`Equiangular`]). Both vertices share next-event
+//! estimation by the balance heuristic. They use the same random numbers, hence the same point of the light. Given
+//! these numbers both densities are known and the shares sum to one, so the estimate is unbiased however lights are
+//! chosen.
 
 use super::direct::balance;
 use super::segment::{MediumArrival, Passage, Span, Through};
@@ -32,17 +33,17 @@ fn arrival(scene: &Scene, span: &Span, collision: Collision) -> MediumArrival {
     }
 }
 
-/// Free flight.
+/// Flight with random collisions.
 pub(super) struct Fly<'a> {
     pub scene: &'a Scene,
-    /// What the ray carried when it started.
+    /// Throughput of the path at the start of the ray.
     pub throughput: Rgb,
     pub draws: Draws,
-    /// The ray starts at a vertex of a medium.
+    /// The ray starts at a vertex in a medium.
     pub from_medium: bool,
-    /// It has come from infinity already when it starts.
+    /// The ray comes from infinity.
     pub from_infinity: bool,
-    /// Densities up to where it is.
+    /// Densities of the flight so far.
     pub flight: FlightDensity,
 }
 
@@ -70,7 +71,7 @@ impl Through for Fly<'_> {
     }
 }
 
-/// Splitting.
+/// Flight that splits.
 pub(super) struct Split<'a, V> {
     pub scene: &'a Scene,
     pub visitor: &'a mut V,
@@ -84,23 +85,23 @@ pub(super) struct Split<'a, V> {
 }
 
 impl<V> Split<'_, V> {
-    /// The way as seen from the point of a light to which next-event estimation goes, if that is near or shines on
-    /// little of it.
+    /// Equiangular distribution along `span` as seen from the light point of next-event estimation, if the light is
+    /// near or lights only a small part of the span.
     #[inline]
-    fn lamp(&self, span: &Span, draws: &Draws) -> Option<Equiangular> {
+    fn near_light(&self, span: &Span, draws: &Draws) -> Option<Equiangular> {
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
-        let (lamp, cone) = self.scene.lights.sample_point(choice, point)?;
+        let (light, cone) = self.scene.lights.sample_point(choice, point)?;
         let lit = match cone {
             Some(cone) => cone.within(span.origin, span.direction, span.distance)?,
             None => [0.0, span.distance],
         };
-        let seen = Equiangular::new(span.origin, span.direction, lit, lamp)?;
-        // Light comes from within a mean free path, mostly.
+        let seen = Equiangular::new(span.origin, span.direction, lit, light)?;
+        // Most light comes from within one mean free path.
         let length = span.distance.min(3.0 / span.medium.sigma_t().element_sum());
         (seen.is_near(length) || seen.is_short(length)).then_some(seen)
     }
 
-    /// A vertex on the way; see [`MediumVertex`] for `opacity` and `next_event`.
+    /// The vertex at `at`; [`MediumVertex`] explains `opacity` and `next_event`.
     #[inline]
     fn vertex(&self, span: &Span, at: Collision, draws: Draws, opacity: f32, next_event: f32) -> MediumVertex {
         let met = arrival(self.scene, span, at);
@@ -129,21 +130,21 @@ impl<'a, V: Visitor<'a>> Through for Split<'_, V> {
         if !span.medium.scatters() {
             return Passage::Left(left);
         }
-        // One for the points, the others for what is measured there; the surface behind has draws of its own.
+        // One set of draws positions the vertices, the others sample light there; the surface behind has its own.
         let draws = self.draws.nth(span.crossed);
         if let Some(collisions) = span.medium.collision_distribution(self.throughput * span.left, span.distance) {
-            let lamp = self.lamp(span, &draws);
+            let light = self.near_light(span, &draws);
             let opacity = 1.0 - left.element_sum() / 3.0;
             if let Some(at) = collisions.sample(draws.two(Purpose::Flight)) {
-                let by_angle = lamp.map_or(0.0, |lamp| lamp.pdf(at.distance));
+                let by_angle = light.map_or(0.0, |light| light.pdf(at.distance));
                 let share = balance(collisions.pdf(at.distance), by_angle);
                 let vertex = self.vertex(span, at, draws, opacity, share);
                 self.visitor.medium(&vertex, self.scattered);
             }
-            if let Some(lamp) = lamp
-                && let Some(at) = collisions.sample_equiangular(&lamp, draws.one(Purpose::Equiangular))
+            if let Some(light) = light
+                && let Some(at) = collisions.sample_equiangular(&light, draws.one(Purpose::Equiangular))
             {
-                let share = balance(lamp.pdf(at.distance), collisions.pdf(at.distance));
+                let share = balance(light.pdf(at.distance), collisions.pdf(at.distance));
                 let vertex = self.vertex(span, at, draws, opacity, share);
                 self.visitor.medium_next_event(&vertex, self.scattered);
             }

@@ -1,11 +1,10 @@
-//! Nested dielectrics: which solids a path is inside of.
+//! Nested dielectrics: the solids that a path is inside of.
 //!
-//! The rule: a path keeps the solids it has entered and not left. Where several overlap, the one of highest priority
-//! (`extras.caustique.priority`, 0 by default) fills the space, and among equals the smaller one ([`Scene::ranks`]):
-//! paths of both directions must agree. A surface is a boundary only if what fills the space differs on its two sides;
-//! otherwise, and where both sides are of one material, it is no bounce at all \[Schmidt and Budge 2002, "Simple Nested
-//! Dielectrics in Ray Traced Images"\]. A path that leaves a solid it never entered (the eye or a lamp was inside) is
-//! taken to have been in it.
+//! A path keeps the solids that it has entered and not left. Where several overlap, the one of highest priority
+//! (`extras.caustique.priority`, 0 by default) fills the space; of equal ones the smaller ([`Scene::ranks`]), so that
+//! paths of both directions agree. A surface is a boundary only if different materials fill the space on its two sides;
+//! otherwise it does not scatter \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path
+//! that leaves a solid that it never entered (camera or light were inside) is taken to have been in it.
 
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
@@ -15,13 +14,13 @@ use crate::spectrum::Wavelength;
 use crate::trace::Ray;
 use smallvec::SmallVec;
 
-/// Solids that a path keeps with it, the last ones entered; of those before them it keeps one number.
-const INNERMOST: usize = 5;
+/// Number of solids stored with a path, the innermost ones. A single index stands for all outer ones.
+const MAX_STORED_SOLIDS: usize = 5;
 
-/// Two hits of an object that differ by less than this part of their distance are hits of one edge.
-const SAME_CROSSING: f32 = 8.0 * f32::EPSILON;
+/// Hits of an object belong to one edge if their distances differ by less than this, relative.
+const EDGE_TOLERANCE: f32 = 8.0 * f32::EPSILON;
 
-/// Where the ray that looks for the solids around a point crosses the surface of one.
+/// A hit of the ray that finds the solids around a point.
 struct Boundary {
     object: u32,
     t: f32,
@@ -29,12 +28,12 @@ struct Boundary {
     leaves: bool,
 }
 
-/// The solids a path is inside of, in order of entry: each by the instance through whose surface it was entered.
+/// The solids around a path in order of entry, each by the instance through whose surface the path entered.
 #[derive(Clone, Copy, Debug)]
 pub struct Interior {
-    inside: [u32; INNERMOST],
+    inside: [u32; MAX_STORED_SOLIDS],
     len: u8,
-    /// Those entered before: a stack of the scene's [`crate::scene::SolidStacks`], or [`EMPTY_STACK`]; where there are some,
+    /// The outer solids: a stack of the scene's [`crate::scene::SolidStacks`], or [`EMPTY_STACK`]. If it is not empty,
     /// `inside` is full.
     outer: u32,
 }
@@ -48,18 +47,18 @@ impl PartialEq for Interior {
 impl Default for Interior {
     /// The open space.
     fn default() -> Interior {
-        Interior { inside: [0; INNERMOST], len: 0, outer: EMPTY_STACK }
+        Interior { inside: [0; MAX_STORED_SOLIDS], len: 0, outer: EMPTY_STACK }
     }
 }
 
-/// What is on the two sides of a solid's surface.
+/// The media on both sides of a solid's surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
-    /// Material that fills the space on the side the path comes from; `None` is the open space.
+    /// Material before the surface, on the side of the path; `None` is the open space.
     pub before: Option<u32>,
-    /// Material that fills the space behind the surface.
+    /// Material behind the surface.
     pub after: Option<u32>,
-    /// The solids a path is in once it has crossed.
+    /// The solids around the path behind the surface.
     pub interior: Interior,
 }
 
@@ -71,62 +70,62 @@ impl Interior {
     /// Enters a solid.
     #[inline]
     fn push(&mut self, scene: &Scene, instance: u32) {
-        if usize::from(self.len) == INNERMOST && !self.spill_outermost(scene) {
-            // As if it replaced the last.
+        if usize::from(self.len) == MAX_STORED_SOLIDS && !self.spill_outermost(scene) {
+            // Replaces the innermost solid.
             self.len -= 1;
         }
         self.inside[usize::from(self.len)] = instance;
         self.len += 1;
     }
 
-    /// Moves the first of those it has with it to the others.
+    /// Moves the outermost of the stored solids to the stack. Returns false if the stack is full.
     #[cold]
     #[inline(never)]
     fn spill_outermost(&mut self, scene: &Scene) -> bool {
-        let Some(outer) = pushed(scene, self.outer, self.inside[0]) else { return false };
+        let Some(outer) = push_solid(scene, self.outer, self.inside[0]) else { return false };
         self.outer = outer;
         self.inside.copy_within(1.., 0);
         self.len -= 1;
         true
     }
 
-    /// Leaves the solid of the same object that was entered last; whether there is one.
+    /// Leaves the innermost solid of the instance's object. Returns false if the path is in none.
     #[inline]
     fn remove(&mut self, scene: &Scene, instance: u32) -> bool {
         let object_of = |instance: u32| scene.shapes.instances[instance as usize].object;
         if let Some(at) = self.entries().iter().rposition(|&entry| object_of(entry) == object_of(instance)) {
             self.inside.copy_within(at + 1.., at);
             self.len -= 1;
-            self.fill(scene);
+            self.refill(scene);
             return true;
         }
         if self.outer == EMPTY_STACK {
             return false;
         }
-        let left = without(scene, self.outer, object_of(instance));
+        let left = remove_solid(scene, self.outer, object_of(instance));
         self.outer = left.unwrap_or(self.outer);
         left.is_some()
     }
 
-    /// Takes one of the others back where there is room.
+    /// Takes a solid back from the stack after one was removed.
     #[inline]
-    fn fill(&mut self, scene: &Scene) {
+    fn refill(&mut self, scene: &Scene) {
         if self.outer != EMPTY_STACK {
             let SolidStack { outer, last, .. } = scene.solid_stacks.get(self.outer);
-            self.inside.copy_within(..INNERMOST - 1, 1);
+            self.inside.copy_within(..MAX_STORED_SOLIDS - 1, 1);
             (self.inside[0], self.outer) = (last, outer);
             self.len += 1;
         }
     }
 
-    /// The solids around `p`, where paths start: those that a ray from there leaves more often than it enters them. All
-    /// surfaces along the ray count, however many lie on each other or on opaque ones.
+    /// The solids around `p`, where a path starts: those that a ray from there leaves more often than it enters. All
+    /// surfaces along the ray count, including those that lie on each other or on opaque ones.
     pub fn at(scene: &Scene, p: Vec3) -> Interior {
         let mut interior = Interior::default();
         if !scene.survey.solids {
             return interior;
         }
-        // No axis, so that it grazes no wall of a box.
+        // Not along an axis, so that it does not graze the walls of boxes.
         let direction = Vec3::new(0.267_261, 0.801_784, 0.534_522);
         let mut crossings = SmallVec::<[Boundary; 16]>::new();
         scene.tracer.each_hit(&Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, &mut |hit| {
@@ -138,8 +137,8 @@ impl Interior {
             }
         });
         crossings.sort_unstable_by(|a, b| a.object.cmp(&b.object).then(a.t.total_cmp(&b.t)));
-        // Triangles that share the edge a ray hits are crossed once.
-        crossings.dedup_by(|b, a| (a.object, a.leaves) == (b.object, b.leaves) && b.t - a.t <= SAME_CROSSING * a.t);
+        // A hit on an edge that triangles share counts once.
+        crossings.dedup_by(|b, a| (a.object, a.leaves) == (b.object, b.leaves) && b.t - a.t <= EDGE_TOLERANCE * a.t);
         let mut around = SmallVec::<[(f32, u32, usize); 8]>::new();
         for of_object in crossings.chunk_by(|a, b| a.object == b.object) {
             let left = of_object.iter().filter(|crossing| crossing.leaves).count();
@@ -147,7 +146,7 @@ impl Interior {
                 around.push((last.t, last.instance, (2 * left).saturating_sub(of_object.len())));
             }
         }
-        // The solid that the ray leaves last was entered first.
+        // The solid that the ray leaves last is the outermost.
         around.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         for (_, instance, times) in around {
             (0..times).for_each(|_| interior.push(scene, instance));
@@ -155,13 +154,14 @@ impl Interior {
         interior
     }
 
-    /// No solid is around here.
+    /// Whether no solid is around the path.
     #[inline(always)]
     pub fn is_open(&self) -> bool {
         self.len == 0 && self.outer == EMPTY_STACK
     }
 
-    /// Where a light path starts on a light that lies on solids, before it enters the first of them: without those.
+    /// The solids around the start of a light path, without those that it enters because their surfaces lie on the
+    /// light.
     #[cold]
     pub fn before(mut self, scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Interior {
         for surface in contact::surfaces_after(scene, place, direction, token) {
@@ -172,21 +172,21 @@ impl Interior {
         self
     }
 
-    /// Material that fills the space here; `None` is the open space.
+    /// Material that fills the space; `None` is the open space.
     #[inline]
     pub fn material(&self, scene: &Scene) -> Option<u32> {
         self.host(scene).map(|instance| scene.shapes.instances[instance as usize].material)
     }
 
-    /// The instance whose material fills the space here; `None` is the open space.
+    /// The instance whose material fills the space; `None` is the open space.
     #[inline]
     pub fn host(&self, scene: &Scene) -> Option<u32> {
-        // `max_by_key` keeps the last of equals, which belong to one object.
+        // `max_by_key` returns the last of equal ones, which belong to one object.
         let inner = self.entries().iter().copied().max_by_key(|&instance| strength(scene, instance));
         if self.outer == EMPTY_STACK { inner } else { inner.map(|inner| stronger(scene, self.outer, inner)) }
     }
 
-    /// Absorption and scattering here.
+    /// Medium that fills the space.
     #[inline]
     pub fn medium(&self, scene: &Scene) -> Option<MediumParameters> {
         match self.material(scene) {
@@ -195,13 +195,13 @@ impl Interior {
         }
     }
 
-    /// Index of refraction of what fills the space here.
+    /// Index of refraction of the medium that fills the space.
     #[inline]
     pub fn ior(&self, scene: &Scene) -> f32 {
         ior(scene, self.material(scene))
     }
 
-    /// What crossing the surface of `instance` means; `entering`: from its front to its back.
+    /// The media on both sides of the surface of `instance`; `entering`: the path comes from its front.
     #[inline]
     pub fn crossing(&self, scene: &Scene, instance: u32, entering: bool) -> Crossing {
         let mut interior = *self;
@@ -215,14 +215,14 @@ impl Interior {
     }
 }
 
-/// Priority and rank: the larger fills the space.
+/// Priority and rank of an instance; the instance with the larger pair fills the space.
 #[inline]
 fn strength(scene: &Scene, instance: u32) -> (i32, u32) {
     let material = scene.shapes.instances[instance as usize].material;
     (scene.materials.list[material as usize].priority, scene.ranks[instance as usize])
 }
 
-/// Which fills the space: the host of a stack or `inner`, which was entered later.
+/// The instance that fills the space, out of the host of `stack` and `inner`.
 fn stronger(scene: &Scene, stack: u32, inner: u32) -> u32 {
     if stack == EMPTY_STACK {
         return inner;
@@ -231,13 +231,13 @@ fn stronger(scene: &Scene, stack: u32, inner: u32) -> u32 {
     if strength(scene, outer) > strength(scene, inner) { outer } else { inner }
 }
 
-/// A stack with one more solid.
-fn pushed(scene: &Scene, outer: u32, last: u32) -> Option<u32> {
+/// Adds a solid to a stack; `None` if there are too many stacks.
+fn push_solid(scene: &Scene, outer: u32, last: u32) -> Option<u32> {
     scene.solid_stacks.push(SolidStack { outer, last, host: stronger(scene, outer, last) })
 }
 
-/// A stack without the last solid of an object; `None` where it has none.
-fn without(scene: &Scene, stack: u32, object: u32) -> Option<u32> {
+/// Removes the last solid of an object from a stack; `None` if the stack has none.
+fn remove_solid(scene: &Scene, stack: u32, object: u32) -> Option<u32> {
     if stack == EMPTY_STACK {
         return None;
     }
@@ -245,33 +245,33 @@ fn without(scene: &Scene, stack: u32, object: u32) -> Option<u32> {
     if scene.shapes.instances[last as usize].object == object {
         return Some(outer);
     }
-    pushed(scene, without(scene, outer, object)?, last)
+    push_solid(scene, remove_solid(scene, outer, object)?, last)
 }
 
 /// Index of refraction of a material that fills space; 1 in the open.
 #[inline]
 pub fn ior(scene: &Scene, material: Option<u32>) -> f32 {
-    material.map_or(1.0, |m| refractive(&scene.materials.list[m as usize]))
+    material.map_or(1.0, |m| finite_ior(&scene.materials.list[m as usize]))
 }
 
-fn refractive(material: &Material) -> f32 {
+fn finite_ior(material: &Material) -> f32 {
     if material.ior.is_finite() { material.ior } else { 1.0 }
 }
 
 impl Crossing {
-    /// The surface is none: the same material on both sides.
+    /// Whether both sides have the same material, so that the surface does not scatter.
     #[inline]
     pub fn is_nothing(&self) -> bool {
         self.before == self.after
     }
 
-    /// Whether the index of refraction on one of its sides depends on the wavelength.
+    /// Whether the index of refraction on one of the sides depends on the wavelength.
     #[inline]
     pub fn disperses(&self, scene: &Scene) -> bool {
         [self.before, self.after].into_iter().flatten().any(|m| scene.materials.list[m as usize].disperses())
     }
 
-    /// Index of refraction behind the surface (its back) over the one before it at a wavelength; `entering`: the path
+    /// Index of refraction on the back of the surface over that on its front, at a wavelength. `entering`: the path
     /// comes from its front.
     #[inline]
     pub fn eta(&self, scene: &Scene, entering: bool, wavelength: &Wavelength) -> f32 {

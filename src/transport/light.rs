@@ -34,7 +34,7 @@ pub struct LightPaths<'a> {
 }
 
 /// Light paths between two looks at whether they are given up.
-const LOOK: u32 = 16;
+const ABORT_CHECK_INTERVAL: u32 = 16;
 
 /// How a light path begins.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +119,7 @@ impl<'a> LightPaths<'a> {
     /// Whether path `index` and all others of its iteration are given up.
     #[inline]
     pub fn is_given_up(&self, index: u32) -> bool {
-        index.is_multiple_of(LOOK) && self.stop.is_some_and(Stop::should_abort)
+        index.is_multiple_of(ABORT_CHECK_INTERVAL) && self.stop.is_some_and(Stop::should_abort)
     }
 
     /// The wavelength of path `index`.

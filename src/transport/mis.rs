@@ -34,7 +34,7 @@ use crate::medium::FlightDensity;
 
 /// Directions nearer to a surface (cosine) than this count as if they were this far from it: so near that f32 hardly
 /// tells them from along it.
-const LEAST_COSINE: f32 = 1e-30;
+const MIN_COSINE: f32 = 1e-30;
 
 /// `pi r^2 n_VM / n_VC` \[Georgiev (20)\]: how many merges there are for a connection, per unit of density.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,7 +142,7 @@ impl MisState {
     #[inline]
     pub fn arrive(self, distance2: f32, cos: f32) -> MisState {
         // A ray along the surface must not make sums that are not numbers.
-        let inverse = 1.0 / f64::from(cos.max(LEAST_COSINE));
+        let inverse = 1.0 / f64::from(cos.max(MIN_COSINE));
         MisState {
             d_vcm: self.d_vcm * f64::from(distance2) * inverse,
             plain: self.plain * inverse,

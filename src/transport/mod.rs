@@ -52,7 +52,7 @@ pub use pixel_sample::{Features, PixelSample};
 pub use probe::{GatherPoint, Probe};
 pub use scattering_vertex::{ScatterPoint, lit_side};
 pub use segment::{
-    Arrival, Between, End, FirstHit, MediumArrival, PrecomputedHit, ShadowRay, Start, next_surface, shadow_ray,
+    Arrival, End, FirstHit, MediumArrival, PrecomputedHit, ShadowRay, Start, Visibility, next_surface, shadow_ray,
 };
 pub use vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 pub use vertex_counts::VertexCounts;

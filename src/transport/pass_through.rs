@@ -1,34 +1,34 @@
-//! What glows without a body: lamps that light passes as if they were not there, as area lamps of Cycles and Blender.
+//! Pass-through lights: lights that rays do not hit, as the area lights of Cycles and Blender.
 //!
-//! Camera paths alone ask for them, on each of their segments: what they emit is added, and the path goes on to what is
-//! behind. Light paths start from them and next-event estimation samples them as any other lamp; shadow rays and light
-//! paths do not meet them. So all strategies see the same paths, with the same densities.
+//! On each of its segments a camera path adds the light of the pass-through lights there, and continues to the surface
+//! behind. Light paths start from them, and next-event estimation samples them, as any other light. Shadow rays and
+//! light paths do not hit them. So all techniques sample the same paths with the same densities.
 
-use super::segment::{Between, Start, shadow_ray};
+use super::segment::{ShadowRay, Start, shadow_ray};
 use crate::geometry::Surface;
 use crate::math::{Rgb, Vec3};
 use crate::medium::FlightDensity;
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
-/// A lamp without a body on a segment of a camera path.
+/// A pass-through light on a segment of a camera path.
 pub struct PassThroughHit {
-    /// Where it is met.
+    /// Point of the light on the segment.
     pub surface: Surface,
     /// Unit direction back along the path.
     pub wo: Vec3,
-    /// Weight of the path up to here.
+    /// Throughput of the path up to the light.
     pub throughput: Rgb,
-    /// Number of segments up to here.
+    /// Number of segments up to the light.
     pub depth: u32,
-    /// Length of the segment up to here.
+    /// Distance from the last vertex.
     pub distance: f32,
-    /// Densities of the flight up to here.
+    /// Densities of the flight from the last vertex.
     pub flight: FlightDensity,
 }
 
-/// Calls `each` with every lamp without a body that a ray meets within `reach`, how far it is, what is left of its
-/// light and the densities of flight. Whether a medium scatters a walk on the way is not drawn: light comes attenuated.
+/// Calls `each` with every pass-through light on a ray up to the distance `reach`: its surface, distance, the
+/// transmittance up to it, and the densities of flight. Media attenuate its light; no collision is sampled.
 #[inline]
 pub(super) fn for_each_pass_through_light(
     scene: &Scene,
@@ -41,10 +41,10 @@ pub(super) fn for_each_pass_through_light(
         let Start { origin, direction, token, .. } = *start;
         let mut met = |hit: Hit| {
             let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
-            let between = Between { start: *start, tmax: hit.t, reaching: None, in_medium: [from_medium, false] };
-            let way = shadow_ray(scene, &between);
-            if way.left != Rgb::ZERO {
-                each(&surface, hit.t, way.left, way.flight);
+            let between = ShadowRay { start: *start, tmax: hit.t, reaching: None, in_medium: [from_medium, false] };
+            let visibility = shadow_ray(scene, &between);
+            if visibility.transmittance != Rgb::ZERO {
+                each(&surface, hit.t, visibility.transmittance, visibility.flight);
             }
         };
         pass_through_lights.each_hit(&Ray { origin, direction, tmax: reach, token }, &mut met);

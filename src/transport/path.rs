@@ -61,13 +61,13 @@ impl<R: Record> PathTracer<'_, R> {
         if (f * light.radiance).max_element() <= 0.0 {
             return;
         }
-        let way = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
-        if !is_lit(way.left) {
+        let visibility = vertex.shadow_ray_to_light(scene, &light, token(scene, draws, Purpose::ShadowAlpha));
+        if !is_lit(visibility.transmittance) {
             return;
         }
-        let pdf = pdf * vertex.survival(LobeSet::ALL) * way.flight.forward;
+        let pdf = pdf * vertex.survival(LobeSet::ALL) * visibility.flight.forward;
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
-        let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * way.left);
+        let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * visibility.transmittance);
         let technique = Technique::NextEvent { camera: self.depth };
         let shares = shares(vertex, (self.history.suffix, prefix), (light.wi, Transport::Radiance, f), self.classes);
         for (class, share) in shares.iter() {

@@ -1,4 +1,4 @@
-//! Photons gathered at a vertex, eight at a time.
+//! Evaluation of the BSDF for photons at a vertex, eight at a time.
 
 use super::bandwidths::{FoundPhotons, MAX_LEVELS, PhotonCounter, first_lane};
 use super::vertex::Vertex;
@@ -8,21 +8,21 @@ use crate::photon::{ByKind, Kernel, Near, Photon, PhotonFlags, VolumePhoton};
 use bumpalo::Bump;
 use wide::{CmpEq, CmpLt, f32x8};
 
-/// What a worker keeps from camera path to camera path of one pass.
+/// Memory that a thread reuses for all camera paths of one iteration.
 #[derive(Default)]
 pub struct Scratch {
-    /// What the vertices of a path need.
+    /// Shading data of the vertices of a path.
     pub(super) arena: Bump,
-    /// Photons near the last vertices.
+    /// Cache of the photons around the last vertices, by kind.
     pub(super) near: ByKind<Near<Photon>>,
-    /// Photons in media near the last vertices there.
+    /// Cache of the photons in media around the last vertices.
     pub(super) near_volume: Near<VolumePhoton>,
-    /// Room for those that are waiting for their BSDF.
+    /// Photons that wait for their BSDF.
     pub(super) waiting: Waiting,
 }
 
-/// Photons that are waiting, copied as they are: it takes two stores, and their columns are had by shuffles when eight
-/// are together.
+/// Photons that wait for their BSDF. They are stored as rows, which takes two stores each; shuffles make columns of
+/// eight rows.
 #[derive(Default)]
 pub(super) struct Waiting {
     photons: [Photon; 8],
@@ -36,45 +36,45 @@ impl Waiting {
         self.count += 1;
     }
 
-    /// Their positions, directions, normals and fluxes, component by component.
+    /// Positions, directions, normals and fluxes of the photons, by component.
     #[inline(always)]
     fn columns(&self) -> [[f32x8; 3]; 4] {
         let photons = self.photons.each_ref();
         let rows = photons.map(|Photon { p, wi, ng, .. }| [p.x, p.y, p.z, wi.x, wi.y, wi.z, ng.x, ng.y]);
         let [px, py, pz, wx, wy, wz, nx, ny] = f32x8::transpose(rows.map(f32x8::from));
-        // The last four numbers are the second half of a row that begins with others, which is one load.
+        // The last four values (normal z and flux) are the second half of a row of eight, which is one load.
         let rows = photons.map(|Photon { wi, ng, flux, .. }| [wi.y, wi.z, ng.x, ng.y, ng.z, flux.x, flux.y, flux.z]);
         let [.., nz, red, green, blue] = f32x8::transpose(rows.map(f32x8::from));
         [[px, py, pz], [wx, wy, wz], [nx, ny, nz], [red, green, blue]]
     }
 }
 
-/// Places of eight.
+/// Lane numbers.
 const LANES: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
-/// Dot products of eight vectors with eight, added up as `Vec3::dot` does.
+/// Eight dot products, summed in the order of `Vec3::dot`.
 #[inline(always)]
 fn dot(a: &[f32x8; 3], b: &[f32x8; 3]) -> f32x8 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Photons of one kind waiting for their BSDF, and the sums of those that have had it.
+/// Photons of one kind that wait for their BSDF at a vertex, and the sums of the evaluated ones.
 pub(super) struct Batch<'a, 's, K> {
     kernel: std::marker::PhantomData<K>,
     radii: &'s [f32],
     p: Vec3,
     throughput: Rgb,
     gathering: Gathering<'a>,
-    /// For photons that no camera path that goes on could find; `None` where it is the same.
+    /// For photons that no continued camera path could find; `None` if the lobes are those of `gathering`.
     unreachable: Option<Gathering<'a>>,
     waiting: &'s mut Waiting,
-    /// By level, of every eighth photon.
+    /// Sums by level; each lane sums every eighth photon.
     sums: [[f32x8; 3]; MAX_LEVELS],
 }
 
 impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
-    /// Radii squared, ascending; `set` are the lobes that see photons, `all` those that see the ones nothing else
-    /// finds.
+    /// `radii` are squared and ascending. Photons are evaluated with the lobes of `set`, those that no continued path
+    /// could find with the lobes of `all`.
     #[inline]
     pub fn new(
         _: K,
@@ -97,7 +97,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         }
     }
 
-    /// Adds a photon at a distance squared within reach.
+    /// Adds a photon within reach, at this squared distance.
     #[inline(always)]
     pub fn push<C: PhotonCounter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
         if photon.flags == PhotonFlags::UNREACHABLE && self.unreachable.is_some() {
@@ -109,7 +109,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         }
     }
 
-    /// Adds a photon that no camera path could find: few, and out of the way of the others.
+    /// Adds a photon that no continued camera path could find. There are few of them, so they are not batched.
     #[inline(never)]
     fn push_unreachable<C: PhotonCounter>(&mut self, photon: &Photon, distance2: f32, counter: &mut C) {
         let Some(gathering) = &self.unreachable else { return };
@@ -132,9 +132,9 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         let there = LANES.cmp_lt(f32x8::splat(self.waiting.count as f32));
         let from = self.p.to_array().map(f32x8::splat);
         let offset = [p[0] - from[0], p[1] - from[1], p[2] - from[2]];
-        // As the map has found it.
+        // In the order of operations of the map's query.
         let distance2 = there.blend(dot(&offset, &offset), f32x8::splat(f32::INFINITY));
-        // Where none waits, what is left of another has no cosine, so that it brings nothing.
+        // Unused lanes hold stale photons; a zero cosine makes them contribute nothing.
         let cosine = there & dot(&wi, &ng).abs();
         let f = self.gathering.photons8(wi, cosine);
         let found = [f[0] * flux[0], f[1] * flux[1], f[2] * flux[2]];
@@ -142,7 +142,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         if C::COUNTS {
             let weight = self.throughput.to_array().map(f32x8::splat);
             let light = found[0].mul_add(weight[0], found[1].mul_add(weight[1], found[2] * weight[2]));
-            // Photons that bring nothing do not count [CPPM 2020, 7.2].
+            // Photons without contribution are not counted [CPPM 2020, 7.2].
             let dark = light.cmp_eq(f32x8::ZERO);
             counter.count(&FoundPhotons {
                 offset,
@@ -158,10 +158,10 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         self.waiting.count = 0;
     }
 
-    /// Adds what photons bring to the levels that hold them.
+    /// Adds photons to each level whose radius exceeds their distance.
     #[inline(always)]
     fn add<C: PhotonCounter>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
-        // What is within reach is within the largest.
+        // With one level, each photon within reach is within its radius.
         if K::BOX && !C::BEYOND && self.radii.len() == 1 {
             self.sums[0].iter_mut().zip(light).for_each(|(sum, light)| *sum += *light);
             return;
@@ -170,7 +170,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
             let within = distance2.cmp_lt(f32x8::splat(radius2));
             let weight = if K::BOX { f32x8::ONE } else { f32x8::from((distance2 / radius2).to_array().map(K::weight)) };
             for (sum, light) in sums.iter_mut().zip(light) {
-                // What is not there is infinitely far away, and its product not a number: masked last.
+                // Unused lanes are infinitely far away, where the product is NaN, so the mask comes last.
                 *sum += within & if K::BOX { *light } else { *light * weight };
             }
         }

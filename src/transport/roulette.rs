@@ -1,39 +1,39 @@
-//! How probable it is that a path goes on.
+//! Russian roulette: the probability that a path continues.
 
-/// After this many bounces even a path that loses nothing may end, so that light trapped between perfect mirrors ends
+/// Number of bounces after which even a path without losses may end, so that light trapped between perfect mirrors ends
 /// without a limit on depth.
-const LATE: u32 = 64;
-/// After this many all but such light is gone.
-const TRAPPED: u32 = 1 << 16;
-/// The same where nothing but perfect mirrors and clear glass is met: what gets so far between them most often never
-/// comes out, and there is no next-event estimation on the way that could have found anything.
-const TRAPPED_IN_MIRRORS: u32 = 1 << 8;
+const LATE_BOUNCES: u32 = 64;
+/// Number of bounces after which only trapped light is left.
+const TRAPPED_BOUNCES: u32 = 1 << 16;
+/// Number of bounces after which light is taken for trapped if it met perfect mirrors and clear glass only. Such a path
+/// rarely comes out again, and no next-event estimation could have contributed.
+const TRAPPED_BOUNCES_IN_MIRRORS: u32 = 1 << 8;
 
-/// Least probability of going on: keeps the weight of what survives bounded.
-const LEAST_SURVIVAL: f32 = 0.02;
+/// Smallest probability of continuing, which bounds the weight of surviving paths.
+const MIN_SURVIVAL: f32 = 0.02;
 
-/// Probability of going on where a path of `depth` keeps a share `expected` of its weight; `mirrored` says whether by
-/// a delta lobe, and is asked late alone.
+/// Probability that a path of `depth` bounces continues, if it is expected to keep the fraction `expected` of its
+/// weight. `mirrored` tells whether it continues by a delta lobe; it is called for long paths only.
 #[inline]
 pub(super) fn survival(expected: f32, depth: u32, mirrored: impl FnOnce() -> bool) -> f32 {
     // Written so that NaN ends the path.
-    let survival = if expected > 0.0 { expected.clamp(LEAST_SURVIVAL, 1.0) } else { 0.0 };
+    let survival = if expected > 0.0 { expected.clamp(MIN_SURVIVAL, 1.0) } else { 0.0 };
     survival.min(late_survival(depth, mirrored))
 }
 
-/// Probability of going on at most.
+/// Upper bound of the probability of continuing.
 ///
-/// With `1 - c / n` at the `n`-th bounce a path gets there with `P(n) ~ n^-c`, and an estimate that finds `f(n)` on its
-/// way has the second moment `sum_mn f(m) f(n) / P(min(m, n))`. It is finite for whatever loses a share of itself at
-/// every bounce, whatever that share, unlike with a constant survival `s`, which must be above the albedo squared; and
-/// for c = 1/2 it grows as a logarithm only for what comes back out of a half space that absorbs nothing, `f(n) ~
-/// n^-3/2`. A trapped path then has 16 sqrt(n) bounces among the first n on average: with c = 2 from some n on, an end.
+/// With `1 - c / n` at the `n`-th bounce, a path reaches it with probability `P(n) ~ n^-c`. An estimate that collects
+/// `f(n)` there has the second moment `sum_mn f(m) f(n) / P(min(m, n))`. It is finite for any light that loses a fixed
+/// fraction at every bounce; a constant survival `s` would have to exceed the squared albedo. For c = 1/2 it grows as a
+/// logarithm only for light from a half space without absorption, `f(n) ~ n^-3/2`. A trapped path then has 16 sqrt(n)
+/// bounces among the first n on average; c = 2 from some n on ends it.
 #[inline]
 pub(super) fn late_survival(depth: u32, mirrored: impl FnOnce() -> bool) -> f32 {
-    if depth <= LATE {
+    if depth <= LATE_BOUNCES {
         return 1.0;
     }
-    let trapped = if mirrored() { TRAPPED_IN_MIRRORS } else { TRAPPED };
+    let trapped = if mirrored() { TRAPPED_BOUNCES_IN_MIRRORS } else { TRAPPED_BOUNCES };
     let c = if depth <= trapped { 0.5 } else { 2.0 };
     1.0 - c / depth as f32
 }

@@ -1,8 +1,8 @@
-//! Where a path scatters: on a surface or in a medium. What is connected to, lit or measured need not know which.
+//! Common interface of surface and medium vertices, for next-event estimation and connections.
 
 use super::interior::Interior;
 use super::roulette::survival;
-use super::segment::{Between, ShadowRay, Start, shadow_ray};
+use super::segment::{ShadowRay, Start, Visibility, shadow_ray};
 use super::vertex::{MediumVertex, Vertex};
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::{DirectSample, Receiver};
@@ -13,40 +13,41 @@ use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint};
 use crate::spectrum::Wavelength;
 
-/// A vertex of a walk, on a surface or in a medium. The cosine of a medium is 1, and its phase function a lobe that is
-/// broad.
+/// A vertex of a walk, on a surface or in a medium. In a medium the cosine is 1, and the phase function counts as a
+/// broad lobe.
 pub trait ScatterPoint {
-    /// Whether it is in a medium.
+    /// Whether the vertex is in a medium.
     const IN_MEDIUM: bool;
     /// World position.
     fn p(&self) -> Vec3;
-    /// Weight of the path before it scatters.
+    /// Throughput of the path before the vertex scatters.
     fn throughput(&self) -> Rgb;
-    /// Number of segments up to here.
+    /// Number of segments up to the vertex.
     fn depth(&self) -> u32;
     /// Random numbers of the vertex.
     fn draws(&self) -> Draws;
-    /// The wavelength the path has taken.
+    /// The wavelength of the path, if it has met dispersive glass.
     fn wavelength(&self) -> Option<&Wavelength>;
-    /// Its lobes that are not delta.
+    /// Lobes that are not delta.
     fn smooth(&self) -> LobeSet;
-    /// Scattering from `wi` times its cosine, and the density of drawing `wi` ([`crate::bsdf::Shading::evaluate_cos`]).
+    /// Value of the lobes in `set` for light from `wi` times the cosine, and the density of sampling `wi`
+    /// ([`crate::bsdf::Shading::evaluate_cos`]).
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
-    /// Density of the way back ([`crate::bsdf::Shading::reverse_pdf`]).
+    /// Density of sampling `wo` from `wi` ([`crate::bsdf::Shading::reverse_pdf`]).
     fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32;
-    /// Draws an onward direction ([`crate::bsdf::Shading::sample`]).
+    /// Samples a direction ([`crate::bsdf::Shading::sample`]).
     fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample>;
     /// Geometric cosine of a direction.
     fn cos(&self, w: Vec3) -> f32;
-    /// Where a ray towards `w` starts.
+    /// Origin of a ray towards `w`.
     fn ray_origin(&self, w: Vec3) -> Vec3;
-    /// The solids on the side of `wo`, and behind.
+    /// The solids on the side of `wo`, and on the other side.
     fn interiors(&self) -> [&Interior; 2];
-    /// Whether `w` is on the other side than `wo`.
+    /// Whether `w` points to the other side than `wo`.
     fn crosses(&self, w: Vec3) -> bool;
-    /// As what receives light straight from lights.
+    /// The vertex as a receiver of direct light.
     fn receiver(&self) -> Receiver;
-    /// Whether a camera that lies along `wi` looks through it.
+    /// Whether back-face culling hides the surface from a camera along `wi`.
     fn is_culled(&self, _scene: &Scene, _wi: Vec3) -> bool {
         false
     }
@@ -58,26 +59,26 @@ pub trait ScatterPoint {
         1.0
     }
 
-    /// The surface it is on, if others lie on that.
+    /// The surface of the vertex, if other surfaces lie on it.
     #[inline]
     fn touching(&self) -> Option<ContactPoint> {
         None
     }
 
-    /// What is left of light on the way along `wi` to `target` (`None`: out of the scene).
+    /// Traces a shadow ray along `wi` to `target` (`None`: out of the scene).
     #[inline]
-    fn shadow_ray(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> ShadowRay {
+    fn shadow_ray(&self, scene: &Scene, wi: Vec3, target: Option<Vec3>, token: u32) -> Visibility {
         self.shadow_ray_to(scene, wi, target, token, false, None)
     }
 
-    /// [`ScatterPoint::shadow_ray`] to a light.
+    /// Traces a shadow ray to a sampled light.
     #[inline]
-    fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample, token: u32) -> ShadowRay {
+    fn shadow_ray_to_light(&self, scene: &Scene, light: &DirectSample, token: u32) -> Visibility {
         let reaching = light.target.and_then(|target| ContactPoint::on_light(scene, light.light, target));
         self.shadow_ray_to(scene, light.wi, light.target, token, false, reaching)
     }
 
-    /// The same to a vertex of a medium or not, or to one on a surface that others lie on.
+    /// Traces a shadow ray to a vertex, which may lie in a medium, or to a point on a surface on which others lie.
     #[inline]
     fn shadow_ray_to(
         &self,
@@ -87,12 +88,12 @@ pub trait ScatterPoint {
         token: u32,
         to_medium: bool,
         reaching: Option<ContactPoint>,
-    ) -> ShadowRay {
+    ) -> Visibility {
         let origin = self.ray_origin(wi);
         let (direction, tmax) = match target {
             None => (wi, f32::INFINITY),
             Some(target) => {
-                // Both ends are off their surfaces already.
+                // Both ends are offset from their surfaces.
                 let to = target - origin;
                 let distance = to.length();
                 (to / distance, distance)
@@ -100,12 +101,12 @@ pub trait ScatterPoint {
         };
         let interior = *self.interiors()[usize::from(self.crosses(wi))];
         let start = Start { origin, direction, interior, leaving: self.touching(), token };
-        shadow_ray(scene, &Between { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium] })
+        shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium] })
     }
 }
 
-/// The normal on the side that a surface seen from `wo` is lit from; zero if it is from both, or if the surface may
-/// send most of what it gets along itself to the eye.
+/// The normal on the side from which light can reach `wo`; zero if both sides can, or if sharp lobes may scatter
+/// grazing light.
 #[inline]
 pub fn lit_side(shading: &Shading<'_>, ng: Vec3, wo: Vec3) -> Vec3 {
     if shading.bsdf.transmits() || shading.bsdf.lobes().intersects(LobeSet::SHARP) {
@@ -206,7 +207,7 @@ impl ScatterPoint for Vertex<'_, '_> {
     }
 }
 
-/// A direction drawn from a phase function, whose weight is 1.
+/// Samples a direction from a phase function; the weight is 1.
 #[inline]
 pub(super) fn phase_sample(phase: &HenyeyGreenstein, wo: Vec3, u: Vec2) -> BsdfSample {
     let wi = phase.sample(wo, u);

@@ -1,5 +1,5 @@
-//! From one scattering vertex to the next: through alpha cut-outs (Embree skips them) and boundaries that do not
-//! scatter.
+//! Rays from one scattering vertex to the next, through alpha cut-outs (Embree skips them) and boundaries that do not
+//! scatter; and shadow rays.
 
 use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
@@ -11,27 +11,27 @@ use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint, RaySurfaces};
 use crate::trace::{CAMERA_RAY_BIT, Hit, Ray};
 
-/// Boundaries without scattering that a segment may cross, as those of heaped drops of one liquid; more are taken for a
+/// Largest number of non-scattering boundaries on a segment, as between many drops of one liquid. More are taken for a
 /// numerical trap and end the path.
 const MAX_NULL_CROSSINGS: u32 = 1 << 16;
 
 /// The next scattering surface along a ray.
 pub struct Arrival {
-    /// The surface.
+    /// The surface point.
     pub surface: Surface,
-    /// Index of refraction behind it (its back) over the one before it.
+    /// Index of refraction on its back over that on its front.
     pub eta: f32,
-    /// For the surface of a solid: what is on its sides.
+    /// The media on both sides, if it bounds a solid.
     pub crossing: Option<Crossing>,
-    /// The solids the ray was in when it arrived.
+    /// The solids around the ray on arrival.
     pub interior: Interior,
-    /// What absorption and tinted boundaries on the way have left.
+    /// Transmittance of absorbing media and tinted boundaries on the segment.
     pub transmittance: Rgb,
-    /// Length of the way.
+    /// Length of the segment.
     pub distance: f32,
 }
 
-/// The first hit of a camera path.
+/// The first visible hit of a camera path.
 #[derive(Clone, Copy, Debug)]
 pub struct FirstHit {
     /// World position.
@@ -40,7 +40,7 @@ pub struct FirstHit {
     pub instance: u32,
 }
 
-/// A vertex of a medium on a ray.
+/// A collision in a medium along a ray.
 pub struct MediumArrival {
     /// World position.
     pub p: Vec3,
@@ -48,65 +48,65 @@ pub struct MediumArrival {
     pub medium: MediumParameters,
     /// The solids around it.
     pub interior: Interior,
-    /// Transmittance up to here over the density per length of this point.
+    /// Transmittance up to the point over the density of the point per length.
     pub weight: Rgb,
-    /// Length of the way.
+    /// Length of the segment.
     pub distance: f32,
-    /// What it shows as a first hit.
+    /// The hit to report if it is the path's first.
     pub first: Option<FirstHit>,
 }
 
-/// What a ray meets, if that is known before it is followed.
+/// The hit of a ray, if the ray has been traced already.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum PrecomputedHit {
-    /// It is not.
+    /// The ray has not been traced.
     #[default]
     Unknown,
-    /// Nothing.
+    /// The ray hits nothing.
     Nothing,
-    /// This triangle.
+    /// The ray hits this triangle.
     Hit(Hit),
 }
 
-/// How a ray ended.
+/// The end of a ray.
 // Boxing the large variant would allocate once per ray.
 #[allow(clippy::large_enum_variant)]
 pub enum End {
-    /// At a surface.
+    /// The ray reaches a scattering surface.
     Surface(Arrival),
-    /// In a medium.
+    /// A medium scatters the ray.
     Medium(MediumArrival),
-    /// It left the scene, with this transmittance.
+    /// The ray leaves the scene, with this transmittance.
     Escaped(Rgb),
-    /// In a numerical trap.
+    /// The ray is in a numerical trap.
     Lost,
 }
 
-/// A part of a ray's way that lies in one medium.
+/// The part of a ray that lies in one medium.
 pub(super) struct Span {
     /// The medium.
     pub medium: MediumParameters,
-    /// The solids here.
+    /// The solids around it.
     pub interior: Interior,
-    /// Where it begins.
+    /// Its start.
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
-    /// Its length, maybe infinite.
+    /// Its length; may be infinite.
     pub distance: f32,
-    /// Length of the way before it.
+    /// Distance from the ray's origin to its start.
     pub before: f32,
-    /// What the way before it has left.
+    /// Transmittance up to its start.
     pub left: Rgb,
-    /// Parts before it, in media or not.
+    /// Number of parts of the ray before it, in media or not.
     pub crossed: u32,
     /// The surface at its end.
     pub beyond: Option<FirstHit>,
 }
 
 impl Span {
-    /// What a vertex in here shows as a first hit: the object that holds the medium, or what lies behind a medium that
-    /// fills the scene.
+    /// The hit to report for a collision at `p`: the object that contains the medium, or the surface behind a medium
+    /// that fills the scene.
     pub fn first_hit(&self, scene: &Scene, p: Vec3) -> Option<FirstHit> {
         match self.interior.host(scene) {
             Some(instance) => Some(FirstHit { p, instance }),
@@ -115,23 +115,23 @@ impl Span {
     }
 }
 
-/// What media do to a ray.
+/// How a ray crosses media.
 pub(super) trait Through {
-    /// There may be some.
+    /// False if there are no media.
     const MEDIA: bool = true;
-    /// On its way through `span`.
+    /// Crosses `span`.
     fn pass(&mut self, span: &Span) -> Passage;
 }
 
 /// Outcome of [`Through::pass`].
 pub(super) enum Passage {
-    /// What is left at the end of the span.
+    /// The ray reaches the end of the span with this transmittance.
     Left(Rgb),
-    /// A vertex of the medium.
+    /// The ray collides in the span.
     Ended(MediumArrival),
 }
 
-/// Light is attenuated, no more \[Beer-Lambert\].
+/// Attenuates only \[Beer-Lambert\].
 pub(super) struct Attenuate;
 
 impl Through for Attenuate {
@@ -141,7 +141,7 @@ impl Through for Attenuate {
     }
 }
 
-/// There are none.
+/// There are no media.
 pub(super) struct Clear;
 
 impl Through for Clear {
@@ -153,18 +153,18 @@ impl Through for Clear {
     }
 }
 
-/// Out of the way of rays that meet no medium: they stay in registers, for what is told here of one is a copy.
+/// Not inlined, so that rays without media keep their state in registers: only a copy of it escapes here.
 #[cold]
 #[inline(never)]
-fn pass(through: &mut impl Through, span: &Span) -> Passage {
+fn cross(through: &mut impl Through, span: &Span) -> Passage {
     through.pass(span)
 }
 
-/// What a surface hit by a ray is.
+/// How a surface affects a ray that hits it.
 enum Boundary {
-    /// Nothing: go on behind it with this tint and interior.
+    /// The ray continues behind it, with this tint and inside these solids.
     None(Rgb, Interior),
-    /// A scattering surface: index of refraction behind it over before it, and what is on its sides if it bounds a
+    /// It scatters. Index of refraction behind it over that before it, and the media on both sides if it bounds a
     /// solid.
     Scattering(f32, Option<Crossing>),
 }
@@ -173,25 +173,25 @@ enum Boundary {
 fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3, token: u32) -> Boundary {
     let material = &scene.materials.list[surface.material as usize];
     if !material.is_solid_glass() {
-        // What covers an opaque body meets the medium around it, air or water.
+        // The coat of an opaque body borders on the medium around the body, such as air or water.
         let around = if scene.survey.solids { interior.ior(scene) } else { 1.0 };
         return Boundary::Scattering(material.ior / around, None);
     }
     let entering = direction.dot(surface.ng) < 0.0;
     let crossing = interior.crossing(scene, surface.instance, entering);
-    // A ray that has passed the solid's front as if it were not there is not in it, and leaves it unseen.
+    // A ray that passed the front of a solid through a cut-out is not inside, and so it ignores the back.
     if material.has_alpha_per_entry()
         && if entering { !scene.solid_is_present(surface, token) } else { crossing.interior == *interior }
     {
         return Boundary::None(Rgb::ONE, *interior);
     }
-    // What gives light of its own is there whatever is behind it.
+    // A surface that emits light is never skipped.
     if crossing.is_nothing() && !material.emits() {
         return Boundary::None(Rgb::ONE, crossing.interior);
     }
     let (before, after) = (ior(scene, crossing.before), ior(scene, crossing.after));
     let eta = if entering { after / before } else { before / after };
-    // Of two glasses with one index some wavelengths are refracted all the same.
+    // Two dispersive glasses with equal index refract other wavelengths.
     if eta == 1.0 && !material.emits() && !(scene.survey.dispersion && crossing.disperses(scene)) {
         let parameters = material.parameters(surface, &scene.materials.textures, eta);
         if parameters.is_clear_if_matched() {
@@ -201,48 +201,48 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     Boundary::Scattering(eta, Some(crossing))
 }
 
-/// What decides where a ray passes what is there in part only; nothing is drawn where all is there.
+/// Random bits that decide about cut-outs along a ray; 0 if the scene has none.
 #[inline(always)]
 pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
     let bits = if scene.survey.alpha { draws.token(purpose) } else { 0 };
-    told(scene, bits, false)
+    with_camera_bit(scene, bits, false)
 }
 
-/// The same of a camera's own ray, or of one to its lens: such rays pass what is hidden from cameras, too.
+/// [`token`] of a ray from or to the lens. Such rays pass objects that are hidden from cameras.
 #[inline(always)]
 pub(super) fn camera_token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
-    told(scene, token(scene, draws, purpose), true)
+    with_camera_bit(scene, token(scene, draws, purpose), true)
 }
 
-/// Random bits that tell of a camera's ray where that matters.
+/// Sets or clears the bit that marks rays of the camera, if the scene needs it.
 #[inline(always)]
-pub(super) fn told(scene: &Scene, bits: u32, camera: bool) -> u32 {
+pub(super) fn with_camera_bit(scene: &Scene, bits: u32, camera: bool) -> u32 {
     let matters = scene.survey.hidden_from_camera || scene.survey.culled;
     if matters { bits & !CAMERA_RAY_BIT | if camera { CAMERA_RAY_BIT } else { 0 } } else { bits }
 }
 
-/// A ray from inside `interior`, about to be followed.
+/// Start of a ray.
 #[derive(Clone, Copy)]
 pub struct Start {
-    /// Where it starts.
+    /// Its origin.
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
-    /// The solids around its start.
+    /// The solids around its origin.
     pub interior: Interior,
-    /// The surface that it leaves, if others lie on that.
+    /// The surface that it leaves, if other surfaces lie on it.
     pub leaving: Option<ContactPoint>,
-    /// Decides about cut-outs.
+    /// Random bits that decide about cut-outs.
     pub token: u32,
 }
 
-/// Follows a ray to the next surface that scatters; media on the way attenuate.
+/// Follows a ray to the next scattering surface. Media attenuate it.
 #[inline(always)]
 pub fn next_surface(scene: &Scene, start: Start) -> End {
     next_vertex(scene, start, &PrecomputedHit::Unknown, &mut Attenuate)
 }
 
-/// Follows a ray to the next surface that scatters, `through` whatever media.
+/// Follows a ray to the next scattering surface, or to a collision in a medium that `through` crosses.
 #[inline(always)]
 pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &PrecomputedHit, through: &mut T) -> End {
     let Start { origin, direction, mut interior, leaving, token } = start;
@@ -261,7 +261,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
             if let Some(medium) = medium {
                 let (distance, beyond) = (f32::INFINITY, None);
                 let span = Span { medium, interior, origin, direction, distance, before, left, crossed, beyond };
-                match pass(through, &span) {
+                match cross(through, &span) {
                     Passage::Left(left) => transmittance *= left,
                     Passage::Ended(arrival) => return End::Medium(arrival),
                 }
@@ -273,7 +273,7 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
         {
             let (distance, beyond) = (t, Some(FirstHit { p: surface.p, instance: surface.instance }));
             let span = Span { medium, interior, origin, direction, distance, before, left, crossed, beyond };
-            match pass(through, &span) {
+            match cross(through, &span) {
                 Passage::Left(left) => transmittance *= left,
                 Passage::Ended(arrival) => return End::Medium(arrival),
             }
@@ -300,19 +300,19 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
     End::Lost
 }
 
-/// What a ray to a light, or between two vertices, meets on its way.
+/// Result of a shadow ray.
 #[derive(Clone, Copy, Debug)]
-pub struct ShadowRay {
-    /// What is left of the light.
-    pub left: Rgb,
-    /// Densities of flying it both ways.
+pub struct Visibility {
+    /// Transmittance; zero if the ray is blocked.
+    pub transmittance: Rgb,
+    /// Densities of the flight in both directions.
     pub flight: FlightDensity,
 }
 
-impl ShadowRay {
-    const BLOCKED: ShadowRay = ShadowRay { left: Rgb::ZERO, flight: FlightDensity::ONE };
+impl Visibility {
+    const BLOCKED: Visibility = Visibility { transmittance: Rgb::ZERO, flight: FlightDensity::ONE };
 
-    /// Goes on through `distance` of what fills the space.
+    /// Crosses `distance` of the medium inside `interior`.
     #[inline]
     fn pass(&mut self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) {
         if scene.survey.media {
@@ -322,69 +322,71 @@ impl ShadowRay {
 
     #[cold]
     #[inline(never)]
-    fn through(self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) -> ShadowRay {
+    fn through(self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) -> Visibility {
         let Some(medium) = interior.medium(scene) else { return self };
-        let left = self.left * medium.transmittance(distance);
+        let transmittance = self.transmittance * medium.transmittance(distance);
         let scatters = scene.survey.scattering;
         let flight = if scatters { self.flight.through(&medium, distance, starts, ends) } else { self.flight };
-        ShadowRay { left, flight }
+        Visibility { transmittance, flight }
     }
 }
 
-/// A ray to a point, or to infinity, whose way is asked for.
+/// A shadow ray: a ray to a point or to infinity.
 #[derive(Clone, Copy)]
-pub struct Between {
-    /// From where, and how.
+pub struct ShadowRay {
+    /// Its start.
     pub start: Start,
-    /// Distance to the end; may be infinite.
+    /// Its length; may be infinite.
     pub tmax: f32,
-    /// The surface at the end, if others lie on that.
+    /// The surface at its end, if other surfaces lie on it.
     pub reaching: Option<ContactPoint>,
-    /// Whether the way starts and ends at a vertex of a medium.
+    /// Whether it starts and ends at a vertex of a medium.
     pub in_medium: [bool; 2],
 }
 
-/// What is left of light between two points (zero if anything scatters there, else absorption and tints), and the
-/// densities of flight.
+/// Transmittance along a shadow ray (zero if a scattering surface blocks it, otherwise that of media and tinted
+/// boundaries), and the densities of flight.
 #[inline]
-pub fn shadow_ray(scene: &Scene, between: &Between) -> ShadowRay {
-    let Between { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
+pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
+    let ShadowRay { start: Start { origin, direction, ref interior, leaving, token }, tmax, reaching, .. } = *between;
     let [starts, ends] = between.in_medium;
     let culls = scene.survey.culled && token & CAMERA_RAY_BIT != 0;
     if scene.survey.null_boundaries || culls || leaving.is_some() || reaching.is_some() {
-        return way_through(scene, between);
+        return trace_through_boundaries(scene, between);
     }
     if scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
-        return ShadowRay::BLOCKED;
+        return Visibility::BLOCKED;
     }
-    let mut way = ShadowRay { left: Rgb::ONE, flight: FlightDensity::ONE };
-    way.pass(scene, interior, tmax, starts, ends);
-    way
+    let mut visibility = Visibility { transmittance: Rgb::ONE, flight: FlightDensity::ONE };
+    visibility.pass(scene, interior, tmax, starts, ends);
+    visibility
 }
 
-/// The same through boundaries that do not scatter.
-fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
-    let Between { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
+/// [`shadow_ray`] through non-scattering boundaries.
+fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
+    let ShadowRay { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);
-    let mut way = ShadowRay { left: Rgb::ONE, flight: FlightDensity::ONE };
+    let mut visibility = Visibility { transmittance: Rgb::ONE, flight: FlightDensity::ONE };
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some((mut surface, t)) = along.next(scene, !interior.is_open()) else {
-            way.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
-            let Some(place) = reaching else { return way };
+            visibility.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
+            let Some(place) = reaching else { return visibility };
             for surface in &contact::surfaces_before(scene, &place, direction, token) {
                 match boundary(scene, surface, &interior, direction, token) {
-                    Boundary::Scattering(..) => return ShadowRay::BLOCKED,
-                    Boundary::None(tint, behind) => (way.left, interior) = (way.left * tint, behind),
+                    Boundary::Scattering(..) => return Visibility::BLOCKED,
+                    Boundary::None(tint, behind) => {
+                        (visibility.transmittance, interior) = (visibility.transmittance * tint, behind)
+                    }
                 }
             }
-            return way;
+            return visibility;
         };
         if t > 0.0 {
-            way.pass(scene, &interior, t, starts, false);
+            visibility.pass(scene, &interior, t, starts, false);
             starts = false;
         }
-        // Towards the lens, so that the lens sees its other side.
+        // Reversed, because culling refers to rays from the lens.
         if token & CAMERA_RAY_BIT != 0 && scene.culls(&surface, -direction) {
             let Some(other) = contact::visible_on_culled(scene, &surface, -direction, token) else {
                 along.pass(&surface);
@@ -393,13 +395,13 @@ fn way_through(scene: &Scene, between: &Between) -> ShadowRay {
             surface = other;
         }
         match boundary(scene, &surface, &interior, direction, token) {
-            Boundary::Scattering(..) => return ShadowRay::BLOCKED,
+            Boundary::Scattering(..) => return Visibility::BLOCKED,
             Boundary::None(tint, behind) => {
-                way.left *= tint;
+                visibility.transmittance *= tint;
                 interior = behind;
                 along.pass(&surface);
             }
         }
     }
-    ShadowRay::BLOCKED
+    Visibility::BLOCKED
 }

@@ -1,9 +1,9 @@
-//! Photons gathered in media.
+//! Photon gathering in media.
 //!
-//! A photon carries flux times length, so the photons of a ball over its volume are the fluence there; what the medium
-//! makes of it, its scattering coefficient and phase function, the camera path's vertex knows \[Jensen and Christensen
-//! 1998, "Efficient simulation of light transport in scenes with participating media using photon maps", (10), with the
-//! coefficient taken out of the photon\].
+//! A photon carries flux times length, so the sum over the photons of a ball, divided by its volume, is the fluence.
+//! The vertex of the camera path multiplies it by the scattering coefficient and the phase function \[Jensen and
+//! Christensen 1998, "Efficient simulation of light transport in scenes with participating media using photon maps",
+//! (10), with the coefficient moved from the photon to the vertex\].
 
 use super::bandwidths::MAX_LEVELS;
 use super::vertex::MediumVertex;
@@ -11,17 +11,17 @@ use crate::math::Rgb;
 use crate::photon::{Kernel, NO_NORMAL, Near, PhotonMap, VolumePhoton};
 use std::f32::consts::FRAC_1_PI;
 
-/// The photons in media, and the bandwidths of a camera path's levels.
+/// The photons in media, and the radii of a camera path's levels.
 #[derive(Clone, Copy)]
 pub struct Volume<'a> {
     photons: &'a PhotonMap<VolumePhoton>,
-    /// Radii squared, in any order.
+    /// Squared radii, in any order.
     radius2: [f32; MAX_LEVELS],
     count: usize,
 }
 
 impl<'a> Volume<'a> {
-    /// With radii of at most [`MAX_LEVELS`] levels, in the order in which they are to be measured.
+    /// Takes the radii of at most [`MAX_LEVELS`] levels, in the order of the results.
     #[inline]
     pub fn new(photons: &'a PhotonMap<VolumePhoton>, radii: impl Iterator<Item = f32>) -> Volume<'a> {
         let mut volume = Volume { photons, radius2: [0.0; MAX_LEVELS], count: 0 };
@@ -32,14 +32,14 @@ impl<'a> Volume<'a> {
         volume
     }
 
-    /// The radii squared, in the order in which they are measured.
+    /// The squared radii, in the order of the results.
     #[inline]
     pub(super) fn radii2(&self) -> &[f32] {
         &self.radius2[..self.count]
     }
 
-    /// Radiance that photons in `medium` of at most `longest` segments scatter at `vertex`, all levels from one query:
-    /// kernel density estimation over balls, the box kernel being `3 / (4 pi r^3)`.
+    /// Radiance by level that the photons in `medium` scatter at `vertex`, from one query: kernel density estimation
+    /// over balls, with `3 / (4 pi r^3)` as the box kernel. Photons of more than `longest` segments are skipped.
     #[inline]
     pub(super) fn gather<K: Kernel>(
         &self,
@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// Normalised over the disc, where it should be over the ball.
+    /// A kernel with the normalisation of the disc instead of the ball.
     #[derive(Clone, Copy)]
     struct Flat<K>(K);
 
@@ -138,10 +138,10 @@ mod tests {
         }
     }
 
-    /// Largest deviation over levels and lengths, in standard errors, from what an even field gives: unit flux times
-    /// length spread evenly over the unit cube and over all directions is fluence 1, of which a normalised phase
-    /// function sends 1 / (4 pi) everywhere, whatever the bandwidth and the order of levels. `roughness` is the
-    /// integral of the squared kernel over that of the box.
+    /// Largest deviation, in standard errors, from the result for a uniform field, over levels and path lengths. A unit
+    /// of flux times length, spread evenly over the unit cube and over all directions, is a fluence of 1. A normalised
+    /// phase function scatters 1 / (4 pi) of it into every direction, for all bandwidths and orders of levels.
+    /// `roughness` is the integral of the squared kernel over that of the box.
     fn deviation<K: Kernel>(map: &PhotonMap<VolumePhoton>, kernel: K, roughness: f32) -> f32 {
         let radii = [0.4f32, 0.1, 0.2, 0.15, 0.3];
         let volume = Volume::new(map, radii.into_iter());
@@ -162,7 +162,7 @@ mod tests {
         worst
     }
 
-    /// Ten checks for each of three kernels, at 5 sigma of the Poisson counts: false alarms below 2e-5.
+    /// Ten checks for each of three kernels, at 5 sigma of the Poisson counts: the rate of false alarms is below 2e-5.
     #[test]
     fn an_even_field_is_measured_without_bias() {
         let map =

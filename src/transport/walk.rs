@@ -1,5 +1,5 @@
-//! The bounce loop. It owns intersection, the solids a path is in, roulette and depth, and knows no film; an algorithm
-//! is a [`Visitor`].
+//! The only bounce loop. It handles intersection, nested solids, roulette and depth, and does not access the film. Each
+//! algorithm is a [`Visitor`].
 
 use super::flight::{Fly, Split};
 use super::interior::Interior;
@@ -19,31 +19,31 @@ use crate::scene::contact::ContactPoint;
 use crate::spectrum::{Wavelength, WavelengthSample};
 use bumpalo::Bump;
 
-/// Where a path starts.
+/// The start of a path.
 #[derive(Clone, Copy, Debug)]
 pub struct PathStart {
-    /// Origin of the first ray, off any surface.
+    /// Origin of the first ray, offset from any surface.
     pub origin: Vec3,
     /// Unit direction of the first ray.
     pub direction: Vec3,
-    /// Weight of the path: flux or importance.
+    /// Throughput: flux or importance.
     pub throughput: Rgb,
-    /// The solids the origin is in.
+    /// The solids around the origin.
     pub interior: Interior,
-    /// The surface that the first ray leaves, if others lie on that.
+    /// The surface that the first ray leaves, if other surfaces lie on it.
     pub leaving: Option<ContactPoint>,
-    /// What the first ray meets, if it has been traced already.
+    /// Hit of the first ray, if it has been traced already.
     pub first: PrecomputedHit,
-    /// It has come from infinity.
+    /// The path comes from infinity.
     pub far: bool,
-    /// The one channel of a path that keeps its weight: what it would lose is the probability that it ends.
+    /// For a path of a single channel: that channel. Such a path keeps its weight; losses become the probability that
+    /// it ends.
     pub channel: Option<usize>,
-    /// The wavelength it takes if it meets dispersive glass.
+    /// The wavelength that the path takes if it meets dispersive glass.
     pub wavelength_sample: WavelengthSample,
 }
 
-/// Walks from `start`. `transport` says which way; the path has at most `max_depth` segments. What vertices need beyond
-/// the scene is made in `arena`, which may be reset when none of them is left.
+/// Walks from `start`, with at most `max_depth` segments. The vertices store their shading data in `arena`.
 #[inline]
 pub fn walk<'a, V: Visitor<'a>>(
     scene: &'a Scene,
@@ -54,7 +54,8 @@ pub fn walk<'a, V: Visitor<'a>>(
     max_depth: u32,
     visitor: &mut V,
 ) {
-    // Scenes without media or dispersion walk as if there were none in the world.
+    // Each kind of scene has its own instance of the loop, so that scenes without media or dispersion pay nothing for
+    // them.
     if scene.survey.dispersion {
         walk_aside::<V, DISPERSION>(scene, arena, start, stream, transport, max_depth, visitor);
     } else if scene.survey.scattering {
@@ -66,14 +67,14 @@ pub fn walk<'a, V: Visitor<'a>>(
     }
 }
 
-/// What a scene has besides surfaces, each with all before it: nothing, media that absorb, media that scatter, solids
-/// that refract colours differently.
+/// Features of a scene besides surfaces. Each value includes the smaller ones: nothing, absorbing media, scattering
+/// media, dispersive solids.
 const NOTHING: u8 = 0;
 const ABSORPTION: u8 = 1;
 const SCATTERING: u8 = 2;
 const DISPERSION: u8 = 3;
 
-/// Out of the way of the other, which is inlined.
+/// Not inlined, so that the case without media stays small.
 #[inline(never)]
 fn walk_aside<'a, V: Visitor<'a>, const BESIDES: u8>(
     scene: &'a Scene,
@@ -145,7 +146,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
     }
 }
 
-/// Ends a path; one whose weight is not finite is told of.
+/// Ends a path, and tells the visitor if its throughput is not finite.
 #[inline]
 fn end<'a, V: Visitor<'a>>(throughput: Rgb, visitor: &mut V) -> Option<()> {
     if !throughput.is_finite() {
@@ -154,18 +155,18 @@ fn end<'a, V: Visitor<'a>>(throughput: Rgb, visitor: &mut V) -> Option<()> {
     None
 }
 
-/// A path under way.
+/// State of a path during the walk.
 struct Path<'a> {
     scene: &'a Scene,
     arena: &'a Bump,
     stream: Stream,
     transport: Transport,
     max_depth: u32,
-    /// The one channel that keeps its weight, and that weight.
+    /// The channel of a path of a single channel, and its weight.
     channel: Option<(usize, f32)>,
     wavelength_sample: WavelengthSample,
     far: bool,
-    /// Number of the segment under way, from 1.
+    /// Number of the current segment, from 1.
     depth: u32,
     origin: Vec3,
     direction: Vec3,
@@ -173,19 +174,20 @@ struct Path<'a> {
     interior: Interior,
     /// See [`Vertex::survival_scale`].
     survival_scale: f32,
-    /// Distance from the middle of the scene beyond which what it carries matters less and less ([`Scene::reach`]).
+    /// Distance from the scene's centre beyond which the path's contribution falls off ([`Scene::reach`]).
     reach: f32,
-    /// How the last vertex has scattered it.
+    /// How the last vertex scattered the path.
     scattered: Option<Scattered>,
     /// The last vertex lies in a medium.
     in_medium: bool,
-    /// Where it leaves a surface.
+    /// The surface that the path leaves.
     leaving: Option<ContactPoint>,
     wavelength: Option<Wavelength>,
 }
 
 impl<'a> Path<'a> {
-    /// Goes to the next vertex: where the segment ends, and what media on the way mean for the densities of distances.
+    /// Follows the path to the next vertex. Returns the end of the segment, and the densities of the flight through
+    /// media.
     #[inline(always)]
     fn travel<V: Visitor<'a>, const BESIDES: u8>(
         &mut self,
@@ -216,7 +218,9 @@ impl<'a> Path<'a> {
             end
         };
         if self.transport == Transport::Radiance && scene.pass_through_lights.is_some() {
-            visit_pass_through_lights(scene, &start, &end, (self.in_medium, throughput, depth), scattered, visitor);
+            let segment =
+                Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };
+            visit_pass_through_lights(scene, &segment, visitor);
         }
         if BESIDES >= SCATTERING
             && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut self.scattered)
@@ -226,12 +230,12 @@ impl<'a> Path<'a> {
         (end, flight)
     }
 
-    /// Scatters it in a medium; `None` ends it.
+    /// Scatters the path in a medium; `None` ends it.
     #[inline(always)]
     fn medium<V: Visitor<'a>>(&mut self, met: MediumArrival, flight: FlightDensity, visitor: &mut V) -> Option<()> {
         let Path { scene, depth, wavelength, survival_scale, reach, .. } = *self;
         let arriving = self.throughput * met.weight;
-        // What light at a distance still brings to the scene, or takes from it, falls with the distance squared.
+        // The contribution of light far from the scene falls off with the squared distance.
         let back = (reach * reach / met.p.distance_squared(scene.lights.sky().center)).min(1.0);
         let draws = self.stream.vertex(depth);
         let vertex = MediumVertex {
@@ -248,7 +252,7 @@ impl<'a> Path<'a> {
             wavelength,
             survival_scale: survival_scale * back,
         };
-        // Where the channel that has brought it here scatters nothing, it carries nothing.
+        // A medium may not scatter the channel that was sampled.
         if !is_lit(vertex.throughput) {
             return end(vertex.throughput, visitor);
         }
@@ -272,7 +276,7 @@ impl<'a> Path<'a> {
         Some(())
     }
 
-    /// Scatters it at a surface; `None` ends it.
+    /// Scatters the path at a surface; `None` ends it.
     #[inline(always)]
     fn surface<V: Visitor<'a>, const BESIDES: u8>(
         &mut self,
@@ -323,7 +327,7 @@ impl<'a> Path<'a> {
         }
         let survival = match self.channel {
             None => vertex.survival_chosen(set, chance),
-            // It has its roulette on arrival; this one ends what is trapped without loss.
+            // Its roulette takes place on arrival. This one only ends trapped light.
             Some(_) => late_survival(depth, || set == LobeSet::DELTA),
         };
         if draws.one(Purpose::Roulette) >= survival {
@@ -335,8 +339,8 @@ impl<'a> Path<'a> {
         self.throughput *= sample.weight / going;
         self.scattered = Some(Scattered { lobe: sample.lobe, pdf_w: sample.pdf_w * going });
         if sample.transmitted && crossing.is_some() && transport == Transport::Radiance {
-            // Radiance is denser where the index is higher, by its square; a path that has only come in there has lost
-            // nothing, and gets it back on the way out. Roulette must not take it for absorption.
+            // Radiance grows with the squared index of refraction. A path that has entered a dense medium has lost
+            // nothing and regains the factor when it leaves, so roulette must not treat the factor as absorption.
             let eta = if self.direction.dot(surface.ng) < 0.0 { eta } else { 1.0 / eta };
             self.survival_scale *= eta * eta;
         }
@@ -347,9 +351,8 @@ impl<'a> Path<'a> {
         Some(())
     }
 
-    /// The path's wavelength, which it takes where it first meets glass that disperses. Even where light is only
-    /// reflected: whether it is depends on the wavelength, and all ways to put a path together must agree that it has
-    /// one.
+    /// The path's wavelength, which it takes at the first dispersive glass. It does so even if it is reflected: the
+    /// probability of reflection depends on the wavelength, and all techniques must agree whether the path has one.
     #[inline(always)]
     fn take_wavelength(&mut self) -> Wavelength {
         if let Some(taken) = self.wavelength {
@@ -366,7 +369,7 @@ impl<'a> Path<'a> {
         taken
     }
 
-    /// Ends a path of one channel by the weight that it has lost; `None` if so.
+    /// Roulette of a path of a single channel, by the weight that it has lost; `None` ends it.
     #[inline(always)]
     fn lose(&mut self) -> Option<()> {
         let Some((channel, weight)) = self.channel else { return Some(()) };
@@ -381,22 +384,28 @@ impl<'a> Path<'a> {
     }
 }
 
-/// Shows a visitor the lamps without a body on a segment that has ended somewhere, which began in a medium or not with
-/// some weight and is the last of so many.
+/// A segment of a camera path that has been followed to its end.
+struct Segment<'s> {
+    start: &'s Start,
+    end: &'s End,
+    /// The segment starts at a vertex in a medium.
+    from_medium: bool,
+    throughput: Rgb,
+    /// Number of the segment, from 1.
+    depth: u32,
+    /// How the vertex at the start scattered the path.
+    scattered: Option<Scattered>,
+}
+
+/// Shows the visitor the pass-through lights on a segment.
 #[cold]
 #[inline(never)]
-fn visit_pass_through_lights<'a, V: Visitor<'a>>(
-    scene: &Scene,
-    start: &Start,
-    end: &End,
-    (from_medium, throughput, depth): (bool, Rgb, u32),
-    scattered: Option<Scattered>,
-    visitor: &mut V,
-) {
-    // Behind a vertex of a medium there may be more, whose light comes past it.
+fn visit_pass_through_lights<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segment<'_>, visitor: &mut V) {
+    let Segment { start, end, from_medium, throughput, depth, scattered } = *segment;
+    // A split walk continues behind a vertex of a medium, and so do the lights.
     let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
-    for_each_pass_through_light(scene, start, reach, from_medium, |surface, distance, left, flight| {
-        let (surface, wo, throughput) = (*surface, -start.direction, throughput * left);
+    for_each_pass_through_light(scene, start, reach, from_medium, |surface, distance, transmittance, flight| {
+        let (surface, wo, throughput) = (*surface, -start.direction, throughput * transmittance);
         let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
         visitor.pass_through_light(&PassThroughHit { surface, wo, throughput, depth, distance, flight }, scattered);
     });
