@@ -1,4 +1,4 @@
-//! Checkpoints: a render that was killed and goes on is the render that was not.
+//! Checkpoints: a render that was killed and resumed gives the bytes of an uninterrupted render.
 
 use crate::Folder;
 use caustique::render::Method;
@@ -12,35 +12,35 @@ fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
     std::fs::read(folder.path(name)).expect("the file is there")
 }
 
-/// Kills a render once it has saved itself, and waits for its end.
-fn killed(folder: &Folder, arguments: &str, checkpoint: &Path, moment: Duration) {
+/// Kills a render `delay` after it has written its checkpoint, and waits for its end.
+fn kill_after_checkpoint(folder: &Folder, arguments: &str, checkpoint: &Path, delay: Duration) {
     let mut render = folder.command(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
-    let mut looks = 0;
+    let mut checks = 0;
     while !checkpoint.exists() {
-        looks += 1;
-        assert!(looks < 60_000, "no checkpoint was written");
-        assert!(render.try_wait().expect("it can be asked").is_none(), "the render has ended");
+        checks += 1;
+        assert!(checks < 60_000, "no checkpoint was written");
+        assert!(render.try_wait().expect("its state is known").is_none(), "the render has ended");
         std::thread::sleep(Duration::from_millis(2));
     }
-    std::thread::sleep(moment);
+    std::thread::sleep(delay);
     render.kill().expect("it can be killed");
     render.wait().expect("it ends");
 }
 
-/// Every method, killed at some moment, goes on to the same bytes. What auto chooses depends on how long it may take, so
-/// it is asked for as many iterations as in the end.
+/// Every method, killed at some time and resumed, gives the same bytes. The choice of `auto` depends on the budget, so its
+/// first run already has the final number of iterations.
 #[test]
-fn what_was_killed_goes_on_to_the_same_bytes() {
+fn a_killed_render_resumes_to_the_same_bytes() {
     let methods = Method::ALL.iter().map(|method| method.name()).chain(["auto"]);
     for (i, method) in methods.enumerate() {
         let folder = Folder::new();
         let common = format!("{COMMON} --method {method}");
-        let (first, moment) = if method == "auto" { (400, 0) } else { (1_000_000, 7 * i as u64) };
+        let (first, delay) = if method == "auto" { (400, 0) } else { (1_000_000, 7 * i as u64) };
         let state = folder.path("cut.exr.checkpoint");
         let cut = format!("{common} --iterations {first} -o cut.exr --checkpoint-every 0.001");
-        killed(&folder, &cut, &state, Duration::from_millis(moment));
+        kill_after_checkpoint(&folder, &cut, &state, Duration::from_millis(delay));
         assert!(!folder.path("cut.exr").exists());
-        // So many more that some are left to do.
+        // A few more iterations than the checkpoint has.
         let (head, done) = state_of(&folder, "cut.exr.checkpoint");
         assert_eq!(head["version"], env!("CARGO_PKG_VERSION"));
         let total = if method == "auto" { 400 } else { done + 7 };
@@ -52,21 +52,21 @@ fn what_was_killed_goes_on_to_the_same_bytes() {
             bytes(&folder, "whole.exr") == bytes(&folder, "cut.exr"),
             "{method}: other bytes after a kill at {done}"
         );
-        // Who is killed while writing leaves the half beside the whole.
+        // A render that is killed while it writes leaves an incomplete `.part` file.
         let files: Vec<String> = folder.files().into_iter().filter(|name| !name.ends_with(".part")).collect();
         assert_eq!(files, ["cut.exr", "whole.exr"], "{method}: the checkpoint is removed");
     }
 }
 
-/// What a checkpoint says of itself, and after how many iterations it was written.
+/// The head of a checkpoint, and its number of iterations.
 fn state_of(folder: &Folder, name: &str) -> (serde_json::Value, u64) {
     let (head, state) = caustique::pipeline::checkpoint::read(&folder.path(name)).expect("it can be read");
     (serde_json::to_value(head).expect("it is an object"), state.iterations())
 }
 
-/// A checkpoint that was asked for stays, and a render that was done can be extended.
+/// A file of --checkpoint is kept, so that a complete render can be extended.
 #[test]
-fn a_render_that_was_done_is_extended() {
+fn a_complete_render_can_be_extended() {
     let folder = Folder::new();
     let run = |more: &str| {
         let outcome = folder.run(&format!("{COMMON} --method cppm {more}"));
@@ -81,7 +81,7 @@ fn a_render_that_was_done_is_extended() {
 }
 
 #[test]
-fn what_does_not_belong_is_refused_by_name() {
+fn a_checkpoint_of_another_render_or_a_damaged_one_is_rejected() {
     let folder = Folder::new();
     let run = |more: &str| folder.run(&format!("{COMMON} --iterations 2 -o a.exr {more}"));
     assert_eq!(run("--method path --checkpoint state").code, Some(0));
@@ -113,30 +113,35 @@ fn what_does_not_belong_is_refused_by_name() {
     refused("--method path --resume state", "another scene");
 }
 
-/// What a render that was stopped has saved is not lost to one that begins anew, unless that is asked for; and no other
-/// file is taken for a checkpoint.
+/// A new render replaces the checkpoint of a stopped one only with --overwrite. A file that is not a checkpoint is never
+/// replaced.
 #[test]
-fn the_state_of_a_stopped_render_is_not_replaced() {
+fn the_checkpoint_of_a_stopped_render_is_not_replaced() {
     let folder = Folder::new();
     let state = folder.path("a.exr.checkpoint");
     let render = format!("{COMMON} --method path -o a.exr");
-    killed(&folder, &format!("{render} --iterations 1000000 --checkpoint-every 0.001"), &state, Duration::ZERO);
+    kill_after_checkpoint(
+        &folder,
+        &format!("{render} --iterations 1000000 --checkpoint-every 0.001"),
+        &state,
+        Duration::ZERO,
+    );
     let saved = bytes(&folder, "a.exr.checkpoint");
     let anew = folder.run(&format!("{render} --iterations 2"));
     let error = "a.exr.checkpoint: is the checkpoint of a render that was not finished\n\
                  hint: go on with --resume a.exr.checkpoint, or start anew with --overwrite\n";
     assert_eq!((anew.code, anew.stderr.as_str()), (Some(2), error));
     assert!(bytes(&folder, "a.exr.checkpoint") == saved && !folder.path("a.exr").exists());
-    // It is not in the way of others, and goes where it is to go.
+    // A render without a checkpoint does not touch the file.
     assert_eq!(folder.run(&format!("{render} --iterations 2 --no-checkpoint")).code, Some(0));
     assert!(bytes(&folder, "a.exr.checkpoint") == saved);
-    // A render goes on from it by whatever name.
+    // --resume finds the checkpoint by another spelling of its path.
     let (_, done) = state_of(&folder, "a.exr.checkpoint");
     let resumed = folder.run(&format!("{render} --iterations {} --resume ./a.exr.checkpoint", done + 1));
     assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
     let anew = folder.run(&format!("{render} --iterations 2 --overwrite --checkpoint a.exr.checkpoint"));
     assert_eq!(anew.code, Some(0), "{}", anew.stderr);
-    // That of a render that was done is its last state, which another may replace.
+    // The checkpoint of a complete render may be replaced.
     let again = folder.run(&format!("{render} --iterations 2 --checkpoint a.exr.checkpoint"));
     assert_eq!(again.code, Some(0), "{}", again.stderr);
     for overwrite in ["", "--overwrite"] {
@@ -147,13 +152,18 @@ fn the_state_of_a_stopped_render_is_not_replaced() {
     }
 }
 
-/// The state stays until the picture is written.
+/// The checkpoint is kept until the picture is written.
 #[test]
-fn a_picture_that_cannot_be_written_leaves_the_state() {
+fn a_picture_that_cannot_be_written_leaves_the_checkpoint() {
     let folder = Folder::new();
     let state = folder.path("a.exr.checkpoint");
     let render = format!("{COMMON} --method path -o a.exr");
-    killed(&folder, &format!("{render} --iterations 1000000 --checkpoint-every 0.001"), &state, Duration::ZERO);
+    kill_after_checkpoint(
+        &folder,
+        &format!("{render} --iterations 1000000 --checkpoint-every 0.001"),
+        &state,
+        Duration::ZERO,
+    );
     let (_, done) = state_of(&folder, "a.exr.checkpoint");
     let resume = format!("{render} --iterations {} --resume a.exr.checkpoint --png full.png", done + 3);
     std::os::unix::fs::symlink("/dev/full", folder.path("full.png")).expect("a link");

@@ -1,11 +1,11 @@
-//! Finishing, comparing, and what files hold.
+//! The commands `finish`, `compare` and `info`.
 
 use crate::{Folder, Outcome, support, values};
 use caustique::film::{Layer, LayerSet, Naming};
 use caustique::image::exr::{self, Attributes};
 
 #[test]
-fn finishing_later_is_finishing_at_once() {
+fn finishing_later_gives_the_picture_of_finishing_at_once() {
     let folder = Folder::new();
     folder.render("-o at_once.exr --iterations 3");
     folder.render("-o levels.exr --iterations 3 --no-combine");
@@ -15,13 +15,13 @@ fn finishing_later_is_finishing_at_once() {
         (folder.read("at_once.exr"), folder.read("levels.exr"), folder.read("later.exr"));
     assert!(values(&at_once, "") == values(&later, ""));
     assert!(values(&levels, "") != values(&later, ""));
-    // With the finished parts: direct, indirect, caustic and seen light.
+    // The finish adds the finished parts: direct, indirect, caustic, emission.
     assert_eq!(levels.layers.len() + 4, later.layers.len());
     assert_eq!(at_once.layers.len(), later.layers.len());
     assert!(values(&at_once, "CombinedCaustic") == values(&later, "CombinedCaustic"));
     let denoiser = header["combined"]["denoiser"].as_str().expect("it says with what");
     assert!(denoiser.starts_with("Open Image Denoise 2.") && header["iterations"] == 3, "{denoiser}");
-    // Equation (6) with its network, and nothing after it.
+    // Equation (6) with its network, without a denoiser.
     let outcome = folder.run("combine levels.exr -o network.exr --model compact --denoise none");
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let (network, header) = folder.read("network.exr");
@@ -39,10 +39,10 @@ fn finishing_later_is_finishing_at_once() {
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
 }
 
-/// A picture with Blender's names: combined, two halves, albedo and normal. With a layer of variances instead of halves
-/// the same picture comes out where they say the same.
+/// A picture with Blender's layer names can be finished: combined, albedo, normal, and either two halves or the equivalent
+/// variance, which give the same picture.
 #[test]
-fn pictures_of_other_renderers_are_finished() {
+fn pictures_of_other_renderers_can_be_finished() {
     let folder = Folder::new();
     folder.render("-o own.exr --iterations 8 --no-combine --layers beauty,Quarter,albedo,normal --levels 1");
     let (own, _) = folder.read("own.exr");
@@ -80,7 +80,7 @@ fn pictures_of_other_renderers_are_finished() {
 }
 
 #[test]
-fn comparisons() {
+fn compare_prints_error_measures() {
     let folder = Folder::new();
     folder.render("-o a.exr --iterations 2 --no-combine");
     folder.render("-o b.exr --iterations 2 --no-combine --seed 1");
@@ -103,7 +103,7 @@ fn comparisons() {
 }
 
 #[test]
-fn what_a_scene_holds() {
+fn info_lists_the_content_of_a_scene() {
     let folder = Folder::new();
     let json = folder.run("info scene.glb --json").json();
     assert_eq!((&json["meshes"], &json["triangles"]), (&2.into(), &4.into()));
@@ -116,9 +116,9 @@ fn what_a_scene_holds() {
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), "nope: No such file or directory (os error 2)\n"));
 }
 
-/// Warnings are lines of their own; `--strict` makes an error of them before rendering.
+/// Each warning is a line. `--strict` turns warnings into an error before rendering.
 #[test]
-fn warnings_and_strict() {
+fn strict_turns_warnings_into_an_error() {
     let folder = Folder::new();
     support::glb::write(&folder.path("dark.glb"), false);
     let render = "render dark.glb -o out.exr --width 32 --iterations 1 --photons 100 --no-combine --progress none";
@@ -132,17 +132,17 @@ fn warnings_and_strict() {
                  hint: mend what the warnings above name, or leave --strict out\n";
     assert_eq!((outcome.code, outcome.stderr), (Some(1), format!("{warning}{error}")));
     assert!(!folder.path("out.exr").exists());
-    // An environment is light, and a background that can be seen.
+    // An environment gives light, and an opaque background.
     assert_eq!(folder.run(&format!("{render} --env 1,1,1 --strict")).code, Some(0));
     let (set, _) = folder.read("out.exr");
     let alpha = &set.get("").and_then(|beauty| beauty.plane("A")).expect("alpha").values;
     assert!(alpha.iter().all(|a| *a == 1.0));
 }
 
-/// What the scene names outside its folder is refused by every command that reads scenes, unless it is allowed; what
-/// the command line names may be anywhere.
+/// Every command that reads scenes rejects files that the scene names outside its folder, unless --allow-outside is given.
+/// Files that the command line names may be anywhere.
 #[test]
-fn files_outside_the_scenes_folder() {
+fn files_outside_the_scenes_folder_are_rejected() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("scenes")).expect("it can be made");
     image::Rgb32FImage::from_pixel(2, 1, image::Rgb([1.0; 3])).save(folder.path("sky.hdr")).expect("it can be written");
@@ -163,10 +163,9 @@ fn files_outside_the_scenes_folder() {
     assert_eq!(folder.run(&format!("render scenes/in.glb --env sky.hdr {render}")).code, Some(0));
 }
 
-/// Four million copies, each a kilobyte of our lists and Embree's, do not fit under a limit of two gigabytes: told
-/// before they are made.
+/// Four million instances of a kilobyte each exceed a limit of two gigabytes. The error comes before they are allocated.
 #[test]
-fn scenes_larger_than_memory() {
+fn scenes_larger_than_memory_are_rejected() {
     let folder = Folder::new();
     support::glb::write_copies(&folder.path("copies.glb"), 64);
     let mut command = std::process::Command::new("sh");
@@ -179,15 +178,15 @@ fn scenes_larger_than_memory() {
         " GiB are left by 'ulimit -v'\n\
          hint: place fewer copies, join them into one mesh, or render with more memory\n",
     );
-    // On a busy machine the wait is explained first.
+    // On a busy machine, a message about the wait comes first.
     let error = outcome.stderr.strip_prefix("reading copies.glb\n").unwrap_or(&outcome.stderr);
     assert!(error.starts_with(start) && error.ends_with(end), "{error}");
     assert!(error.contains(" placed meshes need about "), "{error}");
     assert_eq!(outcome.code, Some(1));
 }
 
-/// Equation (6) subtracts levels from each other, so that the network's picture has negative pixels, and nothing comes
-/// after it here: the file has none, and says how many were clamped.
+/// Equation (6) subtracts levels, so the network's picture has negative pixels. They are clamped in the file, and the
+/// header has their number.
 #[test]
 fn no_finished_pixel_is_negative() {
     let folder = Folder::new();

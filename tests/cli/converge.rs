@@ -1,12 +1,12 @@
-//! `caustique converge`: the report of a small comparison, and what is refused.
+//! `caustique converge`: the report of a small comparison, and errors.
 
 use crate::{Folder, Outcome, values};
 use serde_json::Value;
 
-/// Three quick runs against a reference of their own.
+/// Arguments of a small comparison.
 const SMALL: &str = "converge scene.glb --width 48 --height 36 --progress none -o out";
 
-/// A comparison with runs that are one argument each.
+/// Runs a comparison with one `--run` argument for each of `runs`.
 fn converge(folder: &Folder, arguments: &str, runs: &[&str]) -> Outcome {
     let mut command = folder.command(arguments);
     for run in runs {
@@ -19,7 +19,7 @@ fn text(folder: &Folder, name: &str) -> String {
     std::fs::read_to_string(folder.path(name)).expect("the file is there")
 }
 
-/// Every element that is opened is closed, in order; returns the names of all.
+/// Checks that all elements of a document are closed in the right order, and returns the names of all elements.
 fn elements(document: &str) -> Vec<String> {
     let void = ["meta", "img", "br", "!doctype"];
     let (mut open, mut all) = (Vec::new(), Vec::new());
@@ -62,8 +62,8 @@ fn the_report_of_a_small_comparison() {
     let expected = "a-b-c.exr error-core-seconds.svg error-iterations.svg error-seconds.svg five-finished.exr five.exr index.html one-finished.exr one.exr path-finished.exr path.exr points.csv points.json reference.exr trimmed-core-seconds.svg trimmed-iterations.svg trimmed-seconds.svg";
     assert_eq!(files.join(" "), expected);
 
-    // A row per curve, seed and moment: 1, 2, 3, 4, 6, 8, 11 and the last, and the target's 10 of one run. Three of the
-    // four runs have a curve of finished pictures.
+    // A row per curve, seed and measured iteration: 1, 2, 3, 4, 6, 8, 11 and the last, for one run also 10, which the
+    // target needs. Three of the four runs have a curve of finished pictures.
     let csv = text(&folder, "out/points.csv");
     let mut lines = csv.lines();
     let header = "run,method,seed,iterations,light_paths,seconds,cpu_seconds,finish_seconds,figure,relmse,relmse_trimmed,mse,mean_ratio,estimated_error,fireflies";
@@ -93,7 +93,7 @@ fn the_report_of_a_small_comparison() {
             .iter()
             .all(|p| p["finish_seconds"].is_null() != finished(p) && p["estimated_error"].is_null() >= finished(p))
     );
-    // The finish's time is added to that of what it finishes.
+    // The time of a finished picture includes the time of the finish.
     let (raw, whole, finish) =
         (of("five", "seconds"), of("five, finished", "seconds"), of("five, finished", "finish_seconds"));
     assert!((0..raw.len()).all(|i| (whole[i] - raw[i] - finish[i]).abs() < 1e-9));
@@ -102,12 +102,12 @@ fn the_report_of_a_small_comparison() {
     for point in points {
         let (figure, measured) = (point["figure"].as_f64(), point["relmse"].as_f64().expect("a number"));
         match figure {
-            // Numbers lose their last bit when JSON is read.
+            // Parsing JSON may change the last bit of a number.
             Some(figure) => assert!(figure > own && (figure + own - measured).abs() < 1e-12 * measured, "{point}"),
             None => assert!(measured - own <= own, "{point}"),
         }
     }
-    // The first run that the target is of reaches it there; nothing reaches what the reference does not.
+    // A target below the error of the reference cannot be reached.
     assert_eq!(json["targets"][0]["error"], 1e-9);
     assert_eq!(json["targets"][0]["runs"][1]["because"], "below the reference's error");
     assert_eq!(json["targets"][1]["of"], "one after 10 iterations");
@@ -119,7 +119,7 @@ fn the_report_of_a_small_comparison() {
     assert_eq!(json["runs"][6]["levels"], 5);
     assert!(json["runs"][5]["overhead"]["finish_seconds"].as_f64().is_some_and(|seconds| seconds > 0.0));
 
-    // The page holds everything, fetches nothing, and shows names as they are.
+    // The page is self-contained, and escapes names.
     let page = text(&folder, "out/index.html");
     let names = elements(&page);
     let count = |name: &str| names.iter().filter(|n| n.as_str() == name).count();
@@ -137,10 +137,10 @@ fn the_report_of_a_small_comparison() {
     assert!(csv.starts_with(header) && !csv.contains("NaN") && !page.contains("NaN") && !page.contains("inf "));
 }
 
-/// Turns change nothing: after as many iterations the picture is the one that `render` makes, finished or not; and a
-/// reference that was made tells its error when it is read again.
+/// The alternation between runs does not change pictures: after equal iterations they equal those of `render`, finished or
+/// not. A reference that was rendered has its error in the file.
 #[test]
-fn pictures_are_those_of_render_and_references_know_their_error() {
+fn pictures_equal_those_of_render_and_references_have_their_error() {
     let folder = Folder::new();
     let options = [
         ("one", "--method sppm --levels 1 --photons 2000 --no-combine"),
@@ -178,7 +178,7 @@ fn pictures_are_those_of_render_and_references_know_their_error() {
     let json = |folder: &Folder| serde_json::from_str::<Value>(&text(folder, "out/points.json")).expect("it is JSON");
     let first = json(&folder)["reference"]["error"].clone();
     assert!(first["mse"].as_f64().is_some_and(|mse| mse > 0.0));
-    // The measured error is the one that `compare` tells.
+    // The measured error equals that of `compare`.
     let compared = folder.run("compare out/one.exr out/reference.exr --json").json();
     let points = json(&folder)["points"].clone();
     let last = points.as_array().and_then(|points| points.iter().rfind(|point| point["run"] == "one").cloned());
@@ -188,7 +188,7 @@ fn pictures_are_those_of_render_and_references_know_their_error() {
         converge(&folder, &format!("{SMALL} --iterations 1 --error-metric mse --reference reference.exr"), &runs[..1]);
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
     assert_eq!((&json(&folder)["reference"]["error"], &json(&folder)["metric"]), (&first, &"mse".into()));
-    // A render of ours estimates itself, and may be no judge of its own method and seed.
+    // A reference with the method and seed of a run gives a warning.
     let same = "warning: one.exr: it has method and seed 3 of the run \"one\", whose error will look too small; choose another --seed\n";
     let outcome = converge(&folder, &format!("{SMALL} --iterations 1 --seed 3 --reference one.exr"), &runs[..1]);
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), same));
@@ -196,7 +196,7 @@ fn pictures_are_those_of_render_and_references_know_their_error() {
 }
 
 #[test]
-fn what_is_refused_word_for_word() {
+fn errors_of_converge_name_cause_and_remedy() {
     let folder = Folder::new();
     folder.render("-o other.exr --iterations 1 --no-combine --layers beauty");
     folder.render("-o depth.exr --iterations 1 --no-combine --layers depth");

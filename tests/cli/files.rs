@@ -1,11 +1,11 @@
-//! What a render leaves in its files.
+//! The files that a render writes.
 
 use crate::{Folder, support, values};
 use caustique::image::exr;
 use serde_json::Value;
 
 #[test]
-fn a_render_leaves_all_layers_and_its_account() {
+fn a_render_writes_all_layers_and_a_complete_header() {
     let folder = Folder::new();
     let outcome = folder.render("-o out.exr --png out.png --iterations 6 --seed 7");
     assert_eq!(folder.files(), ["out.exr", "out.png"]);
@@ -35,7 +35,7 @@ fn a_render_leaves_all_layers_and_its_account() {
     assert_eq!(found, expected);
     assert!(set.layers.iter().flat_map(|l| &l.planes).all(|plane| plane.values.iter().all(|v| v.is_finite())));
 
-    // The parts are the image; it is the second largest level; something is combined, something is a caustic.
+    // The parts sum to the estimate, which is level 4. The picture is finished, and it has a caustic.
     let (noisy, level) = (values(&set, "Noisy"), values(&set, "Level4"));
     let parts = ["Direct", "Indirect", "Caustic", "Emission"].map(|name| values(&set, name));
     for i in 0..noisy.len() {
@@ -49,7 +49,7 @@ fn a_render_leaves_all_layers_and_its_account() {
         }
         assert_eq!(noisy[i], level[i]);
     }
-    // The finished parts are the finished image, to the last bit or so, and none is negative.
+    // The finished parts sum to the finished picture up to rounding, and none is negative.
     let finished = ["Direct", "Indirect", "Caustic", "Emission"].map(|name| values(&set, &format!("Combined{name}")));
     for (i, beauty) in values(&set, "").iter().enumerate() {
         for c in 0..3 {
@@ -60,7 +60,7 @@ fn a_render_leaves_all_layers_and_its_account() {
     }
     let caustic: f32 = parts[2].iter().map(|p| p[0]).sum();
     assert!(caustic > 0.0 && values(&set, "") != noisy);
-    // Each level's radius is 1/sqrt(2) of the next larger.
+    // The radius of each level is 1/sqrt(2) of the next larger one.
     for k in 1..5 {
         for stem in ["Radius", "CausticRadius"] {
             let [small, large] = [k, k + 1].map(|k| values(&set, &format!("{stem}{k}")));
@@ -90,7 +90,7 @@ fn a_render_leaves_all_layers_and_its_account() {
     assert!(text.contains("\n          +-----") && text.contains("6 iterations, 12000 light paths"), "{text}");
 }
 
-/// Every effect by name, what calls for it, and whether it is simulated; all phases are core-seconds.
+/// The header lists each effect with its reasons and whether it is simulated, and the core-seconds of each phase.
 #[test]
 fn the_header_has_the_plan_and_the_phases() {
     let folder = Folder::new();
@@ -107,9 +107,9 @@ fn the_header_has_the_plan_and_the_phases() {
     let names: Vec<&str> = effects.iter().filter_map(|effect| effect["name"].as_str()).collect();
     let all = "emission direct indirect glossy caustic sds volume dispersion depth_of_field environment alpha textures";
     assert_eq!(names.join(" "), all);
-    // A perfect mirror shows what is there, and has no gloss of its own.
+    // A perfect mirror does not call for the effect glossy.
     assert_eq!(of("present"), ["direct", "indirect", "caustic", "sds"]);
-    // A caustic seen in a mirror has four segments at least.
+    // A path of a caustic in a mirror has at least four segments.
     assert_eq!(of("simulated"), ["direct", "indirect", "caustic"]);
     assert_eq!(effects[4]["because"], serde_json::json!(["material \"silver\" on \"Mirror\" under light \"Lamp\""]));
 
@@ -120,10 +120,10 @@ fn the_header_has_the_plan_and_the_phases() {
     assert!((sum - total).abs() < 0.1, "{sum} of {total}");
 }
 
-/// Every method writes its own layers: levels and bandwidths where it has them, parts that sum to its image, and a plan
-/// that says what it cannot find.
+/// Every method writes levels and bandwidths if it has them, parts that sum to its estimate, and a warning about effects
+/// that it does not find.
 #[test]
-fn every_method_leaves_what_it_has() {
+fn every_method_writes_its_layers() {
     let folder = Folder::new();
     let cases = [
         ("path", 1, false, true),
@@ -162,12 +162,12 @@ fn every_method_leaves_what_it_has() {
         }
         means.push(noisy.iter().map(|p| p[1]).sum::<f32>() / noisy.len() as f32);
     }
-    // Those that find everything agree roughly here; closely in tests of their own.
+    // The methods that find all light agree roughly. Other tests compare them precisely.
     assert!(means[3..].iter().all(|mean| (mean / means[4] - 1.0).abs() < 0.1), "{means:?}");
 
-    let idle = folder.run("render scene.glb -o out.exr --method vcm --photons 1000");
+    let rejected = folder.run("render scene.glb -o out.exr --method vcm --photons 1000");
     assert_eq!(
-        (idle.code, idle.stderr.as_str()),
+        (rejected.code, rejected.stderr.as_str()),
         (
             Some(2),
             "command line: --photons has no effect with --method vcm\nhint: leave --photons out, or choose --method sppm\n"
@@ -175,10 +175,10 @@ fn every_method_leaves_what_it_has() {
     );
 }
 
-/// The pictures per technique are where and what they should be: weighted ones sum to the method's own image, and each
-/// is at most what is found without weights.
+/// `--debug-techniques` writes a weighted and an unweighted picture per technique. The weighted ones sum to the estimate,
+/// and none is brighter than its unweighted picture.
 #[test]
-fn a_picture_per_technique() {
+fn weighted_pictures_of_all_techniques_sum_to_the_estimate() {
     let folder = Folder::new();
     let cases = [
         ("path", &["nextevent_s1_t2", "nextevent_s1_t3"][..]),
@@ -224,15 +224,15 @@ fn a_picture_per_technique() {
         }
         assert!(noisy.iter().any(|p| p[1] > 0.0));
     }
-    let idle = folder.run("render scene.glb -o out.exr --debug-techniques d");
+    let rejected = folder.run("render scene.glb -o out.exr --debug-techniques d");
     let cause = "command line: --debug-techniques has no effect before a method is chosen\nhint: ";
-    assert!(idle.code == Some(2) && idle.stderr.starts_with(cause), "{}", idle.stderr);
+    assert!(rejected.code == Some(2) && rejected.stderr.starts_with(cause), "{}", rejected.stderr);
     std::fs::write(folder.path("file"), "").expect("a file");
     let refused = folder.run("render scene.glb -o out.exr --method path --debug-techniques file");
     assert!(refused.code == Some(1) && refused.stderr.starts_with("file: "), "{}", refused.stderr);
 }
 
-/// Guided light paths for caustics alone are as many as pixels, unless their number is asked for.
+/// If guided light paths carry caustics alone, their default number is the number of pixels.
 #[test]
 fn small_pictures_have_few_guided_light_paths() {
     let folder = Folder::new();
@@ -248,9 +248,9 @@ fn small_pictures_have_few_guided_light_paths() {
     }
 }
 
-/// A map that does not fit ends early, says so, and shines no less.
+/// A photon map that is full ends tracing early with a warning, and the picture is not darker.
 #[test]
-fn a_full_photon_map_is_said() {
+fn a_full_photon_map_gives_a_warning_and_loses_no_light() {
     let folder = Folder::new();
     let pm = "render scene.glb --width 48 --height 36 --iterations 4 --method pm --photons 400000 --progress none";
     let mut means = vec![];
@@ -266,7 +266,7 @@ fn a_full_photon_map_is_said() {
         let by_photons = ["Caustic", "Indirect"].map(|name| values(&set, name).iter().map(|p| p[1]).sum::<f32>());
         means.push(by_photons[0] + by_photons[1]);
     }
-    // Some 7000 photons, in wide kernels; without dividing by fewer paths it would be a fraction.
+    // About 7000 photons, in wide kernels. Divided by the full number of paths, the mean would be a fraction.
     assert!((means[1] / means[0] - 1.0).abs() < 0.15, "{means:?}");
     for (option, cause) in [
         ("--method pm --knn 1", "--knn must be 2 or more with --method pm"),
@@ -292,7 +292,7 @@ fn the_same_bytes_with_any_number_of_threads() {
             .collect();
         assert!(files[0] == files[1] && files[0] == files[2], "{combine}");
     }
-    // Two tiles of the combiner, thirty bands of rows.
+    // The picture is two tiles of the network and thirty bands of rows.
     let files = [1, 3].map(|threads| {
         let name = format!("large{threads}.exr");
         let size = "--width 600 --height 480 --photons 2000 --iterations 1 --layers beauty --reproducible";
@@ -311,9 +311,9 @@ fn the_same_bytes_with_any_number_of_threads() {
     assert!(header["history"][0].get("seconds").is_none());
 }
 
-/// Shards render disjoint iterations of the same render: their means weigh up to the whole.
+/// Shards render disjoint iterations, so their weighted mean is the whole render.
 #[test]
-fn shards_share_the_iterations_out() {
+fn shards_divide_the_iterations() {
     let folder = Folder::new();
     folder.render("-o whole.exr --iterations 5 --no-combine");
     folder.render("-o a.exr --iterations 5 --shard 0/2 --no-combine");
@@ -334,7 +334,7 @@ fn shards_share_the_iterations_out() {
 }
 
 #[test]
-fn levels_layers_names_and_bandwidths_as_asked() {
+fn options_set_levels_layers_names_and_bandwidths() {
     let folder = Folder::new();
     folder.render("-o one.exr --iterations 2 --levels 1 --layers beauty,Radius1 --initial-bandwidth 0.25 --alpha 1");
     let (set, header) = folder.read("one.exr");
@@ -350,8 +350,8 @@ fn levels_layers_names_and_bandwidths_as_asked() {
     assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
 }
 
-/// Photons in media have bandwidths of their own, whose balls double from level to level; methods that gather none
-/// there have none.
+/// Photons in media have separate bandwidths, and the volume of the kernel doubles from level to level. Methods that gather
+/// no photons in media do not write these layers.
 #[test]
 fn media_add_layers_of_their_own() {
     let folder = Folder::new();
@@ -368,9 +368,9 @@ fn media_add_layers_of_their_own() {
     assert!(set.get("Volume").is_some() && set.get("Radius1").is_some() && set.get("VolumeRadius1").is_none());
 }
 
-/// One iteration cannot tell a variance: the header says so, and nothing in the file is infinite.
+/// One iteration gives no variance. The header says so, and all values in the file are finite.
 #[test]
-fn one_iteration_says_that_its_variance_is_unknown() {
+fn after_one_iteration_the_variance_is_unknown() {
     let folder = Folder::new();
     folder.render("-o out.exr --iterations 1 --no-combine");
     let (set, header) = folder.read("out.exr");
@@ -379,14 +379,14 @@ fn one_iteration_says_that_its_variance_is_unknown() {
     assert!(values(&set, "Error") == values(&set, "Noisy"));
 }
 
-/// A few pixels by `path`.
+/// Renders a few pixels with the method `path`.
 pub fn small(folder: &Folder, options: &str) -> crate::Outcome {
     let outcome = folder.run(&format!("render scene.glb -o out.exr --width 8 --height 8 --method path {options}"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     outcome
 }
 
-/// Names of light groups are the scene's: whatever they are, each group has layers of its own that can be written.
+/// Each light group has its own layers with legal names, for any names of groups in the scene.
 #[test]
 fn light_groups_of_any_names_have_layers() {
     let folder = Folder::new();
@@ -411,9 +411,9 @@ fn light_groups_of_any_names_have_layers() {
     }
 }
 
-/// A part of the light that a scene has none of is black where it is asked for by name: shots keep their layers.
+/// A layer of light that a scene does not have is black if the user names it, so that all shots have the same layers.
 #[test]
-fn a_part_without_light_is_black() {
+fn a_named_part_without_light_is_black() {
     let folder = Folder::new();
     let outcome = small(&folder, "--iterations 4 --layers beauty,Volume,CombinedVolume");
     assert!(outcome.stderr.contains("layer \"Volume\" is black: the render has no such light"), "{}", outcome.stderr);
@@ -424,10 +424,9 @@ fn a_part_without_light_is_black() {
     assert!(values(&set, "").as_flattened().iter().any(|value| *value > 0.0));
 }
 
-/// A scene and an environment may have names that are not UTF-8.
 #[cfg(target_os = "linux")]
 #[test]
-fn names_that_are_not_utf8() {
+fn scene_names_may_be_invalid_utf8() {
     use std::os::unix::ffi::OsStrExt;
     let folder = Folder::new();
     let name = std::ffi::OsStr::from_bytes(b"sc\xffne.glb");

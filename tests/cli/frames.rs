@@ -1,12 +1,12 @@
-//! Frames of an animation: which are rendered, under which names, by which seeds, and what stops them.
+//! Frames of an animation: names, seeds, existing files and interruption.
 
 use crate::{Folder, values};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
-/// Puts `moving.gltf` into the folder: a lit wall that fills the view and jumps aside at frame 3 of 24 a second.
-fn animate(folder: &Folder) {
+/// Writes `moving.gltf`: an emissive wall that fills the view and jumps aside at frame 3, at 24 frames per second.
+fn write_animation(folder: &Folder) {
     let (mut bytes, mut views, mut accessors) = (Vec::<u8>::new(), Vec::new(), Vec::new());
     let mut push = |floats: &[f32], kind: &str, width: usize| {
         views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": 4 * floats.len()}));
@@ -37,7 +37,7 @@ fn animate(folder: &Folder) {
 
 fn folder() -> Folder {
     let folder = Folder::new();
-    animate(&folder);
+    write_animation(&folder);
     folder
 }
 
@@ -49,7 +49,7 @@ fn mean(folder: &Folder, name: &str) -> f32 {
 }
 
 #[test]
-fn each_frame_has_its_moment_and_its_name() {
+fn each_frame_has_its_time_and_its_file_name() {
     let folder = folder();
     let names = "-o out.###.exr --png look.%02d.png";
     let outcome = folder.run(&format!("render moving.gltf --frames 1-5,2 {names} {SMALL}"));
@@ -65,7 +65,7 @@ fn each_frame_has_its_moment_and_its_name() {
     let outputs = ["out.001.exr", "out.003.exr", "out.005.exr"];
     assert_eq!(folder.files(), [&pictures[..], &["moving.bin", "moving.gltf"], &outputs[..]].concat());
     assert_eq!(outputs.map(|name| mean(&folder, name)), [1.0, 0.0, 0.0]);
-    // Alone a frame is the same, to the last byte; without frames the first key is shown.
+    // A frame that is rendered alone has the same bytes. Without --frames, the first key is rendered.
     let alone = folder.run(&format!("render moving.gltf --frames 3 -o alone.exr {SMALL}"));
     assert_eq!(alone.code, Some(0), "{}", alone.stderr);
     let bytes = |name: &str| std::fs::read(folder.path(name)).expect("it is there");
@@ -75,9 +75,9 @@ fn each_frame_has_its_moment_and_its_name() {
     assert_eq!(mean(&folder, "first.exr"), 1.0);
 }
 
-/// A frame's seed is its number more than the one asked for, unless all are to have the same.
+/// The seed of a frame is --seed plus the frame number, or --seed itself with --frame-seed same.
 #[test]
-fn seeds_of_frames() {
+fn frames_have_different_seeds_by_default() {
     let folder = folder();
     let run = |options: &str| {
         let outcome = folder.run(&format!("render scene.glb {SMALL} --method sppm --photons 500 {options}"));
@@ -97,9 +97,9 @@ fn seeds_of_frames() {
     assert_eq!(folder.read("vary.7.exr").1["seed"], 17);
 }
 
-/// A file for each frame, as Blender's exporter with a pattern writes them.
+/// A scene can be a sequence of files, one per frame, as our exporter for Blender writes them.
 #[test]
-fn scenes_can_be_a_sequence() {
+fn a_scene_can_be_a_sequence_of_files() {
     let folder = folder();
     for frame in ["0004", "0005"] {
         std::fs::copy(folder.path("scene.glb"), folder.path(&format!("shot.{frame}.glb"))).expect("it can be copied");
@@ -118,7 +118,7 @@ fn scenes_can_be_a_sequence() {
 }
 
 #[test]
-fn names_that_cannot_be() {
+fn file_names_that_do_not_fit_the_frames_are_rejected() {
     let folder = folder();
     for (arguments, fault) in [
         (
@@ -153,7 +153,7 @@ fn names_that_cannot_be() {
     assert_eq!(folder.files(), ["moving.bin", "moving.gltf"]);
 }
 
-/// Frames that are there are passed over, and rendered again unless that is asked for.
+/// Existing frames are skipped with --skip-existing, and rendered again otherwise.
 #[test]
 fn existing_frames_can_be_skipped() {
     let folder = folder();
@@ -169,9 +169,9 @@ fn existing_frames_can_be_skipped() {
     assert_eq!(mean(&folder, "out.1.exr"), 1.0);
 }
 
-/// A run that was interrupted keeps what is done, and goes on in the middle of its frame.
+/// An interrupted sequence keeps its finished frames, and continues in the middle of a frame.
 #[test]
-fn an_interrupted_run_goes_on() {
+fn an_interrupted_sequence_continues() {
     let folder = folder();
     let render =
         "render moving.gltf --width 32 --height 32 --method path --iterations 3000 --no-combine --reproducible";
@@ -181,8 +181,8 @@ fn an_interrupted_run_goes_on() {
     loop {
         let mut line = String::new();
         assert_ne!(lines.read_line(&mut line).expect("stderr can be read"), 0, "it has ended");
-        let told: Value = serde_json::from_str(&line).unwrap_or_default();
-        if told["frame"] == 2 {
+        let progress: Value = serde_json::from_str(&line).unwrap_or_default();
+        if progress["frame"] == 2 {
             break;
         }
     }

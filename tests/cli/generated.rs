@@ -1,5 +1,4 @@
-//! Files that are made from the definition of a render's options (`src/options`), compared with it.
-//! `scripts/generate.sh` writes them anew.
+//! Compares generated files with the definition of a render's options (`src/options`). `scripts/generate.sh` writes them.
 
 use crate::Folder;
 use caustique::options::catalogue;
@@ -7,7 +6,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
-/// Compares a file with what it is to hold, or writes it.
+/// Compares a file with its expected content, or writes it.
 fn compare(path: &str, expected: &str) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     if std::env::var_os("CAUSTIQUE_WRITE").is_some() {
@@ -17,7 +16,7 @@ fn compare(path: &str, expected: &str) {
     assert!(found == expected, "{path} is not what src/options gives: run scripts/generate.sh");
 }
 
-/// Compares the part of a file between two marks, or writes it.
+/// Compares the part of a file between two markers, or writes it.
 fn compare_part(path: &str, [begin, end]: [&str; 2], expected: &str) {
     let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).expect("the file can be read");
     let (before, rest) = text.split_once(begin).expect("the part begins");
@@ -27,16 +26,16 @@ fn compare_part(path: &str, [begin, end]: [&str; 2], expected: &str) {
 
 /// All options of `render`, as the program describes them.
 fn options() -> Vec<Value> {
-    let told = Folder::new().run("options").stdout;
-    let told: Value = serde_json::from_str(&told).expect("it is JSON");
-    told["render"].as_array().expect("there are options").clone()
+    let printed = Folder::new().run("options").stdout;
+    let described: Value = serde_json::from_str(&printed).expect("it is JSON");
+    described["render"].as_array().expect("there are options").clone()
 }
 
 fn text<'a>(option: &'a Value, key: &str) -> &'a str {
     option[key].as_str().unwrap_or_default()
 }
 
-/// Options that are arguments of Python's `render`; of its `plan` those about the picture and the way to it.
+/// Options that are arguments of Python's `render`, or of its `plan`, which has no options about output and running.
 fn arguments(all: &[Value], plan: bool) -> Vec<&Value> {
     let runs = |option: &Value| ["Output", "Running"].contains(&text(option, "heading")) && option["name"] != "threads";
     all.iter()
@@ -46,7 +45,7 @@ fn arguments(all: &[Value], plan: bool) -> Vec<&Value> {
 }
 
 #[test]
-fn what_files_may_say_of_a_render() {
+fn generated_json_lists_the_options_that_files_may_set() {
     let all = options();
     let of_stages = all.iter().filter(|option| option["stage"] == true);
     let names: Vec<&Value> = of_stages
@@ -68,9 +67,9 @@ fn what_files_may_say_of_a_render() {
     compare("scripts/blender/caustique_addon/options.json", &made);
 }
 
-/// A stage of USD, or a file of Blender, may come from anywhere.
+/// USD stages and Blender files come from untrusted sources, so they cannot set files or permissions.
 #[test]
-fn stages_give_neither_files_nor_permissions() {
+fn stages_cannot_set_files_or_permissions() {
     let all = options();
     for name in [
         "output",
@@ -103,7 +102,7 @@ fn python_has_all_options_or_a_reason() {
     }
 }
 
-/// What Python's checkers know of an argument: its type.
+/// The Python type of an argument.
 fn python_type(option: &Value) -> String {
     let literal = |names: Vec<&str>| {
         let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
@@ -131,7 +130,7 @@ fn python_type(option: &Value) -> String {
     }
 }
 
-/// The default of an argument, as Python writes it.
+/// The default of an argument in Python syntax.
 fn python_default(option: &Value, quote: char) -> String {
     match (text(option, "kind"), option["default"].as_str()) {
         ("flag", _) if option["python"] != "finish" => "False".into(),
@@ -142,7 +141,7 @@ fn python_default(option: &Value, quote: char) -> String {
 }
 
 #[test]
-fn stubs_of_python() {
+fn python_stubs_match_the_options() {
     let all = options();
     for (call, plan) in [("render", false), ("plan", true)] {
         let line = |option: &&Value| {
@@ -162,8 +161,8 @@ fn find<'a>(all: &'a [Value], name: &str) -> &'a Value {
     all.iter().find(|option| option["name"] == name).expect("there is such an option")
 }
 
-/// Words in lines of at most so many characters.
-fn wrapped(words: &str, width: usize) -> Vec<String> {
+/// Wraps text into lines of at most `width` characters.
+fn wrap(words: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in words.split_whitespace() {
         let last = lines.last_mut().expect("there is a line");
@@ -178,7 +177,7 @@ fn wrapped(words: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// The help of an option with arguments of Python in place of options, without more than its first paragraph.
+/// The first paragraph of an option's help, with the names of Python's arguments in place of options.
 fn python_help(all: &[Value], option: &Value) -> String {
     if option["python"] == "finish" {
         return "False: the picture is not finished, it is the method's own estimate, at one bandwidth".into();
@@ -201,7 +200,7 @@ fn python_help(all: &[Value], option: &Value) -> String {
 }
 
 #[test]
-fn docstrings_of_python() {
+fn python_docstrings_match_the_options() {
     let all = options();
     let progress = "called with a Progress after every iteration, in the thread that called; False ends the render";
     for (call, plan, about, end) in [
@@ -234,7 +233,7 @@ fn docstrings_of_python() {
             entries.push(("progress", progress.into()));
         }
         let line = |(name, help): &(&str, String)| {
-            let lines = wrapped(help, 94);
+            let lines = wrap(help, 94);
             let shown = |(i, line): (usize, &String)| format!("{:<20}{line}\n", if i == 0 { name } else { "" });
             lines.iter().enumerate().map(shown).collect::<String>()
         };
@@ -254,8 +253,7 @@ fn the_page_about_python_lists_all_arguments() {
         .filter(|name| !own.contains(name))
         .map(|name| format!("`{name}`"))
         .collect();
-    let lines =
-        wrapped(&format!("Options are those of `caustique render` by the same names: {}.", names.join(", ")), 120);
+    let lines = wrap(&format!("Options are those of `caustique render` by the same names: {}.", names.join(", ")), 120);
     let marks = ["<!-- options of render -->\n\n", "\n\n<!-- end of options of render -->"];
     compare_part("docs/python.md", marks, &lines.join("\n"));
 }

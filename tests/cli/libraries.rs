@@ -1,17 +1,17 @@
-//! Where libraries and Pythons are loaded from: never from the current folder, which may hold anybody's files.
+//! Origins of libraries and Python interpreters: never the current folder, which may have untrusted files.
 
 use crate::{Folder, Outcome};
 use std::path::Path;
 use std::process::Command;
 
-/// A library whose initialiser leaves a file.
+/// C source of a library that writes a file when it is loaded.
 const LIBRARY: &str = r#"
 #include <stdio.h>
 __attribute__((constructor)) static void run(void) { FILE *file = fopen("ran-library", "w"); if (file) fclose(file); }
 "#;
 
-/// Fills a folder with all that the program might run or load if it looked there.
-fn lay_traps(folder: &Folder) {
+/// Fills a folder with libraries and programs that write a file `ran-...` if the program loads or runs them.
+fn write_traps(folder: &Folder) {
     let write = |name: &str, text: &str| {
         let path = folder.path(name);
         std::fs::create_dir_all(path.parent().expect("a folder")).expect("it can be made");
@@ -33,15 +33,15 @@ fn lay_traps(folder: &Folder) {
     }
 }
 
-/// Files of [`lay_traps`] that have run.
-fn sprung(folder: &Folder) -> Vec<String> {
+/// Files that traps of [`write_traps`] have written.
+fn triggered(folder: &Folder) -> Vec<String> {
     folder.files().into_iter().filter(|name| name.starts_with("ran-")).collect()
 }
 
 #[test]
 fn nothing_in_the_current_folder_is_run_or_loaded() {
     let folder = Folder::new();
-    lay_traps(&folder);
+    write_traps(&folder);
     std::fs::write(folder.path("stage.usda"), "#usda 1.0\n").expect("it can be written");
     let render = "render scene.glb -o out.exr --width 8 --height 8 --iterations 4 --progress none --denoise oidn";
     let converge = "converge scene.glb --width 8 --height 8 --methods path --iterations 4 --no-finish --progress none";
@@ -54,19 +54,18 @@ fn nothing_in_the_current_folder_is_run_or_loaded() {
         let mut command = folder.command(arguments);
         command.env_remove("CAUSTIQUE_HOME");
         let outcome = Outcome::of(command);
-        assert_eq!(sprung(&folder), [""; 0], "{arguments}: {}", outcome.stderr);
+        assert_eq!(triggered(&folder), [""; 0], "{arguments}: {}", outcome.stderr);
     }
-    // The traps do work.
+    // The traps work when they are named explicitly.
     let mut command = folder.command("doctor");
     command.env("CAUSTIQUE_OIDN", folder.path(".deps/oidn/libOpenImageDenoise.so.9"));
     command.env("CAUSTIQUE_USD_PYTHON", folder.path(".venv-usd/bin/python"));
     Outcome::of(command);
-    assert_eq!(sprung(&folder), ["ran-library", "ran-python"]);
+    assert_eq!(triggered(&folder), ["ran-library", "ran-python"]);
 }
 
-/// The folder that `CAUSTIQUE_HOME` names is searched, and `doctor` says where each library comes from.
 #[test]
-fn a_named_home_is_searched_and_the_origin_is_told() {
+fn caustique_home_is_searched_and_doctor_prints_the_origin_of_libraries() {
     let folder = Folder::new();
     let found = folder.run("doctor --json").json();
     let path = found["oidn"]["path"].as_str().expect("Open Image Denoise is found");

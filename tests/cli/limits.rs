@@ -1,4 +1,4 @@
-//! Limits of memory, disk and time: what they take away is said, and what is finished is kept.
+//! Limits of memory, disk and time: they give warnings or errors, and finished work is kept.
 
 use crate::{Folder, Outcome, values};
 use caustique::image::exr;
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
-/// The program under limits of the shell.
+/// Runs the program under limits of the shell.
 fn limited(folder: &Folder, limits: &str, arguments: &str) -> Outcome {
     let mut command = Command::new("sh");
     let line = format!("ulimit -c 0; {limits}; exec {} {arguments}", env!("CARGO_BIN_EXE_caustique"));
@@ -14,9 +14,9 @@ fn limited(folder: &Folder, limits: &str, arguments: &str) -> Outcome {
     Outcome::of(command)
 }
 
-/// Whatever the limit of memory, a render ends well, or with an error and a remedy.
+/// With any limit of memory, a render succeeds or ends with an error and a remedy.
 #[test]
-fn no_limit_of_memory_aborts() {
+fn no_limit_of_memory_aborts_the_program() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --width 320 --iterations 2 --method sppm --threads 2 --progress none";
     let mut codes = Vec::new();
@@ -31,15 +31,15 @@ fn no_limit_of_memory_aborts() {
     assert!(codes[0] == Some(1) && codes[codes.len() - 1] == Some(0), "{codes:?}");
 }
 
-/// A render whose announced memory fits is finished, and takes no more, and no less than a third: whoever has more than
-/// that is not refused.
+/// A render succeeds if its announced memory is available. It takes at most this memory, and at least a third of it, so
+/// that the check does not reject renders that would fit.
 #[test]
-fn renders_whose_memory_fits_are_finished() {
+fn renders_whose_announced_memory_fits_succeed() {
     const GIB: f64 = (1 << 30) as f64;
-    /// The message rounds both its numbers to tenths.
+    /// The message rounds both numbers to tenths of a GiB.
     const ROUNDING: f64 = 0.1 * GIB;
-    /// Enough for the scene, and for no picture.
-    const LITTLE: f64 = 550e6;
+    /// Enough memory for the scene, but not for the picture.
+    const SCENE_ONLY: f64 = 550e6;
     let folder = Folder::new();
     for (size, method, denoiser) in
         [((1280, 720), "path", "auto"), ((1280, 720), "sppm --photons 2000", "none"), ((1920, 1080), "path", "none")]
@@ -50,13 +50,13 @@ fn renders_whose_memory_fits_are_finished() {
              --compression none --threads 2 --progress none"
         );
         let within = |bytes: f64| limited(&folder, &format!("ulimit -v {}", (bytes / 1024.0) as u64), &render);
-        let refused = within(LITTLE).stderr;
+        let refused = within(SCENE_ONLY).stderr;
         let number = |before: &str, after: &str| -> f64 {
             let (_, rest) = refused.split_once(before).expect(&refused);
             GIB * rest.split_once(after).expect(&refused).0.parse::<f64>().expect("a number")
         };
         let announced = number("need about ", " GiB of memory, ");
-        let taken = LITTLE - number(" GiB of memory, ", " GiB are left by 'ulimit -v'");
+        let taken = SCENE_ONLY - number(" GiB of memory, ", " GiB are left by 'ulimit -v'");
         let outcome = within(taken + announced + ROUNDING);
         assert_eq!(outcome.code, Some(0), "{method} {size}: {}", outcome.stderr);
         let (_, header) = folder.read("out.exr");
@@ -67,10 +67,9 @@ fn renders_whose_memory_fits_are_finished() {
     }
 }
 
-/// A file that is named by many buffers, and an image that is shown by many textures, are counted as often as they are
-/// read.
+/// The memory check counts a file once for each buffer that names it, and an image once for each texture.
 #[test]
-fn what_a_scene_names_many_times_is_counted() {
+fn files_that_a_scene_names_repeatedly_are_counted_each_time() {
     let folder = Folder::new();
     std::fs::write(folder.path("big.bin"), vec![0; 1 << 20]).expect("it can be written");
     image::RgbaImage::new(1024, 1024).save(folder.path("big.png")).expect("it can be written");
@@ -98,9 +97,10 @@ fn what_a_scene_names_many_times_is_counted() {
     }
 }
 
-/// A cap on memory has its price told: fewer light paths, less of a map; and what cannot be is refused.
+/// With --memory, warnings report the smaller number of light paths or the smaller photon map. A limit that cannot be met
+/// is an error.
 #[test]
-fn a_cap_on_memory_is_planned() {
+fn a_memory_limit_reduces_light_paths_with_a_warning() {
     let folder = Folder::new();
     let pool = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/pool.glb");
     std::fs::copy(pool, folder.path("pool.glb")).expect("it can be copied");
@@ -117,7 +117,7 @@ fn a_cap_on_memory_is_planned() {
     let (set, header) = folder.read("out.exr");
     assert_eq!(header["light_paths"], 2 * photons);
     assert!(header["plan"]["warnings"].to_string().contains("light paths an iteration instead of 200000"));
-    // It is the render of so many light paths.
+    // The picture equals a render with this number of light paths.
     assert_eq!(render(&format!("--method sppm --photons {photons}")).code, Some(0));
     assert!(values(&folder.read("out.exr").0, "") == values(&set, ""));
     let outcome = render("--method pm --photons 200000 --memory 6");
@@ -135,8 +135,8 @@ fn a_cap_on_memory_is_planned() {
     );
 }
 
-/// The estimate is there while the picture is finished, and afterwards only if the program was ended meanwhile: by
-/// force, or by a second signal, which ends it at once.
+/// The estimate is on disk during the finish. Afterwards it is there only if the program was killed, or ended at once by a
+/// second signal.
 #[test]
 fn the_estimate_outlives_a_killed_finish() {
     let folder = Folder::new();
@@ -170,9 +170,9 @@ fn the_estimate_outlives_a_killed_finish() {
     assert!(!estimate.exists() && folder.read("out.exr").1["combined"].is_object());
 }
 
-/// A file that may not grow as large as it must: the older one stays whole, and nothing else is left.
+/// If the output exceeds the limit on file size, the older file stays, and no other file is left.
 #[test]
-fn a_limit_on_files_keeps_the_older_one() {
+fn a_limit_on_file_size_keeps_the_older_file() {
     let folder = Folder::new();
     std::fs::write(folder.path("out.exr"), "older").expect("it can be written");
     let render =
@@ -185,7 +185,7 @@ fn a_limit_on_files_keeps_the_older_one() {
     assert_eq!(folder.files(), ["out.exr"]);
 }
 
-/// A full device is an error, and the render is kept elsewhere.
+/// A full device is an error, and the render is saved elsewhere.
 #[test]
 fn a_full_disk_loses_no_render() {
     let folder = Folder::new();
@@ -197,9 +197,9 @@ fn a_full_disk_loses_no_render() {
     assert!(exr::read(rescued.as_ref()).is_ok_and(|(set, _)| set.get("").is_some()));
 }
 
-/// The EXR goes to standard output, and all talk elsewhere; a reader that goes loses no render.
+/// With `-o -`, only the EXR is written to standard output. If writing fails, the render is saved elsewhere.
 #[test]
-fn a_render_to_standard_output() {
+fn standard_output_gets_the_exr_alone() {
     let folder = Folder::new();
     let small = "--width 16 --height 12 --iterations 1 --method path --no-combine --reproducible";
     assert_eq!(folder.run(&format!("render scene.glb -o file.exr {small}")).code, Some(0));
@@ -219,9 +219,9 @@ fn a_render_to_standard_output() {
     assert!(outcome.code == Some(2) && outcome.stderr.starts_with(error), "{}", outcome.stderr);
 }
 
-/// A signal while the picture is finished or the scene is read leaves either the new file whole, or the older one.
+/// A signal while the scene is read, or during the finish, leaves either the complete new file or the older one.
 #[test]
-fn a_signal_at_any_time_leaves_a_whole_file() {
+fn a_signal_at_any_time_leaves_a_complete_file() {
     let folder = Folder::new();
     assert!(Command::new("mkfifo").arg(folder.path("pipe.glb")).status().expect("mkfifo runs").success());
     std::fs::write(folder.path("out.exr"), "older").expect("it can be written");
@@ -239,7 +239,7 @@ fn a_signal_at_any_time_leaves_a_whole_file() {
     assert_eq!(child.wait().expect("it ends").code(), None);
     assert_eq!(std::fs::read(folder.path("out.exr")).expect("it is there"), b"older");
 
-    // The last iteration is told before the picture is finished.
+    // The last iteration is reported before the finish begins.
     let arguments = "render scene.glb -o out.exr --width 320 --iterations 1 --method path --progress json";
     let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
     let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
@@ -251,7 +251,7 @@ fn a_signal_at_any_time_leaves_a_whole_file() {
     let mut rest = String::new();
     lines.read_to_string(&mut rest).expect("stderr can be read");
     let code = child.wait().expect("it ends").code();
-    // Between the iteration and the look at the signals it may be either; the picture is whole in both cases.
+    // The signal may come before or after the last check for signals; the picture is complete in both cases.
     assert!(matches!(code, Some(0 | 130)), "{code:?} {rest}");
     assert_eq!(folder.read("out.exr").1["iterations"], 1);
 }

@@ -1,4 +1,4 @@
-//! `caustique merge`: shards to the bytes of one render, and renders of other seeds to their mean.
+//! `caustique merge`: joins shards to the bits of one render, and renders of other seeds to their mean.
 
 use crate::{Folder, Outcome, values};
 use caustique::film::LayerSet;
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 const COMMON: &str = "render scene.glb --width 40 --height 24 --progress none";
 
-/// Renders the shards of a render; returns their names.
+/// Renders all shards of a render, and returns their file names.
 fn shards(folder: &Folder, arguments: &str, count: u32) -> Vec<String> {
     let shard = |index: u32| {
         let name = format!("s{index}.exr");
@@ -21,8 +21,8 @@ fn merge(folder: &Folder, names: &[String], more: &str) -> Outcome {
     folder.run(&format!("merge {} -o merged.exr {more}", names.join(" ")))
 }
 
-/// Every method whose iterations do not depend on each other, in any order, finished and not, quarters and
-/// cryptomattes included: the same bits in every channel. The finish sees the layers that it would have seen.
+/// For every method with independent iterations, merged shards have the bits of one render in every channel: in any order,
+/// finished or not, with quarters and cryptomattes.
 #[test]
 fn shards_make_the_bits_of_one_render_in_any_order() {
     let finished = "--layers all";
@@ -53,7 +53,7 @@ fn shards_make_the_bits_of_one_render_in_any_order() {
             assert_eq!(header[key], first[key], "{method}: {key}");
         }
         assert_eq!(header["merged"]["shards"].as_array().map(Vec::len), Some(count as usize));
-        // That of the estimate; what is told of the finished picture also follows from earlier moments.
+        // The error of the estimate. The error of the finished picture also depends on earlier iterations.
         let noisy = |header: &Value| header.get("error_noisy").unwrap_or(&header["error"]).clone();
         assert_eq!(noisy(&header), noisy(&first), "{method}");
         let last = header["history"].as_array().and_then(|history| history.last()).expect("there is a last moment");
@@ -61,7 +61,7 @@ fn shards_make_the_bits_of_one_render_in_any_order() {
     }
 }
 
-/// Channels that are not the same to the last bit, or not in both.
+/// Names of the layers that differ in any bit, or are missing in one of the two.
 fn different(a: &LayerSet, b: &LayerSet) -> Vec<String> {
     let mut names: Vec<&str> = a.layers.iter().chain(&b.layers).map(|layer| layer.name.as_str()).collect();
     names.sort_unstable();
@@ -73,15 +73,14 @@ fn different(a: &LayerSet, b: &LayerSet) -> Vec<String> {
     names.into_iter().filter(|name| bits(a, name) != bits(b, name)).map(String::from).collect()
 }
 
-/// Another order, another split, a shard that was killed and went on: nothing of it is seen.
 #[test]
-fn a_shard_that_was_interrupted_goes_on_and_merges_to_the_same_bits() {
+fn a_shard_that_was_interrupted_and_resumed_merges_to_the_same_bits() {
     let folder = Folder::new();
     let arguments = "--method vcm --iterations 12 --no-combine";
     let names = shards(&folder, arguments, 2);
     assert_eq!(merge(&folder, &names, "").code, Some(0));
     let whole = folder.read("merged.exr").0;
-    // Half of its iterations, saved; the other half later.
+    // Renders half of the iterations with a checkpoint, then the other half.
     let shard = format!("{COMMON} --method vcm --no-combine --shard 1/2 -o s1.exr");
     assert_eq!(folder.run(&format!("{shard} --iterations 6 --checkpoint state")).code, Some(0));
     let early = merge(&folder, &names, "");
@@ -94,7 +93,7 @@ fn a_shard_that_was_interrupted_goes_on_and_merges_to_the_same_bits() {
 }
 
 #[test]
-fn shards_that_do_not_belong_together_are_named() {
+fn shards_that_do_not_belong_together_are_rejected_by_name() {
     let folder = Folder::new();
     let names = shards(&folder, "--method path --iterations 6 --layers beauty", 3);
     let refused = |names: &[&str], more: &str, cause: &str, hint: &str| {
@@ -148,7 +147,7 @@ fn shards_that_do_not_belong_together_are_named() {
         "whole.exr: is no shard of a render",
         "merge files that --shard I/N made, or whole renders of other seeds alone",
     );
-    // The sums of a shard are damaged, its picture is not.
+    // The sums of the shard are damaged, but its picture is not.
     let mut bytes = std::fs::read(folder.path("s1.exr")).expect("it is there");
     let at = bytes.len() - 200;
     bytes[at] ^= 1;
@@ -156,9 +155,9 @@ fn shards_that_do_not_belong_together_are_named() {
     assert!(caustique::image::exr::read(&folder.path("damaged.exr")).is_ok());
     let damaged = folder.run("merge s0.exr damaged.exr s2.exr -o merged.exr");
     assert_eq!(damaged.code, Some(1), "{}", damaged.stderr);
-    let told = "damaged.exr: the sums behind its picture are damaged\nhint: render this shard again\n";
-    assert_eq!(damaged.stderr, told);
-    // What is there alone, if that is asked for.
+    let error = "damaged.exr: the sums behind its picture are damaged\nhint: render this shard again\n";
+    assert_eq!(damaged.stderr, error);
+    // --partial merges the shards that are present.
     let partial = merge(&folder, &[names[0].clone(), names[2].clone()], "--partial");
     assert_eq!(partial.code, Some(0), "{}", partial.stderr);
     assert!(partial.stderr.starts_with("warning: shard 1 is missing"), "{}", partial.stderr);
@@ -166,7 +165,8 @@ fn shards_that_do_not_belong_together_are_named() {
     assert_eq!((&header["iterations"], &header["merged"]["missing"]), (&4.into(), &serde_json::json!([1])));
 }
 
-/// The mean weighed by iterations, variances by their squares; cryptomattes and counts as they add up.
+/// Merged renders of other seeds are their mean weighted by iterations. Variances are weighted by squared shares, counts
+/// are summed, and cryptomattes averaged.
 #[test]
 fn renders_of_other_seeds_give_their_mean() {
     let folder = Folder::new();
@@ -198,20 +198,20 @@ fn renders_of_other_seeds_give_their_mean() {
     check("Variance1", |a, b| (a + 4.0 * b) / 9.0);
     check("Rejected", |a, b| a + b);
     check("Z", |a, _| a);
-    // Their picture is finished anew, from the mean: neither of theirs.
+    // The merged picture is finished from the mean, and differs from both pictures.
     assert!(header["combined"].is_object() && values(&merged, "") != values(&a, ""));
     let mean = |set: &LayerSet| {
         let all = values(set, "").concat();
         all.iter().sum::<f32>() / all.len() as f32
     };
     assert!((mean(&merged) / ((mean(&a) + 2.0 * mean(&b)) / 3.0) - 1.0).abs() < 0.02);
-    // Shares of objects: of all, and the same object first.
+    // The first cryptomatte layer has the mean coverage of the same object.
     let share =
         |set: &LayerSet| set.get("CryptoObject00").and_then(|layer| layer.plane("g").or(layer.plane("G")).cloned());
     let [a, b, merged] = [&a, &b, &merged].map(|set| share(set).expect("there are cryptomattes").values);
     let middle = a.len() / 2 + 20;
     assert!((merged[middle] - (a[middle] + 2.0 * b[middle]) / 3.0).abs() < 1e-5, "{}", merged[middle]);
-    // Another scene's picture does not belong there.
+    // A render by another method is rejected.
     folder.run(&format!("{COMMON} --method path --iterations 6 --seed 9 -o path.exr"));
     let outcome = merge(&folder, &["0.exr".into(), "path.exr".into()], "");
     assert_eq!(outcome.code, Some(2));
@@ -222,7 +222,7 @@ fn renders_of_other_seeds_give_their_mean() {
     );
 }
 
-/// No input is overwritten, by whatever name it is called.
+/// Inputs are not overwritten, also if the output names them by another path or link.
 #[test]
 fn inputs_are_not_overwritten() {
     let folder = Folder::new();
@@ -248,9 +248,9 @@ fn inputs_are_not_overwritten() {
     assert_eq!((preview.code, folder.read("1.exr").1["seed"].clone()), (Some(2), 1.into()), "{}", preview.stderr);
 }
 
-/// A shard whose sums are not those that its facts promise, its checks put right, is damaged, and ends no program.
+/// A shard with valid checksums, but with sums that do not fit its header, is rejected as damaged.
 #[test]
-fn forged_shards_are_refused() {
+fn forged_shards_are_rejected() {
     use caustique::pipeline::shard::{ShardFile, ShardSums};
     let folder = Folder::new();
     let names = shards(&folder, "--method vcm --iterations 4 --no-combine", 2);

@@ -1,15 +1,15 @@
-//! `caustique converge --with`: what drivers of other renderers are asked and answer. A shell script stands in for the
-//! Python that runs them; the drivers themselves are tested in Python (test_peers.py).
+//! `caustique converge --with`: the protocol between the program and drivers of other renderers. A shell script replaces
+//! the Python that runs the drivers; `test_peers.py` tests the drivers themselves.
 
 use crate::{Folder, Outcome};
 use serde_json::Value;
 use std::process::{Command, Stdio};
 
-/// A comparison with other renderers; the finishes of ours are of no interest.
+/// Arguments of a comparison with other renderers, without the finish of our own pictures.
 const SMALL: &str = "converge scene.glb --width 48 --height 36 --methods path --no-finish --reference reference.exr --progress none -o out";
 
-/// A folder with a reference, and the script in place of a Python: it is called `-I -B -c PROBE MODULES` or `-I -B FOLDER
-/// DRIVER SCENE OUT --mode=.. ..`, and finds all modules.
+/// A folder with a reference, and with a script in place of Python. The program calls it as `-I -B -c PROBE MODULES`, which
+/// always succeeds, or as `-I -B FOLDER DRIVER SCENE OUT --mode=.. ..`.
 fn folder(script: &str) -> Folder {
     let folder = Folder::new();
     let size = "--width 48 --height 36 --no-combine --layers beauty";
@@ -44,9 +44,10 @@ echo 'noise of a library'
 echo 'PEER {"seconds": 0.25, "core_seconds": 0.5, "startup_seconds": 1.5, "passes": 12, "version": "9.9", "approximations": ["red is blue"]}'
 "#;
 
-/// One renders, one cannot say the scene, one fails: all have a row, and nothing fails.
+/// One mode renders, one cannot express the scene, and one fails. Each has a row in the report, and the comparison
+/// succeeds.
 #[test]
-fn peers_are_curves_or_rows_with_a_reason() {
+fn peers_have_a_curve_or_a_row_with_a_reason() {
     let folder = folder(ANSWERS);
     let outcome = Outcome::of(command(&folder, &format!("{SMALL} --time 0.8 --seed 3 --with luxcore")));
     assert_eq!((outcome.code, outcome.stderr.contains("warning: --with")), (Some(0), false), "{}", outcome.stderr);
@@ -98,9 +99,9 @@ fn peers_are_curves_or_rows_with_a_reason() {
     assert!(folder.path("out/luxcore-path.exr").exists() && folder.path("out/luxcore-path-oidn.exr").exists());
 }
 
-/// A picture with more light is not of the same scene, and the row says by how much.
+/// If the mean of a picture differs from the reference, the row says that the scene is not the same, and by how much.
 #[test]
-fn a_peer_with_another_scene_is_told() {
+fn a_peer_that_renders_another_scene_is_reported() {
     let folder = folder(&ANSWERS.replace("same.exr", "other.exr"));
     let outcome = Outcome::of(command(&folder, &format!("{SMALL} --time 0.2 --with luxcore")));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
@@ -108,7 +109,7 @@ fn a_peer_with_another_scene_is_told() {
     let run = &json["runs"][1];
     let compared = folder.run("compare other.exr reference.exr --json").json();
     assert_eq!((&run["same_scene"], &run["mean_ratio"]["value"]), (&false.into(), &compared["mean_ratio"]));
-    // Options that drivers do not know make another scene, too.
+    // Options that drivers do not support would change the scene.
     let arguments = format!("{SMALL} --time 0.1 --env 1,1,1 --with luxcore");
     let outcome = Outcome::of(command(&folder, &arguments));
     let warning = "warning: --with: drivers do not know --env; other renderers are left out\n";
@@ -117,7 +118,7 @@ fn a_peer_with_another_scene_is_told() {
 }
 
 #[test]
-fn what_is_not_installed_says_what_installs_it() {
+fn missing_modules_give_a_hint_how_to_install_them() {
     let folder = folder("");
     std::fs::write(folder.path("python"), "#!/bin/sh\necho 'no module pyluxcore' >&2; exit 1\n")
         .expect("it is written");
@@ -140,7 +141,7 @@ fn what_is_not_installed_says_what_installs_it() {
     assert!(!folder.path("out").exists());
 }
 
-/// Ctrl-C ends a driver that would render for ten minutes, and the report on what was done is written.
+/// Ctrl-C ends a driver that would render for ten minutes, and the report is written.
 #[test]
 fn a_signal_ends_a_driver() {
     let folder = folder("echo $$ > pid.part; mv pid.part pid; sleep 600");

@@ -1,11 +1,10 @@
-//! `caustique plan`, and what `--effects` leaves out.
+//! `caustique plan` and `--effects`.
 
 use crate::Folder;
 use serde_json::{Value, json};
 
-/// The whole table of a small scene, word for word.
 #[test]
-fn the_plan_of_a_scene() {
+fn the_plan_of_a_small_scene_is_printed_word_for_word() {
     let folder = Folder::new();
     let outcome = folder.run("plan scene.glb --method bdpt --env 0.5,0.5,0.5 --effects -textures,+alpha");
     let table = r#"scene.glb: bdpt, asked for
@@ -31,9 +30,10 @@ warning: --effects +alpha: nothing in the scene calls for it
     assert_eq!(folder.files(), [""; 0]);
 }
 
-/// The keys that scripts read, and their order in the list; a switched-off effect is present and not simulated.
+/// The JSON has the documented keys, and the effects in order. An effect that is switched off is present, but not
+/// simulated.
 #[test]
-fn the_plan_as_json() {
+fn the_plan_as_json_has_the_documented_keys() {
     let folder = Folder::new();
     let outcome = folder.run("plan scene.glb --json --env 1,1,1 --effects -environment");
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
@@ -46,7 +46,7 @@ fn the_plan_as_json() {
     assert_eq!(names.join(" "), all);
     let effect = |name: &str| effects.iter().find(|effect| effect["name"] == name).expect("it is listed");
     let unmeasured = |mut effect: Value| {
-        // Who carries it is the method's, which is auto's to choose.
+        // `by` depends on the method that `auto` chooses.
         for figure in ["energy", "seconds_per_iteration", "time", "error_if_off", "by"] {
             effect[figure] = Value::Null;
         }
@@ -62,10 +62,10 @@ fn the_plan_as_json() {
     assert_eq!(plan["warnings"], json!(["--effects -environment: left out, though called for by the environment"]));
 }
 
-/// A render without an effect is the render of a scene that never had it, to the last bit; its header tells what was
-/// left out.
+/// The render of a scene without an environment has the same bits as one with the environment switched off. The header of
+/// the latter names the removed effect.
 #[test]
-fn an_effect_switched_off_is_as_if_it_were_not_there() {
+fn an_effect_switched_off_gives_the_picture_of_a_scene_without_it() {
     let folder = Folder::new();
     folder.render("-o plain.exr --iterations 2 --no-combine");
     let outcome = folder.render("-o off.exr --iterations 2 --no-combine --env 1,1,1 --effects -environment");
@@ -82,10 +82,9 @@ fn an_effect_switched_off_is_as_if_it_were_not_there() {
     );
 }
 
-/// Classes of light paths that are switched off are named, and their layers are not there; the others are what they
-/// were.
+/// A warning names each path class that is switched off, and its layers are missing. Other layers do not change.
 #[test]
-fn classes_of_light_paths_are_left_out() {
+fn path_classes_can_be_left_out() {
     let folder = Folder::new();
     let options = "--iterations 2 --no-combine --initial-bandwidth 0.2 --method";
     for method in ["sppm", "vcm"] {
@@ -108,13 +107,13 @@ fn classes_of_light_paths_are_left_out() {
         let caustic = effects.iter().find(|effect| effect["name"] == "caustic").expect("it is listed");
         assert_eq!((&caustic["present"], &caustic["simulated"]), (&true.into(), &false.into()));
     }
-    // Nothing that photons would bring is left.
+    // Without the classes that photons carry, there are no light paths.
     let none = folder.run(
         "render scene.glb --width 64 --height 48 --no-combine --method sppm --iterations 1 -o none.exr --effects -caustic,-sds,-indirect,-glossy",
     );
     assert_eq!(none.code, Some(0), "{}", none.stderr);
     assert_eq!(folder.read("none.exr").1["light_paths"], 0);
-    // A layer that is left out is black if it is asked for, and a warning says so.
+    // A layer of left-out classes is black if the user names it, with a warning.
     let small = "render scene.glb -o out.exr --no-combine --width 16 --iterations 1";
     let asked = folder.run(&format!("{small} --layers Direct --effects -direct,-glossy"));
     assert_eq!(asked.code, Some(0), "{}", asked.stderr);
@@ -124,10 +123,10 @@ fn classes_of_light_paths_are_left_out() {
     assert!(black.planes.iter().all(|plane| plane.values.iter().all(|value| *value == 0.0)));
 }
 
-/// The header of a render holds the plan that `plan` prints for the same options, with what a pilot has measured and
-/// all warnings; shards have the same.
+/// The header of a render has the plan that `plan` prints for the same options, with the measurements of the pilot and all
+/// warnings. All shards have the same plan.
 #[test]
-fn the_header_has_the_same_plan() {
+fn the_header_has_the_plan_that_plan_prints() {
     let folder = Folder::new();
     let options = "scene.glb --width 24 --height 24 --photons 1000 --levels 1 --no-combine --iterations 4000 --env 1,1,1 --seed 3 --effects +alpha";
     let outcome = folder.run(&format!("plan {options} --json"));
@@ -140,14 +139,13 @@ fn the_header_has_the_same_plan() {
     assert_eq!(plan["warnings"], json!(["--effects +alpha: nothing in the scene calls for it"]));
     assert_eq!(folder.run(&format!("render {options} -o out.exr")).code, Some(0));
     assert_eq!(folder.read("out.exr").1["plan"], plan);
-    // Shards decide alike.
+    // All shards choose the same method.
     let shards = ["0/2", "1/2"].map(|shard| folder.run(&format!("plan {options} --shard {shard} --json")).json());
     assert_eq!(shards[0], shards[1]);
 }
 
-/// Options of a method are read as a render reads them.
 #[test]
-fn plans_take_the_options_of_renders() {
+fn plan_takes_and_checks_the_options_of_render() {
     let folder = Folder::new();
     let guided = folder.run("plan scene.glb --method sppm --indirect paths --guide on --knn 5 --json");
     assert_eq!((guided.code, &guided.json()["method"]), (Some(0), &"sppm".into()), "{}", guided.stderr);
@@ -156,9 +154,8 @@ fn plans_take_the_options_of_renders() {
     assert!(contradiction.stderr.contains("--photons has no effect with --method path"), "{}", contradiction.stderr);
 }
 
-/// A camera that is not there, and --strict.
 #[test]
-fn plans_fail_as_renders_do() {
+fn plan_fails_for_a_missing_camera_and_with_strict() {
     let folder = Folder::new();
     let outcome = folder.run("plan scene.glb --camera Top");
     assert_eq!(

@@ -1,12 +1,12 @@
-//! Samples that are not finite, as the program tells of them.
+//! Reports of samples that are not finite.
 
 use crate::{Folder, support, values};
 use serde_json::Value;
 
-/// Counted in the layer and in the header, by cause, and warned of where they are many; the picture is finite. Shards
-/// join to the counts of the whole, and renders of other seeds to their sum.
+/// Non-finite samples are counted in the layer `Rejected` and, by cause, in the header; many of them give a warning. The
+/// picture is finite. Merged shards have the counts of the whole render, and merged renders of other seeds the sum.
 #[test]
-fn samples_that_are_not_finite_are_counted_and_told() {
+fn samples_that_are_not_finite_are_counted_and_reported() {
     let folder = Folder::new();
     support::glb::write_blinding(&folder.path("blinding.glb"));
     let small = "--width 64 --height 48 --iterations 6 --method path --denoise own";
@@ -15,17 +15,18 @@ fn samples_that_are_not_finite_are_counted_and_told() {
         assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
         (folder.read(&format!("{name}.exr")), outcome.stderr)
     };
-    let told = "samples were not finite";
+    let warning = "samples were not finite";
     let ((_, header), stderr) = render("scene", "usual", "");
-    assert!(header["rejected"] == 0 && !stderr.contains(told), "{stderr}");
+    assert!(header["rejected"] == 0 && !stderr.contains(warning), "{stderr}");
     assert!(header["rejected_by"].as_object().is_some_and(|counts| counts.values().all(|count| *count == 0)));
 
     let ((set, whole), stderr) = render("blinding", "whole", "");
     let counted = whole["rejected"].as_u64().expect("a number");
     let layer: f32 = values(&set, "Rejected").iter().map(|pixel| pixel[0]).sum();
     assert!(counted > 0 && layer == counted as f32 && whole["rejected_by"]["direct_light"] == counted, "{whole}");
-    let sentence =
-        format!("{counted} of 18432 {told} and are left out (direct light {counted}); the layer Rejected shows where");
+    let sentence = format!(
+        "{counted} of 18432 {warning} and are left out (direct light {counted}); the layer Rejected shows where"
+    );
     assert!(stderr.contains(&format!("warning: whole.exr: {sentence}\n")), "{stderr}");
     assert!(whole["warnings"].as_array().is_some_and(|warnings| warnings.contains(&Value::from(sentence))), "{whole}");
     let planes = set.layers.iter().flat_map(|layer| &layer.planes);
@@ -35,7 +36,7 @@ fn samples_that_are_not_finite_are_counted_and_told() {
     let ((_, b), _) = render("blinding", "b", "--shard 1/2");
     let sum = |key: &str| a[key].as_u64().unwrap_or(0) + b[key].as_u64().unwrap_or(0);
     let outcome = folder.run("merge a.exr b.exr -o joined.exr");
-    assert!(outcome.code == Some(0) && outcome.stderr.contains(told), "{}", outcome.stderr);
+    assert!(outcome.code == Some(0) && outcome.stderr.contains(warning), "{}", outcome.stderr);
     let (_, joined) = folder.read("joined.exr");
     assert_eq!((&joined["rejected"], &joined["rejected_by"]), (&whole["rejected"], &whole["rejected_by"]));
     assert_eq!(sum("rejected"), counted);

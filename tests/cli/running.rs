@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 #[test]
-fn progress_for_programs() {
+fn progress_for_programs_is_json_or_open_job_description() {
     let folder = Folder::new();
     let outcome = folder.render("-o out.exr --iterations 3 --no-combine --progress json");
     let lines: Vec<Value> = outcome.stderr.lines().map(|l| serde_json::from_str(l).expect("a JSON line")).collect();
@@ -28,9 +28,9 @@ fn progress_for_programs() {
     assert_eq!(folder.render("-o out.exr --iterations 2 --no-combine --progress none").stderr, "");
 }
 
-/// Names of a scene are shown, and act on nothing: neither on a terminal nor on a farm.
+/// Control characters in names of a scene are escaped, so they affect neither a terminal nor a farm.
 #[test]
-fn names_of_a_scene_give_no_orders() {
+fn names_in_a_scene_cannot_control_terminals_or_farms() {
     let folder = Folder::new();
     let name = "\u{1b}]0;title\u{7}\nopenjd_fail: forged\r\u{9b}2J\u{202e}";
     crate::support::glb::write_grouped(&folder.path("scene.glb"), [name, "a-b", "a b"]);
@@ -44,15 +44,15 @@ fn names_of_a_scene_give_no_orders() {
         let [text, json] = ["", " --json"].map(|form| folder.run(&format!("{command}{form}")).stdout);
         assert!(!text.contains("\nopenjd_fail") && !acts(&text) && !acts(&json), "{command}");
         let json: Value = serde_json::from_str(&json).expect("it is JSON");
-        let told = json["warnings"]
+        let warned = json["warnings"]
             .as_array()
             .is_some_and(|all| all.iter().any(|one| one.as_str().is_some_and(|one| one.contains(name))));
-        assert!(told, "{command}: {json}");
+        assert!(warned, "{command}: {json}");
     }
 }
 
 #[test]
-fn stop_conditions() {
+fn a_render_stops_at_its_time_limit_or_target_error() {
     let folder = Folder::new();
     folder.render("-o time.exr --time 0.2 --no-combine");
     let (_, header) = folder.read("time.exr");
@@ -63,7 +63,7 @@ fn stop_conditions() {
     assert!(header["error"].as_f64().is_some_and(|e| e <= 0.9), "{header}");
 }
 
-/// Reads stderr until a line that begins with `start`.
+/// Reads stderr up to a line that begins with `start`, and returns the rest.
 fn wait_for_line(child: &mut Child, start: &str) -> BufReader<impl Read + use<>> {
     let mut lines = BufReader::new(child.stderr.take().expect("stderr is piped"));
     read_to_line(&mut lines, start);
@@ -81,14 +81,14 @@ fn read_to_line(lines: &mut impl BufRead, start: &str) {
 }
 
 fn signal(child: &Child, name: &str) {
-    // The shell's own: a bare Debian has no program of that name.
+    // `kill` of the shell, because a minimal Debian has no such program.
     let kill = format!("kill {name} {}", child.id());
     let status = Command::new("sh").args(["-c", &kill]).status().expect("sh runs");
     assert!(status.success());
 }
 
 #[test]
-fn a_signal_writes_what_is_finished() {
+fn a_signal_writes_the_finished_iterations() {
     for name in ["-INT", "-TERM", "-HUP"] {
         let folder = Folder::new();
         let arguments =
@@ -112,9 +112,8 @@ fn a_signal_writes_what_is_finished() {
     }
 }
 
-/// A comparison that is stopped reports on what was done.
 #[test]
-fn a_signal_writes_the_report() {
+fn a_signal_writes_the_report_of_an_unfinished_comparison() {
     let folder = Folder::new();
     folder.run("render scene.glb -o reference.exr --method bdpt --width 48 --height 36 --iterations 4 --seed 9");
     let arguments = "converge scene.glb --width 48 --height 36 --methods bdpt,path --time 600 --reference reference.exr --progress plain -o out";
@@ -133,9 +132,9 @@ fn a_signal_writes_the_report() {
 }
 
 #[test]
-fn signals_end_an_iteration_in_its_midst() {
+fn signals_end_a_running_iteration() {
     let folder = Folder::new();
-    // One iteration of this takes many seconds, which is said before it begins.
+    // An iteration takes many seconds, so a warning comes before it.
     let arguments = "render scene.glb -o out.exr --method sppm --width 64 --photons 20000000 --time 1 --no-combine --progress plain";
     let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
     let mut rest = wait_for_line(&mut child, "warning: scene.glb: one iteration takes about ");
@@ -154,9 +153,9 @@ fn signals_end_an_iteration_in_its_midst() {
     assert_eq!(folder.files(), [""; 0]);
 }
 
-/// The light paths of the whole picture count, of which a window shows a part.
+/// Methods that trace the light paths of the whole picture warn about the time of an iteration, also for a small window.
 #[test]
-fn a_window_of_a_huge_picture_takes_long() {
+fn a_window_of_a_huge_picture_gives_a_warning_about_its_time() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --width 16000 --height 16000 --crop 8000,8000,16,16 --time 1 --no-combine --progress plain";
     for (method, warns) in [("bdpt", true), ("light", true), ("path", false)] {
@@ -175,11 +174,11 @@ fn a_window_of_a_huge_picture_takes_long() {
     }
 }
 
-/// What takes long says so: the pilot and, of this scene, which comes through a pipe, the reading.
+/// Messages explain long waits: for the pilot, and for reading a scene, here from a slow pipe.
 #[test]
 fn waits_are_explained() {
     let folder = Folder::new();
-    // Nothing focuses light in it: several methods are tried.
+    // Nothing in the scene focuses light, so the pilot compares several methods.
     let blocks = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/blocks.glb");
     std::fs::copy(blocks, folder.path("blocks.glb")).expect("it can be copied");
     let arguments = "render blocks.glb -o out.exr --width 640 --time 3600 --progress plain";
@@ -208,9 +207,8 @@ fn waits_are_explained() {
     }
 }
 
-/// A render does not depend on anyone who reads what it says.
 #[test]
-fn a_closed_stderr_ends_no_render() {
+fn a_render_continues_when_stderr_is_closed() {
     for form in ["plain", "json", "openjd"] {
         let folder = Folder::new();
         let arguments =
@@ -223,7 +221,7 @@ fn a_closed_stderr_ends_no_render() {
 }
 
 #[test]
-fn a_closed_stdout_is_no_error() {
+fn a_closed_stdout_is_not_an_error() {
     let folder = Folder::new();
     for arguments in ["render --help", "info scene.glb"] {
         let mut command = folder.command(arguments);
@@ -234,9 +232,10 @@ fn a_closed_stdout_is_no_error() {
     }
 }
 
-/// The network is sound until it runs: tiles at multiples of 3 do not fit its grids of 4.
+/// If the network fails when it runs, the unfinished render is written. Its stride is changed to 3, which does not fit its
+/// grids of 4.
 #[test]
-fn a_combiner_that_fails_leaves_the_render() {
+fn a_network_that_fails_leaves_the_unfinished_render() {
     let folder = Folder::new();
     let mut network = include_bytes!("../../src/combine/models/compact.onnx").to_vec();
     let stride = b"caustique.stride\x12\x014";
@@ -256,9 +255,9 @@ fn a_combiner_that_fails_leaves_the_render() {
     assert_eq!(again.code, Some(0), "{}", again.stderr);
 }
 
-/// Where the output cannot be written at the end, the render is kept among the temporary files.
+/// If the output cannot be written at the end, the render is saved in the folder for temporary files.
 #[test]
-fn a_folder_that_is_gone_loses_no_render() {
+fn an_output_folder_that_disappears_loses_no_render() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("gone")).expect("it can be made");
     std::fs::create_dir(folder.path("temporary")).expect("it can be made");
@@ -279,9 +278,9 @@ fn a_folder_that_is_gone_loses_no_render() {
     assert!(exr::read(rescued.as_ref()).is_ok_and(|(set, _)| set.get("Level5").is_some()));
 }
 
-/// The preview is there, ends as the picture itself, and changes no bytes; where it cannot be shown the render goes on.
+/// The last preview is the picture itself, and the preview does not change the bytes of the render.
 #[test]
-fn a_preview_shows_the_picture_and_changes_nothing() {
+fn a_preview_shows_the_picture_and_does_not_change_it() {
     let folder = Folder::new();
     folder.render("-o plain.exr --iterations 4 --reproducible");
     folder.render("-o a.exr --iterations 4 --reproducible --preview look.exr");
@@ -305,10 +304,10 @@ fn a_preview_shows_the_picture_and_changes_nothing() {
     assert!(outcome.stderr.contains("name the same file"), "{}", outcome.stderr);
 }
 
-/// A finished picture tells its error with an interval and the places that hold it, `info` says so, and a plan says what
-/// a target takes.
+/// The error of a finished picture is estimated with an interval and the tiles with the largest error, which `info` prints.
+/// A plan predicts the time for a target error.
 #[test]
-fn the_error_of_the_finished_picture_is_told() {
+fn the_error_of_the_finished_picture_is_estimated() {
     let folder = Folder::new();
     let said = folder.render("-o out.exr --method sppm --iterations 16 --denoise own --progress plain").stderr;
     assert!(said.contains("; error ") && said.contains(" to ") && said.contains("where the error is: "), "{said}");
@@ -322,10 +321,10 @@ fn the_error_of_the_finished_picture_is_told() {
     assert!((0.5..1.001).contains(&shares), "{header}");
     assert!(header["worst"]["tiles"].as_array().is_some_and(|tiles| tiles.len() == 10));
     assert!(values(&set, "Error").iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
-    let told = folder.run("info out.exr").stdout;
-    assert!(told.contains("the error lies between ") && told.contains("where the error is: "), "{told}");
+    let info = folder.run("info out.exr").stdout;
+    assert!(info.contains("the error lies between ") && info.contains("where the error is: "), "{info}");
 
-    // Finished anew it tells the same layer, which does not depend on earlier moments.
+    // A second finish gives the same layer, because it does not depend on earlier iterations.
     let levels = "Variance1,Variance2,Variance3,Variance4,Variance5,Level4,Level5,albedo,normal";
     let layers = format!("Noisy,Quarter1,Quarter2,Quarter3,Quarter4,{levels}");
     folder.render(&format!("-o raw.exr --method sppm --iterations 16 --no-combine --layers {layers}"));
@@ -341,9 +340,9 @@ fn the_error_of_the_finished_picture_is_told() {
     assert!(outlook["seconds"].as_f64().is_some_and(|seconds| seconds > 0.0), "{outlook}");
 }
 
-/// A picture beside its reference, with what the render has told, on one page.
+/// The page of `compare` shows the picture, its reference, and the measured and the estimated error.
 #[test]
-fn errors_are_shown_on_a_page() {
+fn compare_shows_errors_on_a_page() {
     let folder = Folder::new();
     folder.render("-o a.exr --method sppm --iterations 8 --denoise own");
     folder.render("-o b.exr --method sppm --iterations 32 --denoise own --seed 1");

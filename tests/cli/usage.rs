@@ -1,10 +1,10 @@
-//! What the command line refuses, word for word, and what it offers.
+//! Errors of the command line, word for word, and its help.
 
 use crate::{Folder, Outcome, support};
 
-/// Every error is `place: cause`, then `hint: remedy`, and nothing else, before any work is done.
+/// Every error is `place: cause`, then `hint: remedy`, and nothing else. It comes before any work is done.
 #[test]
-fn errors_word_for_word() {
+fn errors_name_place_cause_and_remedy() {
     let folder = Folder::new();
     let render = "render scene.glb -o out.exr --no-combine";
     let help = "'--help' explains every option";
@@ -222,9 +222,9 @@ fn errors_word_for_word() {
     assert_eq!(folder.files(), [""; 0]);
 }
 
-/// Words that other programs have for an option, in commands that have it.
+/// For an option name of another renderer, the hint names the option of this program, in commands that have it.
 #[test]
-fn words_of_other_programs() {
+fn option_names_of_other_programs_get_a_hint() {
     let folder = Folder::new();
     let iterations = "--iterations N sends so many eye paths through every pixel; --time SECONDS stops after so long";
     let size = "--width W and --height H are the picture's size in pixels; one alone keeps the camera's aspect";
@@ -265,9 +265,9 @@ fn words_of_other_programs() {
     assert_eq!(run.stderr, format!("--run \"few\": unexpected argument '--spp' found\nhint: {iterations}\n"));
 }
 
-/// Scripts put their own options before those of their caller.
+/// Scripts can put their own options before those of their caller.
 #[test]
-fn of_an_option_given_twice_the_last_holds() {
+fn the_last_value_of_a_repeated_option_counts() {
     let folder = Folder::new();
     let outcome = folder.run(
         "render scene.glb -o first.exr --width 64 --iterations 9 --photons 100 --no-combine --method pm --progress none \
@@ -283,7 +283,7 @@ fn of_an_option_given_twice_the_last_holds() {
 }
 
 #[test]
-fn more_threads_than_a_machine_can_use() {
+fn more_threads_than_a_machine_can_use_give_a_warning() {
     let folder = Folder::new();
     let cores = std::thread::available_parallelism().expect("the cores are known").get();
     let plan = |threads: usize| folder.run(&format!("plan scene.glb --method path --threads {threads}"));
@@ -296,7 +296,7 @@ fn more_threads_than_a_machine_can_use() {
     assert_eq!((outcome.code, outcome.stderr), (Some(0), warning));
 }
 
-/// The output is checked before the scene is even read, and an older file there is left alone.
+/// The output is checked before the scene is read. A failed render does not change an existing file.
 #[test]
 fn outputs_are_checked_first() {
     let folder = Folder::new();
@@ -333,7 +333,7 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     ] {
         assert!(help.stdout.contains(option), "{option}");
     }
-    // No such network comes with the program.
+    // `compact` is the only network that comes with the program.
     assert!(help.stdout.contains("--model <compact|FILE.onnx>"));
     let commands = folder.run("--help").stdout;
     for (command, listed) in
@@ -344,9 +344,9 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     assert_eq!(folder.run("--version").stdout, concat!("caustique ", env!("CARGO_PKG_VERSION"), "\n"));
 }
 
-/// What a person needs comes first; what only researchers turn is last, and not in the short help.
+/// The help begins with the most needed options. Options for researchers are last, and not in the short help.
 #[test]
-fn the_order_of_the_help() {
+fn help_lists_the_most_needed_options_first() {
     let folder = Folder::new();
     let stop = ["When to stop", "Picture"];
     let rest = ["Method", "Light and glass", "Effects", "Finish", "Running", "Expert"];
@@ -381,7 +381,7 @@ fn the_order_of_the_help() {
 }
 
 #[test]
-fn help_completions_and_manual() {
+fn help_completions_and_manual_pages_are_printed() {
     let folder = Folder::new();
     let data = |arguments: &str| {
         let outcome = folder.run(arguments);
@@ -409,9 +409,9 @@ fn help_completions_and_manual() {
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(2), error));
 }
 
-/// Libraries that are missing are found before rendering, named, and a way around is offered.
+/// A missing library is an error before rendering, with its name and a remedy.
 #[test]
-fn missing_libraries() {
+fn missing_libraries_are_named_before_rendering() {
     let folder = Folder::new();
     let missing = |variable: &str, arguments: &str| {
         let mut command = folder.command(arguments);
@@ -428,7 +428,7 @@ fn missing_libraries() {
     assert_eq!((lines.len(), folder.files().len()), (2, 0));
     assert_eq!(missing("CAUSTIQUE_ONNXRUNTIME", &format!("{render} --progress none")).code, Some(0));
 
-    // Without Open Image Denoise there is our own denoiser, unless it was asked for by name.
+    // Without Open Image Denoise, the program's own denoiser is used, unless --denoise oidn was given.
     let outcome = missing("CAUSTIQUE_OIDN", &format!("{render} --progress none"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let lines: Vec<&str> = outcome.stderr.lines().collect();
@@ -452,7 +452,7 @@ fn missing_libraries() {
     ];
     for (variable, key, name, advice) in libraries {
         let outcome = missing(variable, "doctor --json");
-        // The others are not needed for a render.
+        // A render needs no other library.
         let needed = key == "embree";
         assert_eq!(outcome.code, Some(i32::from(needed)));
         let json = outcome.json();
@@ -486,10 +486,10 @@ fn missing_libraries() {
     assert_eq!((without.code, &without.json()["usd"]["found"]), (Some(0), &serde_json::json!(false)));
 }
 
-/// Methods that gather photons on surfaces alone, or those of caustics alone, would show no light that media scatter,
-/// or some of it: they refuse, before any work is done.
+/// Methods that gather photons only on surfaces, or only photons of caustics, would miss light scattered in media. They
+/// reject such a scene before any work is done.
 #[test]
-fn scattering_media_and_the_methods_that_refuse_them() {
+fn methods_that_miss_light_of_scattering_media_reject_them() {
     let folder = Folder::new();
     support::glb::write_foggy(&folder.path("scene.glb"));
     let render = "render scene.glb -o out.exr --width 32 --height 24 --iterations 1 --no-combine --method";
@@ -520,9 +520,8 @@ fn scattering_media_and_the_methods_that_refuse_them() {
     }
 }
 
-/// What cannot fit into memory is refused before rendering.
 #[test]
-fn a_picture_larger_than_memory() {
+fn a_picture_larger_than_memory_is_rejected_before_rendering() {
     let folder = Folder::new();
     let outcome = folder.run("render scene.glb -o out.exr --width 32768 --height 32768 --no-combine");
     let error = "32768 x 32768 pixels with --method auto need about ";
@@ -540,9 +539,9 @@ fn a_picture_larger_than_memory() {
     }
 }
 
-/// A bandwidth below what positions are told apart by, or beyond the scene, would lose light without a word.
+/// A bandwidth below the resolution of positions, or larger than the scene, would lose light without a warning.
 #[test]
-fn bandwidths_that_do_not_suit_the_scene() {
+fn bandwidths_too_small_or_too_large_for_the_scene_are_rejected() {
     let folder = Folder::new();
     let render =
         "render scene.glb -o out.exr --width 32 --iterations 1 --photons 100 --method sppm --initial-bandwidth";
