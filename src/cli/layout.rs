@@ -29,6 +29,7 @@ pub fn arrange(command: Command) -> Command {
         option.get_help_heading().map(|heading| HEADINGS.iter().position(|known| *known == heading))
     });
     let arranged = Command::new(command.get_name().to_string())
+        .aliases(command.get_all_aliases().map(String::from).collect::<Vec<_>>())
         .next_line_help(command.is_next_line_help_set())
         .args(options)
         .groups(command.get_groups().cloned());
