@@ -1,22 +1,22 @@
 //! Equation (6) with pairwise weights, from the network output `features`.
 //!
-//! Per pixel i and pair j of levels the network gives a point phi_i^j of a small space and three scalars; the weight of
-//! neighbour i for centre c is, always positive,
+//! For each pixel i and pair j of levels the network outputs a point phi_i^j of a low-dimensional space and three scalars.
+//! The weight of neighbour i for centre c is always positive:
 //!
 //! ```text
 //! w_i^j = exp(source_i^j + centre_c^j - exp(falloff_c^j) |c - i|^2 - |phi_c^j - phi_i^j|^2)
 //! ```
 //!
 //! with |c - i| in pixels. Channels, of P pairs and D dimensions: phi (P D, pair by pair), source (P), centre (P),
-//! falloff (P). So a network with tens of outputs commands windows of hundreds of weights: what the
-//! paper's last layer (1444 filters) computes is here two loops, run on eight pixels at a time.
+//! falloff (P). A network with tens of outputs so defines windows of hundreds of weights: two loops over eight
+//! pixels at a time replace the paper's last layer (1444 filters).
 
 use std::array::from_fn;
 
 use rayon::prelude::*;
 
 use super::Sums;
-use super::map::{Map, Rect};
+use super::output::{NetworkOutput, Rect};
 use super::stack::LevelStack;
 
 /// Channels per pair besides the feature space: source, centre, falloff.
@@ -25,23 +25,31 @@ pub const SCALARS: usize = 3;
 /// Largest number of dimensions of the feature space.
 pub const MAX_DIMENSIONS: usize = 8;
 
-/// Exponents of affinities end here, in powers of two (exp(-60)), so that every weight stays positive in f32.
+/// Maximum exponent of an affinity in powers of two (exp(-60)), so that every weight stays positive in f32.
 const MAX_DISTANCE: f32 = 60.0 * std::f32::consts::LOG2_E;
 
-/// Bounds of the logarithms, as in training; what is no number counts as 0.
+/// Range of source and centre, as in training; NaN counts as 0.
 const LOG_WEIGHT: (f32, f32) = (-12.0, 12.0);
+/// Range of falloff, as in training; NaN counts as 0.
 const LOG_FALLOFF: (f32, f32) = (-20.0, 0.0);
 
-/// Pixels handled together.
+/// Pixels per SIMD block.
 const LANES: usize = 8;
 
 type Lanes = [f32; LANES];
 
 /// Adds pair `pair` (levels 1 and `pair` + 2) of equation (6) to `sums`, over the pixels of `core`.
 ///
-/// `features` covers `core` and a window's radius around it where the image does; `valid` tells for each pixel of the
-/// image whether it may be a neighbour.
-pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, pair: usize, sums: &mut [Sums]) {
+/// `features` covers `core` and a window's radius around it within the image; `valid` says for each pixel of the image
+/// whether it can be a neighbour.
+pub fn add_pair(
+    stack: &LevelStack,
+    valid: &[bool],
+    core: Rect,
+    features: &NetworkOutput,
+    pair: usize,
+    sums: &mut [Sums],
+) {
     let pairs = stack.levels.len() - 1;
     let dimensions = (features.data.len() / (features.rect.width() * features.rect.height())) / pairs - SCALARS;
     let add = match dimensions {
@@ -57,7 +65,14 @@ pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, 
     add(stack, valid, core, features, pair, sums);
 }
 
-fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, pair: usize, sums: &mut [Sums]) {
+fn add<const D: usize>(
+    stack: &LevelStack,
+    valid: &[bool],
+    core: Rect,
+    features: &NetworkOutput,
+    pair: usize,
+    sums: &mut [Sums],
+) {
     let neighbours = Neighbours::<D>::gather(stack, valid, core, features, pair);
     let (_, centre, falloff) = scalar_channels::<D>(stack.levels.len() - 1, pair);
     sums.par_chunks_mut(core.width()).enumerate().for_each(|(y, sums)| {
@@ -74,7 +89,7 @@ fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features:
             let (difference, weight) = neighbours.window_sums(x, y, falloff);
             for (l, sum) in sums.iter_mut().enumerate() {
                 let scale = exp_bounded(centre[x + l], LOG_WEIGHT);
-                // The centre may be invalid; its sums are replaced later and must only stay free of panics.
+                // The sums of an invalid centre are replaced later; they only must not panic.
                 let z = correlated[x + l];
                 sum.value = from_fn(|c| sum.value[c] + scale * (difference[c][l] + z[c] * weight[l]));
                 sum.weight += scale * weight[l];
@@ -83,7 +98,7 @@ fn add<const D: usize>(stack: &LevelStack, valid: &[bool], core: Rect, features:
     });
 }
 
-/// What equation (6) reads of every neighbour, in planes around the core: no bounds to test in the loops.
+/// Inputs of equation (6) from every neighbour, in padded planes around the core, so that the loops test no bounds.
 struct Neighbours<const D: usize> {
     radius: usize,
     pitch: usize,
@@ -96,12 +111,12 @@ struct Neighbours<const D: usize> {
 }
 
 impl<const D: usize> Neighbours<D> {
-    fn gather(stack: &LevelStack, valid: &[bool], core: Rect, features: &Map, pair: usize) -> Self {
+    fn gather(stack: &LevelStack, valid: &[bool], core: Rect, features: &NetworkOutput, pair: usize) -> Self {
         let radius = features.window / 2;
         let pitch = core.width().next_multiple_of(LANES) + 2 * radius;
         let rows = core.height() + 2 * radius;
         let (source, ..) = scalar_channels::<D>(stack.levels.len() - 1, pair);
-        // Image columns that the planes show, and where they begin in a plane's row.
+        // Image columns in the planes, and their offset in a plane's row.
         let (x0, x1) = (core.x0.saturating_sub(radius), (core.x1 + radius).min(stack.size.width));
         let offset = x0 + radius - core.x0;
         let plane = |value: &(dyn Fn(usize, &mut [f32]) + Sync)| {
@@ -129,7 +144,7 @@ impl<const D: usize> Neighbours<D> {
                 let start = y * stack.size.width + x0;
                 let pixels = stack.levels[0][start..].iter().zip(&stack.levels[pair + 1][start..]).zip(mask(y));
                 for (out, ((independent, correlated), valid)) in row.iter_mut().zip(pixels) {
-                    // Zero times a value that is not finite would still spoil the sum.
+                    // Zero times a value that is not finite would still be NaN.
                     *out = if *valid { independent[c] - correlated[c] } else { 0.0 };
                 }
             })
@@ -139,8 +154,8 @@ impl<const D: usize> Neighbours<D> {
         Neighbours { radius, pitch, phi, weight, difference: from_fn(difference) }
     }
 
-    /// Sums over the windows of the pixels (x .. x + LANES, y) of the core: w (y_i - z_i), and w, all without the
-    /// centre's own factor. `falloff` is in powers of two.
+    /// Sums of w (y_i - z_i) and of w over the windows of the pixels (x .. x + LANES, y) of the core, without the centre's
+    /// own factor. `falloff` is in powers of two.
     #[inline]
     fn window_sums(&self, x: usize, y: usize, falloff: Lanes) -> ([Lanes; 3], Lanes) {
         let side = 2 * self.radius + 1;
@@ -148,7 +163,7 @@ impl<const D: usize> Neighbours<D> {
         let centre: [Lanes; D] = from_fn(|d| lanes(&self.phi[d], centre_at));
         let (mut sums, mut total) = ([[0.0; LANES]; 3], [0.0; LANES]);
         for v in 0..side {
-            // Rows cut to the length read, so that their ends are tested once a row.
+            // Slices of the length read, so that bounds are tested once per row.
             let from = (y + v) * self.pitch + x;
             let part = from..from + side - 1 + LANES;
             let phi: [&[f32]; D] = from_fn(|d| &self.phi[d][part.clone()]);
@@ -183,22 +198,22 @@ impl<const D: usize> Neighbours<D> {
     }
 }
 
-/// LANES values from `start` on.
+/// LANES values from `start`.
 #[inline(always)]
 fn lanes(plane: &[f32], start: usize) -> Lanes {
     plane[start..start + LANES].try_into().unwrap_or([0.0; LANES])
 }
 
-/// a b + c, fused where the processor can: elsewhere `mul_add` is a slow library call.
+/// a b + c, fused if the target has the instruction; otherwise `mul_add` is a slow library call.
 #[inline(always)]
 fn fma(a: f32, b: f32, c: f32) -> f32 {
     if cfg!(any(target_feature = "fma", target_arch = "aarch64")) { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// 2^-x for x >= 0, x cut at [`MAX_DISTANCE`]; relative error below 5e-7, and no branch, so that loops vectorise.
+/// 2^-x for x >= 0, with x clamped at [`MAX_DISTANCE`]; relative error below 5e-7. Has no branch, so that loops vectorise.
 #[inline(always)]
 fn exp2_minus(x: f32) -> f32 {
-    // 2^t = 2^n 2^f with n the nearest integer, found by adding 1.5 * 2^23, whose last bits then hold n.
+    // 2^t = 2^n 2^f with n the nearest integer: after adding 1.5 * 2^23 the last bits of the sum hold n.
     const SHIFT: f32 = 12_582_912.0;
     let t = -if x < MAX_DISTANCE { x } else { MAX_DISTANCE };
     let shifted = t + SHIFT;
@@ -222,7 +237,7 @@ const TAYLOR: [f32; 7] = {
     coefficients
 };
 
-/// exp(x) with x kept within bounds, and read as 0 where it is no number.
+/// exp(x) with x clamped to a range; exp(0) for NaN.
 fn exp_bounded(x: f32, (least, most): (f32, f32)) -> f32 {
     if x.is_nan() { 1.0 } else { x.clamp(least, most).exp() }
 }

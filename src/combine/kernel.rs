@@ -8,20 +8,27 @@ use std::array::from_fn;
 use rayon::prelude::*;
 
 use super::Sums;
-use super::map::{Map, Rect};
+use super::output::{NetworkOutput, Rect};
 use super::stack::LevelStack;
 
-/// Weights are kept between these, so that they and their sums stay positive and finite whatever the network says.
+/// Range to which weights are clamped, so that they and their sums stay positive and finite.
 const WEIGHT_RANGE: (f32, f32) = (1e-20, 1e20);
 
 /// Adds pair `pair` of equation (6) to `sums`, over the pixels of `core`, which `weights` covers.
-pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, weights: &Map, pair: usize, sums: &mut [Sums]) {
+pub fn add_pair(
+    stack: &LevelStack,
+    valid: &[bool],
+    core: Rect,
+    weights: &NetworkOutput,
+    pair: usize,
+    sums: &mut [Sums],
+) {
     let (side, radius) = (weights.window, weights.window / 2);
     let (independent, correlated) = (&stack.levels[0], &stack.levels[pair + 1]);
     sums.par_chunks_mut(core.width()).enumerate().for_each(|(y, sums)| {
         let y = core.y0 + y;
-        // Sums of w (y_i - z_i) and of w: the centre's z joins them once, so that equal levels leave no rounding
-        // behind.
+        // Sums of w (y_i - z_i) and of w. The centre's z is added once at the end, so that equal levels give no rounding
+        // error.
         let mut window = vec![Sums::default(); sums.len()];
         for v in 0..side {
             let Some(row) = (y + v).checked_sub(radius).filter(|row| *row < stack.size.height) else { continue };
@@ -32,7 +39,7 @@ pub fn add_pair(stack: &LevelStack, valid: &[bool], core: Rect, weights: &Map, p
                     let Some(i) = column.map(|column| row * stack.size.width + column).filter(|i| valid[*i]) else {
                         continue;
                     };
-                    // max and min, not clamp: they drop a weight that is no number.
+                    // Not `clamp`, which keeps NaN.
                     let w = w.max(WEIGHT_RANGE.0).min(WEIGHT_RANGE.1);
                     sum.value = from_fn(|c| sum.value[c] + w * (independent[i][c] - correlated[i][c]));
                     sum.weight += w;

@@ -1,25 +1,24 @@
-//! The learned combiner: levels of one progressive render in, one better image out.
+//! The learned combiner: turns the bandwidth levels of one render into one image with a smaller error.
 //!
-//! A network looks at all levels, their variances and the first hit's features, and says how much the neighbours
-//! i of each pixel c count; equation (6) of [Choi and Moon 2021] then combines the independent level y (the smallest
-//! bandwidth) with the correlated levels z^j (all larger ones):
+//! A network reads all levels, their variances and the features of the first hit, and outputs weights for the neighbours i
+//! of each pixel c. Equation (6) of [Choi and Moon 2021] then combines the independent level y (the smallest bandwidth)
+//! with the correlated levels z^j (all larger ones):
 //!
 //! ```text
 //! out_c = 1/W sum_j sum_{i in window of c} w_i^j (y_i + z_c^j - z_i^j)
 //! ```
 //!
-//! Whatever positive weights the network gives, the result is consistent: it tends to the truth where every level does
-//! (their appendix A), so nothing is clamped here. Order of work: [`tensor`] makes the network's input for a
-//! [`tile`], [`network`] runs it in ONNX Runtime (found by [`runtime`]), [`affinity`] or [`kernel`] evaluates
-//! equation (6) with the weights it gives.
+//! The result is consistent for any positive weights: it converges to the truth if every level does (their appendix A), so
+//! that nothing is clamped here. [`tensor`] makes the network's input for a [`tile`], [`network`] runs it in ONNX Runtime
+//! (found by [`runtime`]), and [`affinity`] or [`kernel`] evaluates equation (6) with its weights.
 //!
 //! Source: H. Choi, B. Moon, "Consistent Post-Reconstruction for Progressive Photon Mapping", Pacific Graphics 2021.
 
 pub mod affinity;
 pub mod kernel;
-mod map;
 pub mod model;
 pub mod network;
+mod output;
 pub mod runtime;
 mod stack;
 pub mod tensor;
@@ -39,46 +38,46 @@ pub use stack::LevelStack;
 use tensor::Normalisation;
 use tile::Tile;
 
-/// A network ready to combine stacks of levels.
+/// A loaded network that combines levels.
 pub struct Combiner {
     network: Network,
 }
 
 impl Combiner {
-    /// Loads `model` into `runtime`, with as many threads as the current rayon pool has.
+    /// Loads `model` into `runtime`, with the number of threads of the current rayon pool.
     ///
     /// # Errors
-    /// [`ErrorKind::Model`](crate::error::ErrorKind::Model) when the file is no network, or not one of ours.
+    /// [`ErrorKind::Model`](crate::error::ErrorKind::Model): the file is not a network, or not for this program.
     pub fn new(model: &Model, runtime: &Runtime) -> Result<Self> {
         Ok(Combiner { network: Network::load(model, runtime, rayon::current_num_threads())? })
     }
 
-    /// What the network says about itself.
-    pub fn facts(&self) -> &model::Facts {
-        self.network.facts()
+    /// The network's metadata.
+    pub fn metadata(&self) -> &model::Metadata {
+        self.network.metadata()
     }
 
-    /// The combined image, row by row from the top, in the units of the levels.
+    /// Combines the levels of a stack, in their units.
     ///
-    /// A pixel with a value that is not finite in any level counts for no neighbour; its own result is its first finite
-    /// level, else the mean of its finite neighbours in the window, else black.
+    /// A pixel that is not finite in every level contributes to no neighbour. Its own result is its first finite level, else
+    /// the mean of the finite pixels in its window, else black.
     ///
     /// # Errors
-    /// [`ErrorKind::Image`](crate::error::ErrorKind::Image) when planes differ in size or the number of levels is not the
-    /// network's; [`ErrorKind::Model`](crate::error::ErrorKind::Model) when the network fails.
+    /// [`ErrorKind::Image`](crate::error::ErrorKind::Image): planes differ in size, or the number of levels is not the
+    /// network's; [`ErrorKind::Model`](crate::error::ErrorKind::Model): the network fails.
     pub fn run(&mut self, stack: &LevelStack) -> Result<Picture> {
-        let pixels = self.network.facts().tile_pixels();
+        let pixels = self.network.metadata().tile_pixels();
         self.run_tiled(stack, pixels)
     }
 
-    /// [`run`](Self::run) with tiles of about `pixels` pixels; the result does not depend on it beyond rounding.
+    /// [`run`](Self::run) with tiles of about `pixels` pixels, on which the result depends by rounding only.
     pub(crate) fn run_tiled(&mut self, stack: &LevelStack, pixels: usize) -> Result<Picture> {
-        let facts = self.network.facts().clone();
-        stack.check(facts.levels)?;
+        let metadata = self.network.metadata().clone();
+        stack.check(metadata.levels)?;
         let valid = stack.valid();
         let normalisation = Normalisation::of(stack);
         let mut image = Picture::filled(stack.size, [0.0; 3]);
-        for tile in tile::tiles(stack.size, &facts, pixels) {
+        for tile in tile::tiles(stack.size, &metadata, pixels) {
             let input = tensor::fill(stack, &normalisation, tile.input);
             let weights = self.network.run(&input, tile.input)?;
             let part = combine_tile(stack, &valid, &tile, &weights);
@@ -87,12 +86,12 @@ impl Combiner {
                 image[start..start + row.len()].copy_from_slice(row);
             }
         }
-        stack::fill_invalid(stack, &valid, facts.window / 2, &mut image);
+        stack::fill_invalid(stack, &valid, metadata.window / 2, &mut image);
         Ok(image)
     }
 }
 
-/// Weighted sums of equation (6) at one pixel: over all pairs, of the values and of the weights.
+/// Sums of equation (6) at one pixel, over all pairs of levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// sum of w (y_i + z_c - z_i), RGB.
@@ -101,13 +100,13 @@ pub struct Sums {
     pub weight: f32,
 }
 
-/// Equation (6) over a tile's core.
+/// Equation (6) at the pixels of a tile's core.
 fn combine_tile(stack: &LevelStack, valid: &[bool], tile: &Tile, weights: &Weights) -> Vec<[f32; 3]> {
     let mut sums = vec![Sums::default(); tile.core.width() * tile.core.height()];
     for pair in 0..stack.levels.len() - 1 {
         match weights {
-            Weights::Features(map) => affinity::add_pair(stack, valid, tile.core, map, pair, &mut sums),
-            Weights::Kernel(map) => kernel::add_pair(stack, valid, tile.core, map, pair, &mut sums),
+            Weights::Features(output) => affinity::add_pair(stack, valid, tile.core, output, pair, &mut sums),
+            Weights::Kernel(output) => kernel::add_pair(stack, valid, tile.core, output, pair, &mut sums),
         }
     }
     sums.par_iter().map(|s| s.value.map(|v| v / s.weight)).collect()

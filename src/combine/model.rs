@@ -1,4 +1,4 @@
-//! Network files: where they come from, and what they say about themselves.
+//! Network files and their metadata.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};
 
-/// An ONNX file in memory, with a name for messages.
+/// An ONNX file in memory, and its name for messages.
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(super) name: String,
@@ -14,15 +14,15 @@ pub struct Model {
 }
 
 impl Model {
-    /// The network that ships with the program; `models/compact.txt` says how it was trained.
+    /// The network that ships with the program; `models/compact.txt` describes its training.
     pub fn compact() -> Self {
         Model { name: "compact".into(), bytes: Cow::Borrowed(include_bytes!("models/compact.onnx")) }
     }
 
-    /// A network made by `scripts/lab/train/export_network.py`.
+    /// Reads a network made by `scripts/lab/train/export_network.py`.
     ///
     /// # Errors
-    /// [`ErrorKind::Io`] when the file cannot be read. What it holds is checked by [`Combiner::new`](super::Combiner::new).
+    /// [`ErrorKind::Io`]: the file cannot be read. Its contents are checked by [`Combiner::new`](super::Combiner::new).
     pub fn from_file(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|cause| {
             Error::io(path, &cause)
@@ -31,7 +31,7 @@ impl Model {
         Ok(Model { name: path.display().to_string(), bytes: Cow::Owned(bytes) })
     }
 
-    /// What `--model` means: `compact`, or the path of a file.
+    /// The network that `--model` names: `compact`, or the path of a file.
     ///
     /// # Errors
     /// As [`from_file`](Self::from_file); `paper` without a file of that name says how to make one.
@@ -48,9 +48,9 @@ impl Model {
     }
 }
 
-/// How a network expresses the weights of equation (6).
+/// The form in which a network outputs the weights of equation (6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Contract {
+pub enum WeightForm {
     /// Output `features`: pairwise affinities from per-pixel features, see [`affinity`](super::affinity).
     Features {
         /// Dimensions of the feature space.
@@ -60,29 +60,29 @@ pub enum Contract {
     Weights,
 }
 
-/// A network's own description, from its metadata.
+/// Metadata of a network file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Facts {
-    /// How weights are expressed.
-    pub contract: Contract,
-    /// Levels it takes, m.
+pub struct Metadata {
+    /// Form of the weights.
+    pub form: WeightForm,
+    /// Number of levels in the input, m.
     pub levels: usize,
     /// Side of the square window, odd.
     pub window: usize,
-    /// Its coarsest grid has one cell per so many pixels: inputs must be multiples.
+    /// Pixels per cell of the network's coarsest grid; input sizes are multiples of it.
     pub stride: usize,
-    /// Receptive radius, pixels.
+    /// Receptive radius in pixels.
     pub halo: usize,
-    /// How, on what and how long it was trained.
+    /// Description of the training.
     pub training: String,
 }
 
-/// Numbers a tile may hold in one network output: 32 Mi floats are 128 MiB.
-const TILE_FLOATS: usize = 32 << 20;
-/// A tile needs no more pixels than this: its halo is small beside it already.
-const TILE_PIXELS: usize = 512 * 512;
+/// Maximum number of floats in the network output of a tile: 128 MiB.
+const MAX_TILE_FLOATS: usize = 32 << 20;
+/// Maximum number of pixels in a tile. The halo of a tile of this size is already small.
+const MAX_TILE_PIXELS: usize = 512 * 512;
 
-impl Facts {
+impl Metadata {
     /// Reads metadata through `get`, which returns the value of a key without its prefix `caustique.`.
     pub(super) fn read(get: impl Fn(&str) -> Option<String>) -> std::result::Result<Self, String> {
         let text = |key: &str| get(key).ok_or_else(|| format!("its metadata lacks caustique.{key}"));
@@ -95,17 +95,17 @@ impl Facts {
         if version != tensor::VERSION as usize {
             return Err(format!("it expects input version {version}, this program makes {}", tensor::VERSION));
         }
-        let contract = match text("kind")?.as_str() {
-            "features" => Contract::Features { dimensions: number("features", 1, super::affinity::MAX_DIMENSIONS)? },
-            "weights" => Contract::Weights,
+        let form = match text("kind")?.as_str() {
+            "features" => WeightForm::Features { dimensions: number("features", 1, super::affinity::MAX_DIMENSIONS)? },
+            "weights" => WeightForm::Weights,
             other => return Err(format!("its caustique.kind is {other:?}, neither features nor weights")),
         };
         let window = number("window", 1, 63)?;
         if window % 2 == 0 {
             return Err(format!("its window of {window} pixels has no centre"));
         }
-        Ok(Facts {
-            contract,
+        Ok(Metadata {
+            form,
             levels: number("levels", 2, 16)?,
             window,
             stride: number("stride", 1, 64)?,
@@ -114,33 +114,33 @@ impl Facts {
         })
     }
 
-    /// Name of the output that the contract asks for.
+    /// Name of the output tensor.
     pub fn output(&self) -> &'static str {
-        match self.contract {
-            Contract::Features { .. } => "features",
-            Contract::Weights => "weights",
+        match self.form {
+            WeightForm::Features { .. } => "features",
+            WeightForm::Weights => "weights",
         }
     }
 
-    /// Channels of that output.
+    /// Number of channels of the output tensor.
     pub fn output_channels(&self) -> usize {
         let pairs = self.levels - 1;
-        match self.contract {
-            Contract::Features { dimensions } => pairs * (dimensions + super::affinity::SCALARS),
-            Contract::Weights => pairs * self.window * self.window,
+        match self.form {
+            WeightForm::Features { dimensions } => pairs * (dimensions + super::affinity::SCALARS),
+            WeightForm::Weights => pairs * self.window * self.window,
         }
     }
 
-    /// How far around a pixel the network's output is needed for that pixel's result.
+    /// Radius in pixels of the network output that the result at a pixel depends on.
     pub fn neighbour_radius(&self) -> usize {
-        match self.contract {
-            Contract::Features { .. } => self.window / 2,
-            Contract::Weights => 0,
+        match self.form {
+            WeightForm::Features { .. } => self.window / 2,
+            WeightForm::Weights => 0,
         }
     }
 
-    /// Pixels a tile should have.
+    /// Number of pixels of a tile.
     pub(super) fn tile_pixels(&self) -> usize {
-        (TILE_FLOATS / self.output_channels()).min(TILE_PIXELS)
+        (MAX_TILE_FLOATS / self.output_channels()).min(MAX_TILE_PIXELS)
     }
 }

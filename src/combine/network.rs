@@ -1,76 +1,76 @@
-//! One network in ONNX Runtime: load, check against its own description, run on a tile.
+//! A network in ONNX Runtime: it is loaded, checked against its metadata, and run on tiles.
 
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 use ort::value::{Outlet, TensorRef, ValueType};
 
-use super::map::{Map, Rect};
-use super::model::{Contract, Facts, Model};
-use super::runtime::{Quiet, Runtime};
+use super::model::{Metadata, Model, WeightForm};
+use super::output::{NetworkOutput, Rect};
+use super::runtime::{Runtime, SilencedStderr};
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};
 
-/// The weights of equation (6), in either form.
+/// The weights of equation (6), in one of two forms.
 #[derive(Debug)]
 pub enum Weights {
     /// See [`affinity`](super::affinity).
-    Features(Map),
+    Features(NetworkOutput),
     /// See [`kernel`](super::kernel).
-    Kernel(Map),
+    Kernel(NetworkOutput),
 }
 
 /// A loaded network.
 pub struct Network {
     session: Session,
-    facts: Facts,
+    metadata: Metadata,
     name: String,
 }
 
 impl Network {
-    /// Loads and checks `model`; inference uses `threads` threads.
+    /// Loads and checks `model` for inference with `threads` threads.
     ///
     /// # Errors
-    /// [`ErrorKind::Model`] naming what is wrong with the file.
+    /// [`ErrorKind::Model`]: the file is not a network, or its metadata or tensors do not fit.
     pub fn load(model: &Model, runtime: &Runtime, threads: usize) -> Result<Self> {
         let refuse = |cause: &dyn std::fmt::Display| {
             Error::new(ErrorKind::Model, format!("model {}", model.name), one_line(cause))
                 .hint("make network files with scripts/lab/train/export_network.py")
         };
         let session = open(model, runtime, threads).map_err(|cause| refuse(&cause))?;
-        let facts = {
+        let metadata = {
             let metadata = session.metadata().map_err(|cause| refuse(&cause))?;
-            Facts::read(|key| metadata.custom(&format!("caustique.{key}"))).map_err(|cause| refuse(&cause))?
+            Metadata::read(|key| metadata.custom(&format!("caustique.{key}"))).map_err(|cause| refuse(&cause))?
         };
-        check_outlets(&session, &facts).map_err(|cause| refuse(&cause))?;
-        Ok(Network { session, facts, name: model.name.clone() })
+        check_outlets(&session, &metadata).map_err(|cause| refuse(&cause))?;
+        Ok(Network { session, metadata, name: model.name.clone() })
     }
 
-    /// What the network says about itself.
-    pub fn facts(&self) -> &Facts {
-        &self.facts
+    /// The network's metadata.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
     }
 
     /// Runs the network on `input`, the tensor of `rect` from [`tensor::fill`].
     ///
     /// # Errors
-    /// [`ErrorKind::Model`] when ONNX Runtime fails or the output has the wrong shape.
+    /// [`ErrorKind::Model`]: ONNX Runtime fails or the output has the wrong shape.
     pub fn run(&mut self, input: &[f32], rect: Rect) -> Result<Weights> {
-        let Network { session, facts, name } = self;
+        let Network { session, metadata, name } = self;
         let fail =
             |cause: &dyn std::fmt::Display| Error::new(ErrorKind::Model, format!("model {name}"), one_line(cause));
-        let shape = [1, tensor::channels(facts.levels), rect.height(), rect.width()];
+        let shape = [1, tensor::channels(metadata.levels), rect.height(), rect.width()];
         let tensor = TensorRef::from_array_view((shape, input)).map_err(|cause| fail(&cause))?;
         let outputs = session.run(ort::inputs!["input" => tensor]).map_err(|cause| fail(&cause))?;
-        let output = outputs.get(facts.output()).ok_or_else(|| fail(&"the output is missing"))?;
+        let output = outputs.get(metadata.output()).ok_or_else(|| fail(&"the output is missing"))?;
         let (shape, data) = output.try_extract_tensor::<f32>().map_err(|cause| fail(&cause))?;
-        let expected = [1, facts.output_channels(), rect.height(), rect.width()].map(|n| n as i64);
+        let expected = [1, metadata.output_channels(), rect.height(), rect.width()].map(|n| n as i64);
         if **shape != expected {
             return Err(fail(&format!("the output has shape {shape:?} instead of {expected:?}")));
         }
-        let map = Map { rect, window: facts.window, data: data.to_vec() };
-        Ok(match facts.contract {
-            Contract::Features { .. } => Weights::Features(map),
-            Contract::Weights => Weights::Kernel(map),
+        let output = NetworkOutput { rect, window: metadata.window, data: data.to_vec() };
+        Ok(match metadata.form {
+            WeightForm::Features { .. } => Weights::Features(output),
+            WeightForm::Weights => Weights::Kernel(output),
         })
     }
 }
@@ -81,11 +81,11 @@ fn open(model: &Model, runtime: &Runtime, threads: usize) -> ort::Result<Session
         .with_intra_threads(threads)?
         // Idle inference threads must not spin while equation (6) needs the cores.
         .with_intra_op_spinning(false)?;
-    let _quiet = Quiet::new();
+    let _quiet = SilencedStderr::new();
     builder.commit_from_memory(&model.bytes)
 }
 
-fn check_outlets(session: &Session, facts: &Facts) -> std::result::Result<(), String> {
+fn check_outlets(session: &Session, metadata: &Metadata) -> std::result::Result<(), String> {
     let channels = |name: &str, dtype: &ValueType| match dtype {
         ValueType::Tensor { shape, .. } if shape.len() == 4 => Ok(shape[1]),
         other => Err(format!("its {name} is no image tensor but {other}")),
@@ -94,10 +94,10 @@ fn check_outlets(session: &Session, facts: &Facts) -> std::result::Result<(), St
         let found = outlets.iter().find(|outlet| outlet.name() == name);
         channels(name, found.ok_or_else(|| format!("it has no tensor named {name:?}"))?.dtype())
     };
-    let expected = [("input", tensor::channels(facts.levels)), (facts.output(), facts.output_channels())];
-    let found = [find(session.inputs(), "input")?, find(session.outputs(), facts.output())?];
+    let expected = [("input", tensor::channels(metadata.levels)), (metadata.output(), metadata.output_channels())];
+    let found = [find(session.inputs(), "input")?, find(session.outputs(), metadata.output())?];
     for ((name, expected), found) in expected.into_iter().zip(found) {
-        // A negative number is a size left open.
+        // A negative number is a dynamic size.
         if found >= 0 && found != expected as i64 {
             return Err(format!("its {name} has {found} channels, its metadata imply {expected}"));
         }
@@ -105,7 +105,7 @@ fn check_outlets(session: &Session, facts: &Facts) -> std::result::Result<(), St
     Ok(())
 }
 
-/// ONNX Runtime's messages may span lines; ours are one clause.
+/// A message in one line; ONNX Runtime's can have several.
 fn one_line(message: &dyn std::fmt::Display) -> String {
     message.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,8 +1,8 @@
-//! Finding and loading ONNX Runtime, once per process.
+//! Finds and loads ONNX Runtime, once per process.
 //!
-//! Candidates in order: the file that the environment variable `CAUSTIQUE_ONNXRUNTIME` names, and then no other; the
-//! system's loader under the library's usual names; any `libonnxruntime.so*` below `.deps/onnxruntime/`, where
-//! `scripts/setup.sh` puts it (see [`installed`]).
+//! If the environment variable `CAUSTIQUE_ONNXRUNTIME` is set, only the file that it names is tried. Otherwise the system's
+//! loader is asked for the common names of the library, then any `libonnxruntime.so*` below `.deps/onnxruntime/`, where
+//! `scripts/setup.sh` installs it (see [`installed`]).
 
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
@@ -17,14 +17,14 @@ use crate::installed;
 /// Environment variable that names the library's file.
 pub const VARIABLE: &str = "CAUSTIQUE_ONNXRUNTIME";
 
-/// What every name of the library begins with.
+/// Prefix of the library's file names.
 const NAME: &str = "libonnxruntime.so";
 
-/// Minor versions whose sonames the system's loader is asked for (Debian 13 installs libonnxruntime.so.1.21). The first
-/// is the oldest that `ort` takes here.
+/// Minor versions whose file names are tried (Debian 13 installs libonnxruntime.so.1.21). The first is the oldest that
+/// `ort` supports here.
 const MINOR_VERSIONS: std::ops::RangeInclusive<u32> = 17..=49;
 
-/// Where `scripts/setup.sh` installs, in the project's folder.
+/// Folder within the project into which `scripts/setup.sh` installs the library.
 const FOLDER: &str = ".deps/onnxruntime";
 
 const HINT: &str = "on Debian 13: apt-get install libonnxruntime1.21; on Debian 12: run scripts/setup.sh; \
@@ -37,14 +37,14 @@ pub struct Runtime {
     path: PathBuf,
 }
 
-/// `ort` allows one environment per process and no second after it is dropped, so it lives here for good.
+/// The library of the process. `ort` allows no second environment, even after the first is dropped.
 static LOADED: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl Runtime {
-    /// The library: loaded by the first call, the same for all later ones.
+    /// Returns the library; the first call loads it.
     ///
     /// # Errors
-    /// [`ErrorKind::Library`] when no candidate can be loaded; the hint says what to install.
+    /// [`ErrorKind::Library`]: no candidate can be loaded. The hint says what to install.
     pub fn find() -> Result<Self> {
         let mut loaded = LOADED.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(runtime) = &*loaded {
@@ -54,17 +54,17 @@ impl Runtime {
         Ok(loaded.insert(runtime).clone())
     }
 
-    /// File that the library was loaded from.
+    /// The loaded file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where it comes from.
+    /// Where the library was found, in words.
     pub fn origin(&self) -> &'static str {
         installed::origin(VARIABLE, FOLDER, &self.path)
     }
 
-    /// Version as the file's name tells it, such as `1.21.1`; `None` when it does not (it is 1.17 or later).
+    /// Version in the file name, such as `1.21.1`; `None` if the name has none (it is 1.17 or later).
     pub fn version(&self) -> Option<&str> {
         let name = self.path.file_name()?.to_str()?;
         name.split_once(".so.").map(|(_, version)| version).filter(|version| version.contains('.'))
@@ -75,10 +75,10 @@ impl Runtime {
     }
 }
 
-/// What to try, in order. A name without a folder is the system loader's to find.
+/// Candidates in the order in which they are tried. The system's loader searches for names without a folder.
 fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
     if let Some(path) = named {
-        // Absolute, because `ort` would look beside the executable first.
+        // An absolute path, because `ort` searches for relative ones beside the executable first.
         let absolute = std::path::absolute(&path).map_err(|cause| Error::io(&path, &cause))?;
         if !absolute.is_file() {
             let place = format!("{VARIABLE}={}", path.display());
@@ -93,19 +93,19 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// Loads the first candidate that is an ONNX Runtime new enough.
+/// Loads the first candidate that is a supported version of ONNX Runtime.
 fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     let mut refusals = Vec::new();
     for candidate in candidates {
-        // `init_from` reports failures; the route through ORT_DYLIB_PATH panics.
+        // `init_from` returns errors; loading through ORT_DYLIB_PATH panics.
         match ort::init_from(candidate) {
             Ok(builder) => {
-                let path = located(candidate);
+                let path = loaded_file(candidate);
                 let environment = builder.with_name("caustique").with_telemetry(false).build();
                 let environment = environment.map_err(|cause| Error::new(ErrorKind::Library, path.display(), cause))?;
                 return Ok(Runtime { environment, path });
             }
-            // A name unknown to the loader is no news; a file that refuses, or a library too old, is.
+            // Names that the loader does not know are not reported; unloadable files and old versions are.
             Err(ort::LoadDynamicError::Dlopen { .. }) if !candidate.is_absolute() => {}
             Err(cause) => refusals.push(cause.to_string()),
         }
@@ -117,31 +117,31 @@ fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     Err(Error::new(ErrorKind::Library, "ONNX Runtime", cause).hint(HINT))
 }
 
-/// While it lives, what is written to stderr is lost. Debian 13's ONNX Runtime is linked to a libonnx that has
-/// registered all operators already, and complains of each of them, past its own logger, some 500 lines with the first
-/// session. Errors come back as values all the same.
-pub(super) struct Quiet(Option<OwnedFd>);
+/// Redirects stderr to `/dev/null` until it is dropped. Debian 13's ONNX Runtime is linked to a libonnx that has already
+/// registered all operators, and prints some 500 lines about them past its own logger when the first session starts.
+/// Errors are still returned as values.
+pub(super) struct SilencedStderr(Option<OwnedFd>);
 
-impl Quiet {
-    pub fn new() -> Quiet {
+impl SilencedStderr {
+    pub fn new() -> SilencedStderr {
         let nowhere = std::fs::OpenOptions::new().write(true).open("/dev/null");
         let saved = rustix::io::fcntl_dupfd_cloexec(rustix::stdio::stderr(), 3);
-        let (Ok(nowhere), Ok(saved)) = (nowhere, saved) else { return Quiet(None) };
-        Quiet(rustix::stdio::dup2_stderr(nowhere).is_ok().then_some(saved))
+        let (Ok(nowhere), Ok(saved)) = (nowhere, saved) else { return SilencedStderr(None) };
+        SilencedStderr(rustix::stdio::dup2_stderr(nowhere).is_ok().then_some(saved))
     }
 }
 
-impl Drop for Quiet {
+impl Drop for SilencedStderr {
     fn drop(&mut self) {
         if let Some(saved) = self.0.take() {
-            // Nothing is left to tell a failure to.
+            // A failure cannot be reported: stderr is gone.
             let _ = rustix::stdio::dup2_stderr(saved);
         }
     }
 }
 
-/// The real file behind a candidate; for a bare name, the file that this process has mapped.
-fn located(candidate: &Path) -> PathBuf {
+/// The file of a loaded candidate; for a name without a folder, the file that this process has mapped.
+fn loaded_file(candidate: &Path) -> PathBuf {
     if candidate.is_absolute() {
         return candidate.canonicalize().unwrap_or_else(|_| candidate.to_path_buf());
     }

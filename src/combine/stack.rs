@@ -1,11 +1,11 @@
-//! The combiner's input: all layers it reads, checked for size, and its rule for values that are not finite.
+//! The combiner's input: the layers it reads, their size check, and the treatment of values that are not finite.
 
 use rayon::prelude::*;
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LayerSet, Picture, Role, Size};
 
-/// The layers of one render that the combiner reads; every plane holds `width * height` pixels, rows from the top.
+/// The layers of one render that the combiner reads.
 #[derive(Clone, Debug, Default)]
 pub struct LevelStack {
     /// Width and height.
@@ -23,10 +23,10 @@ pub struct LevelStack {
 }
 
 impl LevelStack {
-    /// The layers that the combiner reads. Those that are missing are empty, which the combiner refuses by name.
+    /// Collects the layers. A missing layer is left empty; the combiner then returns an error with its name.
     ///
     /// # Errors
-    /// There are no levels.
+    /// The set has no levels.
     pub fn of(set: &LayerSet) -> Result<LevelStack> {
         let numbered = |stem: &str| (1..).map_while(|k| set.picture(&format!("{stem}{k}"))).collect::<Vec<_>>();
         let of_role = |role| set.find(role).map(|layer| set.picture_of(layer)).unwrap_or_default();
@@ -46,7 +46,7 @@ impl LevelStack {
         })
     }
 
-    /// Checks that all planes are there, of one size, and that there are `expected` levels.
+    /// Checks that all planes exist and have the same size, and that the number of levels is `expected`.
     pub(crate) fn check(&self, expected: usize) -> Result<()> {
         let Size { width, height } = self.size;
         let pixels = width.checked_mul(height).unwrap_or(0);
@@ -75,15 +75,15 @@ impl LevelStack {
         plane("depth".into(), self.depth.len())
     }
 
-    /// For every pixel whether all its levels are finite; only such pixels take part in equation (6).
+    /// Whether each pixel is finite in all levels; only such pixels take part in equation (6).
     pub(crate) fn valid(&self) -> Vec<bool> {
         let at = |i: usize| self.levels.iter().all(|level| level[i].iter().all(|v| v.is_finite()));
         (0..self.size.pixels()).into_par_iter().map(at).collect()
     }
 }
 
-/// Gives every pixel that is not valid its first finite level, else the mean of valid pixels of `image` no further than
-/// `radius` in x and y, else black.
+/// Fills every pixel of `image` that is not valid with its first finite level, else with the mean of level 1 over valid
+/// pixels within `radius` in x and y, else with black.
 pub(crate) fn fill_invalid(stack: &LevelStack, valid: &[bool], radius: usize, image: &mut Picture) {
     let Size { width, height } = stack.size;
     let replacement = |i: usize| {

@@ -1,25 +1,25 @@
-//! The network's input: which layer sits in which channel, how each is scaled. No other file knows.
+//! The network's input: the order and scaling of its channels.
 //!
-//! Version 1, for m levels 4 m + 7 channels (27 for five): the levels' RGB, the levels' deviations, albedo, normal,
-//! depth. `scripts/lab/train/normalise.py` is the same in Python; a fixture holds the two together.
+//! Version 1 has 4 m + 7 channels for m levels (27 for five): RGB of the levels, standard deviations of the levels, albedo,
+//! normal, depth. `scripts/lab/train/normalise.py` implements the same in Python; a test compares the two.
 
 use rayon::prelude::*;
 
-use super::map::Rect;
+use super::output::Rect;
 use super::stack::LevelStack;
 use crate::film::Picture;
 use crate::stat::median;
 
-/// Version of channel order and scaling; a network states the one it was trained with.
+/// Version of the channel order and scaling. The metadata of a network states the version of its training.
 pub const VERSION: u32 = 1;
 
-/// Deviations below this, in tone-mapped units, are all "no noise".
+/// Deviations below this value, on the scale of log(1 + x), count as no noise.
 const DEVIATION_FLOOR: f32 = 1e-3;
 
-/// Depth from here on is background (the EXR writes 1e10).
+/// Depths from this value on are background (the EXR stores 1e10).
 const BACKGROUND_DEPTH: f32 = 1e9;
 
-/// Part of the lit pixels, the brightest, that the exposure ignores: one in so many.
+/// The exposure leaves out the brightest 1 / `TRIMMED` of the pixels that are not black.
 const TRIMMED: usize = 100;
 
 /// Number of channels for `levels` levels.
@@ -27,19 +27,19 @@ pub const fn channels(levels: usize) -> usize {
     4 * levels + 7
 }
 
-/// What one channel shows.
+/// Content of one channel.
 #[derive(Clone, Copy)]
 enum Channel {
-    /// Level index, colour component.
+    /// Colour component of a level: level index, component.
     Level(usize, usize),
-    /// Level index.
+    /// Standard deviation of a level, by its index.
     Deviation(usize),
     Albedo(usize),
     Normal(usize),
     Depth,
 }
 
-/// The model's order.
+/// Channels in the network's order.
 fn order(levels: usize) -> Vec<Channel> {
     let mut all: Vec<Channel> = (0..levels).flat_map(|j| (0..3).map(move |c| Channel::Level(j, c))).collect();
     all.extend((0..levels).map(Channel::Deviation));
@@ -49,24 +49,24 @@ fn order(levels: usize) -> Vec<Channel> {
     all
 }
 
-/// Scales of one whole image, so that neither light units nor scene units change the network's input.
+/// Scales of a whole image, which make the network's input independent of the units of light and length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Normalisation {
-    /// Factor on radiance: reciprocal of a robust mean luminance of the smoothest level.
+    /// Factor on radiance: one over a trimmed mean luminance of the level with the largest bandwidth.
     pub exposure: f32,
-    /// Median depth of what is not background.
+    /// Median depth without the background.
     pub depth: f32,
 }
 
 impl Normalisation {
-    /// The scales of `stack`; 1 where there is nothing to measure.
+    /// The scales of `stack`; 1 for an image without light or depth.
     pub fn of(stack: &LevelStack) -> Self {
         Normalisation { exposure: exposure(stack.levels.last()), depth: median_depth(&stack.depth) }
     }
 }
 
-/// The mean leaves out black pixels (how much background a picture has should not matter) and the brightest hundredth
-/// (a firefly should not either).
+/// One over the mean luminance without black pixels, so that the amount of background does not matter, and without the
+/// brightest hundredth, so that fireflies do not.
 fn exposure(level: Option<&Picture>) -> f32 {
     let luminance = |rgb: &[f32; 3]| {
         let [r, g, b] = rgb.map(finite);
@@ -88,12 +88,12 @@ fn median_depth(depth: &[f32]) -> f32 {
     median(&mut seen, f32::total_cmp).unwrap_or(1.0)
 }
 
-/// The input of `rect`, `[channel][y][x]`; zero where `rect` leaves the image, as a convolution's padding is.
+/// The network's input for `rect`, `[channel][y][x]`; zero outside the image, like the padding of a convolution.
 pub fn fill(stack: &LevelStack, normalisation: &Normalisation, rect: Rect) -> Vec<f32> {
     let (width, area) = (rect.width(), rect.width() * rect.height());
     let order = order(stack.levels.len());
     let mut data = vec![0.0; order.len() * area];
-    // Rows of all channels are equal work: chunks of constant size whatever the number of threads.
+    // One chunk per row and channel: their size does not depend on the number of threads.
     data.par_chunks_mut(width).enumerate().for_each(|(k, out)| {
         let (channel, y) = (order[k / rect.height()], rect.y0 + k % rect.height());
         if y >= stack.size.height {
@@ -106,7 +106,7 @@ pub fn fill(stack: &LevelStack, normalisation: &Normalisation, rect: Rect) -> Ve
     data
 }
 
-/// One row of one channel, from pixel `start` on.
+/// Fills one row of one channel, from pixel `start`.
 fn row(stack: &LevelStack, normalisation: &Normalisation, channel: Channel, start: usize, out: &mut [f32]) {
     let scale = normalisation.exposure;
     let n = start..start + out.len();
@@ -117,7 +117,7 @@ fn row(stack: &LevelStack, normalisation: &Normalisation, channel: Channel, star
         Channel::Deviation(j) => {
             let level = &stack.levels[j][n.clone()];
             for ((out, rgb), variance) in out.iter_mut().zip(level).zip(&stack.variances[j][n]) {
-                // The deviation of log(1 + x): that of x over 1 + x, on a logarithmic scale.
+                // The deviation of log(1 + x) is that of x over 1 + x; on a logarithmic scale.
                 let bright = mean(rgb.map(|v| finite(v).max(0.0) * scale));
                 let deviation = mean(variance.map(|v| finite(v).max(0.0))).sqrt() * scale / (1.0 + bright);
                 let floor = DEVIATION_FLOOR.ln();
@@ -127,7 +127,7 @@ fn row(stack: &LevelStack, normalisation: &Normalisation, channel: Channel, star
         Channel::Albedo(c) => map(out, &stack.albedo[n], |rgb| finite(rgb[c]).clamp(0.0, 1.0)),
         Channel::Normal(c) => map(out, &stack.normal[n], |xyz| finite(xyz[c]).clamp(-1.0, 1.0)),
         Channel::Depth => map(out, &stack.depth[n], |d| {
-            // Not `d >= BACKGROUND_DEPTH`: a depth that is no number is background too.
+            // Not `d >= BACKGROUND_DEPTH`, because NaN is background as well.
             if *d < BACKGROUND_DEPTH { d.max(0.0) / (d.max(0.0) + normalisation.depth) } else { 1.0 }
         }),
     }
@@ -141,7 +141,7 @@ fn mean([r, g, b]: [f32; 3]) -> f32 {
     (r + g + b) / 3.0
 }
 
-/// `x`, or zero if it is not finite: one bad channel must not poison the neighbours through the convolutions.
+/// `x`, or zero if it is not finite, because convolutions would spread it to the neighbours.
 fn finite(x: f32) -> f32 {
     if x.is_finite() { x } else { 0.0 }
 }

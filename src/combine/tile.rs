@@ -1,29 +1,29 @@
-//! Cutting an image into tiles that give what the whole image would give, in bounded memory.
+//! Splits an image into tiles with the result of the whole image, in bounded memory.
 //!
-//! A tile's core is its part of the result. Its input reaches further on every side: by the window's radius where
-//! neighbours need network outputs of their own, and by the network's halo (its receptive radius). Inputs start
-//! at multiples of the network's stride, so that its coarser grids fall on the same pixels in every tile; at the
-//! image's edge they end where the whole image does, so that zero padding acts in the same place.
+//! The core of a tile is its part of the result. Its input extends the core on every side by the window's radius, if the
+//! weights need the network's output at neighbours, and by the network's halo (its receptive radius). Inputs start at
+//! multiples of the network's stride, so that its coarser grids fall on the same pixels in every tile. At the border of the
+//! image they end where the whole image ends, so that zero padding acts at the same place.
 
-use super::map::Rect;
-use super::model::Facts;
+use super::model::Metadata;
+use super::output::Rect;
 use crate::film::Size;
 
-/// A part of the image and what the network must see for it.
+/// A part of the image, and the part that the network reads for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
-    /// Pixels that this tile yields, inside the image.
+    /// Pixels of the result, inside the image.
     pub core: Rect,
-    /// Pixels that the network sees; may pass the image's right and bottom edge by less than a stride.
+    /// Pixels that the network reads. They can exceed the image at the right and bottom by less than a stride.
     pub input: Rect,
 }
 
-/// Tiles of about `pixels` pixels each, whose cores cover the image once.
-pub fn tiles(Size { width, height }: Size, facts: &Facts, pixels: usize) -> Vec<Tile> {
+/// Tiles of about `pixels` pixels each. Their cores cover the image once.
+pub fn tiles(Size { width, height }: Size, metadata: &Metadata, pixels: usize) -> Vec<Tile> {
     let side = pixels.isqrt();
-    // A quarter wider than high: two by two tiles for a 16:9 picture at the usual size.
-    let columns = spans(width, (side / 4).saturating_mul(5), facts);
-    let rows = spans(height, (side / 5).saturating_mul(4), facts);
+    // Tiles of 25:16 split common 16:9 pictures into two by two.
+    let columns = spans(width, (side / 4).saturating_mul(5), metadata);
+    let rows = spans(height, (side / 5).saturating_mul(4), metadata);
     let tile = |(y, v): &(Span, Span), (x, u): &(Span, Span)| Tile {
         core: Rect { x0: x.0, y0: y.0, x1: x.1, y1: y.1 },
         input: Rect { x0: u.0, y0: v.0, x1: u.1, y1: v.1 },
@@ -31,14 +31,15 @@ pub fn tiles(Size { width, height }: Size, facts: &Facts, pixels: usize) -> Vec<
     rows.iter().flat_map(|row| columns.iter().map(move |column| tile(row, column))).collect()
 }
 
+/// First pixel and end along one axis.
 type Span = (usize, usize);
 
-/// Cores and inputs along one axis: equal parts no longer than `longest`, at least a stride.
-fn spans(size: usize, longest: usize, facts: &Facts) -> Vec<(Span, Span)> {
-    let stride = facts.stride;
+/// Cores and inputs along one axis: equal parts of at most `longest` pixels, or of a stride if that is longer.
+fn spans(size: usize, longest: usize, metadata: &Metadata) -> Vec<(Span, Span)> {
+    let stride = metadata.stride;
     let parts = size.div_ceil(longest.max(stride));
     let step = size.div_ceil(parts).next_multiple_of(stride);
-    let reach = (facts.halo + facts.neighbour_radius()).next_multiple_of(stride);
+    let reach = (metadata.halo + metadata.neighbour_radius()).next_multiple_of(stride);
     let padded = size.next_multiple_of(stride);
     let span = |start: usize| {
         let end = (start + step).min(size);

@@ -1,32 +1,32 @@
-//! The bounded displacement: what a denoiser may change, by how sure the estimate is.
+//! The bounded displacement: a denoiser may move a pixel by a multiple of its standard error.
 //!
 //! ```text
 //! out = M + clip(D - M, -c s, c s)
 //! ```
 //!
-//! `M` is the estimate, `D` the denoiser's picture, `s` the larger of the pixel's own standard error and a high
-//! percentile of those around it, which stand in where a pixel has not met the rare bright sample yet. As `s` falls
-//! with the iterations, so does the displacement: whatever `D` is, the picture tends to what `M` tends to
-//! (`docs/theory.md`). The result stays between zero and the brightest estimate around; how often it had to be kept
-//! there is counted.
+//! `M` is the estimate and `D` the denoiser's picture. The spread `s` is the larger of the pixel's own standard error and
+//! a high percentile of its neighbours' standard errors, because a pixel that no rare bright sample has hit yet
+//! underestimates its own. As `s` falls with the iterations, so does the displacement: for any `D` the picture converges
+//! to the limit of `M` (`docs/theory.md`). The result is clamped between zero and the brightest estimate around; clamped
+//! pixels are counted.
 
 use super::Estimate;
 use super::window::window;
 use crate::film::Picture;
 use rayon::prelude::*;
 
-/// `c`: how many standard errors a pixel may be moved.
+/// `c`: maximum displacement of a pixel, in standard errors.
 pub const LIMIT: f32 = 3.0;
-/// Pixels to each side of the window in which standard errors are ranked.
+/// Pixels to each side in the window of the percentile.
 pub const REACH: usize = 3;
-/// Share of the window's standard errors that are no larger than the one taken.
-const RANK: f32 = 0.8;
+/// The percentile, as a share of the window.
+const PERCENTILE: f32 = 0.8;
 
-/// The larger of each pixel's standard error and the one of rank `RANK` around it, by channel; not finite ones count as
-/// unknown, larger than all. Zero where a pixel is exact.
+/// The spread of every pixel and channel: the larger of its standard error and the percentile `PERCENTILE` of its
+/// neighbours'. Standard errors that are not finite count as infinite. The spread of an exact pixel is zero.
 ///
-/// A pixel takes over the standard errors of those around it alone whose estimate its own may be another sample of:
-/// beside a bright light its own samples say that it does not show the light.
+/// A neighbour counts only if its estimate is not above the pixel's by more than [`LIMIT`] of the neighbour's standard
+/// errors: beside a bright light the pixel's own samples show that it does not see the light.
 pub fn spread(estimate: &Estimate) -> Picture {
     let Estimate { mean, deviation, .. } = estimate;
     let known = |value: f32| if value.is_finite() { value.max(0.0) } else { f32::INFINITY };
@@ -42,7 +42,7 @@ pub fn spread(estimate: &Estimate) -> Picture {
             };
             ranked.clear();
             ranked.extend(window(mean.size(), index, REACH).map(error_of));
-            let rank = (RANK * (ranked.len() - 1) as f32).round() as usize;
+            let rank = (PERCENTILE * (ranked.len() - 1) as f32).round() as usize;
             let (_, around, _) = ranked.select_nth_unstable_by(rank, f32::total_cmp);
             known(deviation[index][c]).max(*around)
         })
@@ -50,26 +50,26 @@ pub fn spread(estimate: &Estimate) -> Picture {
     Picture::new(mean.size(), (0..mean.len()).into_par_iter().map_init(Vec::new, of_pixel).collect())
 }
 
-/// The largest estimates within [`REACH`] of a pixel that are numbers; zero where there are none.
+/// The largest finite estimate within [`REACH`] of a pixel, by channel; zero if there is none.
 pub fn brightest(mean: &Picture, index: usize) -> [f32; 3] {
     window(mean.size(), index, REACH).fold([0.0; 3], |most, other| {
         std::array::from_fn(|c| if mean[other][c].is_finite() { most[c].max(mean[other][c]) } else { most[c] })
     })
 }
 
-/// Pixels with a channel that was kept within the range.
+/// Numbers of pixels that were clamped in any channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clamped {
-    /// That would be negative: equation (6) subtracts levels from each other, and denoisers overshoot.
+    /// Clamped to zero: equation (6) subtracts levels from each other, and denoisers overshoot.
     pub below_zero: u64,
-    /// That would be brighter than the brightest estimate around.
+    /// Clamped to the brightest estimate around.
     pub too_bright: u64,
 }
 
-/// `mean` displaced towards `denoised` by at most [`LIMIT`] of `spread`; not below zero, not above the largest estimate
-/// within [`REACH`]. Also counts the pixels that zero or that largest estimate stopped.
+/// Moves `mean` towards `denoised` by at most [`LIMIT`] times `spread`, clamped between zero and [`brightest`]. Also
+/// counts the clamped pixels.
 ///
-/// A value of `denoised` that is no number changes nothing; where `mean` is none, `denoised` stands alone.
+/// Values of `denoised` that are not finite are ignored; they replace values of `mean` that are not finite.
 pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture) -> (Picture, Clamped) {
     let displaced = |index: usize, c: usize| {
         let (m, d) = (mean[index][c], denoised[index][c]);
@@ -118,8 +118,7 @@ mod tests {
         displace(mean, denoised, spread).0
     }
 
-    /// A denoiser that returns nonsense moves no pixel by more than the bound, and what it returns where it is not a
-    /// number is not used.
+    /// A denoiser that returns nonsense moves no pixel by more than the bound, and its NaN and infinities are ignored.
     #[test]
     fn nonsense_is_bounded() {
         let mean = plane(|index| 1.0 + 0.1 * noise(1, index));
@@ -137,15 +136,14 @@ mod tests {
         }
     }
 
-    /// The consistency of `docs/theory.md`: with standard errors that fall as 1/sqrt(n), the squared distance to the
-    /// truth of the estimate with a fixed wrong denoiser falls with a slope of -1 in n over two decades. Without the
-    /// bound it would not fall at all.
+    /// The consistency of `docs/theory.md`: with standard errors that fall as 1/sqrt(n) and a fixed wrong denoiser, the
+    /// squared error falls with a slope of -1 in n over two decades. Without the bound it would not fall at all.
     #[test]
-    fn whatever_the_denoiser_the_error_falls_as_that_of_its_input() {
+    fn the_error_falls_as_fast_as_the_estimates_with_any_denoiser() {
         let wrong = plane(|index| 7.0 * noise(5, index));
         let error = |n: f32| {
             let deviation = plane(|_| n.sqrt().recip());
-            // Uniform noise of that deviation.
+            // Uniform noise with that standard deviation.
             let mean = plane(|index| 3.0 + (12f32 / n).sqrt() * (noise(n as u64, index) - 0.5));
             let out = bounded(&mean, &wrong, &spread(&estimate(&mean, deviation)));
             out.iter().map(|out| f64::from((out[0] - 3.0).powi(2))).sum::<f64>() / SIZE.pixels() as f64
@@ -154,10 +152,9 @@ mod tests {
         assert!((slope + 1.0).abs() < 0.05, "{slope}");
     }
 
-    /// A bright sample is let go where the pixel itself is as unsure as it is bright; its neighbours, sure of
-    /// themselves, do not take it over.
+    /// A firefly, whose standard error equals its value, is removed; neighbours with small standard errors stay.
     #[test]
-    fn a_firefly_goes_and_its_neighbours_stay() {
+    fn a_firefly_is_removed_and_its_neighbours_stay() {
         let at = 15 * SIZE.width + 20;
         let mean = plane(|index| if index == at { 100.0 } else { 1.0 });
         let deviation = plane(|index| if index == at { 100.0 } else { 0.1 });
@@ -165,7 +162,7 @@ mod tests {
         let out = bounded(&mean, &smeared, &spread(&estimate(&mean, deviation)));
         assert_eq!(out[at][0], 5.0);
         assert!(out.iter().enumerate().all(|(index, out)| index == at || out[0] < 1.31));
-        // Nor is anything brighter than what was estimated around.
+        // No pixel is brighter than the brightest estimate around it.
         let far = bounded(&mean, &plane(|_| 1e6), &plane(|_| 1e6));
         assert!(far.iter().all(|out| out[0] <= 100.0) && far[0][0] == 1.0);
         let dark = bounded(&mean, &plane(|_| -1e6), &plane(|_| 1e6));
@@ -177,10 +174,9 @@ mod tests {
         assert_eq!(count(0.9), Clamped::default());
     }
 
-    /// Equation (6) may make negative estimates, and nothing may be between it and the picture: they are clamped all
-    /// the same.
+    /// Equation (6) can make negative estimates. They are clamped also without a denoiser.
     #[test]
-    fn negative_estimates_do_not_get_through() {
+    fn negative_estimates_are_clamped() {
         let mean = plane(|index| if index % 7 == 0 { -0.25 } else { 1.0 });
         let (out, clamped) = displace(&mean, &mean, &plane(|_| 0.0));
         assert!(out.iter().flatten().all(|value| *value >= 0.0));
@@ -188,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_of_any_shape() {
+    fn pictures_of_any_size_work() {
         for (width, height) in [(0, 0), (1, 1), (1, 50), (50, 1), (3, 2)] {
             let size = Size { width, height };
             let values = Picture::filled(size, [1.0; 3]);
@@ -197,8 +193,8 @@ mod tests {
         }
     }
 
-    /// Beside a light of a million a wall whose samples were all equal stays as it is, and so does one with little
-    /// noise, because its samples are none of the light's.
+    /// Beside a light of radiance 1e6 a wall without noise stays unchanged, and a wall with little noise stays within its
+    /// own bound.
     #[test]
     fn a_bright_light_leaves_no_halo() {
         let lit = |index: usize| index % SIZE.width < 10;
@@ -212,9 +208,10 @@ mod tests {
         }
     }
 
-    /// A pixel that shows nothing stays black; a black surface may have missed the light of those around.
+    /// The spread is zero where alpha is zero; a black surface takes the spread of its neighbours, whose rare light may
+    /// have missed it.
     #[test]
-    fn nothing_is_seen_where_alpha_is_zero() {
+    fn empty_pixels_have_no_spread_and_black_surfaces_have_one() {
         let covered = |index: usize| index % SIZE.width < 20;
         let mean = plane(|index| if index % 2 == 0 && covered(index) { 1.0 } else { 0.0 });
         let alpha = (0..SIZE.pixels()).map(|index| f32::from(u8::from(covered(index)))).collect();
@@ -227,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_may_be_anything_and_no_estimate_is_replaced() {
+    fn only_estimates_that_are_not_finite_are_replaced() {
         let size = Size { width: 2, height: 1 };
         let picture = |pixels: [f32; 2]| Picture::new(size, pixels.map(|value| [value; 3]).to_vec());
         let out = bounded(&picture([f32::NAN, 4.0]), &picture([3.0; 2]), &picture([f32::INFINITY, 0.0]));

@@ -1,5 +1,4 @@
-//! What makes the denoised picture `D`: Intel Open Image Denoise where its library is found, else our own statistical
-//! filter.
+//! Denoisers: Intel Open Image Denoise if its library is found, else our own statistical filter.
 
 use super::Estimate;
 use super::bound::spread;
@@ -12,18 +11,18 @@ use serde::{Deserialize, Serialize};
 
 pub use oidn::Quality;
 
-/// Bytes that Open Image Denoise works in, for a pixel of a picture that it takes in one piece.
-const SCRATCH: u64 = 700;
-/// The memory that it is given to work in (MiB): it takes a picture that needs more in tiles. Tiles leave other rounding,
-/// so this does not depend on the machine.
-const MEMORY_MIB: u32 = 1024;
+/// Bytes of scratch memory that Open Image Denoise needs per pixel of an untiled picture.
+const SCRATCH_PER_PIXEL: u64 = 700;
+/// Limit on the scratch memory of Open Image Denoise (MiB), which splits larger pictures into tiles. Tiles change the
+/// rounding, so that the limit must not depend on the machine.
+const MAX_MEMORY_MIB: u32 = 1024;
 
-/// Bytes that the denoiser works in, for a picture of `pixels` pixels.
+/// Bytes of scratch memory for a picture of `pixels` pixels.
 pub fn scratch(pixels: u64) -> u64 {
-    (SCRATCH * pixels).min(u64::from(MEMORY_MIB) << 20)
+    (SCRATCH_PER_PIXEL * pixels).min(u64::from(MAX_MEMORY_MIB) << 20)
 }
 
-/// What makes the denoised picture.
+/// The user's choice of a denoiser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -39,9 +38,9 @@ pub enum DenoiserChoice {
     None,
 }
 
-/// A denoiser that is ready.
+/// A loaded denoiser.
 pub enum Denoiser {
-    /// Open Image Denoise. The filter keeps its network between pictures of one size and kind.
+    /// Open Image Denoise. The filter keeps its network between pictures of equal size and inputs.
     Oidn {
         /// The filter.
         filter: oidn::Filter,
@@ -50,26 +49,28 @@ pub enum Denoiser {
     },
     /// [`statistical`].
     Own,
-    /// The estimate as it is.
+    /// None: the denoised picture is the estimate.
     None,
 }
 
 impl Denoiser {
-    /// The one asked for, with as many threads as the current rayon pool has. With [`DenoiserChoice::Auto`] also why it
-    /// is not Open Image Denoise.
+    /// Loads the chosen denoiser with the number of threads of the current rayon pool. If [`DenoiserChoice::Auto`] falls
+    /// back to our own, also returns why Open Image Denoise cannot be loaded.
     ///
     /// # Errors
-    /// [`ErrorKind::Library`] where [`DenoiserChoice::Oidn`] cannot be had.
+    /// [`ErrorKind::Library`]: [`DenoiserChoice::Oidn`] is chosen and cannot be loaded.
     pub fn open(choice: DenoiserChoice) -> Result<(Denoiser, Option<Error>)> {
         match choice {
             DenoiserChoice::None => Ok((Denoiser::None, None)),
             DenoiserChoice::Own => Ok((Denoiser::Own, None)),
-            DenoiserChoice::Oidn => Ok((oidn()?, None)),
-            DenoiserChoice::Auto => Ok(oidn().map_or_else(|error| (Denoiser::Own, Some(error)), |found| (found, None))),
+            DenoiserChoice::Oidn => Ok((load_oidn()?, None)),
+            DenoiserChoice::Auto => {
+                Ok(load_oidn().map_or_else(|error| (Denoiser::Own, Some(error)), |found| (found, None)))
+            }
         }
     }
 
-    /// What the header says.
+    /// Name and version for the header.
     pub fn name(&self) -> String {
         match self {
             Denoiser::Oidn { version, .. } => format!("Open Image Denoise {version}"),
@@ -78,10 +79,10 @@ impl Denoiser {
         }
     }
 
-    /// The denoised picture of an estimate, row by row.
+    /// Denoises an estimate.
     ///
     /// # Errors
-    /// [`ErrorKind::Library`] when Open Image Denoise fails.
+    /// [`ErrorKind::Library`]: Open Image Denoise fails.
     pub fn run(&mut self, estimate: &Estimate, quality: Quality) -> Result<Picture> {
         let Estimate { mean, albedo, normal, .. } = estimate;
         let (albedo, normal) = (albedo.as_ref(), normal.as_ref());
@@ -95,12 +96,12 @@ impl Denoiser {
                 let size = mean.size();
                 let finite = mean.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 });
                 let mut input = oidn::Input::new(size.width, size.height, &finite);
-                // Normals alone are no guide that it takes. Ours are averages over all eye paths: with `clean_aux` they
-                // served as well as denoised ones, and without it left 1.2 times the error.
+                // Open Image Denoise takes normals only together with albedo. Our guides are means over all camera paths:
+                // with `clean_aux` they serve as well as denoised guides; without it the error is 1.2 times as large.
                 input.albedo = albedo.map(|albedo| &**albedo);
                 input.normal = normal.filter(|_| albedo.is_some()).map(|normal| &**normal);
                 (input.hdr, input.clean_aux) = (true, albedo.is_some());
-                (input.quality, input.max_memory_mib) = (quality, Some(MEMORY_MIB));
+                (input.quality, input.max_memory_mib) = (quality, Some(MAX_MEMORY_MIB));
                 let pixels = filter.denoise(&input);
                 let pixels = pixels.map_err(|error| Error::new(ErrorKind::Library, "Open Image Denoise", error))?;
                 Ok(Picture::new(size, pixels))
@@ -109,23 +110,23 @@ impl Denoiser {
     }
 }
 
-/// Where `scripts/setup.sh` puts Open Image Denoise, in the project's folder.
+/// Folder within the project into which `scripts/setup.sh` installs Open Image Denoise.
 const FOLDER: &str = ".deps/oidn";
 
-/// Open Image Denoise, as the system or `scripts/setup.sh` has installed it (see [`installed`]).
+/// Loads Open Image Denoise, as installed by the system or by `scripts/setup.sh` (see [`installed`]).
 ///
 /// # Errors
-/// That of [`oidn::Library::load`].
+/// As [`oidn::Library::load`].
 pub fn library() -> std::result::Result<oidn::Library, oidn::Error> {
     oidn::Library::load(&installed::candidates(FOLDER))
 }
 
-/// Where that library comes from.
+/// Where the library was found, in words.
 pub fn origin(library: &oidn::Library) -> &'static str {
     installed::origin(oidn::LIBRARY_VARIABLE, FOLDER, library.path())
 }
 
-fn oidn() -> Result<Denoiser> {
+fn load_oidn() -> Result<Denoiser> {
     let refuse = |error: oidn::Error| {
         let refusal = Error::new(ErrorKind::Library, "Open Image Denoise", &error);
         error.hint().into_iter().fold(refusal, Error::hint)

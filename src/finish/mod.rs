@@ -147,7 +147,7 @@ impl Finish {
         let combined = match &mut self.network {
             Some(network) => {
                 estimate.mean = network.run(&LevelStack::of(set)?)?;
-                Some(network.facts().levels)
+                Some(network.metadata().levels)
             }
             None => None,
         };

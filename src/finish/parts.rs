@@ -1,8 +1,8 @@
 //! Additive parts of the finished picture.
 //!
-//! Each part is denoised and bounded by the whole picture's standard errors, then all are scaled together so that they
-//! sum to the finished picture: a part is as clean as the whole, never negative, and tends to what its estimate tends
-//! to.
+//! Each part is denoised and displaced within the bound of the whole picture. Then all parts are scaled by a common factor
+//! per pixel so that they sum to the finished picture. A part is never negative, and converges to the limit of its
+//! estimate.
 
 use super::Estimate;
 use super::bound::displace;
@@ -10,18 +10,18 @@ use super::conserve::give_back;
 use crate::film::Picture;
 use rayon::prelude::*;
 
-/// One part: its estimate and its denoised picture.
+/// A part before the bound: its estimate and its denoised picture.
 pub struct Part {
     /// Estimate.
     pub mean: Picture,
-    /// What the denoiser makes of it; the estimate itself where there is nothing to remove.
+    /// Denoised estimate; the estimate itself if it has no noise.
     pub denoised: Picture,
 }
 
-/// Parts that sum to `whole`, in their order; estimate and spread are those of the whole picture.
+/// Finishes parts so that they sum to the finished picture `whole`. `estimate` and `spread` belong to the whole picture.
 ///
-/// Where no part has light but the whole picture does, which is light that the denoiser has brought from around, the
-/// last takes it.
+/// Light of the whole picture at a pixel where no part has any, which the denoiser has brought from around, goes to the
+/// last part.
 pub fn split(parts: &[Part], whole: &Picture, (estimate, spread): (&Estimate, &Picture)) -> Vec<Picture> {
     let finish = |part: &Part| {
         let (mut picture, _) = displace(&part.mean, &part.denoised, spread);
@@ -43,7 +43,7 @@ pub fn split(parts: &[Part], whole: &Picture, (estimate, spread): (&Estimate, &P
             *value = std::array::from_fn(|c| (f64::from(value[c]) * scale[c]) as f32);
         });
     }
-    // What is left, so that rounding does not show in the sum.
+    // The last part takes the remainder, so that the sum has no rounding error.
     last.par_iter_mut().enumerate().for_each(|(index, value)| {
         *value = std::array::from_fn(|c| {
             let sum = others.iter().map(|part| f64::from(part[index][c])).sum::<f64>();
@@ -59,7 +59,7 @@ mod tests {
     use crate::film::Size;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// The whole picture, with the same standard error everywhere.
+    /// An estimate with a constant standard error.
     fn estimate(mean: &Picture, error: f32) -> Estimate {
         let deviation = Picture::filled(mean.size(), [error; 3]);
         Estimate { mean: mean.clone(), deviation, albedo: None, normal: None, alpha: None }
@@ -87,15 +87,15 @@ mod tests {
         assert!(split(&[], &whole, (&estimate, &spread)).is_empty());
     }
 
-    /// With standard errors of zero the parts are their estimates, which sum to the picture.
+    /// With standard errors of zero the finished parts are their estimates.
     #[test]
-    fn sure_parts_stay() {
+    fn exact_parts_stay() {
         let size = Size { width: 4, height: 4 };
         let plane = |value: f32| Picture::filled(size, [value; 3]);
         let part = |value: f32| Part { mean: plane(value), denoised: plane(9.0) };
         let whole = plane(0.75);
-        let sure = (&estimate(&whole, 0.0), &plane(0.0));
-        let finished = split(&[part(0.25), part(0.5)], &whole, sure);
+        let exact = (&estimate(&whole, 0.0), &plane(0.0));
+        let finished = split(&[part(0.25), part(0.5)], &whole, exact);
         assert_eq!(finished, [plane(0.25), plane(0.5)]);
     }
 }

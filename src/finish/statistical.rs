@@ -1,44 +1,45 @@
-//! A denoiser without a network: means over neighbours that the noise cannot tell apart.
+//! A denoiser without a network: means over neighbours whose difference noise can explain.
 //!
-//! Whether two pixels show the same light is asked of their difference and its standard error, as in the membership
-//! tests of \[Sakai et al. 2024, "A Statistical Approach to Monte Carlo Denoising"\]; whether they show the same
-//! surface is asked of albedo and normal (a joint bilateral weight). A first pass asks the noisy estimates, a second
-//! one the first's result, in which fainter differences show.
+//! Two pixels show the same light if their difference is within its standard error, as in the membership tests of
+//! \[Sakai et al. 2024, "A Statistical Approach to Monte Carlo Denoising"\], and the same surface if albedo and normal
+//! agree (a joint bilateral weight). The first pass tests the noisy estimates, the second the result of the first, which
+//! shows fainter differences.
 
 use super::window::window;
 use crate::film::Picture;
 
-/// Pixels to each side of the window that is averaged.
+/// Pixels to each side in the averaged window.
 const REACH: usize = 8;
-/// Standard deviation of the weight by distance, in pixels.
-const NEAR: f32 = 5.0;
-/// Differences of albedo and of unit normals at which a weight has fallen to exp(-1/2).
+/// Standard deviation of the weight in distance, in pixels.
+const DISTANCE: f32 = 5.0;
+/// Standard deviation of the weight in albedo.
 const ALBEDO: f32 = 0.04;
+/// Standard deviation of the weight in the difference of unit normals.
 const NORMAL: f32 = 0.2;
-/// Standard errors of the difference beyond which two estimates are taken for different light: passes one and two.
-const APART: [f32; 2] = [3.0, 1.0];
+/// Largest difference of two estimates of the same light, in standard errors of the difference: first and second pass.
+const MAX_DIFFERENCE: [f32; 2] = [3.0, 1.0];
 
-/// What is denoised.
+/// Input of the denoiser: pictures of equal size.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
     /// Estimates.
     pub mean: &'a Picture,
     /// Standard errors ([`super::bound::spread`]).
     pub spread: &'a Picture,
-    /// Reflectances, or nothing.
+    /// Reflectances, if known.
     pub albedo: Option<&'a Picture>,
-    /// Unit normals, or nothing.
+    /// Unit normals, if known.
     pub normal: Option<&'a Picture>,
 }
 
-/// The denoised picture.
+/// Denoises a picture in two passes.
 pub fn denoise(input: &Input<'_>) -> Picture {
-    let first = pass(input, input.mean, APART[0]);
-    pass(input, &first, APART[1])
+    let first = pass(input, input.mean, MAX_DIFFERENCE[0]);
+    pass(input, &first, MAX_DIFFERENCE[1])
 }
 
-/// Means of the estimates over neighbours whose `guide` differs by less than so many standard errors.
-fn pass(input: &Input<'_>, guide: &Picture, apart: f32) -> Picture {
+/// Means of the estimates over neighbours whose `guide` differs by less than `max_difference` standard errors.
+fn pass(input: &Input<'_>, guide: &Picture, max_difference: f32) -> Picture {
     let Input { mean, spread, albedo, normal } = *input;
     let size = mean.size();
     let of_pixel = |index: usize| {
@@ -48,7 +49,7 @@ fn pass(input: &Input<'_>, guide: &Picture, apart: f32) -> Picture {
             if !values.iter().all(|value| value.is_finite()) {
                 continue;
             }
-            let light = distance2(guide[index], guide[other]) / variance(spread[index], spread[other], apart);
+            let light = distance2(guide[index], guide[other]) / variance(spread[index], spread[other], max_difference);
             if light > 1.0 {
                 continue;
             }
@@ -57,8 +58,9 @@ fn pass(input: &Input<'_>, guide: &Picture, apart: f32) -> Picture {
             let feature = |plane: Option<&Picture>, scale: f32| {
                 plane.map_or(0.0, |plane| distance2(plane[index], plane[other]) / (scale * scale))
             };
-            let exponent = (dx * dx + dy * dy) / (NEAR * NEAR) + feature(albedo, ALBEDO) + feature(normal, NORMAL);
-            // A weight that falls to zero where estimates are apart (Epanechnikov's).
+            let exponent =
+                (dx * dx + dy * dy) / (DISTANCE * DISTANCE) + feature(albedo, ALBEDO) + feature(normal, NORMAL);
+            // Epanechnikov's kernel in the difference of the estimates.
             let weight = (1.0 - light) * (-0.5 * exponent).exp();
             sum = std::array::from_fn(|c| sum[c] + weight * values[c]);
             total += weight;
@@ -72,10 +74,10 @@ fn distance2(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|c| (a[c] - b[c]).powi(2)).sum()
 }
 
-/// Variance of the difference of two estimates, all channels together, times `apart` squared.
-fn variance(a: [f32; 3], b: [f32; 3], apart: f32) -> f32 {
+/// Variance of the difference of two estimates, summed over channels, times `factor` squared.
+fn variance(a: [f32; 3], b: [f32; 3], factor: f32) -> f32 {
     let sum: f32 = (0..3).map(|c| a[c] * a[c] + b[c] * b[c]).sum();
-    (apart * apart * sum).max(f32::MIN_POSITIVE)
+    (factor * factor * sum).max(f32::MIN_POSITIVE)
 }
 
 #[cfg(test)]
@@ -84,10 +86,10 @@ mod tests {
     use crate::film::Size;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// A step twice as bright on one side, with noise of a tenth: the noise goes, the step stays. Averages over 289
-    /// pixels with weights that keep some 60 of them leave a seventh of the noise.
+    /// A step from 1 to 2 with noise of 0.1: the noise is removed, the step stays. Weights over 289 pixels with an
+    /// effective number of some 60 leave a seventh of the noise.
     #[test]
-    fn noise_goes_and_edges_stay() {
+    fn noise_is_removed_and_edges_stay() {
         let size = Size { width: 64, height: 48 };
         let truth = |index: usize| if index % size.width < 32 { 1.0 } else { 2.0f32 };
         let noise = |index: usize| {
@@ -103,10 +105,10 @@ mod tests {
         };
         let (before, after) = (error(&mean), error(&denoise(&input)));
         assert!(after < 0.3 * before, "{before} to {after}");
-        // Equal light on two surfaces of another colour stays apart.
+        // Light that noise cannot distinguish is separated by the albedo.
         let albedo = Picture::from_fn(size, |index| [0.4 * truth(index); 3]);
-        let unsure = Picture::filled(size, [10.0; 3]);
-        let guided = Input { albedo: Some(&albedo), spread: &unsure, ..input };
+        let uncertain = Picture::filled(size, [10.0; 3]);
+        let guided = Input { albedo: Some(&albedo), spread: &uncertain, ..input };
         let blurred = Input { albedo: None, ..guided };
         let (guided, blurred) = (error(&denoise(&guided)), error(&denoise(&blurred)));
         assert!(guided < 0.3 * before && blurred > before, "{guided}, {blurred}");

@@ -1,41 +1,41 @@
-//! Windows of pixels around a pixel.
+//! Square windows around pixels, and means over them.
 
 use crate::film::Size;
 use rayon::prelude::*;
 
-/// Indices of the pixels within `reach` of pixel `index` in x and y, itself among them, row by row; the picture's edge
-/// cuts windows off.
+/// Indices of the pixels within `reach` of pixel `index` in x and y, the pixel included, row by row. The border cuts
+/// windows off.
 pub fn window(size: Size, index: usize, reach: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (index % size.width, index / size.width);
     let around = move |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
     around(y, size.height).flat_map(move |y| around(x, size.width).map(move |x| y * size.width + x))
 }
 
-/// Means over square windows of those pixels that count; edges cut windows off.
+/// Means over the pixels that count in square windows. The border cuts windows off.
 pub struct Windows<'a> {
     size: Size,
     reach: usize,
     counts: &'a [bool],
-    /// Pixels that count in the window about each.
+    /// Number of pixels that count in the window of each pixel.
     number: Vec<[f32; 1]>,
 }
 
 impl<'a> Windows<'a> {
-    /// Windows of so many pixels to each side; `counts` has the pixels row by row.
+    /// Windows of `reach` pixels to each side. `counts` says which pixels count, row by row.
     pub fn new(size: Size, reach: usize, counts: &'a [bool]) -> Windows<'a> {
         let windows = Windows { size, reach, counts, number: Vec::new() };
         let number = windows.sums(|i| [f32::from(u8::from(counts[i]))]);
         Windows { number, ..windows }
     }
 
-    /// The mean about each pixel; zero where none counts.
+    /// The mean over the window of each pixel; zero if no pixel of it counts.
     pub fn means<const N: usize>(&self, values: &[[f32; N]]) -> Vec<[f32; N]> {
         let mut sums = self.sums(|i| if self.counts[i] { values[i] } else { [0.0; N] });
         sums.par_iter_mut().zip(&self.number).for_each(|(sum, [number])| *sum = sum.map(|sum| sum / number.max(1.0)));
         sums
     }
 
-    /// Sums over windows: differences of running sums, along rows and then down columns.
+    /// Sums over windows, by differences of running sums along rows and then columns.
     fn sums<const N: usize>(&self, value: impl Fn(usize) -> [f32; N] + Sync) -> Vec<[f32; N]> {
         let (width, height) = (self.size.width, self.size.height);
         let mut rows = vec![[0.0; N]; width * height];
@@ -75,16 +75,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn means_are_those_of_windows_one_by_one() {
+    fn means_equal_those_of_each_window_computed_alone() {
         for (width, height, reach) in [(9, 7, 2), (1, 5, 3), (6, 1, 1), (4, 4, 9)] {
             let size = Size { width, height };
             let counts: Vec<bool> = (0..size.pixels()).map(|i| i % 5 != 3).collect();
             let values: Vec<[f32; 2]> = (0..size.pixels()).map(|i| [(i * i % 17) as f32, -(i as f32)]).collect();
             let means = Windows::new(size, reach, &counts).means(&values);
             for (index, mean) in means.iter().enumerate() {
-                let there: Vec<usize> = window(size, index, reach).filter(|i| counts[*i]).collect();
+                let counted: Vec<usize> = window(size, index, reach).filter(|i| counts[*i]).collect();
                 for c in 0..2 {
-                    let expected = there.iter().map(|i| values[*i][c]).sum::<f32>() / there.len().max(1) as f32;
+                    let expected = counted.iter().map(|i| values[*i][c]).sum::<f32>() / counted.len().max(1) as f32;
                     assert!((mean[c] - expected).abs() < 1e-5, "{mean:?} {expected}");
                 }
             }

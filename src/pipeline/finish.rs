@@ -56,7 +56,7 @@ fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)
         error
     })?;
     let combiner = Combiner::new(&model, &runtime)?;
-    let facts = combiner.facts();
+    let facts = combiner.metadata();
     if let Some(levels) = levels.filter(|levels| *levels != facts.levels) {
         let cause = format!("the network {name} combines {} levels, not {levels}", facts.levels);
         let error = Error::usage(cause);

@@ -1,7 +1,7 @@
-//! Agreement with the training code (`scripts/lab/train/fixture.py` writes the numbers), and what network files may say.
+//! Agreement with the training code (`scripts/lab/train/fixture.py` writes the numbers), and checks of network files.
 
-use super::map::{Map, Rect};
-use super::model::{Contract, Facts};
+use super::model::{Metadata, WeightForm};
+use super::output::{NetworkOutput, Rect};
 use super::*;
 use std::collections::HashMap;
 
@@ -46,7 +46,7 @@ fn input_and_equation_equal_the_training_codes() {
 
     let tile = Tile { core: rect, input: rect };
     let data = reader.floats((levels - 1) * (dimensions + affinity::SCALARS) * n);
-    let features = Weights::Features(Map { rect, window: 15, data });
+    let features = Weights::Features(NetworkOutput { rect, window: 15, data });
     let got = combine_tile(&stack, &stack.valid(), &tile, &features);
     assert!(distance(&got, &reader.rgb(size), bright) < 1e-5);
 
@@ -59,24 +59,24 @@ fn input_and_equation_equal_the_training_codes() {
     let part = LevelStack { size, levels: stack.levels.iter().map(cut).collect(), ..LevelStack::default() };
     let n = size.pixels();
     let data = reader.floats((levels - 1) * side * side * n);
-    let weights = Weights::Kernel(Map { rect: corner, window: side, data });
+    let weights = Weights::Kernel(NetworkOutput { rect: corner, window: side, data });
     let got = combine_tile(&part, &part.valid(), &Tile { core: corner, input: corner }, &weights);
     assert!(distance(&got, &reader.rgb(size), bright) < 1e-5);
     assert!(reader.0.is_empty());
 }
 
 #[test]
-fn the_shipped_network_is_as_it_says() {
+fn the_shipped_network_has_its_metadata() {
     let combiner = combiner();
-    let facts = combiner.facts();
-    assert_eq!((facts.levels, facts.window), (5, 15));
-    assert_eq!(tensor::channels(facts.levels), 27);
-    assert!(matches!(facts.contract, Contract::Features { .. }));
+    let metadata = combiner.metadata();
+    assert_eq!((metadata.levels, metadata.window), (5, 15));
+    assert_eq!(tensor::channels(metadata.levels), 27);
+    assert!(matches!(metadata.form, WeightForm::Features { .. }));
     assert!(Model::compact().bytes.len() < 2 << 20);
 }
 
 #[test]
-fn metadata_that_cannot_be_are_refused() {
+fn wrong_metadata_are_refused() {
     let good = [
         ("kind", "features"),
         ("levels", "5"),
@@ -89,7 +89,7 @@ fn metadata_that_cannot_be_are_refused() {
     let read = |change: &[(&'static str, &'static str)]| {
         let mut map: HashMap<&str, &str> = good.into_iter().collect();
         map.extend(change.iter().copied());
-        Facts::read(|key| map.get(key).filter(|value| !value.is_empty()).map(ToString::to_string))
+        Metadata::read(|key| map.get(key).filter(|value| !value.is_empty()).map(ToString::to_string))
     };
     assert_eq!(read(&[]).unwrap().output_channels(), 28);
     assert_eq!(read(&[("kind", "weights"), ("window", "3")]).unwrap().output_channels(), 36);

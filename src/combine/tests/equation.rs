@@ -1,6 +1,6 @@
 //! Equation (6) with arbitrary positive weights.
 
-use super::map::{Map, Rect};
+use super::output::{NetworkOutput, Rect};
 use super::*;
 
 fn whole(width: usize, height: usize) -> Rect {
@@ -14,8 +14,8 @@ fn random_weights(random: &mut Random, width: usize, height: usize, levels: usiz
     let features = random.fill(area * pairs * 6, -1.5, 1.5);
     let weights = random.fill(area * pairs * 25, -6.0, 3.0).into_iter().map(f32::exp).collect();
     [
-        Weights::Features(Map { rect, window: 7, data: features }),
-        Weights::Kernel(Map { rect, window: 5, data: weights }),
+        Weights::Features(NetworkOutput { rect, window: 7, data: features }),
+        Weights::Kernel(NetworkOutput { rect, window: 5, data: weights }),
     ]
 }
 

@@ -1,14 +1,13 @@
-//! What equation (6) promises of any picture: with positive weights its result is a mean of `y_i + z_c - z_i`, and lies
-//! among them.
+//! With positive weights the result of equation (6) is a mean of the terms `y_i + z_c - z_i`, and lies between them.
 
 use super::*;
 
 /// Pixels to each side of the shipped network's window.
 const REACH: usize = 7;
-/// What rounding may add to a mean of some hundreds of terms, in units of the largest number that is summed.
+/// Rounding error of a mean of some hundreds of terms, relative to the largest number that is summed.
 const ROUNDING: f32 = 1e-5;
 
-/// Least and largest term of a pixel's channel, and what rounding may add.
+/// Least and largest term of a pixel's channel, and the rounding error.
 fn hull(stack: &LevelStack, valid: &[bool], pixel: usize, c: usize) -> (f32, f32, f32) {
     let (x, y) = (pixel % stack.size.width, pixel / stack.size.width);
     let (mut least, mut most, mut largest) = (f32::INFINITY, f32::NEG_INFINITY, 0f32);
@@ -29,7 +28,7 @@ fn hull(stack: &LevelStack, valid: &[bool], pixel: usize, c: usize) -> (f32, f32
     (least, most, ROUNDING * largest)
 }
 
-/// Pixels whose result lies outside.
+/// Number of pixels whose result lies outside the range of their terms.
 fn outside(stack: &LevelStack, image: &Picture) -> usize {
     let valid = stack.valid();
     let beyond = |pixel: usize, c: usize| {
@@ -39,7 +38,7 @@ fn outside(stack: &LevelStack, image: &Picture) -> usize {
     (0..image.len()).filter(|&pixel| valid[pixel] && (0..3).any(|c| beyond(pixel, c))).count()
 }
 
-/// A stack whose levels are `of` a pixel's index, times what noise makes of one.
+/// A stack whose levels are a function `of` the pixel's index, times noise with mean 1.
 fn picture(width: usize, height: usize, noise: f32, of: impl Fn(usize) -> f32) -> LevelStack {
     let mut stack = Random(12).stack(width, height, 5);
     let mut random = Random(13);
@@ -51,11 +50,11 @@ fn picture(width: usize, height: usize, noise: f32, of: impl Fn(usize) -> f32) -
     stack
 }
 
-/// Constant and black pictures, half a picture and single pixels a million times as bright as the rest, and values that
-/// are not finite, in pictures that are one pixel, a row, a column, or more. A result that leaves the hull by a
-/// thousandth is seen.
+/// Constant and black pictures, pictures with a half or single pixels a million times as bright as the rest, and values
+/// that are not finite, for pictures of one pixel, a row, a column, or more. The test detects a result that leaves the
+/// range by a thousandth.
 #[test]
-fn results_lie_among_their_terms_in_any_picture() {
+fn results_lie_between_their_terms() {
     let mut combiner = combiner();
     for (width, height) in [(1, 1), (1, 40), (40, 1), (2, 3), (33, 26)] {
         let half = |index: usize| if 2 * (index % width) < width { 1e6 } else { 1.0 };

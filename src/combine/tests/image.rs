@@ -1,6 +1,6 @@
 //! The shipped network on whole images: sizes, tiles, threads, units, bad input.
 
-use super::map::Rect;
+use super::output::Rect;
 use super::*;
 
 #[test]
@@ -29,9 +29,9 @@ fn tiles_leave_no_seams() {
 }
 
 #[test]
-fn the_network_sees_no_further_than_its_halo_but_does_see_that_far() {
+fn the_receptive_radius_of_the_network_is_its_halo() {
     let (stack, mut combiner) = (Random(6).stack(212, 152, 5), combiner());
-    let halo = combiner.facts().halo;
+    let halo = combiner.metadata().halo;
     let normalisation = Normalisation::of(&stack);
     let mut output = |rect: Rect| match combiner.network.run(&tensor::fill(&stack, &normalisation, rect), rect) {
         Ok(Weights::Features(map)) => map,
@@ -51,16 +51,16 @@ fn the_network_sees_no_further_than_its_halo_but_does_see_that_far() {
 
 #[test]
 fn cores_cover_the_image_once_and_inputs_keep_the_stride() {
-    let facts = combiner().facts().clone();
+    let metadata = combiner().metadata().clone();
     for (width, height, pixels) in [(1, 1, 1), (5, 3, 1), (211, 150, 2500), (1280, 720, 1 << 18), (3840, 2160, 1 << 18)]
     {
         let mut count = vec![0u8; width * height];
-        for tile in tile::tiles(Size { width, height }, &facts, pixels) {
+        for tile in tile::tiles(Size { width, height }, &metadata, pixels) {
             for y in tile.core.y0..tile.core.y1 {
                 count[y * width + tile.core.x0..y * width + tile.core.x1].iter_mut().for_each(|n| *n += 1);
             }
             for edge in [tile.input.x0, tile.input.y0, tile.input.x1, tile.input.y1] {
-                assert_eq!(edge % facts.stride, 0);
+                assert_eq!(edge % metadata.stride, 0);
             }
         }
         assert!(count.iter().all(|n| *n == 1), "{width} x {height}");
@@ -68,7 +68,7 @@ fn cores_cover_the_image_once_and_inputs_keep_the_stride() {
 }
 
 #[test]
-fn the_same_bits_with_one_two_and_three_threads() {
+fn results_do_not_depend_on_the_number_of_threads() {
     let stack = Random(7).stack(150, 90, 5);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -1,4 +1,4 @@
-//! The combiner's contract: invariants of equation (6), agreement with the training code, tiles, threads, bad input.
+//! Tests of the combiner: invariants of equation (6), agreement with the training code, tiles, threads, bad input.
 
 mod contract;
 mod equation;

@@ -11,30 +11,30 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// x1 - x0.
+    /// Pixels per row.
     pub fn width(&self) -> usize {
         self.x1 - self.x0
     }
 
-    /// y1 - y0.
+    /// Number of rows.
     pub fn height(&self) -> usize {
         self.y1 - self.y0
     }
 }
 
-/// A network output, `[channel][y][x]`, over the rectangle that the network saw.
+/// Output of the network over the rectangle of its input.
 #[derive(Debug)]
-pub struct Map {
-    /// The rectangle.
+pub struct NetworkOutput {
+    /// The rectangle of pixels.
     pub rect: Rect,
-    /// Window side of equation (6).
+    /// Side of the window of equation (6).
     pub window: usize,
-    /// All channels.
+    /// Values, `[channel][y][x]`.
     pub data: Vec<f32>,
 }
 
-impl Map {
-    /// Row `y` of the image in channel `channel`, from the rectangle's left edge on.
+impl NetworkOutput {
+    /// Row `y` of the image in a channel, from the left edge of the rectangle.
     pub fn row(&self, channel: usize, y: usize) -> &[f32] {
         let width = self.rect.width();
         let start = (channel * self.rect.height() + y - self.rect.y0) * width;
