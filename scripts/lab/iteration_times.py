@@ -9,7 +9,7 @@ from .record import ROOT
 def history(program, scene, options, iterations, file):
     """Renders a scene without its finish to a file; returns the history of the render."""
     words = ["render", ROOT / "scenes" / f"{scene}.glb", "-o", file, *options]
-    line = command(*words, program=program, iterations=iterations, no_combine=True, progress="none")
+    line = command(*words, program=program, iterations=iterations, no_finish=True, progress="none")
     subprocess.run(line, check=True, stderr=subprocess.DEVNULL)
     return read("info", file)["history"]
 

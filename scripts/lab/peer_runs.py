@@ -70,7 +70,7 @@ class Peers:
         if not (folder / "guides.exr").exists():
             with create(folder) as draft:
                 words = ["render", self.scene, "-o", draft / "guides.exr"]
-                settings = {"method": "path", "no_combine": True, "iterations": GUIDE_ITERATIONS}
+                settings = {"method": "path", "no_finish": True, "iterations": GUIDE_ITERATIONS}
                 settings |= {"width": options.width, "layers": "albedo,normal", "progress": "none"}
                 run_timed(command(*words, **settings))
         layers = Layers(folder / "guides.exr")

@@ -88,7 +88,7 @@ def reference(scene):
         "iterations": [],
         "core_seconds": [],
     }
-    known["options"] = ["--method", *method(scene), "--levels", "1", "--no-combine", "--layers", "beauty"]
+    known["options"] = ["--method", *method(scene), "--levels", "1", "--no-finish", "--layers", "beauty"]
     with create(where) as draft:
         for half in (1, 2):
             file = draft / f"half{half}.exr"

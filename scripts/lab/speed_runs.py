@@ -48,7 +48,7 @@ class Program:
         self.key = digest(self.binary)
 
     def _render(self, scene, method, stop, seed, file):
-        """Renders with the options `method` and `stop`; returns the history."""
+        """Renders with the options `method` and `stop`; returns the history. --no-combine is the name that old programs know."""
         levels = None if options.levels == "default" else options.levels
         settings = {"seed": seed, "width": options.width, "threads": options.threads, "levels": levels}
         words = ["render", scene, "-o", file, *method, *stop]

@@ -59,7 +59,7 @@ def guided(scene, reference, view=()):
 
 def fixed(method):
     """The options of a method with one level and no finish."""
-    return f"--method {method} --levels 1 --no-combine"
+    return f"--method {method} --levels 1 --no-finish"
 
 
 def renders(scene, method):

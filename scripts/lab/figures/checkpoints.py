@@ -34,7 +34,7 @@ def saves(method):
     """The seconds of each checkpoint of a render."""
     size = {"width": options.width, "height": options.width * 9 // 16}
     settings = {"method": method, "iterations": options.saves, "checkpoint": STATE, "checkpoint_every": "0.001"}
-    settings |= {"layers": "beauty", "no_combine": True, "progress": "json"}
+    settings |= {"layers": "beauty", "no_finish": True, "progress": "json"}
     line = command("render", SCENE, "-o", OUT / "a.exr", **size, **settings)
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
     found, before = [], 0

@@ -76,7 +76,7 @@ def main():
             half = OUT / f"{scene}-reference-{seed}.exr"
             words = REFERENCES.get(scene, ["--method", "vcm", "--levels", "1"])
             if not (options.keep and half.exists()):
-                render(file, half, options.reference_seconds, seed, [*words, "--no-combine"])
+                render(file, half, options.reference_seconds, seed, [*words, "--no-finish"])
             halves.append(picture(half, "Noisy"))
         reference = (halves[0] + halves[1]) / 2
         # The variance of the mean is a quarter of the squared difference of the halves.
@@ -91,7 +91,7 @@ def main():
             for seed in range(options.seeds):
                 out = OUT / f"{scene}-{name.replace(', ', '-').replace(' ', '-')}.exr"
                 infos.append(
-                    render(file, out, options.seconds, seed, words if layer != "Noisy" else [*words, "--no-combine"])
+                    render(file, out, options.seconds, seed, words if layer != "Noisy" else [*words, "--no-finish"])
                 )
                 errors.append(relmse(picture(out, layer), reference))
             error = np.mean(errors, axis=0) - own

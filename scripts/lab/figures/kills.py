@@ -38,7 +38,7 @@ def render_command(method, file, *options):
         "photons": 2000 if method in WITH_PHOTONS else None,
     }
     words = ["render", SCENE, "-o", file, *options]
-    return command(*words, **settings, reproducible=True, no_combine=True, progress="none")
+    return command(*words, **settings, reproducible=True, no_finish=True, progress="none")
 
 
 def run(words):

@@ -26,7 +26,7 @@ def render(name, method, seconds, seed):
         "seed": seed,
     }
     words = ["render", ROOT / "scenes" / "godrays.glb", "-o", file]
-    line = command(*words, **settings, no_combine=True, progress="none")
+    line = command(*words, **settings, no_finish=True, progress="none")
     subprocess.run(line, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return file, read("info", file)
 

@@ -107,7 +107,7 @@ def threads(method):
 
 def load(triangles):
     """The core-seconds of a render of one pixel, most of which is loading."""
-    settings = {"iterations": 1, "width": 1, "height": 1, "method": "path", "threads": 1, "no_combine": True}
+    settings = {"iterations": 1, "width": 1, "height": 1, "method": "path", "threads": 1, "no_finish": True}
     line = command("render", scene(triangles) + ".glb", "-o", OUT / "a.exr", **settings)
     runs = [measure_process(line) for _ in range(given.rounds)]
     return min(run["core_seconds"] for run in runs)

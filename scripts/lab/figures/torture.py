@@ -126,7 +126,7 @@ def by_caustique(scene, seed):
     """Renders the .glb at `scene` by path tracing; returns the picture and the warnings."""
     with tempfile.TemporaryDirectory() as folder:
         picture = os.path.join(folder, "ours.exr")
-        settings = {"method": "path", "iterations": SAMPLES, "no_combine": True, "width": SIZE, "height": SIZE}
+        settings = {"method": "path", "iterations": SAMPLES, "no_finish": True, "width": SIZE, "height": SIZE}
         settings |= {"seed": seed, "layers": "beauty", "progress": "none"}
         line = command("render", scene, "-o", picture, program=program(), **settings)
         done = subprocess.run(line, capture_output=True, text=True, timeout=600, check=False)

@@ -115,7 +115,7 @@ def render(args, scene, out, **options):
     """Render by sppm without a finish; returns whether the program succeeded, and prints its error."""
     size = {"width": args.width, "height": args.height, "threads": args.threads or None}
     words = ["render", scene, "-o", out]
-    line = command(*words, program=args.caustique, method="sppm", **size, **options, no_combine=True, progress="none")
+    line = command(*words, program=args.caustique, method="sppm", **size, **options, no_finish=True, progress="none")
     done = subprocess.run(line, capture_output=True, text=True)
     if done.returncode != 0:
         print(f"{scene.name}: {done.stderr.strip()}", file=sys.stderr)
