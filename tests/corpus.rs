@@ -1,5 +1,5 @@
-//! What was kept of fuzzing (`tests/fuzz.sh`) is read again, each file by its own reader: none may panic, take long or
-//! take much memory. A folder of `tests/corpus` is called as its reader in `tests/support/readers.rs`.
+//! Reads the kept inputs of fuzzing (`tests/fuzz.sh`) again, each with its own reader: no reader may panic, take long
+//! or use much memory. A folder of `tests/corpus` has the name of its reader in `tests/support/readers.rs`.
 
 #[path = "support/mod.rs"]
 mod support;
@@ -12,32 +12,32 @@ use std::thread;
 use std::time::Duration;
 use support::readers::{READERS, Reader};
 
-/// What reading a file may take.
+/// Limits for reading a file.
 #[derive(Clone, Copy)]
 struct Bounds {
     time: Duration,
-    /// Resident memory on top of what was there (bytes).
+    /// Increase of resident memory (bytes).
     memory: u64,
 }
 
-/// Files are small: an image of them is none of a gigabyte. A slow machine has time enough.
+/// The files are small, so their images are far below a gigabyte. The time is enough for a slow machine.
 const BOUNDS: Bounds = Bounds { time: Duration::from_secs(20), memory: 256 << 20 };
 
-/// The memory of a process is measured: one file at a time.
+/// Memory is measured for the whole process, so one file is read at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// A line of `/proc/self/status` (bytes).
+/// The value of a line of `/proc/self/status` (bytes).
 fn memory(key: &str) -> u64 {
     let text = fs::read_to_string("/proc/self/status").expect("Linux tells");
     let line = text.lines().find_map(|line| line.strip_prefix(key)).expect("the line is there");
     line.split_whitespace().nth(1).and_then(|kib| kib.parse::<u64>().ok()).expect("a number") << 10
 }
 
-/// Reads a file; what is wrong with how that went.
+/// Reads a file and returns the limit that was exceeded, if any.
 fn fault(reader: Reader, path: &Path, bounds: Bounds) -> Option<String> {
     let bytes = fs::read(path).expect("it can be read");
     let folder = tempfile::tempdir().expect("a folder");
-    // Sets the peak to what is in use now.
+    // Resets the peak to the memory in use.
     fs::write("/proc/self/clear_refs", "5").expect("Linux lets a process");
     let before = memory("VmRSS");
     let (done, ended) = mpsc::channel();
@@ -56,7 +56,7 @@ fn fault(reader: Reader, path: &Path, bounds: Bounds) -> Option<String> {
     Some(format!("{}: {what}", path.display()))
 }
 
-/// The files that were kept of a reader.
+/// The kept inputs of a reader.
 fn kept(name: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name);
     let entries = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
@@ -77,7 +77,7 @@ fn what_was_kept_of_fuzzing_is_read_or_refused() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// The bounds find readers that panic, that do not end, and that take more memory than they should.
+/// The limits detect readers that panic, that do not end, and that use too much memory.
 #[test]
 fn planted_faults_are_found() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,5 +1,5 @@
-//! Files that are made from tables of the program, compared with them. `CAUSTIQUE_WRITE=1 cargo test --release --test
-//! generated` writes them anew.
+//! Compares generated files with the tables of the program that they are made from. `CAUSTIQUE_WRITE=1 cargo test
+//! --release --test generated` writes them.
 
 use caustique::estimator::QUARTERS;
 use caustique::film::cryptomatte::RANKS;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
-/// Compares a file with what it is to hold, or writes it.
+/// Compares a file with its expected content, or writes it.
 fn compare(path: &str, expected: &str) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     if std::env::var_os("CAUSTIQUE_WRITE").is_some() {
@@ -33,7 +33,7 @@ fn compare_part(path: &str, name: &str, expected: &str) {
     compare(path, &format!("{before}{begin}{expected}{end}{after}"));
 }
 
-/// Names of the layers of a kind, `NAME` standing for the name of a group.
+/// Names of the layers of a kind, with `NAME` for the name of a light group.
 fn names(kind: &LayerKind, beginning: &str) -> Vec<String> {
     let numbers: Vec<String> = match kind.suffix {
         Suffix::None => vec![String::new()],
@@ -45,17 +45,17 @@ fn names(kind: &LayerKind, beginning: &str) -> Vec<String> {
     numbers.iter().map(|number| format!("{beginning}{number}")).collect()
 }
 
-/// What Blender's add-on and the USD converter have to know of layers.
+/// The properties of layers that Blender's add-on and the USD converter use.
 fn layers() -> Value {
     let of_group = |kind: &&LayerKind| kind.suffix == Suffix::Group;
     let part =
         |name: String| json!({"name": &name, "components": "RGB", "layer": &name, "switch": "parts", "always": false});
     let pass = |kind: &LayerKind| {
         let Some(switch) = kind.switch.filter(|_| kind.suffix != Suffix::Group) else { return vec![] };
-        // Not every scene has all parts, and not every method all levels.
+        // Not every scene has all finished parts, and not every method all levels.
         let always = kind.suffix != Suffix::Level && kind.finished().is_none();
         let entry = |name: String| {
-            // All ranks come together.
+            // All ranks of a cryptomatte are selected together.
             let layer = if kind.suffix == Suffix::Ranks { kind.name } else { &name };
             let pass = kind.blender.unwrap_or(&name);
             json!({"name": pass, "components": kind.components, "layer": layer, "switch": switch, "always": always})

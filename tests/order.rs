@@ -1,4 +1,4 @@
-//! The order of modules in `src/lib.rs`, and habits that no file may leave.
+//! The order of modules in `src/lib.rs`, and other rules for all source files.
 
 use caustique::render::Method;
 use std::collections::HashMap;
@@ -67,7 +67,7 @@ fn used(text: &str) -> Vec<String> {
     found.into_iter().map(word).filter(|name| !name.is_empty()).collect()
 }
 
-/// What breaks the order: module `own` uses one that is not above it.
+/// Violations of the order: the modules that module `own` uses although they are not above it.
 fn broken(order: &HashMap<&str, usize>, own: &str, text: &str) -> Vec<String> {
     let Some(&place) = order.get(own) else { return vec![format!("module {own} is not in src/lib.rs")] };
     let wrong = |name: &String| name != "error" && order.get(name.as_str()).is_some_and(|&other| other > place);
@@ -84,7 +84,7 @@ fn modules_use_only_modules_above_them() {
     for file in files("src") {
         let inside = file.strip_prefix(root.join("src")).expect("it is below src");
         let own = inside.components().next().expect("it has a name").as_os_str().to_string_lossy().replace(".rs", "");
-        // The program uses the library from outside: all of it is above.
+        // The program uses the library from outside, so all modules are above it.
         if ["lib", "main", "cli"].contains(&own.as_str()) {
             continue;
         }
@@ -107,7 +107,7 @@ fn the_order_test_finds_planted_faults() {
     assert_eq!(broken(&order, "math", "use embree_crate::scene;"), [] as [&str; 0]);
 }
 
-/// The folders that hold the modules of one parent: `src`, the sources of each crate in `ffi`, and all folders below.
+/// The folders with the modules of one parent: `src`, the sources of each crate in `ffi`, and all their subfolders.
 fn folders(root: &Path) -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> =
         files("src").into_iter().chain(files("ffi")).filter_map(|file| parent(&file)).collect();
@@ -122,8 +122,8 @@ fn parent(file: &Path) -> Option<PathBuf> {
     file.parent().map(Path::to_path_buf)
 }
 
-/// The modules in a folder, each with its code. A folder inside counts as one module. The code of the parent itself
-/// (`mod.rs`, `lib.rs`, `main.rs`) is left out: it may name all of its modules.
+/// The modules in a folder with their code. A subfolder counts as one module. The code of the parent itself (`mod.rs`,
+/// `lib.rs`, `main.rs`) is left out, because it may use all of its modules.
 fn modules(folder: &Path, path: &str) -> Vec<(String, String)> {
     let mut modules: HashMap<String, String> = HashMap::new();
     for file in files(&folder.to_string_lossy()) {
@@ -143,8 +143,8 @@ fn modules(folder: &Path, path: &str) -> Vec<(String, String)> {
     modules
 }
 
-/// Code with every path into the module `path` (empty for the crate) written as `parent::...`, and no other path that
-/// begins with `crate` or `super`. The code lies `depth` modules below.
+/// The code with every path into the module `path` (empty for the crate) written as `parent::...`, and without other
+/// paths that begin with `crate` or `super`. The code is `depth` modules below.
 fn from_parent(code: &str, path: &str, depth: usize) -> String {
     let code = if path.is_empty() {
         code.replace("crate::", "parent::")
@@ -166,7 +166,7 @@ fn from_parent(code: &str, path: &str, depth: usize) -> String {
     written + rest
 }
 
-/// Names that a module gives to others of its parent.
+/// Names that a module exports to other modules of its parent.
 fn given(text: &str) -> Vec<String> {
     let kinds = ["fn ", "const fn ", "struct ", "enum ", "trait ", "type ", "const ", "static "];
     let name = |line: &str| {
@@ -195,7 +195,7 @@ fn circle(modules: &[(String, String)]) -> Vec<String> {
     };
     let edges: Vec<(&str, Vec<&str>)> = modules.iter().map(|module| (module.0.as_str(), uses(module))).collect();
     let mut left: Vec<&str> = edges.iter().map(|(own, _)| *own).collect();
-    // A module that uses none of those left is in no circle, and neither is one that none of them uses.
+    // A module that uses no remaining module is in no circle, and neither is one that no remaining module uses.
     loop {
         let before = left.len();
         let of = |own: &str| edges.iter().find(|(name, _)| *name == own).map_or(&[][..], |(_, others)| &others[..]);
@@ -241,7 +241,7 @@ fn the_circle_test_finds_planted_faults() {
     assert_eq!(circle(right), [] as [&str; 0]);
     assert_eq!(circle(["use super::c;\npub struct A;", right[1], right[2]]), ["a", "b", "c"]);
     assert_eq!(circle(["use super::b;\npub struct A;", right[1], ""]), ["a", "b"]);
-    // Modules of the same names elsewhere are others.
+    // Modules with the same names in other folders are other modules.
     assert_eq!(
         circle(["use crate::boundary_kernel::b;\nuse super::super::b;\npub struct A;", right[1], ""]),
         [] as [&str; 0]
@@ -256,13 +256,14 @@ fn paths_of_nested_files_are_resolved() {
     assert_eq!(from_parent("use crate::x;", "", 1), "use parent::x;");
 }
 
-/// The part of a file that ships: what stands before its tests, without comments.
+/// The part of a file that ships: the code before its tests, without comments.
 fn shipped(text: &str) -> String {
     let body = text.split("#[cfg(test)]\nmod ").next().unwrap_or("");
     body.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
 }
 
-/// Unfinished work and panics that no shipped line may hold; printing that panics when nobody listens is one.
+/// Unfinished work, and calls that may panic, which shipped lines must not contain. Printing panics if the output is
+/// closed.
 fn forbidden(text: &str) -> Vec<&'static str> {
     let words = ["todo!(", "unimplemented!(", ".unwrap()", ".unwrap_err()", "dbg!(", "println!(", "eprint!("];
     let code = shipped(text);
@@ -274,7 +275,7 @@ fn nothing_is_left_undone_or_unwrapped() {
     let mut faults = Vec::new();
     for file in files("src").into_iter().chain(files("ffi")) {
         let path = file.to_string_lossy().replace('\\', "/");
-        // Tests, and programs that show how the binding is used, may end where they stand.
+        // Tests and examples may panic.
         if ["/tests/", "/examples/", "/tests.rs"].iter().any(|place| path.contains(place)) {
             continue;
         }
@@ -295,7 +296,8 @@ fn the_scan_finds_planted_faults() {
     );
 }
 
-/// Files that name methods: the table of methods and their passes, what auto chooses from, and defaults of comparisons.
+/// Files that may name methods: the table of methods and their passes, the candidates of auto, and defaults of
+/// comparisons.
 const NAMES_METHODS: [&str; 8] = [
     "src/render/settings/method.rs",
     "src/render/pass/choice.rs",
@@ -320,7 +322,8 @@ fn named_methods(text: &str) -> Vec<&'static str> {
     found
 }
 
-/// A method is its pass and one row of a table: other files ask the row, so that a new method does not touch them.
+/// Only the table of methods names single methods, so that a new method is its pass and one row. Other files ask the
+/// row.
 #[test]
 fn only_the_table_and_choices_name_methods() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -51,10 +51,10 @@ fn is_white(what: &str, scene: &Scene, methods: &[Method]) {
         println!("{what}, {method:?}: {mean:.5} +- {error:.5}");
         let passes = |expected: f64| (mean - expected).abs() < critical * error + 2e-3;
         assert!(passes(1.0), "{what}, {method:?}: {mean} +- {error}");
-        let told = if method == Method::Sppm { 0.12 } else { 0.05 };
+        let detects = if method == Method::Sppm { 0.12 } else { 0.05 };
         assert!(
-            !passes(1.0 - told) && !passes(1.0 + told),
-            "{what}, {method:?}: cannot tell {told} ({mean} +- {error})"
+            !passes(1.0 - detects) && !passes(1.0 + detects),
+            "{what}, {method:?}: cannot tell {detects} ({mean} +- {error})"
         );
     }
 }
@@ -191,8 +191,8 @@ fn panes_too_thin_to_tell_are_named() {
         add(&mut description, "ground", square_of(-4000.0, 4000.0), matte(0.5, 0.0));
         description.cameras.push(look_at(DVec3::new(2997.0, 0.2, 0.3), DVec3::new(3000.0, 0.0, 0.0), 30.0));
         let scene = build(description);
-        let told = scene.warnings.iter().any(|warning| warning.contains("\"pane\"") && warning.contains("thinner"));
-        assert_eq!(told, named, "{thickness}: {:?}", scene.warnings);
+        let reported = scene.warnings.iter().any(|warning| warning.contains("\"pane\"") && warning.contains("thinner"));
+        assert_eq!(reported, named, "{thickness}: {:?}", scene.warnings);
     }
 }
 

@@ -100,25 +100,25 @@ fn nothing_white_is_seen_under_a_white_sky() {
         let scene = build(description);
         for method in METHODS {
             let (mean, error) = mean_and_error(&means(&scene, method));
-            let (mut bias, mut told): (f64, f64) = if by_photons(method) { (0.03, 0.2) } else { (5e-3, 0.05) };
+            let (mut bias, mut detects): (f64, f64) = if by_photons(method) { (0.03, 0.2) } else { (5e-3, 0.05) };
             match (what, method) {
                 ("brushed metal", _) => {
                     bias += 0.015;
-                    told += 0.05;
+                    detects += 0.05;
                 }
-                ("frosted glass" | "frosted film", _) if by_photons(method) => told = 0.9,
+                ("frosted glass" | "frosted film", _) if by_photons(method) => detects = 0.9,
                 _ => {}
             }
             if method == Method::Bpm {
-                told = told.max(0.4);
+                detects = detects.max(0.4);
             }
             println!("{what}, {method:?}: {mean:.5} +- {error:.5}");
             let passes = |expected: f64| (mean - expected).abs() < critical * error + bias;
             if !passes(1.0) {
                 faults.push(format!("{what}, {method:?}: {mean} +- {error}"));
             }
-            if passes(1.0 - told) || passes(1.0 + told) {
-                faults.push(format!("{what}, {method:?}: cannot tell {told} ({mean} +- {error})"));
+            if passes(1.0 - detects) || passes(1.0 + detects) {
+                faults.push(format!("{what}, {method:?}: cannot tell {detects} ({mean} +- {error})"));
             }
         }
     }
@@ -155,9 +155,9 @@ fn steep_normal_maps_look_the_same_by_all_methods() {
     let (_, expected, own) = found[0];
     let critical = t_critical(sidak(ERROR_RATE, methods.len() - 1), 1, SEEDS as f64 - 1.0);
     for &(method, mean, error) in &found[1..] {
-        let (bias, told) = if matches!(method, Method::Bdpt | Method::Vcm) { (2e-3, 0.05) } else { (0.02, 0.2) };
+        let (bias, detects) = if matches!(method, Method::Bdpt | Method::Vcm) { (2e-3, 0.05) } else { (0.02, 0.2) };
         let passes = |expected: f64| (mean - expected).abs() < critical * error.hypot(own) + bias * expected;
         assert!(passes(expected), "{method:?}: {mean} +- {error}, {expected}");
-        assert!(!passes((1.0 - told) * expected), "{method:?}: cannot tell {told}");
+        assert!(!passes((1.0 - detects) * expected), "{method:?}: cannot tell {detects}");
     }
 }

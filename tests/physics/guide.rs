@@ -362,9 +362,9 @@ fn effects_are_weighed() {
     };
     let all = light(&Effect::ALL);
     for effect in [Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Sds] {
-        let (told, found) = (energy(effect), light(&[effect]) / all);
-        println!("{effect:?}: {told:.4} told, {found:.4} found");
-        assert!((told - found).abs() < 0.25 * found + 0.002, "{effect:?}: {told} told, {found} found");
+        let (estimated, found) = (energy(effect), light(&[effect]) / all);
+        println!("{effect:?}: {estimated:.4} estimated, {found:.4} found");
+        assert!((estimated - found).abs() < 0.25 * found + 0.002, "{effect:?}: {estimated} estimated, {found} found");
     }
 }
 
@@ -465,16 +465,16 @@ fn properties_of_the_scene_are_weighed() {
         let pixels = whole.iter().zip(&without);
         let floor = floor::relative_to_mean(whole.iter().copied());
         let found = pixels.map(|(a, b)| (a - b).powi(2) / (a * a + floor)).sum::<f64>() / whole.len() as f64;
-        let told = weight(&weights, effect).expect("it is weighed");
-        println!("{told:?}, {:.4} found", found.sqrt());
-        let error = told.error_if_off.expect("it stands out");
-        assert!((error / found.sqrt() - 1.0).abs() < 0.2, "{effect:?}: {error} told, {} found", found.sqrt());
+        let estimated = weight(&weights, effect).expect("it is weighed");
+        println!("{estimated:?}, {:.4} found", found.sqrt());
+        let error = estimated.error_if_off.expect("it stands out");
+        assert!((error / found.sqrt() - 1.0).abs() < 0.2, "{effect:?}: {error} estimated, {} found", found.sqrt());
         let share = 1.0 - without.iter().sum::<f64>() / whole.iter().sum::<f64>();
-        match told.energy {
-            Some(energy) => assert!((energy / share - 1.0).abs() < 0.15, "{energy} told, {share} found"),
+        match estimated.energy {
+            Some(energy) => assert!((energy / share - 1.0).abs() < 0.15, "{energy} estimated, {share} found"),
             None => assert_eq!(effect, Effect::Textures),
         }
-        assert!(told.saved.is_some_and(f64::is_finite));
+        assert!(estimated.saved.is_some_and(f64::is_finite));
     }
     let lens = weight(&weights, Effect::DepthOfField).expect("it is weighed");
     assert!(lens.error_if_off.is_none_or(|error| error < 0.02) && lens.energy.is_none(), "{lens:?}");

@@ -100,8 +100,8 @@ fn photons_are_forecast() {
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     for method in [Method::Sppm, Method::Pm] {
         let settings = Settings { method, iterations: Some(1), ..settings(20_000, 3) };
-        let told = photons_per_path(&scene, &camera, &settings);
-        assert!((told - 9.0).abs() < 4.0 * 9.5 / 2048f64.sqrt(), "{told}");
+        let forecast = photons_per_path(&scene, &camera, &settings);
+        assert!((forecast - 9.0).abs() < 4.0 * 9.5 / 2048f64.sqrt(), "{forecast}");
         let rendered = picture(&scene, &settings);
         let left = rendered.stats.photons as f64 / rendered.stats.light_paths as f64;
         assert!((left - 9.0).abs() < 4.0 * 9.5 / 20_000f64.sqrt(), "{left}");

@@ -1,16 +1,16 @@
-//! Smaller pictures compared tile by tile and channel by channel.
+//! Comparison of small pictures tile by tile and channel by channel.
 
 use super::stats::{ERROR_RATE, mean_and_error, t_critical};
 use caustique::render::{Method, Rendered};
 
-/// Pixels a side.
+/// Side of the picture (pixels).
 pub const SIZE: u32 = 16;
-/// Pixels a side of a tile.
+/// Side of a tile (pixels).
 pub const TILE: u32 = 8;
-/// Tiles of a picture.
+/// Number of tiles of a picture.
 pub const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
 
-/// Tile means of every channel.
+/// Means of every channel of every tile.
 pub fn tiles(rendered: &Rendered) -> Vec<f64> {
     let own = rendered.settings.levels.picture_level();
     let mut sums = vec![0.0; 3 * TILES];
@@ -23,7 +23,7 @@ pub fn tiles(rendered: &Rendered) -> Vec<f64> {
     sums
 }
 
-/// Tile means of every channel by seed, printed with their errors.
+/// Means of every channel of every tile, one list per seed, printed with their errors.
 pub fn seeds(method: Method, seeds: u64, render: impl Fn(u64) -> Rendered) -> Vec<Vec<f64>> {
     let images: Vec<Vec<f64>> = (0..seeds).map(|seed| tiles(&render(seed))).collect();
     let (means, relative): (Vec<f64>, Vec<f64>) = (0..3 * TILES)
@@ -36,12 +36,12 @@ pub fn seeds(method: Method, seeds: u64, render: impl Fn(u64) -> Rendered) -> Ve
     images
 }
 
-/// Mean and its standard error over seeds of one tile's channel.
+/// Mean and standard error over seeds of one channel of one tile.
 fn of(images: &[Vec<f64>], at: usize) -> (f64, f64) {
     mean_and_error(&images.iter().map(|image| image[at]).collect::<Vec<_>>())
 }
 
-/// Tiles and channels in which two sets of seeds differ by more than chance and `bias` (relative) allow.
+/// The tiles and channels in which two sets of renders differ by more than noise and `bias` (relative) allow.
 pub fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {
     let critical = t_critical(ERROR_RATE, 3 * TILES, (a.len().min(b.len()) - 1) as f64);
     let fault = |at: usize| {
@@ -53,7 +53,7 @@ pub fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], bias: f64) -> Vec<String> {
     (0..3 * TILES).filter_map(fault).collect()
 }
 
-/// `a` agrees with the oracle `b`, and brighter by `planted` (relative) it would not.
+/// Checks that `a` agrees with the reference `b`, and that `a` brighter by `planted` (relative) does not.
 pub fn agree(what: &str, a: &[Vec<f64>], b: &[Vec<f64>], bias: f64, planted: f64) {
     let found = disagreeing(a, b, bias);
     assert!(found.is_empty(), "{what}: {found:#?}");

@@ -1,8 +1,9 @@
-//! Fields of photons in closed form: a floor lit by the mirror images of a lamp.
+//! Closed forms of photon fields: a floor lit by the mirror images of a lamp.
 //!
-//! What comes straight from the lamp is no photon's; with paths as short as [`Field::max_depth`] every photon on the
-//! floor has come by one mirror. The floor's irradiance is that of the lamp's images; a kernel's expectation is its
-//! mean over discs. Photons of equal flux that fall independently have the variance of a Poisson process.
+//! Direct light of the lamp is not carried by photons, and with paths of at most [`Field::max_depth`] segments every
+//! photon on the floor has been reflected by one mirror. So the irradiance by photons is that of the lamp's images, and
+//! the expectation of a kernel is its mean over a disc. Independent photons of equal flux have the variance of a
+//! Poisson process.
 
 use super::scenes::{add, build, look_at, matte, mirror, point_light, quad};
 use caustique::estimator::{InitialBandwidth, PixelAccumulator};
@@ -12,34 +13,35 @@ use caustique::scene::description::Projection;
 use caustique::scene::{CameraRequest, Description, Scene};
 use std::f64::consts::PI;
 
-/// Pixels of the coarsest picture across and down, each of side [`PIXEL`], from [`CORNER`] on.
+/// Columns and rows of the coarsest picture. Its pixels have the side [`PIXEL`] and start at [`CORNER`].
 pub const SIZE: (u32, u32) = (8, 16);
 /// Side of a pixel (m).
 pub const PIXEL: f64 = 0.1;
-/// Least x and z of the picture.
+/// Smallest x and z of the picture (m).
 pub const CORNER: (f64, f64) = (0.0, -0.8);
-/// Reflectance of the floor, radiance of the square lamp, its side and the height of either's centre.
+/// Reflectance of the floor; radiance of the square lamp; its side; height of its centre.
 const RHO: f64 = 0.5;
 const RADIANCE: f64 = 10.0;
 const SIDE: f64 = 0.06;
 const HEIGHT: f64 = 0.2;
-/// Where the mirrors are: a wall, and a ceiling where there is one.
+/// Position of the mirrors: x of the wall, and the height of the ceiling where there is one.
 const MIRROR: f64 = -0.25;
 const CEILING: f64 = 1.0;
 /// Intensity of the point lamp (W/sr).
 const INTENSITY: f64 = 1.0;
 
-/// What lights the floor, and how it is seen.
+/// The light on the floor, and the view of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
-    /// A square lamp that faces the mirror, by that; seen from above.
+    /// A square lamp that faces the mirror wall; the floor is seen from above.
     Square,
-    /// A point lamp, by the wall and the ceiling; seen in the ceiling. Nothing but merging finds what photons bring.
+    /// A point lamp, reflected by the wall and the mirror ceiling; the floor is seen in the ceiling. Only merging finds
+    /// the light of photons.
     Point,
 }
 
 impl Field {
-    /// The scene, with its one camera.
+    /// The scene with its only camera.
     pub fn scene(self) -> Scene {
         let mut description = Description::default();
         let floor = quad(Vec3::new(MIRROR as f32, 0.0, -3.0), Vec3::Z * 6.0, Vec3::X * 4.0);
@@ -67,7 +69,7 @@ impl Field {
         build(description)
     }
 
-    /// Segments of the longest paths.
+    /// Number of segments of the longest paths.
     pub fn max_depth(self) -> u32 {
         match self {
             Field::Square => 3,
@@ -75,7 +77,7 @@ impl Field {
         }
     }
 
-    /// Settings of one level with this first bandwidth.
+    /// Settings of one bandwidth level with this initial bandwidth.
     pub fn settings(self, radius: f64, photons: u32, seed: u64) -> Settings {
         Settings {
             seed,
@@ -87,7 +89,7 @@ impl Field {
         }
     }
 
-    /// Irradiance of the floor at (x, z) by mirror images (W/m2).
+    /// Irradiance of the floor at (x, z) by the mirror images (W/m2).
     pub fn irradiance(self, x: f64, z: f64) -> f64 {
         match self {
             Field::Square => {
@@ -96,7 +98,7 @@ impl Field {
                 let mut sum = 0.0;
                 for i in 0..N {
                     for j in 0..N {
-                        // The image is as far behind the mirror, and faces +x.
+                        // The image is at the same distance behind the mirror, and faces +x.
                         let (dx, dy, dz) = (x - 2.0 * MIRROR, HEIGHT + at(i), z - at(j));
                         let d2 = dx * dx + dy * dy + dz * dz;
                         sum += dx * dy / (d2 * d2);
@@ -114,7 +116,7 @@ impl Field {
         }
     }
 
-    /// Flux of one of so many photons (W).
+    /// Flux of a photon (W), for `photons` light paths per iteration.
     fn flux(self, photons: u32) -> f64 {
         let power = match self {
             Field::Square => RADIANCE * PI * SIDE * SIDE,
@@ -123,10 +125,10 @@ impl Field {
         power / f64::from(photons)
     }
 
-    /// Mean of the irradiance over the disc of squared radius `radius2` around (x, z): six directions on three circles
-    /// whose radii halve equal areas, exact to the sixth order in the radius.
+    /// Mean of the irradiance over the disc of squared radius `radius2` around (x, z): six directions on three circles,
+    /// exact to the sixth order in the radius.
     fn disc(self, x: f64, z: f64, radius2: f64) -> f64 {
-        // Gauss-Legendre in the squared radius.
+        // Gauss-Legendre quadrature in the squared radius.
         const NODES: [(f64, f64); 3] =
             [(0.112_701_665_379_258, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_742, 5.0 / 18.0)];
         NODES.iter().map(|(s, weight)| weight * self.ring(x, z, (s * radius2).sqrt())).sum()
@@ -138,17 +140,17 @@ impl Field {
     }
 }
 
-/// The picture, with so many pixels for every one of [`SIZE`] across and down.
+/// The picture, with `finer` pixels per pixel of [`SIZE`] in each direction.
 pub fn view(finer: u32) -> CameraRequest {
     CameraRequest { width: Some(SIZE.0 * finer), height: Some(SIZE.1 * finer), ..CameraRequest::default() }
 }
 
-/// What photons bring to a pixel, on average over its iterations.
+/// Mean contribution of photons to a pixel over its iterations.
 pub fn photons_of(pixel: &PixelAccumulator) -> f64 {
     (pixel.parts().caustic.x + pixel.parts().indirect.x) / f64::from(pixel.iterations.max(1))
 }
 
-/// What one iteration gives a pixel.
+/// Moments of the contribution of one iteration to a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {
     /// Expectation (radiance).
@@ -157,11 +159,11 @@ pub struct Moments {
     pub variance: f64,
 }
 
-/// One pixel's moments as functions of the squared bandwidth, of the box kernel.
+/// The moments of one pixel as functions of the squared bandwidth, for the box kernel.
 pub struct PixelField {
-    /// Radiance without bias: the mean over the pixel.
+    /// Unbiased radiance: the mean over the pixel.
     pub truth: f64,
-    /// Expectation at squared radii 0, a half and one of the largest.
+    /// Expectation at the squared radii 0, half the largest, and the largest.
     means: [f64; 3],
     largest2: f64,
     /// Variance of the field over the pixel.
@@ -171,13 +173,13 @@ pub struct PixelField {
 }
 
 impl PixelField {
-    /// Of pixel (i, j) of a view for bandwidths up to `radius` and so many photons an iteration.
+    /// The moments of pixel (i, j) of a view, for bandwidths up to `radius` and `photons` light paths per iteration.
     pub fn new(field: Field, (i, j): (u32, u32), finer: u32, radius: f64, photons: u32) -> PixelField {
         let largest2 = radius * radius;
         let mut means = [0.0; 3];
         let (mut first, mut second) = (0.0, 0.0);
         const N: i32 = 4;
-        // The camera that looks down has its right at -x; both have z up.
+        // The right of the camera that looks down is -x; up is z in both views.
         let across = if field == Field::Square { SIZE.0 * finer - 1 - i } else { i };
         let up = SIZE.1 * finer - 1 - j;
         for k in 0..N * N {
@@ -197,11 +199,11 @@ impl PixelField {
         PixelField { truth: means[0], means, largest2, spread: second - first * first, flux }
     }
 
-    /// At a squared bandwidth: of photons that fall independently.
+    /// The moments at a squared bandwidth, for independent photons.
     pub fn moments(&self, radius2: f64) -> Moments {
         let s = radius2 / self.largest2;
         let [a, b, c] = self.means;
-        // The parabola through the three.
+        // The parabola through the three expectations.
         let mean = a + s * (4.0 * b - 3.0 * a - c) + s * s * 2.0 * (a + c - 2.0 * b);
         let variance = mean * self.flux * RHO / PI / (PI * radius2) + self.spread;
         Moments { mean, variance }

@@ -3,31 +3,31 @@
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Writes the scene, with the lamp or dark.
+/// Writes the scene, with or without the lamp.
 pub fn write(path: &Path, lamp: bool) {
     let extras = json!({"light_units": "radiometric"});
     std::fs::write(path, bytes(lamp.then_some(LAMP), &extras)).expect("the scene can be written");
 }
 
-/// The same with a lamp just above the floor, so strong that what it sends there is more than f32 holds.
+/// Writes the scene with a lamp just above the floor, so strong that its light there overflows f32.
 pub fn write_blinding(path: &Path) {
     let extras = json!({"light_units": "radiometric"});
     std::fs::write(path, bytes(Some((1e37, 0.02)), &extras)).expect("the scene can be written");
 }
 
-/// The same with the lamp, in fog.
+/// Writes the scene with the lamp and fog.
 pub fn write_foggy(path: &Path) {
     let medium = json!({"sigma_a": [0.02, 0.02, 0.02], "sigma_s": [0.1, 0.1, 0.1], "g": 0.3});
     let extras = json!({"light_units": "radiometric", "medium": medium});
     std::fs::write(path, bytes(Some(LAMP), &extras)).expect("the scene can be written");
 }
 
-/// The same without the lamp, under a sky from a file.
+/// Writes the scene without the lamp, under a sky from a file.
 pub fn write_under(path: &Path, sky: &str) {
     std::fs::write(path, bytes(None, &json!({"environment": {"file": sky}}))).expect("the scene can be written");
 }
 
-/// The same with three lamps in as many groups.
+/// Writes the scene with three lamps in three light groups.
 pub fn write_grouped(path: &Path, groups: [&str; 3]) {
     let extras = json!({"light_units": "radiometric"});
     let (mut document, binary) = parts(Some(LAMP), &extras);
@@ -41,7 +41,7 @@ pub fn write_grouped(path: &Path, groups: [&str; 3]) {
     std::fs::write(path, chunks(&document, &binary)).expect("the scene can be written");
 }
 
-/// So many nodes, each of which places one triangle 2^16 times (EXT_mesh_gpu_instancing), all by the same numbers.
+/// Writes `nodes` nodes, each of which places one triangle 2^16 times (EXT_mesh_gpu_instancing) with shared transforms.
 pub fn write_copies(path: &Path, nodes: usize) {
     const COPIES: usize = 1 << 16;
     let mut binary: Vec<u8> =
@@ -64,16 +64,16 @@ pub fn write_copies(path: &Path, nodes: usize) {
     std::fs::write(path, chunks(&document, &binary)).expect("the scene can be written");
 }
 
-/// Intensity of the lamp, and its height.
+/// Intensity and height of the lamp.
 const LAMP: (f64, f64) = (20.0, 3.0);
 
-/// The whole file.
+/// The bytes of the file.
 fn bytes(lamp: Option<(f64, f64)>, extras: &Value) -> Vec<u8> {
     let (document, binary) = parts(lamp, extras);
     chunks(&document, &binary)
 }
 
-/// Quads as positions and indices: the floor looks up, the mirror along +Z.
+/// The document and its binary chunk. The floor is a quad that faces up, the mirror one that faces +Z.
 fn parts(lamp: Option<(f64, f64)>, extras: &Value) -> (Value, Vec<u8>) {
     let (intensity, height) = lamp.unwrap_or(LAMP);
     let floor: [[f32; 3]; 4] = [[-5.0, 0.0, -5.0], [-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0]];
@@ -85,7 +85,7 @@ fn parts(lamp: Option<(f64, f64)>, extras: &Value) -> (Value, Vec<u8>) {
     binary.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
     let positions = |view: u32, low: [f32; 3], high: [f32; 3]| json!({"bufferView": view, "componentType": 5126, "count": 4, "type": "VEC3", "min": low, "max": high});
     let mesh = |name: &str, positions: u32, material: u32| json!({"name": name, "primitives": [{"attributes": {"POSITION": positions}, "indices": 2, "material": material}]});
-    // Cameras look along their local -Z: this turn about X looks down at the floor.
+    // Cameras look along their local -Z. This rotation about X points them at the floor.
     let camera = |name: &str, x: f64| json!({"name": name, "camera": 0, "translation": [x, 3.5, 5.5], "rotation": [-0.27, 0.0, 0.0, 0.962_859_283_7]});
     let light = json!({"name": "Lamp", "type": "point", "intensity": intensity});
     let document = json!({
@@ -123,7 +123,7 @@ fn parts(lamp: Option<(f64, f64)>, extras: &Value) -> (Value, Vec<u8>) {
     (document, binary)
 }
 
-/// A document and its binary chunk as a file.
+/// A .glb file of a document and its binary chunk.
 fn chunks(document: &Value, binary: &[u8]) -> Vec<u8> {
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');

@@ -1,9 +1,9 @@
-//! What integration tests share.
+//! Code that integration tests share.
 #![allow(dead_code)]
 
 use caustique::bsdf::{Bsdf, EnergyTables, Interface, Parameters};
 
-/// The BSDF of `p`; its interface lives as long as the program.
+/// The BSDF of `p`. Its interface is leaked, so it lives as long as the program.
 pub fn bsdf(p: &Parameters, tables: &EnergyTables) -> Bsdf<'static> {
     Bsdf::new(p, Box::leak(Box::new(Interface::new(p, tables))))
 }

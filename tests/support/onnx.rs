@@ -1,6 +1,6 @@
-//! The smallest networks that ONNX has words for, in the wire format of protocol buffers.
+//! Minimal ONNX networks in the wire format of protocol buffers.
 
-/// A field of bytes: its number and what it holds.
+/// A field of bytes: its number and its content.
 fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
     let mut out = vec![number << 3 | 2];
     out.extend(varint(bytes.len() as u64));
@@ -8,7 +8,7 @@ fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A field of a number.
+/// A field with an integer.
 fn number(field: u8, value: u64) -> Vec<u8> {
     [vec![field << 3], varint(value)].concat()
 }
@@ -23,7 +23,7 @@ fn varint(mut value: u64) -> Vec<u8> {
     out
 }
 
-/// An image tensor of so many channels: ValueInfoProto.
+/// An image tensor with this number of channels (ValueInfoProto).
 fn image(name: &str, channels: u64) -> Vec<u8> {
     let size = |n: u64| field(1, &number(1, n));
     let open = |name: &str| field(1, &field(2, name.as_bytes()));
@@ -32,7 +32,7 @@ fn image(name: &str, channels: u64) -> Vec<u8> {
     [field(1, name.as_bytes()), field(2, &field(1, &tensor))].concat()
 }
 
-/// What a network says about itself.
+/// The metadata of a network.
 fn metadata(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
     let right = [
         ("normalisation", "1"),
@@ -52,8 +52,8 @@ fn metadata(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
     metadata
 }
 
-/// A network for two levels: one convolution, all of whose weights are zero. `kind`: its contract; `others`: metadata in
-/// place of what is right, none where a value is empty.
+/// A network for two levels: one convolution with zero weights. `kind` is its contract. `others` replaces metadata, or
+/// removes it if the value is empty.
 pub fn network(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
     let input = 4 * 2 + 7;
     let output = if kind == "features" { 1 + 3 } else { 3 * 3 };
@@ -72,7 +72,7 @@ pub fn network(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
     [number(1, 8), field(7, &graph.concat()), field(8, &opset), metadata(kind, others)].concat()
 }
 
-/// The network of features with an input that is a list and no image.
+/// The network of features with an input that is a vector instead of an image.
 pub fn flat() -> Vec<u8> {
     let tensor = [number(1, 1), field(2, &field(1, &number(1, 15)))].concat();
     let value = |name: &str| [field(1, name.as_bytes()), field(2, &field(1, &tensor))].concat();

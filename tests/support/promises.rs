@@ -1,8 +1,8 @@
-//! What a description that a reader hands out promises.
+//! Invariants of the scene descriptions that readers return.
 
 use caustique::scene::Description;
 
-/// What a description promises: indices are valid, numbers finite, transforms can be inverted.
+/// Checks that all indices are valid, all numbers finite and all transforms invertible.
 pub fn check(scene: &Description, what: &str) {
     for instance in &scene.instances {
         assert!((instance.mesh as usize) < scene.meshes.len(), "{what}");

@@ -1,5 +1,5 @@
-//! Every reader of files that come from anywhere, called with the bytes of one file as the program calls it. What is
-//! fuzzed (`tests/fuzz/`) and what replays the corpus that was kept of it call the same functions.
+//! Every reader of untrusted files, called with the bytes of one file as the program calls it. Fuzz targets
+//! (`tests/fuzz/`) and the replay of the kept corpus call the same functions.
 
 use super::promises;
 use caustique::combine::network::Network;
@@ -18,10 +18,10 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::LazyLock;
 
-/// A reader: what it is called, and what reads the bytes of a file; other files lie in the folder, which is its own.
+/// A reader: its name, and a function that reads the bytes of a file. The function may write other files to the folder.
 pub type Reader = (&'static str, fn(&[u8], &Path));
 
-/// All of them.
+/// All readers.
 pub const READERS: [Reader; 13] = [
     ("glb", glb),
     ("scene", scene),
@@ -38,29 +38,29 @@ pub const READERS: [Reader; 13] = [
     ("usd_fault", usd_fault),
 ];
 
-/// An error says what it is of.
-fn told<T>(outcome: Result<T>) -> Option<T> {
+/// The value of a result. Errors must have a message.
+fn value_of<T>(outcome: Result<T>) -> Option<T> {
     outcome.inspect_err(|error| assert!(!error.cause.is_empty() && !error.place.is_empty(), "{error:?}")).ok()
 }
 
-/// Puts bytes into a file.
+/// Writes bytes to a file.
 fn file(folder: &Path, name: &str, bytes: &[u8]) -> std::path::PathBuf {
     let path = folder.join(name);
     fs::write(&path, bytes).expect("the folder takes files");
     path
 }
 
-/// Scene files, binary or not.
+/// Scene files, binary or JSON.
 fn glb(bytes: &[u8], _: &Path) {
-    if let Some(scene) = told(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default())) {
+    if let Some(scene) = value_of(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default())) {
         promises::check(&scene, "what was read");
     }
 }
 
-/// Scene files, the scenes that are built of them, and an iteration of pictures of four pixels.
+/// Scene files, the scenes built from them, and one iteration of pictures of four pixels.
 fn scene(bytes: &[u8], _: &Path) {
-    let read = told(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default()));
-    let Some(scene) = read.and_then(|description| told(Scene::build(description, 1))) else { return };
+    let read = value_of(gltf::read_bytes(bytes, Path::new("fuzz.glb"), &ReadOptions::default()));
+    let Some(scene) = read.and_then(|description| value_of(Scene::build(description, 1))) else { return };
     let Ok(camera) = scene.camera(&small()) else { return };
     for method in METHODS {
         let settings = Settings {
@@ -82,7 +82,7 @@ fn small() -> CameraRequest {
     CameraRequest { width: Some(2), height: Some(2), ..CameraRequest::default() }
 }
 
-/// Renders of [`METHODS`] that saved states are gone on with: of a triangle in light from all around.
+/// Renders of [`METHODS`] that continue from saved states, of a triangle under a uniform sky.
 static STAGES: LazyLock<Vec<RenderInput<'static>>> = LazyLock::new(|| {
     let document = serde_json::json!({
         "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
@@ -99,7 +99,8 @@ static STAGES: LazyLock<Vec<RenderInput<'static>>> = LazyLock::new(|| {
     METHODS.map(|method| RenderInput::new(scene, camera, &Settings::for_candidate(Candidate::unguided(method)))).into()
 });
 
-/// A scene in JSON and, behind a zero, what lies beside it as `a.bin`, `a.png`, `a.jpg`, `a.hdr` and `a.exr`.
+/// A scene in JSON and, behind a zero byte, the content of the files `a.bin`, `a.png`, `a.jpg`, `a.hdr` and `a.exr`
+/// beside it.
 fn gltf(bytes: &[u8], folder: &Path) {
     let (json, beside) = match bytes.iter().position(|byte| *byte == 0) {
         Some(at) => (&bytes[..at], &bytes[at + 1..]),
@@ -109,12 +110,12 @@ fn gltf(bytes: &[u8], folder: &Path) {
         file(folder, name, beside);
     }
     let path = file(folder, "fuzz.gltf", json);
-    if let Some(scene) = told(gltf::read(&path, &ReadOptions::default())) {
+    if let Some(scene) = value_of(gltf::read(&path, &ReadOptions::default())) {
         promises::check(&scene, "what was read");
     }
 }
 
-/// A texture, as colours, as numbers and as glossiness.
+/// A texture with all encodings: colours, numbers and glossiness.
 fn texture(bytes: &[u8], _: &Path) {
     let texture = serde_json::json!({"index": 0});
     let document = serde_json::json!({
@@ -134,13 +135,13 @@ fn texture(bytes: &[u8], _: &Path) {
         Path::new("fuzz.glb"),
         &ReadOptions::default(),
     );
-    if let Some(scene) = told(scene) {
+    if let Some(scene) = value_of(scene) {
         promises::check(&scene, "what was read");
         assert!(scene.textures.iter().all(|texture| texture.mean().is_finite()), "texels");
     }
 }
 
-/// A `.glb` of a document and its bytes.
+/// A `.glb` file of a document and its binary chunk.
 fn packed(document: &serde_json::Value, binary: &[u8]) -> Vec<u8> {
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -156,7 +157,7 @@ fn packed(document: &serde_json::Value, binary: &[u8]) -> Vec<u8> {
 
 /// A picture, as `info`, `compare` and `combine` read it.
 fn picture(bytes: &[u8], folder: &Path) {
-    if let Some((layers, attributes)) = told(exr::read(&file(folder, "fuzz.exr", bytes))) {
+    if let Some((layers, attributes)) = value_of(exr::read(&file(folder, "fuzz.exr", bytes))) {
         let pixels = layers.width * layers.height;
         assert!(layers.layers.iter().flat_map(|layer| &layer.planes).all(|plane| plane.values.len() == pixels));
         attributes.object();
@@ -166,14 +167,14 @@ fn picture(bytes: &[u8], folder: &Path) {
 /// An image of an environment.
 fn environment(bytes: &[u8], folder: &Path) {
     let read = environment_file::read(&file(folder, "fuzz.sky", bytes), &mut Vec::new());
-    if let Some(EnvironmentSource::Image { width, height, texels }) = told(read) {
+    if let Some(EnvironmentSource::Image { width, height, texels }) = value_of(read) {
         assert_eq!(texels.len(), width as usize * height as usize);
         assert!(texels.iter().flatten().all(|x| x.is_finite() && *x >= 0.0));
     }
 }
 
-/// Contents of records: the first two up to a zero and by a length of two bytes, the third is the rest. Their hashes are
-/// put right, which else would let nothing through.
+/// Records with correct hashes, without which every mutant would be refused. The content of the first record ends at a
+/// zero byte, the second starts with its length in two bytes, the third is the rest.
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     let head = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
     let rest = bytes.get(head + 1..).unwrap_or_default();
@@ -188,12 +189,12 @@ fn sealed(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A checkpoint as it is, or the contents of its records; the render goes on for an iteration.
+/// A checkpoint, or the contents of its records. The render continues for one iteration.
 fn checkpoint(bytes: &[u8], folder: &Path) {
     let whole = bytes.starts_with(checkpoint::MAGIC);
     let bytes = if whole { bytes.to_vec() } else { [&checkpoint::MAGIC[..], &sealed(bytes)].concat() };
     let path = file(folder, "fuzz.checkpoint", &bytes);
-    if told(checkpoint::read(&path)).is_none() {
+    if value_of(checkpoint::read(&path)).is_none() {
         return;
     }
     for stage in STAGES.iter() {
@@ -205,7 +206,7 @@ fn checkpoint(bytes: &[u8], folder: &Path) {
     }
 }
 
-/// A shard as it is, or the contents of the records behind its picture; merged alone.
+/// A shard, or the contents of the records behind its picture. It is merged alone.
 fn shard(bytes: &[u8], folder: &Path) {
     let mut bytes = if bytes.ends_with(shard::MARK) { bytes.to_vec() } else { sealed(bytes) };
     if !bytes.ends_with(shard::MARK) {
@@ -213,9 +214,9 @@ fn shard(bytes: &[u8], folder: &Path) {
         bytes.write_all(&length.to_le_bytes()).and_then(|()| bytes.write_all(shard::MARK)).expect("memory");
     }
     let request = MergeRequest { finish: None, layers: Selection::All, naming: Naming::Plain, reproducible: true };
-    if let Some(shards) = told(Shards::open(&[file(folder, "fuzz.exr", &bytes)], true)) {
+    if let Some(shards) = value_of(Shards::open(&[file(folder, "fuzz.exr", &bytes)], true)) {
         shards.warnings();
-        told(shards.merge(&request, |_| {}));
+        value_of(shards.merge(&request, |_| {}));
     }
 }
 
@@ -223,15 +224,15 @@ fn shard(bytes: &[u8], folder: &Path) {
 fn model(bytes: &[u8], folder: &Path) {
     let runtime = Runtime::find().expect("ONNX Runtime is installed");
     let model = Model::from_file(&file(folder, "fuzz.onnx", bytes)).expect("it can be read");
-    told(Network::load(&model, &runtime, 1));
+    value_of(Network::load(&model, &runtime, 1));
 }
 
-/// What the converter of stages says of options.
+/// The options that the USD converter reports.
 fn usd_options(bytes: &[u8], _: &Path) {
-    told(usd::answer::options(bytes, Path::new("fuzz.usda")));
+    value_of(usd::answer::options(bytes, Path::new("fuzz.usda")));
 }
 
-/// What the converter of stages says when it fails.
+/// The message of the USD converter when it fails.
 fn usd_fault(bytes: &[u8], _: &Path) {
-    told::<()>(Err(usd::answer::failure(bytes, Path::new("fuzz.usda"))));
+    value_of::<()>(Err(usd::answer::failure(bytes, Path::new("fuzz.usda"))));
 }

@@ -11,7 +11,7 @@ use caustique::scene::description::{
 use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::{CameraPaths, Indirect, InitialMedia};
 
-/// A diffuse material of some reflectance that gives some radiance, without any Fresnel layer.
+/// A diffuse material with this reflectance and emission, without a Fresnel layer.
 pub fn matte(reflectance: f32, emission: f32) -> Material {
     Material {
         base_color: [reflectance, reflectance, reflectance, 1.0],
@@ -37,7 +37,7 @@ pub fn add(description: &mut Description, name: &str, mesh: Mesh, material: Mate
     add_at(description, name, mesh, material, DAffine3::IDENTITY);
 }
 
-/// Adds a mesh with its own material, placed.
+/// Adds a mesh with its own material and a transform.
 pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: Material, to_world: DAffine3) {
     description.instances.push(PlacedMesh {
         name: name.into(),
@@ -53,7 +53,7 @@ pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: M
     description.materials.push(Material { name: name.into(), ..material });
 }
 
-/// A parallelogram from a corner and two edges; its front is the side from which the edges turn counter-clockwise.
+/// A parallelogram from a corner and two edges. Seen from its front, the edges are counter-clockwise.
 pub fn quad(corner: Vec3, a: Vec3, b: Vec3) -> Mesh {
     Mesh {
         positions: vec![corner, corner + a, corner + a + b, corner + b],
@@ -62,7 +62,7 @@ pub fn quad(corner: Vec3, a: Vec3, b: Vec3) -> Mesh {
     }
 }
 
-/// A closed axis-aligned box, its front inside (`inward`) or outside.
+/// A closed axis-aligned box with its front inside (`inward`) or outside.
 pub fn cuboid(low: Vec3, high: Vec3, inward: bool) -> Mesh {
     let corner = |i: u32| Vec3::select(glam_mask(i), high, low);
     let positions = (0..8).map(corner).collect();
@@ -79,7 +79,7 @@ fn glam_mask(i: u32) -> glam::BVec3 {
     glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0)
 }
 
-/// A sphere of latitude-longitude triangles with smooth normals, its front outside.
+/// A sphere of latitude-longitude triangles with smooth normals and its front outside.
 pub fn sphere(center: Vec3, radius: f32, segments: u32) -> Mesh {
     let rings = segments / 2;
     let mut mesh = Mesh { closed: true, ..Mesh::default() };
@@ -135,14 +135,14 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
     }
 }
 
-/// What paths are traced from: all classes of light, of any length.
+/// Camera paths of all classes of light and any length.
 pub fn camera_paths<'a>(scene: &'a Scene, camera: &'a Camera) -> CameraPaths<'a> {
     let interior = InitialMedia::of(scene, camera).camera;
     let (indirect, classes) = (Indirect::Photons, ClassSet::ALL);
     CameraPaths { scene, camera, interior, max_depth: u32::MAX, indirect, classes, stop: None }
 }
 
-/// Builds a scene, panicking with the error: tests know their scenes are good.
+/// Builds a valid scene; panics if it is invalid.
 pub fn build(description: Description) -> Scene {
     match Scene::build(description, 1) {
         Ok(scene) => scene,

@@ -8,7 +8,7 @@ pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// Student's t statistic of "the mean of `values` is `expected`".
+/// Student's t statistic of the hypothesis that the mean of `values` is `expected`.
 pub fn t_statistic(values: &[f64], expected: f64) -> f64 {
     let (mean, error) = mean_and_error(values);
     (mean - expected) / error.max(1e-12 * expected.abs().max(1e-300))
@@ -25,21 +25,21 @@ pub fn t_critical(alpha: f64, tests: usize, freedom: f64) -> f64 {
     }
 }
 
-/// Family-wise error rate of the tests of a kind.
+/// Family-wise error rate of the checks of one kind.
 pub const ERROR_RATE: f64 = 1e-3;
 
-/// What values must be on average, and what they must be told apart from.
+/// An expected mean, and the shift that must be rejected.
 #[derive(Clone, Copy)]
 pub struct Check {
     pub expected: f64,
-    /// Relative bias of the closed form or of the kernel that is known to remain.
+    /// Known relative bias of the closed form or of the kernel.
     pub bias: f64,
     /// Relative shift of the expectation that must be rejected.
     pub detects: f64,
 }
 
 impl Check {
-    /// One of `tests` simultaneous tests, by independent values.
+    /// Checks independent values, as one of `tests` simultaneous checks.
     pub fn run(&self, tests: usize, what: &str, values: &[f64]) {
         let Check { expected, bias, detects } = *self;
         let (mean, error) = mean_and_error(values);
@@ -53,8 +53,9 @@ impl Check {
     }
 }
 
-/// P-value of Pearson's chi-squared test of counts against expectations. Cells are pooled, in order of expectation,
-/// until each pool expects at least [`LEAST_EXPECTED`]; counts where next to nothing is expected make the value zero.
+/// P-value of Pearson's chi-squared test of counts against expectations. Cells are pooled in the order of their
+/// expectation, until each pool expects at least [`MIN_EXPECTED`]. Counts in cells of almost zero expectation make the
+/// p-value zero.
 pub fn chi_squared_p(counts: &[f64], expected: &[f64]) -> f64 {
     use statrs::distribution::{ChiSquared, ContinuousCDF};
     let mut cells: Vec<(f64, f64)> = expected.iter().copied().zip(counts.iter().copied()).collect();
@@ -63,11 +64,11 @@ pub fn chi_squared_p(counts: &[f64], expected: &[f64]) -> f64 {
     for (i, (e, c)) in cells.iter().enumerate() {
         pool = (pool.0 + e, pool.1 + c);
         let last = i + 1 == cells.len();
-        if pool.0 >= LEAST_EXPECTED {
+        if pool.0 >= MIN_EXPECTED {
             statistic += (pool.1 - pool.0) * (pool.1 - pool.0) / pool.0;
             pools += 1;
             pool = (0.0, 0.0);
-        } else if last && pool.1 > pool.0 + 10.0 * LEAST_EXPECTED {
+        } else if last && pool.1 > pool.0 + 10.0 * MIN_EXPECTED {
             return 0.0;
         }
     }
@@ -80,8 +81,8 @@ pub fn chi_squared_p(counts: &[f64], expected: &[f64]) -> f64 {
     }
 }
 
-/// Least expectation of a pool of cells.
-pub const LEAST_EXPECTED: f64 = 8.0;
+/// Smallest expectation of a pool of cells.
+pub const MIN_EXPECTED: f64 = 8.0;
 
 /// Significance of one of `tests` simultaneous tests at a family-wise error rate of `alpha` (Sidak).
 pub fn sidak(alpha: f64, tests: usize) -> f64 {

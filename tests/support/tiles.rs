@@ -1,15 +1,15 @@
-//! Small pictures compared tile by tile.
+//! Comparison of small pictures tile by tile.
 
 use super::stats::mean_and_error;
 
-/// Pixels a side.
+/// Side of the picture (pixels).
 pub const SIZE: u32 = 32;
-/// Pixels a side of a tile.
+/// Side of a tile (pixels).
 pub const TILE: u32 = 8;
-/// Tiles of a picture.
+/// Number of tiles of a picture.
 pub const TILES: usize = (SIZE / TILE * SIZE / TILE) as usize;
 
-/// Means of the tiles of a picture, given its values row by row.
+/// Means of the tiles of a picture with these row-major values.
 pub fn tiles(value: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut sums = vec![0.0; TILES];
     for y in 0..SIZE {
@@ -21,7 +21,7 @@ pub fn tiles(value: impl Fn(usize) -> f64) -> Vec<f64> {
     sums
 }
 
-/// Tiles in which two sets of seeds differ by more than `critical` standard errors and `bias` (relative).
+/// The tiles in which two sets of renders differ by more than `critical` standard errors and `bias` (relative).
 pub fn disagreeing(a: &[Vec<f64>], b: &[Vec<f64>], critical: f64, bias: f64) -> Vec<String> {
     (0..TILES)
         .filter_map(|tile| {

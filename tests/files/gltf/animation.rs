@@ -203,10 +203,12 @@ fn frame_rates() {
         near(seconds(&file, Some(60), Some(30.0)), x, &[]);
     }
     let above_zero = "extras.caustique.frame_rate must be one or two whole numbers above zero";
-    for (wrong, told) in [(json!(0), above_zero), (json!([24, 0]), above_zero), (json!(-1), "a whole number, or two")] {
+    for (wrong, expected) in
+        [(json!(0), above_zero), (json!([24, 0]), above_zero), (json!(-1), "a whole number, or two")]
+    {
         file.json["scenes"][0]["extras"] = json!({"caustique": {"frame_rate": wrong}});
         let error = seconds(&file, Some(60), None).unwrap_err();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
     let mut still = thing();
     still.json["animations"] = json!([]);

@@ -124,14 +124,14 @@ pub fn jpegs() -> [Vec<u8>; 2] {
 #[test]
 fn jpegs_that_are_cut_off() {
     let [whole, bomb] = jpegs();
-    let told = |bytes: &[u8]| read(&wearing(bytes, "image/jpeg")).warnings;
-    assert_eq!(told(&whole), [""; 0]);
+    let warnings = |bytes: &[u8]| read(&wearing(bytes, "image/jpeg")).warnings;
+    assert_eq!(warnings(&whole), [""; 0]);
     let mut longer = whole.clone();
     longer.extend([0, 1, 2, 3]);
-    assert_eq!(told(&longer), [""; 0]);
+    assert_eq!(warnings(&longer), [""; 0]);
     let cut = "image \"tiles\": the file of the image is cut off: what is missing of it is grey (copy it again)";
     for share in [2, 3] {
-        assert_eq!(told(&whole[..whole.len() / share]), [cut]);
+        assert_eq!(warnings(&whole[..whole.len() / share]), [cut]);
     }
     let error = message(&try_read(&wearing(&bomb, "image/jpeg")).unwrap_err());
     let place = "pool.glb: material 0, baseColorTexture: image \"tiles\": it is cut off: ";

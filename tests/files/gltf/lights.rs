@@ -116,11 +116,11 @@ fn lamps_of_old_and_new_exporters_are_alike() {
         for (given, expected) in given.iter().zip([sun, candela / 683.0, candela / 683.0]) {
             assert!((given / expected - 1.0).abs() < 1e-6, "{version}: {given} for {expected}");
         }
-        let told = format!(
+        let expected = format!(
             "generator \"Khronos glTF Blender I/O {version}\" writes lamps in Blender's watts, without 683 lumens for each \
              (--light-units decides)"
         );
-        assert_eq!(scene.warnings, if old { vec![told] } else { vec![] });
+        assert_eq!(scene.warnings, if old { vec![expected] } else { vec![] });
         assert_eq!(scene.guessed_units.map(|guess| guess.photometric), Some(!old));
     }
 }
@@ -144,8 +144,8 @@ fn lamps_too_dark_for_lumens_are_watts() {
         let intensity = |scene: &Description| f64::from(scene.lights[0].intensity.x);
         assert!((intensity(&unitless) / intensity(&standard) - 1.0).abs() < 1e-6);
         assert_eq!(standard.warnings, [""; 0]);
-        let [told] = &unitless.warnings[..] else { panic!("{:?}", unitless.warnings) };
-        assert!(told.starts_with("its lamps would give ") && told.contains("'Unitless'"), "{told}");
+        let [warning] = &unitless.warnings[..] else { panic!("{:?}", unitless.warnings) };
+        assert!(warning.starts_with("its lamps would give ") && warning.contains("'Unitless'"), "{warning}");
         assert_eq!(unitless.guessed_units.map(|guess| guess.photometric), Some(false));
         // What glows tells how bright the scene is meant to be.
         let glowing = read(lamp(kind, watts), true);
@@ -154,10 +154,10 @@ fn lamps_too_dark_for_lumens_are_watts() {
     assert_eq!(read(lamp("point", 0.0), false).warnings, [""; 0]);
 }
 
-/// Clip planes are ignored, which is told where they would change the picture.
+/// Clip planes are ignored, which is warnings where they would change the picture.
 #[test]
 fn clip_planes() {
-    let told = |camera: Value, at: [f64; 3]| {
+    let warnings = |camera: Value, at: [f64; 3]| {
         let mut file = Glb::new();
         file.push("cameras", camera);
         file.node(json!({"name": "CameraPaths", "camera": 0, "translation": at}));
@@ -177,17 +177,17 @@ fn clip_planes() {
                  remove it)"
         )
     };
-    assert_eq!(told(perspective(0.1, 100.0), ahead), [""; 0]);
-    assert_eq!(told(perspective(4.5, 100.0), ahead), [near]);
-    assert_eq!(told(perspective(0.1, 5.5), ahead), [far("5.5")]);
-    assert_eq!(told(perspective(4.5, 5.5), ahead), [near.to_string(), far("5.5")]);
+    assert_eq!(warnings(perspective(0.1, 100.0), ahead), [""; 0]);
+    assert_eq!(warnings(perspective(4.5, 100.0), ahead), [near]);
+    assert_eq!(warnings(perspective(0.1, 5.5), ahead), [far("5.5")]);
+    assert_eq!(warnings(perspective(4.5, 5.5), ahead), [near.to_string(), far("5.5")]);
     // Beside the picture, and behind the camera.
-    assert_eq!(told(perspective(4.5, 5.5), [9.0, 0.0, 5.0]), [""; 0]);
-    assert_eq!(told(perspective(4.5, 5.5), [0.0, 0.0, -5.0]), [""; 0]);
-    assert_eq!(told(orthographic.clone(), ahead), [far("3")]);
-    assert_eq!(told(orthographic, [2.5, 0.0, 5.0]), [""; 0]);
+    assert_eq!(warnings(perspective(4.5, 5.5), [9.0, 0.0, 5.0]), [""; 0]);
+    assert_eq!(warnings(perspective(4.5, 5.5), [0.0, 0.0, -5.0]), [""; 0]);
+    assert_eq!(warnings(orthographic.clone(), ahead), [far("3")]);
+    assert_eq!(warnings(orthographic, [2.5, 0.0, 5.0]), [""; 0]);
     // A cube that is seen from its inside.
-    assert_eq!(told(perspective(0.5, 1.5), [0.0; 3]), [""; 0]);
+    assert_eq!(warnings(perspective(0.5, 1.5), [0.0; 3]), [""; 0]);
 }
 
 #[test]
@@ -259,15 +259,15 @@ fn environment_and_medium_of_the_scene() {
 #[test]
 fn a_world_that_is_left_out() {
     let mut file = Glb::new();
-    let told = |file: &Glb| (read(file).environment_unknown, read(file).environment.is_some());
-    assert_eq!(told(&file), (true, false));
+    let environment = |file: &Glb| (read(file).environment_unknown, read(file).environment.is_some());
+    assert_eq!(environment(&file), (true, false));
     file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0, 0, 0]}}});
-    assert_eq!(told(&file), (false, false));
+    assert_eq!(environment(&file), (false, false));
     file.json["scenes"][0]["extras"] = json!({"caustique": {"environment": {"color": [0, 0.1, 0]}}});
-    assert_eq!(told(&file), (false, true));
+    assert_eq!(environment(&file), (false, true));
     let mut file = Glb::new();
     file.json["asset"]["generator"] = "by hand".into();
-    assert_eq!(told(&file), (false, false));
+    assert_eq!(environment(&file), (false, false));
 }
 
 /// OpenEXR and Radiance images, the first beside the scene file; what is negative or not finite is clamped and counted.

@@ -68,8 +68,8 @@ fn files_outside_the_folder_are_not_opened() {
                 "DIR/scene/a.glb: {place}: the file {shown} is outside the scene's folder\n\
                  hint: put it beside the scene file and name it so, or allow such files with --allow-outside"
             );
-            let told = reading(folder, part, &name, false).expect_err(&name);
-            assert_eq!(told, expected, "{part} {name}");
+            let error = reading(folder, part, &name, false).expect_err(&name);
+            assert_eq!(error, expected, "{part} {name}");
             let of_windows = ["\\", "%5C", "c:"].iter().any(|part| name.contains(part));
             if name != absent && !name.contains("no-") && !name.starts_with("nowhere") && !of_windows {
                 assert_eq!(reading(folder, part, &name, true), Ok(()), "{part} {name}");
@@ -103,8 +103,8 @@ fn addresses_are_not_opened() {
             assert_eq!(reading(folder, part, &name, true), Err(expected.clone()), "{part} {name}");
             assert_eq!(reading(folder, part, &name, false), Err(expected), "{part} {name}");
         }
-        let told = reading(folder, part, "%252e%252e/a", false).expect_err("it is not there");
-        assert!(told.contains("2e/a") && told.contains("No such file") && told.contains("hint: "), "{told}");
+        let error = reading(folder, part, "%252e%252e/a", false).expect_err("it is not there");
+        assert!(error.contains("2e/a") && error.contains("No such file") && error.contains("hint: "), "{error}");
     }
 }
 

@@ -74,9 +74,9 @@ fn faults_of_animations_do_not_refuse_still_pictures() {
         let mut file = everything();
         *file.json.pointer_mut(pointer).unwrap() = value;
         let warnings = read(&file).warnings;
-        let told =
+        let names_fault =
             |warning: &String| warning.starts_with(fault) && warning.contains("; what it moves stays as it is (");
-        assert!(warnings.iter().any(told), "{fault}: {warnings:?}");
+        assert!(warnings.iter().any(names_fault), "{fault}: {warnings:?}");
         let frame = Some(FrameTime { number: 12, rate: None, of_sequence: false });
         let options = ReadOptions { frame, ..ReadOptions::default() };
         let error = read_bytes(&file.bytes(), Path::new("pool.glb"), &options).unwrap_err();

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// What is said of a file.
-pub fn told(bytes: &[u8], options: &ReadOptions) -> Vec<String> {
+pub fn messages_of(bytes: &[u8], options: &ReadOptions) -> Vec<String> {
     match read_bytes(bytes, Path::new("a.glb"), options) {
         Ok(scene) => scene.warnings.iter().map(|warning| format!("warning: {warning}")).collect(),
         Err(error) => vec![message(&error)],
@@ -63,8 +63,8 @@ pub fn changed(base: &Glb, changes: &Value) -> Vec<String> {
             place => put(&mut file.json, place, value.clone()),
         }
     }
-    let before = told(&base.bytes(), &ReadOptions::default());
-    told(&file.bytes(), &options).into_iter().filter(|line| !before.contains(line)).collect()
+    let before = messages_of(&base.bytes(), &ReadOptions::default());
+    messages_of(&file.bytes(), &options).into_iter().filter(|line| !before.contains(line)).collect()
 }
 
 /// A quad called "water" on a node called "Pool".
@@ -79,7 +79,7 @@ pub fn pool() -> Glb {
 pub fn said() -> String {
     let mut said = Said::default();
     let everything = everything();
-    said.case("everything as it is", &told(&everything.bytes(), &ReadOptions::default()));
+    said.case("everything as it is", &messages_of(&everything.bytes(), &ReadOptions::default()));
     let lists = [numbers(), parts(), meshes(), shapes(&everything), materials(), textures(), lamps(), nodes()];
     for (what, changes) in lists.into_iter().flatten() {
         said.case(&format!("{what}: {changes}"), &changed(&everything, &changes));
@@ -89,7 +89,7 @@ pub fn said() -> String {
     }
     let [whole, small] = jpegs();
     for (what, image) in [("half a JPEG", &whole[..whole.len() / 2]), ("a JPEG of too few bits", &small)] {
-        said.case(what, &told(&wearing(image, "image/jpeg").bytes(), &ReadOptions::default()));
+        said.case(what, &messages_of(&wearing(image, "image/jpeg").bytes(), &ReadOptions::default()));
     }
     let solid = |positions: &[[f32; 3]], indices: &[u32]| {
         let mut file = Glb::new();
@@ -100,7 +100,7 @@ pub fn said() -> String {
         );
         let mesh = file.mesh("cube", positions, indices, Some(glass));
         file.node(json!({"mesh": mesh}));
-        told(&file.bytes(), &ReadOptions::default())
+        messages_of(&file.bytes(), &ReadOptions::default())
     };
     let cube = |middle: f32, half: f32| {
         let corner = move |i: u32| [0, 1, 2].map(|k| middle + if i >> k & 1 == 1 { half } else { -half });
@@ -116,7 +116,7 @@ pub fn said() -> String {
         said.case(what, &solid(&shells.concat(), &indices));
     }
     for (what, bytes) in containers() {
-        said.case(what, &told(&bytes, &ReadOptions::default()));
+        said.case(what, &messages_of(&bytes, &ReadOptions::default()));
     }
     let missing = read(Path::new("/nowhere/a.glb"), &ReadOptions::default()).expect_err("it is not there");
     said.case("no such file", &[message(&missing)]);

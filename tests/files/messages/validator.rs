@@ -5,7 +5,7 @@
 //! Left out: extensions that are not read, hints about what is never used, and what only a validator does (`IO_ERROR`).
 
 use super::Said;
-use super::scene::{changed, pool, told};
+use super::scene::{changed, messages_of, pool};
 use crate::gltf::everything::everything;
 use crate::gltf::glb::Glb;
 use caustique::scene::gltf::ReadOptions;
@@ -256,7 +256,7 @@ fn what_the_validator_knows_is_read_or_refused() {
         case(&format!("{code}: {changes}"), changed(&everything, &changes));
     }
     for (code, bytes) in containers() {
-        case(code, told(&bytes, &ReadOptions::default()));
+        case(code, messages_of(&bytes, &ReadOptions::default()));
     }
     insta::assert_snapshot!("validator", said.0);
 }

@@ -255,8 +255,8 @@ fn narrow_beams_light_large_glass() {
     };
     silent(scene(0.3, false));
     silent(scene(0.3, true));
-    let told = "object \"Slab\": no light shines on its glass, so it casts no caustic; aim a light at it";
-    assert_eq!(warning(scene(4.0, false)), told);
+    let expected = "object \"Slab\": no light shines on its glass, so it casts no caustic; aim a light at it";
+    assert_eq!(warning(scene(4.0, false)), expected);
 }
 
 /// Old models fade glass by alpha. Veils that are open, rough, flat or hardly fade may be meant to.
@@ -305,10 +305,10 @@ fn a_dome_shuts_the_environment_out() {
         let dome_mesh = sphere(Vec3::ZERO, radius, 16);
         with(Description { environment, ..floor() }, "Dome", dome_mesh, dome)
     };
-    let told = "the environment lights nothing that the camera sees: \"Dome\" shuts it out; make an opening, let it glow if it is the sky, \
+    let expected = "the environment lights nothing that the camera sees: \"Dome\" shuts it out; make an opening, let it glow if it is the sky, \
                 or take it away";
     let plan = plan(under(matte(0.5, 0.0), 50.0));
-    assert_eq!(plan.warnings, [told]);
+    assert_eq!(plan.warnings, [expected]);
     assert_eq!(plan.reason_if_black, "what the warnings above name is the likely reason");
     silent(under(glass(1.0), 50.0));
     // A ball beside the camera.

@@ -1,4 +1,4 @@
-//! Makes small valid files for every fuzz target: `seeds PROGRAM FOLDER`, where the program is caustique.
+//! Writes small valid files for every fuzz target: `seeds PROGRAM FOLDER`, where the program is caustique.
 
 #[path = "../../../files/gltf/everything.rs"]
 mod everything;
@@ -19,7 +19,7 @@ use std::{env, fs};
 
 type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
-/// A folder with a folder of seeds for each target.
+/// A folder with one subfolder of seeds per target.
 struct Seeds(PathBuf);
 
 impl Seeds {
@@ -46,7 +46,7 @@ fn main() -> Outcome {
     Ok(())
 }
 
-/// A cube, lit, with a camera.
+/// A cube with a light and a camera.
 fn plain() -> Glb {
     let mut file = Glb::new();
     let mesh = file.cube("cube", None);
@@ -91,7 +91,7 @@ fn encoded(image: &DynamicImage, format: ImageFormat) -> Outcome<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
-/// Texels that are not all alike.
+/// Texels with different values.
 fn gradient(width: u32, height: u32) -> DynamicImage {
     image::RgbaImage::from_fn(width, height, |x, y| image::Rgba([(40 * x) as u8, (50 * y) as u8, 7, 200])).into()
 }
@@ -167,7 +167,7 @@ fn pictures(seeds: &Seeds) -> Outcome {
     Ok(())
 }
 
-/// A checkpoint and a shard of a small render, whole and as the contents of their records.
+/// A checkpoint and a shard of a small render, as whole files and as the contents of their records.
 fn states(seeds: &Seeds, program: &str) -> Outcome {
     let folder = tempfile::tempdir()?;
     fs::write(folder.path().join("a.glb"), plain().bytes())?;
@@ -194,7 +194,8 @@ fn states(seeds: &Seeds, program: &str) -> Outcome {
     Ok(())
 }
 
-/// The contents of records as the targets take them: the first up to a zero, the second with its length, the third.
+/// The contents of records in the format of the targets: the first ends at a zero byte, the second starts with its
+/// length, the third is the rest.
 fn contents(mut file: &[u8]) -> Outcome<Vec<u8>> {
     let mut all = Vec::new();
     while let Some(record) = Record::read(&mut file)? {
