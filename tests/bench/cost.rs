@@ -1,7 +1,7 @@
-//! What `--method auto` takes an iteration to cost, by counted work, beside what it costs.
+//! Compares the cost of an iteration that `--method auto` predicts from counted work with the measured cost.
 //!
-//! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by way and scene; the
-//! last line is JSON for `scripts/lab`.
+//! `cargo bench --bench cost -- SCENE.glb... [width=W] [levels=M]`: core-seconds of an iteration by candidate and
+//! scene. The last line is JSON for `scripts/lab`.
 
 use caustique::choose::counted_cost;
 use caustique::render::Candidate;
@@ -10,7 +10,7 @@ use caustique::scene::gltf::{ReadOptions, read};
 use caustique::scene::{CameraRequest, Scene};
 use caustique::transport::Indirect;
 
-/// What counts is the median of so many.
+/// Number of iterations, of which the median counts.
 const ITERATIONS: usize = 7;
 
 fn main() {

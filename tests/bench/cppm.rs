@@ -1,8 +1,8 @@
-//! The chi-squared rule on its own: how often it rejects uniform photons, at how many of them and over how many looks,
-//! and what it costs.
+//! The chi-squared rule in isolation: how often it rejects uniform photons, by the number of photons and of tests, and
+//! its cost.
 //!
-//! `cargo bench --bench cppm -- [SCENE.glb...] [width=W] [iterations=N]`; the last line is JSON for `scripts/lab`.
-//! With scenes named, only what the rule costs there.
+//! `cargo bench --bench cppm -- [SCENE.glb...] [width=W] [iterations=N]`. The last line is JSON for `scripts/lab`. If
+//! scenes are given, only the cost of the rule in these scenes is measured.
 
 use caustique::camera::Camera;
 use caustique::estimator::rule::CountingRule;
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 
 const TRIALS: u64 = 100_000;
-/// Where its cost is measured.
+/// Scenes in which the cost is measured.
 const SCENES: [&str; 6] = [
     "scenes/interior.glb",
     "scenes/blocks.glb",
@@ -27,7 +27,7 @@ const SCENES: [&str; 6] = [
     "scenes/pool.glb",
     "scenes/torus.glb",
 ];
-/// Pixels and iterations of the look after look at uniform light.
+/// Number of pixels, and of iterations, for repeated tests of uniform light.
 const PIXELS: u64 = 4000;
 const LOOKS: u64 = 1000;
 
@@ -57,7 +57,7 @@ fn uniform(frame: &Frame, stream: Stream) -> FoundPhotons {
 /// Share of uniform samples that are rejected, by their number.
 fn sizes() -> Vec<Value> {
     println!("uniform photons that are rejected, of {TRIALS} trials (the significance is 0.05)");
-    // Of a disc that never shrinks.
+    // A rule whose disc never shrinks.
     let rule = ChiSquared::new(&ChiSquaredSettings { significance: 1e-300, ..ChiSquaredSettings::default() });
     let frame = Frame::from_normal(Vec3::Z);
     let critical = Distribution::new(11.0).map_or(f64::NAN, |d| d.inverse_cdf(0.95));
@@ -83,7 +83,7 @@ fn sizes() -> Vec<Value> {
     all
 }
 
-/// What look after look does to pixels under uniform light, ten photons in each to begin with.
+/// The effect of repeated tests on pixels under uniform light, with ten photons each at the start.
 fn looks() -> Value {
     println!("{PIXELS} uniform pixels of 10 photons, looked at after every iteration");
     let rule = ChiSquared::new(&ChiSquaredSettings::default());
@@ -96,7 +96,7 @@ fn looks() -> Value {
         let mut rejected = None;
         for i in 1..=LOOKS {
             let mut tally = Tally::default();
-            // Ten photons an iteration in the first disc; those in the bandwidth are counted.
+            // Ten photons per iteration in the initial disc, of which those within the bandwidth are counted.
             for k in 0..10 {
                 let found = uniform(&frame, Stream::new(12, i * 16 + k, Domain::Test, pixel));
                 rule.count(&bandwidth, &mut counts, &mut tally, &frame, &found);
@@ -122,7 +122,7 @@ fn looks() -> Value {
     json!({"rejected": all, "area_mean": mean, "area_deciles": [at(0.1), at(0.5), at(0.9)]})
 }
 
-/// Core-seconds of an iteration with bandwidths that stay, with the rule and without; and with the rule's own.
+/// Core-seconds of an iteration with fixed bandwidths, with and without the rule, and with the bandwidths of the rule.
 fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
     let description = read(path.as_ref(), &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let scene = Scene::build(description, 0).unwrap_or_else(|e| panic!("{e}"));
@@ -135,7 +135,7 @@ fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
         let stay = Settings { alpha: 1.0, ..base.clone() };
         let rule = Settings { method: Method::Cppm, chi_squared: never, ..base.clone() };
         let kept = Steps::of(&scene, &camera, [&stay, &rule], iterations);
-        // Which nothing but a median is wanted of.
+        // Fewer iterations, because only a median is needed.
         let few = iterations.div_ceil(4);
         let own = Steps::of(&scene, &camera, [&base, &Settings { method: Method::Cppm, ..base.clone() }], few);
         println!(
@@ -159,21 +159,21 @@ fn cost(path: &str, width: u32, iterations: usize) -> Vec<Value> {
     rows
 }
 
-/// Core-seconds of every iteration of two renders that take turns, with the same photons and eye paths.
+/// Core-seconds of every iteration of two alternating renders with the same photons and camera paths.
 struct Steps {
     /// Whole iterations.
     all: [Vec<f64>; 2],
-    /// Their eye passes.
+    /// Their camera passes.
     eye: [Vec<f64>; 2],
 }
 
 impl Steps {
-    /// Their iterations, each after or before that of the other, by turns.
+    /// Measures both renders. In each iteration the order alternates.
     fn of(scene: &Scene, camera: &Camera, settings: [&Settings; 2], iterations: usize) -> Steps {
         let stages = settings.map(|settings| RenderInput::new(scene, camera, settings));
         let mut sessions = stages.each_ref().map(Session::new);
         let mut steps = Steps { all: [vec![], vec![]], eye: [vec![], vec![]] };
-        // The first has what is made once.
+        // The first iteration includes one-time work.
         for i in 0..=iterations {
             for turn in 0..2 {
                 let which = (i + turn) % 2;
@@ -189,13 +189,13 @@ impl Steps {
         steps
     }
 
-    /// Of an iteration.
+    /// Median core-seconds of an iteration.
     fn seconds(&self, which: usize) -> f64 {
         sorted(self.all[which].iter().copied())[self.all[which].len() / 2]
     }
 
-    /// What the second adds to an iteration of the first, in percent, with its interval of 95 %: the median of paired
-    /// differences of eye passes, for the rest is the same work, and by order statistics where it may be.
+    /// The cost that the second render adds to an iteration of the first (percent), with a 95 % interval by order
+    /// statistics: the median of the paired differences of the camera passes, because the remaining work is equal.
     fn difference_percent(&self) -> [f64; 3] {
         let differences = sorted(self.eye[0].iter().zip(&self.eye[1]).map(|(first, second)| second - first));
         let middle = differences.len() as f64 / 2.0;

@@ -1,5 +1,4 @@
-//! What an iteration costs, and what levels and the second eye path add: variants interleaved in one run, core-seconds
-//! per phase.
+//! The cost of an iteration, and of levels and the second camera path: core-seconds per phase of interleaved variants.
 //!
 //! `cargo bench --bench iteration -- SCENE.glb [WIDTH] [ROUNDS]`; the last line is JSON for `scripts/lab`.
 
@@ -56,7 +55,7 @@ fn main() {
     println!("layers and combiner, once{:>47.3}", combiner);
     println!("five levels over one, both with two eye paths: {:+.1} %", (all(0) / all(1) - 1.0) * 100.0);
     println!("five levels over one on one eye path: {:+.1} %", (all(0) / all(2) - 1.0) * 100.0);
-    // What a whole render pays for levels and combiner, against the plain method: pilot and combiner once.
+    // Relative cost of levels and combiner in a whole render, with one pilot and one run of the combiner.
     let whole = |v: usize, iterations: f64, once: f64| seconds[v] + once + iterations * all(v);
     for iterations in [16.0, 64.0, 256.0, 1024.0] {
         let (ours, plain) = (whole(0, iterations, combiner), whole(2, iterations, 0.0));
@@ -77,7 +76,7 @@ fn main() {
     );
 }
 
-/// Core-seconds of the combiner with all that it reads, after a render of two iterations.
+/// Core-seconds of the combiner with all its inputs, after a render of two iterations.
 fn combine(scene: &Scene, camera: &Camera) -> f64 {
     let settings = Settings { iterations: Some(2), ..Settings::default() };
     let rendered = render(scene, camera, &settings, |_, _| Control::Continue);

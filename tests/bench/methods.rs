@@ -1,5 +1,5 @@
-//! What methods cost: processor seconds of an iteration at 512 x 512 and of a million light and eye paths, in a Cornell
-//! box with a mirror sphere, and of path tracing in one where all is diffuse. The last line is JSON for
+//! The cost of methods: processor seconds of an iteration at 512 x 512 and of a million light and camera paths, in a
+//! Cornell box with a mirror sphere, and of path tracing in a purely diffuse one. The last line is JSON for
 //! `scripts/lab`.
 
 #[path = "../support/mod.rs"]
@@ -14,7 +14,7 @@ use caustique::scene::{CameraRequest, Description, Scene};
 use caustique::transport::{LightVertex, MergePhoton};
 use support::scenes::{add, build, cuboid, look_at, matte, mirror, quad, sphere};
 
-/// The classical box; what stands in it decides how it scatters.
+/// The Cornell box. `ball` is the material of a sphere in it.
 fn cornell(ball: Option<Material>) -> Description {
     let mut description = Description::default();
     let color = |r, g, b| Material { base_color: [r, g, b, 1.0], ..matte(0.0, 0.0) };
@@ -48,7 +48,7 @@ fn cornell(ball: Option<Material>) -> Description {
     description
 }
 
-/// A box turned about the vertical.
+/// A box rotated about the vertical axis.
 fn block(center: Vec3, half: Vec3, angle: f32) -> Mesh {
     let mut mesh = cuboid(-half, half, false);
     for p in &mut mesh.positions {
@@ -78,7 +78,8 @@ struct Cost {
     photons: u64,
 }
 
-/// Processor seconds of an iteration, the first left out (it merges nothing, and it is cold); least of some runs.
+/// Processor seconds of an iteration, the minimum over some runs. Without the first iteration, which merges nothing and
+/// starts with cold caches.
 fn cost(scene: &Scene, method: Method, levels: usize) -> Cost {
     let camera = scene
         .camera(&CameraRequest { width: Some(512), height: Some(512), ..CameraRequest::default() })
@@ -137,14 +138,14 @@ fn main() {
         let (light, eye) = (per_million(light_paths), per_million(eye_paths));
         println!("{:<8}{levels:>8}{seconds:>12.2}{light:>24}{eye:>24}", format!("{method:?}").to_lowercase());
         match (method, levels) {
-            // Merges every vertex that is not a mirror's.
+            // Merges every vertex that is not on a mirror.
             (Method::Bpm, _) => photons[0] = left,
             (Method::Vcm, 1) => (vcm, photons[1]) = (seconds, left),
             _ => {}
         }
     }
-    // What keeping a pass's light vertices until its eye paths merge them would take, beside the photons that wait for
-    // the next pass.
+    // Memory for keeping the light vertices of an iteration until its camera paths merge them, and for the photons kept
+    // for the next iteration.
     let mib = |count: u64, size: usize| count as f64 * size as f64 / f64::from(1 << 20);
     let (kept, whole) = (mib(photons[1], size_of::<MergePhoton>()), mib(photons[0], size_of::<LightVertex>()));
     println!("\nmemory of vcm: {} photons of {} bytes, {kept:.0} MiB;", photons[1], size_of::<MergePhoton>());

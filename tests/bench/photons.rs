@@ -1,6 +1,6 @@
-//! Which structure serves range queries best: our implicit tree against a hash grid and a kd-tree, on photons as scenes
-//! leave them (a plane, a caustic in a room, a focus), with bandwidths that spread a hundredfold. All in one run,
-//! interleaved; ratios count.
+//! Compares data structures for range queries: this project's implicit tree, a hash grid and a kd-tree, on typical
+//! photon distributions (a plane, a caustic in a room, a focus), with bandwidths over a factor of a hundred. All
+//! interleaved in one run; only ratios count.
 
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 
@@ -13,20 +13,20 @@ use std::time::Instant;
 const PHOTONS: u64 = 200_000;
 const QUERIES: usize = 100_000;
 
-/// Photons of a distribution, then query points: places where photons lie, as pixels see them.
+/// Photons of a distribution, then query points: positions of photons, in the order of pixels.
 fn distribution(name: &str, i: u64) -> Vec3 {
     let draws = Stream::new(5, 0, Domain::Test, i).vertex(0);
     let u = draws.two(Purpose::Pixel);
     let v = draws.two(Purpose::Lens);
     match name {
         "plane" => Vec3::new(u.x * 4.0, 0.0, u.y * 4.0),
-        // Walls of a room, and half of the photons on caustic curves a millimetre wide.
+        // Walls of a room, and half of the photons on caustic curves of a millimetre's width.
         "caustic" if i.is_multiple_of(2) => {
             let phi = u.x * 6.0;
             let r = 0.2 + 0.05 * (3.0 * phi).sin() + 1e-3 * (v.x + v.y - 1.0);
             Vec3::new(1.0 + r * phi.cos(), 0.0, 1.0 + r * phi.sin())
         }
-        // A perfect focus: density like 1 / r^2 over four decades.
+        // A perfect focus: density proportional to 1 / r^2 over four decades.
         "focus" if i.is_multiple_of(2) => {
             let r = 0.5 * 10f32.powf(-4.0 * u.x);
             let phi = u.y * std::f32::consts::TAU;
@@ -40,7 +40,7 @@ fn distribution(name: &str, i: u64) -> Vec3 {
     }
 }
 
-/// Counting-sorted hash grid with cells of twice the radius it is made for; coordinates are checked, so nothing counts
+/// Counting-sorted hash grid with cells of twice the radius. Queries compare cell coordinates, so that no photon counts
 /// twice.
 struct Grid {
     cell: f32,
@@ -180,7 +180,7 @@ fn main() {
         let t = Instant::now();
         let map = PhotonMap::build(points.iter().map(photon).collect());
         let build_tree = t.elapsed();
-        // Neighbouring pixels see neighbouring places: queries follow the map's own order in runs.
+        // Neighbouring pixels see neighbouring points, so queries follow the order of the map in runs.
         let mut nearest = Nearest::<Photon>::default();
         let queries: Vec<(Vec3, f32)> = (0..QUERIES)
             .map(|i| {
@@ -196,7 +196,7 @@ fn main() {
         }
         let mut sorted: Vec<f32> = queries.iter().map(|q| q.1.sqrt()).collect();
         sorted.sort_by(f32::total_cmp);
-        // A grid has one cell size; SmallVCM and pbrt take the largest radius. The 99th percentile is kinder to it.
+        // A grid has one cell size. SmallVCM and pbrt use the largest radius; the 99th percentile favours the grid.
         let t = Instant::now();
         let grid = Grid::build(&points, sorted[sorted.len() * 99 / 100]);
         let build_grid = t.elapsed();

@@ -1,7 +1,7 @@
-//! What f32 loses where f64 or sums in two parts could stand, and what each costs: both in one run, errors against the
-//! same numbers with more digits.
+//! Errors of f32 where f64 or two-part sums could be used, and the costs of both, in one run. Errors are relative to
+//! numbers with more digits.
 //!
-//! `cargo bench --bench precision`; figures of the section "Precision" in `docs/lab/hard-cases.md`.
+//! `cargo bench --bench precision`. The figures are in the section "Precision" of `docs/lab/hard-cases.md`.
 
 use caustique::estimator::rule::memoryless::radius2_factor;
 use caustique::math::{Affine3A, DAffine3, DVec3, Vec3};
@@ -11,7 +11,7 @@ use caustique::stat::sum::{Grid, Sum};
 use std::hint::black_box;
 
 const MILLION: u32 = 1_000_000;
-/// Runs of which the fastest counts.
+/// Number of runs, of which the fastest counts.
 const RUNS: usize = 5;
 
 fn main() {
@@ -30,7 +30,7 @@ fn row(what: &str, [single, double]: [f64; 2], [ns_single, ns_double]: [f64; 2])
     println!("{what:<44}{single:>12.1e}{double:>12.1e}{ns_single:>10.2}{ns_double:>10.2}");
 }
 
-/// Nanoseconds of one of `count` steps of `run`, and what it returns.
+/// Nanoseconds per step of `run`, which has `count` steps, and its result.
 fn timed<T>(count: u32, run: impl Fn() -> T) -> (f64, T) {
     let mut result = black_box(run());
     let mut best = f64::INFINITY;
@@ -46,10 +46,11 @@ fn uniform(index: u32, vertex: u32) -> f32 {
     Stream::new(51, 0, Domain::Test, u64::from(index)).vertex(vertex).one(Purpose::Pixel)
 }
 
-/// A million samples, few of them a million times as bright as the rest: in f32, in f64, and as pixels are summed.
+/// A million samples, of which a few are a million times as bright as the rest: summed in f32, in f64, and as pixels
+/// are.
 fn pixel_sums() {
     let values: Vec<f32> = (0..MILLION).map(|i| 10f32.powf(6.0 * uniform(i, 0).powi(8) - 3.0)).collect();
-    // Whole multiples of 2^-40, whose sum is exact.
+    // Multiples of 2^-40, whose sum is exact.
     let exact: i128 = values.iter().map(|value| (f64::from(*value) * 2f64.powi(40)) as i128).sum();
     let exact = exact as f64 * 2f64.powi(-40);
     let error = |sum: f64| (sum / exact - 1.0).abs();
@@ -65,7 +66,7 @@ fn pixel_sums() {
     row("a pixel's sum, on two grids", [error(f64::from(single)), error(sum)], [ns_single, ns]);
 }
 
-/// A squared radius multiplied by its factor a million times, against the explicit form.
+/// A squared radius multiplied by its factor a million times, compared with the explicit form.
 fn radii() {
     const ALPHA: f64 = 2.0 / 3.0;
     let exact = radius2_factor(u64::from(MILLION), ALPHA);
@@ -77,12 +78,12 @@ fn radii() {
     row("a radius kept over 10^6 iterations", [error(f64::from(single)), error(double)], [ns_single, ns_double]);
 }
 
-/// Weights of connecting a path of `N` vertices at each of its edges by partial sums along the path [Georgiev 2012], in
-/// either precision: how far their sum is from one, at worst; infinite where one is no number.
+/// Weights of connecting a path of `N` vertices at each of its edges, by partial sums along the path [Georgiev 2012],
+/// in either precision: the largest deviation of their sum from one; infinite if one is not finite.
 macro_rules! partial_sums {
     ($name:ident, $real:ty) => {
         fn $name<const N: usize>(forward: &[f32; N], reverse: &[f32; N]) -> f64 {
-            // `light[s]`: densities of all edges before `s` over that of `s`, and likewise from the eye.
+            // `light[s]`: densities of all edges before `s` over that of `s`; `eye` likewise from the camera.
             let (mut light, mut eye) = ([0.0 as $real; N], [0.0 as $real; N]);
             for s in 1..N {
                 light[s] = (reverse[s - 1] as $real / forward[s - 1] as $real) * (1.0 + light[s - 1]);
@@ -111,7 +112,7 @@ fn weights<const N: usize>(what: &str, span: f32) {
     row(what, [single, double], [ns_single, ns_double]);
 }
 
-/// exp(-x) of optical depths up to 40, against f64.
+/// exp(-x) of optical depths up to 40, compared with f64.
 fn transmittance() {
     let depths: Vec<[f32; 2]> = (0..MILLION).map(|i| [40.0 * uniform(i, 0).sqrt(), uniform(i, 1).sqrt()]).collect();
     let (ns_single, _) = timed(MILLION, || depths.iter().map(|[sigma, d]| (-sigma * d).exp()).sum::<f32>());
@@ -125,7 +126,7 @@ fn transmittance() {
     row("transmittance, optical depths up to 40", [worst, f64::EPSILON], [ns_single, ns_double]);
 }
 
-/// A million equal lamps chosen by running sums: the largest error of a probability, relative.
+/// A million equal lamps chosen by running sums: the largest relative error of a probability.
 fn choices() {
     let share = 1.0 / f64::from(MILLION);
     let (ns_single, single) = timed(MILLION, || {
@@ -149,7 +150,7 @@ fn choices() {
     row("probabilities of 10^6 lamps, running sums", [single, double], [ns_single, ns_double]);
 }
 
-/// A turned part of a turned node, 1,300 km from the origin, seen from beside: metres.
+/// A rotated child of a rotated node, 1,300 km from the origin, seen from nearby: errors in metres.
 fn transforms() {
     let turn = |angle: f64| DAffine3::from_rotation_y(angle);
     let away = DAffine3::from_translation(DVec3::new(1.3e6, 10.0, -2.0e5));
@@ -163,7 +164,7 @@ fn transforms() {
         let all = singles.iter().fold(Affine3A::IDENTITY, |all, node| all * *black_box(node));
         all.transform_point3(p.as_vec3()) - near.as_vec3()
     });
-    // Recentred: composed in f64, and moved to the camera before it is rounded.
+    // Recentred: transforms are composed in f64 and moved to the camera before rounding.
     let recentred: Vec3 = double.as_vec3();
     let errors = [(single.as_dvec3() - double).length(), (recentred.as_dvec3() - double).length()];
     row("a part 1,300 km away, metres", errors, [ns_single, ns_double]);

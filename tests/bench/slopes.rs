@@ -1,11 +1,11 @@
-//! Bias and variance against iterations on fields of photons in closed form: the memoryless rule beside its exact
-//! finite sums, by SPPM and where merging alone finds light by VCM, and CPPM whose test always rejects.
+//! Bias and variance as functions of iterations on photon fields with a closed form: the memoryless rule with its exact
+//! finite sums, for SPPM and, where only merging finds light, for VCM; and CPPM with a test that always rejects.
 //!
-//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`, or `-- MEASURED.json PLOT.svg`, which draws what
-//! has been measured; every line of stdout is a JSON object: a rule, and per number of iterations the share of the
-//! first bandwidth's bias, the variance and the mean squared error (mean over pixels, over the squared truth), each
-//! with its standard error, and what is expected. Given the bandwidths, which earlier photons decide, an iteration's
-//! expectation is known: `bias_given` is the mean of these, the bias without the photons' noise.
+//! `cargo bench --bench slopes -- [ITERATIONS] [SEEDS] [PLOT.svg]`, or `-- MEASURED.json PLOT.svg` to plot earlier
+//! results. Every line of standard output is a JSON object: a rule, and per number of iterations the share of the first
+//! bandwidth's bias, the variance and the mean squared error (mean over pixels, relative to the squared truth), each
+//! with its standard error and expectation. Given the bandwidths, which depend on earlier photons, the expectation of
+//! an iteration is known: `bias_given` is the mean of these expectations, the bias without the noise of photons.
 
 #[path = "../support/field.rs"]
 mod field;
@@ -23,16 +23,16 @@ use serde_json::{Value, json};
 const RADIUS: f64 = 0.2;
 const PHOTONS: u32 = 2000;
 
-/// What is measured.
+/// A configuration to measure.
 struct Run {
     name: &'static str,
     field: Field,
-    /// Pixels for every one of the coarsest picture, across and down.
+    /// Number of pixels per pixel of the coarsest picture, in each direction.
     finer: u32,
-    /// Light paths of an iteration.
+    /// Light paths per iteration.
     photons: u32,
     method: Method,
-    /// Of the memoryless rule.
+    /// Alpha of the memoryless rule.
     alpha: Option<f64>,
     chi_squared: ChiSquaredSettings,
 }
@@ -55,7 +55,7 @@ impl Run {
         Run { name: "cppm, forced", method: Method::Cppm, alpha: None, chi_squared, ..Run::memoryless(1.0) }
     }
 
-    /// One light path a pixel.
+    /// One light path per pixel.
     fn merged() -> Run {
         let (finer, method) = (4, Method::Vcm);
         let photons = field::SIZE.0 * field::SIZE.1 * finer * finer;
@@ -70,14 +70,14 @@ impl Run {
     }
 }
 
-/// What a seed has at some number of iterations.
+/// Results of one seed after some number of iterations.
 struct Moment {
     /// Estimates of all pixels.
     estimates: Vec<f64>,
-    /// Their expectations, given the bandwidths.
+    /// Expectations of the estimates, given the bandwidths.
     given: Vec<f64>,
-    /// Mean over pixels of the sum over iterations of squared deviations from their expectation, over the squared
-    /// number of iterations and the squared truth.
+    /// Mean over pixels of the sum over iterations of squared deviations from the expectation, over the squared number
+    /// of iterations and the squared truth.
     sum: f64,
 }
 
@@ -119,7 +119,7 @@ fn main() {
             let stage = RenderInput::new(&scene, &camera, &settings);
             let mut session = Session::new(&stage);
             let (mut sums, mut given, mut squares) = (vec![0.0; fields.len()], vec![0.0; fields.len()], 0.0);
-            // The bandwidths of the next iteration, where they are the photons' doing.
+            // The bandwidths of the next iteration, if they depend on photons.
             let mut radii = vec![RADIUS; fields.len()];
             for i in 1..=n {
                 session.step();
@@ -157,8 +157,8 @@ fn main() {
     }
 }
 
-/// What is measured with its standard errors, the finite sums (lines) and the asymptotes (dashed): Knaus and Zwicker's
-/// figure.
+/// Plots the measurements with standard errors, the finite sums (lines) and the asymptotes (dashed), as in the figure
+/// of Knaus and Zwicker.
 fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
     let root = SVGBackend::new(file, (1000, 460)).into_drawing_area();
     root.fill(&WHITE)?;
@@ -172,7 +172,7 @@ fn plot(file: &str, rules: &[Value]) -> Result<(), Box<dyn std::error::Error>> {
             let series = rule["series"].as_array().into_iter().flatten();
             series.filter_map(|at| Some((at["iterations"].as_f64()?, number(&at[key])?))).collect()
         };
-        // CPPM's bias without the photons' noise.
+        // The bias of CPPM without the noise of photons.
         let shown = |rule: &Value| {
             if key == "bias" && rule["parameters"]["alpha"].is_null() { "bias_given" } else { key }
         };
@@ -254,7 +254,7 @@ fn at(n: u64, seeds: &[Moment], fields: &[PixelField], alpha: Option<f64>) -> Va
     };
     let pixels = fields.len() as f64;
     let estimates: Vec<&Vec<f64>> = seeds.iter().map(|moment| &moment.estimates).collect();
-    // Variance of each seed about the mean of the others, and error about the truth.
+    // Variance of each seed about the mean of the others, and error from the truth.
     let count = estimates.len() as f64;
     let means: Vec<f64> = (0..fields.len()).map(|k| estimates.iter().map(|e| e[k]).sum::<f64>() / count).collect();
     let by_seed = |about: &dyn Fn(usize) -> f64| -> Vec<f64> {

@@ -1,6 +1,6 @@
-//! Rays, photon maps and EXR files against what bounds them, as ratios in one run.
+//! Speed of rays, photon maps and EXR files relative to their lower bounds, as ratios in one run.
 //!
-//! `cargo bench --bench spine -- [SCENE.glb]`; the last line is JSON for `scripts/lab`.
+//! `cargo bench --bench spine -- [SCENE.glb]`. The last line is JSON for `scripts/lab`.
 
 #![allow(clippy::disallowed_methods, reason = "benchmarks are what clocks are for")]
 
@@ -16,7 +16,7 @@ use caustique::trace::Ray;
 use caustique_embree as embree;
 use std::time::Instant;
 
-/// Best of five, interleaved: seconds of `a` and of `b`.
+/// Seconds of `a` and of `b`, the fastest of five interleaved runs.
 fn race(mut a: impl FnMut(), mut b: impl FnMut()) -> (f64, f64) {
     let mut best = (f64::INFINITY, f64::INFINITY);
     for _ in 0..5 {
@@ -30,7 +30,7 @@ fn race(mut a: impl FnMut(), mut b: impl FnMut()) -> (f64, f64) {
     best
 }
 
-/// Rays of eye paths: from the camera, and from what those hit in a random direction.
+/// Rays of camera paths: from the camera, and in random directions from their hits.
 fn rays(scene: &Scene) -> Vec<Ray> {
     let view = CameraRequest { width: Some(640), ..CameraRequest::default() };
     let camera = scene.camera(&view).unwrap_or_else(|e| panic!("{e}"));
@@ -52,7 +52,7 @@ fn rays(scene: &Scene) -> Vec<Ray> {
     rays
 }
 
-/// The same triangles in Embree, without anything of ours around it.
+/// The triangles of the scene in Embree, without other code around it.
 fn raw(scene: &Scene) -> Result<embree::Scene, embree::Error> {
     let device = embree::Device::new(&embree::Library::load()?, 1)?;
     let mut root = embree::SceneBuilder::new(&device)?;

@@ -1,4 +1,4 @@
-//! Random scenes whose pictures are known: integrals of double precision over the film.
+//! Random scenes with known pictures: integrals over the film in double precision.
 
 use super::picture::{
     Difference, Found, MEANS, SIGNIFICANCE, SIZE, Shot, TILES, TOLERANCE, confirmed, differences, pictures,
@@ -14,23 +14,23 @@ use std::f64::consts::PI;
 /// Kinds of scenes with a known picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// A glowing convex body over a floor.
+    /// An emissive convex body over a floor.
     Glowing,
     /// A punctual light over a floor.
     Punctual,
-    /// A floor lit by a ball that a spot shines on.
+    /// A floor lit by light of a spot that a ball reflects.
     Bounce,
-    /// A wall seen through a block that absorbs and does not refract.
+    /// A wall seen through a block that absorbs but does not refract.
     Absorbing,
     /// A wall seen through a pane of absorbing glass at right angles.
     Pane,
-    /// White bodies of all kinds under a white sky.
+    /// White objects of all kinds under a white sky.
     Furnace,
 }
 
 pub const FORMS: [Form; 6] = [Form::Glowing, Form::Punctual, Form::Bounce, Form::Absorbing, Form::Pane, Form::Furnace];
 
-/// A scene and its picture.
+/// A scene and its known picture.
 pub struct Known {
     pub world: World,
     pub expected: Vec<f64>,
@@ -58,7 +58,7 @@ impl Form {
         known
     }
 
-    /// Methods that find this light, and the tolerance for their bias.
+    /// Methods that find this light, with the tolerance for their bias.
     pub fn methods(self) -> Vec<Method> {
         use Method as M;
         let all = vec![M::Path, M::Bdpt, M::Vcm, M::Sppm, M::Light, M::Mlt, M::Appm, M::Cppm, M::Ppm, M::Pm, M::Bpm];
@@ -81,10 +81,10 @@ impl Form {
     }
 }
 
-/// Compares a scene with its known picture; `None` where they agree.
+/// Compares renders of a scene with its known picture; `None` if they agree.
 ///
 /// # Errors
-/// The scene is not taken.
+/// The renderer refuses the scene.
 pub fn check(form: Form, known: &Known, method: Method) -> Result<Option<Vec<Difference>>, String> {
     let shot = Shot { max_depth: known.max_depth, ..Shot::new(method, CAMERA) };
     let expected = vec![known.expected.clone(); 2];
@@ -94,7 +94,7 @@ pub fn check(form: Form, known: &Known, method: Method) -> Result<Option<Vec<Dif
     })
 }
 
-/// A room with black walls whose floor is the plane y = -1, and a camera that sees nothing but the floor.
+/// A room with black walls and the floor at y = -1, and a camera that sees only the floor.
 fn over_a_floor(random: &mut Random) -> (World, DVec3) {
     let mut world = World { size: 2.0, ..World::default() };
     let side = if random.chance(0.5) { 1.0 } else { -1.0 };
@@ -112,7 +112,7 @@ fn over_a_floor(random: &mut Random) -> (World, DVec3) {
     (world, base)
 }
 
-/// Means of a picture of the first camera: radiance by ray.
+/// Means of the picture of the first camera; `radiance` gives the radiance of a ray (origin, direction).
 fn expect(world: &World, radiance: impl Fn(DVec3, DVec3) -> DVec3) -> Vec<f64> {
     const POINTS: u32 = 2;
     let camera = &world.things[0];
@@ -137,19 +137,18 @@ fn expect(world: &World, radiance: impl Fn(DVec3, DVec3) -> DVec3) -> Vec<f64> {
     means
 }
 
-/// Where a ray meets the floor.
+/// The intersection of a ray with the floor.
 fn on_floor(origin: DVec3, direction: DVec3) -> DVec3 {
     origin + direction * ((-1.0 - origin.y) / direction.y)
 }
 
-/// A place for a light, often in the middle of the room.
+/// A position for a light, often in the middle of the room.
 fn place(random: &mut Random, size: f64) -> DVec3 {
     let reach = if random.chance(0.6) { random.scale(1e-4, 0.1) } else { 0.6 - size };
     random.vector(-1.0, 1.0) * reach
 }
 
-/// Irradiance of a floor that looks up from a triangle that glows with radiance 1 (Lambert), wholly above it; none from
-/// its back.
+/// Irradiance of a floor that faces up, from a triangle of radiance 1 that is above it (Lambert). Zero for its back.
 fn irradiance(p: DVec3, corners: [DVec3; 3]) -> f64 {
     let front = (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(p - corners[0]) > 0.0;
     if !front {
@@ -159,7 +158,7 @@ fn irradiance(p: DVec3, corners: [DVec3; 3]) -> f64 {
     let edge = |i: usize| {
         let (a, b) = (v[i], v[(i + 1) % 3]);
         let normal = a.cross(b);
-        // Exact also for directions that almost agree.
+        // Accurate also for nearly equal directions.
         normal.length().atan2(a.dot(b)) * normal.normalize().y
     };
     0.5 * (edge(0) + edge(1) + edge(2)).abs()
@@ -188,7 +187,7 @@ fn glowing(random: &mut Random) -> Known {
     } else {
         Matter::glowing(emission)
     };
-    // Flat ones look about downwards, so that no floor in the picture is near their plane.
+    // Flat bodies face nearly downwards, so that no visible part of the floor is near their plane.
     let tilt = DQuat::from_rotation_x(PI + random.within(-0.15, 0.15));
     let rotation = if flat { tilt } else { random.turn() };
     let chain = vec![Placement { translation: place(random, size), rotation, scale: DVec3::splat(size) }];
@@ -237,7 +236,7 @@ fn punctual(random: &mut Random) -> Known {
     Known { world, expected, max_depth: 2 }
 }
 
-/// KHR_lights_punctual's recommended fall-off of a spot.
+/// The falloff of a spot that KHR_lights_punctual recommends.
 fn fall_off(cosine: f64, inner: f64, outer: f64) -> f64 {
     let x = ((cosine - outer.cos()) / (inner.cos() - outer.cos()).max(1e-3)).clamp(0.0, 1.0);
     x * x
@@ -252,13 +251,13 @@ fn bounce(random: &mut Random) -> Known {
     let white = random.vector(0.3, 1.0);
     let chain = vec![Placement { translation: middle, rotation: random.turn(), scale: DVec3::splat(size) }];
     let to_world = world.add("ball", ball.clone(), Matter::matte(white), chain).to_world();
-    // From the side that the camera's part of the floor sees, and no light passes the ball.
+    // On the side that the visible part of the floor sees; no light passes through the ball.
     let seen = world.things[0].to_world();
     let seen = on_floor(seen.translation, seen.transform_vector3(DVec3::NEG_Z)) - middle;
     let (from, p) = loop {
         let from = (seen.normalize() + random.vector(-0.5, 0.5) + 0.3 * DVec3::Y).normalize();
         let p = middle + from * random.within(2.0, 3.0) * size;
-        // Walls and floor hide the ball from a spot behind them.
+        // Walls and floor would hide the ball from a spot behind them.
         if p.abs().max_element() < 0.95 {
             break (from, p);
         }
@@ -290,7 +289,7 @@ fn bounce(random: &mut Random) -> Known {
     Known { world, expected, max_depth: 3 }
 }
 
-/// Small parts of a convex mesh that a spot of intensity 1 shines on: middle, normal and the flux that each receives.
+/// Small patches of a convex mesh lit by a spot of intensity 1: centre, normal and received flux of each.
 fn lit_patches(mesh: &Mesh, to_world: &DAffine3, p: DVec3, axis: DVec3, cone: (f64, f64)) -> Vec<(DVec3, DVec3, f64)> {
     let mut patches = vec![];
     for [a, b, c] in corners(mesh, to_world) {
@@ -320,7 +319,7 @@ fn lit_patches(mesh: &Mesh, to_world: &DAffine3, p: DVec3, axis: DVec3, cone: (f
     patches
 }
 
-/// A glowing wall, and a camera that sees nothing but that.
+/// An emissive wall, and a camera that sees only the wall.
 fn before_a_wall(random: &mut Random, view: f64) -> (World, DVec3) {
     let mut world = World { size: 4.0, ..World::default() };
     world.look(DVec3::Z * 2.0, DVec3::ZERO, Lens { view, orthographic: false, aperture: 0.0, focus: 2.0 });
@@ -398,7 +397,7 @@ fn furnace(random: &mut Random) -> Known {
     Known { world, expected, max_depth: u32::MAX }
 }
 
-/// A small sphere that looks inwards: in a solid, a bubble.
+/// A small sphere that faces inwards: a bubble in a solid.
 fn bubble() -> Mesh {
     let mut mesh = sphere(10, false).transformed(&DAffine3::from_scale(DVec3::splat(0.3)));
     mesh.triangles.iter_mut().for_each(|triangle| triangle.reverse());

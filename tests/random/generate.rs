@@ -1,7 +1,7 @@
-//! Random scenes from a seed: a room or a place under the sky, lights anywhere in it, things on its floor and in the
-//! air, as small as a millimetre or as large as a kilometre.
+//! Generates a random scene from a seed: a room or an open place, lights at any position, things on the floor and in
+//! the air, with sizes from a millimetre to a kilometre.
 //!
-//! They are made in a room whose longest side is 1, and then scaled, turned and moved as a whole.
+//! A scene is generated in a room whose longest side is 1, and then scaled, rotated and moved as a whole.
 
 use super::random::Random;
 use super::relation::similar;
@@ -10,22 +10,22 @@ use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Placement, Text
 use glam::{DQuat, DVec3, EulerRot};
 use std::f64::consts::{PI, TAU};
 
-/// Radius around a camera that stays empty.
+/// Radius of the empty space around a camera.
 const CAMERA_SPACE: f64 = 0.08;
-/// Attempts to find a place for a thing.
+/// Number of attempts to find a place for a thing.
 const ATTEMPTS: usize = 40;
 
 struct Generator {
     random: Random,
     world: World,
-    /// Half width, height and half depth of the room.
+    /// Half width, half height and half depth of the room.
     room: DVec3,
     closed: bool,
-    /// Bounding spheres of what is there.
+    /// Bounding spheres of the things placed so far.
     taken: Vec<(DVec3, f64)>,
 }
 
-/// The scene of a seed.
+/// Generates the scene of a seed.
 pub fn generate(seed: u64) -> World {
     let mut random = Random::new(seed);
     let mut sides = random.vector(0.55, 1.0);
@@ -98,7 +98,7 @@ impl Generator {
         }
     }
 
-    /// A place for a sphere of that radius within the room, its middle at a given height if there is one.
+    /// Finds a free place in the room for a sphere of this radius, with its centre at `height` if given.
     fn free(&mut self, radius: f64, height: Option<f64>) -> Option<DVec3> {
         for _ in 0..ATTEMPTS {
             let inner = (self.room - DVec3::splat(radius * 1.02)).max(DVec3::ZERO);
@@ -189,7 +189,7 @@ impl Generator {
         self.world.add("lamp", mesh, matter, chain);
     }
 
-    /// The same placement as a chain of nodes, some of them mirrored.
+    /// An equal placement as a chain of nodes, some of them with reflections.
     fn nested(&mut self, place: Placement) -> Vec<Placement> {
         let mut chain = vec![];
         let mut rest = place;
@@ -215,7 +215,7 @@ impl Generator {
         chain
     }
 
-    /// Something that no light passes.
+    /// An opaque material.
     fn opaque(&mut self) -> Matter {
         let base = self.color(0.1, 0.85);
         let mut matter = match self.random.below(6) {
@@ -248,7 +248,7 @@ impl Generator {
         self.world.textures.len() - 1
     }
 
-    /// Something that light passes.
+    /// A transmitting material.
     fn transparent(&mut self) -> Matter {
         let roughness = if self.random.chance(0.25) { self.random.within(0.15, 0.6) } else { 0.0 };
         let mut matter = Matter::glass(self.random.within(1.15, 1.9), roughness);
@@ -295,7 +295,7 @@ impl Generator {
         }
     }
 
-    /// Fog as wide as the room, whose faces are the room's.
+    /// Fog as wide as the room, whose faces coincide with the walls.
     fn fog_on_the_floor(&mut self) {
         let top = DVec3::new(1.0, self.random.within(0.1, 0.4), 1.0);
         let mesh = cuboid(self.room * DVec3::new(-1.0, 0.0, -1.0), self.room * top, false);
@@ -329,7 +329,7 @@ impl Generator {
         }
     }
 
-    /// Something with a flat bottom, on the floor exactly.
+    /// Adds a thing with a flat bottom that stands exactly on the floor.
     fn standing(&mut self, radius: f64) {
         let height = self.random.within(0.6, 1.6);
         let scale = radius / (1.0 + 0.25 * height * height).sqrt();
@@ -353,7 +353,7 @@ impl Generator {
     fn floating(&mut self, radius: f64) {
         let Some(p) = self.free(radius, None) else { return };
         let rotation = self.random.turn();
-        // Another copy of a thing that is there.
+        // Another instance of an existing thing.
         let copied = self.random.below(self.world.things.len());
         let copied = &self.world.things[copied];
         if self.random.chance(0.25) && copied.name.starts_with("floating") {
@@ -376,7 +376,7 @@ impl Generator {
         self.world.add("floating", mesh, matter, chain);
     }
 
-    /// The whole scene scaled, turned and moved.
+    /// Scales, rotates and moves the whole scene.
     fn placed(mut self) -> World {
         let size = self.random.scale(1e-3, 1e3);
         let middle = DVec3::new(0.0, 0.5 * self.room.y, 0.0);

@@ -1,5 +1,5 @@
-//! The long form: scenes of new seeds for hours. What fails is saved and made as small as it can be; a run goes on where
-//! the last one ended.
+//! Checks random scenes of new seeds for hours. Failing scenes are saved and reduced. A run continues from the last
+//! one.
 
 #![allow(clippy::disallowed_methods, reason = "hours are what clocks are for")]
 
@@ -36,13 +36,13 @@ struct Options {
     /// Hours to run.
     #[arg(long, default_value_t = 4.0)]
     hours: f64,
-    /// The first seed, of a folder that has no state.
+    /// The first seed, if the folder has no state.
     #[arg(long, default_value_t = 1000)]
     seed: u64,
-    /// Folder of the state and of what fails.
+    /// Folder of the state and of failing scenes.
     #[arg(long, default_value = "out/random")]
     output: PathBuf,
-    /// Checks of each scene by the four methods that are used most.
+    /// Checks of each scene with the four most used methods.
     #[arg(long, default_value_t = 4)]
     checks: usize,
     /// Checks a saved scene again (`scene.json` of a failure), and nothing else.
@@ -53,7 +53,7 @@ struct Options {
     bench: bool,
 }
 
-/// What a run leaves for the next one.
+/// State that a run saves for the next one.
 #[derive(Default, Serialize, Deserialize)]
 struct State {
     next_seed: u64,
@@ -63,7 +63,7 @@ struct State {
     seconds: f64,
 }
 
-/// A scene and how it failed.
+/// A failing scene and its failure.
 #[derive(Serialize, Deserialize)]
 struct Failure {
     broken: Broken,
@@ -88,7 +88,7 @@ fn main() -> io::Result<()> {
         state.seconds += before.elapsed().as_secs_f64();
         state.next_seed += 1;
         state.scenes += 1;
-        // Renamed, so that a killed run leaves the state of the last whole scene.
+        // Written and renamed, so that a killed run leaves the state of the last complete scene.
         let part = path.with_extension("part");
         fs::write(&part, serde_json::to_vec_pretty(&state)?)?;
         fs::rename(&part, &path)?;
@@ -136,7 +136,7 @@ fn scene(options: &Options, state: &mut State) -> io::Result<()> {
     Ok(())
 }
 
-/// Saves a scene that fails, and the smallest that is found of it.
+/// Saves a failing scene, and the smallest one that still fails.
 fn save(output: &Path, world: &World, broken: Broken) -> io::Result<PathBuf> {
     let name = format!("{}-{:?}-{}", world.seed, broken.relation, broken.method.name());
     let folder = output.join(name.replace(['(', ')'], "-"));

@@ -1,11 +1,12 @@
-//! Random scenes against closed forms, and against relations that hold whatever a scene is; `long.rs` does the same for
+//! Compares random scenes with closed forms, and tests relations that hold for any scene. `long.rs` does the same for
 //! hours with new seeds.
 //!
-//! A picture is 51 means: three channels of sixteen tiles and of the whole, over 8 seeds. A mean differs if Welch's t
-//! test finds it at 10^-6 and it is off by more than a tolerance (3 %; more for methods whose kernels blur), and this
-//! counts if the same mean differs again in four times as many new seeds. With normal means two equal pictures fail
-//! with a probability of at most 51 x 10^-12, so all checks here together with less than 10^-7. Means of few samples are
-//! not normal: `equal_pictures_rarely_differ` counts how often the first test alone fails. Seeds are fixed.
+//! A picture is reduced to 51 means: three channels of sixteen tiles and of the whole, over 8 seeds. A mean differs if
+//! Welch's t test rejects equality at 10^-6 and the difference exceeds a tolerance (3 %; more for methods whose kernels
+//! blur). The difference counts if the same mean differs again in four times as many new seeds. For normal means two
+//! equal pictures fail with a probability of at most 51 x 10^-12, so all checks together with less than 10^-7. Means of
+//! few samples are not normal: `equal_pictures_rarely_differ` counts how often the first test alone fails. Seeds are
+//! fixed.
 
 #[path = "../support/mod.rs"]
 mod support;
@@ -30,11 +31,11 @@ use picture::{SEEDS, Shot, differences, pictures, read};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use relation::{Relation, check};
 
-/// Scenes whose relations are checked.
+/// Number of scenes whose relations are checked.
 const SCENES: u64 = 40;
-/// Scenes of each form whose picture is known.
+/// Number of scenes of each form with a known picture.
 const KNOWN: u64 = 8;
-/// Scenes that are read as stages of USD, too: each starts a converter three times at most.
+/// Number of scenes that are also read as USD stages. Each starts a converter at most three times.
 const STAGES: u64 = 4;
 
 #[test]
@@ -45,7 +46,7 @@ fn scenes_are_read_without_a_warning() {
     }
 }
 
-/// Nothing that is reported may be lost among others' output.
+/// Prints all faults at once, so that none is lost in other output.
 fn report(faults: &[String]) {
     assert!(faults.is_empty(), "{} checks fail:\n{}", faults.len(), faults.join("\n"));
 }
@@ -64,7 +65,7 @@ fn relations_hold() {
     report(&faults);
 }
 
-/// Scenes of other seeds that have failed, or were taken for failures.
+/// Scenes of other seeds that have failed, or were wrongly reported as failures.
 const RELATIONS_FOUND: [(u64, Relation, Method); 1] = [(1089, Relation::SumOfLights, Method::Path)];
 const FORMS_FOUND: [(u64, Form, Method); 3] =
     [(1062, Form::Glowing, Method::Bpm), (1165, Form::Punctual, Method::Light), (1214, Form::Bounce, Method::Path)];
@@ -85,7 +86,7 @@ fn scenes_that_have_failed_hold() {
     report(&faults);
 }
 
-/// A scene read as a stage of USD shows what it shows as glTF.
+/// A scene read as a USD stage has the same picture as the scene read as glTF.
 #[test]
 fn stages_look_like_gltf() {
     let faults = (0..STAGES).filter_map(|seed| {
@@ -96,7 +97,7 @@ fn stages_look_like_gltf() {
     report(&faults.collect::<Vec<_>>());
 }
 
-/// Where no rare path dominates: in closed rooms without glass and metal.
+/// In closed rooms without glass and metal, where no rare path dominates.
 #[test]
 fn errors_shrink_as_reported() {
     let plain = |world: &world::World| {
@@ -111,7 +112,7 @@ fn errors_shrink_as_reported() {
         .filter_map(|(world, method)| {
             let shot = Shot::new(method, world.cameras()[0]);
             let found = errors::errors(&world, &shot).expect("the scene is taken");
-            // The planted fault: an error of twice as many iterations is reported.
+            // The planted bug: the reported error is halved.
             let planted = found.map(|errors| errors::Errors { reported: 0.5 * errors.reported, ..errors });
             assert!(!errors::as_reported(&planted), "seed {}: half the error passes: {found:?}", world.seed);
             (!errors::as_reported(&found)).then(|| format!("seed {}, {}: {found:?}", world.seed, method.name()))
@@ -128,7 +129,7 @@ fn known_pictures_are_met() {
         .flat_map_iter(|(form, seed)| {
             let known = form.known(seed);
             let methods = form.methods();
-            // The four methods that are used most, then two of the others in turns.
+            // The four most used methods, then two of the others in turns.
             let (often, seldom) = methods.split_at(4);
             let turn = (0..2).filter_map(|k| seldom.get((2 * seed as usize + k) % seldom.len().max(1)));
             let methods: Vec<Method> = often.iter().chain(turn).copied().collect();
@@ -144,7 +145,7 @@ fn known_pictures_are_met() {
     report(&faults);
 }
 
-/// For every relation, the first of the two sets of seeds finds a planted fault in a scene where it can be seen.
+/// For every relation, the first of the two tests detects a planted bug in a scene where it is visible.
 #[test]
 fn planted_faults_break_relations() {
     let missed: Vec<String> = plants::plants()
@@ -180,8 +181,8 @@ fn planted_faults_break_known_pictures() {
     report(&missed);
 }
 
-/// The first of the two tests, at 10^-3 and without a tolerance, on pictures of the same scene: at most three times as
-/// many means differ as should if they were normal and independent.
+/// Counts how often the first of the two tests, at 10^-3 and without a tolerance, rejects pictures of the same scene:
+/// at most three times as often as for normal and independent means.
 #[test]
 fn equal_pictures_rarely_differ() {
     const LEVEL: f64 = 1e-3;

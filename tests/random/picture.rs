@@ -1,4 +1,4 @@
-//! Pictures of several seeds, and when two sets of them differ.
+//! Pictures of several seeds, and the test whether two sets of them differ.
 
 use super::usd;
 use super::world::World;
@@ -12,42 +12,42 @@ use caustique::scene::{CameraRequest, Crop, Description, Scene};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::path::Path;
 
-/// Pixels a side.
+/// Side of a picture (pixels).
 pub const SIZE: u32 = 24;
-/// Tiles a side.
+/// Number of tiles per side.
 pub const TILES: u32 = 4;
-/// Means of a picture: each channel of each tile, then each channel of the whole.
+/// Number of means of a picture: each channel of each tile, then each channel of the whole.
 pub const MEANS: usize = (3 * TILES * TILES + 3) as usize;
-/// Pictures of a set.
+/// Number of pictures of a set.
 pub const SEEDS: u64 = 8;
-/// Seeds of the set that confirms a difference, relative to the first.
+/// Number of seeds of the set that confirms a difference, relative to the first set.
 pub const CONFIRMING: u64 = 4;
-/// Most iterations of sparse pictures, relative to others'.
+/// Largest number of iterations of sparse pictures, relative to that of others.
 const MAX_EFFORT: f64 = 16.0;
-/// Probability with which one comparison of means of two equal sets exceeds the critical value.
+/// Probability that one comparison of means of two equal sets exceeds the critical value.
 pub const SIGNIFICANCE: f64 = 1e-6;
-/// Relative difference of means that is a fault if it is significant.
+/// Relative difference of means above which a significant difference is a fault.
 pub const TOLERANCE: f64 = 0.03;
-/// Share of a hemisphere's projected solid angle below which a light is met too seldom by chance.
+/// Share of a hemisphere's projected solid angle below which random paths hit a light too rarely.
 const SMALL_LIGHT: f64 = 0.01;
-/// Tiles darker than this share of the picture are compared with that share.
+/// Tiles darker than this share of the picture's mean are compared relative to that share.
 const DARK: f64 = 0.02;
 
-/// How pictures are made.
+/// Settings of pictures.
 #[derive(Clone, Debug)]
 pub struct Shot {
     pub method: Method,
     /// Name of the camera.
     pub camera: String,
-    /// A window in tiles: left, top, width, height.
+    /// A crop window in tiles: left, top, width, height.
     pub window: Option<[u32; 4]>,
     /// Factor on the iterations.
     pub effort: f64,
-    /// Factor on the photons of an iteration, of methods that take their number.
+    /// Factor on the photons per iteration, for methods with photons.
     pub photons: u32,
-    /// Longest path in segments.
+    /// Number of segments of the longest paths.
     pub max_depth: u32,
-    /// The scene is read as a stage of USD.
+    /// Whether the scene is read as a USD stage.
     pub usd: bool,
 }
 
@@ -90,10 +90,10 @@ impl Shot {
     }
 }
 
-/// Reads a scene as files are read.
+/// Reads a scene like a file.
 ///
 /// # Errors
-/// What the reader says.
+/// The reader refuses the file.
 pub fn read(world: &World) -> Result<Scene, String> {
     let description = gltf::read_bytes(&glb(world), Path::new("random.glb"), &ReadOptions::default());
     build(description.map_err(|error| error.to_string())?)
@@ -103,13 +103,13 @@ fn build(description: Description) -> Result<Scene, String> {
     Scene::build(description, 1).map_err(|error| error.to_string())
 }
 
-/// Means of the pictures of some seeds; what a window leaves out is not a number.
+/// Means of one picture per seed. Tiles outside of a crop window are NaN.
 pub type Set = Vec<Vec<f64>>;
 
-/// Renders with some seeds.
+/// Renders one picture per seed.
 ///
 /// # Errors
-/// The scene is not taken, or samples are rejected.
+/// The renderer refuses the scene, or rejects samples.
 pub fn renders(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Vec<Rendered>, String> {
     let scene = if shot.usd { build(usd::read(world)?)? } else { read(world)? };
     let camera = scene.camera(&shot.view()).map_err(|error| error.to_string())?;
@@ -127,12 +127,12 @@ pub fn renders(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Resul
 /// A set of pictures.
 ///
 /// # Errors
-/// Those of [`renders`].
+/// See [`renders`].
 pub fn pictures(world: &World, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Set, String> {
     Ok(renders(world, shot, seeds)?.iter().map(|rendered| means(rendered, shot.window)).collect())
 }
 
-/// Means of a picture, of a window in tiles or whole.
+/// Means of a whole picture or of a crop window in tiles.
 fn means(rendered: &Rendered, window: Option<[u32; 4]>) -> Vec<f64> {
     let own = rendered.settings.levels.picture_level();
     let [left, top, width, _] = window.unwrap_or([0, 0, TILES, TILES]);
@@ -153,9 +153,9 @@ fn means(rendered: &Rendered, window: Option<[u32; 4]>) -> Vec<f64> {
     means
 }
 
-/// Whether the method finds all light of the scene, and often enough for a t test: methods without photons find caustics
-/// seen through glass by chance alone, in proportion to the solid angle of the light. Where a light is small, no picture
-/// of a set may hold such a sample, and the estimated standard error of all others lacks them, too.
+/// Whether the method finds all light of the scene, often enough for a t test. Methods without photons find caustics
+/// seen through glass with a probability proportional to the solid angle of the light. For a small light a set may have
+/// no such sample, and then its estimated standard error is too small as well.
 pub fn finds_all(world: &World, scene: &Scene, shot: &Shot) -> bool {
     let removed = Removed::default();
     let asked = PlanRequest {
@@ -179,7 +179,7 @@ pub struct Difference {
     pub index: usize,
     pub means: [f64; 2],
     pub errors: [f64; 2],
-    /// Probability of a difference this large between equal sets.
+    /// Probability that equal sets have a difference of this size.
     pub probability: f64,
 }
 
@@ -193,8 +193,8 @@ impl std::fmt::Display for Difference {
 /// Differences between sets of pictures.
 pub struct Found {
     pub differences: Vec<Difference>,
-    /// Some picture is black where sets differ: so few light paths came there that a t test says nothing. Where one
-    /// comes with probability q, n black pictures have the probability (1 - q)^n, and an estimated error of 0.
+    /// Whether some picture is black where the sets differ: too few light paths reach that place for a t test. If one
+    /// does with probability q, n black pictures have the probability (1 - q)^n, and an estimated error of 0.
     pub sparse: bool,
 }
 
@@ -206,11 +206,11 @@ impl Found {
     }
 }
 
-/// What `found(effort, seeds)` finds in a set, and again in one of four times as many other seeds. Sparse pictures get
-/// more iterations before they count.
+/// The differences that `found(effort, seeds)` finds in a set and again in a set of four times as many other seeds.
+/// Sparse pictures are rendered with more iterations before they count.
 ///
 /// # Errors
-/// Those of `found`.
+/// The errors of `found`.
 pub fn confirmed(
     found: impl Fn(f64, std::ops::Range<u64>) -> Result<Found, String>,
 ) -> Result<Option<Vec<Difference>>, String> {
@@ -236,7 +236,8 @@ pub fn confirmed(
     }
 }
 
-/// Means in which two sets differ by more than chance and a relative tolerance allow: Welch's t test of each.
+/// The means in which two sets differ by more than noise and a relative tolerance allow, by Welch's t test for each
+/// mean.
 pub fn differences(a: &Set, b: &Set, tolerance: f64, significance: f64) -> Vec<Difference> {
     let column = |set: &Set, index: usize| -> Vec<f64> { set.iter().map(|means| means[index]).collect() };
     (0..MEANS)
@@ -245,7 +246,7 @@ pub fn differences(a: &Set, b: &Set, tolerance: f64, significance: f64) -> Vec<D
             let whole = mean_and_error(&column(b, MEANS - 3 + index % 3)).0;
             let scale = of_a.0.abs().max(of_b.0.abs()).max(DARK * whole);
             let apart = (of_a.0 - of_b.0).abs();
-            // Means that are not numbers are outside of a window.
+            // NaN means are outside of a crop window.
             if apart.is_nan() || apart <= tolerance * scale {
                 return None;
             }
@@ -266,7 +267,8 @@ fn place(index: usize) -> String {
     if index >= MEANS - 3 { format!("whole picture, {channel}") } else { format!("tile {}, {channel}", index / 3) }
 }
 
-/// Two-sided p-value of a difference of means with standard errors of as many values (Welch, Satterthwaite).
+/// Two-sided p-value of a difference of two means with these standard errors and numbers of values (Welch,
+/// Satterthwaite).
 pub fn welch(apart: f64, errors: [f64; 2], counts: [usize; 2]) -> f64 {
     let squares = errors.map(|error| error * error);
     let variance = squares[0] + squares[1];

@@ -1,18 +1,18 @@
-//! Which checks a scene gets.
+//! Chooses the checks of a scene.
 
 use super::picture::{Shot, finds_all, read};
 use super::relation::{RELATIONS, Relation};
 use super::world::World;
 use caustique::render::Method;
 
-/// Methods that get most checks.
+/// The methods that get most checks.
 pub const METHODS: [Method; 4] = [Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm];
 /// The other methods.
 pub const OTHERS: [Method; 7] =
     [Method::Light, Method::Mlt, Method::Appm, Method::Cppm, Method::Ppm, Method::Bpm, Method::Pm];
 
-/// `count` checks of the scene of a seed by the four methods, in turns that come to all pairs of relation and method;
-/// one by another method; and one method against another.
+/// `count` checks of the scene of a seed with the four methods, in an order that covers all pairs of relation and
+/// method; one check with another method; and one comparison of two methods.
 pub fn checks(world: &World, count: usize) -> Vec<(Relation, Shot)> {
     let i = world.seed as usize;
     let cameras = world.cameras();

@@ -1,21 +1,21 @@
-//! Faults that a renderer could have, planted into what is compared.
+//! Bugs that a renderer could have, planted into one side of a comparison.
 
 use super::forms::{Form, Known};
 use super::relation::{Other, Relation, lifted, switch_off};
 use super::world::{Mesh, Thing, ThingKind, World};
 use glam::DVec3;
 
-/// A fault in one of the two sides of a relation.
+/// A planted bug in one of the two sides of a relation.
 pub struct Plant {
     pub name: &'static str,
     pub relation: Relation,
-    /// Seed of a scene in which the fault can be seen.
+    /// Seed of a scene in which the bug is visible.
     pub seed: u64,
-    /// Spoils the scene or what it is compared with; false where there is nothing to spoil.
+    /// Plants the bug in the scene or in its counterpart; false if the scene does not allow it.
     pub spoil: fn(&mut World, &mut Other) -> bool,
 }
 
-/// Lights hide a part of themselves from what they shine on, as they did when shadow rays ended within them.
+/// Lights shade themselves, as they did when shadow rays ended inside of them.
 fn lights_hide_themselves(world: &World) -> World {
     let mut made = world.clone();
     made.sky = made.sky.map(|sky| 0.7 * sky);
@@ -34,7 +34,7 @@ fn lights_hide_themselves(world: &World) -> World {
     made
 }
 
-/// A flat mesh of two thirds of its area.
+/// A flat mesh with two thirds of the area.
 fn small(mesh: &Mesh) -> Mesh {
     Mesh { positions: mesh.positions.iter().map(|p| 0.8 * *p).collect(), ..mesh.clone() }
 }
@@ -135,7 +135,7 @@ pub fn plants() -> Vec<Plant> {
     ]
 }
 
-/// A fault in a scene whose picture is known.
+/// Plants a bug in a scene with a known picture.
 pub fn spoil(form: Form, known: &mut Known) {
     match form {
         Form::Glowing | Form::Punctual | Form::Bounce => known.world = lights_hide_themselves(&known.world),

@@ -1,9 +1,9 @@
-//! Random numbers of which scenes are made.
+//! Random numbers for the generation of scenes.
 
 use glam::{DQuat, DVec3, EulerRot};
 use std::f64::consts::TAU;
 
-/// Splitmix64 (Steele, Lea and Flood 2014).
+/// The generator SplitMix64 (Steele, Lea and Flood 2014).
 pub struct Random(u64);
 
 impl Random {
@@ -18,17 +18,17 @@ impl Random {
         z ^ z >> 31
     }
 
-    /// Uniform in [low, high).
+    /// A uniform number in [low, high).
     pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Logarithmically uniform.
+    /// A number with a uniform logarithm.
     pub fn scale(&mut self, low: f64, high: f64) -> f64 {
         self.within(low.ln(), high.ln()).exp()
     }
 
-    /// Below `n`.
+    /// A uniform index below `n`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }

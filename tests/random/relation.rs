@@ -1,4 +1,4 @@
-//! Relations that must hold whatever a scene is, and planted faults that must break them.
+//! Relations that must hold for any scene, and planted bugs that must violate them.
 
 use super::picture::{Difference, Found, MEANS, SIGNIFICANCE, Set, Shot, TOLERANCE, confirmed, differences, pictures};
 use super::random::Random;
@@ -8,44 +8,44 @@ use caustique::render::Method;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// A relation between the pictures of a scene and of what is made of it.
+/// A relation between the picture of a scene and the picture of a changed scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Relation {
-    /// The whole scene moved.
+    /// The whole scene is moved.
     Moved,
-    /// The whole scene turned.
+    /// The whole scene is rotated.
     Turned,
-    /// The whole scene larger or smaller.
+    /// The whole scene is scaled.
     Scaled,
-    /// Every triangle as four.
+    /// Every triangle is split into four.
     Subdivided,
-    /// Every copy a mesh of its own, in place, without nodes above it.
+    /// Every instance becomes its own mesh in world space, without parent nodes.
     Copied,
-    /// Triangles, nodes and lights in another order.
+    /// Triangles, nodes and lights have another order.
     Reordered,
-    /// Every light as two.
+    /// Every light is split into two.
     LightsSplit,
-    /// The sum of pictures with one light each; lamps that are off stay as black bodies.
+    /// The sum of pictures with one light each. Lamps that are off stay as black objects.
     SumOfLights,
-    /// Twice the light.
+    /// All light is doubled.
     Doubled,
-    /// Colour channels exchanged.
+    /// Colour channels are exchanged.
     Permuted,
-    /// What stands on something opaque lifted by 10^-4 of its size.
+    /// Things that stand on something opaque are lifted by 10^-4 of their size.
     Lifted,
-    /// A window of the picture.
+    /// A crop window of the picture.
     Cropped,
-    /// Every mesh mirrored in its file and on its node.
+    /// Every mesh is mirrored in the file and mirrored back by its node.
     MirroredTwice,
-    /// A small black thing far away.
+    /// A small black object is added far away.
     FarThing,
-    /// The same scene as a stage of USD, where it is what that can express ([`super::usd::reduced`]).
+    /// The scene is read as a USD stage, reduced to what USD can express ([`super::usd::reduced`]).
     Usd,
-    /// Another method.
+    /// Another method renders the scene.
     Method(Method),
 }
 
-/// Relations of one method.
+/// Relations between pictures of one method.
 pub const RELATIONS: [Relation; 14] = [
     Relation::Moved,
     Relation::Turned,
@@ -63,20 +63,20 @@ pub const RELATIONS: [Relation; 14] = [
     Relation::FarThing,
 ];
 
-/// What is compared with the pictures of a scene.
+/// The counterpart of a scene in a relation.
 pub struct Other {
     /// Scenes whose pictures are added.
     pub worlds: Vec<World>,
     pub shot: Shot,
-    /// By what the pictures are divided.
+    /// Divisor of the pictures.
     pub factor: f64,
-    /// Channel of the pictures that is compared with each of the scene's.
+    /// The channel of these pictures that is compared with each channel of the scene's pictures.
     pub channels: [usize; 3],
     pub tolerance: f64,
 }
 
 impl Relation {
-    /// What is compared with the scene; `None` where the relation says nothing about it.
+    /// The counterpart of the scene; `None` if the relation does not apply to it.
     pub fn other(self, world: &World, shot: &Shot) -> Option<Other> {
         let mut random = Random::new(world.seed ^ 0x5eed);
         let identity = [0, 1, 2];
@@ -120,7 +120,7 @@ impl Relation {
     }
 }
 
-/// Relative bias that a method's tiles may have at the effort of these tests: kernels blur.
+/// Allowed relative bias of a method's tiles with the few iterations of these tests, due to the blur of kernels.
 fn bias(method: Method) -> f64 {
     match method {
         Method::Path | Method::Bdpt | Method::Light | Method::Mlt => TOLERANCE,
@@ -129,13 +129,13 @@ fn bias(method: Method) -> f64 {
     }
 }
 
-/// A relation that does not hold.
+/// A violated relation.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Broken {
     pub relation: Relation,
     pub method: Method,
     pub camera: String,
-    /// What is confirmed by the second set, or what went wrong.
+    /// The differences that the second set confirms, or an error.
     pub differences: Vec<Difference>,
     pub error: Option<String>,
 }
@@ -148,12 +148,12 @@ impl std::fmt::Display for Broken {
     }
 }
 
-/// Factor on the photons by which a difference between methods with kernels must survive.
+/// Factor on the number of photons with which a difference between methods with kernels must remain.
 const MORE_PHOTONS: u32 = 16;
 
-/// Compares a scene with what a relation says must look alike. A difference counts when sets of four times as many
-/// other seeds show it again. Between methods with kernels it must also be there with more photons: the bias of a kernel
-/// shrinks with its size, a fault does not.
+/// Compares a scene with its counterpart. A difference counts if sets of four times as many other seeds confirm it.
+/// Between methods with kernels it must also remain with more photons, because the bias of a kernel shrinks with its
+/// size.
 pub fn check(world: &World, relation: Relation, shot: &Shot) -> Option<Broken> {
     let mut other = relation.other(world, shot)?;
     let mut shot = shot.clone();
@@ -176,10 +176,10 @@ pub fn check(world: &World, relation: Relation, shot: &Shot) -> Option<Broken> {
     if differences.is_empty() { None } else { broken(&shot, differences, None) }
 }
 
-/// Differences of one set of seeds.
+/// The differences between sets of some seeds.
 ///
 /// # Errors
-/// One of the scenes is not taken.
+/// The renderer refuses one of the scenes.
 pub fn found(
     world: &World,
     other: &Other,
@@ -193,7 +193,7 @@ pub fn found(
     Ok(Found::new(differences(&a, &b, other.tolerance, SIGNIFICANCE), &[&a, &b]))
 }
 
-/// Seeds of the other scenes start here.
+/// First seed of the counterparts.
 const OTHER_SEEDS: u64 = 1 << 20;
 
 fn others(other: &Other, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Set, String> {
@@ -210,7 +210,7 @@ fn others(other: &Other, shot: &Shot, seeds: std::ops::Range<u64>) -> Result<Set
     Ok(sum)
 }
 
-/// The scene scaled, then turned, then moved; it looks the same.
+/// The scene scaled, then rotated, then moved. Its picture stays the same.
 pub fn similar(world: &World, scale: f64, rotation: DQuat, translation: DVec3) -> World {
     let mut made = world.clone();
     let parent = Placement { translation, rotation, scale: DVec3::splat(scale) };
@@ -250,7 +250,7 @@ fn subdivided(world: &World) -> World {
         for &[a, b, c] in &source.triangles {
             let mut middle = |i: u32, j: u32| {
                 let (i, j) = (i as usize, j as usize);
-                // As a file holds them, so that neighbours get the same vertex.
+                // Computed like the numbers in a file, so that neighbours share the vertex.
                 let p = 0.5 * (source.positions[i] + source.positions[j]);
                 mesh.positions.push(p);
                 if !source.normals.is_empty() {
@@ -293,7 +293,7 @@ fn reordered(world: &World, random: &mut Random) -> World {
     made
 }
 
-/// Every light as two: a share of the intensity each, or a part of the triangles. Solids of glass stay whole.
+/// Splits every light into two, by intensity or by triangles. Solids of glass are not split.
 fn split(world: &World) -> Option<World> {
     let mut made = world.clone();
     let mut any = false;
@@ -302,7 +302,7 @@ fn split(world: &World) -> Option<World> {
         second.name += " too";
         match &mut second.kind {
             ThingKind::Light(light) => {
-                // A sphere would hide the other.
+                // A sphere would hide the other one.
                 if matches!(light.kind, LightKind::Point { radius } if radius > 0.0) {
                     continue;
                 }
@@ -329,7 +329,7 @@ fn split(world: &World) -> Option<World> {
     any.then_some(made)
 }
 
-/// Scenes with one of the lights each.
+/// One scene per light.
 fn single_lights(world: &World) -> Vec<World> {
     let lights = world.lights();
     let dark = {
@@ -351,10 +351,10 @@ fn single_lights(world: &World) -> Vec<World> {
     worlds
 }
 
-/// Intensity of a sphere that is off, relative to itself: without any it would not be there, and hide nothing.
+/// Relative intensity of a sphere light that is off. With zero it would not exist and block no light.
 const FAINT: f64 = 1e-9;
 
-/// Turns a light off; its body stays.
+/// Turns a light off. Its object stays.
 pub fn switch_off(world: &mut World, index: usize) {
     match world.things[index].kind {
         ThingKind::Mesh { mesh, material } => {
@@ -370,7 +370,7 @@ pub fn switch_off(world: &mut World, index: usize) {
     }
 }
 
-/// All light times a factor for each channel.
+/// Multiplies all light by a factor per channel.
 pub fn brighter(world: &World, factor: DVec3) -> World {
     let mut made = world.clone();
     made.sky = made.sky.map(|sky| sky * factor);
@@ -383,7 +383,7 @@ pub fn brighter(world: &World, factor: DVec3) -> World {
     made
 }
 
-/// Red becomes blue, green red, and blue green.
+/// Exchanges channels: red becomes blue, green red, and blue green.
 fn permuted(world: &World) -> World {
     let turn = |color: &mut DVec3| *color = DVec3::new(color.y, color.z, color.x);
     let mut made = world.clone();
@@ -408,21 +408,22 @@ fn permuted(world: &World) -> World {
     made
 }
 
-/// Bodies that stand on something, raised by a share of their size; sunk if it is negative. `None` without any.
+/// Raises objects that stand on something by a share of their size (lowers them if it is negative). `None` if there are
+/// none.
 pub fn lifted(world: &World, share: f64) -> Option<World> {
     let mut made = world.clone();
     for thing in made.things.iter_mut().filter(|thing| thing.rests) {
-        // A liquid is raised as far as its vessel, which is larger.
+        // A liquid is raised with its vessel, which is larger.
         let of_body = world.things.iter().filter(|other| other.body == thing.body);
         let radius = of_body.map(|other| world.radius(other)).fold(0.0, f64::max);
-        // A thing's own vertical is its floor's.
+        // The vertical axis of a thing is that of the floor.
         let up = thing.to_world().transform_vector3(DVec3::Y);
         thing.chain.push(Placement::at(DVec3::Y * share * 2.0 * radius / up.length()));
     }
     made.things.iter().any(|thing| thing.rests).then_some(made)
 }
 
-/// Every mesh mirrored, and mirrored back by its node.
+/// Mirrors every mesh, and mirrors it back by its node.
 fn mirrored(world: &World) -> World {
     let mut made = world.clone();
     let mirror = Placement::scaled(DVec3::new(1.0, -1.0, 1.0));
@@ -431,8 +432,8 @@ fn mirrored(world: &World) -> World {
     made
 }
 
-/// A small black box far away, where no light shines on it that could return. `None` under a sky or sun, whose photons
-/// it would thin out.
+/// Adds a small black box far away, from which no light returns. `None` under a sky or sun, because the larger scene
+/// would reduce their photon density.
 fn with_far_thing(world: &World) -> Option<World> {
     let from_infinity = |kind: &ThingKind| matches!(kind, ThingKind::Light(Light { kind: LightKind::Sun { .. }, .. }));
     if world.sky.is_some() || world.fog.is_some() || world.things.iter().any(|thing| from_infinity(&thing.kind)) {

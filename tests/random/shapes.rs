@@ -1,10 +1,10 @@
-//! Meshes.
+//! Creates meshes.
 
 use super::world::Mesh;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 
-/// A parallelogram from a corner and two edges; its front is the side from which they turn counter-clockwise.
+/// A parallelogram from a corner and two edges. Seen from its front, the edges are counter-clockwise.
 pub fn quad(corner: DVec3, a: DVec3, b: DVec3) -> Mesh {
     Mesh {
         positions: vec![corner, corner + a, corner + a + b, corner + b],
@@ -14,7 +14,7 @@ pub fn quad(corner: DVec3, a: DVec3, b: DVec3) -> Mesh {
     }
 }
 
-/// Several meshes as one.
+/// Joins meshes.
 pub fn joined(meshes: impl IntoIterator<Item = Mesh>) -> Mesh {
     let mut whole = Mesh::default();
     for mesh in meshes {
@@ -27,7 +27,7 @@ pub fn joined(meshes: impl IntoIterator<Item = Mesh>) -> Mesh {
     whole
 }
 
-/// A closed box between two corners, its front inside or outside.
+/// A closed box between two corners, with its front inside or outside.
 pub fn cuboid(low: DVec3, high: DVec3, inward: bool) -> Mesh {
     let corner = |i: u32| DVec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), high, low);
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3]];
@@ -40,8 +40,7 @@ pub fn cuboid(low: DVec3, high: DVec3, inward: bool) -> Mesh {
     joined(faces.map(face))
 }
 
-/// A profile of (radius, height) turned about the vertical: its front is to the left of the way along the profile as
-/// seen with the axis to the left, so that profiles from the bottom up look outwards.
+/// A profile of (radius, height) points rotated about the vertical axis. Profiles from bottom to top face outwards.
 pub fn lathe(profile: &[(f64, f64)], segments: u32) -> Mesh {
     let mut mesh = Mesh::default();
     let rows = profile.len() as u32;
@@ -79,17 +78,17 @@ pub fn sphere(segments: u32, smooth: bool) -> Mesh {
     mesh
 }
 
-/// A prism of radius 1 that stands on the ground, with as many sides.
+/// A prism of radius 1 with `sides` sides that stands on the ground.
 pub fn prism(height: f64, sides: u32) -> Mesh {
     lathe(&[(0.0, 0.0), (1.0, 0.0), (1.0, height), (0.0, height)], sides)
 }
 
-/// A flat disc of radius 1 that looks up.
+/// A flat disc of radius 1 that faces up.
 pub fn disc(sides: u32) -> Mesh {
     lathe(&[(1.0, 0.0), (0.0, 0.0)], sides)
 }
 
-/// A triangle of side about 1 that looks up.
+/// A triangle with sides of about 1 that faces up.
 pub fn triangle() -> Mesh {
     Mesh {
         positions: vec![DVec3::new(-1.0, 0.0, 0.6), DVec3::new(1.0, 0.0, 0.6), DVec3::new(0.0, 0.0, -1.0)],
@@ -99,11 +98,12 @@ pub fn triangle() -> Mesh {
     }
 }
 
-/// A drinking glass of outer radius 1, and the liquid in it up to `level`, whose faces are the glass's own.
+/// A drinking glass of outer radius 1, and the liquid in it up to `level`, whose faces coincide with those of the
+/// glass.
 pub fn vessel(height: f64, wall: f64, level: f64, sides: u32) -> [Mesh; 2] {
     let (inner, floor) = (1.0 - wall, wall);
     let outside = [(0.0, 0.0), (1.0, 0.0), (1.0, height), (inner, height), (inner, floor), (0.0, floor)];
-    // The glass has a ring of vertices where the liquid ends, so that their triangles are the same.
+    // The glass has a ring of vertices at the surface of the liquid, so that both meshes have the same triangles there.
     let outside = [&outside[..4], &[(inner, level)], &outside[4..]].concat();
     let liquid = [(0.0, floor), (inner, floor), (inner, level), (0.0, level)];
     [lathe(&outside, sides), lathe(&liquid, sides)]

@@ -1,9 +1,9 @@
-//! Makes a scene in which something fails as small as it can be while it still fails.
+//! Reduces a failing scene as far as possible while it still fails.
 
 use super::world::{LightKind, Matter, Placement, ThingKind, World};
 use glam::DVec3;
 
-/// The smallest scene found in which `fails` still holds, by leaving out and simplifying one thing after another.
+/// Returns the smallest scene found for which `fails` is true, by removing and simplifying one thing after another.
 pub fn shrink(world: World, mut fails: impl FnMut(&World) -> bool) -> World {
     let mut smallest = world;
     loop {
@@ -12,7 +12,7 @@ pub fn shrink(world: World, mut fails: impl FnMut(&World) -> bool) -> World {
             let mut index = 0;
             while let Some(candidate) = step(&smallest, index) {
                 match candidate {
-                    // What comes after has moved to its place.
+                    // The next thing now has this index.
                     Some(candidate) if fails(&candidate) => {
                         let shorter = candidate.things.len() < smallest.things.len();
                         smallest = candidate;
@@ -28,7 +28,7 @@ pub fn shrink(world: World, mut fails: impl FnMut(&World) -> bool) -> World {
     }
 }
 
-/// A simpler scene: the outer `None` ends the steps of a kind, the inner one says that this step changes nothing.
+/// A simpler scene. The outer `None` ends the steps of one kind, the inner `None` means that this step changes nothing.
 type Candidate = Option<Option<World>>;
 
 fn without_a_thing(world: &World, index: usize) -> Candidate {
@@ -49,7 +49,7 @@ fn without_space(world: &World, index: usize) -> Candidate {
     })
 }
 
-/// Materials without what few things need; in the end grey ones.
+/// Removes rare features of a material; the last step makes it grey.
 fn with_plain_matter(world: &World, index: usize) -> Candidate {
     const STEPS: usize = 6;
     let matter = world.materials.get(index / STEPS)?;
@@ -68,7 +68,7 @@ fn with_plain_matter(world: &World, index: usize) -> Candidate {
     }))
 }
 
-/// Lights and cameras without a size.
+/// Lights and cameras of size zero.
 fn with_plain_light(world: &World, index: usize) -> Candidate {
     let thing = world.things.get(index)?;
     let mut kind = thing.kind;
@@ -87,7 +87,7 @@ fn with_plain_light(world: &World, index: usize) -> Candidate {
     }))
 }
 
-/// A thing on one node.
+/// A thing with a single node.
 fn with_flat_chain(world: &World, index: usize) -> Candidate {
     let thing = world.things.get(index)?;
     Some((thing.chain.len() > 1).then(|| {
@@ -98,7 +98,7 @@ fn with_flat_chain(world: &World, index: usize) -> Candidate {
     }))
 }
 
-/// Without meshes, materials and textures that nothing uses.
+/// Removes unused meshes, materials and textures.
 fn tidied(mut world: World) -> World {
     let (meshes, materials) = (std::mem::take(&mut world.meshes), std::mem::take(&mut world.materials));
     for thing in &mut world.things {

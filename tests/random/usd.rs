@@ -1,4 +1,4 @@
-//! Scenes as stages of USD, of what both USD and glTF can express.
+//! Scenes as USD stages, reduced to features that both USD and glTF have.
 
 use super::world::{Lens, Light, LightKind, Matter, Mesh, Placement, Thing, ThingKind, World};
 use caustique::scene::Description;
@@ -6,8 +6,8 @@ use caustique::scene::gltf::ReadOptions;
 use caustique::stop::Stop;
 use glam::DVec3;
 
-/// What is left of a scene that means the same as a stage: no media, textures, lenses, soft spots and bodies of spots,
-/// and no partial specular reflection.
+/// The part of a scene that USD can express: no media, textures, lenses, soft spots and spots with a radius, and no
+/// partial specular reflection.
 pub fn reduced(world: &World) -> World {
     let mut made = World { fog: None, textures: vec![], ..world.clone() };
     for matter in &mut made.materials {
@@ -24,22 +24,22 @@ pub fn reduced(world: &World) -> World {
             }
             ThingKind::Light(_) => {}
         }
-        // Sizes of lights and cameras are the world's in glTF, and their node's in USD.
+        // Sizes of lights and cameras are in world space in glTF, and in the space of their node in USD.
         let (_, rotation, translation) = thing.to_world().to_scale_rotation_translation();
         thing.chain = vec![Placement { translation, rotation, scale: DVec3::ONE }];
     }
     made
 }
 
-/// Name that a camera has once its stage is read.
+/// Name of a camera after its stage is read.
 pub fn camera(name: &str) -> String {
     format!("/{}", name.replace(' ', "_"))
 }
 
-/// Reads a scene by way of a stage.
+/// Reads a scene as a USD stage.
 ///
 /// # Errors
-/// What the reader says.
+/// The reader refuses the file.
 pub fn read(world: &World) -> Result<Description, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let path = folder.path().join("random.usda");
@@ -47,7 +47,7 @@ pub fn read(world: &World) -> Result<Description, String> {
     caustique::scene::usd::read(&path, &ReadOptions::default(), &Stop::default()).map_err(|error| error.to_string())
 }
 
-/// The scene as the text of a stage.
+/// The stage as text.
 pub fn stage(world: &World) -> String {
     let mut text = String::from("#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = \"Y\"\n)\n");
     text += "def Scope \"Materials\"\n{\n";
@@ -82,7 +82,7 @@ pub fn stage(world: &World) -> String {
     text
 }
 
-/// Name of the prim of a thing, or of one above it; the outermost bears the thing's name.
+/// Name of the prim of a thing, or of one of its ancestors. The outermost prim has the name of the thing.
 fn level(thing: &Thing, depth: usize) -> String {
     if depth == 0 { thing.name.replace(' ', "_") } else { format!("level_{depth}") }
 }
@@ -96,7 +96,7 @@ fn list(items: impl Iterator<Item = String>) -> String {
     format!("[{}]", items.collect::<Vec<_>>().join(", "))
 }
 
-/// As USD writes it: points are rows.
+/// As USD writes it, for row vectors.
 fn transform(placement: &Placement) -> String {
     let to_parent = placement.affine();
     let rows: [(DVec3, f64); 4] = [
@@ -123,7 +123,7 @@ fn geometry(mesh: &Mesh, material: usize) -> String {
     text
 }
 
-/// Intensities of lamps are a quarter of what the sphere's surface emits.
+/// Intensities of lamps are a quarter of the emission of the sphere's surface.
 fn light_of(light: &Light) -> (&'static str, String) {
     let color = light.color;
     let lamp = |radius: f64, cone: &str| {
@@ -148,7 +148,7 @@ fn light_of(light: &Light) -> (&'static str, String) {
     }
 }
 
-/// Apertures and focal lengths are in tenths of the unit.
+/// Apertures and focal lengths are in tenths of the scene unit.
 fn camera_of(lens: &Lens) -> String {
     let (projection, aperture) = if lens.orthographic {
         ("orthographic", 20.0 * lens.view)
@@ -160,7 +160,7 @@ fn camera_of(lens: &Lens) -> String {
     )
 }
 
-/// By the specular workflow what has no specular reflection, by the metallic one all else.
+/// Materials without specular reflection use the specular workflow, all others the metallic one.
 fn material(index: usize, matter: &Matter) -> String {
     let opacity = if matter.is_glass() { 0.0 } else { 1.0 };
     format!(

@@ -1,45 +1,45 @@
-//! A scene as plain data, which transformations change before it is written as glTF.
+//! A scene as plain data that can be transformed and then written as glTF.
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Everything in a scene.
+/// A whole scene.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct World {
-    /// Seed it was generated from.
+    /// Seed from which it was generated.
     pub seed: u64,
     /// Length of the room's longest side (m).
     pub size: f64,
-    /// What stands in it; each becomes a chain of nodes.
+    /// The things of the scene. Each becomes a chain of nodes.
     pub things: Vec<Thing>,
-    /// Meshes; several things may share one.
+    /// Meshes, which things may share.
     pub meshes: Vec<Mesh>,
-    /// Materials; several things may share one.
+    /// Materials, which things may share.
     pub materials: Vec<Matter>,
     /// Textures of materials.
     pub textures: Vec<Texture>,
-    /// Radiance from everywhere.
+    /// Radiance of a uniform sky.
     pub sky: Option<DVec3>,
     /// The medium that fills the scene.
     pub fog: Option<Medium>,
 }
 
-/// Something with a place.
+/// An object, light or camera with its placement.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Thing {
     /// Name of its node.
     pub name: String,
-    /// Nested nodes from the root to itself.
+    /// Transforms of the nested nodes, from the root to the thing.
     pub chain: Vec<Placement>,
-    /// What it is.
+    /// Kind of the thing.
     pub kind: ThingKind,
-    /// Things of one rigid body, which are lifted together: a vessel and what it holds.
+    /// Index of the rigid body, whose things are lifted together: a vessel and its content.
     pub body: u32,
-    /// Its body stands on something opaque.
+    /// Whether the body stands on something opaque.
     pub rests: bool,
 }
 
-/// What a thing is.
+/// Kind of a thing.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum ThingKind {
     /// A mesh with a material, by index.
@@ -50,7 +50,7 @@ pub enum ThingKind {
     Camera(Lens),
 }
 
-/// A node's transform.
+/// Transform of a node.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Placement {
     pub translation: DVec3,
@@ -69,15 +69,15 @@ pub struct Light {
 /// Kind of a punctual light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LightKind {
-    /// A point, or a sphere of that radius.
+    /// A point, or a sphere of this radius.
     Point { radius: f64 },
-    /// A cone with half angles of full and no intensity.
+    /// A cone with the half angles of full and of zero intensity.
     Spot { inner: f64, outer: f64, radius: f64 },
-    /// From infinity, angle of its disc in degrees.
+    /// Light from infinity, with the angle of its disc in degrees.
     Sun { angle: f64 },
 }
 
-/// A camera, square, along -Z of its node.
+/// A camera with a square film that looks along -Z of its node.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Lens {
     /// Field of view (radians), or half the width of an orthographic picture (m).
@@ -87,18 +87,18 @@ pub struct Lens {
     pub focus: f64,
 }
 
-/// Triangles.
+/// A triangle mesh.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Mesh {
     pub positions: Vec<DVec3>,
-    /// As many as positions, or none: flat.
+    /// One per position, or empty for flat shading.
     pub normals: Vec<DVec3>,
-    /// As many as positions.
+    /// One per position.
     pub uvs: Vec<DVec2>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A homogeneous medium (1/m).
+/// A homogeneous medium; coefficients in 1/m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Medium {
     pub sigma_a: DVec3,
@@ -115,7 +115,7 @@ pub struct Matter {
     /// Factor of the reflection of a dielectric; 0 is purely diffuse.
     pub specular: f64,
     pub transmission: f64,
-    /// Transmitting walls bound a solid.
+    /// Whether transmitting faces are the boundary of a solid.
     pub solid: bool,
     pub ior: f64,
     pub emission: DVec3,
@@ -123,17 +123,17 @@ pub struct Matter {
     pub priority: i32,
     /// Texture of the base colour.
     pub texture: Option<usize>,
-    /// Strength of a normal map, and its texture.
+    /// Strength and texture of a normal map.
     pub bumps: Option<(f64, usize)>,
     pub clearcoat: f64,
 }
 
-/// Texels of 8 bits, row by row.
+/// Row-major texels of 8 bits.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Texture {
     pub width: u32,
     pub texels: Vec<[u8; 3]>,
-    /// Encoded colours, whose channels can be exchanged; directions otherwise.
+    /// Whether texels are sRGB colours, whose channels can be exchanged. Otherwise they are directions.
     pub color: bool,
 }
 
@@ -183,7 +183,7 @@ impl Matter {
 }
 
 impl Medium {
-    /// In a scene that is `scale` times as large, the same picture.
+    /// The medium that gives the same picture in a scene `scale` times as large.
     pub fn scaled(self, scale: f64) -> Medium {
         Medium { sigma_a: self.sigma_a / scale, sigma_s: self.sigma_s / scale, ..self }
     }
@@ -211,7 +211,7 @@ impl Placement {
 }
 
 impl Thing {
-    /// Local to world.
+    /// Transform from local to world space.
     pub fn to_world(&self) -> DAffine3 {
         self.chain.iter().fold(DAffine3::IDENTITY, |to_world, placement| to_world * placement.affine())
     }
@@ -229,7 +229,7 @@ impl Thing {
 }
 
 impl Mesh {
-    /// The same with its vertices moved; a mirroring transform also turns its triangles over.
+    /// The mesh with transformed vertices. A reflection also flips the triangles.
     pub fn transformed(&self, by: &DAffine3) -> Mesh {
         let mirrored = by.matrix3.determinant() < 0.0;
         let of_normals = by.matrix3.inverse().transpose();
@@ -241,7 +241,7 @@ impl Mesh {
         }
     }
 
-    /// A part of the triangles.
+    /// The mesh with the triangles that `keep` selects.
     pub fn part(&self, keep: impl Fn(usize) -> bool) -> Mesh {
         let triangles = self.triangles.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, t)| *t).collect();
         Mesh { triangles, ..self.clone() }
@@ -257,7 +257,7 @@ impl World {
         self.add_kind(name, kind, chain)
     }
 
-    /// Adds whatever it is.
+    /// Adds a thing of any kind.
     pub fn add_kind(&mut self, name: &str, kind: ThingKind, chain: Vec<Placement>) -> &mut Thing {
         let index = self.things.len();
         let body = self.things.iter().map(|thing| thing.body + 1).max().unwrap_or(0);
@@ -288,7 +288,7 @@ impl World {
         self.things.iter().filter(|thing| thing.is_camera()).map(|thing| thing.name.as_str()).collect()
     }
 
-    /// Radius of a thing's mesh about its middle in the world, 0 for what has none.
+    /// Radius of a thing's mesh about its centre in world space; 0 for things without a mesh.
     pub fn radius(&self, thing: &Thing) -> f64 {
         let Some((mesh, _)) = thing.mesh() else { return 0.0 };
         let to_world = thing.to_world();
@@ -298,8 +298,8 @@ impl World {
         0.5 * (high - low).length()
     }
 
-    /// Share of a hemisphere's projected solid angle that the smallest light fills, seen from as far away as the scene is
-    /// large; 1 without lights.
+    /// Share of a hemisphere's projected solid angle that the smallest light covers, at the distance of the scene's
+    /// size; 1 without lights.
     pub fn smallest_light(&self) -> f64 {
         let share = |index: usize| {
             let thing = &self.things[index];
@@ -316,7 +316,7 @@ impl World {
         self.lights().into_iter().map(share).fold(1.0, f64::min)
     }
 
-    /// Things that give light.
+    /// Indices of the things that emit light.
     pub fn lights(&self) -> Vec<usize> {
         let shines = |thing: &Thing| match thing.kind {
             ThingKind::Mesh { .. } => self.matter(thing).is_some_and(Matter::glows),

@@ -1,4 +1,4 @@
-//! Scenes as the bytes of a .glb file.
+//! Writes scenes as the bytes of a .glb file.
 
 use super::world::{Lens, Light, LightKind, Matter, Medium, Mesh, Texture, Thing, ThingKind, World};
 use glam::DVec3;
@@ -6,7 +6,7 @@ use image::{ImageFormat, RgbImage};
 use serde_json::{Value, json};
 use std::io::Cursor;
 
-/// The binary chunk and what describes it.
+/// The binary chunk and the objects that describe it.
 #[derive(Default)]
 struct Writer {
     binary: Vec<u8>,
@@ -15,7 +15,7 @@ struct Writer {
     nodes: Vec<Value>,
     lights: Vec<Value>,
     cameras: Vec<Value>,
-    /// By pair of mesh and material.
+    /// Meshes by mesh and material index.
     meshes: Vec<((usize, usize), Value)>,
 }
 
@@ -45,7 +45,7 @@ pub fn glb(world: &World) -> Vec<u8> {
         "bufferViews": writer.views,
         "buffers": [{"byteLength": writer.binary.len()}],
     });
-    // Empty lists are not valid glTF.
+    // Empty lists are invalid in glTF.
     let meshes: Vec<Value> = writer.meshes.into_iter().map(|(_, mesh)| mesh).collect();
     let samplers = vec![json!({"magFilter": 9729}); usize::from(!images.is_empty())];
     for (key, list) in [
@@ -67,7 +67,7 @@ pub fn glb(world: &World) -> Vec<u8> {
 }
 
 impl Writer {
-    /// Writes the chain of nodes of a thing; the index of the first.
+    /// Writes the chain of nodes of a thing, and returns the index of the first node.
     fn thing(&mut self, world: &World, thing: &Thing) -> usize {
         let mut node = json!({"name": thing.name});
         match &thing.kind {
@@ -237,7 +237,7 @@ fn material(matter: &Matter) -> Value {
     material
 }
 
-/// A document and its binary chunk as a file.
+/// A .glb file of a document and its binary chunk.
 fn container(document: &Value, mut binary: Vec<u8>) -> Vec<u8> {
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');

@@ -1,4 +1,4 @@
-//! What all figures stand on: a scene, pictures of it, references, and errors.
+//! Common code of all figures: a scene, its pictures, references, and errors.
 
 use caustique::camera::Camera;
 use caustique::estimator::InitialBandwidth;
@@ -12,19 +12,19 @@ use caustique::scene::{CameraRequest, Scene};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Light paths of an iteration of a reference by photons, and its neighbours: where photons alone find light, a third
-/// of the bias that the paper's setting has after 1,000 iterations.
+/// Light paths per iteration, and neighbours, of a reference by photons. Where only photons find light, its bias is a
+/// third of that of the paper's setting after 1,000 iterations.
 const REFERENCE: (u32, usize) = (1 << 18, 8);
-/// Scenes that bidirectional path tracing, which has no bias, is done with soon.
+/// Scenes that bidirectional path tracing, which has no bias, renders quickly.
 const CONNECTED: [&str; 2] = ["blocks", "interior"];
-/// Scenes where single bright samples of it take too long to average out, and vertex connection and merging, whose bias
-/// is far below that of any rule, does.
+/// Scenes where bidirectional path tracing has fireflies. Vertex connection and merging, whose bias is far below that
+/// of any rule, renders them.
 const MERGED: [&str; 1] = ["cornell"];
 
-/// The methods of the paper's comparison.
+/// The methods that the paper compares.
 pub const METHODS: [Method; 3] = [Method::Sppm, Method::Appm, Method::Cppm];
 
-/// A scene from scenes/ and how wide its picture is.
+/// A scene from scenes/ and the width of its picture.
 pub struct Ground {
     pub name: String,
     pub scene: Scene,
@@ -50,7 +50,7 @@ impl Ground {
         RenderInput::new(&self.scene, &self.camera, settings)
     }
 
-    /// The picture after some iterations.
+    /// Renders some iterations.
     pub fn render(&self, settings: &Settings, iterations: u64) -> Shot {
         let stage = self.stage(settings);
         let mut session = Session::new(&stage);
@@ -60,8 +60,8 @@ impl Ground {
         Shot::of(&session)
     }
 
-    /// Two independent halves that take so many core-seconds together: by bidirectional path tracing or VCM, if they
-    /// converge here, else by SPPM with more light paths and narrower bandwidths. Kept in out/rules.
+    /// Renders two independent halves of a reference in `seconds` core-seconds: by bidirectional path tracing or VCM if
+    /// they converge in this scene, else by SPPM with more light paths and smaller bandwidths. Kept in out/rules.
     pub fn reference(&self, seconds: f64) -> Reference {
         let method = match self.name.as_str() {
             name if CONNECTED.contains(&name) => Method::Bdpt,
@@ -89,7 +89,7 @@ impl Ground {
             Method::Vcm => InitialBandwidth::Footprint,
             _ => InitialBandwidth::Nearest(neighbours),
         };
-        // The usual alpha of a method that merges.
+        // The default alpha of a method that merges.
         let alpha = method.default_alpha();
         let settings = |seed| Settings { initial_bandwidth: initial, alpha, ..settings(method, photons, seed) };
         let stages = [1_000_001, 1_000_002].map(|seed| self.stage(&settings(seed)));
@@ -113,7 +113,7 @@ impl Ground {
     }
 }
 
-/// One level, bandwidths from ten neighbours: the paper's setting.
+/// The paper's setting: one level, and bandwidths from ten neighbours.
 pub fn settings(method: Method, photons: u32, seed: u64) -> Settings {
     Settings {
         method,
@@ -126,7 +126,7 @@ pub fn settings(method: Method, photons: u32, seed: u64) -> Settings {
     }
 }
 
-/// A picture, and the part of it that photons rule: all but direct light and what is seen of lamps.
+/// A picture, and its part without direct light and visible lights.
 pub struct Shot {
     pub all: Vec<DVec3>,
     pub photons: Vec<DVec3>,
@@ -143,22 +143,22 @@ impl Shot {
     }
 }
 
-/// Two independent pictures of little bias. What a picture differs from one, times what it differs from the other,
-/// expects its own squared error alone.
+/// Two independent pictures of little bias. The mean product of the differences of a picture from both is the expected
+/// squared error of the picture alone.
 pub struct Reference {
     pub halves: [Shot; 2],
-    /// Of each half.
+    /// Iterations of each half.
     pub iterations: u64,
 }
 
 /// Mean squared errors over pixels and channels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Errors {
-    /// Of all light.
+    /// Error of all light.
     pub all: f64,
-    /// Of photons' light.
+    /// Error of the light of photons.
     pub photons: f64,
-    /// Of what a screen shows, 0 to 255, which no firefly leaves.
+    /// Error of display values from 0 to 255, which clamp fireflies.
     pub display: f64,
 }
 
@@ -169,13 +169,13 @@ impl Errors {
 }
 
 impl Reference {
-    /// A pixel's truth as far as it is known: photons' light.
+    /// Best estimate of a pixel's light of photons.
     pub fn photons(&self, pixel: usize) -> DVec3 {
         let [a, b] = &self.halves;
         0.5 * (a.photons[pixel] + b.photons[pixel])
     }
 
-    /// Mean squared noise of a half: of all light, and of photons'.
+    /// Mean squared noise of a half, for all light and for the light of photons.
     pub fn noise(&self) -> [f64; 2] {
         let [a, b] = &self.halves;
         let half = |a: &[DVec3], b: &[DVec3]| {
@@ -184,14 +184,14 @@ impl Reference {
         [half(&a.all, &b.all), half(&a.photons, &b.photons)]
     }
 
-    /// Squared bias of two pictures that differ in their seed alone: of all light, and of photons'.
+    /// Squared bias of two pictures that differ only in their seed, for all light and for the light of photons.
     pub fn squared_bias(&self, x: &Shot, y: &Shot) -> [f64; 2] {
         let [a, b] = &self.halves;
         let all = product([&x.all, &y.all], [&a.all, &b.all]);
         [all, product([&x.photons, &y.photons], [&a.photons, &b.photons])]
     }
 
-    /// Errors of a picture without the reference's own.
+    /// Errors of a picture, without the error of the reference.
     pub fn errors(&self, shot: &Shot) -> Errors {
         let [a, b] = &self.halves;
         let values = (3 * shot.all.len()) as f64;
@@ -207,13 +207,13 @@ impl Reference {
     }
 }
 
-/// Mean over pixels and channels of what pictures differ from references, times each other.
+/// Mean over pixels and channels of the product of the differences of two pictures from two references.
 fn product([x, y]: [&[DVec3]; 2], [a, b]: [&[DVec3]; 2]) -> f64 {
     let sum: f64 = x.iter().zip(y).zip(a.iter().zip(b)).map(|((x, y), (a, b))| (*x - *a).dot(*y - *b)).sum();
     sum / (3 * x.len()) as f64
 }
 
-/// Iterations to measure at: growing by a fifth, and the last.
+/// Iterations at which errors are measured: increasing by a fifth, and the last.
 pub fn moments(last: u64) -> Vec<u64> {
     let mut all = vec![1];
     let mut at = 1.0_f64;

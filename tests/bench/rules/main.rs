@@ -1,6 +1,6 @@
-//! The progressive rules beside one another: SPPM, APPM and CPPM on scenes of ours.
+//! Compares the progressive rules SPPM, APPM and CPPM on the scenes of this project.
 //!
-//! `cargo bench --bench rules -- FIGURE [KEY=VALUE...]`; stdout is one JSON object for `scripts/lab`.
+//! `cargo bench --bench rules -- FIGURE [KEY=VALUE...]`. Standard output is one JSON object for `scripts/lab`.
 
 mod ground;
 mod neighbours;
@@ -13,7 +13,7 @@ mod surface;
 use ground::Ground;
 use std::path::PathBuf;
 
-/// KEY=VALUE of the command line.
+/// KEY=VALUE options of the command line.
 struct Options(Vec<(String, String)>);
 
 impl Options {

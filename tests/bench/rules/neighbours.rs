@@ -1,4 +1,4 @@
-//! Error by the number of neighbours that set the first bandwidth: Figure 11 of \[CPPM 2020\].
+//! Error as a function of the number of neighbours that set the initial bandwidth: Figure 11 of \[CPPM 2020\].
 
 use crate::ground::{Errors, Ground, METHODS, mean, settings};
 use crate::plot::{Curve, Panel, panels};
@@ -9,7 +9,7 @@ use std::path::Path;
 
 const NEIGHBOURS: [usize; 6] = [5, 10, 20, 40, 80, 160];
 
-/// Errors by method and number, and of APPM whose first bandwidth is the same everywhere: a tenth of the scene's
+/// Errors by method and number of neighbours, and of APPM with a uniform initial bandwidth of a tenth of the scene's
 /// radius.
 pub fn neighbours(
     grounds: &[Ground],

@@ -1,11 +1,11 @@
-//! What CPPM's parameters do to its error: Tables 2 to 4 of \[CPPM 2020\].
+//! Effect of CPPM's parameters on its error: Tables 2 to 4 of \[CPPM 2020\].
 
 use crate::ground::{Ground, settings};
 use caustique::estimator::rule::chi_squared::ChiSquaredSettings;
 use caustique::render::{Method, Settings};
 use serde_json::{Value, json};
 
-/// The paper's settings, each with the table that it is in.
+/// The paper's settings with the table of each.
 fn variants() -> Vec<(&'static str, ChiSquaredSettings)> {
     let usual = ChiSquaredSettings::default();
     let mut all = vec![("default", usual)];
@@ -22,7 +22,7 @@ fn variants() -> Vec<(&'static str, ChiSquaredSettings)> {
     all
 }
 
-/// Errors of all variants by seed, and SPPM's.
+/// Errors of all variants and of SPPM, by seed.
 pub fn parameters(ground: &Ground, (photons, iterations, seeds): (u32, u64, u64), reference_seconds: f64) -> Value {
     let reference = ground.reference(reference_seconds);
     let variants = variants();

@@ -1,12 +1,12 @@
-//! Curves in panels.
+//! Plots curves in panels.
 
 use plotters::prelude::*;
 use std::path::Path;
 
-/// Blue, vermilion, green: SPPM, APPM, CPPM.
+/// Blue, vermilion and green for SPPM, APPM and CPPM.
 const COLOURS: [(u8, u8, u8); 3] = [(0, 114, 178), (213, 94, 0), (0, 158, 115)];
 
-/// A curve; every point has a standard error, or 0. Curves take the colours in turn.
+/// A curve. Every point has a standard error, or 0. Curves use the colours in order.
 pub struct Curve {
     pub name: String,
     pub points: Vec<(f64, f64, f64)>,
@@ -14,7 +14,7 @@ pub struct Curve {
     pub colour: usize,
 }
 
-/// A plot, both axes logarithmic.
+/// A plot with two logarithmic axes.
 pub struct Panel {
     pub title: String,
     pub across: &'static str,
@@ -36,7 +36,7 @@ pub fn panels(
         };
         let (left, right) = (fold(f64::min, |p| p.0) / 1.1, fold(f64::max, |p| p.0) * 1.1);
         let (least, most) = (fold(f64::min, |p| p.1), fold(f64::max, |p| p.1));
-        // Less than a decade would have hardly a label.
+        // An axis of less than a decade would have hardly any label.
         let (low, high) = if most < 8.0 * least { (least / 3.0, most * 1.6) } else { (least / 1.3, most * 1.3) };
         let mut chart = ChartBuilder::on(area)
             .margin(14)

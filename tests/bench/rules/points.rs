@@ -1,4 +1,4 @@
-//! Bandwidth and error of pixels against iterations: Figure 9 of \[CPPM 2020\].
+//! Bandwidth and error of pixels as functions of iterations: Figure 9 of \[CPPM 2020\].
 
 use crate::ground::{Ground, METHODS, Shot, moments, settings};
 use crate::plot::{Curve, Panel, panels};
@@ -6,8 +6,8 @@ use caustique::render::{RenderInput, Session};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Bandwidths (first seed) and errors of photons' light (root mean square over seeds, of the truth) at a smooth place
-/// and at an edge.
+/// Bandwidths (of the first seed) and errors of the light of photons (root mean square over seeds, relative to the
+/// truth) at a smooth place and at an edge.
 pub fn points(
     ground: &Ground,
     (photons, iterations, seeds): (u32, u64, u64),
@@ -19,7 +19,7 @@ pub fn points(
     let (width, _) = ground.size();
     let moments = moments(iterations);
     let pixels = places.map(|[x, y]| y * width + x);
-    // Of every place and method.
+    // By place and method.
     let mut bandwidths = vec![vec![Vec::new(); METHODS.len()]; pixels.len()];
     let mut errors = vec![vec![vec![0.0; moments.len()]; METHODS.len()]; pixels.len()];
     for seed in 0..seeds {

@@ -1,10 +1,10 @@
-//! Error against iterations and core-seconds by method: Table 1 of \[CPPM 2020\].
+//! Error as a function of iterations and core-seconds by method: Table 1 of \[CPPM 2020\].
 
 use crate::ground::{Ground, METHODS, Shot, moments, settings};
 use caustique::render::{RenderInput, Session};
 use serde_json::{Value, json};
 
-/// Methods take turns, iteration by iteration, so that they share what else the machine does.
+/// Methods alternate in every iteration, so that other load on the machine affects all equally.
 pub fn race(ground: &Ground, (photons, iterations, seeds): (u32, u64, u64), reference_seconds: f64) -> Value {
     let reference = ground.reference(reference_seconds);
     let moments = moments(iterations);

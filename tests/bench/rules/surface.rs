@@ -9,7 +9,7 @@ use caustique::render::{Method, Session};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Colours of small to large, black to yellow (after matplotlib's inferno).
+/// Colours from small to large values, black to yellow (after matplotlib's inferno).
 const SCALE: [[f32; 3]; 6] = [
     [0.0, 0.0, 0.015],
     [0.26, 0.04, 0.41],
@@ -25,7 +25,7 @@ fn colour(share: f32) -> Rgb {
     Vec3::from_array(SCALE[low]).lerp(Vec3::from_array(SCALE[low + 1]), at - low as f32)
 }
 
-/// A part of the picture by CPPM, and the bandwidths of SPPM and of CPPM there, in one scale of logarithms.
+/// A crop of the picture by CPPM, and the bandwidths of SPPM and of CPPM there on a common logarithmic scale.
 pub fn surface(ground: &Ground, photons: u32, iterations: u64, window: [usize; 4], file: &Path) -> Value {
     let (width, _) = ground.size();
     let [x0, y0, w, h] = window;
@@ -46,7 +46,7 @@ pub fn surface(ground: &Ground, photons: u32, iterations: u64, window: [usize; 4
             layers.get("Radius1").map(|l| l.triples().iter().map(|v| v[0]).collect()).unwrap_or_default()
         })
         .collect();
-    // The scale spans what is in the window, but for the outer hundredths.
+    // The scale covers the values in the window except the outermost hundredths.
     let inside: Vec<usize> = (0..h).flat_map(|y| (0..w).map(move |x| (y + y0) * width + x + x0)).collect();
     let mut all: Vec<f32> = maps.iter().flat_map(|map| inside.iter().map(|p| map[*p])).collect();
     all.sort_by(f32::total_cmp);
