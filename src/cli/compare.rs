@@ -12,28 +12,28 @@ use std::path::{Path, PathBuf};
 /// Measure the error of an image against a reference
 ///
 /// relMSE is the mean over pixels of the squared difference over the squared reference plus 0.01; trimmed leaves out
-/// the worst 0.5 % of pixels. FLIP estimates the difference that people see when they switch between the two. Grain is
-/// the part of relMSE that neighbouring pixels do not share: of the error its mean over 3 x 3 pixels is taken off.
+/// the worst 0.5 % of pixels. FLIP estimates the visible difference when one image replaces the other. Grain is the part
+/// of relMSE that neighbouring pixels do not share: the mean over 3 x 3 pixels is subtracted from the error.
 #[derive(clap::Args)]
 pub struct CompareArgs {
-    /// EXR to judge
+    /// EXR to measure
     #[arg(value_name = "A.exr")]
     image: PathBuf,
     /// Reference EXR
     #[arg(value_name = "B.exr")]
     reference: PathBuf,
-    /// Layer to take from both, such as Noisy or Level1 [default: the picture itself]
+    /// Layer to compare, such as Noisy or Level1 [default: the picture itself]
     #[arg(long, value_name = "NAME")]
     layer: Option<String>,
-    /// In relMSE and grain add 0.01 times the squared mean radiance of the reference instead of 0.01, so that they do
-    /// not depend on how bright the lamps are
+    /// Add 0.01 times the squared mean radiance of the reference instead of 0.01 in relMSE and grain, so that both are
+    /// independent of the brightness of the lamps
     #[arg(long)]
     relative: bool,
     /// Also write a heat map of FLIP: black is no difference, pale yellow a large one
     #[arg(long, value_name = "FILE.png")]
     png: Option<PathBuf>,
-    /// Also write a page with both pictures, the errors of pixels and, where the image has a layer Error, what its render
-    /// has told of them, with a scale
+    /// Also write a page with both pictures and the errors of their pixels, and with the estimated errors if the image has
+    /// a layer Error
     #[arg(long, value_name = "FILE.html")]
     page: Option<PathBuf>,
     /// Print one JSON object
@@ -41,7 +41,7 @@ pub struct CompareArgs {
     json: bool,
 }
 
-/// Compares two files.
+/// Compares two files and prints the errors.
 pub fn run(args: &CompareArgs) -> Result<()> {
     if let Some(png) = &args.png {
         output::check(png, "png")?;
@@ -52,7 +52,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let image = read(&args.image, args.layer.as_deref())?;
     let reference = read(&args.reference, args.layer.as_deref())?;
     let floor = if args.relative { Floor::Relative } else { Floor::Papers };
-    let compared = Form::beside(args.json).during("comparing", || compare_with_floor(&image, &reference, floor));
+    let compared = Form::for_output(args.json).during("comparing", || compare_with_floor(&image, &reference, floor));
     let comparison = compared.map_err(|e| e.within(args.image.display()))?;
     if let Some(path) = &args.png {
         let colours = comparison.flip_map.iter().map(|&error| heat::magma(error));
@@ -66,11 +66,11 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
 }
 
-/// A file; with a layer named, that layer alone as the picture.
+/// Reads a file. If a layer is named, it becomes the picture, without the other layers.
 fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
     let (mut set, _) = exr::read(path)?;
     if let Some(name) = layer {
-        let names: Vec<String> = set.layers.iter().map(shown).collect();
+        let names: Vec<String> = set.layers.iter().map(describe_layer).collect();
         set.layers.retain(|layer| layer.name == name);
         let Some(layer) = set.layers.first_mut() else {
             let error = Error::new(ErrorKind::Usage, path.display(), format!("there is no layer \"{name}\""));
@@ -81,8 +81,8 @@ fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
     Ok(set)
 }
 
-/// The name of a layer; the beauty, which has none, by its channels.
-fn shown(layer: &Layer) -> String {
+/// The name of a layer, or the channels of the beauty layer, which has no name.
+fn describe_layer(layer: &Layer) -> String {
     let components: Vec<&str> = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
     if layer.name.is_empty() { components.join(" ") } else { layer.name.clone() }
 }

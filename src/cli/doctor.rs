@@ -1,4 +1,4 @@
-//! `caustique doctor`: the libraries that are loaded when the program runs, and the Python that reads USD.
+//! `caustique doctor`: finds the libraries that the program loads, and the Python that reads USD.
 
 use super::{print, print_json};
 use caustique::combine::Runtime;
@@ -10,7 +10,8 @@ use caustique_embree as embree;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Say which Embree, ONNX Runtime, Open Image Denoise and USD are found, where, which versions, and what to install if not
+/// Show which Embree, ONNX Runtime, Open Image Denoise and USD are found, their files and versions, and how to install
+/// missing ones
 #[derive(clap::Args)]
 pub struct DoctorArgs {
     /// Print one JSON object
@@ -18,20 +19,20 @@ pub struct DoctorArgs {
     json: bool,
 }
 
-/// What is known about one library.
+/// The result of the search for a library.
 struct Finding {
     name: &'static str,
     key: &'static str,
     needed_for: &'static str,
-    /// Renders of scenes in glTF do without.
+    /// Whether renders of glTF scenes work without the library.
     optional: bool,
     found: std::result::Result<Found, (String, Option<String>)>,
 }
 
-/// A library that is there: its version, its file, and where that comes from.
+/// A library that was found: its version, its file, and the origin of the file.
 struct Found(String, String, &'static str);
 
-/// Looks for the libraries and reports; an error if one is missing.
+/// Prints the libraries. Returns an error if a required library is missing.
 pub fn run(args: &DoctorArgs) -> Result<()> {
     let findings = [embree(), onnxruntime(), oidn(), usd()];
     if args.json {

@@ -16,10 +16,10 @@ use std::path::PathBuf;
 
 /// Finish a rendered EXR as 'caustique render' finishes its own
 ///
-/// The file needs a picture and what tells its noise: the layers that 'caustique render' writes, or from another
-/// renderer the beauty with a layer Variance (of the mean) or two independent halves, Half1 and Half2. Albedo and
-/// normal guide the denoiser, by the names that Blender, Mitsuba, pbrt, LuxCore and Arnold give them. With --model it
-/// needs Level1, Level2, ... and Variance1, ... All layers are kept, the picture itself is replaced.
+/// The file needs a picture and an estimate of its noise: the layers that 'caustique render' writes, or from another
+/// renderer the beauty with a layer Variance (of the mean) or two independent halves, Half1 and Half2. The denoiser also
+/// uses albedo and normal, under the names of Blender, Mitsuba, pbrt, LuxCore and Arnold. --model needs Level1, Level2,
+/// ... and Variance1, ... The picture is replaced, all other layers stay.
 #[derive(clap::Args)]
 pub struct FinishArgs {
     /// EXR to finish
@@ -36,14 +36,14 @@ pub struct FinishArgs {
     threads: usize,
 }
 
-/// Finishes a file.
+/// Finishes the picture of a file.
 pub fn run(args: &FinishArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     super::pool(args.threads)?.install(|| {
         let mut opened = open(&args.finish, None)?;
         let (mut set, mut attributes) = exr::read(&args.input)?;
-        // Names in the style of the input: cryptomatte attributes hold them too.
+        // Keep the naming style of the input, which its cryptomatte attributes also use.
         let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
         let naming = if blender { Naming::Blender } else { Naming::Plain };
         for name in take_plain_names(&mut set) {
@@ -67,18 +67,18 @@ pub fn run(args: &FinishArgs) -> Result<()> {
     })
 }
 
-/// Opens a finish as [`finish::open`] does, and says which denoiser is missing.
+/// Opens a finish and warns if the preferred denoiser is missing.
 ///
 /// # Errors
-/// A library that was asked for by name is missing, or the network takes other levels.
+/// Errors of [`finish::open`].
 pub fn open(options: &FinishOptions, levels: Option<usize>) -> Result<OpenFinish> {
     let opened = finish::open(&options.request(), levels)?;
-    tell_missing(opened.missing.as_ref());
+    warn_missing_denoiser(opened.missing.as_ref());
     Ok(opened)
 }
 
-/// Says that our own denoiser takes the place of one that is missing.
-pub fn tell_missing(missing: Option<&Error>) {
+/// Warns that the built-in denoiser replaces a missing one.
+pub fn warn_missing_denoiser(missing: Option<&Error>) {
     let Some(error) = missing else { return };
     say(&format!("warning: {error}: our own denoiser takes its place, whose pictures are grainier"));
     if let Some(hint) = &error.hint {

@@ -1,4 +1,4 @@
-//! `caustique info`: what a scene or an EXR holds.
+//! `caustique info`: prints the contents of a scene or an EXR.
 
 use super::progress::{Form, duration, percent};
 use super::render::place;
@@ -18,12 +18,12 @@ use std::path::{Path, PathBuf};
 /// The first bytes of every EXR.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
-/// Say what a scene or an EXR holds
+/// Show what a scene or an EXR contains
 #[derive(clap::Args)]
 pub struct InfoArgs {
     /// Scene (.glb, .gltf, .usd, .usda, .usdc, .usdz) or EXR
     file: PathBuf,
-    /// Let a scene name files (buffers, textures, its environment) outside its own folder
+    /// Allow a scene to name files (buffers, textures, its environment) outside its own folder
     #[arg(long)]
     allow_outside: bool,
     /// Print one JSON object
@@ -31,7 +31,7 @@ pub struct InfoArgs {
     json: bool,
 }
 
-/// Reports on a file.
+/// Prints the contents of a file.
 pub fn run(args: &InfoArgs) -> Result<()> {
     let path = &args.file;
     if is_exr(path)? {
@@ -44,8 +44,9 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         return print(&image_text(path, &set, &object));
     }
     let asked = SceneOptions::of(path, args.allow_outside);
-    let scene =
-        super::pool(0)?.install(|| scene::read(&asked, Form::beside(args.json), rayon::current_num_threads()))?.scene;
+    let scene = super::pool(0)?
+        .install(|| scene::read(&asked, Form::for_output(args.json), rayon::current_num_threads()))?
+        .scene;
     let mut object = scene_object(path, &scene);
     if args.json {
         return print_json(&object);
@@ -54,7 +55,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     print(&scene_text(path, &object))
 }
 
-/// Makes all texts in a value printable.
+/// Escapes control characters in all texts of a value.
 fn escape(value: &mut Value) {
     match value {
         Value::String(text) => *text = printable(text),
@@ -74,7 +75,7 @@ fn is_exr(path: &Path) -> Result<bool> {
     Ok(start == EXR_MAGIC)
 }
 
-/// The header's object, with what the file itself tells.
+/// The header's object, with the size and the layers of the file.
 fn image_object(set: &LayerSet, header: Option<Value>) -> Map<String, Value> {
     let mut object = match header {
         Some(Value::Object(object)) => object,
@@ -97,7 +98,7 @@ fn image_text(path: &Path, set: &LayerSet, object: &Value) -> String {
     for layer in &set.layers {
         let components: Vec<&str> = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
         let name = if layer.name.is_empty() { "(beauty)" } else { &layer.name };
-        // Blender's names that are ours behind the view layer's.
+        // Blender's names have the name of the view layer in front.
         let plain = layer.name.strip_prefix("ViewLayer.").unwrap_or(&layer.name);
         let known = describe(plain).map(|known| format!("{} [{}]", known.meaning, known.unit));
         let [name, components] = [name, &components.concat()].map(printable);
@@ -129,14 +130,14 @@ fn image_text(path: &Path, set: &LayerSet, object: &Value) -> String {
         text += &format!("warning: {warning}\n");
     }
     let history = object.get("history").and_then(Value::as_array).cloned().unwrap_or_default();
-    // A reproducible file has no clock in it.
+    // Reproducible files state no times.
     let timed = history.iter().any(|moment| moment.get("seconds").is_some());
     let (key, name) = if timed { ("seconds", "seconds") } else { ("iterations", "iterations") };
     let points = |of: &str| -> Vec<(f64, f64)> {
         let point = |moment: &Value| Some((moment.get(key)?.as_f64()?, moment.get(of)?.as_f64()?));
         history.iter().filter_map(point).collect()
     };
-    // That of the finished picture, where it was judged more than once.
+    // The error of the finished picture, if it was estimated more than once.
     let finished = points("finished");
     let (points, of) = match finished.len() {
         0 | 1 => (points("error"), "estimated relative error"),
@@ -145,7 +146,7 @@ fn image_text(path: &Path, set: &LayerSet, object: &Value) -> String {
     text + &plot::log_log(&points, name, of)
 }
 
-/// How sure the error is, and where it is.
+/// The interval of the error, and the places of the largest errors.
 fn accuracy_text(object: &Value) -> String {
     let accuracy = object.get("accuracy");
     let number = |value: &Value, key: &str| value.get(key).and_then(Value::as_f64);
@@ -216,16 +217,16 @@ fn kind(emitter: &Emitter) -> &'static str {
     }
 }
 
-/// Names of a kind that the text lists.
-const SHOWN: usize = 24;
+/// Most names of a kind that the text lists.
+const MAX_NAMES: usize = 24;
 
 fn scene_text(path: &Path, object: &Value) -> String {
     let names = |key: &str| {
         let names: Vec<&str> = object[key].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
         match names.len() {
             0 => "none".to_string(),
-            n if n <= SHOWN => format!("{n}: {}", names.join(", ")),
-            n => format!("{n}: {} and {} more (all of them with --json)", names[..SHOWN].join(", "), n - SHOWN),
+            n if n <= MAX_NAMES => format!("{n}: {}", names.join(", ")),
+            n => format!("{n}: {} and {} more (all of them with --json)", names[..MAX_NAMES].join(", "), n - MAX_NAMES),
         }
     };
     let mut text = format!("{}\n", printable(&path.display().to_string()));

@@ -1,9 +1,9 @@
 //! `caustique merge`: merges the shards of one render to its picture, or renders of different seeds to their mean.
 
-use super::finish::tell_missing;
+use super::finish::warn_missing_denoiser;
 use super::output::{self, PictureArgs};
 use super::progress::Form;
-use super::render::{Summary, tell_finish, tell_picture, tell_unseen};
+use super::render::{Summary, print_finish, print_picture, warn_unseen};
 use super::say;
 use caustique::error::Result;
 use caustique::film::{LayerSet, Naming, Selection, take_plain_names};
@@ -17,41 +17,40 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Put the shards of a render together, or renders of other seeds
+/// Merge the shards of a render, or renders of different seeds
 ///
-/// Shards that --shard I/N made give the picture that one machine would have rendered, to the last bit of every channel
-/// and in whatever order they are named: layers, variances, errors and cryptomattes. The picture is finished as the
-/// render would have been, once. Whole renders that differ in their --seed alone give their mean, weighed by
-/// iterations; the header says so.
+/// Shards by --shard I/N give the picture that one machine would have rendered, to the last bit of every channel: layers,
+/// variances, errors and cryptomattes. Their order does not matter. The picture is finished once, as the render would
+/// have been. Whole renders that differ only in their --seed give their mean, weighted by iterations.
 #[derive(clap::Args)]
 pub struct MergeArgs {
-    /// Shards of one render, or renders of other seeds
+    /// Shards of one render, or renders of different seeds
     #[arg(required = true, value_name = "EXR")]
     inputs: Vec<PathBuf>,
     /// EXR to write
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     output: PathBuf,
-    /// Do with the shards that are there: the picture so far
+    /// Merge the shards although some are missing: the picture so far
     #[arg(long)]
     partial: bool,
-    /// Do not finish the picture [default: as the shards were asked]
+    /// Do not finish the picture [default: as for the shards]
     #[arg(long, alias = "no-combine", conflicts_with_all = ["model", "denoise"], help_heading = "Finish")]
     no_finish: bool,
-    /// What makes the denoised picture: 'auto', 'oidn', 'own' or 'none' [default: as the shards were asked]
+    /// Denoiser: 'auto', 'oidn', 'own' or 'none' [default: as for the shards]
     #[arg(long, value_enum, help_heading = "Finish")]
     denoise: Option<DenoiserChoice>,
-    /// Network that combines five bandwidth levels before that [default: as the shards were asked]
+    /// Network that combines five bandwidth levels before denoising [default: as for the shards]
     #[arg(long, value_name = "compact|FILE.onnx", help_heading = "Expert")]
     model: Option<String>,
-    /// Layers: 'all', 'comp', 'beauty' or names with commas between them [default: as the shards were asked]
+    /// Layers: 'all', 'comp', 'beauty' or names separated by commas [default: as for the shards]
     #[arg(long, value_name = "LIST", help_heading = "Output")]
     layers: Option<String>,
-    /// Names of channels [default: as the shards were asked]
+    /// Names of channels [default: as for the shards]
     #[arg(long, value_enum, help_heading = "Output")]
     exr_naming: Option<Naming>,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Leave clocks, threads and the names of shards out of the header: the same shards make the same file
+    /// Leave clocks, threads and the names of shards out of the header, so that equal shards give equal files
     #[arg(long, help_heading = "Running")]
     reproducible: bool,
     /// Threads; 0 takes all cores
@@ -59,7 +58,7 @@ pub struct MergeArgs {
     threads: usize,
 }
 
-/// Merges.
+/// Merges shards if there are any, else averages renders.
 pub fn run(args: &MergeArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
@@ -89,11 +88,11 @@ impl MergeArgs {
         self.exr_naming.or_else(|| given(arguments, "exr-naming")).unwrap_or(Naming::Plain)
     }
 
-    /// Writes the picture.
+    /// Writes the EXR and the PNG.
     fn write(&self, set: &LayerSet, attributes: &Attributes, naming: Naming, made_for: &PictureDefaults) -> Result<()> {
         exr::write(&self.output, set, attributes, self.picture.exr_options(naming))?;
         self.picture.write_png(set, made_for)?;
-        tell_picture(&self.output, set);
+        print_picture(&self.output, set);
         Ok(())
     }
 }
@@ -116,18 +115,18 @@ fn merge_shards(args: &MergeArgs) -> Result<()> {
     let delivery = Form::Auto.during("merging", || {
         shards.merge(&request, |event| {
             if let MergeEvent::Finishing { rendered, missing } = event {
-                tell_missing(missing);
+                warn_missing_denoiser(missing);
                 summary = Some(Summary::of(rendered));
             }
         })
     })?;
     if let Some(summary) = summary {
-        summary.tell();
+        summary.print();
         if let Some(name) = &delivery.finished_by {
-            tell_finish(name, &delivery, summary.coverage_of_finished());
+            print_finish(name, &delivery, summary.coverage_of_finished());
         }
-        summary.tell_rejected(&args.output, true);
-        tell_unseen(&args.output, &delivery);
+        summary.print_rejected(&args.output, true);
+        warn_unseen(&args.output, &delivery);
     }
     args.write(&delivery.set, &delivery.attributes, naming, &made_for)?;
     let output = args.output.display();
@@ -152,7 +151,7 @@ fn average_seeds(args: &MergeArgs) -> Result<()> {
     let arguments = header["arguments"].clone();
     if let Some(request) = args.finish(&arguments) {
         let mut opened = finish::open(&request, None)?;
-        tell_missing(opened.missing.as_ref());
+        warn_missing_denoiser(opened.missing.as_ref());
         let account = opened.finish().apply(&mut set, |_| true)?;
         header["combined"] = opened.header(&account);
         if let Some(header) = header.as_object_mut() {

@@ -1,4 +1,4 @@
-//! The command line: one file per command. Data goes to stdout, talk to stderr; only this file prints.
+//! The command line, one file per command. Data goes to stdout, messages to stderr. Only this file prints.
 
 mod compare;
 mod converge;
@@ -40,22 +40,22 @@ struct Cli {
 enum Command {
     /// Render a scene to a multichannel EXR, and to a PNG to look at
     Render(Box<render::RenderArgs>),
-    /// Say which effects a scene calls for, which will be simulated, and why
+    /// Show which effects a scene calls for, which will be simulated, and why
     Plan(Box<plan::PlanArgs>),
     /// Finish a rendered EXR, also one of another renderer
     #[command(alias = "combine")]
     Finish(finish::FinishArgs),
-    /// Put the shards of a render together, or renders of other seeds
+    /// Merge the shards of a render, or renders of different seeds
     Merge(merge::MergeArgs),
     /// Measure the error of an image against a reference
     Compare(compare::CompareArgs),
     /// Compare methods and settings: accuracy against time
     Converge(Box<converge::ConvergeArgs>),
-    /// Say what a scene or an EXR holds
+    /// Show what a scene or an EXR contains
     Info(info::InfoArgs),
-    /// Say which Embree, ONNX Runtime, Open Image Denoise and USD are found, and what to install if not
+    /// Show which Embree, ONNX Runtime, Open Image Denoise and USD are found, and how to install missing ones
     Doctor(doctor::DoctorArgs),
-    /// Print what completes commands and options in a shell
+    /// Print a script that completes commands and options in a shell
     Completions(shell::CompletionsArgs),
     /// Print a page of the manual
     Man(shell::ManArgs),
@@ -64,7 +64,7 @@ enum Command {
     Options,
 }
 
-/// The whole command line.
+/// The command line with all commands, arranged for the help.
 fn command_line() -> clap::Command {
     let mut places = 0..;
     Cli::command().mut_subcommands(|command| {
@@ -72,8 +72,8 @@ fn command_line() -> clap::Command {
     })
 }
 
-/// The command that the words of the command line begin with.
-fn named(line: &clap::Command) -> Option<&clap::Command> {
+/// The command that the first argument names.
+fn named_command(line: &clap::Command) -> Option<&clap::Command> {
     std::env::args_os().nth(1).and_then(|word| line.find_subcommand(word))
 }
 
@@ -86,10 +86,10 @@ pub fn main() -> ExitCode {
     let matches = line.try_get_matches_from_mut(std::env::args_os());
     let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
-        Err(error) => match usage::explain(&error, named(&line)) {
+        Err(error) => match usage::explain(&error, named_command(&line)) {
             Some(error) => return fail(&error),
             None => {
-                // Help and version were asked for: data, on stdout.
+                // Help and version are data: they go to stdout.
                 return match error.print() {
                     Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => ExitCode::FAILURE,
                     _ => ExitCode::SUCCESS,
@@ -97,7 +97,7 @@ pub fn main() -> ExitCode {
             }
         },
     };
-    let command = match stage::defaults(cli.command, &mut line) {
+    let command = match stage::add_stage_options(cli.command, &mut line) {
         Ok(command) => command,
         Err(error) => return fail(&error),
     };
@@ -120,7 +120,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The two lines of an error, and its exit code.
+/// Prints an error with its hint, and returns its exit code.
 fn fail(error: &Error) -> ExitCode {
     say(&error.to_string());
     if let Some(hint) = &error.hint {
@@ -129,13 +129,13 @@ fn fail(error: &Error) -> ExitCode {
     ExitCode::from(error.exit_code())
 }
 
-/// So many threads to a core are a slip.
-const THREADS_PER_CORE: usize = 4;
+/// More threads per core than this are taken for a typing error.
+const MAX_THREADS_PER_CORE: usize = 4;
 
-/// Threads for everything that a command does; 0 takes all cores.
+/// The thread pool of a command; 0 threads: one for each core.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
-    if threads > THREADS_PER_CORE * cores {
+    if threads > MAX_THREADS_PER_CORE * cores {
         say(&format!(
             "warning: --threads {threads}: there are {cores} cores: more threads take memory, and make nothing faster"
         ));
@@ -144,26 +144,25 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     builder.build().map_err(|error| Error::new(ErrorKind::Io, "threads", error).hint("ask for fewer with --threads"))
 }
 
-/// Prints a line to stderr. Nobody may be listening any more (a closed pipe, a terminal that is gone): a render goes
-/// on.
+/// Prints a line to stderr. Ignores errors, so that a render continues after its terminal or its pipe is closed.
 fn say(line: &str) {
-    progress::beside_the_bar(|| {
+    progress::hide_bar_during(|| {
         let _ = writeln!(std::io::stderr().lock(), "{}", printable(line));
     });
 }
 
-/// One line of text in which names of a scene cannot act on a terminal or begin a line of their own: what is not shown
-/// but acted on (control characters, changes of direction) is shown as an escape such as `\u{1b}`.
+/// Escapes control characters and changes of text direction, such as `\u{1b}`, so that names from a scene can neither
+/// control the terminal nor start a new line.
 fn printable(text: &str) -> String {
-    text.chars().map(|c| if commands(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
+    text.chars().map(|c| if is_control(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
 }
 
-/// Whether a terminal does something for a character other than to show it.
-fn commands(c: char) -> bool {
+/// Whether a character controls a terminal instead of being shown.
+fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Prints data to stdout. A reader that has closed the pipe wants no more: that is no error.
+/// Prints data to stdout. A closed pipe is no error.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -173,14 +172,14 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Sends a file to stdout.
+/// Copies a file to stdout.
 fn print_file(path: &Path) -> std::io::Result<()> {
     let mut out = File::from(std::io::stdout().as_fd().try_clone_to_owned()?);
     std::io::copy(&mut File::open(path)?, &mut out).map(drop)
 }
 
-/// Prints a JSON object to stdout, indented. What a terminal would act on stands in strings alone, as escapes.
+/// Prints an indented JSON object to stdout. Escapes control characters, which occur only within strings.
 fn print_json(value: &serde_json::Value) -> Result<()> {
-    let escape = |c: char| if c != '\n' && commands(c) { format!("\\u{:04x}", c as u32) } else { c.to_string() };
+    let escape = |c: char| if c != '\n' && is_control(c) { format!("\\u{:04x}", c as u32) } else { c.to_string() };
     print(&format!("{value:#}\n").chars().map(escape).collect::<String>())
 }

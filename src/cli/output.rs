@@ -1,4 +1,4 @@
-//! Options and checks that every command with output files shares.
+//! Options and checks that all commands with output files share.
 
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, Naming};
@@ -12,7 +12,7 @@ use std::io::IsTerminal;
 use std::ops::Bound::Unbounded;
 use std::path::{Path, PathBuf};
 
-/// How files are written.
+/// Options about the PNG and the compression of the EXR.
 #[derive(clap::Args, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[command(next_help_heading = "Output")]
@@ -43,18 +43,18 @@ impl PictureArgs {
         self.png.as_deref().map_or(Ok(()), |path| check(path, "png"))
     }
 
-    /// How the EXR is written.
+    /// Options for writing the EXR.
     pub fn exr_options(&self, naming: Naming) -> exr::Options {
         exr::Options { compression: self.compression, naming }
     }
 
-    /// Exposure in stops and tone curve: the user's, else those of the picture that a scene was made for.
+    /// Exposure in stops and tone curve: the user's, else the scene's.
     pub fn look(&self, made_for: &PictureDefaults) -> (f32, ToneMap) {
         let exposure = self.exposure.map(|ev| ev as f32).or(made_for.exposure).unwrap_or(0.0);
         (exposure, self.tonemap.or(made_for.tonemap).unwrap_or_default())
     }
 
-    /// Writes the PNG if one is asked for.
+    /// Writes the PNG, if the user wants one.
     pub fn write_png(&self, set: &LayerSet, made_for: &PictureDefaults) -> Result<()> {
         let Some(path) = &self.png else { return Ok(()) };
         let (exposure, tonemap) = self.look(made_for);
@@ -62,13 +62,13 @@ impl PictureArgs {
     }
 }
 
-/// Checks that `path` is a name for a file of this kind and that one can be written there.
+/// Checks that `path` has the extension and that a file can be written there.
 ///
 /// # Errors
-/// Another extension, no such folder, or one that takes no files.
+/// The extension is another, or the folder is missing or not writable.
 pub fn check(path: &Path, extension: &str) -> Result<()> {
     let named = path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
-    // A device, such as /dev/null, is called what it is called; of a folder another error tells.
+    // Devices, such as /dev/null, need no extension, and folders are reported by the check below.
     let is_no_file = path.exists() && !path.is_file();
     if !named && !is_no_file {
         let error = Error::new(ErrorKind::Usage, path.display(), format!("the name does not end in .{extension}"));
@@ -80,10 +80,10 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
     atomic::check_writable(path)
 }
 
-/// Checks that an output is none of the inputs, which would be lost.
+/// Checks that an output replaces no input, also if they are named differently.
 ///
 /// # Errors
-/// It is, by whatever name.
+/// The output is an input.
 pub fn check_inputs<'a>(output: &Path, mut inputs: impl Iterator<Item = &'a Path>) -> Result<()> {
     if !output.is_file() {
         return Ok(());
@@ -97,15 +97,15 @@ pub fn check_inputs<'a>(output: &Path, mut inputs: impl Iterator<Item = &'a Path
     }
 }
 
-/// Whether a name stands for standard output.
+/// Whether a path stands for standard output.
 pub fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Checks that the EXR of a render can be written: to a file, or to standard output where something takes it.
+/// Checks that the EXR of a render can be written to a file or to standard output.
 ///
 /// # Errors
-/// See [`check`]; a terminal.
+/// Errors of [`check`]; standard output is a terminal.
 pub fn check_render(path: &Path) -> Result<()> {
     if !is_stdout(path) {
         return check(path, "exr");

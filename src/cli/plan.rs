@@ -1,4 +1,4 @@
-//! `caustique plan`: what a render of a scene would simulate, why, and what it warns of.
+//! `caustique plan`: prints which effects a render would simulate and why, with its warnings.
 
 use super::progress::{Form, duration, percent};
 use super::{print, print_json, printable, scene};
@@ -11,11 +11,11 @@ use caustique::plan::{EffectPlan, Plan};
 use caustique::scene::View;
 use serde_json::json;
 
-/// Say which effects a scene calls for, which will be simulated, and why.
+/// Show which effects a scene calls for, which will be simulated, and why.
 ///
-/// Reads the scene as 'caustique render' does, tries what --method auto tries, and prints what it would do. Below that
-/// it says what looks like a mistake in the scene: glass that does not bend light, lamps that are closed in or a
-/// thousand times too bright, and the like.
+/// Reads the scene as 'caustique render' does, compares methods as --method auto does, and prints the plan. Warns of
+/// likely mistakes in the scene: glass that does not refract, enclosed lamps, lamps that are a thousand times too
+/// bright, and the like.
 #[derive(clap::Args)]
 #[command(next_line_help = true)]
 pub struct PlanArgs {
@@ -31,19 +31,19 @@ pub struct PlanArgs {
 }
 
 impl PlanArgs {
-    /// The scene that is looked at.
+    /// The options of the scene.
     pub fn scene(&self) -> &SceneOptions {
         &self.job.scene
     }
 }
 
-/// Plans without rendering.
+/// Prints the plan of a render.
 pub fn run(args: &PlanArgs) -> Result<()> {
     super::pool(args.threads)?.install(|| report(args))
 }
 
 fn report(args: &PlanArgs) -> Result<()> {
-    let (job, form) = (&args.job, Form::beside(args.json));
+    let (job, form) = (&args.job, Form::for_output(args.json));
     let request = job.picture_request()?;
     let loaded = scene::read(&job.scene, form, rayon::current_num_threads())?;
     let auto = matches!(request.method, MethodRequest::Auto(_));
@@ -70,7 +70,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     }
     let warnings = &loaded.scene.warnings;
     if job.scene.strict && !warnings.is_empty() {
-        return Err(scene::forbidden(&job.scene, warnings.len()));
+        return Err(scene::strict_error(&job.scene, warnings.len()));
     }
     Ok(())
 }
@@ -81,7 +81,7 @@ fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, ta
     let settings = with_light_paths(planned.chosen.settings.clone(), args.job.photons, view.camera.size());
     let mut finish = args.job.forecast_finish()?;
     let work = || forecast(view, &settings, &mut finish, target);
-    Form::beside(args.json).during("trying how the error falls", work)
+    Form::for_output(args.json).during("trying how the error falls", work)
 }
 
 /// `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, and the pilot that this follows from.
@@ -98,14 +98,14 @@ fn sentence(error: f64, forecast: Option<Forecast>) -> String {
     )
 }
 
-/// A column: its title, and what it says of an effect.
+/// A column: its title, and its text for an effect.
 type Column = (&'static str, fn(&EffectPlan) -> String);
 
 fn figure(x: Option<f64>, say: fn(f64) -> String) -> String {
     x.map_or("-".into(), say)
 }
 
-/// The columns before the reasons; those of figures where something has measured them.
+/// The columns before the reasons. Columns of figures exist if a pilot has estimated some.
 fn columns(plan: &Plan) -> Vec<Column> {
     let mut columns: Vec<Column> = vec![("effect", |e| e.effect.name().into()), ("simulated by", carrier)];
     let any = |figure: fn(&EffectPlan) -> Option<f64>| plan.effects.iter().any(|e| figure(e).is_some());
@@ -132,7 +132,7 @@ fn carrier(e: &EffectPlan) -> String {
     }
 }
 
-/// A table for people.
+/// The plan as a table for people.
 fn text(plan: &Plan) -> String {
     let columns = columns(plan);
     let cells = |row: &dyn Fn(&Column) -> String| columns.iter().map(row).collect::<Vec<String>>();
@@ -178,7 +178,7 @@ mod tests {
     use caustique::render::{Candidate, Method, Settings};
     use caustique::scene::{CameraRequest, Description, Scene};
 
-    /// Columns of figures are there when something has measured them, with a dash where it has not.
+    /// A column of figures exists if an effect has one, with dashes for the other effects.
     #[test]
     fn figures_have_columns() {
         let scene = Scene::build(Description::default(), 1).unwrap();

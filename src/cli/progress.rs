@@ -1,4 +1,4 @@
-//! Progress on stderr: a bar on a terminal, lines for logs, JSON and Open Job Description for programs.
+//! Progress on stderr: a bar on a terminal, lines in logs, JSON or Open Job Description for programs.
 
 use super::{printable, say};
 use caustique::pipeline::FINISHED_PICTURE;
@@ -29,42 +29,42 @@ pub enum Form {
 }
 
 impl Form {
-    /// Whether people read it: programs get neither notes nor a summary.
+    /// Whether people read the reports. Programs get neither notes nor a summary.
     pub fn for_people(self) -> bool {
         matches!(self, Form::Auto | Form::Plain)
     }
 
-    /// The form for commands without `--progress`: where JSON is asked for, nobody looks on.
-    pub fn beside(json: bool) -> Form {
+    /// The form of commands without `--progress`: no reports if the output is JSON.
+    pub fn for_output(json: bool) -> Form {
         if json { Form::None } else { Form::Auto }
     }
 
-    /// Where `auto` shows no bar, its lines.
-    pub fn settled(self) -> Form {
+    /// Replaces `Auto` by `Plain` if stderr is no terminal.
+    pub fn resolved(self) -> Form {
         if self == Form::Auto && !std::io::stderr().is_terminal() { Form::Plain } else { self }
     }
 
-    /// Does something that may take long, and says what it is where it does.
+    /// Runs `work` and shows `what` while it takes long.
     pub fn during<T>(self, what: &str, work: impl FnOnce() -> T) -> T {
         let _waiting = Waiting::begin(self, what);
         work()
     }
 }
 
-/// Seconds between plain lines.
-pub const PLAIN_EVERY: f64 = 5.0;
+/// Seconds between two plain lines.
+pub const PLAIN_INTERVAL: f64 = 5.0;
 /// Steps of the bar.
-const STEPS: u64 = 1000;
-/// A wait as long as this is explained.
-const PATIENCE: Duration = Duration::from_secs(1);
-/// Time between two pictures of a spinner.
-const TICK: Duration = Duration::from_millis(100);
+const BAR_STEPS: u64 = 1000;
+/// Waits shorter than this are not shown.
+const MIN_SHOWN_WAIT: Duration = Duration::from_secs(1);
+/// Time between two frames of a spinner.
+const SPINNER_INTERVAL: Duration = Duration::from_millis(100);
 
-/// The bar or spinner that is on the terminal.
+/// The bar or spinner on the terminal.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Prints lines to stderr without tearing a bar that is there.
-pub fn beside_the_bar(print: impl FnOnce()) {
+/// Hides the bar on the terminal while `print` writes lines to stderr.
+pub fn hide_bar_during(print: impl FnOnce()) {
     let shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
     match shown {
         Some(bar) => bar.suspend(print),
@@ -72,17 +72,17 @@ pub fn beside_the_bar(print: impl FnOnce()) {
     }
 }
 
-/// A bar or spinner on the terminal until it is dropped.
+/// A bar or spinner, shown on the terminal until it is dropped.
 pub struct Bar(ProgressBar);
 
 impl Bar {
-    /// A bar for [`Form::Auto`] on a terminal.
+    /// Shows the bar of [`Form::Auto`].
     pub fn new() -> Bar {
         Bar::show("{bar:24} {percent:>3} %  {msg}", Duration::ZERO)
     }
 
     fn show(template: &str, elapsed: Duration) -> Bar {
-        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr()).with_elapsed(elapsed);
+        let bar = ProgressBar::with_draw_target(Some(BAR_STEPS), ProgressDrawTarget::stderr()).with_elapsed(elapsed);
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
@@ -90,9 +90,9 @@ impl Bar {
         Bar(bar)
     }
 
-    /// Shows how much is done, 0 to 1, and a message.
+    /// Sets the finished fraction, 0 to 1, and the message.
     pub fn set(&self, fraction: f64, message: String) {
-        self.0.set_position((fraction * STEPS as f64) as u64);
+        self.0.set_position((fraction * BAR_STEPS as f64) as u64);
         self.0.set_message(message);
     }
 }
@@ -104,33 +104,33 @@ impl Drop for Bar {
     }
 }
 
-/// Something that goes on without a measure of how far it is: a spinner on a terminal, a line elsewhere, once it has
-/// taken as long as [`PATIENCE`].
+/// Shows work of unknown length until it is dropped: a spinner on a terminal, a line elsewhere, after
+/// [`MIN_SHOWN_WAIT`].
 pub struct Waiting {
     over: Option<Sender<()>>,
     teller: Option<JoinHandle<()>>,
 }
 
 impl Waiting {
-    /// Begins to wait for `what`.
+    /// Begins to show `what`.
     pub fn begin(form: Form, what: &str) -> Waiting {
         let (over, end) = channel::<()>();
-        let (form, what) = (form.settled(), printable(what));
+        let (form, what) = (form.resolved(), printable(what));
         let tell = move || {
-            if end.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
+            if end.recv_timeout(MIN_SHOWN_WAIT) != Err(RecvTimeoutError::Timeout) {
                 return;
             }
-            let spinner = (form == Form::Auto).then(|| Bar::show("{spinner} {msg}, {elapsed}", PATIENCE));
+            let spinner = (form == Form::Auto).then(|| Bar::show("{spinner} {msg}, {elapsed}", MIN_SHOWN_WAIT));
             match (&spinner, form) {
                 (Some(Bar(spinner)), _) => {
                     spinner.set_message(what);
-                    spinner.enable_steady_tick(TICK);
+                    spinner.enable_steady_tick(SPINNER_INTERVAL);
                 }
                 (None, Form::Plain) => say(&what),
                 (None, Form::Openjd) => say(&format!("openjd_status: {what}")),
                 (None, _) => {}
             }
-            // Nothing is ever sent: the wait is over when the sender is gone.
+            // Nothing is sent: the channel ends with its sender when `Waiting` is dropped.
             let _ = end.recv();
         };
         Waiting { over: Some(over), teller: std::thread::Builder::new().spawn(tell).ok() }
@@ -146,28 +146,28 @@ impl Drop for Waiting {
     }
 }
 
-/// A frame among those of a run.
+/// The position of a frame in a run over several frames.
 #[derive(Clone, Copy, Debug)]
-pub struct Turn {
-    /// Its number in the animation.
+pub struct FrameOfRun {
+    /// Number of the frame in the animation.
     pub frame: u32,
-    /// How many of the run come before it.
+    /// Number of frames before it in the run.
     pub before: usize,
-    /// How many frames the run has.
+    /// Number of frames in the run.
     pub count: usize,
 }
 
-/// Reports on one render.
+/// Prints the progress of one render.
 pub struct Reporter {
     form: Form,
-    turn: Option<Turn>,
+    turn: Option<FrameOfRun>,
     bar: Option<Bar>,
     first: Option<Waiting>,
     time: Option<f64>,
     next_line: f64,
 }
 
-/// `--progress json`: the keys that scripts rely on.
+/// A line of `--progress json`. Scripts rely on its keys.
 #[derive(Serialize)]
 struct Line {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -179,12 +179,12 @@ struct Line {
     light_paths: u64,
     error: Option<f64>,
     error_of: &'static str,
-    /// An error to come, and in how many seconds.
+    /// A smaller error, and the seconds until the render reaches it.
     #[serde(skip_serializing_if = "Option::is_none")]
     expected: Option<Expected>,
 }
 
-/// An error to come.
+/// A smaller error, and the seconds until the render reaches it.
 #[derive(Serialize)]
 struct Expected {
     error: f64,
@@ -193,13 +193,13 @@ struct Expected {
 
 impl Reporter {
     /// A reporter for a render with these settings.
-    pub fn new(form: Form, settings: &Settings, turn: Option<Turn>) -> Reporter {
+    pub fn new(form: Form, settings: &Settings, turn: Option<FrameOfRun>) -> Reporter {
         let first = Some(Waiting::begin(form, "first iteration"));
-        let form = form.settled();
+        let form = form.resolved();
         Reporter { form, turn, bar: None, first, time: settings.time, next_line: 0.0 }
     }
 
-    /// Reports the state after an iteration.
+    /// Prints the state after an iteration, if a line or an update of the bar is due.
     pub fn report(&mut self, progress: &Progress) {
         self.first = None;
         match self.form {
@@ -211,7 +211,7 @@ impl Reporter {
             Form::Plain => {
                 let last = progress.iterations == Some(progress.iteration);
                 if progress.seconds >= self.next_line || last {
-                    self.next_line = progress.seconds + PLAIN_EVERY;
+                    self.next_line = progress.seconds + PLAIN_INTERVAL;
                     say(&self.sentence(progress));
                 }
             }
@@ -235,18 +235,19 @@ impl Reporter {
         }
     }
 
-    /// Takes the bar off the terminal.
+    /// Removes the bar from the terminal.
     pub fn finish(&mut self) {
         (self.first, self.bar) = (None, None);
     }
 
-    /// What a line says, after the frame if there is one.
+    /// The text of a line, with the frame if the run has several.
     fn sentence(&self, progress: &Progress) -> String {
         let frame = self.turn.map(|turn| format!("frame {}, ", turn.frame)).unwrap_or_default();
         frame + &sentence(progress)
     }
 
-    /// How much is done of all frames, 0 to 1; of this one by whichever limit is nearer.
+    /// Finished fraction of all frames, 0 to 1. Of the current frame it is the larger of the fractions of iterations and of
+    /// time.
     fn fraction(&self, progress: &Progress) -> f64 {
         let by_count = progress.iterations.map_or(0.0, |n| progress.iteration as f64 / n.max(1) as f64);
         let by_time = self.time.map_or(0.0, |t| progress.seconds / t);
@@ -255,7 +256,7 @@ impl Reporter {
     }
 }
 
-/// `iteration 12 of 64, 3.1 s, 13 s left, 387000 photons/s, error 3.1 %`.
+/// The state of a render for people: `iteration 12 of 64, 3.1 s, 13 s left, 387000 photons/s, error 3.1 %`.
 fn sentence(progress: &Progress) -> String {
     let mut text = format!("iteration {}", progress.iteration);
     if let Some(n) = progress.iterations {
@@ -308,7 +309,7 @@ mod tests {
     use caustique::render::ErrorCoverage;
 
     #[test]
-    fn sentences_are_for_people() {
+    fn progress_is_printed_in_sentences() {
         let progress = Progress {
             iteration: 12,
             iterations: Some(64),

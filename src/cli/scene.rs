@@ -1,4 +1,4 @@
-//! From a scene file and the options about it to a scene, and its warnings on stderr.
+//! Reads a scene by its options, and prints its warnings.
 
 use super::progress::{Form, Waiting};
 use super::say;
@@ -8,10 +8,10 @@ use caustique::pipeline::Loaded;
 use caustique::pipeline::load::load;
 use caustique::stop::Stop;
 
-/// Reads and builds the scene as the options ask for it.
+/// Reads and builds a scene.
 ///
 /// # Errors
-/// See [`load`]; more than one frame.
+/// Errors of [`load`]; the options name several frames.
 pub fn read(args: &SceneOptions, form: Form, threads: usize) -> Result<Loaded> {
     let args = match args.frames {
         None => args,
@@ -27,19 +27,22 @@ pub fn read(args: &SceneOptions, form: Form, threads: usize) -> Result<Loaded> {
     load(&args.request(), threads, &Stop::default())
 }
 
-/// Prints a line for each warning; with `--strict` they are an error that lists them all.
-pub fn tell(args: &SceneOptions, warnings: &[String]) -> Result<()> {
+/// Prints a line for each warning.
+///
+/// # Errors
+/// `--strict` is set and there are warnings.
+pub fn print_warnings(args: &SceneOptions, warnings: &[String]) -> Result<()> {
     for warning in warnings {
         say(&format!("warning: {}: {warning}", args.path.display()));
     }
     if !args.strict || warnings.is_empty() {
         return Ok(());
     }
-    Err(forbidden(args, warnings.len()))
+    Err(strict_error(args, warnings.len()))
 }
 
-/// What `--strict` makes of so many warnings.
-pub fn forbidden(args: &SceneOptions, warnings: usize) -> Error {
+/// The error that `--strict` raises.
+pub fn strict_error(args: &SceneOptions, warnings: usize) -> Error {
     let things = if warnings == 1 { "1 thing is" } else { &format!("{warnings} things are") };
     let cause = format!("{things} ignored or approximated, and --strict forbids it");
     Error::new(ErrorKind::Scene, args.path.display(), cause)

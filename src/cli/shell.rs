@@ -1,5 +1,5 @@
-//! `caustique completions`, `caustique man` and `caustique options`: what a shell, the reader of manuals and other programs
-//! take from the command line itself.
+//! `caustique completions`, `caustique man` and `caustique options`: the command line as shell completions, as manual
+//! pages and as JSON.
 
 use super::{print, print_json};
 use caustique::error::{Error, ErrorKind, Result};
@@ -8,7 +8,7 @@ use clap::Command;
 use clap_complete::Shell;
 use serde_json::json;
 
-/// Print what completes commands and options in a shell.
+/// Print a script that completes commands and options in a shell.
 ///
 /// For bash: caustique completions bash > ~/.local/share/bash-completion/completions/caustique
 #[derive(clap::Args)]
@@ -23,7 +23,7 @@ pub struct CompletionsArgs {
 /// To read one: caustique man render | man -l -
 #[derive(clap::Args)]
 pub struct ManArgs {
-    /// Command whose page it is [default: the program's own]
+    /// Command [default: the page of the program]
     command: Option<String>,
 }
 

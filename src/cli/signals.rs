@@ -1,5 +1,5 @@
-//! Ctrl-C, SIGTERM and SIGHUP (the terminal is gone): the first asks for an end, the second
-//! ends the program at once. Ctrl-C is answered, by a thread of its own: a handler may not print.
+//! Ctrl-C, SIGTERM and SIGHUP (the terminal is closed): the first signal requests a stop, the second ends the program at
+//! once. A thread answers Ctrl-C with a message, because signal handlers may not print.
 
 use super::say;
 use caustique::error::{Error, ErrorKind, Result};
@@ -10,23 +10,23 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// Whether an end was asked for.
+/// The flag that the first signal sets.
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicBool>);
 
-/// The one that listens.
-static LISTENING: OnceLock<Interrupt> = OnceLock::new();
+/// The flag, once the handlers are installed.
+static INSTALLED: OnceLock<Interrupt> = OnceLock::new();
 
 impl Interrupt {
-    /// Listens from now on, once for all frames of a run.
-    pub fn listen() -> Result<Interrupt> {
-        if let Some(interrupt) = LISTENING.get() {
+    /// Installs the handlers, once for all frames of a run.
+    pub fn install() -> Result<Interrupt> {
+        if let Some(interrupt) = INSTALLED.get() {
             return Ok(interrupt.clone());
         }
         let failed = |error| Error::new(ErrorKind::Io, "signals", error);
         let asked = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
-            // In this order: a signal ends the program if one came before it, and only then is noted itself.
+            // In this order: a signal ends the program if the flag is set already, and else sets the flag.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&asked))
                 .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&asked)))
                 .map_err(failed)?;
@@ -38,41 +38,41 @@ impl Interrupt {
             }
         };
         std::thread::Builder::new().spawn(answer).map_err(failed)?;
-        Ok(LISTENING.get_or_init(|| Interrupt(asked)).clone())
+        Ok(INSTALLED.get_or_init(|| Interrupt(asked)).clone())
     }
 
-    /// Whether a signal has come since somebody listens.
-    pub fn came() -> bool {
-        LISTENING.get().is_some_and(Interrupt::asked)
+    /// Whether a signal has come since the handlers were installed.
+    pub fn has_come() -> bool {
+        INSTALLED.get().is_some_and(Interrupt::requested)
     }
 
-    /// Ends a run that was interrupted while it decided how to render.
+    /// Ends a run that was interrupted before its first iteration.
     ///
     /// # Errors
-    /// A signal came.
-    pub fn before_the_first_iteration(&self, output: &Path) -> Result<()> {
-        if !self.asked() {
+    /// A signal has come.
+    pub fn check_before_first_iteration(&self, output: &Path) -> Result<()> {
+        if !self.requested() {
             return Ok(());
         }
         let cause = "interrupted before the first iteration; nothing is written";
         Err(Error::new(ErrorKind::Interrupted, output.display(), cause))
     }
 
-    /// What tells a render to end, once somebody listens.
+    /// The stop flag for a render.
     pub fn stop() -> Stop {
-        LISTENING.get().map(|interrupt| Stop::from_flag(Arc::clone(&interrupt.0))).unwrap_or_default()
+        INSTALLED.get().map(|interrupt| Stop::from_flag(Arc::clone(&interrupt.0))).unwrap_or_default()
     }
 
-    /// Whether a signal came.
-    pub fn asked(&self) -> bool {
+    /// Whether a signal has come.
+    pub fn requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Makes a file that grows past `ulimit -f` an error of whoever writes it; by itself that signal ends the program.
+/// Catches SIGXFSZ, so that a file that grows past `ulimit -f` fails to be written instead of ending the program.
 ///
 /// # Errors
-/// The system takes no handler.
+/// The handler cannot be installed.
 pub fn survive_large_files() -> Result<()> {
     let noted = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(SIGXFSZ, noted).map(drop).map_err(|error| Error::new(ErrorKind::Io, "signals", error))

@@ -1,4 +1,4 @@
-//! What a stage of USD says about its own render: options that hold where the command line does not give them.
+//! Options from the render settings of a USD stage, which apply unless the command line gives them.
 
 use super::{Cli, Command, usage};
 use caustique::error::{Error, ErrorKind, Result};
@@ -7,15 +7,15 @@ use caustique::scene::usd;
 use clap::FromArgMatches;
 use std::ffi::OsString;
 
-/// How the word begins that names the output of a product; without more it names none.
-const OUTPUT: &str = "--output=";
+/// Prefix of the argument that names the output of a product; nothing follows if the product has no name.
+const OUTPUT_PREFIX: &str = "--output=";
 
-/// The command with the options of the stage that it reads, each before those of the command line: of an option that is
-/// given twice the last one holds. `plan` takes those that it knows.
+/// Parses the command line again with the options of its USD stage in front, so that those of the command line take
+/// precedence. `plan` takes only the options that it has.
 ///
 /// # Errors
-/// The stage cannot be read, or says options that do not exist or contradict those of the command line.
-pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
+/// The stage cannot be read, or its options do not exist or contradict the command line.
+pub fn add_stage_options(command: Command, line: &mut clap::Command) -> Result<Command> {
     let (scene, known) = match &command {
         Command::Render(args) => (&args.job.scene, None),
         Command::Plan(args) => (args.scene(), line.find_subcommand("plan")),
@@ -25,7 +25,7 @@ pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
     if !usd::is_stage(&path.path) || !path.path.is_file() {
         return Ok(command);
     }
-    let named = |word: &String| word.starts_with(OUTPUT);
+    let named = |word: &String| word.starts_with(OUTPUT_PREFIX);
     let (products, mut said): (Vec<String>, Vec<String>) =
         usd::arguments(&path.path, path.allow_outside)?.into_iter().partition(named);
     said.retain(|word| {
@@ -52,27 +52,27 @@ pub fn defaults(command: Command, line: &mut clap::Command) -> Result<Command> {
     }
 }
 
-/// Whether an option has a name of the command line, which may be a former one.
+/// Whether an option has a name, or had it formerly.
 fn has_name(argument: &clap::Arg, name: Option<&str>) -> bool {
     let aliases = argument.get_all_aliases().unwrap_or_default();
     argument.get_long() == name || name.is_some_and(|name| aliases.contains(&name))
 }
 
-/// The output that the stage's product names, if there is one: a product, and a name.
+/// The argument with the output of the stage's product, if the product has a name.
 ///
 /// # Errors
-/// Several products: one picture would be written.
+/// The stage has several products.
 fn output(scene: &SceneOptions, mut products: Vec<String>) -> Result<Option<String>> {
     if products.len() < 2 {
-        return Ok(products.pop().filter(|word| word != OUTPUT));
+        return Ok(products.pop().filter(|word| word != OUTPUT_PREFIX));
     }
-    let names: Vec<&str> = products.iter().map(|word| word.trim_start_matches(OUTPUT)).collect();
+    let names: Vec<&str> = products.iter().map(|word| word.trim_start_matches(OUTPUT_PREFIX)).collect();
     let cause = format!("RenderSettings has several products, and a render writes one: {}", names.join(", "));
     let hint = "-o OUT.exr renders the first; for each of the others make RenderSettings with that product alone";
     Err(Error::new(ErrorKind::Usage, scene.path.display(), cause).hint(hint))
 }
 
-/// The scene, or its first frame's file where its name is a pattern.
+/// The scene; of a sequence of files the file of the first frame.
 fn first_file(scene: &SceneOptions) -> SceneOptions {
     let first = scene.frames.and_then(|frames| frames.iter().next());
     first.map_or_else(|| scene.clone(), |frame| scene.at(frame))

@@ -1,16 +1,16 @@
-//! Errors of the command line in the form of all others: `command line: cause`, `hint: remedy`.
+//! Turns clap's errors into errors of the program: `command line: cause`, `hint: remedy`.
 
 use caustique::error::Error;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// Words that people type, the option that is meant, and what to say of it where the command has that option; where it
-/// is "", to every command.
-const WORDS: [(&[&str], &str, &str); 16] = [
+/// Options of other programs, our option for the same purpose, and the hint if the command has our option. An empty name
+/// stands for every command.
+const FOREIGN_OPTIONS: [(&[&str], &str, &str); 16] = [
     (
         &["--samples", "--spp", "-s", "--aa-samples", "--num-samples"],
         "iterations",
-        "--iterations N sends so many eye paths through every pixel; --time SECONDS stops after so long",
+        "--iterations N sends N camera paths through every pixel; --time SECONDS stops after that time",
     ),
     (
         &["--passes"],
@@ -42,15 +42,15 @@ const WORDS: [(&[&str], &str, &str); 16] = [
         "threads",
         "--threads T is the number of threads; 0 takes all cores",
     ),
-    (&["--seconds", "--time-limit", "--timeout"], "time", "--time SECONDS stops after so long"),
+    (&["--seconds", "--time-limit", "--timeout"], "time", "--time SECONDS stops after that time"),
     (&["--noise-threshold", "--error"], "target-error", "--target-error E stops at this estimated relative error"),
     (&["--integrator", "--renderer"], "method", "--method chooses how light is found"),
     (&["--out", "--outfile", "--output-file"], "output", "--output, or -o, names what is written"),
-    (&["--out", "--output", "-o"], "json", "what is told goes to standard output: '> FILE' writes it to a file"),
+    (&["--out", "--output", "-o"], "json", "the command prints to standard output: '> FILE' writes to a file"),
     (&["--version", "-v"], "", "'caustique --version' prints the version"),
 ];
 
-/// What clap has to say about the line of a command; `None` when help or the version was asked for.
+/// The error of a command line; `None` if the user asks for help or the version.
 pub fn explain(error: &clap::Error, command: Option<&Command>) -> Option<Error> {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => None,
@@ -61,8 +61,10 @@ pub fn explain(error: &clap::Error, command: Option<&Command>) -> Option<Error> 
         kind => {
             let said = rephrase(&error.render().to_string());
             let hint = match kind {
-                ErrorKind::UnknownArgument => meant(&context(error, ContextKind::InvalidArg), command),
-                ErrorKind::ValueValidation => fraction(error),
+                ErrorKind::UnknownArgument => {
+                    hint_for_foreign_option(&context(error, ContextKind::InvalidArg), command)
+                }
+                ErrorKind::ValueValidation => hint_for_percentage(error),
                 ErrorKind::InvalidSubcommand if error.get(ContextKind::SuggestedSubcommand).is_none() => {
                     Some("'caustique --help' lists the commands".into())
                 }
@@ -76,7 +78,7 @@ pub fn explain(error: &clap::Error, command: Option<&Command>) -> Option<Error> 
     }
 }
 
-/// A detail of clap's error; empty where there is none.
+/// A detail of clap's error; empty if the error has none.
 fn context(error: &clap::Error, kind: ContextKind) -> String {
     match error.get(kind) {
         Some(ContextValue::String(text)) => text.clone(),
@@ -84,8 +86,8 @@ fn context(error: &clap::Error, kind: ContextKind) -> String {
     }
 }
 
-/// The option that is meant by a word that is none, if a command has it.
-fn meant(word: &str, command: Option<&Command>) -> Option<String> {
+/// The hint for an unknown option, if the command has an option for the same purpose.
+fn hint_for_foreign_option(word: &str, command: Option<&Command>) -> Option<String> {
     if word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')) {
         return Some("a value that begins with '-' is joined to its option, as in --option=-1,2".into());
     }
@@ -93,11 +95,14 @@ fn meant(word: &str, command: Option<&Command>) -> Option<String> {
         let options = command.into_iter().flat_map(Command::get_arguments);
         option.is_empty() || options.filter_map(clap::Arg::get_long).any(|long| long == option)
     };
-    WORDS.iter().find(|(words, option, _)| words.contains(&word) && has(option)).map(|(.., hint)| (*hint).to_string())
+    FOREIGN_OPTIONS
+        .iter()
+        .find(|(words, option, _)| words.contains(&word) && has(option))
+        .map(|(.., hint)| (*hint).to_string())
 }
 
-/// The fraction that is meant by a relative error in percent.
-fn fraction(error: &clap::Error) -> Option<String> {
+/// The hint for a relative error that the user gives in percent.
+fn hint_for_percentage(error: &clap::Error) -> Option<String> {
     if !context(error, ContextKind::InvalidArg).starts_with("--target-error ") {
         return None;
     }
@@ -107,7 +112,7 @@ fn fraction(error: &clap::Error) -> Option<String> {
     (fraction > 0.0 && fraction < 1.0).then(|| format!("did you mean {fraction}, which is {percent} %?"))
 }
 
-/// clap writes paragraphs: the fault, tips, the usage, where help is.
+/// Turns clap's message into a cause and a hint. The message has paragraphs: the fault, tips, the usage, a note on help.
 fn rephrase(text: &str) -> Error {
     let words = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut paragraphs = text.split("\n\n");
@@ -116,7 +121,7 @@ fn rephrase(text: &str) -> Error {
     let tips: Vec<String> = paragraphs
         .flat_map(str::lines)
         .filter_map(|line| line.trim_start().strip_prefix("tip: "))
-        // How to pass an unknown option as a value: no value of ours looks like one.
+        // The tip to pass an unknown option as a value does not apply: no value starts with a dash.
         .filter(|tip| !tip.starts_with("to pass "))
         .map(str::to_string)
         .collect();

@@ -1,5 +1,5 @@
-//! Renders that differ in their seed alone, averaged: their mean, weighed by iterations, and what that makes of
-//! variances and errors. The bandwidth that each has shrunk to stays, and so does the bias.
+//! The mean of renders that differ only in their seed, weighted by iterations, with its variance and its error. The
+//! renders keep their bandwidths, so the mean has the bias of one render.
 
 use super::checkpoint::difference;
 use super::deliver::FINISHED_PICTURE;
@@ -12,33 +12,33 @@ use crate::math::Vec3;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// Options that may be others.
-const FREE: [&str; 9] =
+/// Options that may differ between the renders.
+const FREE_OPTIONS: [&str; 9] =
     ["seed", "iterations", "time", "target-error", "layers", "exr-naming", "compression", "scene", "path"];
 
-/// A file and what its header tells.
+/// A render that has been added.
 struct Source {
     path: PathBuf,
     header: Value,
     iterations: f64,
 }
 
-/// The sum so far.
+/// The sum of the renders that have been added.
 #[derive(Default)]
 pub struct Seeds {
     sources: Vec<Source>,
     sum: Option<(LayerSet, Attributes)>,
-    /// Ranks of cryptomattes of every pixel, by the beginning of their layers' names.
+    /// Prefix of the layer names of each cryptomatte, and the ranks of its pixels.
     mattes: Vec<(String, Vec<PixelRanks>)>,
 }
 
-/// How the values of a layer are put together.
-fn rule(name: &str) -> Merge {
+/// The rule by which values of a layer are merged.
+fn merge_rule(name: &str) -> Merge {
     kind_of(name).map_or(Merge::Mean, |(kind, _)| kind.merge)
 }
 
 impl Merge {
-    /// Adds the value of a render of so many iterations to the sum over others.
+    /// Adds the value of a render with this number of iterations to the sum over the renders before.
     fn add(self, sum: f32, value: f32, iterations: f64) -> f32 {
         let (total, value) = (f64::from(sum), f64::from(value));
         let added = match self {
@@ -51,7 +51,7 @@ impl Merge {
         added as f32
     }
 
-    /// From the sum over renders of so many iterations in all.
+    /// The merged value from the sum over renders; `iterations`: their total number.
     fn finish(self, sum: f32, iterations: f64) -> f32 {
         let total = f64::from(sum);
         let value = match self {
@@ -64,16 +64,16 @@ impl Merge {
 }
 
 impl Seeds {
-    /// Adds a render; only layers that all have stay.
+    /// Adds a render. The mean keeps the layers that all renders have.
     ///
     /// # Errors
-    /// It is no render of ours, of another picture or option than the first, or of a seed that is there.
+    /// The file is no render, differs from the first in its size or in an option, or has the seed of another render.
     pub fn add(&mut self, path: &Path, mut set: LayerSet, attributes: Attributes) -> Result<()> {
         let source = self.source(path, &set, &attributes)?;
         let iterations = source.iterations;
         self.add_mattes(&set, iterations);
         for layer in &mut set.layers {
-            let rule = rule(&layer.name);
+            let rule = merge_rule(&layer.name);
             let first = self.sum.as_ref().map(|(sum, _)| sum.get(&layer.name));
             for plane in &mut layer.planes {
                 let before = match first {
@@ -112,7 +112,9 @@ impl Seeds {
         };
         if let Some(first) = self.sources.first() {
             let name = first.path.display();
-            if let Some((key, there, here)) = difference(&first.header["arguments"], &header["arguments"], &FREE) {
+            if let Some((key, there, here)) =
+                difference(&first.header["arguments"], &header["arguments"], &FREE_OPTIONS)
+            {
                 let cause = format!("was rendered with another --{key} than {name}: {here} here, {there} there");
                 return Err(error(cause).hint("merge renders that differ in their --seed alone"));
             }
@@ -157,11 +159,10 @@ impl Seeds {
         }
     }
 
-    /// The mean, and the header that tells of it. What is told of the finish is that of one of the renders: the mean is
-    /// to be finished anew.
+    /// The mean with its header, which describes no finish: the mean has to be finished again.
     ///
     /// # Errors
-    /// There is none, or its header cannot be written.
+    /// No render was added, or the header cannot be written.
     pub fn mean(self) -> Result<(LayerSet, Attributes)> {
         let Seeds { sources, sum, mattes } = self;
         let Some((mut set, mut attributes)) = sum else {
@@ -169,7 +170,7 @@ impl Seeds {
         };
         let total: f64 = sources.iter().map(|source| source.iterations).sum();
         for layer in &mut set.layers {
-            let rule = rule(&layer.name);
+            let rule = merge_rule(&layer.name);
             let values = layer.planes.iter_mut().flat_map(|plane| plane.values.iter_mut());
             values.for_each(|value| *value = rule.finish(*value, total));
             if layer.name == "normal" {
@@ -177,8 +178,8 @@ impl Seeds {
             }
         }
         let own = sources.first().and_then(|source| source.header["levels"].as_u64()).unwrap_or(1).max(2) - 1;
-        if !finished(&sources) {
-            tell_errors(&mut set, &format!("Variance{own}"), sources.len());
+        if !have_finished_errors(&sources) {
+            set_error_of_mean(&mut set, &format!("Variance{own}"), sources.len());
         } else if let Some(error) = set.layers.iter_mut().find(|layer| layer.name == "Error") {
             error.planes.iter_mut().flat_map(|plane| &mut plane.values).for_each(|square| *square = square.sqrt());
         }
@@ -195,14 +196,14 @@ impl Seeds {
     }
 }
 
-/// Whether errors are those of finished pictures.
-fn finished(sources: &[Source]) -> bool {
+/// Whether the renders state the errors of their finished pictures.
+fn have_finished_errors(sources: &[Source]) -> bool {
     sources.iter().any(|source| source.header["error_of"] == FINISHED_PICTURE)
 }
 
-/// From mean squares of the errors of so many renders to the error of their mean. Variances fall with their number,
-/// what else there is in the squares is bias, and all have it.
-fn tell_errors(set: &mut LayerSet, variance: &str, renders: usize) {
+/// Turns the layer `Error` from the mean square of the errors into the error of the mean. The variance falls with the
+/// number of renders. The remainder of the mean square is bias, which the renders share.
+fn set_error_of_mean(set: &mut LayerSet, variance: &str, renders: usize) {
     let variance = set.get(variance).cloned();
     let Some(error) = set.layers.iter_mut().find(|layer| layer.name == "Error") else { return };
     for plane in &mut error.planes {
@@ -214,7 +215,7 @@ fn tell_errors(set: &mut LayerSet, variance: &str, renders: usize) {
     }
 }
 
-/// To unit length, but for zero.
+/// Scales vectors to unit length, except zero vectors.
 fn normalise(layer: &mut Layer) {
     let [x, y, z] = layer.planes.as_mut_slice() else { return };
     for ((x, y), z) in x.values.iter_mut().zip(&mut y.values).zip(&mut z.values) {
@@ -223,7 +224,7 @@ fn normalise(layer: &mut Layer) {
     }
 }
 
-/// What the renders have left out, by name.
+/// Sums of the rejected samples of all renders, by cause.
 fn rejected_by(sources: &[Source]) -> Value {
     let mut all: Map<String, Value> = Map::new();
     for (name, count) in sources.iter().filter_map(|source| source.header["rejected_by"].as_object()).flatten() {
@@ -233,8 +234,8 @@ fn rejected_by(sources: &[Source]) -> Value {
     all.into()
 }
 
-/// The photons of all renders, and the least error by light that these have not brought: one render that has found it
-/// is enough. `None` where none counts photons.
+/// The header's key `unseen`: sums of photon counts, and the smallest error by light that hardly any photon has brought,
+/// because it is enough that one render has found the light. `None` if the methods count no photons.
 fn unseen(sources: &[Source]) -> Option<Value> {
     let all = || sources.iter().filter_map(|source| source.header.get("unseen"));
     let error = all().filter_map(|unseen| unseen["error"].as_f64()).reduce(f64::min)?;
@@ -245,15 +246,16 @@ fn unseen(sources: &[Source]) -> Option<Value> {
     Some(json!({"indirect": of_kind("indirect"), "caustic": of_kind("caustic"), "error": error}))
 }
 
-/// The first render's header, with what all have in common done.
+/// The header of the mean: the header of the first render with sums over all renders.
 fn header(sources: &[Source], total: f64) -> Value {
     let mut header: Map<String, Value> =
         sources.first().and_then(|source| source.header.as_object().cloned()).unwrap_or_default();
     let sum = |key: &str| sources.iter().map(|source| source.header[key].as_f64().unwrap_or(0.0)).sum::<f64>();
-    // Independent errors of renders, by squares of their weights. What denoisers do to finished pictures they have in
-    // common, so that their mean is sure to be no worse than they are, and no more.
-    let weight =
-        |source: &Source| if finished(sources) { source.iterations * total } else { source.iterations.powi(2) };
+    // Errors of estimates are independent, so their squares add with squared weights. Errors of finished pictures are
+    // correlated by the denoiser, so the bound is the mean of their squares.
+    let weight = |source: &Source| {
+        if have_finished_errors(sources) { source.iterations * total } else { source.iterations.powi(2) }
+    };
     let squares = sources.iter().map(|source| Some(weight(source) * source.header["error"].as_f64()?.powi(2)));
     let error = squares.sum::<Option<f64>>().map(|squares| squares.sqrt() / total);
     for (key, value) in [

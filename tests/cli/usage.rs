@@ -226,11 +226,11 @@ fn errors_name_place_cause_and_remedy() {
 #[test]
 fn option_names_of_other_programs_get_a_hint() {
     let folder = Folder::new();
-    let iterations = "--iterations N sends so many eye paths through every pixel; --time SECONDS stops after so long";
+    let iterations = "--iterations N sends N camera paths through every pixel; --time SECONDS stops after that time";
     let size = "--width W and --height H are the picture's size in pixels; one alone keeps the camera's aspect";
     let depth = "--max-depth N is the longest light path in segments, one more than it has bounces";
     let layers = "--layers LIST chooses the layers of the EXR";
-    let output = "what is told goes to standard output: '> FILE' writes it to a file";
+    let output = "the command prints to standard output: '> FILE' writes to a file";
     let cases = [
         ("render", "--samples", iterations),
         ("render", "--spp", iterations),

@@ -1,4 +1,4 @@
-//! What a comparison leaves in its folder.
+//! Writes the report of a comparison to its folder.
 
 use super::options::ConvergeArgs;
 use crate::cli::say;
@@ -16,15 +16,15 @@ use caustique::report::{data, page, plot};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Checks that files can be written to the folder, or that it can be made.
+/// Checks that the folder is writable or can be created.
 ///
 /// # Errors
-/// They cannot.
+/// The folder is neither.
 pub fn check(folder: &Path) -> Result<()> {
     if folder.is_dir() {
         return atomic::check_writable(&folder.join("index.html"));
     }
-    // The nearest folder that is there would get the first new one.
+    // The first missing folder would be created in the nearest existing one.
     let mut new = folder;
     while let Some(parent) = new.parent().filter(|p| !p.as_os_str().is_empty() && !p.exists()) {
         new = parent;
@@ -37,10 +37,10 @@ pub fn check(folder: &Path) -> Result<()> {
     atomic::check_writable(new)
 }
 
-/// Writes everything, the numbers first: a disk that is full keeps them longest.
+/// Writes all files, the figures first, so that a full disk does not lose them.
 ///
 /// # Errors
-/// The file system.
+/// A file cannot be written.
 pub fn write(
     args: &ConvergeArgs,
     subject: &Subject,
@@ -72,7 +72,7 @@ pub fn write(
         plots.push(row);
     }
     bytes("index.html", page::html(subject, outcome, summary, &plots)?.as_bytes())?;
-    pictures(folder, subject, outcome, threads)?;
+    write_pictures(folder, subject, outcome, threads)?;
     if args.progress.for_people() {
         say(&format!(
             "{}: the report; points.csv, points.json, plots and pictures are beside it",
@@ -82,8 +82,8 @@ pub fn write(
     Ok(())
 }
 
-/// The last picture of every curve with the first seed, as EXR.
-fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: usize) -> Result<()> {
+/// Writes the last picture of every curve with the first seed as EXR.
+fn write_pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: usize) -> Result<()> {
     let mut names: Vec<String> = Vec::new();
     for (line, of) in subject.lines.iter().enumerate() {
         let mut name = slug(&of.name);
@@ -103,7 +103,7 @@ fn pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: us
     Ok(())
 }
 
-/// What the header of a curve's picture says.
+/// The header of a curve's picture.
 fn header(subject: &Subject, outcome: &Outcome, line: &Line, threads: usize) -> Value {
     let mut header = match line.source {
         PictureSource::Estimate(run) | PictureSource::Finished(run) => {
@@ -124,7 +124,7 @@ fn header(subject: &Subject, outcome: &Outcome, line: &Line, threads: usize) -> 
     header
 }
 
-/// A name as a file's: small letters, digits and hyphens.
+/// A name as a file name: lower-case letters, digits and hyphens.
 fn slug(name: &str) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' }).collect();

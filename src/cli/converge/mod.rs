@@ -1,4 +1,4 @@
-//! `caustique converge`: accuracy against time.
+//! `caustique converge`: compares methods by their accuracy against time.
 
 mod files;
 mod options;
@@ -9,7 +9,7 @@ mod runs;
 
 pub use options::ConvergeArgs;
 
-use super::render::tell_plan;
+use super::render::print_plan_warnings;
 use super::signals::Interrupt;
 use super::{finish, say, scene};
 use caustique::camera::Camera;
@@ -30,15 +30,15 @@ use progress::Reporter;
 use runs::Run;
 use std::collections::HashSet;
 
-/// Seconds of each run where nothing says when to stop.
+/// Seconds of each run if no option limits it.
 const DEFAULT_TIME: f64 = 60.0;
 
-/// Seconds of each run.
+/// Seconds of each run; `None`: only the iterations are limited.
 fn time(args: &ConvergeArgs) -> Option<f64> {
     args.time.or(args.iterations.is_none().then_some(DEFAULT_TIME))
 }
 
-/// Compares: everything that can be wrong is found before the first light path.
+/// Compares methods. Everything that can be wrong is found before the first light path.
 pub fn run(args: &ConvergeArgs) -> Result<()> {
     let runs = runs::all(args)?;
     let more = targets_of(args, &runs)?;
@@ -49,7 +49,7 @@ pub fn run(args: &ConvergeArgs) -> Result<()> {
 fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Result<()> {
     let threads = rayon::current_num_threads();
     let Loaded { scene, removed } = scene::read(&args.scene, args.progress, threads)?;
-    scene::tell(&args.scene, &scene.warnings)?;
+    scene::print_warnings(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.camera_request())?;
     let view = View::new(&scene, &camera);
     let windows = windows(args, &camera)?;
@@ -59,15 +59,15 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
             error
         })?;
     }
-    let interrupt = Interrupt::listen()?;
+    let interrupt = Interrupt::install()?;
     let runs = choose_all(args, runs, view, &interrupt)?;
-    interrupt.before_the_first_iteration(&args.output)?;
+    interrupt.check_before_first_iteration(&args.output)?;
     memory::check_all(view, runs.iter().map(|(run, _)| &run.entry.settings))?;
     let seeds: Vec<u64> = (0..args.seeds).map(|i| args.seed.wrapping_add(i)).collect();
     let mut notes = Vec::new();
     let source = reference::source(args, view, &runs, &seeds, &mut notes)?;
     let (entries, mut finishes) = open_finishes(args, runs, view, &removed)?;
-    let renders = peers::all(args, view, threads, &interrupt, &mut notes)?;
+    let renders = peers::prepare(args, view, threads, &interrupt, &mut notes)?;
     let peers = renders.as_ref().map_or_else(Vec::new, |renders| renders.peers.clone());
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
@@ -77,7 +77,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     let participants = Participants { entries: &entries, finishes: &mut finishes, peers: renders };
     let mut outcome = render_in_turns(view, participants, &rules, &reference, &args.output, |step| {
         reporter.step(step);
-        if interrupt.asked() { Control::Stop } else { Control::Continue }
+        if interrupt.requested() { Control::Stop } else { Control::Continue }
     })?;
     reporter.finish();
 
@@ -107,7 +107,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     Ok(())
 }
 
-/// The runs and iterations whose errors are targets.
+/// The runs and iterations of `--target-of`, whose errors are targets.
 fn targets_of(args: &ConvergeArgs, runs: &[Run]) -> Result<Vec<(usize, u64)>> {
     let entries: Vec<Entry> = runs.iter().map(|run| run.entry.clone()).collect();
     let place = |target: &options::TargetOf| {
@@ -125,7 +125,7 @@ fn targets_of(args: &ConvergeArgs, runs: &[Run]) -> Result<Vec<(usize, u64)>> {
     args.target_of.iter().map(place).collect()
 }
 
-/// The windows that are asked for.
+/// The windows of `--crop`.
 fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     let (width, height) = camera.size();
     let windows: Vec<Window> = args.crop.iter().map(|crop| crop.0).collect();
@@ -151,7 +151,7 @@ fn choose_all(
         let settings = with_light_paths(run.entry.settings.clone(), run.args.photons, view.camera.size());
         let chosen = {
             let mut method = run.args.method_request()?.map_candidates(limits);
-            let work = || choose(&mut method, settings, view, |_| true, || interrupt.asked());
+            let work = || choose(&mut method, settings, view, |_| true, || interrupt.requested());
             args.progress.during("choosing a method", work)
         };
         if let Some(choice) = &chosen.choice {
@@ -178,7 +178,7 @@ fn open_finishes(
         let (max_depth, switches) = (args.max_depth, args.scene.switches());
         let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
         let new: Vec<String> = plan.warnings.into_iter().filter(|warning| printed.insert(warning.clone())).collect();
-        tell_plan(&args.scene.path, &new);
+        print_plan_warnings(&args.scene.path, &new);
         let place = format!("--run \"{}\"", entry.name);
         let levels = entry.settings.levels.count;
         let opened = (!options.no_finish).then(|| finish::open(&options.finish, Some(levels))).transpose();
@@ -199,7 +199,7 @@ fn open_finishes(
     Ok((entries, finishes))
 }
 
-/// Options that concern all runs.
+/// Options of all runs, for the report.
 fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
     let mut settings = vec![("scene".to_string(), args.scene.path.display().to_string())];
     let mut put = |name: &str, value: Option<String>| settings.extend(value.map(|value| (name.to_string(), value)));
@@ -215,7 +215,7 @@ fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
     settings
 }
 
-/// What it ran on.
+/// Facts about the machine and the libraries, for the report.
 fn machine(threads: usize, entries: &[Entry]) -> Vec<(String, String)> {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

@@ -1,4 +1,4 @@
-//! Every option of `caustique converge`.
+//! The options of `caustique converge`.
 
 use crate::cli::progress::Form;
 use caustique::image::tonemap::ToneMap;
@@ -15,84 +15,83 @@ use std::str::FromStr;
 
 /// Compare methods and settings: accuracy against time.
 ///
-/// Renders all runs in turns, one iteration of each, measures them at a geometric series of moments against a
-/// reference, and writes plots, tables, fitted exponents and crops as one page, DIR/index.html, beside points.csv,
-/// points.json, the plots as SVG and the final pictures as EXR. Ctrl-C finishes the running iteration and writes what
-/// there is.
+/// Renders all runs in turns, one iteration of each, and measures their errors against a reference at iterations that
+/// form a geometric series. Writes plots, tables, fitted exponents and crops as one page, DIR/index.html, with
+/// points.csv, points.json, the plots as SVG and the final pictures as EXR. Ctrl-C finishes the running iteration and
+/// writes the results so far.
 ///
-/// A run's seconds are its own: pilot and iterations, not measurements, nor other runs. A run has two curves: NAME is
-/// the estimate, 'NAME, finished' the picture that is finished from it, the finish's time added once, as if the run
-/// stopped at that moment. With --with other renderers take turns with ours, each point a render of its own.
+/// The seconds of a run include its pilot and iterations, not the measurements. A run has two curves: NAME is the
+/// estimate; 'NAME, finished' is the finished picture, with the time of one finish, as if the run stopped there. With
+/// --with, other renderers take turns with ours, and each of their points is a separate render.
 #[derive(clap::Args)]
 #[command(next_line_help = true)]
 pub struct ConvergeArgs {
-    /// Folder to write to; made if need be
+    /// Folder to write to; created if missing
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     pub output: PathBuf,
 
-    /// Methods, each with its defaults and one bandwidth level [default: path,sppm,cppm,vcm, unless there is a --run]
+    /// Methods, with their defaults and one bandwidth level [default: path,sppm,cppm,vcm, unless there is a --run]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
     pub methods: Vec<MethodChoice>,
-    /// A run by a name and the method options of 'caustique render', such as 'five levels: --method sppm --levels 5';
-    /// may be repeated. As there, the picture is finished unless --no-finish is given
+    /// A run: its name and its options of 'caustique render', such as 'five levels: --method sppm --levels 5'; may be
+    /// repeated. The picture is finished unless --no-finish is given
     #[arg(long = "run", value_name = "NAME: OPTIONS", allow_hyphen_values = true, help_heading = "Runs")]
     pub runs: Vec<String>,
-    /// Estimates alone, no finished pictures
+    /// Compare only estimates, no finished pictures
     #[arg(long, help_heading = "Runs")]
     pub no_finish: bool,
     /// Other renderers on the same scene, at budgets that double up to --time, with and without Open Image Denoise
     /// ('scripts/compare/setup.sh peers' installs them)
     #[arg(long = "with", value_enum, value_name = "LIST", value_delimiter = ',', help_heading = "Runs")]
     pub with: Vec<Renderer>,
-    /// Stop each run after so many seconds of its own [default: 60, without --iterations]
+    /// Stop each run after this many seconds of its own [default: 60, without --iterations]
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = "When to stop")]
     pub time: Option<f64>,
-    /// Stop each run after so many iterations
+    /// Stop each run after this many iterations
     #[arg(long, value_name = "N", whole = 1_u64..=MAX_TERMS, help_heading = "When to stop")]
     pub iterations: Option<u64>,
-    /// Measure at iterations that grow by this factor, in (1, 10]
+    /// Factor between the iterations of two measurements, in (1, 10]
     #[arg(long, value_name = "RATIO", default_value_t = std::f64::consts::SQRT_2, between = (Excluded(1.0), Included(10.0)), help_heading = "Runs")]
     pub moments: f64,
-    /// Seed; a reference made here has others
+    /// Seed; a reference rendered here has others
     #[arg(long, value_name = "S", default_value_t = 0, whole = 0..=u64::MAX, help_heading = "Runs")]
     pub seed: u64,
-    /// Repeat everything with so many seeds: means and standard errors
+    /// Number of seeds; several give means and standard errors
     #[arg(long, value_name = "N", default_value_t = 1, whole = 1_u64..=1000, help_heading = "Runs")]
     pub seeds: u64,
 
-    /// Figure of curves, targets and exponents
+    /// Error metric of curves, targets and exponents
     #[arg(long, value_enum, default_value_t, help_heading = "Error")]
     pub error_metric: Metric,
-    /// Errors for the table of times to a given error [default: some that two runs reach]
+    /// Errors for the table of times to an error [default: some that two runs reach]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, help_heading = "Error")]
     pub targets: Vec<f64>,
-    /// A target more: the error of a run after so many iterations, such as sppm@1000; may be repeated
+    /// Another target: the error of a run after N iterations, such as sppm@1000; may be repeated
     #[arg(long, value_name = "RUN@N", help_heading = "Error")]
     pub target_of: Vec<TargetOf>,
-    /// Reference EXR [default: one is made, and kept as DIR/reference.exr]
+    /// Reference EXR [default: one is rendered to DIR/reference.exr]
     #[arg(long, value_name = "FILE.exr", help_heading = "Error")]
     pub reference: Option<PathBuf>,
-    /// The reference's own error in the figure chosen, where its header does not tell: smaller figures are not reported
+    /// Error of the reference in the chosen metric, if its header does not state it: smaller errors are not reported
     #[arg(long, value_name = "E", value_parser = positive, requires = "reference", help_heading = "Error")]
     pub reference_error: Option<f64>,
-    /// Method of a reference made here [default: bdpt; vcm where the scene has caustics seen through glass or in
-    /// mirrors]
+    /// Method of a reference rendered here [default: bdpt; vcm if the scene has caustics seen through glass or in mirrors]
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with = "reference", help_heading = "Error")]
     pub reference_method: Option<MethodChoice>,
-    /// Seconds for a reference made here, both halves together [default: 8 times --time]
+    /// Seconds for a reference rendered here, both halves together [default: 8 times --time]
     #[arg(long, value_name = "SECONDS", value_parser = positive, conflicts_with = "reference", help_heading = "Error")]
     pub reference_time: Option<f64>,
-    /// Iterations of each of the two halves of a reference made here [default: 16 times --iterations, without --time]
+    /// Iterations of each half of a reference rendered here [default: 16 times --iterations, without --time]
     #[arg(long, value_name = "N", whole = 2_u64..=MAX_TERMS, conflicts_with = "reference", help_heading = "Error")]
     pub reference_iterations: Option<u64>,
 
-    /// Width in pixels; without a height the camera's aspect is kept [default: the scene's, else 1280]
+    /// Width in pixels; alone it keeps the camera's aspect ratio [default: the scene's, else 1280]
     #[arg(long, value_name = "W", whole = 1..=MAX_SIZE, help_heading = "Picture")]
     pub width: Option<u32>,
-    /// Height in pixels; without a width the camera's aspect is kept
+    /// Height in pixels; alone it keeps the camera's aspect ratio
     #[arg(long, value_name = "H", whole = 1..=MAX_SIZE, help_heading = "Picture")]
     pub height: Option<u32>,
-    /// Camera by name [default: the scene's first]
+    /// Name of the camera [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     pub camera: Option<String>,
     /// Longest light path in segments, camera to light, of all runs [default: no limit]
@@ -102,20 +101,20 @@ pub struct ConvergeArgs {
     #[command(flatten)]
     pub scene: SceneOptions,
 
-    /// A part of the picture to show side by side; may be repeated [default: two, where the runs differ most]
+    /// A window of the picture to show side by side; may be repeated [default: two, where the runs differ most]
     #[arg(long, value_name = "X,Y,W,H", help_heading = "Page")]
     pub crop: Vec<CropChoice>,
     /// Exposure of the page's pictures in stops
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Page")]
     pub exposure: f64,
-    /// From light to the page's colours
+    /// Tone curve of the page's pictures
     #[arg(long, value_enum, default_value_t, help_heading = "Page")]
     pub tonemap: ToneMap,
 
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     pub threads: usize,
-    /// Reports on stderr
+    /// Form of the reports on stderr
     #[arg(long, value_enum, default_value_t = Form::Auto, help_heading = "Running")]
     pub progress: Form,
 }
@@ -135,9 +134,9 @@ impl ConvergeArgs {
 /// `--target-of RUN@N`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TargetOf {
-    /// A run's name.
+    /// Name of the run.
     pub run: String,
-    /// Its iterations.
+    /// Iterations of the run.
     pub iterations: u64,
 }
 

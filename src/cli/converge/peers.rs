@@ -1,4 +1,4 @@
-//! Other renderers, from the words of the command line.
+//! Prepares the other renderers of `--with`.
 
 use super::options::ConvergeArgs;
 use crate::cli::say;
@@ -11,11 +11,11 @@ use caustique::report::peer_renders::{Driver, PeerDenoiser, PeerRenders};
 use caustique::scene::gltf::{Glass, LightUnits};
 use caustique::scene::{View, usd};
 
-/// The peers that are asked for; `None` where there are none.
+/// The peers of `--with`; `None` if there are none.
 ///
 /// # Errors
-/// A renderer is not installed; no `--time` says how long they render.
-pub fn all(
+/// A renderer is not installed, or `--time` is missing.
+pub fn prepare(
     args: &ConvergeArgs,
     View { scene, camera }: View<'_>,
     threads: usize,
@@ -32,7 +32,7 @@ pub fn all(
         return Err(error.hint("add --time SECONDS"));
     };
     let drivers = Drivers::new(&renderers, &args.scene.path, args.camera.as_deref(), camera.size(), threads)?;
-    let driver = match refused(args) {
+    let driver = match unsupported(args) {
         Some(why) => {
             say(&format!("warning: --with: {why}; other renderers are left out"));
             Driver::Refused(why)
@@ -51,13 +51,13 @@ pub fn all(
         }
     };
     let interrupt = interrupt.clone();
-    let stop = Box::new(move || interrupt.asked());
+    let stop = Box::new(move || interrupt.requested());
     let peers = renderers.into_iter().flat_map(Renderer::peers).collect();
     Ok(Some(PeerRenders { peers, driver, denoising, time, stop }))
 }
 
-/// An option or a kind of file that drivers do not know, so that they would render another scene.
-fn refused(args: &ConvergeArgs) -> Option<String> {
+/// An option or a kind of file that the drivers do not support, so that the peers would render another scene.
+fn unsupported(args: &ConvergeArgs) -> Option<String> {
     let SceneOptions { path, frames, env, env_rotation, env_strength, light_units, glass, effects, .. } = &args.scene;
     let option = [
         ("--env", env.is_some()),

@@ -1,13 +1,13 @@
 //! Progress of a comparison on stderr.
 
-use crate::cli::progress::{Bar, Form, PLAIN_EVERY, Waiting, duration};
+use crate::cli::progress::{Bar, Form, PLAIN_INTERVAL, Waiting, duration};
 use crate::cli::say;
 use caustique::render::Clock;
 use caustique::report::equal_time::Step;
 use caustique::report::number::short;
 use serde_json::json;
 
-/// Reports on a reference and a race.
+/// Prints the progress of the reference and of the runs.
 pub struct Reporter {
     form: Form,
     bar: Option<Bar>,
@@ -17,20 +17,20 @@ pub struct Reporter {
 }
 
 impl Reporter {
-    /// In a form.
+    /// A reporter in the form of `--progress`.
     pub fn new(form: Form) -> Reporter {
         let first = Some(Waiting::begin(form, "first iteration"));
-        Reporter { form: form.settled(), bar: None, first, clock: Clock::start(), next_line: 0.0 }
+        Reporter { form: form.resolved(), bar: None, first, clock: Clock::start(), next_line: 0.0 }
     }
 
-    /// The reference's halves have done so much.
+    /// Prints the progress of the reference. `fraction`: the finished share, 0 to 1.
     pub fn reference(&mut self, iterations: u64, seconds: f64, fraction: f64) {
         let sentence = format!("reference: {iterations} iterations of each half, {}", duration(seconds));
         let line = json!({"reference": true, "iteration": iterations, "seconds": seconds, "fraction": fraction});
         self.tell(fraction, &sentence, &line.to_string());
     }
 
-    /// A run has made a step.
+    /// Prints the progress after a step of a run.
     pub fn step(&mut self, step: &Step<'_>) {
         let name = step.name;
         let relmse = step.point.map(|point| point.errors.relmse);
@@ -54,7 +54,7 @@ impl Reporter {
             Form::Plain => {
                 let now = self.clock.seconds();
                 if now >= self.next_line {
-                    self.next_line = now + PLAIN_EVERY;
+                    self.next_line = now + PLAIN_INTERVAL;
                     say(&format!("{:.0} %, {sentence}", 100.0 * fraction));
                 }
             }
@@ -67,7 +67,7 @@ impl Reporter {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar from the terminal.
     pub fn finish(&mut self) {
         (self.first, self.bar) = (None, None);
     }

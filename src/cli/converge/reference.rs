@@ -1,4 +1,4 @@
-//! The reference of a comparison: a file, or one made here.
+//! The reference of a comparison, read from a file or rendered here.
 
 use super::options::ConvergeArgs;
 use super::progress::Reporter;
@@ -14,18 +14,18 @@ use caustique::render::{Control, Method, Settings};
 use caustique::report::reference::{Halves, OwnError, Reference};
 use caustique::scene::View;
 
-/// Where the reference comes from.
+/// The origin of a reference.
 pub enum Source {
-    /// A file, read.
+    /// Read from a file.
     File(Reference),
-    /// To be made with these settings.
+    /// To be rendered with these settings.
     Own(Box<Settings>),
 }
 
-/// Reads the file, or settles how to make one. Remarks go to `notes`.
+/// Reads the reference file, or prepares the settings to render one. Adds remarks to `notes`.
 ///
 /// # Errors
-/// A file that will not do; options.
+/// The file is no suitable reference, or options contradict each other.
 pub fn source(
     args: &ConvergeArgs,
     view: View<'_>,
@@ -34,7 +34,7 @@ pub fn source(
     notes: &mut Vec<String>,
 ) -> Result<Source> {
     let metric = args.error_metric;
-    let Some(path) = &args.reference else { return own(args, view).map(Source::Own) };
+    let Some(path) = &args.reference else { return reference_settings(args, view).map(Source::Own) };
     let (mut reference, header) = Reference::read(path, view.camera.size())?;
     if let Some(error) = args.reference_error {
         reference.error = OwnError::in_metric(metric, error);
@@ -45,7 +45,7 @@ pub fn source(
     };
     if reference.error.of(metric).is_none() {
         note(format!(
-            "its own {} is not known, so that figures near it say nothing; --reference-error tells it",
+            "its own {} is not known, so that figures near it say nothing; --reference-error states it",
             metric.name()
         ));
     }
@@ -61,8 +61,8 @@ pub fn source(
     Ok(Source::File(reference))
 }
 
-/// Settings of a reference to be made.
-fn own(args: &ConvergeArgs, View { scene, camera }: View<'_>) -> Result<Box<Settings>> {
+/// Settings for rendering a reference.
+fn reference_settings(args: &ConvergeArgs, View { scene, camera }: View<'_>) -> Result<Box<Settings>> {
     let method = match args.reference_method {
         Some(method) => method,
         None if Presence::of(scene, camera).has(Effect::Sds) => MethodChoice(Some(Method::Vcm)),
@@ -84,7 +84,7 @@ fn own(args: &ConvergeArgs, View { scene, camera }: View<'_>) -> Result<Box<Sett
     Ok(Box::new(settings))
 }
 
-/// Says what a reference will take, and what comes after it.
+/// Prints the time of the reference and of the runs after it.
 fn announce(args: &ConvergeArgs, settings: &Settings, runs: usize) {
     let method = settings.method.name();
     let count = settings.iterations.map(|n| format!("{n} iterations each"));
@@ -102,10 +102,10 @@ fn announce(args: &ConvergeArgs, settings: &Settings, runs: usize) {
     ));
 }
 
-/// The reference; one that is made here is also written to the folder.
+/// The reference. A reference that is rendered here is also written to the folder.
 ///
 /// # Errors
-/// The file system; a signal, when what was made has been written.
+/// The file cannot be written; a signal has stopped the render, after its file was written.
 pub fn get(
     args: &ConvergeArgs,
     source: Source,
@@ -126,13 +126,13 @@ pub fn get(
         let by_time = settings.time.map_or(0.0, |time| seconds / time);
         let by_count = settings.iterations.map_or(0.0, |n| iterations as f64 / n as f64);
         reporter.reference(iterations, seconds, by_time.max(by_count).min(1.0));
-        if interrupt.asked() { Control::Stop } else { Control::Continue }
+        if interrupt.requested() { Control::Stop } else { Control::Continue }
     });
     reporter.finish();
     let reference = halves.reference();
     let path = args.output.join("reference.exr");
     reference.write(&path, &halves)?;
-    if interrupt.asked() {
+    if interrupt.requested() {
         let cause =
             format!("interrupted, the reference after {} iterations of each half is written", halves.iterations);
         return Err(Error::new(ErrorKind::Interrupted, path.display(), cause));

@@ -1,4 +1,4 @@
-//! Runs from the words of the command line, read with the options of `caustique render`.
+//! Parses the runs of a comparison with the options of `caustique render`.
 
 use super::options::ConvergeArgs;
 use crate::cli::layout;
@@ -11,24 +11,23 @@ use caustique::report::entry::Entry;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 
-/// Options beside a render's method that are not a run's: those of the picture itself, which all runs have in common,
-/// and files of its own.
-const COMMON: [&str; 3] = ["seed", "max_depth", "debug_techniques"];
-/// Headings of options that may differ from run to run.
-const OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
+/// Options under the headings of a run that a run may not have: all runs share them, or they write files.
+const NOT_OF_RUN: [&str; 3] = ["seed", "max_depth", "debug_techniques"];
+/// Headings of options that may differ between runs.
+const HEADINGS_OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
 
-/// A run, and the options it was read from.
+/// A run with its options.
 pub struct Run {
-    /// What competes; its finish is not known before libraries are found.
+    /// Name and settings for the report. The finish is set when its libraries have been found.
     pub entry: Entry,
-    /// All options of a render with this method.
+    /// Options of the render.
     pub args: RenderOptions,
 }
 
-/// All runs that are asked for.
+/// The runs of `--methods` and `--run`.
 ///
 /// # Errors
-/// Options that a render does not have, or that are not a run's; names given twice.
+/// A run has an option that a render does not have, or that may not differ between runs; two runs have the same name.
 pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
     let usual = [Method::Path, Method::Sppm, Method::Cppm, Method::Vcm].map(|method| MethodChoice(Some(method)));
     let methods = if args.methods.is_empty() && args.runs.is_empty() { &usual[..] } else { &args.methods };
@@ -58,7 +57,7 @@ pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
     Ok(runs)
 }
 
-/// A method with its defaults and one level.
+/// A run of a method with its defaults and one level.
 pub fn by_method(args: &ConvergeArgs, method: MethodChoice) -> Result<Run> {
     let name = method.name().to_string();
     let mut words = vec!["--method".to_string(), name.clone()];
@@ -72,13 +71,13 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
     let command = layout::arrange(RenderArgs::augment_args(Command::new("render")));
     let command = command.no_binary_name(true).disable_help_flag(true).args_override_self(true);
     let mut line: Vec<std::ffi::OsString> = words.into_iter().map(Into::into).collect();
-    // What a render needs besides.
+    // Required arguments of a render.
     line.extend(["-o".into(), "run.exr".into(), args.scene.path.clone().into()]);
     let explain = |error: clap::Error| {
         usage::explain(&error, Some(&command)).unwrap_or_else(|| Error::new(ErrorKind::Usage, "", error))
     };
     let matches = command.clone().try_get_matches_from(line).map_err(explain)?;
-    refuse_common(&command, &matches)?;
+    check_options_of_run(&command, &matches)?;
     let render = RenderArgs::from_arg_matches(&matches).map_err(explain)?;
     let settings = Settings {
         max_depth: args.max_depth.unwrap_or(u32::MAX),
@@ -95,12 +94,13 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
     Ok(Run { entry, args: job })
 }
 
-/// Errors: an option that is not about the method or the finish of one run.
-fn refuse_common(command: &Command, matches: &ArgMatches) -> Result<()> {
+/// Errors: an option concerns neither the method nor the finish of one run.
+fn check_options_of_run(command: &Command, matches: &ArgMatches) -> Result<()> {
     let given = |arg: &&clap::Arg| matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
     for arg in command.get_arguments().filter(given) {
         let id = arg.get_id().as_str();
-        let of_run = arg.get_help_heading().is_some_and(|heading| OF_RUN.contains(&heading)) && !COMMON.contains(&id);
+        let of_run = arg.get_help_heading().is_some_and(|heading| HEADINGS_OF_RUN.contains(&heading))
+            && !NOT_OF_RUN.contains(&id);
         if !of_run && !["output", "path"].contains(&id) {
             let option = arg.get_long().unwrap_or(id);
             let cause = format!("--{option} cannot differ from run to run");

@@ -1,8 +1,9 @@
-//! Claims of frames, by which machines that share a folder share its frames out.
+//! Claims of frames, by which machines that share a folder divide the frames among themselves.
 //!
-//! A claim is a file beside the output, made by whoever comes first, which file systems let one alone do, NFS included.
-//! It names its owner and is touched as long as that lives; where it is not, its owner has died, and the next one takes
-//! the frame. Ages are differences of times that the file's own server has given: clocks of machines differ.
+//! A claim is a file beside the output. Creating a file is atomic on all file systems, NFS included, so only one process
+//! gets the claim. The file names its owner, who touches it regularly. If the file is not touched, its owner has died, and
+//! another process takes the frame. Ages are differences of times of the file server, because the clocks of machines
+//! differ.
 
 use caustique::error::{Error, Result};
 use caustique::image::atomic;
@@ -17,21 +18,21 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 /// Time between two touches of a claim.
-const TOUCH: Duration = Duration::from_secs(15);
-/// The owner of a claim that was not touched for so long has died: servers may show a file's time a minute late.
-const DEAD: Duration = Duration::from_secs(180);
-/// Most bytes of a claim that are read.
-const MOST: u64 = 1 << 12;
+const TOUCH_INTERVAL: Duration = Duration::from_secs(15);
+/// Age from which the owner of an untouched claim counts as dead: servers may show a file's time a minute late.
+const MAX_AGE: Duration = Duration::from_secs(180);
+/// Most bytes that are read of a claim.
+const MAX_BYTES: u64 = 1 << 12;
 
-/// What came of asking for a frame.
+/// The result of claiming a frame.
 pub enum Claimed {
-    /// It is ours.
+    /// This process renders the frame.
     Here(Claim),
-    /// Somebody else renders it: on what machine, by what process.
+    /// Another process renders the frame: machine and process, for messages.
     Elsewhere(String),
 }
 
-/// A frame that is ours until this is dropped.
+/// The claim of a frame, released when dropped.
 pub struct Claim {
     path: PathBuf,
     owner: String,
@@ -40,11 +41,11 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// Claims the frame whose output this is.
+    /// Claims the frame that is written to `output`.
     ///
     /// # Errors
-    /// The folder takes no files.
-    pub fn of(output: &Path) -> Result<Claimed> {
+    /// The folder is not writable.
+    pub fn claim(output: &Path) -> Result<Claimed> {
         let mut path = output.as_os_str().to_owned();
         path.push(".claim");
         let path = PathBuf::from(path);
@@ -58,23 +59,23 @@ impl Claim {
                 Ok(mut file) => {
                     file.write_all(owner.as_bytes())?;
                     file.sync_all()?;
-                    return Ok(Claimed::Here(Claim::kept(path, owner, file)));
+                    return Ok(Claimed::Here(Claim::keep(path, owner, file)));
                 }
                 Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(cause) => return Err(cause),
             }
-            // A link or a pipe is nobody's claim, and opening it may not end.
+            // Links and pipes are no claims, and opening one may block.
             if fs::symlink_metadata(&path).is_ok_and(|data| !data.is_file()) {
                 return Err(io::Error::other(format!("{} is no file", path.display())));
             }
-            // Gone meanwhile: once more.
+            // The claim was released meanwhile: try again.
             let Some((holder, touched)) = read(&path)? else { continue };
             if !is_dead(&holder, age(&path, touched)?) {
                 let shown = holder.split('\n').next().unwrap_or_default();
                 return Ok(Claimed::Elsewhere(if shown.is_empty() { "another machine".into() } else { shown.into() }));
             }
             match remove(&path, touched) {
-                // Another user's, in a folder that lets nobody else remove it.
+                // In a folder with the sticky bit only the owner may remove the file.
                 Err(cause) if cause.kind() == io::ErrorKind::PermissionDenied => {
                     return Ok(Claimed::Elsewhere("another user".into()));
                 }
@@ -83,12 +84,12 @@ impl Claim {
         }
     }
 
-    /// Touches the file until the claim is dropped.
-    fn kept(path: PathBuf, owner: String, file: File) -> Claim {
+    /// Starts a thread that touches the file until the claim is dropped.
+    fn keep(path: PathBuf, owner: String, file: File) -> Claim {
         let (over, end) = channel::<()>();
         let touch = move || {
-            while end.recv_timeout(TOUCH) == Err(RecvTimeoutError::Timeout) {
-                // The server's own time, and the next touch may succeed where this one fails.
+            while end.recv_timeout(TOUCH_INTERVAL) == Err(RecvTimeoutError::Timeout) {
+                // If this touch fails, the next may succeed.
                 let _ = touch(&file);
             }
         };
@@ -102,14 +103,14 @@ impl Drop for Claim {
         if let Some(toucher) = self.toucher.take() {
             let _ = toucher.join();
         }
-        // Unless somebody has taken us for dead.
+        // Another process may have taken over the claim.
         if read(&self.path).ok().flatten().is_some_and(|(holder, _)| holder == self.owner) {
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// Gives a file the time that its server has now: a write does, even of the byte that is there.
+/// Sets the modification time of a file to the server's current time by rewriting its first byte.
 fn touch(file: &File) -> io::Result<()> {
     let mut first = [0];
     file.read_exact_at(&mut first, 0)?;
@@ -117,13 +118,13 @@ fn touch(file: &File) -> io::Result<()> {
     file.sync_all()
 }
 
-/// What a claim says and when it was touched; `None` where there is none.
+/// The text of a claim and its modification time; `None` if there is no claim.
 fn read(path: &Path) -> io::Result<Option<(String, SystemTime)>> {
     let read = || {
         let file = File::open(path)?;
         let touched = file.metadata()?.modified()?;
         let mut bytes = Vec::new();
-        file.take(MOST).read_to_end(&mut bytes)?;
+        file.take(MAX_BYTES).read_to_end(&mut bytes)?;
         Ok((String::from_utf8_lossy(&bytes).into_owned(), touched))
     };
     match read() {
@@ -132,28 +133,29 @@ fn read(path: &Path) -> io::Result<Option<(String, SystemTime)>> {
     }
 }
 
-/// How long ago a claim was touched, by its server's clock.
+/// Time since a claim was touched, by the server's clock.
 fn age(path: &Path, touched: SystemTime) -> io::Result<Duration> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let now = tempfile::tempfile_in(folder)?.metadata()?.modified()?;
     Ok(now.duration_since(touched).unwrap_or_default())
 }
 
-/// Whether the owner of a claim has died: a process of this machine that is not there, or any that does not touch it.
+/// Whether the owner of a claim has died: it is a process of this machine that does not exist, or it has not touched the
+/// claim for [`MAX_AGE`].
 fn is_dead(holder: &str, age: Duration) -> bool {
     let mut lines = holder.split('\n').skip(1);
     let of_here = lines.next() == Some(machine().as_str());
-    age > DEAD || lines.next().filter(|_| of_here).is_some_and(is_gone)
+    age > MAX_AGE || lines.next().filter(|_| of_here).is_some_and(is_gone)
 }
 
-/// Whether there is no process of a number. One that may not be signalled is there, though `/proc` may hide it.
+/// Whether no process has this number. A process that may not be signalled exists, although `/proc` may hide it.
 fn is_gone(process: &str) -> bool {
     let process = process.parse().ok().filter(|process| *process > 0).and_then(Pid::from_raw);
     process.is_some_and(|process| test_kill_process(process) == Err(Errno::SRCH))
 }
 
-/// Removes a claim whose owner has died. Of several that do so at once the lock lets one after the other look whether
-/// it is still the claim that was read; where a file system has no locks, a frame may be rendered twice.
+/// Removes the claim of a dead owner. Several processes may try this at once: under a lock, each checks that the file is
+/// still the claim that it has read. On file systems without locks a frame may be rendered twice.
 fn remove(path: &Path, touched: SystemTime) -> io::Result<()> {
     let removed = || {
         let file = File::open(path)?;
@@ -168,21 +170,22 @@ fn remove(path: &Path, touched: SystemTime) -> io::Result<()> {
     }
 }
 
-/// Who we are: a line for people, the machine, the process, and what no other claim has.
+/// The text of a claim of this process: a line for people, the machine, the process, and the current time to tell claims
+/// apart.
 fn owner() -> String {
     let process = std::process::id();
     let moment = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default().as_nanos();
     format!("{}, process {process}\n{}\n{process}\n{moment}\n", host(), machine())
 }
 
-/// The machine since it was started, and whose processes are seen: containers of one machine have numbers of their own.
+/// Identifies the machine since its start, and the namespace of its process numbers, which containers have separately.
 fn machine() -> String {
     let boot = fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
     let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
     format!("{} {} {}", host(), boot.trim(), namespace.display())
 }
 
-/// What the machine is called.
+/// Name of the machine.
 fn host() -> String {
     fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned()
 }
@@ -196,7 +199,7 @@ mod tests {
         Claim::make(path.to_owned(), owner.into()).expect("the folder takes files")
     }
 
-    /// A link that leads nowhere is no claim: an error, and no loop without an end.
+    /// A dangling link is an error, not an endless loop.
     #[test]
     fn links_are_no_claims() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -205,9 +208,9 @@ mod tests {
         assert!(Claim::make(path, owner()).is_err());
     }
 
-    /// An owner that lives is not disturbed; one that is gone, or silent for long, is followed.
+    /// A claim can be taken over if its owner does not exist, or has not touched it for long.
     #[test]
-    fn claims_of_the_dead_are_released() {
+    fn claims_of_dead_owners_are_released() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.exr.claim");
         let first = make(&path, &owner());
@@ -232,37 +235,36 @@ mod tests {
             .expect("it can be touched");
         let taken = make(&path, &owner());
         assert!(matches!(&taken, Claimed::Here(_)));
-        // Its old owner lives after all, and leaves the new one's alone.
+        // The former owner is alive after all, and leaves the new claim alone.
         drop(Claim { path: path.clone(), owner: elsewhere.into(), over: None, toucher: None });
         assert!(path.exists());
         assert_eq!(fs::read_dir(folder.path()).expect("it can be read").count(), 1);
     }
 
-    /// Processes that are there are alive, also those of others; what is no number tells nothing.
+    /// Processes of other users count as alive, and so does a text that is no number.
     #[test]
     fn processes_of_others_are_alive() {
         let own = std::process::id().to_string();
         assert_eq!(["1", &own, "0", "-1", "x", "4194999"].map(is_gone), [false, false, false, false, false, true]);
     }
 
-    /// A touch is a new time.
     #[test]
-    fn a_touch_is_seen() {
+    fn a_touch_sets_the_current_time() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.exr.claim");
         fs::write(&path, "owner").expect("it can be written");
         let file = File::options().read(true).write(true).open(&path).expect("it is there");
         file.set_modified(SystemTime::UNIX_EPOCH).expect("it can be touched");
         let touched = |path: &Path| read(path).expect("it can be read").expect("it is there");
-        assert!(age(&path, touched(&path).1).expect("a file can be made") > DEAD);
+        assert!(age(&path, touched(&path).1).expect("a file can be made") > MAX_AGE);
         touch(&file).expect("it can be touched");
         assert_eq!(touched(&path).0, "owner");
-        assert!(age(&path, touched(&path).1).expect("a file can be made") < DEAD);
+        assert!(age(&path, touched(&path).1).expect("a file can be made") < MAX_AGE);
     }
 
-    /// Of many that ask at once, for a new frame or for one whose owner has died, one gets it.
+    /// If several threads claim a new frame, or one whose owner has died, at the same time, one gets it.
     #[test]
-    fn one_of_many_gets_a_frame() {
+    fn one_of_several_gets_a_frame() {
         let folder = tempfile::tempdir().expect("a folder");
         for round in 0..20 {
             let path = folder.path().join(format!("{round}.claim"));
@@ -274,7 +276,7 @@ mod tests {
                 let ask = |i: usize| {
                     let claimed = make(&path, &format!("{}{i}\n", owner()));
                     got.fetch_add(usize::from(matches!(&claimed, Claimed::Here(_))), Ordering::Relaxed);
-                    // Nobody lets go before all have asked.
+                    // Keeps the claim until all threads have tried.
                     claimed
                 };
                 let asking: Vec<_> = (0..8).map(|i| scope.spawn(move || ask(i))).collect();

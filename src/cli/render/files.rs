@@ -1,5 +1,5 @@
-//! The EXR of a render: to its file, or to standard output, and if neither takes it among the temporary files; and the
-//! layer of USD that tells of it.
+//! Writes the EXR of a render to its file or to standard output, or to a temporary file if both fail; and the USD layer
+//! that points to the EXR.
 
 use super::options::RenderArgs;
 use super::preview::Target;
@@ -17,41 +17,41 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// Writes the EXR; where that fails, to the system's folder for temporary files, so that the render is not lost.
+/// Writes the EXR. If that fails, writes it to the system's folder for temporary files, so that the render is not lost.
 ///
 /// # Errors
-/// The EXR could not be written where it was asked for; the hint says where it is instead.
+/// The EXR could not be written to its file or to standard output. The hint names the temporary file.
 pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, sums: Option<&ShardSums>) -> Result<()> {
     let options = args.picture.exr_options(args.run.exr_naming);
     let into = |path: &Path| {
         exr::write_followed(path, set, attributes, options, |file| sums.map_or(Ok(()), |sums| sums.write(file)))
     };
     if output::is_stdout(&args.output) {
-        // The header of a file is written last.
-        let kept = Kept::write("render.exr".as_ref(), into)?;
+        // The writer seeks back to the header, which standard output does not support.
+        let kept = TemporaryExr::write("render.exr".as_ref(), into)?;
         let failed = |cause| Error::new(ErrorKind::Io, "standard output", cause);
-        return print_file(&kept.path).map_err(|cause| kept.told(failed(cause)));
+        return print_file(&kept.path).map_err(|cause| kept.keep(failed(cause)));
     }
     let Err(error) = into(&args.output) else { return Ok(()) };
     let name = args.output.file_name().unwrap_or("render.exr".as_ref());
-    Err(match Kept::write(name, into) {
-        Ok(kept) => kept.told(error),
+    Err(match TemporaryExr::write(name, into) {
+        Ok(kept) => kept.keep(error),
         Err(_) => error,
     })
 }
 
-/// Share of a render's time that writing its estimate may take.
+/// Largest share of the time of a render that writing its estimate may take.
 const MAX_ESTIMATE_SHARE: f64 = 0.05;
-/// Bytes that a disk writes in a second, at least.
-const BYTES_PER_SECOND: f64 = 2e8;
+/// Bytes per second that a slow disk writes.
+const MIN_BYTES_PER_SECOND: f64 = 2e8;
 
-/// Writes the EXR before its picture is finished, for the case that the finish does not end, beside the output: whoever
-/// finds a file of that name has a finished picture. Nothing where that would take much of the `seconds` of the render,
-/// which can be rendered again then. What fails now fails again when the finished picture is written.
+/// Writes the unfinished EXR beside the output, in case the program is killed during the finish. The output itself is only
+/// ever a finished picture. Writes nothing if that takes a large share of the `seconds` of the render. Ignores errors,
+/// which occur again when the finished picture is written.
 pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, seconds: f64) -> Option<PathBuf> {
     let is_file = std::fs::metadata(&args.output).map_or(true, |data| data.is_file());
     let bytes: usize = set.layers.iter().flat_map(|layer| &layer.planes).map(|p| size_of_val(&p.values[..])).sum();
-    let is_quick = bytes as f64 <= MAX_ESTIMATE_SHARE * BYTES_PER_SECOND * seconds;
+    let is_quick = bytes as f64 <= MAX_ESTIMATE_SHARE * MIN_BYTES_PER_SECOND * seconds;
     if output::is_stdout(&args.output) || !is_file || !is_quick {
         return None;
     }
@@ -60,12 +60,12 @@ pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes
     exr::write_followed(&path, set, attributes, options, |_| Ok(())).ok().map(|()| path)
 }
 
-/// Checks that no output would replace the scene, its environment, or a file that the scene names.
+/// Checks that no output replaces the scene, its environment, or a file that the scene names.
 ///
 /// # Errors
-/// One would.
+/// An output is such a file.
 pub fn check_inputs(args: &RenderArgs) -> Result<()> {
-    // A checkpoint replaces nothing but a checkpoint.
+    // Checkpoints replace only checkpoints.
     let written = args.files().filter(|(option, _)| !["--resume", "--checkpoint"].contains(option));
     let outputs = written.map(|(_, path)| path.as_path());
     let mut outputs =
@@ -74,7 +74,7 @@ pub fn check_inputs(args: &RenderArgs) -> Result<()> {
         return Ok(());
     }
     let scene = &args.job.scene;
-    // A scene that cannot be read is an error of its own, and a pipe is read once.
+    // The render reports a scene that cannot be read. A pipe can be read only once.
     let bytes = scene.path.is_file().then(|| std::fs::read(&scene.path).ok()).flatten().unwrap_or_default();
     let mut inputs = gltf::files(&bytes, &scene.path, true);
     inputs.push(scene.path.clone());
@@ -84,10 +84,10 @@ pub fn check_inputs(args: &RenderArgs) -> Result<()> {
     outputs.try_for_each(|path| output::check_inputs(path, inputs.iter().map(PathBuf::as_path)))
 }
 
-/// Checks that the state can be saved where it was asked for, and that no other render's is lost.
+/// Checks that the checkpoint can be written and does not replace the checkpoint of another render.
 ///
 /// # Errors
-/// See [`atomic::check_writable`] and [`checkpoint::check_replaceable`].
+/// Errors of [`atomic::check_writable`] and [`checkpoint::check_replaceable`].
 pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
     args.run.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
     let goes_on = |path: &Path| args.run.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, path));
@@ -98,10 +98,10 @@ pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
     checkpoint::check_replaceable(&path, args.run.overwrite, &remedy)
 }
 
-/// Checks that the layer of USD can be written, and has a file to tell of.
+/// Checks that the USD layer can be written, and that the EXR is a file that the layer can point to.
 ///
 /// # Errors
-/// See [`output::check`]; the EXR goes to standard output.
+/// Errors of [`output::check`]; the EXR goes to standard output.
 pub fn check_usd_layer(args: &RenderArgs) -> Result<()> {
     let Some(path) = &args.usd_layer else { return Ok(()) };
     if output::is_stdout(&args.output) {
@@ -111,30 +111,30 @@ pub fn check_usd_layer(args: &RenderArgs) -> Result<()> {
     output::check(path, "usda")
 }
 
-/// Writes the layer of USD, if one is asked for.
+/// Writes the USD layer, if the user wants one.
 ///
 /// # Errors
-/// It could not be written.
+/// The layer could not be written.
 pub fn write_usd_layer(args: &RenderArgs, set: &LayerSet) -> Result<()> {
     args.usd_layer.as_ref().map_or(Ok(()), |path| usd_layer::write(path, &args.output, set))
 }
 
-/// The EXR among the temporary files, in a folder of its own: a file of that name may be there.
-struct Kept {
+/// An EXR in a new temporary folder.
+struct TemporaryExr {
     folder: TempDir,
     path: PathBuf,
 }
 
-impl Kept {
-    fn write(name: &OsStr, into: impl Fn(&Path) -> Result<()>) -> Result<Kept> {
+impl TemporaryExr {
+    fn write(name: &OsStr, into: impl Fn(&Path) -> Result<()>) -> Result<TemporaryExr> {
         let folder = temporary::create_folder("caustique-")?;
         let path = folder.path().join(name);
         into(&path)?;
-        Ok(Kept { folder, path })
+        Ok(TemporaryExr { folder, path })
     }
 
-    /// The error with what has become of the render, which stays there.
-    fn told(self, error: Error) -> Error {
+    /// Keeps the EXR, and adds its path to an error.
+    fn keep(self, error: Error) -> Error {
         let _ = self.folder.keep();
         error.hint(format!("the render is in {}", self.path.display()))
     }

@@ -10,8 +10,8 @@ mod techniques;
 
 pub use options::RenderArgs;
 
-use super::finish::tell_missing;
-use super::progress::{Reporter, Turn, Waiting};
+use super::finish::warn_missing_denoiser;
+use super::progress::{FrameOfRun, Reporter, Waiting};
 use super::signals::Interrupt;
 use super::{output, say, scene};
 use caustique::error::{Error, ErrorKind, Result};
@@ -26,9 +26,9 @@ use caustique::stop::Stop;
 use preview::Preview;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-pub use summary::{Summary, place, tell_finish, tell_picture, tell_unseen};
+pub use summary::{Summary, place, print_finish, print_picture, warn_unseen};
 
-/// Renders a scene, or frames of it.
+/// Renders a scene, or frames of its animation.
 pub fn run(args: &RenderArgs) -> Result<()> {
     if !args.has_output() {
         let cause = "the following required arguments were not provided: --output <OUT.exr>";
@@ -44,7 +44,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 }
 
 /// Renders one picture. Everything that can be wrong is found before the first light path.
-fn render_one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
+fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
     let picture = args.picture_request()?;
     let layers = args.run.selection()?;
     output::check_render(&args.output)?;
@@ -74,7 +74,7 @@ fn render_one(args: &RenderArgs, turn: Option<Turn>) -> Result<()> {
 /// Reports the progress of a render to people and programs, and writes its files.
 struct Reports<'a> {
     args: &'a RenderArgs,
-    turn: Option<Turn>,
+    turn: Option<FrameOfRun>,
     interrupt: Option<Interrupt>,
     waiting: Option<Waiting>,
     reporter: Option<Reporter>,
@@ -99,7 +99,7 @@ impl Observer for Reports<'_> {
             Event::PhaseEnds => self.waiting = None,
             Event::Loaded(scene) => self.loaded(scene)?,
             Event::Chosen(choice) => self.reason = choice.map(reason),
-            Event::FinishOpened { missing } => tell_missing(missing),
+            Event::FinishOpened { missing } => warn_missing_denoiser(missing),
             Event::Begins { plan, settings } => self.begins(plan, settings),
             Event::Resumed(iterations) if self.args.progress.for_people() => {
                 say(&format!("going on after {iterations} iterations"));
@@ -136,7 +136,7 @@ impl Observer for Reports<'_> {
 }
 
 impl<'a> Reports<'a> {
-    fn new(args: &'a RenderArgs, turn: Option<Turn>) -> Reports<'a> {
+    fn new(args: &'a RenderArgs, turn: Option<FrameOfRun>) -> Reports<'a> {
         Reports {
             args,
             turn,
@@ -163,9 +163,9 @@ impl<'a> Reports<'a> {
     }
 
     fn loaded(&mut self, scene: &Scene) -> Result<()> {
-        scene::tell(&self.args.job.scene, &scene.warnings)?;
+        scene::print_warnings(&self.args.job.scene, &scene.warnings)?;
         self.made_for = scene.picture;
-        self.interrupt = Some(Interrupt::listen()?);
+        self.interrupt = Some(Interrupt::install()?);
         Ok(())
     }
 
@@ -176,14 +176,14 @@ impl<'a> Reports<'a> {
         self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         let RenderArgs { output, preview, picture, .. } = self.args;
         self.preview = preview.as_ref().map(|target| Preview::new(target, output, picture, self.made_for));
-        tell_plan(&self.args.job.scene.path, &plan.warnings);
+        print_plan_warnings(&self.args.job.scene.path, &plan.warnings);
         self.reason_if_black.clone_from(&plan.reason_if_black);
     }
 
-    /// The error of a render that has no picture: a signal before the first iteration says that nothing is written.
+    /// Adds to the error of a signal before the first iteration that nothing is written.
     fn explain(&self, error: Error) -> Error {
         let interrupt = self.interrupt.as_ref().filter(|_| error.kind == ErrorKind::Interrupted);
-        interrupt.and_then(|interrupt| interrupt.before_the_first_iteration(&self.args.output).err()).unwrap_or(error)
+        interrupt.and_then(|interrupt| interrupt.check_before_first_iteration(&self.args.output).err()).unwrap_or(error)
     }
 
     /// Writes all files, and reports how the render ended.
@@ -199,13 +199,13 @@ impl<'a> Reports<'a> {
         if let Some(mut preview) = preview {
             preview.show(beauty(set), attributes.frame);
         }
-        tell_end(args, &summary, &delivery, &reason_if_black);
+        print_end(args, &summary, &delivery, &reason_if_black);
         written?;
         // A file that is already gone is no error: the picture is safe.
         let spent = [delivery.spent_checkpoint.as_deref(), estimate.as_deref()];
         spent.into_iter().flatten().for_each(|file| drop(std::fs::remove_file(file)));
         if talk {
-            Summary::tell_files(args, set, techniques.len());
+            Summary::print_files(args, set, techniques.len());
         }
         if let Some(error) = delivery.refusal {
             let output = args.output.display();
@@ -213,26 +213,26 @@ impl<'a> Reports<'a> {
                 "the unfinished render is in {output}: 'caustique finish {output} -o OUT.exr' finishes it"
             )));
         }
-        summary.interrupted(args)
+        summary.check_interrupted(args)
     }
 }
 
 /// Reports time, error and warnings of a render.
-fn tell_end(args: &RenderArgs, summary: &Summary, delivery: &Delivery, reason_if_black: &str) {
+fn print_end(args: &RenderArgs, summary: &Summary, delivery: &Delivery, reason_if_black: &str) {
     let talk = args.progress.for_people();
     if talk {
-        summary.tell();
+        summary.print();
         if let Some(name) = &delivery.finished_by {
-            tell_finish(name, delivery, summary.coverage_of_finished());
+            print_finish(name, delivery, summary.coverage_of_finished());
         }
     }
     let is_black = || delivery.set.beauty().is_ok_and(|pixels| pixels.iter().flatten().all(|x| *x == 0.0));
     if !reason_if_black.is_empty() && is_black() {
         say(&format!("warning: {}: the picture is black: {reason_if_black}", args.output.display()));
     }
-    summary.tell_full();
-    tell_unseen(&args.output, delivery);
-    summary.tell_rejected(&args.output, talk);
+    summary.warn_full_map();
+    warn_unseen(&args.output, delivery);
+    summary.print_rejected(&args.output, talk);
 }
 
 /// The beauty layer without the others.
@@ -243,7 +243,7 @@ fn beauty(set: &LayerSet) -> Result<LayerSet> {
 }
 
 /// Prints the warnings of a plan.
-pub fn tell_plan(scene: &Path, warnings: &[String]) {
+pub fn print_plan_warnings(scene: &Path, warnings: &[String]) {
     for warning in warnings {
         say(&format!("warning: {}: {warning}", scene.display()));
     }

@@ -93,12 +93,12 @@ impl RenderArgs {
         Ok(request)
     }
 
-    /// Whether there is a name for the EXR: the command line's, or the stage's.
+    /// Whether the command line or the USD stage names the EXR.
     pub fn has_output(&self) -> bool {
         !self.output.as_os_str().is_empty()
     }
 
-    /// The same for one frame alone, its number in the names of files.
+    /// The options for one frame, with its number in the names of files.
     pub fn at(&self, frame: u32) -> RenderArgs {
         let named = |path: &PathBuf| numbered(path, frame).unwrap_or_else(|| path.clone());
         RenderArgs {
@@ -116,7 +116,7 @@ impl RenderArgs {
         }
     }
 
-    /// Files that are written or read for each frame, with their options.
+    /// Options and paths of the files that each frame writes or reads.
     pub fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
         let files = [
             ("--output", Some(&self.output)),
@@ -129,9 +129,9 @@ impl RenderArgs {
         files.into_iter().filter_map(|(option, path)| Some((option, path?)))
     }
 
-    /// Where the state is saved, if at all.
+    /// Where and how often the checkpoint is saved; `None`: nowhere.
     pub fn saving(&self) -> Option<Saving> {
-        // Pictures per technique are no part of the state.
+        // Checkpoints do not hold pictures per technique.
         if self.debug_techniques.is_some() { None } else { self.run.saving(Some(&self.output)) }
     }
 }

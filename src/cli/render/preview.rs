@@ -1,4 +1,4 @@
-//! `--preview`: the picture while it renders, in a file that is rewritten every few seconds, or in a running tev.
+//! `--preview`: shows the picture while it renders, in a file that is rewritten every few seconds, or in a running tev.
 
 use crate::cli::output::{self, PictureArgs};
 use crate::cli::say;
@@ -14,19 +14,19 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
-/// Least seconds between two pictures.
-const EVERY: f64 = 2.0;
-/// Seconds between two pictures over those that one takes: looking takes a tenth of the time at most.
-const RATIO: f64 = 10.0;
-/// Where tev listens.
-const TEV: &str = "127.0.0.1:14158";
+/// Least seconds between two previews.
+const MIN_INTERVAL: f64 = 2.0;
+/// Time between two previews over the time that one takes, so that previews take at most a tenth of the render.
+const INTERVAL_RATIO: f64 = 10.0;
+/// Address of tev.
+const TEV_ADDRESS: &str = "127.0.0.1:14158";
 
-/// Where the picture is shown.
+/// Where previews are shown.
 #[derive(Clone, Debug, Serialize)]
 pub enum Target {
-    /// An sRGB picture under the PNG's exposure and tone curve.
+    /// An sRGB file with the exposure and the tone curve of the PNG.
     Png(PathBuf),
-    /// Scene-linear Rec. 709 radiance and alpha.
+    /// A file with scene-linear Rec. 709 radiance and alpha.
     Exr(PathBuf),
     /// The viewer tev on this machine.
     Tev,
@@ -48,7 +48,7 @@ impl FromStr for Target {
 }
 
 impl Target {
-    /// The file, if it is one.
+    /// The file, unless the target is a viewer.
     pub fn file(&self) -> Option<&std::path::Path> {
         match self {
             Target::Png(path) | Target::Exr(path) => Some(path),
@@ -56,10 +56,10 @@ impl Target {
         }
     }
 
-    /// Checks that it can be written.
+    /// Checks that previews can be written.
     ///
     /// # Errors
-    /// No such folder, or one that takes no files; it is the output itself.
+    /// The folder is missing or not writable; the file is the output itself.
     pub fn check(&self, output: &std::path::Path) -> Result<()> {
         match self {
             Target::Png(path) => output::check(path, "png"),
@@ -73,45 +73,44 @@ impl Target {
     }
 }
 
-/// Shows pictures, and paces them.
+/// Shows previews at intervals.
 pub struct Preview<'a> {
     target: &'a Target,
-    /// The exposure and the tone curve that the user gave.
+    /// The user's exposure and tone curve.
     look: &'a PictureArgs,
-    /// The picture's name in tev: the output's path.
+    /// Name of the picture in tev: the path of the output.
     name: String,
     made_for: PictureDefaults,
     clock: Clock,
-    /// When the next picture is due, and since when the current one is made (seconds).
+    /// Time of the next preview, and the time at which the current preview was started (seconds).
     next: f64,
     began: f64,
     tev: Option<TevClient>,
-    /// It has failed, and said so.
+    /// Whether a preview has failed, which ends the previews.
     failed: bool,
 }
 
 impl<'a> Preview<'a> {
-    /// A preview of the picture that is written to `output`.
+    /// Previews of the picture that is written to `output`.
     pub fn new(target: &'a Target, output: &Path, look: &'a PictureArgs, made_for: PictureDefaults) -> Preview<'a> {
         let name = output.display().to_string();
         Preview { target, look, name, made_for, clock: Clock::start(), next: 0.0, began: 0.0, tev: None, failed: false }
     }
 
-    /// Whether a picture is due.
+    /// Whether a preview is due.
     pub fn due(&mut self) -> bool {
         self.began = self.clock.seconds();
         !self.failed && self.began >= self.next
     }
 
-    /// Shows a picture, which is a window of a larger one as `frame` says. A failure is said once, and ends the preview
-    /// alone.
+    /// Shows a picture. `frame`: position within the whole picture. A failure is a warning and ends the previews.
     pub fn show(&mut self, picture: Result<LayerSet>, frame: Option<Frame>) {
         if let Err(error) = picture.and_then(|set| self.write(&set, frame)) {
             say(&format!("warning: --preview: {error}; the render goes on without"));
             self.failed = true;
         }
         let now = self.clock.seconds();
-        self.next = now + (RATIO * (now - self.began)).max(EVERY);
+        self.next = now + (INTERVAL_RATIO * (now - self.began)).max(MIN_INTERVAL);
     }
 
     fn write(&mut self, set: &LayerSet, frame: Option<Frame>) -> Result<()> {
@@ -125,19 +124,20 @@ impl<'a> Preview<'a> {
                 exr::write(path, set, &Attributes { frame, ..Attributes::default() }, options)
             }
             Target::Tev => self.stream(set).map_err(|cause| {
-                Error::new(ErrorKind::Io, format!("tev at {TEV}"), cause).hint("start tev on this machine first")
+                Error::new(ErrorKind::Io, format!("tev at {TEV_ADDRESS}"), cause)
+                    .hint("start tev on this machine first")
             }),
         }
     }
 
-    /// Sends the picture to tev, which keeps it under the output's name.
+    /// Sends a picture to tev, which replaces the picture of the same name.
     fn stream(&mut self, set: &LayerSet) -> std::io::Result<()> {
         let name = self.name.clone();
         let beauty = set.beauty().map_err(std::io::Error::other)?;
         let side = |pixels: usize| u32::try_from(pixels).map_err(std::io::Error::other);
         let (width, height) = (side(set.width)?, side(set.height)?);
         if self.tev.is_none() {
-            let mut client = TevClient::wrap(TcpStream::connect(TEV)?);
+            let mut client = TevClient::wrap(TcpStream::connect(TEV_ADDRESS)?);
             let channel_names = &["R", "G", "B"];
             client.send(PacketCreateImage { image_name: &name, grab_focus: false, width, height, channel_names })?;
             self.tev = Some(client);
@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn targets_are_told_by_their_names() {
+    fn targets_follow_from_the_extension() {
         assert!(matches!("a.PNG".parse(), Ok(Target::Png(_))));
         assert!(matches!("a/b.exr".parse(), Ok(Target::Exr(_))));
         assert!(matches!("tev".parse(), Ok(Target::Tev)));

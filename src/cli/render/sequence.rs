@@ -1,16 +1,16 @@
-//! `--frames`: one frame after the other, each a render of its own.
+//! `--frames`: renders frames one after the other.
 
 use super::claim::{Claim, Claimed};
 use super::options::RenderArgs;
-use crate::cli::progress::Turn;
+use crate::cli::progress::FrameOfRun;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{Frames, is_pattern, numbered};
 
-/// Renders the frames in order, and ends at the first that fails, as Blender does; those before are written.
+/// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
-    // What is wrong for all frames is no frame's fault.
+    // Report errors of the options here, without the number of a frame.
     args.picture_request()?;
     check(args, frames)?;
     let count = frames.iter().len();
@@ -21,7 +21,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
                 say(&format!("frame {frame}: {} {why}", one.output.display()));
             }
         };
-        // What a run that was stopped has left of it.
+        // The checkpoint that a stopped run has left of this frame.
         let left = || {
             let left = one.saving().map(|saving| saving.path);
             left.filter(|path| args.skip_existing && !args.run.overwrite && path.is_file())
@@ -31,8 +31,8 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             pass_over("is there".into());
             continue;
         }
-        // Held until the frame is written. What another machine renders meanwhile is not ours.
-        let _claim = match args.skip_existing.then(|| Claim::of(&one.output)).transpose()? {
+        // Held until the frame is written.
+        let _claim = match args.skip_existing.then(|| Claim::claim(&one.output)).transpose()? {
             Some(Claimed::Elsewhere(owner)) => {
                 pass_over(format!("is rendered by {owner}"));
                 continue;
@@ -40,13 +40,13 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             Some(Claimed::Here(claim)) => Some(claim),
             None => None,
         };
-        // Another machine may have written it meanwhile.
+        // Another machine may have written the frame before this one got the claim.
         if done() {
             pass_over("is there".into());
             continue;
         }
         let left = left();
-        if Interrupt::came() {
+        if Interrupt::has_come() {
             let cause = format!("interrupted before frame {frame}; the frames before it are written");
             return Err(Error::new(ErrorKind::Interrupted, args.output.display(), cause)
                 .hint("the same command with --skip-existing goes on"));
@@ -54,9 +54,9 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         if args.progress.for_people() {
             say(&format!("frame {frame} ({} of {count}): {}", before + 1, one.output.display()));
         }
-        // Of several frames some may not have been begun.
+        // If there are several frames, some may have no checkpoint.
         one.run.resume = left.clone().or(one.run.resume.filter(|path| count == 1 || path.exists()));
-        super::render_one(&one, Some(Turn { frame, before, count })).map_err(|error| {
+        super::render_one(&one, Some(FrameOfRun { frame, before, count })).map_err(|error| {
             let of_left = left.filter(|left| error.place == left.display().to_string());
             let error = match of_left {
                 Some(left) => error.hint(format!("give the same options, or remove {}", left.display())),
@@ -68,12 +68,13 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     Ok(())
 }
 
-/// Whether the output of a frame is there: it is whole if it is, and an empty one holds a place.
+/// Whether the output of a frame exists. Files are replaced atomically, so an existing file is complete, unless it is an
+/// empty placeholder.
 fn is_there(args: &RenderArgs) -> bool {
     std::fs::metadata(&args.output).is_ok_and(|data| data.is_file() && data.len() > 0)
 }
 
-/// Checks that no frame writes over another.
+/// Checks that the frames have different file names.
 fn check(args: &RenderArgs, frames: Frames) -> Result<()> {
     if frames.single().is_some() {
         return Ok(());
@@ -88,10 +89,10 @@ fn check(args: &RenderArgs, frames: Frames) -> Result<()> {
     Ok(())
 }
 
-/// Checks that no name waits for a number where there are no frames.
+/// Checks that no file name has a placeholder for a frame's number.
 ///
 /// # Errors
-/// One does.
+/// A file name has one.
 pub fn refuse_patterns(args: &RenderArgs) -> Result<()> {
     let scene = Some(("the scene", &args.job.scene.path)).filter(|(_, path)| !path.exists());
     match args.files().chain(scene).find(|(_, path)| is_pattern(path)) {

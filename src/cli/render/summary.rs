@@ -1,4 +1,4 @@
-//! What a render says when its pixels are gone.
+//! The summary that is printed after a render.
 
 use super::options::RenderArgs;
 use crate::cli::output::is_stdout;
@@ -10,22 +10,22 @@ use caustique::pipeline::{Delivery, Place, Reached};
 use caustique::render::{ErrorCoverage, Rejections, Rendered, StopReason, peak_memory};
 use std::path::Path;
 
-/// The numbers of a render.
+/// Figures of a render, kept after its pixels are freed.
 pub struct Summary {
     iterations: u64,
     light_paths: u64,
     seconds: f64,
     phases: String,
     error: Option<f64>,
-    /// What the error before the finish tells of.
-    told: ErrorCoverage,
-    /// Photons are merged or gathered within bandwidths, of one level.
+    /// Parts of the error that the error of the estimate includes.
+    error_coverage: ErrorCoverage,
+    /// Whether photons are merged or gathered within bandwidths of a single level.
     has_one_bandwidth: bool,
     rejections: Rejections,
-    /// Bytes of a pixel's sums and of an iteration's measures of it, and how many levels these are of.
+    /// Bytes of a pixel's sums and of its samples in one iteration, and the number of levels.
     pixel: ([usize; 2], usize),
     stop: StopReason,
-    /// Photons, light paths asked for, and bytes allowed, where the one map of `pm` became full.
+    /// Photons, requested light paths and allowed bytes, if the map of `pm` became full.
     full: Option<(u64, u32, u64)>,
 }
 
@@ -41,7 +41,7 @@ impl Summary {
                 p.pilot, p.light, p.map, p.eye
             ),
             error: rendered.error.relative(),
-            told: rendered.settings.error_coverage(),
+            error_coverage: rendered.settings.error_coverage(),
             has_one_bandwidth: rendered.settings.method.has_bandwidths() && rendered.settings.levels.count < 2,
             rejections: rendered.rejections(),
             pixel: (rendered.bytes_per_pixel(), rendered.settings.levels.count),
@@ -53,8 +53,8 @@ impl Summary {
         }
     }
 
-    /// For people.
-    pub fn tell(&self) {
+    /// Prints time, error and memory.
+    pub fn print(&self) {
         let mut line = format!("{} iterations in {} ({})", self.iterations, duration(self.seconds), self.phases);
         if self.light_paths > 0 {
             let rate = count(self.light_paths as f64 / self.seconds.max(1e-9));
@@ -62,7 +62,11 @@ impl Summary {
         }
         say(&line);
         if let Some(error) = self.error {
-            say(&format!("estimated relative error before the finish {}{}", percent(error), self.told.note()));
+            say(&format!(
+                "estimated relative error before the finish {}{}",
+                percent(error),
+                self.error_coverage.note()
+            ));
         }
         let peak = peak_memory() as f64 / f64::from(1 << 30);
         let ([sums, measures], levels) = self.pixel;
@@ -71,15 +75,15 @@ impl Summary {
         say(&format!("peak memory {peak:.2} GiB; the sums of a pixel, of {levels}, take {sums} bytes{measures}"));
     }
 
-    /// What the error of the finished picture tells of: all quarters have the kernel's bias in common, which levels
-    /// tell.
+    /// Parts of the error that the error of the finished picture includes. All quarters share the bias of the kernel, so
+    /// only levels show it.
     pub fn coverage_of_finished(&self) -> ErrorCoverage {
-        if self.has_one_bandwidth { ErrorCoverage::Noise } else { self.told }
+        if self.has_one_bandwidth { ErrorCoverage::Noise } else { self.error_coverage }
     }
 
-    /// The files that are written.
-    pub fn tell_files(args: &RenderArgs, set: &LayerSet, techniques: usize) {
-        tell_picture(&args.output, set);
+    /// Prints the names of the written files.
+    pub fn print_files(args: &RenderArgs, set: &LayerSet, techniques: usize) {
+        print_picture(&args.output, set);
         if let Some(png) = &args.picture.png {
             say(&png.display().to_string());
         }
@@ -88,8 +92,8 @@ impl Summary {
         }
     }
 
-    /// A warning if the photon map became full.
-    pub fn tell_full(&self) {
+    /// Warns if the photon map became full.
+    pub fn warn_full_map(&self) {
         if let Some((photons, asked, bytes)) = self.full {
             say(&format!(
                 "warning: the photon map was full at {photons} photons ({} MiB) after {} of {asked} light paths; --photon-memory allows more",
@@ -99,16 +103,17 @@ impl Summary {
         }
     }
 
-    /// What was left out as not finite, if anything was: a warning where that is much, else for `people` alone.
-    pub fn tell_rejected(&self, output: &Path, people: bool) {
+    /// Prints the number of rejected samples, which were not finite: as a warning if there are many, else only for
+    /// `people`.
+    pub fn print_rejected(&self, output: &Path, people: bool) {
         let (name, many) = (output.display(), self.rejections.are_too_many());
         if let Some(sentence) = self.rejections.sentence().filter(|_| many || people) {
             say(&format!("{}{name}: {sentence}", if many { "warning: " } else { "" }));
         }
     }
 
-    /// The error of a render that was stopped by a signal.
-    pub fn interrupted(&self, args: &RenderArgs) -> Result<()> {
+    /// Errors: a signal has stopped the render.
+    pub fn check_interrupted(&self, args: &RenderArgs) -> Result<()> {
         if self.stop != StopReason::Interrupted {
             return Ok(());
         }
@@ -127,31 +132,31 @@ impl Summary {
     }
 }
 
-/// The file of a picture.
-pub fn tell_picture(output: &Path, set: &LayerSet) {
+/// Prints the file, the size and the number of channels of a picture.
+pub fn print_picture(output: &Path, set: &LayerSet) {
     let channels: usize = set.layers.iter().map(|layer| layer.planes.len()).sum();
     let name = if is_stdout(output) { "standard output".into() } else { output.display().to_string() };
     say(&format!("{name}: {} x {}, {channels} channels", set.width, set.height));
 }
 
-/// A few bright samples rule the noise where they hold more of it than all others.
-const RARE: f64 = 0.5;
+/// Share of the noise in few bright samples above which a warning is printed.
+const MAX_RARE_SHARE: f64 = 0.5;
 
-/// What has finished a picture, and in how many seconds; the error of that, which knows of `told`, what half of it
-/// takes, and where it is.
-pub fn tell_finish(name: &str, delivery: &Delivery, told: ErrorCoverage) {
+/// Prints the denoiser and the time of the finish, the error of the finished picture, the cost of halving it, and where it
+/// is largest. `coverage`: parts of the error that it includes.
+pub fn print_finish(name: &str, delivery: &Delivery, coverage: ErrorCoverage) {
     let reached = delivery.reached.as_ref();
     let error = reached.map(|reached| {
         let [low, high] = reached.interval().map(percent);
-        let error = format!("; error {} ({low} to {high}){}", percent(reached.error()), told.note());
+        let error = format!("; error {} ({low} to {high}){}", percent(reached.error()), coverage.note());
         let half = reached.seconds_to_half().map(|seconds| format!(", half of it in about {} more", duration(seconds)));
         error + &half.unwrap_or_default()
     });
     say(&format!("finished with {name} in {}{}", duration(delivery.finishing), error.unwrap_or_default()));
-    if let Some(rare) = reached.map(Reached::rare).filter(|rare| *rare > RARE) {
+    if let Some(rare) = reached.map(Reached::rare).filter(|rare| *rare > MAX_RARE_SHARE) {
         let share = percent(rare);
         say(&format!(
-            "warning: few bright samples hold {share} of the noise: with all pixels the error is larger than told, and light that is rarely found may be missing; another --method may find it"
+            "warning: few bright samples hold {share} of the noise: with all pixels the error is larger than stated, and light that is rarely found may be missing; another --method may find it"
         ));
     }
     if let Some(worst) = delivery.worst.as_ref().filter(|worst| !worst.by.is_empty()) {
@@ -160,14 +165,14 @@ pub fn tell_finish(name: &str, delivery: &Delivery, told: ErrorCoverage) {
     }
 }
 
-/// A warning of light that photons have hardly brought, if that is most of the error.
-pub fn tell_unseen(output: &Path, delivery: &Delivery) {
+/// Warns if light that hardly any photon has brought is most of the error.
+pub fn warn_unseen(output: &Path, delivery: &Delivery) {
     if let Some(unseen) = &delivery.unseen {
         say(&format!("warning: {}: {unseen}", output.display()));
     }
 }
 
-/// `caustics at 'Lamp' (Glass): 61 %`.
+/// A place for people: `caustics at 'Lamp' (Glass): 61 %`.
 pub fn place(place: &Place) -> String {
     let Place { share, object, material, light } = place;
     let share = percent(*share);

@@ -1,4 +1,4 @@
-//! `--debug-techniques`: pictures per sampling technique, as files.
+//! `--debug-techniques`: writes a picture per sampling technique.
 
 use super::options::RenderArgs;
 use caustique::error::{Error, ErrorKind, Result};
@@ -9,10 +9,10 @@ use caustique::render::TechniquePicture;
 use caustique::scene::description::PictureDefaults;
 use std::path::Path;
 
-/// Makes the folder.
+/// Creates the folder.
 ///
 /// # Errors
-/// It can be neither found nor made.
+/// The folder cannot be created.
 pub fn prepare(args: &RenderArgs) -> Result<()> {
     let Some(folder) = &args.debug_techniques else { return Ok(()) };
     std::fs::create_dir_all(folder).map_err(|cause| {
@@ -21,10 +21,11 @@ pub fn prepare(args: &RenderArgs) -> Result<()> {
     })
 }
 
-/// Writes all pictures, each weighted and unweighted, as EXR and as PNG under the picture's exposure and tone curve.
+/// Writes the weighted and the unweighted picture of each technique as EXR and as PNG, with the exposure and the tone curve
+/// of the render.
 ///
 /// # Errors
-/// The file system.
+/// A file cannot be written.
 pub fn write(args: &RenderArgs, pictures: &[TechniquePicture], made_for: &PictureDefaults) -> Result<()> {
     let Some(folder) = &args.debug_techniques else { return Ok(()) };
     for picture in pictures {
