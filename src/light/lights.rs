@@ -141,7 +141,7 @@ impl Lights {
             .filter(|&i| matches!(emitters[i as usize], Emitter::Sun { one_minus_cos, .. } if one_minus_cos > 0.0))
             .collect();
         let powers: Vec<f64> = emitters.iter().map(|e| e.power(&sky)).collect();
-        // Next to a sun, a desk lamp has almost no share of the total power, but it dominates its own table. So every
+        // Next to a sun, a desk light has almost no share of the total power, but it dominates its own table. So every
         // light gets a minimum probability, which is also above the resolution of the random numbers.
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
@@ -516,20 +516,7 @@ impl Lights {
                 let (direction, flux) = (warp::sphere_uniform(direction), *intensity * (2.0 * TAU));
                 LightRay { origin: *p, direction, flux, start: 1.0, onward: 0.5 / TAU, cos: 1.0 }
             }
-            Emitter::Spot { p, radius, frame, intensity, inner, outer, edge } => {
-                // The full cone and the penumbra are selected by their flux. In the penumbra, the integral of the
-                // falloff is inverted, so every path carries the same flux.
-                let penumbra = (outer - inner) * edge.mean();
-                let x = direction.x * (inner + penumbra);
-                let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
-                let sin = (h * (2.0 - h)).max(0.0).sqrt();
-                let (s, c) = (TAU * direction.y).sin_cos();
-                let filled = spot_solid_angle(*inner, *outer, *edge);
-                let falloff = spot_falloff(h, *inner, *outer, *edge);
-                let direction = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
-                let (origin, flux) = (spot_point(*p, *radius, frame, point), *intensity * filled);
-                LightRay { origin, direction, flux, start: 1.0, onward: falloff / filled, cos: 1.0 }
-            }
+            Emitter::Spot { .. } => Self::emit_from_spot(emitter, point, direction)?,
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
                 // A facing surface receives the irradiance E from the whole cone; a path from one direction carries
@@ -599,6 +586,24 @@ impl Lights {
         let origin = offset_origin(at, ng, d, position_error(corners));
         let onward = Self::cosine_density(cos, *two_sided, spread);
         Some(LightRay { origin, direction: d, flux, start: 1.0 / area, onward, cos })
+    }
+
+    /// Samples a ray that leaves a spot.
+    #[inline(always)]
+    fn emit_from_spot(spot: &Emitter, point: Vec2, direction: Vec2) -> Option<LightRay> {
+        let Emitter::Spot { p, radius, frame, intensity, inner, outer, edge } = spot else { return None };
+        // The full cone and the penumbra are selected by their flux. In the penumbra, the integral of the falloff is
+        // inverted, so every path carries the same flux.
+        let penumbra = (outer - inner) * edge.mean();
+        let x = direction.x * (inner + penumbra);
+        let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
+        let sin = (h * (2.0 - h)).max(0.0).sqrt();
+        let (s, c) = (TAU * direction.y).sin_cos();
+        let filled = spot_solid_angle(*inner, *outer, *edge);
+        let falloff = spot_falloff(h, *inner, *outer, *edge);
+        let direction = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
+        let (origin, flux) = (spot_point(*p, *radius, frame, point), *intensity * filled);
+        Some(LightRay { origin, direction, flux, start: 1.0, onward: falloff / filled, cos: 1.0 })
     }
 
     /// Aims the start of a light path from infinity at caustic targets (see [`CausticTargets::aim`]). Other starts do

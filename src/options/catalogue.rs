@@ -19,7 +19,7 @@ pub struct OptionDescription {
     pub option: String,
     /// Former names of the field, which files may still give.
     pub aliases: Vec<String>,
-    /// What it takes.
+    /// Kind of value that the option takes.
     pub kind: ValueKind,
     /// Placeholders of the values in the help, one for each value.
     pub values: Vec<String>,

@@ -248,7 +248,7 @@ impl RenderOptions {
             Some(OnOff::On) => candidate.guided || !method.supports_guiding(),
             Some(OnOff::Off) => !candidate.guided,
         };
-        let indirect = self.indirect.is_none_or(|asked| !method.gathers() || candidate.indirect == asked);
+        let indirect = self.indirect.is_none_or(|indirect| !method.gathers() || candidate.indirect == indirect);
         // A network takes the number of levels that it was trained with.
         let required = self.settings().ok()?.levels;
         let levels = |settings: &Settings| self.finish.model.is_none() || settings.levels == required;

@@ -26,8 +26,8 @@
 //! visible only through a lobe that is not a delta lobe. If this lobe is sharp, and only perfect mirrors and clear glass
 //! are between the lobe and the light, the lobe shows a caustic.
 //!
-//! [`CameraSuffix`] reads a path from the camera, [`LightPrefix`] from the light, and where they meet they tell the class
-//! ([`CameraSuffix::class_with`]).
+//! [`CameraSuffix`] reads a path from the camera, [`LightPrefix`] reads it from the light. Together they determine the class
+//! of the whole path ([`CameraSuffix::class_with`]).
 
 mod camera_suffix;
 mod present;

@@ -26,10 +26,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let first_light_sphere = description.objects.len() as u32;
     add_light_spheres(&mut description);
     let groups = light_groups(&description, &mut warnings);
-    let (low, high) = bounds(&description);
-    let (center, radius) =
-        if low.cmple(high).all() { ((low + high) * 0.5, (high - low).length() * 0.5) } else { (DVec3::ZERO, 1.0) };
-    let radius = radius.max(1e-6);
+    let (center, radius) = bounding_sphere(&description);
     let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
 
     let shapes = Arc::new(place_instances(&mut description, origin));
@@ -248,8 +245,8 @@ pub(super) fn rebuild_with_materials(
     })
 }
 
-/// World-space bounds of all meshes, in f64.
-fn bounds(description: &Description) -> (DVec3, DVec3) {
+/// World-space bounding sphere of all meshes, in f64: centre and radius. A unit sphere for a scene without meshes.
+fn bounding_sphere(description: &Description) -> (DVec3, f64) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for placed in &description.instances {
         for p in &description.meshes[placed.mesh as usize].positions {
@@ -258,7 +255,11 @@ fn bounds(description: &Description) -> (DVec3, DVec3) {
             high = high.max(p);
         }
     }
-    (low, high)
+    if low.cmple(high).all() {
+        ((low + high) * 0.5, ((high - low).length() * 0.5).max(1e-6))
+    } else {
+        (DVec3::ZERO, 1.0)
+    }
 }
 
 /// Places the instances. A mesh with one instance is transformed to world space; other meshes are shared.

@@ -7,7 +7,7 @@
 pub(super) mod black;
 mod culling;
 mod glass;
-mod lamps;
+mod lights;
 mod overlap;
 mod rays;
 
@@ -22,12 +22,12 @@ pub(super) fn warnings(scene: &Scene, camera: &Camera, request: &PlanRequest) ->
     warnings.extend(glass::frosted(scene));
     warnings.extend(glass::alpha_glass(scene));
     warnings.extend(overlap::unordered(scene));
-    warnings.extend(lamps::units(scene));
-    warnings.extend(lamps::no_environment(scene, request));
+    warnings.extend(lights::units(scene));
+    warnings.extend(lights::no_environment(scene, request));
     if !scene.lights.is_empty() {
-        warnings.extend(lamps::encased(scene, camera.position()));
-        warnings.extend(lamps::shut_out(scene, camera.position()));
-        warnings.extend(lamps::behind_glass(scene, request));
+        warnings.extend(lights::encased(scene, camera.position()));
+        warnings.extend(lights::shut_out(scene, camera.position()));
+        warnings.extend(lights::behind_glass(scene, request));
         warnings.extend(glass::unlit(scene));
         warnings.extend(black::nothing_seen(scene, camera));
     }

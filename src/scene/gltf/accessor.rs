@@ -6,6 +6,7 @@ use super::fault;
 use crate::error::Result;
 use crate::memory;
 use gltf::json::accessor::ComponentType;
+use gltf::json::accessor::sparse::Sparse;
 use gltf::json::validation::Checked;
 
 const DAMAGED: &str = "the file is damaged: export it again";
@@ -162,27 +163,39 @@ impl Document<'_> {
             }
         };
         if let Some(sparse) = &accessor.sparse {
-            let Checked::Valid(kind) = sparse.indices.component_type else {
-                return Err(fault(place(), "the component type of its sparse indices is unknown").hint(DAMAGED));
-            };
-            let part = |view: usize, offset: u64, size: usize| {
-                let bytes = self.view(view)?;
-                Elements::new(bytes, offset, sparse.count.0, size, None)
-            };
-            let (i, v) = (&sparse.indices, &sparse.values);
-            let keys = part(i.buffer_view.value(), i.byte_offset.0, kind.0.size()).map_err(|e| e.within(place()))?;
-            let news = part(v.buffer_view.value(), v.byte_offset.0, size).map_err(|e| e.within(place()))?;
-            for (key, new) in keys.iter().zip(news.iter()) {
-                let key = unsigned(kind.0, key);
-                match values.get_mut(key as usize) {
-                    Some(value) => *value = decode(component, new),
-                    None => {
-                        let cause = format!("sparse index {key} is past its {count} elements");
-                        return Err(fault(place(), cause).hint(DAMAGED));
-                    }
+            self.replace_sparse(sparse, &mut values, size, &|bytes| decode(component, bytes))
+                .map_err(|e| e.within(place()))?;
+        }
+        Ok(values)
+    }
+
+    /// Replaces the elements that a sparse accessor lists; `size` is the size of an element in bytes.
+    fn replace_sparse<T>(
+        &self,
+        sparse: &Sparse,
+        values: &mut [T],
+        size: usize,
+        decode: &dyn Fn(&[u8]) -> T,
+    ) -> Result<()> {
+        let Checked::Valid(kind) = sparse.indices.component_type else {
+            return Err(fault("", "the component type of its sparse indices is unknown").hint(DAMAGED));
+        };
+        let part =
+            |view: usize, offset: u64, size: usize| Elements::new(self.view(view)?, offset, sparse.count.0, size, None);
+        let (i, v) = (&sparse.indices, &sparse.values);
+        let keys = part(i.buffer_view.value(), i.byte_offset.0, kind.0.size())?;
+        let replacements = part(v.buffer_view.value(), v.byte_offset.0, size)?;
+        let count = values.len();
+        for (key, bytes) in keys.iter().zip(replacements.iter()) {
+            let key = unsigned(kind.0, key);
+            match values.get_mut(key as usize) {
+                Some(value) => *value = decode(bytes),
+                None => {
+                    let cause = format!("sparse index {key} is past its {count} elements");
+                    return Err(fault("", cause).hint(DAMAGED));
                 }
             }
         }
-        Ok(values)
+        Ok(())
     }
 }

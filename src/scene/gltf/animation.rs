@@ -101,10 +101,10 @@ impl FaultPolicy {
 /// Frames per second: of the scene, else of `frame`, else the default.
 fn rate(document: &Document, frame: FrameTime, warnings: &mut Vec<String>) -> Result<f64> {
     let index = document.default_scene()?;
-    let said: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
+    let extras: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
     let is_valid = |rate: &f64| rate.is_finite() && *rate > 0.0;
     // The reader of the scene's extras rejects an invalid rate.
-    let rate = said.frame_rate.map(|rate| {
+    let rate = extras.frame_rate.map(|rate| {
         let [frames, seconds] = rate.fraction().map(f64::from);
         frames / seconds
     });

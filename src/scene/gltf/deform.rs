@@ -160,6 +160,26 @@ fn joints(document: &Document, raw: &Value, worlds: &WorldTransforms) -> Result<
     skin.joints.iter().enumerate().map(joint).collect()
 }
 
+/// Reads an attribute of a skin, with four values per vertex; `None` if the primitive lacks it.
+fn skin_attribute(
+    document: &Document,
+    primitive: &Primitive,
+    semantic: Semantic,
+    vertices: usize,
+    place: &str,
+) -> Result<Option<Vec<[f32; 4]>>> {
+    let found = primitive.attributes.iter().find(|(s, _)| matches!(s, Checked::Valid(s) if *s == semantic));
+    let values = found.map(|(_, index)| document.floats::<4>(index.value())).transpose();
+    let values = values.map_err(|e| e.within(format!("{place}, {}", semantic.to_string())))?;
+    match values {
+        Some(values) if values.len() != vertices => {
+            let cause = format!("{} has {} values for {vertices} vertices", semantic.to_string(), values.len());
+            Err(fault(place, cause).hint(EXPORT))
+        }
+        values => Ok(values),
+    }
+}
+
 /// Applies linear blend skinning to a mesh.
 fn skin(
     document: &Document,
@@ -171,20 +191,9 @@ fn skin(
 ) -> Result<()> {
     let vertices = mesh.positions.len();
     let mut blends = vec![(DAffine3::ZERO, 0.0); vertices];
+    let read = |semantic| skin_attribute(document, primitive, semantic, vertices, place);
     for set in 0.. {
-        let of = |semantic: Semantic| {
-            let found = primitive.attributes.iter().find(|(s, _)| matches!(s, Checked::Valid(s) if *s == semantic));
-            let values = found.map(|(_, index)| document.floats::<4>(index.value())).transpose();
-            let values = values.map_err(|e| e.within(format!("{place}, {}", semantic.to_string())))?;
-            match values {
-                Some(values) if values.len() != vertices => {
-                    let cause = format!("{} has {} values for {vertices} vertices", semantic.to_string(), values.len());
-                    Err(fault(place, cause).hint(EXPORT))
-                }
-                values => Ok(values),
-            }
-        };
-        let (Some(which), Some(weights)) = (of(Semantic::Joints(set))?, of(Semantic::Weights(set))?) else {
+        let (Some(which), Some(weights)) = (read(Semantic::Joints(set))?, read(Semantic::Weights(set))?) else {
             if set == 0 {
                 return Err(fault(place, "its node has a skin, but it has no joints and weights").hint(EXPORT));
             }

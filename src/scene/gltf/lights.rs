@@ -71,24 +71,24 @@ pub(super) struct Divisors {
     /// For suns, to W/m2.
     sun: f32,
     /// For points and spots, to W/sr.
-    lamp: f32,
+    point: f32,
 }
 
 impl Divisors {
-    const RADIOMETRIC: Divisors = Divisors { sun: 1.0, lamp: 1.0 };
-    const PHOTOMETRIC: Divisors = Divisors { sun: EFFICACY, lamp: EFFICACY };
+    const RADIOMETRIC: Divisors = Divisors { sun: 1.0, point: 1.0 };
+    const PHOTOMETRIC: Divisors = Divisors { sun: EFFICACY, point: EFFICACY };
     /// For Blender's own units: the power of a point or spot light over the whole sphere.
-    const WATTS: Divisors = Divisors { sun: 1.0, lamp: 4.0 * PI };
+    const WATTS: Divisors = Divisors { sun: 1.0, point: 4.0 * PI };
 }
 
 /// The divisors for the lights of a file, and whether the units are a guess.
 pub(super) fn divisors(
     document: &Document,
     units: LightUnits,
-    said: Option<Units>,
+    file_units: Option<Units>,
     warnings: &mut Vec<String>,
 ) -> (Divisors, Option<GuessedUnits>) {
-    match (units, said) {
+    match (units, file_units) {
         (LightUnits::Radiometric, _) | (LightUnits::Auto, Some(Units::Radiometric)) => (Divisors::RADIOMETRIC, None),
         (LightUnits::Photometric, _) | (LightUnits::Auto, Some(Units::Photometric)) => (Divisors::PHOTOMETRIC, None),
         (LightUnits::Auto, None) => {
@@ -172,7 +172,7 @@ pub(super) fn light(
     let light = Light::deserialize(raw).map_err(|e| super::container::malformed(&place, &e))?;
     let name =
         Some(node.0.to_owned()).filter(|n| !n.is_empty()).or(light.name).unwrap_or_else(|| format!("light {index}"));
-    let divisor = if light.kind == "directional" { divisors.sun } else { divisors.lamp };
+    let divisor = if light.kind == "directional" { divisors.sun } else { divisors.point };
     let mut intensity = Rgb::from_array(light.color) * light.intensity / divisor;
     if !intensity.is_finite() {
         return Err(fault(place, "its colour or intensity is not finite"));

@@ -295,21 +295,21 @@ impl Reader<'_> {
             }
         }
         extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
-        let said: MaterialExtras = extras::read(self.raw, self.place)?;
-        material.priority = said.priority;
-        material.optical_contact = said.contact == Some(extras::Contact::Optical);
-        material.null_bsdf = said.null_bsdf && material.transmission == 0.0;
-        if said.null_bsdf && !material.null_bsdf {
+        let own: MaterialExtras = extras::read(self.raw, self.place)?;
+        material.priority = own.priority;
+        material.optical_contact = own.contact == Some(extras::Contact::Optical);
+        material.null_bsdf = own.null_bsdf && material.transmission == 0.0;
+        if own.null_bsdf && !material.null_bsdf {
             self.warnings.push(format!("{}: its null_bsdf is ignored: it transmits light by itself", self.place));
         }
-        if let Some(degrees) = said.spread_deg {
+        if let Some(degrees) = own.spread_deg {
             if !(0.0..=180.0).contains(&degrees) {
                 let cause = format!("extras.caustique.spread_deg must lie between 0 and 180, it is {degrees}");
                 return Err(fault(self.place, cause));
             }
             material.spread = (0.5 * degrees).to_radians();
         }
-        if let Some(medium) = said.medium {
+        if let Some(medium) = own.medium {
             material.medium = Some(medium.parameters(self.place)?);
             solid = Some(true);
         }

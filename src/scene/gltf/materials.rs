@@ -61,15 +61,7 @@ impl Library {
                 Glass::Thin => false,
             });
         if solid && !closed {
-            let why = match (bounds.flipped, bounds.rim) {
-                (true, _) => "part of its faces is turned over: recalculate its normals".to_string(),
-                (false, 0) => "edges join more than two of its faces: light may get lost inside".into(),
-                (false, rim) => format!(
-                    "the mesh is not closed ({}): light may get lost inside; close the holes, or take its thickness away",
-                    counted(rim, "edge has one face only", "edges have one face only")
-                ),
-            };
-            warnings.push(format!("mesh \"{}\": its {place} is solid, but {why}", mesh.name));
+            warnings.push(format!("mesh \"{}\": its {place} is solid, but {}", mesh.name, reason_not_closed(bounds)));
         }
         check_coordinates(&loaded.material, mesh, &place, warnings);
         if let Some(&known) = self.known.get(&(index, solid)) {
@@ -96,6 +88,18 @@ impl Library {
         self.list.push(material);
         self.known.insert((index, solid), known);
         Ok(known)
+    }
+}
+
+/// Why a mesh is not closed, with the consequence and a remedy, as the end of a warning.
+fn reason_not_closed(bounds: Solid) -> String {
+    match (bounds.flipped, bounds.rim) {
+        (true, _) => "part of its faces is turned over: recalculate its normals".to_string(),
+        (false, 0) => "edges join more than two of its faces: light may get lost inside".into(),
+        (false, rim) => format!(
+            "the mesh is not closed ({}): light may get lost inside; close the holes, or take its thickness away",
+            counted(rim, "edge has one face only", "edges have one face only")
+        ),
     }
 }
 

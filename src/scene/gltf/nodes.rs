@@ -60,8 +60,8 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
     out.textures = library.textures.list;
     lights::reconsider_units(&mut out);
     clipping::check(&mut out, &clips, &bounds);
-    let mut said = HashSet::new();
-    out.warnings.retain(|warning| said.insert(warning.clone()));
+    let mut seen = HashSet::new();
+    out.warnings.retain(|warning| seen.insert(warning.clone()));
     Ok(out)
 }
 
@@ -187,15 +187,15 @@ impl Reader<'_> {
     }
 
     fn environment(&mut self, place: &str) -> Result<()> {
-        let Some(said) = &self.scene.environment else {
+        let Some(extras) = &self.scene.environment else {
             self.out.environment_unknown = self.document.is_by_blender();
             return Ok(());
         };
-        let strength = said.strength.unwrap_or(1.0);
-        if !(strength.is_finite() && strength >= 0.0 && said.rotation_deg.is_finite()) {
+        let strength = extras.strength.unwrap_or(1.0);
+        if !(strength.is_finite() && strength >= 0.0 && extras.rotation_deg.is_finite()) {
             return Err(fault("environment", "strength and rotation_deg must be finite, strength not negative"));
         }
-        let source = match (&said.color, &said.file) {
+        let source = match (&extras.color, &extras.file) {
             (Some(color), None) => {
                 let color = Rgb::from_array(*color);
                 if !(color.is_finite() && color.min_element() >= 0.0) {
@@ -219,9 +219,9 @@ impl Reader<'_> {
                 return Ok(());
             }
         };
-        self.out.environment_hidden_from_camera = !said.visible.camera;
-        self.out.environment_light_group.clone_from(&said.light_group);
-        self.out.environment = Some(EnvironmentDescription { source, rotation_deg: said.rotation_deg, strength });
+        self.out.environment_hidden_from_camera = !extras.visible.camera;
+        self.out.environment_light_group.clone_from(&extras.light_group);
+        self.out.environment = Some(EnvironmentDescription { source, rotation_deg: extras.rotation_deg, strength });
         Ok(())
     }
 
@@ -271,10 +271,10 @@ impl Reader<'_> {
             return Ok(());
         }
         if let Some(reference) = extension::<LightReference>(raw, "KHR_lights_punctual", place)? {
-            let (units, said) = (self.options.light_units, self.scene.light_units);
+            let (units, file_units) = (self.options.light_units, self.scene.light_units);
             let out = &mut self.out;
             let divisors = *self.divisors.get_or_insert_with(|| {
-                let (divisors, guessed) = lights::divisors(document, units, said, &mut out.warnings);
+                let (divisors, guessed) = lights::divisors(document, units, file_units, &mut out.warnings);
                 out.guessed_units = guessed;
                 divisors
             });
@@ -287,12 +287,12 @@ impl Reader<'_> {
             let mesh_name = get(&document.meshes, mesh, "mesh").map_err(|e| e.within(place))?.name.clone();
             let known = |name: &String| !name.is_empty();
             let name = Some(name).filter(known).or(mesh_name.filter(known)).unwrap_or_else(|| place.into());
-            let said = extras::read::<ObjectExtras>(raw, place)?;
+            let extras = extras::read::<ObjectExtras>(raw, place)?;
             let shape = Deformation::of(document, mesh, index, &self.worlds).map_err(|e| e.within(place))?;
             // A skinned mesh ignores the transform of its node (specification, section 3.7.3.3).
             let to_world = shape.center.unwrap_or(to_world);
             let parts = self.parts(mesh, deform::is_deformed(raw).then_some(index), &shape)?;
-            self.place(&parts, name, self.copies(raw, place)?, to_world, &said, place)?;
+            self.place(&parts, name, self.copies(raw, place)?, to_world, &extras, place)?;
         }
         Ok(())
     }
@@ -304,7 +304,7 @@ impl Reader<'_> {
         name: String,
         copies: Vec<DAffine3>,
         to_world: DAffine3,
-        said: &ObjectExtras,
+        extras: &ObjectExtras,
         place: &str,
     ) -> Result<()> {
         if parts.is_empty() {
@@ -327,8 +327,8 @@ impl Reader<'_> {
                     flat += 1;
                     continue;
                 };
-                let (name, light_group) = (name.clone(), said.light_group.clone());
-                let hidden_from_camera = !said.visible.camera;
+                let (name, light_group) = (name.clone(), extras.light_group.clone());
+                let hidden_from_camera = !extras.visible.camera;
                 let placed = PlacedMesh { name, mesh, material, object, hidden_from_camera, light_group, to_world };
                 self.out.instances.push(placed);
             }

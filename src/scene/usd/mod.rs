@@ -96,12 +96,13 @@ const STOP_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The time limit of a conversion, in seconds.
 fn max_seconds() -> Result<u32> {
-    let Some(said) = std::env::var_os(SECONDS_VARIABLE) else { return Ok(DEFAULT_MAX_SECONDS) };
+    let Some(value) = std::env::var_os(SECONDS_VARIABLE) else { return Ok(DEFAULT_MAX_SECONDS) };
     // poll(2) takes milliseconds in 31 bits.
-    let seconds = said.to_str().and_then(|said| said.parse().ok()).filter(|seconds| (1..=2_000_000).contains(seconds));
+    let seconds =
+        value.to_str().and_then(|value| value.parse().ok()).filter(|seconds| (1..=2_000_000).contains(seconds));
     seconds.ok_or_else(|| {
         let error =
-            Error::new(ErrorKind::Usage, SECONDS_VARIABLE, format!("{} is no number of seconds", said.display()));
+            Error::new(ErrorKind::Usage, SECONDS_VARIABLE, format!("{} is no number of seconds", value.display()));
         error.hint("give a whole number from 1 to 2000000, or none")
     })
 }

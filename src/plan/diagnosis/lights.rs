@@ -30,19 +30,19 @@ const DIRECTIONS_PER_TRIANGLE: u32 = 64;
 pub(super) fn units(scene: &Scene) -> Option<String> {
     let guessed = scene.guessed_units.as_ref()?;
     let sky = scene.lights.sky();
-    let (mut lamps, mut surfaces, mut suns) = (0.0, 0.0, 0.0);
+    let (mut points, mut surfaces, mut suns) = (0.0, 0.0, 0.0);
     for emitter in scene.lights.emitters() {
         match emitter {
             Emitter::Triangle { instance, .. } => {
                 let own = scene.shapes.instances[*instance as usize].object < scene.first_light_sphere;
-                *if own { &mut surfaces } else { &mut lamps } += emitter.power(sky) as f32;
+                *if own { &mut surfaces } else { &mut points } += emitter.power(sky) as f32;
             }
-            Emitter::Point { .. } | Emitter::Spot { .. } => lamps += emitter.power(sky) as f32,
+            Emitter::Point { .. } | Emitter::Spot { .. } => points += emitter.power(sky) as f32,
             Emitter::Sun { irradiance, .. } => suns += luminance(*irradiance),
             Emitter::Environment => {}
         }
     }
-    let alone = surfaces == 0.0 && sky.environment.is_none() && lamps + suns > 0.0;
+    let alone = surfaces == 0.0 && sky.environment.is_none() && points + suns > 0.0;
     if alone && guessed.photometric {
         return Some(format!(
             "lamps give all its light, and their numbers were taken for lumens, going by {}; if the picture is far too dark, use --light-units radiometric",
@@ -52,7 +52,7 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
     let around = sky.environment.as_ref().map_or(0.0, |environment| PI * luminance(environment.mean()));
     let suspicious = EFFICACY / RATIO_TOLERANCE..EFFICACY * RATIO_TOLERANCE;
     let pairs =
-        [(lamps, "its lamps", surfaces, "its surfaces that glow"), (suns, "its suns", around, "the environment")];
+        [(points, "its lamps", surfaces, "its surfaces that glow"), (suns, "its suns", around, "the environment")];
     let (strong, weak, many) = pairs.into_iter().find_map(|(a, named_a, b, named_b)| {
         // Lumens taken for watts are too strong; watts taken for lumens are too weak.
         let many = if guessed.photometric { b / a } else { a / b };
