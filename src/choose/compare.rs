@@ -1,61 +1,42 @@
-//! Candidates against each other, each by the finished picture that it makes of the same counted work.
+//! Pilots of all candidates, compared by the error of the finished picture that each makes of the same counted work.
 //!
-//! The first half of a candidate's iterations is finished as the render will be, and so is each quarter of them: what
-//! more iterations bring is told by both, and carried on to the end of the render as the power of their number that
-//! they show. All pictures are judged alike, by the second halves of all candidates, whose noise no picture shares: the
-//! mean of `(F - J)^2` is the picture's squared error and a variance that is the same for all. So what a candidate
-//! finds too rarely to show noise is in its error, and the bias of photons is, too.
+//! The first half of a candidate's iterations is finished as the render will be, and so are the two quarters in it.
+//! The errors of half and quarters show how the error falls with the number of iterations, and are extrapolated to the
+//! end of the render. All pictures are compared with the same estimates: the second halves of all candidates, whose
+//! noise is independent of every picture's noise. The mean of `(F - J)^2`, with `F` a picture and `J` an estimate, is
+//! the picture's squared error plus a variance that is the same for all pictures. So the error includes light that a
+//! candidate samples too rarely to show noise, and the bias of photons.
 
-use super::pilot_settings::WORST;
+use super::pilot_settings::{TRIMMED_PILOT_SHARE, relative_weight};
 use crate::film::{Picture, channel_mean};
 use crate::finish::cross_product::{PixelError, squared_errors};
 use crate::finish::{Estimate, Finish, quarters, reads_for_error};
 use crate::render::{Candidate, RenderInput, Session};
 use rayon::prelude::*;
 
-/// Iterations of a candidate: one for each quarter, and as many as its share of the pilot allows.
-pub(super) const ITERATIONS: (u64, u64) = (4, 256);
-/// Share of the pilot that goes to all candidates alike.
-const FIRST: f64 = 0.4;
-/// Those whose picture has so many times the squared error of the best after that are out.
-const UNCLEAR: f64 = 2.0;
-/// Standard errors that a difference has to stand out by: before a candidate is out, and before the usual way is left
-/// for a better one.
-const TOLD: f64 = 2.0;
+/// Least iterations of a pilot: one for each quarter.
+pub(super) const MIN_ITERATIONS: u64 = 4;
+/// Most iterations of a pilot.
+const MAX_ITERATIONS: u64 = 256;
+/// Share of the work of all pilots that is divided equally among all candidates, in the first of two rounds.
+const FIRST_ROUND_SHARE: f64 = 0.4;
+/// After the first round a candidate is out if its squared error exceeds the smallest one by this factor.
+const MAX_ERROR_RATIO: f64 = 2.0;
+/// Standard errors by which a difference of errors must exceed 0 to be significant.
+const SIGNIFICANCE: f64 = 2.0;
 
-/// A candidate and how it did.
+/// Result of a candidate's pilot.
 #[derive(Clone, Copy, Debug)]
 pub struct PilotResult {
     /// The candidate.
     pub candidate: Candidate,
-    /// relMSE without the worst pixels that the finished picture is expected to have; infinite where nothing was seen.
+    /// Expected relMSE of the finished picture at the end of the render, trimmed of the worst pixels. Infinite if the
+    /// pilot has seen no light.
     pub squared_error: f64,
     /// Counted core-seconds of an iteration of the whole picture.
     pub seconds_per_iteration: f64,
-    /// It is the one to take.
+    /// Whether this candidate is chosen.
     pub chosen: bool,
-}
-
-/// A candidate being tried.
-pub(super) struct CandidateRun<'a> {
-    candidate: Candidate,
-    session: Session<'a>,
-    /// Counted core-seconds of an iteration of the small picture and of the whole one, and of all so far but for what
-    /// comes before iterations.
-    once: f64,
-    whole: f64,
-    spent: f64,
-}
-
-/// What a candidate's iterations show.
-struct Shown {
-    /// Finished from the first half.
-    finished: Picture,
-    /// Finished from either quarter of it.
-    earlier: [Picture; 2],
-    judges: [Picture; 2],
-    /// Relative variance of the judges, without the worst pixels.
-    noise: f64,
 }
 
 impl PilotResult {
@@ -65,194 +46,259 @@ impl PilotResult {
     }
 }
 
-impl<'a> CandidateRun<'a> {
-    /// Nothing done yet but what comes before iterations, of which one costs so much in the small picture and the whole
-    /// one.
-    pub fn new(stage: &'a RenderInput<'a>, candidate: Candidate, [once, whole]: [f64; 2]) -> CandidateRun<'a> {
-        CandidateRun { candidate, session: Session::new(stage), once, whole, spent: 0.0 }
+/// Counted core-seconds that pilots and render may take.
+#[derive(Clone, Copy)]
+pub(super) struct Budget {
+    /// All pilots together.
+    pub pilots: f64,
+    /// The render.
+    pub render: f64,
+}
+
+/// The pilot of a candidate.
+pub(super) struct PilotRun<'a> {
+    candidate: Candidate,
+    session: Session<'a>,
+    /// Counted core-seconds of an iteration of the pilot.
+    seconds_per_iteration: f64,
+    /// Counted core-seconds of an iteration of the whole picture.
+    render_seconds_per_iteration: f64,
+    /// Counted core-seconds of all iterations so far.
+    spent: f64,
+}
+
+/// Pictures of a pilot.
+struct PilotPictures {
+    /// Finished from the first half of the iterations.
+    half: Picture,
+    /// Finished from each quarter in that half.
+    quarters: [Picture; 2],
+    /// The other two quarters, unfinished: independent estimates.
+    estimates: [Picture; 2],
+    /// Relative variance of the estimates, trimmed of the worst pixels.
+    noise: f64,
+}
+
+impl<'a> PilotRun<'a> {
+    /// Prepares a pilot. Both costs are counted core-seconds of an iteration: of the pilot, and of the whole picture.
+    pub fn new(
+        input: &'a RenderInput<'a>,
+        candidate: Candidate,
+        seconds_per_iteration: f64,
+        render_seconds_per_iteration: f64,
+    ) -> PilotRun<'a> {
+        let session = Session::new(input);
+        PilotRun { candidate, session, seconds_per_iteration, render_seconds_per_iteration, spent: 0.0 }
     }
 
-    /// Goes on until so many core-seconds are spent; no further than the least number of iterations once `stop` holds.
-    fn advance(&mut self, seconds: f64, stop: &dyn Fn() -> bool) {
-        let to = ((seconds / self.once) as u64).clamp(ITERATIONS.0, ITERATIONS.1);
-        while self.session.iterations() < to && !(self.session.iterations() >= ITERATIONS.0 && stop()) {
+    /// Iterates until `seconds` core-seconds are spent in all. Once `stopped` returns true it ends after
+    /// [`MIN_ITERATIONS`].
+    fn advance(&mut self, seconds: f64, stopped: &dyn Fn() -> bool) {
+        let to = ((seconds / self.seconds_per_iteration) as u64).clamp(MIN_ITERATIONS, MAX_ITERATIONS);
+        while self.session.iterations() < to && !(self.session.iterations() >= MIN_ITERATIONS && stopped()) {
             self.session.step();
-            self.spent += self.once;
+            self.spent += self.seconds_per_iteration;
         }
     }
 
-    /// `None` where a quarter of it is black, or it cannot be finished.
-    fn show(&mut self, finish: &mut Finish) -> Option<Shown> {
+    /// The pictures so far; `None` if a quarter is black or the finish fails.
+    fn pictures(&self, finish: &mut Finish) -> Option<PilotPictures> {
         let set = self.session.layers(reads_for_error).ok()?;
         let quarters = quarters(&set)?;
         let estimate = Estimate::of(&set).ok()?;
-        let finished = finish.picture(&estimate.first_half(&quarters)).ok()?;
+        let half = finish.picture(&estimate.first_half(&quarters)).ok()?;
         let [first, second, a, b] = quarters;
         let mut quarter = |mean| finish.picture(&estimate.from_partial(mean, 4.0)).ok();
-        let earlier = [quarter(first)?, quarter(second)?];
-        let noise = variance(&a, &b, &finished);
-        Some(Shown { finished, earlier, judges: [a, b], noise })
+        let quarters = [quarter(first)?, quarter(second)?];
+        let noise = relative_variance(&a, &b, &half);
+        Some(PilotPictures { half, quarters, estimates: [a, b], noise })
     }
 }
 
-/// Relative squared difference of two pictures, without the worst pixels.
-fn variance(a: &Picture, b: &Picture, values: &Picture) -> f64 {
+/// Mean squared difference of two pictures relative to `values`, trimmed of the pixels with the largest: in some
+/// pictures one bright sample would be all of it.
+fn relative_variance(a: &Picture, b: &Picture, values: &Picture) -> f64 {
     let floor = values.relative_floor();
-    let square = |index: usize| -> f64 {
-        let apart: f64 = (0..3).map(|c| f64::from(a[index][c] - b[index][c]).powi(2)).sum();
-        apart / 3.0 * super::pilot_settings::scale(channel_mean(values[index]), floor)
+    let squared_difference = |index: usize| -> f64 {
+        let difference: f64 = (0..3).map(|c| f64::from(a[index][c] - b[index][c]).powi(2)).sum();
+        difference / 3.0 * relative_weight(channel_mean(values[index]), floor)
     };
-    without_worst((0..a.len()).into_par_iter().map(square).collect())
+    let mut squares: Vec<f64> = (0..a.len()).into_par_iter().map(squared_difference).collect();
+    squares.sort_unstable_by(f64::total_cmp);
+    squares.truncate(squares.len() - (squares.len() as f64 * TRIMMED_PILOT_SHARE) as usize);
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
-/// The mean without the largest: one bright sample is all that some have.
-fn without_worst(mut values: Vec<f64>) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.truncate(values.len() - (values.len() as f64 * WORST) as usize);
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+/// Estimates that all pictures are compared with.
+struct CommonEstimates<'a> {
+    /// Means over all candidates, weighted by inverse variance.
+    estimates: [Picture; 2],
+    /// Values that errors are relative to: the finished picture of the candidate with the least noise.
+    values: &'a Picture,
 }
 
-/// The judges, means of all candidates' by what their noise is, and the candidate whose finished picture says what
-/// pixels are worth.
-fn judges(shown: &[Option<Shown>]) -> Option<([Picture; 2], &Shown)> {
-    let all: Vec<&Shown> = shown.iter().flatten().collect();
-    let least = *all.iter().min_by(|a, b| a.noise.total_cmp(&b.noise))?;
-    let weights: Vec<f64> = all.iter().map(|shown| 1.0 / shown.noise.max(f64::MIN_POSITIVE)).collect();
+/// `None` if no pilot has pictures.
+fn common_estimates(pictures: &[Option<PilotPictures>]) -> Option<CommonEstimates<'_>> {
+    let all: Vec<&PilotPictures> = pictures.iter().flatten().collect();
+    let values = &all.iter().min_by(|a, b| a.noise.total_cmp(&b.noise))?.half;
+    let weights: Vec<f64> = all.iter().map(|pictures| 1.0 / pictures.noise.max(f64::MIN_POSITIVE)).collect();
     let total: f64 = weights.iter().sum();
-    let mean = |judge: usize| {
-        Picture::from_fn(least.finished.size(), |index| {
+    let mean = |k: usize| {
+        Picture::from_fn(values.size(), |index| {
             std::array::from_fn(|c| {
-                let parts = all.iter().zip(&weights).map(|(shown, w)| w * f64::from(shown.judges[judge][index][c]));
-                (parts.sum::<f64>() / total) as f32
+                let weighted = all.iter().zip(&weights).map(|(one, w)| w * f64::from(one.estimates[k][index][c]));
+                (weighted.sum::<f64>() / total) as f32
             })
         })
     };
-    Some(([mean(0), mean(1)], least))
+    Some(CommonEstimates { estimates: [mean(0), mean(1)], values })
 }
 
-/// What a candidate is expected to leave, by pixel; `None` where nothing was seen.
-struct Expected(Option<Vec<PixelError>>);
+/// Expected errors of a candidate's pixels at the end of the render; `None` if the pilot has no pictures.
+struct ExpectedErrors(Option<Vec<PixelError>>);
+
+/// How much larger the mean squared error of one candidate is than that of another.
+struct Difference {
+    mean: f64,
+    /// Standard error of `mean` from the noise of the common estimates.
+    noise: f64,
+}
 
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len().max(1) as f64;
     values.sum::<f64>() / count
 }
 
-impl Expected {
-    /// Carries what was told of a candidate's half, and of either quarter of it, on to `more` times the half's
-    /// iterations, as the power of their number that the mean errors show. It is linear in both, so that the power's
-    /// own noise, which grows with the logarithm of `more`, is in what it is told to be worth.
-    fn carried(half: &[PixelError], quarters: [&[PixelError]; 2], more: f64) -> Expected {
-        let of = |pixels: &[PixelError]| mean(pixels.iter().map(|pixel| pixel.squared));
-        let (h, q) = (of(half), 0.5 * (of(quarters[0]) + of(quarters[1])));
-        let more = more.max(1.0);
-        // Twice the iterations leave half of the squared error at best, and all of it at worst, where it is what is
-        // missing.
-        let (of_half, of_quarter) = match h {
-            _ if h <= 0.5 * q => (0.0, 0.5 / more),
+impl ExpectedErrors {
+    /// Extrapolates errors from the half of the pilot's iterations to `factor` times as many, by the power law through
+    /// the mean errors of `half` and `quarters`. The result is linear in both, so that its noise includes the noise of
+    /// the exponent, which grows with the logarithm of `factor`.
+    fn extrapolate(half: &[PixelError], quarters: [&[PixelError]; 2], factor: f64) -> ExpectedErrors {
+        let mean_error = |pixels: &[PixelError]| mean(pixels.iter().map(|pixel| pixel.squared));
+        let (h, q) = (mean_error(half), 0.5 * (mean_error(quarters[0]) + mean_error(quarters[1])));
+        let factor = factor.max(1.0);
+        // Twice the iterations halve the squared error at best (noise) and keep it at worst (missing light).
+        let (half_weight, quarter_weight) = match h {
+            _ if h <= 0.5 * q => (0.0, 0.5 / factor),
             _ if h >= q => (1.0, 0.0),
             _ => {
-                let (doublings, scale) = (more.log2(), more.powf(-(q / h).log2()));
+                let (doublings, scale) = (factor.log2(), factor.powf(-(q / h).log2()));
                 (scale * (1.0 + doublings), -scale * doublings * h / q)
             }
         };
         let pixel = |((half, a), b): ((&PixelError, &PixelError), &PixelError)| {
-            let carried = |half: f64, a: f64, b: f64| of_half * half + of_quarter * 0.5 * (a + b);
+            let combine = |half: f64, a: f64, b: f64| half_weight * half + quarter_weight * 0.5 * (a + b);
             PixelError {
-                squared: carried(half.squared, a.squared, b.squared),
-                noise: std::array::from_fn(|c| carried(half.noise[c], a.noise[c], b.noise[c])),
+                squared: combine(half.squared, a.squared, b.squared),
+                noise: std::array::from_fn(|c| combine(half.noise[c], a.noise[c], b.noise[c])),
             }
         };
-        Expected(Some(half.iter().zip(quarters[0]).zip(quarters[1]).map(pixel).collect()))
+        ExpectedErrors(Some(half.iter().zip(quarters[0]).zip(quarters[1]).map(pixel).collect()))
     }
 
-    fn squared_error(&self) -> f64 {
+    /// Mean squared error; infinite without pictures.
+    fn mean_squared(&self) -> f64 {
         let error = |pixels: &Vec<PixelError>| mean(pixels.iter().map(|pixel| pixel.squared)).max(f64::MIN_POSITIVE);
         self.0.as_ref().map_or(f64::INFINITY, error)
     }
 
-    /// How much more it leaves than another, and the standard error that the judges' noise gives that: both were judged
-    /// by the same.
-    fn more_than(&self, other: &Expected) -> (f64, f64) {
+    /// The excess over another candidate's error. Both are errors against the same estimates.
+    fn excess_over(&self, other: &ExpectedErrors) -> Difference {
         let (Some(pixels), Some(others)) = (&self.0, &other.0) else {
-            return (if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY }, 0.0);
+            let mean = if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY };
+            return Difference { mean, noise: 0.0 };
         };
-        let apart = pixels.iter().zip(others).map(|(a, b)| a.squared - b.squared);
-        let pull = |(a, b): (&PixelError, &PixelError)| (0..3).map(|c| (a.noise[c] - b.noise[c]).powi(2)).sum::<f64>();
+        let pairs = || pixels.iter().zip(others);
+        let noise = |(a, b): (&PixelError, &PixelError)| (0..3).map(|c| (a.noise[c] - b.noise[c]).powi(2)).sum::<f64>();
         let count = pixels.len().max(1) as f64;
-        (mean(apart), (mean(pixels.iter().zip(others).map(pull)) / count).sqrt())
+        Difference {
+            mean: mean(pairs().map(|(a, b)| a.squared - b.squared)),
+            noise: (mean(pairs().map(noise)) / count).sqrt(),
+        }
     }
 
-    /// It may still turn out no worse than the best.
-    fn is_open(&self, best: &Expected) -> bool {
-        let (more, noise) = self.more_than(best);
-        more < ((UNCLEAR - 1.0) * best.squared_error()).max(TOLD * noise)
+    /// Whether more iterations may show that this candidate is as good as the best one.
+    fn is_open(&self, best: &ExpectedErrors) -> bool {
+        let excess = self.excess_over(best);
+        excess.mean < ((MAX_ERROR_RATIO - 1.0) * best.mean_squared()).max(SIGNIFICANCE * excess.noise)
     }
 
-    /// By the judges' noise, and not by a few pixels alone, in which chance has put a splotch.
-    fn is_clearly_worse(&self, than: &Expected) -> bool {
+    /// Whether the excess is significant against the noise of the estimates and against its spread over pixels, so that
+    /// a few blotches alone do not decide.
+    fn is_clearly_worse(&self, than: &ExpectedErrors) -> bool {
         let (Some(pixels), Some(others)) = (&self.0, &than.0) else { return self.0.is_none() };
-        let (more, noise) = self.more_than(than);
+        let excess = self.excess_over(than);
         let square = |(a, b): (&PixelError, &PixelError)| (a.squared - b.squared).powi(2);
         let spread = (mean(pixels.iter().zip(others).map(square)) / pixels.len().max(1) as f64).sqrt();
-        more > (TOLD * noise).max(spread)
+        excess.mean > (SIGNIFICANCE * excess.noise).max(spread)
     }
 }
 
-/// Lets candidates run for so many core-seconds at most and tells what they are expected to leave after the render's
-/// `budget`. What is clear after the first share costs no more. Those are all there are once `stop` holds.
-pub(super) fn hold(
-    candidates: &mut [CandidateRun<'_>],
+/// Runs the pilots within their budget and predicts the error of each candidate at the end of the render. Candidates
+/// that are clearly worse after the first round get no second one. Once `stopped` returns true, the remaining pilots
+/// end after [`MIN_ITERATIONS`].
+pub(super) fn run_pilots(
+    runs: &mut [PilotRun<'_>],
     finish: &mut Finish,
-    (allowed, budget): (f64, f64),
-    stop: &dyn Fn() -> bool,
+    budget: Budget,
+    stopped: &dyn Fn() -> bool,
 ) -> Vec<PilotResult> {
-    let all = candidates.len();
-    let least = |left: &[Expected], open: &[bool]| {
-        let open = (0..all).filter(|&k| open[k]);
-        open.min_by(|&a, &b| left[a].squared_error().total_cmp(&left[b].squared_error())).unwrap_or(0)
-    };
-    let share = FIRST * allowed / all as f64;
-    candidates.iter_mut().for_each(|candidate| candidate.advance(share, stop));
-    let mut left = compare(candidates, finish, budget);
-    let best = least(&left, &vec![true; all]);
-    let open: Vec<bool> = left.iter().map(|one| one.is_open(&left[best])).collect();
-    let count = open.iter().filter(|open| **open).count();
-    if count > 1 {
-        let spent = |(candidate, open): (&CandidateRun<'_>, &bool)| if *open { 0.0 } else { candidate.spent };
-        let closed: f64 = candidates.iter().zip(&open).map(spent).sum();
-        let share = (allowed - closed) / count as f64;
-        let again = candidates.iter_mut().zip(&open).filter(|(_, open)| **open);
-        again.for_each(|(candidate, _)| candidate.advance(share, stop));
-        let second = compare(candidates, finish, budget);
-        // Those that are out stay out: they have had less.
-        let both = left.into_iter().zip(second).zip(&open);
-        left = both.map(|((first, second), open)| if *open { second } else { first }).collect();
+    let share = FIRST_ROUND_SHARE * budget.pilots / runs.len() as f64;
+    runs.iter_mut().for_each(|run| run.advance(share, stopped));
+    let mut errors = expected_errors(runs, finish, budget.render);
+    let best = index_of_least(&errors, &vec![true; runs.len()]);
+    let open: Vec<bool> = errors.iter().map(|error| error.is_open(&errors[best])).collect();
+    if open.iter().filter(|open| **open).count() > 1 {
+        run_second_round(runs, &open, budget.pilots, stopped);
+        let second = expected_errors(runs, finish, budget.render);
+        // Candidates that are out keep the result of the first round: they have had fewer iterations.
+        let rounds = errors.into_iter().zip(second).zip(&open);
+        errors = rounds.map(|((first, second), open)| if *open { second } else { first }).collect();
     }
-    let best = least(&left, &open);
-    let usual = candidates.iter().position(|candidate| candidate.candidate == Candidate::DEFAULT);
-    let usual = usual.filter(|&usual| open[usual] && !left[usual].is_clearly_worse(&left[best]));
-    let chosen = usual.unwrap_or(best);
-    let trial = |(index, (candidate, left)): (usize, (&CandidateRun<'_>, &Expected))| {
-        let CandidateRun { candidate, whole, .. } = *candidate;
-        let squared_error = left.squared_error();
-        PilotResult { candidate, squared_error, seconds_per_iteration: whole, chosen: index == chosen }
+    let chosen = choose(runs, &errors, &open);
+    let result = |(index, (run, error)): (usize, (&PilotRun<'_>, &ExpectedErrors))| PilotResult {
+        candidate: run.candidate,
+        squared_error: error.mean_squared(),
+        seconds_per_iteration: run.render_seconds_per_iteration,
+        chosen: index == chosen,
     };
-    candidates.iter().zip(&left).enumerate().map(trial).collect()
+    runs.iter().zip(&errors).enumerate().map(result).collect()
 }
 
-/// What all are expected to leave after `budget` core-seconds.
-fn compare(candidates: &mut [CandidateRun<'_>], finish: &mut Finish, budget: f64) -> Vec<Expected> {
-    let shown: Vec<Option<Shown>> = candidates.iter_mut().map(|candidate| candidate.show(finish)).collect();
-    let judged = judges(&shown);
-    let left = |candidate: &CandidateRun<'_>, shown: &Option<Shown>| -> Option<Expected> {
-        let (shown, ([a, b], worth)) = (shown.as_ref()?, judged.as_ref()?);
-        let of = |picture: &Picture| squared_errors(picture, [a, b], &worth.finished);
-        let earlier = shown.earlier.each_ref().map(|picture| of(picture));
-        // In the render's iterations over those of the half; the least number of iterations may have cost more than the
-        // share.
-        let more = budget / candidate.whole / (0.5 * candidate.session.iterations() as f64);
-        Some(Expected::carried(&of(&shown.finished), [&earlier[0], &earlier[1]], more))
+/// Divides what the first round has left of `budget` equally among the open candidates.
+fn run_second_round(runs: &mut [PilotRun<'_>], open: &[bool], budget: f64, stopped: &dyn Fn() -> bool) {
+    let count = open.iter().filter(|open| **open).count();
+    let closed: f64 = runs.iter().zip(open).map(|(run, open)| if *open { 0.0 } else { run.spent }).sum();
+    let share = (budget - closed) / count as f64;
+    let remaining = runs.iter_mut().zip(open).filter(|(_, open)| **open);
+    remaining.for_each(|(run, _)| run.advance(share, stopped));
+}
+
+/// The open candidate with the smallest error.
+fn index_of_least(errors: &[ExpectedErrors], open: &[bool]) -> usize {
+    let open = (0..errors.len()).filter(|&k| open[k]);
+    open.min_by(|&a, &b| errors[a].mean_squared().total_cmp(&errors[b].mean_squared())).unwrap_or(0)
+}
+
+/// The default candidate, unless it is clearly worse than the one with the smallest error.
+fn choose(runs: &[PilotRun<'_>], errors: &[ExpectedErrors], open: &[bool]) -> usize {
+    let best = index_of_least(errors, open);
+    let default = runs.iter().position(|run| run.candidate == Candidate::DEFAULT);
+    default.filter(|&default| open[default] && !errors[default].is_clearly_worse(&errors[best])).unwrap_or(best)
+}
+
+/// Expected errors of all candidates after a render of `budget` core-seconds.
+fn expected_errors(runs: &[PilotRun<'_>], finish: &mut Finish, budget: f64) -> Vec<ExpectedErrors> {
+    let pictures: Vec<Option<PilotPictures>> = runs.iter().map(|run| run.pictures(finish)).collect();
+    let common = common_estimates(&pictures);
+    let expected = |run: &PilotRun<'_>, pictures: &Option<PilotPictures>| -> Option<ExpectedErrors> {
+        let (pictures, CommonEstimates { estimates: [a, b], values }) = (pictures.as_ref()?, common.as_ref()?);
+        let errors = |picture: &Picture| squared_errors(picture, [a, b], values);
+        let [first, second] = pictures.quarters.each_ref().map(errors);
+        // Iterations of the render relative to those of the half. A pilot may have cost more than its share, because it
+        // has at least MIN_ITERATIONS.
+        let factor = budget / run.render_seconds_per_iteration / (0.5 * run.session.iterations() as f64);
+        Some(ExpectedErrors::extrapolate(&errors(&pictures.half), [&first, &second], factor))
     };
-    candidates.iter().zip(&shown).map(|(c, shown)| left(c, shown).unwrap_or(Expected(None))).collect()
+    runs.iter().zip(&pictures).map(|(run, one)| expected(run, one).unwrap_or(ExpectedErrors(None))).collect()
 }

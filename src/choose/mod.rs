@@ -1,12 +1,14 @@
-//! Choosing how to render. Vertex connection and merging, which weighs all techniques against each other for every
-//! path, is taken where glass or mirrors focus light. Elsewhere a short pilot renders it and paths without photons on a
-//! small picture of the same view, finished as the render will be, and another is taken where its picture is clearly
-//! closer to the truth: further than the pilot's own noise can say.
+//! `auto`: chooses the method and settings of a render.
 //!
-//! The cost of an iteration is counted, never timed: mean numbers of vertices ([`crate::transport::Lengths`]) times
-//! constants (`crate::render::pass::cost`). So the same arguments give the same choice on any machine and any number of threads.
-//! Candidates get the same work, near to the render's own work per pixel, and their pictures are judged without a
-//! reference by iterations that they do not hold (`compare`).
+//! Where glass or mirrors focus light, the choice is vertex connection and merging, which weighs all techniques against
+//! each other for every path. Elsewhere each candidate renders a pilot: a short render of the same view in a small
+//! picture, finished as the render will be. A candidate other than [`Candidate::DEFAULT`] is chosen if the error of its
+//! picture is smaller by more than the noise of the pilots explains.
+//!
+//! The cost of an iteration is counted, not timed: mean numbers of vertices ([`crate::transport::VertexCounts`]) times
+//! constants (`crate::render::pass::cost`). So the same arguments give the same choice on any machine with any number of
+//! threads. All candidates get the same work, with about as much work per pixel as in the render. The errors of their
+//! pictures are estimated without a reference, from iterations that no picture contains (`compare`).
 
 mod compare;
 mod pilot;
@@ -19,71 +21,84 @@ pub use weights::EffectWeight;
 
 use crate::camera::Camera;
 use crate::finish::Finish;
-use crate::render::{Candidate, Clock, Cost, RenderInput, Session, Settings, TimeSpent, cpu_seconds};
+use crate::render::{Candidate, Cost, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::{Scene, View};
 use pilot::Pilot;
-use weights::Weighed;
 
-/// What was chosen.
+/// The chosen candidate, and why it was chosen.
 pub struct Choice {
     /// Settings of the render.
     pub settings: Settings,
-    /// The way.
+    /// The chosen candidate.
     pub candidate: Candidate,
-    /// All that were tried; none where the render is too short.
+    /// Results of all pilots; empty if none was rendered.
     pub pilots: Vec<PilotResult>,
-    /// What effects of light mean to the picture; none where the render is too short.
+    /// Light, error and cost of each effect; empty if the render is too short to measure them.
     pub weights: Vec<EffectWeight>,
-    /// Why nothing was tried.
+    /// Why no pilot was rendered.
     pub reason: Option<&'static str>,
     /// Counted core-seconds of an iteration.
     pub seconds_per_iteration: f64,
-    /// Time that it took.
+    /// Time that choosing took.
     pub spent: TimeSpent,
 }
 
 impl Choice {
-    /// The trial of what was chosen.
+    /// The pilot of the chosen candidate.
     pub fn chosen_pilot(&self) -> Option<&PilotResult> {
-        self.pilots.iter().find(|trial| trial.chosen)
+        self.pilots.iter().find(|pilot| pilot.chosen)
     }
 }
 
-/// Tries the candidates and takes one by what `finish` makes of them. `make` gives the settings of a way, `None` where
-/// other wishes rule it out. Once `stop` holds, what is tried ends as soon as it can, and the choice is worth nothing.
+/// Chooses the candidate whose picture, finished by `finish`, has the smallest expected error. `settings_of` returns the
+/// settings of a candidate, `None` if the user's options exclude it. Once `stopped` returns true, pilots end as soon as
+/// they can, and the caller has to discard the choice.
 pub fn choose(
-    View { scene, camera }: View<'_>,
+    view: View<'_>,
     finish: &mut Finish,
-    make: impl Fn(Candidate) -> Option<Settings>,
-    stop: impl Fn() -> bool,
+    settings_of: impl Fn(Candidate) -> Option<Settings>,
+    stopped: impl Fn() -> bool,
 ) -> Option<Choice> {
-    let (clock, cpu_start) = (Clock::start(), cpu_seconds());
-    let gathering = make(Candidate::GATHERING)?;
-    let pilot = Pilot::new(scene, camera, &gathering);
-    let (weighed, weighing) = pilot.weigh();
-    let (pilots, reason) = pilot.try_all(weighing, finish, &make, &stop);
+    let mut spent = TimeSpent::default();
+    let choice = spent.measure(|| choose_untimed(view, finish, &settings_of, &stopped));
+    choice.map(|choice| Choice { spent, ..choice })
+}
+
+fn choose_untimed(
+    view: View<'_>,
+    finish: &mut Finish,
+    settings_of: &impl Fn(Candidate) -> Option<Settings>,
+    stopped: &dyn Fn() -> bool,
+) -> Option<Choice> {
+    let gathering = settings_of(Candidate::GATHERING)?;
+    let pilot = Pilot::new(view, &gathering);
+    let (effects, effects_seconds) = pilot.weigh_effects();
+    let (pilots, reason) = pilot.run(effects_seconds, finish, settings_of, stopped);
     let chosen = pilots.iter().find(|pilot| pilot.chosen);
-    let untried = || {
-        let candidates = pilot::focused(scene).iter().chain(&[Candidate::DEFAULT]);
-        candidates.copied().find(|candidate| make(*candidate).is_some()).unwrap_or(Candidate::GATHERING)
-    };
-    let candidate = chosen.map_or_else(untried, |chosen| chosen.candidate);
-    let settings = make(candidate)?;
-    let saving = |weighed: Weighed| weighed.saving(&pilot.cost, candidate, &settings, pilot.pixels);
-    let weights = weighed.into_iter().map(saving).collect();
-    let seconds_per_iteration = pilot.cost.of_film(candidate, &settings, camera);
-    let spent = TimeSpent { seconds: clock.seconds(), cpu_seconds: cpu_seconds() - cpu_start };
-    Some(Choice { settings, candidate, pilots, weights, reason, seconds_per_iteration, spent })
+    let candidate = chosen.map_or_else(|| candidate_without_pilot(view.scene, settings_of), |chosen| chosen.candidate);
+    let settings = settings_of(candidate)?;
+    let cost = &pilot.cost;
+    let weights =
+        effects.into_iter().map(|effect| effect.weight_for(cost, candidate, &settings, pilot.pixels)).collect();
+    let seconds_per_iteration = cost.film_seconds(candidate, &settings, view.camera);
+    Some(Choice { settings, candidate, pilots, weights, reason, seconds_per_iteration, spent: TimeSpent::default() })
 }
 
-/// Core-seconds that an iteration is taken to cost, by counted work.
+/// The first candidate that the user's options allow.
+fn candidate_without_pilot(scene: &Scene, settings_of: &impl Fn(Candidate) -> Option<Settings>) -> Candidate {
+    let mut candidates = pilot::candidates_for_focused_light(scene).iter().chain(&[Candidate::DEFAULT]).copied();
+    candidates.find(|candidate| settings_of(*candidate).is_some()).unwrap_or(Candidate::GATHERING)
+}
+
+/// Counted core-seconds of an iteration.
 pub fn counted_cost(scene: &Scene, camera: &Camera, candidate: Candidate, settings: &Settings) -> f64 {
-    let stage = RenderInput::new(scene, camera, settings);
-    let session = Session::new(&stage);
-    Cost::count(scene, camera, settings, session.guide()).of_film(candidate, settings, camera)
+    let input = RenderInput::new(scene, camera, settings);
+    let session = Session::new(&input);
+    Cost::count(scene, camera, settings, session.guide()).film_seconds(candidate, settings, camera)
 }
 
-/// What an iteration of a film costs, by counted work, over what it would cost if the film were the whole picture.
+/// Counted cost of an iteration of a film, relative to the cost if the film were the whole picture. It is above 1 for
+/// windows of methods that trace the light paths of the whole picture.
 pub fn window_cost_ratio(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
     let [film, whole] = camera.sizes();
     if film == whole || !settings.method.walks_whole_picture() {
@@ -91,5 +106,6 @@ pub fn window_cost_ratio(scene: &Scene, camera: &Camera, settings: &Settings) ->
     }
     let candidate = Candidate::unguided(settings.method);
     let cost = Cost::count(scene, camera, settings, None);
-    cost.of_film(candidate, settings, camera) / cost.of(candidate, settings, f64::from(film.0) * f64::from(film.1))
+    let pixels = f64::from(film.0) * f64::from(film.1);
+    cost.film_seconds(candidate, settings, camera) / cost.iteration_seconds(candidate, settings, pixels)
 }

@@ -1,35 +1,38 @@
-//! What a pilot may take, and what for: its candidates, the size of its picture, the number of its light paths.
+//! Candidates of a scene, and the work that goes to their pilots: size of the picture, iterations, light paths.
 
-use super::compare::{self, CandidateRun, PilotResult};
-use super::pilot_settings::{self, pilot_settings};
-use super::weights::{self, Weighed};
+use super::compare::{Budget, MIN_ITERATIONS, PilotResult, PilotRun, run_pilots};
+use super::pilot_settings::{EFFECTS_PHOTON_SHARE, pilot_settings};
+use super::weights::{self, WeighedEffect};
 use crate::camera::Camera;
 use crate::finish::Finish;
 use crate::plan::{Effect, Presence};
 use crate::render::{Candidate, Cost, Method, RenderInput, Settings};
-use crate::scene::Scene;
+use crate::scene::{Scene, View};
 
-/// Share of the render's cost that the pilot may take.
-const SHARE: f64 = 0.05;
-/// Share of that which may go to weighing the effects.
-const WEIGHING: f64 = 0.2;
-/// Share of the render's cost that the least of all pilots may take: in a render that short a wrong way costs more.
-const LEAST_SHARE: f64 = 0.1;
-/// Pixels of the pilot's picture: fewer show a denoiser nothing, more would take their time from iterations.
-const PIXELS: (f64, f64) = (1024.0, 16384.0);
-/// Pixels of the picture by which effects are weighed.
-const WEIGHED: f64 = 768.0;
-/// Iterations of a candidate over those of the render: near to the render's own, so that what they leave is what the
-/// render will, and few enough that the picture is not much smaller.
-const ITERATIONS: f64 = 0.25;
-/// What a second of `--time` is taken for (core-seconds), whatever the machine: a small one, so that the pilot takes no
-/// more than its share of it. One core takes twice that share.
-const CORES: f64 = 2.0;
-/// What a render until an error is reached is taken for (core-seconds).
-const UNLIMITED: f64 = 1000.0;
+/// Share of the render's work that pilots and the measurement of effects may take together.
+const PILOT_WORK_SHARE: f64 = 0.05;
+/// Share of that for the measurement of effects.
+const EFFECTS_WORK_SHARE: f64 = 0.2;
+/// Share of the render's work that the smallest possible pilots may take. It is larger than [`PILOT_WORK_SHARE`] because
+/// in a short render a wrong choice costs more than a pilot.
+const MAX_PILOT_WORK_SHARE: f64 = 0.1;
+/// Least pixels of a pilot: a denoiser needs them.
+const MIN_PIXELS: f64 = 1024.0;
+/// Most pixels of a pilot: more would leave fewer iterations.
+const MAX_PIXELS: f64 = 16384.0;
+/// Pixels of the pictures that measure effects.
+const EFFECTS_PIXELS: f64 = 768.0;
+/// Iterations of a pilot relative to those of the render. Close to 1, so that the pilot's error is like the render's, and
+/// small enough for a picture of some size.
+const ITERATION_SHARE: f64 = 0.25;
+/// Core-seconds that one second of `--time` counts as on every machine. It is small, so that on most machines pilots take
+/// less than their share; on one core they take twice their share.
+const ASSUMED_CORES: f64 = 2.0;
+/// Core-seconds that a render without limits of time and iterations counts as.
+const UNLIMITED_CORE_SECONDS: f64 = 1000.0;
 
-/// The ways to take where glass or mirrors focus light, the best one first; none elsewhere.
-pub(super) fn focused(scene: &Scene) -> &'static [Candidate] {
+/// Candidates for a scene where glass or mirrors focus light, the best one first; empty for other scenes.
+pub(super) fn candidates_for_focused_light(scene: &Scene) -> &'static [Candidate] {
     if scene.lights.targets().spheres().is_empty() {
         &[]
     } else if Method::Vcm.search().finds(Effect::Sds, &scene.survey) {
@@ -39,12 +42,11 @@ pub(super) fn focused(scene: &Scene) -> &'static [Candidate] {
     }
 }
 
-/// The ways worth trying in a scene, with their settings, of those that other wishes leave. Where glass or mirrors
-/// focus light it is one: what connections and photons leave out there a pilot is too short to miss, and would praise
-/// them for it.
-fn candidates(scene: &Scene, make: &impl Fn(Candidate) -> Option<Settings>) -> Vec<(Candidate, Settings)> {
-    let with_settings = |candidate: &Candidate| make(*candidate).map(|settings| (*candidate, settings));
-    let focused = focused(scene);
+/// Candidates that the user's options allow, with their settings. Where glass or mirrors focus light it is the best one
+/// only: a pilot is too short to miss the light that other candidates do not find, and would favour them for it.
+fn candidates(scene: &Scene, settings_of: &impl Fn(Candidate) -> Option<Settings>) -> Vec<(Candidate, Settings)> {
+    let with_settings = |candidate: &Candidate| settings_of(*candidate).map(|settings| (*candidate, settings));
+    let focused = candidates_for_focused_light(scene);
     if !focused.is_empty() {
         return focused.iter().find_map(with_settings).into_iter().collect();
     }
@@ -54,125 +56,141 @@ fn candidates(scene: &Scene, make: &impl Fn(Candidate) -> Option<Settings>) -> V
         .collect()
 }
 
-/// What a pilot is of.
+/// Why a single candidate is chosen without a pilot.
+fn reason_without_pilot(candidate: Option<Candidate>, focused: bool) -> &'static str {
+    match candidate.map(|candidate| candidate.method) {
+        Some(Method::Vcm) if focused => "light is focused here, which it finds by all techniques",
+        Some(Method::Sppm) if focused => {
+            "a lamp without size shines into cloudy glass, where vcm does not find all light"
+        }
+        _ => "the only candidate that these options leave",
+    }
+}
+
+fn pixel_count(camera: &Camera) -> f64 {
+    let (width, height) = camera.size();
+    f64::from(width) * f64::from(height)
+}
+
+/// Pilots of a render.
 pub(super) struct Pilot<'a> {
-    scene: &'a Scene,
-    camera: &'a Camera,
+    view: View<'a>,
     /// Settings of [`Candidate::GATHERING`].
     gathering: &'a Settings,
+    /// Vertices of paths in the scene.
     pub cost: Cost,
-    /// Pixels of the whole picture.
+    /// Pixels of the render.
     pub pixels: f64,
-    /// What the render may take (core-seconds).
+    /// Counted core-seconds of the render.
     budget: f64,
 }
 
+/// Picture of the pilots, and their work.
+struct PilotSize {
+    camera: Camera,
+    /// Counted core-seconds of all pilots together.
+    seconds: f64,
+}
+
 impl<'a> Pilot<'a> {
-    pub fn new(scene: &'a Scene, camera: &'a Camera, gathering: &'a Settings) -> Pilot<'a> {
-        let (width, height) = camera.size();
-        let pixels = f64::from(width) * f64::from(height);
-        let cost = Cost::count(scene, camera, gathering, None);
+    pub fn new(view: View<'a>, gathering: &'a Settings) -> Pilot<'a> {
+        let pixels = pixel_count(view.camera);
+        let cost = Cost::count(view.scene, view.camera, gathering, None);
         let budget = match (gathering.iterations, gathering.time) {
             (Some(n), time) => {
-                let work = n as f64 * cost.of(Candidate::GATHERING, gathering, pixels);
-                time.map_or(work, |seconds| work.min(seconds * CORES))
+                let work = n as f64 * cost.iteration_seconds(Candidate::GATHERING, gathering, pixels);
+                time.map_or(work, |seconds| work.min(seconds * ASSUMED_CORES))
             }
-            (None, Some(seconds)) => seconds * CORES,
-            (None, None) => UNLIMITED,
+            (None, Some(seconds)) => seconds * ASSUMED_CORES,
+            (None, None) => UNLIMITED_CORE_SECONDS,
         };
-        Pilot { scene, camera, gathering, cost, pixels, budget }
+        Pilot { view, gathering, cost, pixels, budget }
     }
 
-    /// Pixels of the picture by which effects are weighed.
-    fn least(&self) -> f64 {
-        WEIGHED.min(self.pixels)
-    }
-
-    /// What effects mean to the picture, and the core-seconds that finding out is counted to take. Where the render is
-    /// too short, only those of light are weighed, or none.
-    pub fn weigh(&self) -> (Vec<Weighed>, f64) {
-        let settings = weights::settings(self.gathering, pilot_settings::PHOTONS);
-        let once = self.cost.of(Candidate::GATHERING, &settings, self.least()) * weights::ITERATIONS as f64;
-        let most = WEIGHING * SHARE * self.budget;
-        let mut taken = weights::PICTURES as f64 * once;
-        if taken > most {
+    /// Measures what each effect adds to the picture. Also returns the counted core-seconds of the measurement. If the
+    /// render is too short for all of it, measures light effects only, or nothing.
+    pub fn weigh_effects(&self) -> (Vec<WeighedEffect>, f64) {
+        let settings = weights::settings(self.gathering, EFFECTS_PHOTON_SHARE);
+        let pixels = EFFECTS_PIXELS.min(self.pixels);
+        let picture_seconds =
+            self.cost.iteration_seconds(Candidate::GATHERING, &settings, pixels) * weights::ITERATIONS as f64;
+        let allowed = EFFECTS_WORK_SHARE * PILOT_WORK_SHARE * self.budget;
+        let mut seconds = weights::MAX_LIGHT_PICTURES as f64 * picture_seconds;
+        if seconds > allowed {
             return (Vec::new(), 0.0);
         }
-        let presence = Presence::of(self.scene, self.camera);
-        let mut properties = weights::properties(&presence);
-        properties.retain(|effect| {
-            let more = once + weights::making(self.scene, *effect);
-            let affordable = taken + more <= most;
-            taken += if affordable { more } else { 0.0 };
+        let presence = Presence::of(self.view.scene, self.view.camera);
+        let mut scene_effects = weights::scene_effects(&presence);
+        scene_effects.retain(|effect| {
+            let more = picture_seconds + weights::rebuild_seconds(self.view.scene, *effect);
+            let affordable = seconds + more <= allowed;
+            seconds += if affordable { more } else { 0.0 };
             affordable
         });
-        let small = self.camera.subsample((self.least() / self.pixels).sqrt().min(1.0));
+        let small = self.view.camera.subsample((pixels / self.pixels).sqrt().min(1.0));
         let count = |scene: &Scene, camera: &Camera| Cost::count(scene, camera, self.gathering, None);
-        (weights::weigh(self.scene, &small, &settings, &presence, &properties, count), taken)
+        let view = View::new(self.view.scene, &small);
+        (weights::weigh(view, &settings, &presence, &scene_effects, count), seconds)
     }
 
-    /// Tries what there is, with what weighing the effects has left of the pilot; returns the trials, or why there are
-    /// none.
-    pub fn try_all(
+    /// Runs the pilots of all candidates, with the work that the measurement of effects (`effects_seconds`) has left.
+    /// Returns their results, or why there are none.
+    pub fn run(
         &self,
-        weighing: f64,
+        effects_seconds: f64,
         finish: &mut Finish,
-        make: &impl Fn(Candidate) -> Option<Settings>,
-        stop: &dyn Fn() -> bool,
+        settings_of: &impl Fn(Candidate) -> Option<Settings>,
+        stopped: &dyn Fn() -> bool,
     ) -> (Vec<PilotResult>, Option<&'static str>) {
-        let Pilot { scene, camera, cost, pixels, budget, .. } = *self;
-        let (candidates, focuses) = (candidates(scene, make), !focused(scene).is_empty());
+        let View { scene, camera } = self.view;
+        let candidates = candidates(scene, settings_of);
         if candidates.len() < 2 {
-            let why = match candidates.first() {
-                Some((Candidate { method: Method::Vcm, .. }, _)) if focuses => {
-                    "light is focused here, which it finds by all techniques"
-                }
-                Some((Candidate { method: Method::Sppm, .. }, _)) if focuses => {
-                    "a lamp without size shines into cloudy glass, where vcm does not find all light"
-                }
-                _ => "the only candidate that these options leave",
-            };
-            return (Vec::new(), Some(why));
+            let focused = !candidates_for_focused_light(scene).is_empty();
+            let candidate = candidates.first().map(|(candidate, _)| *candidate);
+            return (Vec::new(), Some(reason_without_pilot(candidate, focused)));
         }
-        let allowed = SHARE * budget - weighing;
-        let Some((small, allowed)) = self.size(&candidates, allowed, LEAST_SHARE * budget - weighing) else {
+        let [wanted, most] =
+            [PILOT_WORK_SHARE, MAX_PILOT_WORK_SHARE].map(|share| share * self.budget - effects_seconds);
+        let Some(size) = self.size(&candidates, wanted, most) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
-        let (width, height) = small.size();
-        let few = f64::from(width) * f64::from(height);
-        // As many light paths for a pixel as in the render.
-        let stages: Vec<RenderInput<'_>> = candidates
+        let pixels = pixel_count(&size.camera);
+        // Light paths per pixel are the same as in the render.
+        let inputs: Vec<RenderInput<'_>> = candidates
             .iter()
-            .map(|(_, settings)| RenderInput::new(scene, &small, &pilot_settings(settings, few / pixels)))
+            .map(|(_, settings)| RenderInput::new(scene, &size.camera, &pilot_settings(settings, pixels / self.pixels)))
             .collect();
-        let mut candidates: Vec<CandidateRun<'_>> = stages
+        let mut runs: Vec<PilotRun<'_>> = inputs
             .iter()
             .zip(&candidates)
-            .map(|(stage, (candidate, settings))| {
-                let costs = [cost.of(*candidate, stage.settings(), few), cost.of_film(*candidate, settings, camera)];
-                CandidateRun::new(stage, *candidate, costs)
+            .map(|(input, (candidate, settings))| {
+                let seconds = self.cost.iteration_seconds(*candidate, input.settings(), pixels);
+                PilotRun::new(input, *candidate, seconds, self.cost.film_seconds(*candidate, settings, camera))
             })
             .collect();
-        (compare::hold(&mut candidates, finish, (allowed, budget), stop), None)
+        let budget = Budget { pilots: size.seconds, render: self.budget };
+        (run_pilots(&mut runs, finish, budget, stopped), None)
     }
 
-    /// The picture that is tried and the core-seconds of all candidates together, `allowed` or more where that is too
-    /// little for the smallest picture; `None` where even that takes more than `most`.
-    fn size(&self, candidates: &[(Candidate, Settings)], allowed: f64, most: f64) -> Option<(Camera, f64)> {
-        let once = |candidate: &Candidate, settings: &Settings, pixels: f64| {
-            self.cost.of(*candidate, &pilot_settings(settings, pixels / self.pixels), pixels)
-        };
-        let dearest = |pixels: f64| {
-            candidates.iter().map(|(candidate, settings)| once(candidate, settings, pixels)).fold(0.0, f64::max)
-        };
+    /// Size of the pilots: `wanted` core-seconds, or more if the smallest picture needs more. `None` if that needs more
+    /// than `most`.
+    fn size(&self, candidates: &[(Candidate, Settings)], wanted: f64, most: f64) -> Option<PilotSize> {
         let count = candidates.len() as f64;
-        // Work per pixel is the same as in the render, so iterations and pixels share what there is.
-        let wanted = self.pixels * allowed / (count * ITERATIONS * self.budget);
-        let least = PIXELS.0.min(self.pixels);
-        let pixels = wanted.clamp(least, PIXELS.1.max(least)).min(self.pixels);
-        let needed = |pixels: f64| count * compare::ITERATIONS.0 as f64 * dearest(pixels);
-        let pixels = if needed(pixels) > allowed { least } else { pixels };
-        (needed(pixels) <= most)
-            .then(|| (self.camera.downscale((pixels / self.pixels).sqrt()), allowed.max(needed(pixels))))
+        let iteration_seconds = |(candidate, settings): &(Candidate, Settings), pixels: f64| {
+            self.cost.iteration_seconds(*candidate, &pilot_settings(settings, pixels / self.pixels), pixels)
+        };
+        let needed = |pixels: f64| {
+            let dearest = candidates.iter().map(|one| iteration_seconds(one, pixels)).fold(0.0, f64::max);
+            count * MIN_ITERATIONS as f64 * dearest
+        };
+        // Work per pixel is the same as in the render, so iterations and pixels share the budget.
+        let pixels = self.pixels * wanted / (count * ITERATION_SHARE * self.budget);
+        let least = MIN_PIXELS.min(self.pixels);
+        let pixels = pixels.clamp(least, MAX_PIXELS.max(least)).min(self.pixels);
+        let pixels = if needed(pixels) > wanted { least } else { pixels };
+        (needed(pixels) <= most).then(|| PilotSize {
+            camera: self.view.camera.downscale((pixels / self.pixels).sqrt()),
+            seconds: wanted.max(needed(pixels)),
+        })
     }
 }

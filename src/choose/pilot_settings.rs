@@ -1,4 +1,4 @@
-//! Small renders of the same view: their settings, and what their pixels are worth.
+//! Settings of small renders of the same view, and the values that errors of their pixels are relative to.
 
 use crate::estimator::{InitialBandwidth, PixelAccumulator};
 use crate::film::Size;
@@ -9,64 +9,70 @@ use crate::render::{Levels, Settings, Shard};
 use crate::stat::median;
 use crate::transport::MAX_LEVELS;
 
-/// Share of the light paths that are sent to weigh effects.
-pub(super) const PHOTONS: f64 = 0.125;
-/// Share of the pixels that are left out of means, those of the largest noise: a bright sample in a hundred or so of
-/// pixels says next to nothing about how often there is one.
-pub(super) const WORST: f64 = 0.01;
+/// Share of the light paths of an iteration that measures effects.
+pub(super) const EFFECTS_PHOTON_SHARE: f64 = 0.125;
+/// Share of the pixels that means leave out, those with the largest noise. One bright sample in about a hundred pixels
+/// says next to nothing about how frequent such samples are.
+pub(super) const TRIMMED_PILOT_SHARE: f64 = 0.01;
+/// Pixels to each side of the window of a median.
+const MEDIAN_REACH: usize = 2;
 
-/// Settings of a small render: those of the large one with a share of its light paths, in bandwidths as much wider as
-/// the same number of neighbours asks for.
-pub fn pilot_settings(of: &Settings, photons: f64) -> Settings {
-    widened(of, photons, 1.0 / photons as f32)
+/// Settings of a small render: `photon_share` of the light paths, and bandwidths as much larger as the same number of
+/// neighbours needs.
+pub fn pilot_settings(settings: &Settings, photon_share: f64) -> Settings {
+    with_fewer_photons(settings, photon_share, 1.0 / photon_share as f32)
 }
 
-/// With a share of the light paths, found in so many times the area.
-fn widened(of: &Settings, photons: f64, area: f32) -> Settings {
+/// Reduces the light paths to `photon_share` and enlarges the area of the largest bandwidths by `area_factor`.
+fn with_fewer_photons(settings: &Settings, photon_share: f64, area_factor: f32) -> Settings {
+    let [surface, volume] = settings.max_initial_bandwidth;
     Settings {
-        photons: ((f64::from(of.photons) * photons) as u32).max(1),
-        max_initial_bandwidth: [of.max_initial_bandwidth[0] * area.sqrt(), of.max_initial_bandwidth[1] * area.cbrt()],
+        photons: ((f64::from(settings.photons) * photon_share) as u32).max(1),
+        max_initial_bandwidth: [surface * area_factor.sqrt(), volume * area_factor.cbrt()],
         iterations: None,
         time: None,
         target_error: None,
         techniques: false,
         shard: Shard { index: 0, count: 1 },
-        ..of.clone()
+        ..settings.clone()
     }
 }
 
-/// The same with all levels, level 1 by an eye path of its own, which [`values`] asks for.
-pub(super) fn with_levels(of: &Settings, photons: f64) -> Settings {
-    // Bandwidths that follow counts shrink on their own.
-    let method = of.method.pilot_method();
-    // One level alone is what of several is the second largest, of half the area.
-    let larger = if of.levels.count == 1 { 2 } else { 1 };
-    let initial_bandwidth = match of.initial_bandwidth {
+/// Settings like [`pilot_settings`] with all bandwidth levels, and a camera path for level 1 alone, which
+/// [`reference_values`] needs.
+pub(super) fn with_all_levels(settings: &Settings, photon_share: f64) -> Settings {
+    // Bandwidths that follow photon counts do not keep the ratio of their levels.
+    let method = settings.method.pilot_method();
+    // A single level is like the second largest of several, which has half the area of the largest.
+    let larger = if settings.levels.count == 1 { 2 } else { 1 };
+    let initial_bandwidth = match settings.initial_bandwidth {
         InitialBandwidth::Nearest(k) => InitialBandwidth::Nearest((larger * k).min(MAX_NEIGHBOURS)),
         other => other,
     };
     let levels = Levels::decorrelated(if method.has_levels() { MAX_LEVELS } else { 1 });
-    Settings { method, levels, initial_bandwidth, ..widened(of, photons, larger as f32 / photons as f32) }
+    let fewer = with_fewer_photons(settings, photon_share, larger as f32 / photon_share as f32);
+    Settings { method, levels, initial_bandwidth, ..fewer }
 }
 
+/// Mean over RGB.
 pub(super) fn mean(v: DVec3) -> f64 {
     v.element_sum() / 3.0
 }
 
-/// What makes squares relative to the value of a pixel, above the [`floor`](crate::stat::floor) of the picture.
-pub(super) fn scale(value: f64, floor: f64) -> f64 {
+/// Weight that makes a squared difference relative to the value of a pixel, with the [`floor`](crate::stat::floor) of the
+/// picture.
+pub(super) fn relative_weight(value: f64, floor: f64) -> f64 {
     1.0 / (value * value + floor)
 }
 
-/// What pixels are worth, so that errors can be relative to it: the median of the neighbourhood, at the smoothest of
-/// `levels`. A pixel's own mean would not do: where one bright sample is all that it has, it is as large as its error.
-/// It counts where two eye paths agree on it, for lamps stand out.
-pub(super) fn values(pixels: &[PixelAccumulator], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
+/// Values of pixels that errors are relative to: the median of the neighbourhood at the level with the largest bandwidth.
+/// The mean of the pixel itself would hide errors: where one bright sample is all light of a pixel, the mean is as large
+/// as the error. It is used where it exceeds the median and two camera paths agree on it, as on visible lights.
+pub(super) fn reference_values(pixels: &[PixelAccumulator], (width, height): (u32, u32), levels: Levels) -> Vec<f64> {
     let smoothest = levels.count - 1;
-    const REACH: usize = 2;
     let size = Size { width: width as usize, height: height as usize };
     let value = |index: usize| {
-        let near = window(size, index, REACH);
+        let near = window(size, index, MEDIAN_REACH);
         let mut near: Vec<f64> = near.map(|index| mean(pixels[index].mean(smoothest))).collect();
         let median = median(&mut near, f64::total_cmp).unwrap_or(0.0);
         let own = &pixels[index];

@@ -1,80 +1,84 @@
-//! What an iteration costs, by counted work. The constants are core-seconds on the machine they were fitted on
-//! (`scripts/lab.sh cost`); choices depend on their ratios.
+//! Counted cost of an iteration: numbers of vertices times constants. The constants are core-seconds, fitted on one
+//! machine by `scripts/lab.sh cost`; choices depend on their ratios only.
 
 use crate::camera::Camera;
 use crate::estimator::InitialBandwidth;
 use crate::estimator::bandwidth::footprint;
 use crate::light::Guide;
 use crate::plan::{ClassSet, Effect, PathClass, Search, classes_in};
-use crate::render::settings::BandwidthRule;
-use crate::render::settings::Candidate;
-use crate::render::settings::Settings;
+use crate::render::settings::{BandwidthRule, Candidate, Settings};
 use crate::scene::{Scene, Survey};
 use crate::transport::{CameraPaths, Indirect, InitialMedia, VertexCounts};
 
-/// A ray from the eye, the pixel it belongs to and its statistics.
-const EYE_PATH: f64 = 0.135e-6;
-/// A vertex of an eye path with its light sample.
-const EYE_VERTEX: f64 = 0.83e-6;
-/// Of that, direct light at the first that has broad lobes.
-const DIRECT: f64 = 0.2e-6;
-/// Photons gathered at a vertex.
+/// Start of a camera path: its ray, the pixel, and the pixel's statistics.
+const CAMERA_PATH: f64 = 0.135e-6;
+/// Vertex of a camera path with its light sample.
+const CAMERA_VERTEX: f64 = 0.83e-6;
+/// Light sample at the first vertex with broad lobes, included in [`CAMERA_VERTEX`].
+const DIRECT_LIGHT: f64 = 0.2e-6;
+/// Gathering of photons at a vertex.
 const GATHER: f64 = 0.047e-6;
-/// The start of a light path.
+/// Start of a light path.
 const LIGHT_PATH: f64 = 0.17e-6;
-/// What guiding adds to that.
+/// Guiding of the start of a light path, on top of [`LIGHT_PATH`].
 const GUIDE: f64 = 0.11e-6;
-/// A vertex of a light path, its photon, and its share of the map; in a medium much the same.
+/// Vertex of a light path with its photon and the photon's share of building the map, on surfaces and in media.
 const LIGHT_VERTEX: f64 = 0.7e-6;
-/// A vertex of either path where both are kept and their MIS weights with them.
+/// Vertex of a camera or light path, where both are stored with their MIS weights.
 const TWO_WAY_VERTEX: f64 = 0.78e-6;
-/// A connection of two vertices.
+/// Connection of two vertices.
 const CONNECTION: f64 = 0.51e-6;
-/// A vertex where photons to merge with are looked for.
-const LOOK: f64 = 0.155e-6;
-/// A photon that is merged.
+/// Query for photons to merge with at a vertex.
+const MERGE_QUERY: f64 = 0.155e-6;
+/// Merging of a photon.
 const MERGE: f64 = 0.039e-6;
-/// What counting photons adds to gathering them.
+/// Counting of photons at a vertex, on top of [`GATHER`].
 const COUNTING: f64 = 0.04e-6;
-/// A vertex in a medium of an eye path; of either path where both are kept; a point that an eye path looks at on its
-/// way through a medium, with the photons around it.
-const EYE_MEDIUM: f64 = 0.89e-6;
-const TWO_WAY_MEDIUM: f64 = 1.05e-6;
-const ON_THE_WAY: f64 = 1.04e-6;
-/// Times as much more a vertex takes whose material has textures.
+/// Vertex of a camera path in a medium.
+const CAMERA_MEDIUM_VERTEX: f64 = 0.89e-6;
+/// Vertex of a camera or light path in a medium, where both are stored.
+const TWO_WAY_MEDIUM_VERTEX: f64 = 1.05e-6;
+/// Point on a camera ray through a medium, with the photons gathered around it.
+const MEDIUM_SAMPLE: f64 = 1.04e-6;
+/// Extra cost of a textured vertex, relative to an untextured one.
 const TEXTURED: f64 = 0.4;
-/// Times as long where colours refract differently.
+/// Factor of all costs in a scene with dispersion.
 const DISPERSION: f64 = 1.1;
-/// Rays take the longer the more triangles there are: these were fitted for so many, and their power is.
-const TRIANGLES: f64 = 50_000.0;
-const POWER: f64 = 0.1;
-/// What the start of a guided light path costs, in vertices of one.
+/// Number of triangles in the scenes that the constants were fitted in.
+const FITTED_TRIANGLES: f64 = 50_000.0;
+/// Costs grow as the number of triangles to this power.
+const TRIANGLES_POWER: f64 = 0.1;
+/// Cost of the start of a guided light path, in vertices of a light path.
 pub(super) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VERTEX;
-/// Light that was scattered broadly, or in a medium, before it is where the eye looks; and where the eye looks by
-/// narrow lobes.
+/// Light that has been scattered by a broad lobe or a medium before it arrives at the surface that the camera path sees.
 const SCATTERED: ClassSet = ClassSet::one(PathClass::Indirect)
     .and(ClassSet::one(PathClass::IndirectFocus))
     .and(ClassSet::one(PathClass::Volume));
+/// Scattered light that the camera sees by narrow lobes.
 const REFLECTED: ClassSet = ClassSet::one(PathClass::ReflectedIndirect).and(ClassSet::one(PathClass::ReflectedFocus));
 
-/// Eye paths of a pixel in an iteration.
-fn eye_paths(settings: &Settings) -> f64 {
+/// Camera paths per pixel in an iteration.
+fn camera_paths_per_pixel(settings: &Settings) -> f64 {
     if settings.levels.count > 1 && settings.levels.two_paths { 2.0 } else { 1.0 }
 }
 
-/// The counts.
+fn light_start_seconds(candidate: Candidate) -> f64 {
+    LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 }
+}
+
+/// Counted vertices of the paths of a view.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cost {
-    /// Mean numbers of vertices of paths.
-    pub lengths: VertexCounts,
-    /// What there is.
-    pub survey: Survey,
-    /// Times as long as in a scene of [`TRIANGLES`] without dispersion.
+    /// Mean numbers of vertices per path.
+    counts: VertexCounts,
+    /// Features of the scene.
+    survey: Survey,
+    /// Cost relative to a scene of [`FITTED_TRIANGLES`] without dispersion.
     factor: f64,
 }
 
 impl Cost {
-    /// Counts what paths of a view meet; light paths are guided if there is a guide.
+    /// Counts the vertices of the paths of a view. Light paths are guided if there is a guide.
     pub fn count(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
         let initial_media = InitialMedia::of(scene, camera);
         let camera_paths =
@@ -83,71 +87,116 @@ impl Cost {
             InitialBandwidth::Fixed(radius) => radius,
             _ => footprint(camera, length),
         };
-        let lengths = VertexCounts::new(&camera_paths, &initial_media, settings.seed, guide, reach);
+        let counts = VertexCounts::new(&camera_paths, &initial_media, settings.seed, guide, reach);
         let triangles = scene.shapes.triangles().max(1) as f64;
         let dispersion = if scene.survey.dispersion { DISPERSION } else { 1.0 };
-        Cost { lengths, survey: scene.survey, factor: dispersion * (triangles / TRIANGLES).powf(POWER) }
+        let factor = dispersion * (triangles / FITTED_TRIANGLES).powf(TRIANGLES_POWER);
+        Cost { counts, survey: scene.survey, factor }
     }
 
-    /// Core-seconds of an iteration of the camera's film: of a window, with the light paths of the whole picture.
-    pub fn of_film(&self, candidate: Candidate, settings: &Settings, camera: &Camera) -> f64 {
+    /// Core-seconds of an iteration of the camera's film. If the film is a window, some methods also trace the light paths
+    /// of the whole picture.
+    pub fn film_seconds(&self, candidate: Candidate, settings: &Settings, camera: &Camera) -> f64 {
         let [film, whole] = camera.sizes().map(|(width, height)| f64::from(width) * f64::from(height));
-        let beyond = if candidate.method.walks_whole_picture() { whole - film } else { 0.0 };
-        let VertexCounts { light, light_media, textured, .. } = self.lengths;
-        let start = LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 };
-        let path = start + light * TWO_WAY_VERTEX * (1.0 + TEXTURED * textured) + light_media * TWO_WAY_MEDIUM;
-        self.of(candidate, settings, film) + beyond * path * self.factor
+        let outside = if candidate.method.walks_whole_picture() { whole - film } else { 0.0 };
+        let VertexCounts { light, light_media, textured, .. } = self.counts;
+        let path = light_start_seconds(candidate)
+            + light * TWO_WAY_VERTEX * (1.0 + TEXTURED * textured)
+            + light_media * TWO_WAY_MEDIUM_VERTEX;
+        self.iteration_seconds(candidate, settings, film) + outside * path * self.factor
     }
 
-    /// Core-seconds of an iteration of a picture of so many pixels, which is no window of another.
-    pub fn of(&self, candidate: Candidate, settings: &Settings, pixels: f64) -> f64 {
-        let VertexCounts { camera: camera_vertices, camera_to_broad, light, light_to_broad, merged, textured, .. } =
-            self.lengths;
-        let VertexCounts { camera_media, light_media, media_samples, camera_connectable, light_connectable, .. } =
-            self.lengths;
-        let paths = pixels * eye_paths(settings);
-        // Photons that nobody wants are not sent, and light that was scattered before is not looked for in vain.
-        let unwanted = candidate.method.gathers() && settings.photon_classes(&self.survey).is_empty();
-        let photons = if unwanted { 0.0 } else { f64::from(settings.photons) };
-        let wanted = |classes: ClassSet| !(settings.classes & classes_in(&self.survey) & classes).is_empty();
-        let (camera_alone, camera_media_alone) =
-            if wanted(SCATTERED) { (camera_vertices, camera_media) } else { (camera_to_broad, 0.0) };
-        let scattered = wanted(SCATTERED.and(REFLECTED));
-        let (light_alone, light_media_alone) = if scattered { (light, light_media) } else { (light_to_broad, 0.0) };
-        let start = LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 };
-        let [eye_vertex, light_vertex, two_way_vertex] =
-            [EYE_VERTEX, LIGHT_VERTEX, TWO_WAY_VERTEX].map(|vertex| vertex * (1.0 + TEXTURED * textured));
+    /// Core-seconds of an iteration of a whole picture of `pixels` pixels.
+    pub fn iteration_seconds(&self, candidate: Candidate, settings: &Settings, pixels: f64) -> f64 {
+        let camera_paths = pixels * camera_paths_per_pixel(settings);
+        let method = candidate.method;
+        let sum = if method.search() == Search::CameraPaths {
+            pixels * self.path_tracing_seconds(settings)
+        } else if method.gathers() {
+            let camera = camera_paths * self.gathering_path_seconds(candidate, settings);
+            camera + self.light_paths(settings) * self.photon_path_seconds(candidate, settings)
+        } else {
+            camera_paths * self.two_way_seconds(candidate, settings)
+        };
+        let unused = if self.finds_any(settings, ClassSet::of(Effect::Direct)) {
+            0.0
+        } else {
+            camera_paths * self.counts.camera_to_broad.min(1.0) * DIRECT_LIGHT
+        };
+        (sum - unused).max(0.0) * self.factor
+    }
+
+    /// Whether the render finds any of these classes of light paths that exist in the scene.
+    fn finds_any(&self, settings: &Settings, classes: ClassSet) -> bool {
+        !(settings.classes & classes_in(&self.survey) & classes).is_empty()
+    }
+
+    /// Light paths of an iteration that gathers photons; none are traced if no class of light needs them.
+    fn light_paths(&self, settings: &Settings) -> f64 {
+        if settings.photon_classes(&self.survey).is_empty() { 0.0 } else { f64::from(settings.photons) }
+    }
+
+    /// Mean cost of a vertex, of which a share is textured.
+    fn textured(&self, vertex: f64) -> f64 {
+        vertex * (1.0 + TEXTURED * self.counts.textured)
+    }
+
+    /// A camera path that is not connected to a light path. Without scattered light it ends at the first broad lobe.
+    fn path_tracing_seconds(&self, settings: &Settings) -> f64 {
+        let (vertices, media) = self.camera_vertices(settings);
+        CAMERA_PATH + vertices * self.textured(CAMERA_VERTEX) + media * CAMERA_MEDIUM_VERTEX
+    }
+
+    /// Vertices of such a camera path on surfaces and in media.
+    fn camera_vertices(&self, settings: &Settings) -> (f64, f64) {
+        let VertexCounts { camera, camera_media, camera_to_broad, .. } = self.counts;
+        if self.finds_any(settings, SCATTERED) { (camera, camera_media) } else { (camera_to_broad, 0.0) }
+    }
+
+    /// A camera path that gathers photons.
+    fn gathering_path_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
+        let VertexCounts { camera_to_broad, camera_connectable, media_samples, .. } = self.counts;
         let gather = match candidate.method.rules() {
-            _ if unwanted => 0.0,
+            _ if settings.photon_classes(&self.survey).is_empty() => 0.0,
             [BandwidthRule::ChiSquared] => GATHER + COUNTING,
             _ => GATHER,
         };
-        let all = match (candidate.method, candidate.indirect) {
-            (method, _) if method.search() == Search::CameraPaths => {
-                pixels * (EYE_PATH + camera_alone * eye_vertex + camera_media_alone * EYE_MEDIUM)
+        let vertex = self.textured(CAMERA_VERTEX);
+        match candidate.indirect {
+            Indirect::Photons => CAMERA_PATH + camera_to_broad * (vertex + gather) + media_samples * MEDIUM_SAMPLE,
+            Indirect::Paths => CAMERA_PATH + self.camera_vertices(settings).0 * vertex + camera_connectable * gather,
+        }
+    }
+
+    /// A light path that stores photons. Without scattered light it ends at the first broad lobe.
+    fn photon_path_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
+        let VertexCounts { light, light_media, light_to_broad, .. } = self.counts;
+        let (start, vertex) = (light_start_seconds(candidate), self.textured(LIGHT_VERTEX));
+        match candidate.indirect {
+            Indirect::Photons => {
+                let scattered = self.finds_any(settings, SCATTERED.and(REFLECTED));
+                let (vertices, media) = if scattered { (light, light_media) } else { (light_to_broad, 0.0) };
+                start + vertices * vertex + media * LIGHT_VERTEX
             }
-            (method, Indirect::Photons) if method.gathers() => {
-                paths * (EYE_PATH + camera_to_broad * (eye_vertex + gather) + media_samples * ON_THE_WAY)
-                    + photons * (start + light_alone * light_vertex + light_media_alone * LIGHT_VERTEX)
-            }
-            (method, Indirect::Paths) if method.gathers() => {
-                paths * (EYE_PATH + camera_alone * eye_vertex + camera_connectable * gather)
-                    + photons * (start + light_to_broad * light_vertex)
-            }
-            (method, _) => {
-                // Without light that was scattered before, few pairs are left.
-                let (from_camera, from_light) = match wanted(SCATTERED) {
-                    true => (camera_connectable + camera_media, light_connectable + light_media),
-                    false => (camera_to_broad, light_to_broad),
-                };
-                let merges = if method.has_bandwidths() { from_camera * LOOK + merged * MERGE } else { 0.0 };
-                let vertices =
-                    (camera_vertices + light) * two_way_vertex + (camera_media + light_media) * TWO_WAY_MEDIUM;
-                paths * (EYE_PATH + start + vertices + from_camera * from_light * CONNECTION + merges)
-            }
+            Indirect::Paths => start + light_to_broad * vertex,
+        }
+    }
+
+    /// A camera path and a light path with all their connections and merges. Without scattered light few pairs of
+    /// vertices are connected.
+    fn two_way_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
+        let VertexCounts { camera, camera_media, camera_to_broad, light, light_media, light_to_broad, .. } =
+            self.counts;
+        let VertexCounts { camera_connectable, light_connectable, merged, .. } = self.counts;
+        let (from_camera, from_light) = if self.finds_any(settings, SCATTERED) {
+            (camera_connectable + camera_media, light_connectable + light_media)
+        } else {
+            (camera_to_broad, light_to_broad)
         };
-        let left_out =
-            if wanted(ClassSet::of(Effect::Direct)) { 0.0 } else { paths * camera_to_broad.min(1.0) * DIRECT };
-        (all - left_out).max(0.0) * self.factor
+        let merges = if candidate.method.has_bandwidths() { from_camera * MERGE_QUERY + merged * MERGE } else { 0.0 };
+        let vertices =
+            (camera + light) * self.textured(TWO_WAY_VERTEX) + (camera_media + light_media) * TWO_WAY_MEDIUM_VERTEX;
+        let start = light_start_seconds(candidate);
+        CAMERA_PATH + start + vertices + from_camera * from_light * CONNECTION + merges
     }
 }

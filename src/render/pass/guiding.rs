@@ -92,7 +92,7 @@ fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide
     let (width, height) = camera_paths.camera.size();
     let cost = |guide: Option<&Guide>| {
         let candidate = Candidate { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
-        Cost::count(camera_paths.scene, camera_paths.camera, settings, guide).of(
+        Cost::count(camera_paths.scene, camera_paths.camera, settings, guide).iteration_seconds(
             candidate,
             settings,
             f64::from(width) * f64::from(height),

@@ -1,43 +1,44 @@
-//! A way to render, of those that auto chooses from.
+//! Candidates that `auto` chooses from.
 
 use super::method::Method;
 use crate::transport::Indirect;
 use serde::{Deserialize, Serialize};
 
-/// A way to render.
+/// A method with the settings that `auto` compares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// How light is found.
+    /// Algorithm that finds the light.
     pub method: Method,
-    /// What photons bring, where they are gathered.
+    /// Light that gathered photons carry.
     pub indirect: Indirect,
-    /// Light paths are guided.
+    /// Whether starts of light paths are guided.
     pub guided: bool,
 }
 
 impl Candidate {
-    /// What is taken unless another is clearly better, and where a render is too short to try anything: no light is
-    /// left to a technique that finds it badly.
+    /// The choice unless another candidate is clearly better, and for renders that are too short for pilots. It combines
+    /// all techniques, so that it samples no light badly.
     pub const DEFAULT: Candidate = Candidate::unguided(Method::Vcm);
-    /// What is taken where glass or mirrors focus light: the same with guided light paths, which cost a twentieth where
-    /// others would have found the glass, and without which it is hardly found where it is small.
+    /// The choice where glass or mirrors focus light. Guided light paths find small glass objects that unguided ones
+    /// hardly hit. Guiding costs about 5 % where unguided paths would find the glass as well.
     pub const GUIDED: Candidate = Candidate { guided: true, ..Candidate::DEFAULT };
-    /// What is taken where the usual does not find all light that is focused.
+    /// The choice where [`Candidate::DEFAULT`] does not find all focused light.
     pub const GUIDED_GATHERING: Candidate = Candidate { guided: true, ..Candidate::GATHERING };
-    /// By which effects are weighed and options checked: it has bandwidth levels, and photons of every class.
+    /// Photon gathering with bandwidth levels and photons of every class. Effects are measured and options checked with
+    /// its settings before a candidate is chosen.
     pub const GATHERING: Candidate = Candidate::unguided(Method::Sppm);
 
-    /// A method with light paths as they come.
+    /// A method with unguided light paths, whose photons carry all indirect light.
     pub const fn unguided(method: Method) -> Candidate {
         Candidate { method, indirect: Indirect::Photons, guided: false }
     }
 
-    /// A way in words.
+    /// Name for messages.
     pub fn name(self) -> String {
-        let what = match self.indirect {
+        let indirect = match self.indirect {
             Indirect::Photons => "",
             Indirect::Paths => " for caustics, path tracing for the rest",
         };
-        format!("{}{what}{}", self.method.name(), if self.guided { ", guided" } else { "" })
+        format!("{}{indirect}{}", self.method.name(), if self.guided { ", guided" } else { "" })
     }
 }

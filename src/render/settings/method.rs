@@ -1,62 +1,63 @@
-//! The methods: one row each, with all that others ask about a method. Its pass is made in `choice.rs`.
+//! The table of methods: one row per method with all properties that other modules need. `pass/choice.rs` makes its
+//! integrator.
 
 use crate::estimator::rule::memoryless;
 use crate::plan::Search;
 use serde::{Deserialize, Serialize};
 
-/// Light paths per iteration: the papers' setting.
+/// Default light paths per iteration, as in the papers.
 pub const DEFAULT_PHOTONS: u32 = 100_000;
-/// Light paths of [`Method::Pm`], traced once.
+/// Default light paths of [`Method::Pm`], which are traced once.
 pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
-/// Neighbours whose distance is its bandwidth.
+/// Default number of neighbours whose distance is the bandwidth of [`Method::Pm`].
 pub const DEFAULT_MAP_KNN: usize = 100;
-/// Neighbours that set the largest initial bandwidth with several levels \[post-reconstruction 2021, 4.1\] and with
-/// one.
+/// Default number of neighbours whose distance is the largest initial bandwidth, with several levels
+/// \[post-reconstruction 2021, 4.1\] and with one.
 pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
 /// Default reduction rate where merging complements connections \[Georgiev et al. 2012\].
 const MERGING_ALPHA: f64 = 0.75;
 
-/// The rule that a method's bandwidths follow.
+/// Rule by which bandwidths shrink.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BandwidthRule {
-    /// The iteration's number alone ([`memoryless`]).
+    /// By the number of the iteration alone ([`memoryless`]).
     Memoryless,
-    /// The number of photons found ([`local`](crate::estimator::rule::local)).
+    /// By the number of photons found ([`local`](crate::estimator::rule::local)).
     Local,
-    /// The least estimated error ([`adaptive`](crate::estimator::rule::adaptive)).
+    /// To the least estimated error ([`adaptive`](crate::estimator::rule::adaptive)).
     Adaptive,
-    /// A test of uniformity ([`chi_squared`](crate::estimator::rule::chi_squared)).
+    /// While a test finds that photons are not uniform ([`chi_squared`](crate::estimator::rule::chi_squared)).
     ChiSquared,
 }
 
-/// What others ask about a method.
+/// Properties of a method.
 struct Row {
     /// Name on the command line and in files.
     name: &'static str,
     /// One line for help texts.
     help: &'static str,
-    /// Techniques, where photons bring all indirect light.
+    /// Techniques that find the light, if photons carry all indirect light.
     search: Search,
-    /// Techniques where photons bring caustics alone, if the method can leave the rest to camera paths.
+    /// Techniques that find the light if photons carry caustics alone; `None` if the method does not support that.
     search_with_paths: Option<Search>,
-    /// Rules that its bandwidths can follow, the default first. Empty: it has no bandwidths that shrink.
+    /// Rules that bandwidths can follow, the default first; empty if the method has no shrinking bandwidths.
     rules: &'static [BandwidthRule],
-    /// Whether its bandwidths are several levels.
+    /// Whether the method has several bandwidth levels.
     has_levels: bool,
-    /// Default number of light paths where that is a setting. The other methods trace one per camera path, or none.
+    /// Default number of light paths; `None` if it is no setting: other methods trace one per camera path, or none.
     photons: Option<u32>,
-    /// Default number of neighbours that set bandwidths, with several levels and with one.
+    /// Default number of neighbours that determine initial bandwidths, with several levels and with one.
     neighbours: (usize, usize),
     /// Default reduction rate of the memoryless rule.
     alpha: f64,
-    /// Whether its light paths can be guided.
+    /// Whether light paths can be guided.
     guides: bool,
     /// Whether camera paths gather at the same points in every iteration.
     has_fixed_points: bool,
-    /// Whether its samples are Markov chains.
+    /// Whether samples are states of Markov chains.
     has_chains: bool,
-    /// Method that takes its place in pilots, where levels must keep the ratio of their bandwidths.
+    /// Method that replaces this one where bandwidth levels must keep a fixed ratio.
     pilot: Option<Method>,
 }
 
@@ -91,7 +92,7 @@ impl Row {
 /// Declares [`Method`] and its rows.
 macro_rules! methods {
     ($($(#[$attribute:meta])* $method:ident = $row:expr;)*) => {
-        /// How light is found.
+        /// Algorithm that finds the light.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub enum Method {
@@ -115,7 +116,7 @@ methods! {
     /// Path tracing with next-event estimation.
     Path = Row { name: "path", help: "Path tracing", search: Search::CameraPaths, ..Row::UNBIASED };
 
-    /// Light tracing with connections to the camera; of eye paths only what mirrors and clear glass show of lights.
+    /// Light tracing with connections to the camera. Camera paths show lights in mirrors and clear glass only.
     Light = Row {
         name: "light",
         help: "Light tracing: what mirrors and clear glass show stays black",
@@ -127,7 +128,7 @@ methods! {
     /// Bidirectional path tracing.
     Bdpt = Row { name: "bdpt", help: "Bidirectional path tracing", guides: true, ..Row::UNBIASED };
 
-    /// Classical photon mapping: photons traced once, nearest neighbours.
+    /// Classical photon mapping: photons are traced once; the nearest ones estimate the light.
     Pm = Row {
         name: "pm",
         help: "Classical photon mapping: one map, the nearest photons; tends to a blurred picture",
@@ -137,7 +138,7 @@ methods! {
         ..Row::UNBIASED
     };
 
-    /// Progressive photon mapping: measurement points stay where they are, bandwidths follow local statistics.
+    /// Progressive photon mapping: gather points are fixed, bandwidths follow local statistics.
     Ppm = Row {
         name: "ppm",
         help: "Progressive photon mapping: one fixed point per pixel, so edges are jagged",
@@ -156,7 +157,7 @@ methods! {
         ..Row::GATHERING
     };
 
-    /// Adaptive progressive photon mapping: the bandwidths of least estimated error.
+    /// Adaptive progressive photon mapping: bandwidths have the least estimated error.
     Appm = Row {
         name: "appm",
         help: "Adaptive progressive photon mapping: sppm whose bandwidths have the least estimated error",
@@ -164,7 +165,7 @@ methods! {
         ..Row::GATHERING
     };
 
-    /// Chi-squared progressive photon mapping: bandwidths shrink where photons do not look uniform.
+    /// Chi-squared progressive photon mapping: bandwidths shrink where photons are not uniform.
     Cppm = Row {
         name: "cppm",
         help: "Chi-squared progressive photon mapping: sppm whose bandwidths shrink only where the photons do not look \
@@ -174,7 +175,7 @@ methods! {
         ..Row::GATHERING
     };
 
-    /// Bidirectional photon mapping: merging at all vertices, nothing else.
+    /// Bidirectional photon mapping: merging at all vertices, no connections.
     Bpm = Row {
         name: "bpm",
         help: "Bidirectional photon mapping: merging alone",
@@ -222,63 +223,64 @@ impl Method {
         self.row().help
     }
 
-    /// How it looks for light, where photons bring all indirect light.
+    /// Techniques that find the light, if photons carry all indirect light.
     pub fn search(self) -> Search {
         self.row().search
     }
 
-    /// How it looks for light where photons bring caustics alone, if it can leave the rest to camera paths.
+    /// Techniques that find the light if photons carry caustics alone; `None` if the method does not support that.
     pub fn search_with_paths(self) -> Option<Search> {
         self.row().search_with_paths
     }
 
-    /// Rules that its bandwidths can follow, the default first; empty without bandwidths that shrink.
+    /// Rules that bandwidths can follow, the default first; empty if the method has no shrinking bandwidths.
     pub fn rules(self) -> &'static [BandwidthRule] {
         self.row().rules
     }
 
-    /// The rule that its bandwidths follow where `asked` is asked for, if they follow one.
-    pub fn rule(self, asked: BandwidthRule) -> Option<BandwidthRule> {
+    /// The rule `requested`, or the default rule if the method does not support it; `None` without shrinking bandwidths.
+    pub fn rule(self, requested: BandwidthRule) -> Option<BandwidthRule> {
         let rules = self.rules();
-        rules.iter().find(|rule| **rule == asked).or(rules.first()).copied()
+        rules.iter().find(|rule| **rule == requested).or(rules.first()).copied()
     }
 
-    /// Whether it weighs sampling techniques against each other path by path, or has but one.
+    /// Whether every path belongs to one sampling technique with an MIS weight. It is known, then, which light it comes
+    /// from.
     pub fn has_techniques(self) -> bool {
         !self.takes_photon_count() && !self.has_chains()
     }
 
-    /// Whether its samples are Markov chains.
+    /// Whether samples are states of Markov chains.
     pub fn has_chains(self) -> bool {
         self.row().has_chains
     }
 
-    /// Whether its bandwidths are several levels.
+    /// Whether the method has several bandwidth levels.
     pub fn has_levels(self) -> bool {
         self.row().has_levels
     }
 
-    /// Whether it has bandwidths that shrink.
+    /// Whether the method has bandwidths that shrink.
     pub fn has_bandwidths(self) -> bool {
         !self.rules().is_empty()
     }
 
-    /// Whether a reduction rate sets how fast its bandwidths shrink.
+    /// Whether bandwidths shrink by a reduction rate that is a setting.
     pub fn takes_alpha(self) -> bool {
         self.rules().iter().any(|rule| matches!(rule, BandwidthRule::Memoryless | BandwidthRule::Local))
     }
 
-    /// Whether it weighs photons by any kernel when its bandwidths follow a rule; the box is for all.
+    /// Whether the method supports other kernels than the box with a bandwidth rule.
     pub fn takes_kernels(self, rule: BandwidthRule) -> bool {
         self.gathers() && matches!(self.rule(rule), Some(BandwidthRule::Memoryless | BandwidthRule::Adaptive))
     }
 
-    /// Whether every iteration gathers the photons of a map of its own: progressive photon mapping, of whatever rule.
+    /// Whether every iteration gathers the photons of its own map: progressive photon mapping with any rule.
     pub fn gathers(self) -> bool {
         self.search() == Search::Photons
     }
 
-    /// Whether all iterations gather the photons of one map, so that bias stays.
+    /// Whether all iterations gather the photons of one map, so that bias does not shrink.
     pub fn has_one_map(self) -> bool {
         self.search() == Search::Map
     }
@@ -288,28 +290,28 @@ impl Method {
         self.row().has_fixed_points
     }
 
-    /// Whether it walks the light paths of the whole picture to render a window of it: they all may send light there.
+    /// Whether rendering a window takes the light paths of the whole picture, because all of them may send light there.
     pub fn walks_whole_picture(self) -> bool {
         matches!(self.search(), Search::LightPaths | Search::Connections) && !self.has_chains()
     }
 
-    /// Whether the number of light paths (of an iteration; of all, for one map) is a setting; the other methods have
-    /// one for every eye path, or none.
+    /// Whether the number of light paths is a setting (per iteration; for one map, per render). Other methods trace one
+    /// per camera path, or none.
     pub fn takes_photon_count(self) -> bool {
         self.row().photons.is_some()
     }
 
-    /// Whether its light paths can be guided.
+    /// Whether light paths can be guided.
     pub fn supports_guiding(self) -> bool {
         self.row().guides
     }
 
-    /// Default number of light paths of methods where it is a setting.
+    /// Default number of light paths, for methods that take it as a setting.
     pub fn default_photons(self) -> u32 {
         self.row().photons.unwrap_or(DEFAULT_PHOTONS)
     }
 
-    /// Default number of neighbours that set bandwidths.
+    /// Default number of neighbours that determine initial bandwidths.
     pub fn default_neighbours(self, levels: usize) -> usize {
         let (several, one) = self.row().neighbours;
         if levels == 1 { one } else { several }
@@ -320,7 +322,7 @@ impl Method {
         self.row().alpha
     }
 
-    /// The method that is tried in its place by pilots, where levels must keep the ratio of their bandwidths.
+    /// Method that replaces this one in pilots whose bandwidth levels must keep a fixed ratio.
     pub fn pilot_method(self) -> Method {
         self.row().pilot.unwrap_or(self)
     }
@@ -341,9 +343,8 @@ impl clap::ValueEnum for Method {
 mod tests {
     use super::*;
 
-    /// Names are those that serde writes into checkpoints, and each is one method's.
     #[test]
-    fn names_are_those_in_files() {
+    fn serde_writes_each_method_by_its_unique_name() {
         for method in Method::ALL {
             assert_eq!(serde_json::to_value(method).unwrap(), method.name());
             assert_eq!(Method::named(method.name()), Some(*method));

@@ -1,10 +1,14 @@
-//! What a render is asked to do.
+//! Settings of a render: the method and its parameters, stop conditions, and the shard.
 
 mod candidate;
+mod levels;
 mod method;
+mod shard;
 
 pub use candidate::Candidate;
+pub use levels::Levels;
 pub use method::{BandwidthRule, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
+pub use shard::{MAX_SHARDS, Shard};
 
 use crate::camera::Camera;
 use crate::estimator::bandwidth::SCREEN_CAP;
@@ -20,57 +24,10 @@ use crate::stop::Stop;
 use crate::transport::{CameraPaths, Indirect, InitialMedia, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 
-/// Iterations when no stop condition is given.
+/// Iterations if no stop condition is given.
 pub const DEFAULT_ITERATIONS: u64 = 64;
-/// Bytes that their photons may take.
+/// Default of [`Settings::photon_memory`] (bytes).
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
-
-/// Most shards that a render may have.
-pub const MAX_SHARDS: u64 = 1_000_000;
-
-/// Which iterations to render: those with `i mod count = index`, i from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shard {
-    /// Index of this shard, below `count`.
-    pub index: u64,
-    /// Number of shards.
-    pub count: u64,
-}
-
-impl Shard {
-    /// Whether there can be such a shard.
-    pub fn is_sound(self) -> bool {
-        self.index < self.count && self.count <= MAX_SHARDS
-    }
-}
-
-/// Bandwidth levels, each 1/sqrt(2) of the next larger.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Levels {
-    /// Number of levels, 1 to [`MAX_LEVELS`].
-    pub count: usize,
-    /// Trace a second eye path that decorrelates level 1 from the others \[post-reconstruction 2021, 3\], which
-    /// equation (6) wants; without it all levels share one path, which costs a little more than half as much.
-    pub two_paths: bool,
-}
-
-impl Levels {
-    /// `count` levels that share one eye path.
-    pub fn new(count: usize) -> Levels {
-        Levels { count: count.clamp(1, MAX_LEVELS), two_paths: false }
-    }
-
-    /// `count` levels; with more than one, level 1 has an eye path of its own.
-    pub fn decorrelated(count: usize) -> Levels {
-        Levels { two_paths: count > 1, ..Levels::new(count) }
-    }
-
-    /// The level (from 0) that is the method's own image: the second largest, whose bandwidth is the usual one (k = 10
-    /// where the largest is set by k = 20).
-    pub fn picture_level(&self) -> usize {
-        self.count.saturating_sub(2)
-    }
-}
 
 /// Kernel of density estimation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -92,7 +49,7 @@ pub enum KernelChoice {
     Gaussian,
 }
 
-/// What [`Method::Sppm`]'s bandwidths follow.
+/// Rule that bandwidths of [`Method::Sppm`] follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -120,44 +77,43 @@ impl From<RadiusRule> for BandwidthRule {
 /// Settings of a render.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Settings {
-    /// How light is found.
+    /// Algorithm that finds the light.
     pub method: Method,
-    /// Seed.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Light paths per iteration; with [`Method::Pm`] of the whole render.
+    /// Light paths per iteration; for [`Method::Pm`], light paths of the whole render.
     pub photons: u32,
-    /// Most bytes that the map of [`Method::Pm`] may take, while it is built.
+    /// Most bytes that the photon map of [`Method::Pm`] may take while it is built.
     pub photon_memory: u64,
-    /// What [`Method::Sppm`]'s photons bring: all indirect light, or caustics alone.
+    /// Light that photons of [`Method::Sppm`] carry: all indirect light, or caustics alone.
     pub indirect: Indirect,
-    /// Classes of light paths to be found.
+    /// Classes of light paths that the render finds.
     pub classes: ClassSet,
-    /// Light paths start toward what makes caustics, where a pilot has found them to matter. The methods that count
-    /// photons have none of it.
+    /// Guide the starts of light paths toward objects that focus light, if a pilot finds that it pays. See
+    /// [`Method::supports_guiding`].
     pub guided: bool,
     /// Bandwidth levels.
     pub levels: Levels,
     /// Also make a picture per sampling technique ([`Method::has_techniques`]).
     pub techniques: bool,
-    /// What sets the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is
-    /// its bandwidth.
+    /// Rule for the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is the
+    /// bandwidth.
     pub initial_bandwidth: InitialBandwidth,
-    /// Largest initial bandwidth over the picture's width: on surfaces and in media.
+    /// Upper bound of initial bandwidths on surfaces and in media, relative to the width of the picture.
     pub max_initial_bandwidth: [f32; 2],
-    /// Reduction rate of the memoryless rule and that of local statistics, in (0, 1].
+    /// Reduction rate of the memoryless rule and of the rule of local statistics, in (0, 1].
     pub alpha: f64,
-    /// The same for photons in media.
+    /// Reduction rate of bandwidths in media, in (0, 1].
     pub volume_alpha: f64,
-    /// Rule of [`Method::Sppm`].
+    /// Bandwidth rule of [`Method::Sppm`].
     pub radius_rule: RadiusRule,
-    /// Kernel of [`Method::Sppm`] with the memoryless rule, and of [`Method::Appm`]; the other methods have the box
-    /// kernel.
+    /// Kernel of [`Method::Sppm`] with the memoryless rule, and of [`Method::Appm`]. Other methods use the box kernel.
     pub kernel: KernelChoice,
-    /// Parameters of [`Method::Cppm`]'s rule.
+    /// Parameters of the bandwidth rule of [`Method::Cppm`].
     pub chi_squared: ChiSquaredSettings,
-    /// Longest path in segments.
+    /// Most segments of a path.
     pub max_depth: u32,
-    /// Stop after this many iterations (of the whole render, not of the shard).
+    /// Stop after this many iterations of the whole render, all shards together.
     pub iterations: Option<u64>,
     /// Stop after this many seconds.
     pub time: Option<f64>,
@@ -165,7 +121,7 @@ pub struct Settings {
     pub target_error: Option<f64>,
     /// Part of the iterations to render.
     pub shard: Shard,
-    /// What ends an iteration that is under way.
+    /// Request that ends the current iteration early.
     #[serde(skip)]
     pub stop: Stop,
 }
@@ -200,7 +156,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Those of a way to render when nothing else is asked for.
+    /// Default settings of a candidate.
     pub fn for_candidate(candidate: Candidate) -> Settings {
         let method = candidate.method;
         let levels = Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 });
@@ -220,15 +176,19 @@ impl Settings {
         }
     }
 
-    /// Light paths of an iteration of a picture of that size where no number is asked for. Where they bring caustics
-    /// alone, eye paths bring the rest and are what most of the error is left by: guided ones, which meet glass at once
-    /// and take several times as long, are no more than those.
+    /// Default number of light paths per iteration for a picture of this size. If photons carry caustics alone, most of
+    /// the error comes from camera paths. Guided light paths are several times as long as unguided ones, because most of
+    /// them hit glass; then there are at most as many as pixels.
     pub fn default_photons(&self, (width, height): (u32, u32)) -> u32 {
-        let usual = self.method.default_photons();
-        if self.guided && self.indirect == Indirect::Paths { usual.min(width.saturating_mul(height)) } else { usual }
+        let photons = self.method.default_photons();
+        if self.guided && self.indirect == Indirect::Paths {
+            photons.min(width.saturating_mul(height))
+        } else {
+            photons
+        }
     }
 
-    /// The eye of a render with these settings.
+    /// Camera paths of a render with these settings.
     pub(in crate::render) fn camera_paths<'a>(
         &'a self,
         scene: &'a Scene,
@@ -236,61 +196,63 @@ impl Settings {
         initial_media: &InitialMedia,
     ) -> CameraPaths<'a> {
         let Settings { max_depth, indirect, classes, .. } = *self;
-        // Pictures per technique are summed at once, and cannot do without part of an iteration.
+        // Pictures per technique are sums over paths, so an iteration cannot be taken back from them.
         let stop = (!self.techniques).then_some(&self.stop);
         CameraPaths { scene, camera, interior: initial_media.camera, max_depth, indirect, classes, stop }
     }
 
-    /// What makes its pixels before the first iteration, from their largest initial bandwidths.
+    /// Function that makes a pixel before the first iteration, from its largest initial bandwidths.
     pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.power_exponent());
         let groups = self.light_groups(scene);
         move |bandwidths| PixelAccumulator::new(levels, exponent, bandwidths).with_groups(groups)
     }
 
-    /// All pixels before the first iteration, of methods without bandwidths of pixels.
+    /// All pixels before the first iteration, for methods whose pixels have no bandwidths.
     pub(in crate::render) fn initial_pixels(&self, scene: &Scene, camera: &Camera) -> Vec<PixelAccumulator> {
         let (width, height) = camera.size();
         vec![self.pixel_factory(scene)([0.0; 2]); width as usize * height as usize]
     }
 
-    /// Groups of lights whose light is told apart: by methods that know of each light where it comes from.
+    /// Number of light groups with layers of their own. Photons do not store their light, so methods that gather them
+    /// have none.
     pub(in crate::render) fn light_groups(&self, scene: &Scene) -> usize {
         if self.method.has_techniques() { scene.lights.groups().names.len() } else { 0 }
     }
 
-    /// The number (from 1) of the last of so many iterations of this shard.
+    /// Number (from 1) of the last iteration after this shard has done `done` iterations.
     pub fn last_iteration(&self, done: u64) -> u64 {
         self.shard.index + done.saturating_sub(1) * self.shard.count + 1
     }
 
-    /// What the memoryless rules make of bandwidths at iteration `i` (from 1).
+    /// Reduction of bandwidths at iteration `i` (from 1) by the memoryless rules.
     pub fn schedule(&self, i: u64) -> Schedule {
         Schedule::new(i, self.levels.count, self.alpha, self.volume_alpha)
     }
 
-    /// Whether other machines render other iterations.
+    /// Whether the render is divided among several shards.
     pub fn is_shard(&self) -> bool {
         self.shard.count > 1
     }
 
-    /// Iterations of this shard, when their number is what stops the render.
+    /// Iterations of this shard, if their number stops the render.
     pub fn iterations_of_shard(&self) -> Option<u64> {
         self.iterations.map(|n| n.saturating_sub(self.shard.index).div_ceil(self.shard.count))
     }
 
-    /// How it looks for light.
+    /// Techniques that find the light.
     pub fn search(&self) -> Search {
         let with_paths = self.method.search_with_paths().filter(|_| self.indirect == Indirect::Paths);
         with_paths.unwrap_or(self.method.search())
     }
 
-    /// Classes of light that photons are to bring to eye paths that gather them.
+    /// Classes of light paths that photons carry to gathering camera paths.
     pub fn photon_classes(&self, survey: &Survey) -> ClassSet {
         self.search().owned_by(Owner::Photons) & self.classes & classes_in(survey)
     }
 
-    /// Kinds of photons that have bandwidths; where light paths are merged, which tells no kinds apart, the first.
+    /// Kinds of photons that have bandwidths. Methods that merge light paths have one bandwidth for all photons, stored as
+    /// the first kind.
     pub fn bandwidth_kinds(&self, survey: &Survey) -> ByKind<bool> {
         if self.method.gathers() {
             self.indirect.kinds(self.photon_classes(survey))
@@ -299,24 +261,24 @@ impl Settings {
         }
     }
 
-    /// The rule that its bandwidths follow, if they follow one.
+    /// Rule that bandwidths follow, if they shrink.
     pub fn bandwidth_rule(&self) -> Option<BandwidthRule> {
         self.method.rule(self.radius_rule.into())
     }
 
-    /// Whether red, green and blue have photons and bandwidths of their own.
+    /// Whether red, green and blue have bandwidths of their own.
     pub fn has_channels(&self) -> bool {
         self.bandwidth_rule() == Some(BandwidthRule::ChiSquared) && self.chi_squared.plus
     }
 
-    /// Whether an iteration's bandwidths follow from its number alone, so that iterations may run anywhere and in any
-    /// order.
+    /// Whether bandwidths depend on the number of the iteration alone, so that iterations may run in any order and on any
+    /// machine.
     pub fn is_memoryless(&self) -> bool {
         self.bandwidth_rule().is_none_or(|rule| rule == BandwidthRule::Memoryless)
     }
 
-    /// Levels whose bandwidths are in the fixed ratio from which their bias can be told: all, or, where each shrinks on
-    /// its own, those up to the method's own image, which leaves none to compare it with.
+    /// Number of levels that keep the fixed ratio of bandwidths from which bias is estimated. Under rules that shrink each
+    /// level on its own, it ends with the picture's level, so that there is no larger level to compare with.
     pub fn compared_levels(&self) -> usize {
         if self.is_memoryless() || self.bandwidth_rule() == Some(BandwidthRule::Adaptive) {
             self.levels.count
