@@ -1,9 +1,9 @@
-//! Bidirectional light transport: which strategies find a path, and what its two walks share.
+//! Bidirectional light transport: the techniques of a method, and what its two walks share.
 //!
-//! One presets-and-parts module serves light tracing, bidirectional path tracing \[Veach 1997, 10\], bidirectional
-//! photon mapping and vertex connection and merging \[Georgiev et al. 2012\]. A light path is walked first; it leaves
-//! splats (its vertices connected to the camera), vertices for the one camera path it belongs to, and photons for all eye
-//! paths of the next pass. No light vertex outlives its pixel.
+//! One implementation serves light tracing, bidirectional path tracing \[Veach 1997, 10\], bidirectional photon
+//! mapping, and vertex connection and merging \[Georgiev et al. 2012\]. The light path is walked first. It leaves
+//! splats (its vertices connected to the camera), vertices for its own camera path, and photons for all camera paths of
+//! the next iteration. Light vertices live only as long as their pixel.
 
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
@@ -13,16 +13,16 @@ use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::plan::PathClass;
 
-/// Which strategies take part.
+/// The techniques of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TechniqueSet {
     /// Light vertices are connected to the camera.
     pub camera: bool,
-    /// Next-event estimation, connection of vertices, and camera paths that run into lights.
+    /// Next-event estimation, connections of vertices, and camera paths that hit lights.
     pub connect: bool,
     /// Photons are merged.
     pub merge: bool,
-    /// Depth of the first vertex of a light path and of a camera path that is merged (1 is the first surface).
+    /// Depth of the first merged vertex of a light path, and of a camera path (1 is the first surface).
     pub first_merged: [u32; 2],
 }
 
@@ -31,32 +31,31 @@ impl TechniqueSet {
     pub const LIGHT: TechniqueSet = TechniqueSet { camera: true, connect: false, merge: false, first_merged: [1, 1] };
     /// Bidirectional path tracing.
     pub const BDPT: TechniqueSet = TechniqueSet { camera: true, connect: true, merge: false, first_merged: [1, 1] };
-    /// Bidirectional photon mapping: every vertex merges, even direct light.
+    /// Bidirectional photon mapping: every vertex merges, direct light included.
     pub const BPM: TechniqueSet = TechniqueSet { camera: false, connect: false, merge: true, first_merged: [1, 1] };
-    /// Vertex connection and merging. Direct light is not merged, nor what the camera sees directly: other strategies do
-    /// both better, without bias.
+    /// Vertex connection and merging. Direct light and directly visible vertices are not merged, because other
+    /// techniques sample them better, without bias.
     pub const VCM: TechniqueSet = TechniqueSet { camera: true, connect: true, merge: true, first_merged: [2, 2] };
 
-    /// Whether a light path's vertex at `depth` leaves photons.
+    /// Whether a light vertex at `depth` leaves a photon.
     #[inline]
     pub fn light_vertex_merges(&self, depth: u32) -> bool {
         self.merge && depth >= self.first_merged[0]
     }
 
-    /// Whether a camera path's vertex at `depth` merges photons.
+    /// Whether a camera vertex at `depth` merges photons.
     #[inline]
     pub fn camera_vertex_merges(&self, depth: u32) -> bool {
         self.merge && depth >= self.first_merged[1]
     }
 
-    /// The merge that weights count at a camera path's vertex at `depth`, if any; `clear`: all before it are delta.
+    /// The merge of a camera vertex at `depth` in MIS weights. `clear`: all earlier vertices are delta.
     #[inline]
     pub fn camera_vertex_merge(&self, depth: u32, clear: bool) -> Merges {
         if self.camera_vertex_merges(depth) { one_merge(clear) } else { Merges::ZERO }
     }
 
-    /// The merge that weights count at a light path's vertex at `depth`, if any: the camera path's vertex behind it is not
-    /// delta.
+    /// The merge of a light vertex at `depth` in MIS weights. The camera path behind it has a vertex that is not delta.
     #[inline]
     pub fn light_vertex_merge(&self, depth: u32) -> Merges {
         if self.light_vertex_merges(depth) { one_merge(false) } else { Merges::ZERO }
@@ -68,30 +67,30 @@ impl TechniqueSet {
 pub struct Bidirectional<'a> {
     /// Camera paths.
     pub camera_paths: CameraPaths<'a>,
-    /// The solids around the lights.
+    /// The solids around camera and lights.
     pub initial_media: &'a InitialMedia,
-    /// What finds paths.
+    /// Techniques of the method.
     pub techniques: TechniqueSet,
-    /// Light paths connected to the camera for every camera path of a pixel.
+    /// Number of light paths connected to the camera per camera path of a pixel.
     pub light_paths: f32,
-    /// Light paths of a pass whose photons are merged.
+    /// Number of light paths of an iteration whose photons are merged.
     pub merged_paths: f32,
-    /// What alone is looked for, if not all that the two walks find.
+    /// Limits the walks to the paths of one division, if set.
     pub only: Option<Division>,
 }
 
-/// How a path of `segments` is divided among the two walks: the eye's goes as far as its vertex at depth `eye`, the
-/// light's to the one before.
+/// Division of a path of `segments` among the two walks. The camera path reaches its vertex at depth `camera`, the
+/// light path the vertex before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Division {
-    /// Segments of the path.
+    /// Number of segments of the path.
     pub segments: u32,
-    /// 0 is the camera, to which a light vertex is connected; `segments` the light, which a camera path runs into.
+    /// 0 if a light vertex is connected to the camera; `segments` if the camera path hits a light.
     pub camera: u32,
 }
 
 impl Division {
-    /// That of a path found by connecting.
+    /// The division of a path found by `technique`; `None` for merging.
     pub fn of(technique: Technique) -> Option<Division> {
         let (segments, camera) = match technique {
             Technique::Hit { camera } => (camera, camera),
@@ -103,7 +102,7 @@ impl Division {
         Some(Division { segments, camera })
     }
 
-    /// Depth of the light walk's last vertex, 0 being the light; `None` where the camera path runs into that.
+    /// Depth of the light path's last vertex, 0 for the light; `None` if the camera path hits the light.
     #[inline]
     pub fn light(self) -> Option<u32> {
         self.segments.checked_sub(self.camera + 1)
@@ -111,43 +110,43 @@ impl Division {
 }
 
 impl Bidirectional<'_> {
-    /// Whether a camera path that runs into a light with segment number `depth` tells of it.
+    /// Whether a camera path contributes if its segment `depth` hits a light.
     #[inline]
     pub(super) fn hits_at(&self, depth: u32) -> bool {
         self.only.is_none_or(|only| only.camera == depth && only.segments == depth)
     }
 
-    /// Whether a camera path's vertex at `depth` is connected.
+    /// Whether a camera vertex at `depth` is connected.
     #[inline]
     pub(super) fn connects_camera_vertex(&self, depth: u32) -> bool {
         self.only.is_none_or(|only| only.camera == depth && only.segments > depth)
     }
 
-    /// Whether it is connected to a light itself.
+    /// Whether camera vertices are connected to lights.
     #[inline]
     pub(super) fn next_event(&self) -> bool {
         self.only.is_none_or(|only| only.light() == Some(0))
     }
 
-    /// Whether a light path's vertex at `depth` is connected.
+    /// Whether a light vertex at `depth` is connected.
     #[inline]
     pub(super) fn connects_light_vertex(&self, depth: u32) -> bool {
         self.only.is_none_or(|only| only.light() == Some(depth))
     }
 
-    /// Whether a light path's vertex is connected to the camera.
+    /// Whether light vertices are connected to the camera.
     #[inline]
     pub(super) fn connects_camera(&self) -> bool {
         self.only.is_none_or(|only| only.camera == 0)
     }
 
-    /// Whether a camera path has an end at `depth`.
+    /// Whether a camera path ends at `depth`.
     #[inline]
     pub(super) fn ends_camera_path(&self, depth: u32) -> bool {
         self.only.is_some_and(|only| only.camera <= depth)
     }
 
-    /// Whether a light path has an end at `depth`.
+    /// Whether a light path ends at `depth`.
     #[inline]
     pub(super) fn ends_light_path(&self, depth: u32) -> bool {
         self.only.is_some_and(|only| only.light().is_none_or(|light| light <= depth))
@@ -160,43 +159,42 @@ impl Bidirectional<'_> {
     }
 }
 
-/// Which strategy found a path; `light` and `eye` are depths of the last vertices of the two walks it was put together
-/// from.
+/// The technique that found a path. `light` and `camera` are the depths of the last vertices of the two subpaths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Technique {
-    /// The camera path ran into a light with its segment number `eye`.
+    /// Segment number `camera` of the camera path hit a light.
     Hit {
-        /// See above.
+        /// Depth of the camera subpath.
         camera: u32,
     },
     /// Next-event estimation.
     NextEvent {
-        /// See above.
+        /// Depth of the camera subpath.
         camera: u32,
     },
-    /// Two vertices connected.
+    /// A light vertex was connected to a camera vertex.
     Connect {
-        /// See above.
+        /// Depth of the light subpath.
         light: u32,
-        /// See above.
+        /// Depth of the camera subpath.
         camera: u32,
     },
-    /// A light vertex connected to the camera.
+    /// A light vertex was connected to the camera.
     Camera {
-        /// See above.
+        /// Depth of the light subpath.
         light: u32,
     },
-    /// A photon merged.
+    /// A photon was merged.
     Merge {
-        /// See above.
+        /// Depth of the light subpath.
         light: u32,
-        /// See above.
+        /// Depth of the camera subpath.
         camera: u32,
     },
 }
 
 impl Technique {
-    /// Why a sample is rejected to which it brings what is not finite.
+    /// The cause of rejection if a contribution is not finite.
     pub(super) fn cause(self) -> Cause {
         match self {
             Technique::Hit { .. } => Cause::Emission,
@@ -208,26 +206,26 @@ impl Technique {
     }
 }
 
-/// Looks over the shoulder of the walks: for pictures per technique, and for tests. `()` costs nothing.
-pub trait Record {
-    /// `technique` has found light: `value` unweighted (without visibility), `from` the point connected to or merged,
-    /// and the ratios its weight comes from.
+/// Observes the contributions of paths, for pictures per technique and for tests. `()` costs nothing.
+pub trait PathRecorder {
+    /// `technique` has found light: `value` without weight and visibility, the point `from` that was connected or
+    /// merged, and the ratios that determine the weight.
     #[inline]
     fn contribution(&mut self, technique: Technique, value: Rgb, from: Vec3, ratios: Ratios) {
         let _ = (technique, value, from, ratios);
     }
 
-    /// `technique` brings light to the camera path's own pixel: of a class and of a group of lights, on a `level`, `value`
-    /// unweighted, with visibility and kernel, and its weight. Depths count from 1, also for light from infinity.
+    /// `technique` adds light to the camera path's own pixel at `level`: its class and light group, `value` with
+    /// visibility and kernel but without weight, and the weight. Depths count from 1, also for light from infinity.
     #[inline]
     fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
         let _ = (technique, of, level, value, weight);
     }
 }
 
-impl Record for () {}
+impl PathRecorder for () {}
 
-/// Bandwidths of the levels of one camera path, ascending, with their etas.
+/// Merging radii of the levels of a pixel, ascending, with their etas.
 #[derive(Clone, Copy, Debug)]
 pub struct MergeLevels {
     radius2: [f32; super::MAX_LEVELS],
@@ -236,7 +234,7 @@ pub struct MergeLevels {
 }
 
 impl MergeLevels {
-    /// From radii squared in ascending order (at most [`super::MAX_LEVELS`]) and an eta each.
+    /// Takes squared radii in ascending order (at most [`super::MAX_LEVELS`]), each with its eta.
     #[inline]
     pub fn new(levels: impl Iterator<Item = (f32, Eta)>) -> MergeLevels {
         let mut all = MergeLevels { radius2: [0.0; super::MAX_LEVELS], eta: [Eta::NONE; super::MAX_LEVELS], count: 0 };
@@ -248,7 +246,7 @@ impl MergeLevels {
         all
     }
 
-    /// Radii squared.
+    /// Squared radii.
     #[inline]
     pub fn radius2(&self) -> &[f32] {
         &self.radius2[..self.count]

@@ -1,19 +1,18 @@
-//! Camera paths of the bidirectional methods: all that one measures, given a light path and the photons of the pass
-//! before.
+//! Camera paths of the bidirectional methods, given a light path and the photons of the previous iteration.
 
-use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
+use super::bidirectional::{Bidirectional, MergeLevels, PathRecorder, Technique};
 use super::bidirectional_light::{add, scatter};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
 use super::light_vertex::LightVertex;
-use super::mis::{self, End, Merges, MisState, Ratios, one_merge};
+use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
 use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
-use super::photon_merge::{MergePhoton, merge_photons};
+use super::photon_merge::{Merge, MergePhoton};
 use super::pixel_sample::{Features, PixelSample};
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, token, with_camera_bit};
-use super::shares::{connected, shares, wanted};
+use super::shares::{Connection, Incident, PathHalves, connection_shares, shares, wanted};
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
@@ -26,33 +25,41 @@ use crate::random::{Purpose, Stream, mix};
 use crate::stop::Stop;
 use bumpalo::Bump;
 
-/// What a camera path meets.
+/// The light path and photons of a camera path.
 pub struct CameraWalkContext<'a> {
     /// Vertices of its light path.
     pub vertices: &'a [LightVertex<'a>],
-    /// Photons of the pass before; `None` in the first pass, whose etas must be [`mis::Eta::NONE`].
+    /// Photons of the previous iteration; `None` if there is none. Then all etas must be [`mis::Eta::NONE`].
     pub photons: Option<&'a PhotonMap<MergePhoton>>,
-    /// Its bandwidths.
+    /// Merging radii of its pixel.
     pub levels: &'a MergeLevels,
 }
 
-/// Vertices between two looks at whether the iteration is given up.
+/// Number of vertices between two checks whether the iteration is aborted.
 const ABORT_CHECK_INTERVAL: u32 = 64;
 
 struct CameraWalk<'a, R> {
     shared: &'a Bidirectional<'a>,
-    meets: &'a CameraWalkContext<'a>,
+    context: &'a CameraWalkContext<'a>,
     mis: MisState,
     history: PathHistory,
     /// The last vertex.
     last: Receiver,
-    /// Its depth.
+    /// Depth of the last vertex.
     depth: u32,
     sample: &'a mut PixelSample,
     record: &'a mut R,
 }
 
-/// The first hit and the features of a path that arrives at `vertex`.
+/// A hit of a light, as it is recorded.
+struct LightHit {
+    /// Number of the segment; 0 for light from infinity.
+    depth: u32,
+    /// Position of the hit; the direction for light from infinity.
+    at: Vec3,
+}
+
+/// Records the first hit and the features of a path that arrives at a surface.
 #[inline]
 pub(super) fn record_surface(
     history: &mut PathHistory,
@@ -76,7 +83,7 @@ pub(super) fn record_surface(
     }
 }
 
-/// As [`look`], in a medium.
+/// Records the first hit and the features of a path that arrives at a vertex of a medium.
 #[inline]
 pub(super) fn record_medium(
     history: &mut PathHistory,
@@ -94,8 +101,8 @@ pub(super) fn record_medium(
     }
 }
 
-impl<R: Record> CameraWalk<'_, R> {
-    /// Whether a technique has found light that is worth a ray. What is no number rejects the sample.
+impl<R: PathRecorder> CameraWalk<'_, R> {
+    /// Whether light is worth a shadow ray. NaN rejects the sample.
     #[inline]
     fn finds(&mut self, technique: Technique, light: Rgb) -> bool {
         if light.is_nan() {
@@ -110,15 +117,15 @@ impl<R: Record> CameraWalk<'_, R> {
         if !value.is_finite() {
             return self.sample.reject(technique.cause());
         }
-        for (level, &eta) in self.meets.levels.eta().iter().enumerate() {
+        for (level, &eta) in self.context.levels.eta().iter().enumerate() {
             self.record.arrival(technique, of, level, value, ratios.weight(eta));
         }
-        add(self.sample, self.meets.levels, of.0, value, ratios);
+        add(self.sample, self.context.levels, of.0, value, ratios);
     }
 
-    /// The path has run into a light that sends it `value`.
+    /// Adds `value` from a light that the path has hit.
     #[inline]
-    fn run_into(&mut self, (value, group): (Rgb, Group), depth: u32, at: Vec3, density: &EmissionDensity) {
+    fn hit_light(&mut self, value: Rgb, group: Group, hit: LightHit, density: &EmissionDensity) {
         let class = self.history.suffix.class_at_light(false);
         if !self.shared.hits_at(self.depth) || !self.shared.camera_paths.classes.has(class) {
             return;
@@ -130,15 +137,16 @@ impl<R: Record> CameraWalk<'_, R> {
         } else {
             return;
         };
-        self.record.contribution(Technique::Hit { camera: depth }, value, at, ratios);
+        self.record.contribution(Technique::Hit { camera: hit.depth }, value, hit.at, ratios);
         self.add(Technique::Hit { camera: self.depth }, (class, group), value, ratios);
     }
 
     #[inline]
     fn next_event<S: ScatterPoint>(&mut self, vertex: &S) {
         let CameraPaths { scene, classes, .. } = self.shared.camera_paths;
-        let (draws, seen) = (vertex.draws(), (self.history.suffix, LightPrefix::start(false)));
-        if !wanted(vertex, seen.0, seen.1, classes) {
+        let draws = vertex.draws();
+        let halves = PathHalves { suffix: self.history.suffix, prefix: LightPrefix::start(false) };
+        if !wanted(vertex, halves, classes) {
             return;
         }
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
@@ -157,13 +165,18 @@ impl<R: Record> CameraWalk<'_, R> {
         if !is_lit(visibility.transmittance) {
             return;
         }
-        let reverse = vertex.reverse_pdf(light.wi, Transport::Importance);
-        let arrival_pdf_a = light.arrival_pdf_a * vertex.cos(light.wi) * visibility.flight.reverse;
-        let onward = pdf * visibility.flight.forward;
-        let ratios = mis::next_event(&self.mis, (onward, reverse), (light.pdf_w, arrival_pdf_a), light.delta);
+        let pdfs = NextEventPdfs {
+            pdf_w: pdf * visibility.flight.forward,
+            reverse_pdf_w: vertex.reverse_pdf(light.wi, Transport::Importance),
+            light_pdf_w: light.pdf_w,
+            arrival_pdf_a: light.arrival_pdf_a * vertex.cos(light.wi) * visibility.flight.reverse,
+            delta: light.delta,
+        };
+        let ratios = mis::next_event(&self.mis, &pdfs);
         let at = light.target.unwrap_or(light.wi);
         self.record.contribution(technique, value, at, ratios);
-        for (class, share) in shares(vertex, seen, (light.wi, Transport::Radiance, f), classes).iter() {
+        let incident = Incident { wi: light.wi, transport: Transport::Radiance, f };
+        for (class, share) in shares(vertex, halves, incident, classes).iter() {
             self.add(
                 technique,
                 (class, scene.lights.group(light.light)),
@@ -180,25 +193,26 @@ impl<R: Record> CameraWalk<'_, R> {
         let distance2 = to.length_squared();
         let distance = distance2.sqrt();
         let d = to / distance;
-        let (f_eye, pdf_eye) = vertex.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
+        let (f_camera, pdf_camera) = vertex.evaluate_cos(d, Transport::Radiance, LobeSet::ALL);
         let technique = Technique::Connect { light: light.depth, camera: vertex.depth() };
-        if !self.finds(technique, f_eye) {
+        if !self.finds(technique, f_camera) {
             return;
         }
         let (f_light, pdf_light) = light.evaluate_cos(-d);
         let suffix = self.history.suffix;
-        let shares = || connected(vertex, light, suffix, (d, f_eye, f_light), camera_paths.classes);
+        let connection = Connection { d, f: f_camera, f_light };
+        let shares = || connection_shares(vertex, light, suffix, &connection, camera_paths.classes);
         if !camera_paths.classes.is_all() && shares().is_empty() {
             return;
         }
-        let mut value = vertex.throughput() * f_eye * f_light * light.throughput / distance2;
+        let mut value = vertex.throughput() * f_camera * f_light * light.throughput / distance2;
         if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
             value *= wavelength.inverse_weight();
         }
         if !self.finds(technique, value) {
             return;
         }
-        // Every pair of vertices has its own decisions at cut-outs.
+        // Each pair of vertices decides about cut-outs independently.
         let bits = mix(vertex.draws().bits(Purpose::SecondAlpha).wrapping_add(u64::from(light.depth)));
         let token = with_camera_bit(camera_paths.scene, bits as u32, false);
         let end = Some(light.shadow_end(-d, distance));
@@ -206,18 +220,18 @@ impl<R: Record> CameraWalk<'_, R> {
         if !is_lit(visibility.transmittance) {
             return;
         }
-        let (cos_eye, cos_light) = (vertex.cos(d), light.cos(d));
+        let (cos_camera, cos_light) = (vertex.cos(d), light.cos(d));
         let ratios = mis::connect(
             &End {
                 mis: &light.mis,
                 reverse_pdf_w: light.reverse_pdf(-d),
-                arrival_pdf_a: pdf_eye * cos_light / distance2 * visibility.flight.forward,
+                arrival_pdf_a: pdf_camera * cos_light / distance2 * visibility.flight.forward,
                 merges: if light.in_medium() { Merges::ZERO } else { techniques.light_vertex_merge(light.depth) },
             },
             &End {
                 mis: &self.mis,
                 reverse_pdf_w: vertex.reverse_pdf(d, Transport::Importance),
-                arrival_pdf_a: pdf_light * cos_eye / distance2 * visibility.flight.reverse,
+                arrival_pdf_a: pdf_light * cos_camera / distance2 * visibility.flight.reverse,
                 merges: if S::IN_MEDIUM {
                     Merges::ZERO
                 } else {
@@ -231,7 +245,7 @@ impl<R: Record> CameraWalk<'_, R> {
         }
     }
 
-    /// Next-event estimation and connections.
+    /// Next-event estimation and connections with all vertices of the light path.
     #[inline]
     fn connect_all(&mut self, vertex: &impl ScatterPoint) {
         if !self.shared.connects_camera_vertex(vertex.depth()) {
@@ -241,25 +255,25 @@ impl<R: Record> CameraWalk<'_, R> {
             self.next_event(vertex);
         }
         let longest = self.shared.camera_paths.max_depth - vertex.depth();
-        for light in self.meets.vertices.iter().take_while(|light| light.depth < longest) {
+        for light in self.context.vertices.iter().take_while(|light| light.depth < longest) {
             self.connect(vertex, light);
         }
     }
 
-    /// What a segment's length does to densities; rays of an orthographic camera do not spread.
+    /// Squared distance for the conversion of densities; 1 for the parallel rays of an orthographic camera.
     #[inline]
     fn distance2(&self, distance: f32, scattered: Option<Scattered>) -> f32 {
         if scattered.is_none() && self.shared.camera_paths.camera.is_orthographic() { 1.0 } else { distance * distance }
     }
 
-    /// Whether the work of a path that has grown long is in vain.
+    /// Whether the iteration is aborted. Checked at every few vertices only.
     #[inline]
     fn is_given_up(&self, depth: u32) -> bool {
         depth.is_multiple_of(ABORT_CHECK_INTERVAL) && self.shared.camera_paths.stop.is_some_and(Stop::should_abort)
     }
 }
 
-impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
+impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
@@ -271,35 +285,41 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
             camera_paths.scene.lights.emitted(&camera_paths.scene.materials, &self.last, vertex.surface, vertex.wo)
         {
             let group = camera_paths.scene.lights.surface_group(vertex.surface);
-            self.run_into((vertex.throughput * radiance, group), vertex.depth, vertex.surface.p, &density);
+            let hit = LightHit { depth: vertex.depth, at: vertex.surface.p };
+            self.hit_light(vertex.throughput * radiance, group, hit, &density);
         }
         let smooth = vertex.shading.bsdf.lobes().intersects(LobeSet::SMOOTH);
         if smooth && vertex.depth < camera_paths.max_depth {
             if techniques.connect {
                 self.connect_all(vertex);
             }
-            if let (true, Some(photons)) = (techniques.camera_vertex_merges(vertex.depth), self.meets.photons) {
+            if let (true, Some(photons)) = (techniques.camera_vertex_merges(vertex.depth), self.context.photons) {
                 let sample = &mut *self.sample;
-                let longest = camera_paths.max_depth - vertex.depth;
                 let add = |class: PathClass, level: usize, radiance: Rgb| {
                     *match class.part() {
                         Part::Volume => &mut sample.volume_photons[level],
-                        // Only where all is merged, which has one level.
+                        // With bidirectional photon mapping, which has one level.
                         Part::Emission | Part::Direct => &mut sample.direct,
                         Part::Caustic => &mut sample.caustic_photons[level],
                         Part::Indirect => &mut sample.indirect_photons[level],
                     } += radiance;
                 };
-                let own = one_merge(self.history.delta);
-                let seen = (self.history.suffix, camera_paths.classes);
-                let merging = (photons, self.meets.levels);
-                if !merge_photons(merging, vertex, (&self.mis, own), seen, longest, self.record, add) {
+                let merge = Merge {
+                    photons,
+                    levels: self.context.levels,
+                    mis: &self.mis,
+                    own: one_merge(self.history.delta),
+                    suffix: self.history.suffix,
+                    classes: camera_paths.classes,
+                    longest: camera_paths.max_depth - vertex.depth,
+                };
+                if !merge.run(vertex, self.record, add) {
                     self.sample.reject(Cause::Photons);
                 }
             }
         }
         self.history.leave(Some(vertex.shading.bsdf.lobes()));
-        // One that is to run into a light has its end there.
+        // A path restricted to hit a light ends there, too.
         if !self.history.leads(camera_paths.classes)
             || self.shared.ends_camera_path(vertex.depth)
             || self.is_given_up(vertex.depth)
@@ -307,7 +327,7 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
             return Next::Stop;
         }
         self.last = vertex.receiver();
-        // Without connections and merging only what mirrors and clear glass show is left to find.
+        // Without connections and merging, only light through mirrors and clear glass is left to find.
         Next::Continue(if techniques.connect || techniques.merge { LobeSet::ALL } else { LobeSet::DELTA })
     }
 
@@ -321,12 +341,8 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
         self.depth = hit.depth;
         let cos = hit.wo.dot(hit.surface.ng).abs();
         self.mis = self.mis.arrive(self.distance2(hit.distance, scattered), cos).fly(hit.flight);
-        self.run_into(
-            (hit.throughput * radiance, lights.surface_group(&hit.surface)),
-            hit.depth,
-            hit.surface.p,
-            &density,
-        );
+        let (group, at) = (lights.surface_group(&hit.surface), hit.surface.p);
+        self.hit_light(hit.throughput * radiance, group, LightHit { depth: hit.depth, at }, &density);
         (self.mis, self.history, self.depth) = before;
     }
 
@@ -377,19 +393,19 @@ impl<'a, R: Record> Visitor<'a> for CameraWalk<'_, R> {
         let (last, onward) = (self.last, lights.entry_pdf_a(self.last.p, direction));
         lights.for_each_infinite(&last, direction, scattered.is_none(), |radiance, direct, start, group| {
             let density = EmissionDensity { direct, start, onward, cos: 1.0, infinite: true, delta: false };
-            self.run_into((throughput * radiance, group), 0, direction, &density);
+            self.hit_light(throughput * radiance, group, LightHit { depth: 0, at: direction }, &density);
         });
     }
 }
 
 impl Bidirectional<'_> {
-    /// Walks a camera path and measures all levels, into `measure` in place of what was there.
+    /// Walks a camera path and overwrites `sample` with its light at all levels.
     #[inline]
-    pub fn camera_path<R: Record>(
+    pub fn camera_path<R: PathRecorder>(
         &self,
         arena: &Bump,
         (start, stream): &(PathStart, Stream),
-        meets: &CameraWalkContext<'_>,
+        context: &CameraWalkContext<'_>,
         record: &mut R,
         sample: &mut PixelSample,
     ) {
@@ -398,7 +414,7 @@ impl Bidirectional<'_> {
         let pdf_w = camera_paths.camera.pdf_w(start.direction) * self.pixels();
         let mut visitor = CameraWalk {
             shared: self,
-            meets,
+            context,
             mis: MisState::camera(self.light_paths, pdf_w),
             history: PathHistory::START,
             last: Receiver::anywhere(start.origin),

@@ -1,6 +1,6 @@
-//! Light paths of the bidirectional methods: what one leaves behind.
+//! Light paths of the bidirectional methods.
 
-use super::bidirectional::{Bidirectional, MergeLevels, Record, Technique};
+use super::bidirectional::{Bidirectional, MergeLevels, PathRecorder, Technique};
 use super::cause::Cause;
 use super::light::{Emitted, LightPaths};
 use super::light_vertex::{LightVertex, Scatterer};
@@ -9,7 +9,7 @@ use super::photon_merge::MergePhoton;
 use super::pixel_sample::PixelSample;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::camera_token;
-use super::shares::{shares, wanted};
+use super::shares::{Incident, PathHalves, shares, wanted};
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::walk;
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
@@ -19,25 +19,25 @@ use crate::medium::FlightDensity;
 use crate::plan::{CameraSuffix, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 
-/// Light that a light path sends to a pixel. Its weight waits for that pixel's bandwidths.
+/// Light that a light path sends to a pixel. Its weight depends on the bandwidths of that pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Splat {
     /// Index of the pixel, row by row.
     pub pixel: u32,
-    /// Depth of the light path's vertex.
+    /// Depth of the light vertex.
     pub light: u32,
-    /// What it is, and of what lights.
+    /// Class of the path.
     pub class: PathClass,
-    /// See `class`.
+    /// Group of the light.
     pub group: Group,
-    /// Radiance of the pixel, unweighted.
+    /// Radiance, without weight.
     pub value: Rgb,
-    /// What its weight comes from.
+    /// Ratios that determine the weight.
     pub ratios: Ratios,
 }
 
 impl Splat {
-    /// Adds the weighted light to the pixel's measure.
+    /// Adds the weighted light to the pixel's sample.
     #[inline]
     pub fn apply(&self, levels: &MergeLevels, sample: &mut PixelSample) {
         if !self.value.is_finite() {
@@ -47,11 +47,11 @@ impl Splat {
     }
 }
 
-/// Adds light to all levels of a measure, each with its own weight.
+/// Adds light to all levels of a sample, each with its weight.
 #[inline]
 pub(super) fn add(sample: &mut PixelSample, levels: &MergeLevels, class: PathClass, value: Rgb, ratios: Ratios) {
     let into = match class.part() {
-        // Neither can be merged before its first vertex, so no eta is in their weights.
+        // Such paths are not merged, so their weights do not depend on eta.
         Part::Emission => return sample.emission += value * ratios.weight(levels.eta()[0]),
         Part::Direct => return sample.direct += value * ratios.weight(levels.eta()[0]),
         Part::Caustic => &mut sample.caustic_photons,
@@ -63,22 +63,22 @@ pub(super) fn add(sample: &mut PixelSample, levels: &MergeLevels, class: PathCla
     }
 }
 
-/// Vertices of one light path, for the camera path it belongs to.
+/// Vertices of one light path, for its camera path.
 pub type LightVertices<'s> = bumpalo::collections::Vec<'s, LightVertex<'s>>;
 
-/// What light paths leave for others than their own camera path.
+/// What light paths leave besides vertices.
 #[derive(Default)]
 pub struct Deposits {
-    /// For the film, of all paths so far.
+    /// Light for pixels, of all paths so far.
     pub splats: Vec<Splat>,
-    /// For the next pass, of all paths so far.
+    /// Photons for the next iteration, of all paths so far.
     pub photons: Vec<MergePhoton>,
-    /// Paths that ended because their weight was not finite.
+    /// Number of paths that ended because their throughput was not finite.
     pub lost: u64,
 }
 
 impl Deposits {
-    /// Nothing is left; the lists keep their room.
+    /// Empties the lists and keeps their capacity.
     pub fn clear(&mut self) {
         self.splats.clear();
         self.photons.clear();
@@ -89,7 +89,7 @@ impl Deposits {
 struct LightWalk<'a, 's, R> {
     shared: &'a Bidirectional<'a>,
     mis: MisState,
-    /// Where it comes from, and of what group that is.
+    /// Index of the light.
     light: u32,
     group: Group,
     infinite: bool,
@@ -102,7 +102,7 @@ struct LightWalk<'a, 's, R> {
     record: &'a mut R,
 }
 
-impl<R: Record> LightWalk<'_, '_, R> {
+impl<R: PathRecorder> LightWalk<'_, '_, R> {
     #[inline(always)]
     fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: FlightDensity, scattered: Option<Scattered>) {
         if let Some(scattered) = scattered {
@@ -118,8 +118,9 @@ impl<R: Record> LightWalk<'_, '_, R> {
 
     fn connect_camera<S: ScatterPoint>(&mut self, vertex: &S) {
         let Bidirectional { camera_paths, techniques, light_paths, .. } = self.shared;
-        let (draws, seen) = (vertex.draws(), (CameraSuffix::START, self.prefix));
-        if !wanted(vertex, seen.0, seen.1, camera_paths.classes) {
+        let draws = vertex.draws();
+        let halves = PathHalves { suffix: CameraSuffix::START, prefix: self.prefix };
+        if !wanted(vertex, halves, camera_paths.classes) {
             return;
         }
         let Some(sample) = camera_paths.camera.sample(vertex.p(), draws.two(Purpose::Lens)) else { return };
@@ -127,10 +128,10 @@ impl<R: Record> LightWalk<'_, '_, R> {
             return;
         }
         let (f, _) = vertex.evaluate_cos(sample.wi, Transport::Importance, LobeSet::ALL);
-        // Density of the rays of one pixel.
+        // Density of the camera paths of one pixel.
         let pdf_a = sample.importance * self.shared.pixels();
         let value = vertex.throughput() * f * (pdf_a / light_paths);
-        // What is no number is the end of the sample that it would have come to, and costs no ray.
+        // A NaN rejects the sample of the pixel, so no ray is traced.
         if value.is_nan() {
             if let Some(((x, y), _)) = camera_paths.camera.sample_pixel(sample.film, || draws.two(Purpose::Splat)) {
                 let (pixel, light, group) = (y * camera_paths.camera.size().0 + x, vertex.depth(), self.group);
@@ -163,14 +164,15 @@ impl<R: Record> LightWalk<'_, '_, R> {
             };
             let value = value * weight;
             let (pixel, light, group) = (y * camera_paths.camera.size().0 + x, vertex.depth(), self.group);
-            let shares = shares(vertex, seen, (sample.wi, Transport::Importance, f), camera_paths.classes);
+            let incident = Incident { wi: sample.wi, transport: Transport::Importance, f };
+            let shares = shares(vertex, halves, incident, camera_paths.classes);
             let splat = |(class, share)| Splat { pixel, light, class, group, value: value * share, ratios };
             self.left.splats.extend(shares.iter().map(splat));
         }
     }
 }
 
-impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
+impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 's>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, merged_paths, .. } = self.shared;
@@ -183,14 +185,14 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
         );
         let lobes = vertex.shading.bsdf.lobes();
         self.lobes = Some(lobes);
-        // Whatever the lobes just here: photons measure the light that arrives around a merging point, across borders
+        // Whatever lobes the point has: photons represent the light that arrives around a merging point, across borders
         // of materials.
         if lobes != LobeSet::DELTA
             && techniques.light_vertex_merges(vertex.depth)
             && vertex.depth < camera_paths.max_depth
         {
             let flux = vertex.throughput / *merged_paths;
-            self.left.photons.push(MergePhoton::new(vertex, flux, (self.prefix, self.group), &self.mis));
+            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis));
         }
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && lobes.intersects(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth
@@ -259,7 +261,7 @@ impl<'s, R: Record> Visitor<'s> for LightWalk<'_, 's, R> {
     }
 }
 
-/// The sums after a vertex has scattered; `back` is the transport of the other side's paths.
+/// MIS state after a surface vertex has scattered; `back` is the transport of the opposite subpath.
 #[inline]
 pub(super) fn scatter(
     mis: MisState,
@@ -276,26 +278,26 @@ pub(super) fn scatter(
 }
 
 impl<'s> Bidirectional<'s> {
-    /// Walks light path `index` of `pass`, which adds its vertices; with `photons_only` it leaves only those.
+    /// Walks light path `index`, which leaves vertices, splats and photons; with `photons_only` it leaves photons only.
     #[inline]
-    pub fn light_path<R: Record>(
+    pub fn light_path<R: PathRecorder>(
         &self,
-        pass: &LightPaths,
+        paths: &LightPaths,
         index: u32,
         photons_only: bool,
         vertices: &mut LightVertices<'s>,
         left: &mut Deposits,
         record: &mut R,
     ) {
-        let Some(emitted) = pass.emit(self.camera_paths.scene, self.initial_media, index) else { return };
-        self.light_path_of(pass, &emitted, photons_only, vertices, left, record);
+        let Some(emitted) = paths.emit(self.camera_paths.scene, self.initial_media, index) else { return };
+        self.light_path_of(paths, &emitted, photons_only, vertices, left, record);
     }
 
-    /// The same of a light path that begins so.
+    /// Walks the light path that starts with `emitted`.
     #[inline]
-    pub fn light_path_of<R: Record>(
+    pub fn light_path_of<R: PathRecorder>(
         &self,
-        pass: &LightPaths,
+        paths: &LightPaths,
         emitted: &Emitted,
         photons_only: bool,
         vertices: &mut LightVertices<'s>,
@@ -305,7 +307,7 @@ impl<'s> Bidirectional<'s> {
         let camera_paths = &self.camera_paths;
         let arena = vertices.bump();
         let mut start = emitted.start;
-        start.throughput *= pass.count() as f32;
+        start.throughput *= paths.count() as f32;
         let mut visitor = LightWalk {
             shared: self,
             mis: MisState::light(&emitted.density),

@@ -1,4 +1,4 @@
-//! Where the paths of a render start: the solids around the camera and around each light.
+//! Initial media: the solids around the camera and around each light, where paths start.
 
 use super::interior::Interior;
 use crate::camera::Camera;
@@ -7,17 +7,17 @@ use crate::math::Vec3;
 use crate::scene::Scene;
 use std::collections::HashMap;
 
-/// The solids around the points where paths of one kind start.
+/// The solids around the points where paths from one camera or light start.
 #[derive(Clone, Copy, Debug)]
 pub enum InitialMedium {
-    /// The same around all of them.
+    /// The solids are the same for all points.
     Same(Interior),
-    /// The surface of a solid lies between them: each is looked at.
+    /// The points may lie on both sides of a solid's surface, so each is queried.
     Differs,
 }
 
 impl InitialMedium {
-    /// InitialMedium one of the points.
+    /// The solids around one of the points.
     #[inline]
     pub fn at(&self, scene: &Scene, p: Vec3) -> Interior {
         match self {
@@ -29,37 +29,37 @@ impl InitialMedium {
 
 /// The solids around the camera and around each light.
 pub struct InitialMedia {
-    /// InitialMedium the camera.
+    /// Around the camera.
     pub camera: InitialMedium,
-    /// InitialMedium the lights, by index; empty when the scene has no solids.
+    /// Around the lights, by index; empty when the scene has no solids.
     lights: Vec<InitialMedium>,
 }
 
 impl InitialMedia {
-    /// Looks around the points where a camera's rays start, and those of every light.
+    /// Finds the solids around all points where rays of the camera and of the lights start.
     pub fn of(scene: &Scene, camera: &Camera) -> InitialMedia {
         let mut initial_media = InitialMedia::new(scene, camera.position());
         let starts = Extent::of(camera.origins());
-        if scene.survey.solids && Solid::all(scene).iter().any(|solid| solid.meets(scene, &starts)) {
+        if scene.survey.solids && Solid::all(scene).iter().any(|solid| solid.intersects(scene, &starts)) {
             initial_media.camera = InitialMedium::Differs;
         }
         initial_media
     }
 
-    /// The same of a camera whose rays start in one point.
+    /// Finds the solids around all lights, and around a camera at a single point.
     pub fn new(scene: &Scene, camera: Vec3) -> InitialMedia {
         let lights = if scene.survey.solids { around_lights(scene) } else { Vec::new() };
         InitialMedia { camera: InitialMedium::Same(Interior::at(scene, camera)), lights }
     }
 
-    /// InitialMedium a point just off light `index`.
+    /// The solids around a point just off light `index`.
     #[inline]
     pub fn light(&self, scene: &Scene, index: u32, p: Vec3) -> Interior {
         self.lights.get(index as usize).map_or(Interior::default(), |around| around.at(scene, p))
     }
 }
 
-/// A box along the axes.
+/// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
     low: Vec3,
@@ -72,7 +72,7 @@ impl Extent {
         points.into_iter().fold(nothing, |extent, p| Extent { low: extent.low.min(p), high: extent.high.max(p) })
     }
 
-    fn meets(&self, other: &Extent) -> bool {
+    fn intersects(&self, other: &Extent) -> bool {
         self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
     }
 }
@@ -84,19 +84,19 @@ struct Solid {
 }
 
 impl Solid {
-    /// Those of a scene.
+    /// All solids of a scene.
     fn all(scene: &Scene) -> Vec<Solid> {
         let instances = (0..).zip(&scene.shapes.instances);
         let solid = instances.filter(|(_, i)| scene.materials.list[i.material as usize].is_solid_glass());
         solid.map(|(instance, _)| Solid { instance, extent: extent(scene, instance) }).collect()
     }
 
-    /// Whether its surface may pass a box: the box around one of its triangles meets it.
-    fn meets(&self, scene: &Scene, other: &Extent) -> bool {
+    /// Whether the bounding box of one of its triangles intersects `other`.
+    fn intersects(&self, scene: &Scene, other: &Extent) -> bool {
         let instance = &scene.shapes.instances[self.instance as usize];
         let mesh = &scene.shapes.meshes[instance.mesh as usize];
-        let passes = |primitive| Extent::of(instance.corners(mesh, primitive)).meets(other);
-        self.extent.meets(other) && (0..mesh.triangles.len() as u32).any(passes)
+        let passes = |primitive| Extent::of(instance.corners(mesh, primitive)).intersects(other);
+        self.extent.intersects(other) && (0..mesh.triangles.len() as u32).any(passes)
     }
 }
 
@@ -105,21 +105,21 @@ fn extent(scene: &Scene, instance: u32) -> Extent {
     Extent::of(scene.shapes.meshes[instance.mesh as usize].positions.iter().map(|&p| instance.point(p)))
 }
 
-/// By emitter. A lamp's triangle is looked at as a whole where the lamp is clear of the surfaces of all solids, or the
-/// triangle of the solids that they bound.
+/// The initial medium of each emitter. It is the same for all points of a triangle unless bounding boxes of the
+/// triangle and of a solid intersect, and the solid's surface may cross the whole light.
 fn around_lights(scene: &Scene) -> Vec<InitialMedium> {
     let solids = Solid::all(scene);
     let mut crossed: HashMap<u32, Vec<&Solid>> = HashMap::new();
     let mut around = |emitter: &Emitter| {
         if let Emitter::Triangle { instance, two_sided, corners: [a, b, c], .. } = emitter {
             let crossed = crossed.entry(*instance).or_insert_with(|| {
-                let lamp = extent(scene, *instance);
-                // A lamp that gives light from its front alone is before its own surface everywhere.
+                let light = extent(scene, *instance);
+                // A one-sided light emits on one side of its own surface only.
                 let others = solids.iter().filter(|solid| *two_sided || solid.instance != *instance);
-                others.filter(|solid| solid.meets(scene, &lamp)).collect()
+                others.filter(|solid| solid.intersects(scene, &light)).collect()
             });
             let own = Extent::of([*a, *a + *b, *a + *c]);
-            if crossed.iter().any(|solid| solid.extent.meets(&own)) {
+            if crossed.iter().any(|solid| solid.extent.intersects(&own)) {
                 return InitialMedium::Differs;
             }
         }

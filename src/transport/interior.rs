@@ -163,7 +163,7 @@ impl Interior {
     /// The solids around the start of a light path, without those that it enters because their surfaces lie on the
     /// light.
     #[cold]
-    pub fn before(mut self, scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Interior {
+    pub fn before_entering(mut self, scene: &Scene, place: &ContactPoint, direction: Vec3, token: u32) -> Interior {
         for surface in contact::surfaces_after(scene, place, direction, token) {
             if direction.dot(surface.ng) < 0.0 {
                 self.remove(scene, surface.instance);

@@ -17,11 +17,12 @@ use crate::spectrum::{Band, IterationWavelengths, WavelengthSample};
 use crate::stop::Stop;
 use bumpalo::Bump;
 
-/// The light paths of one pass: their number, and the points their emission is drawn from, rescrambled every pass.
+/// The light paths of one iteration: their number, and the low-discrepancy points of their emission, which are
+/// scrambled anew for each iteration.
 #[derive(Clone, Copy)]
 pub struct LightPaths<'a> {
     streams: Streams,
-    paths: u32,
+    count: u32,
     max_depth: u32,
     choice: SobolPair,
     point: SobolPair,
@@ -33,41 +34,49 @@ pub struct LightPaths<'a> {
     stop: Option<&'a Stop>,
 }
 
-/// Light paths between two looks at whether they are given up.
+/// Number of light paths between two checks whether the iteration is aborted.
 const ABORT_CHECK_INTERVAL: u32 = 16;
 
-/// How a light path begins.
+/// The start of a light path.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitted {
-    /// Its start.
+    /// First ray and throughput.
     pub start: PathStart,
     /// Random numbers of the path.
     pub stream: Stream,
-    /// The light cannot be hit by a ray.
+    /// Rays cannot hit the light.
     pub delta: bool,
     /// Index of the light.
     pub light: u32,
     /// Densities of the start.
     pub density: EmissionDensity,
-    /// Component of the guide that made it; [`guide::UNGUIDED`] where there is none.
+    /// Component of the guide that sampled it; [`guide::UNGUIDED`] without a guide.
     pub cell: usize,
-    /// Density of unguided emission, without a region of interest, over that of the guide; 1 where there is no guide.
+    /// Density of unguided emission without a region of interest over the guide's density; 1 without a guide.
     pub ratio: f32,
-    /// Density of starts that are drawn by power alone over that of the guide; 1 where there is no guide.
+    /// Density of starts sampled by power alone over the guide's density; 1 without a guide.
     pub weight: f32,
-    /// Share of the start's density that paths of all light have, without those sent where caustics are made.
+    /// Fraction of the start's density that is not aimed at what makes caustics.
     pub unaimed: f32,
 }
 
+/// Random numbers of the emission of a light path.
+struct EmissionDraws {
+    /// Choice of the light, and of how it is aimed.
+    choice: DVec2,
+    point: Vec2,
+    direction: Vec2,
+}
+
 impl<'a> LightPaths<'a> {
-    /// Pass `pass` of `paths` light paths.
-    pub fn new(seed: u64, pass: u64, domain: Domain, paths: u32, max_depth: u32) -> LightPaths<'a> {
-        let key = mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(pass.wrapping_mul(GOLDEN)) ^ domain as u64);
-        let pair = |i: u64| SobolPair::new(key.wrapping_add(i));
+    /// `count` light paths of iteration `i`.
+    pub fn new(seed: u64, i: u64, domain: Domain, count: u32, max_depth: u32) -> LightPaths<'a> {
+        let key = mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(i.wrapping_mul(GOLDEN)) ^ domain as u64);
+        let pair = |k: u64| SobolPair::new(key.wrapping_add(k));
         let (choice, point, direction) = (pair(1), pair(2), pair(3));
         LightPaths {
-            streams: Streams::new(seed, pass, domain),
-            paths,
+            streams: Streams::new(seed, i, domain),
+            count,
             max_depth,
             choice,
             point,
@@ -80,43 +89,43 @@ impl<'a> LightPaths<'a> {
         }
     }
 
-    /// The same with emission guided, if there is a guide.
+    /// Guides emission, if there is a guide.
     pub fn guided(self, guide: Option<&'a Guide>) -> LightPaths<'a> {
         LightPaths { guide, ..self }
     }
 
-    /// The same with part of the light from infinity through a region, if there is one.
+    /// Sends part of the light from infinity through a region of interest, if there is one.
     #[must_use]
     pub fn lighting(self, region: Option<Region>) -> LightPaths<'a> {
         LightPaths { region, ..self }
     }
 
-    /// The same with other draws for all but emission, whose points are spread over the paths of a pass.
+    /// Replaces all random numbers except those of emission, whose points are stratified over the paths of an
+    /// iteration.
     #[must_use]
     pub fn drawing(self, streams: Streams) -> LightPaths<'a> {
         LightPaths { streams, ..self }
     }
 
-    /// For camera paths to which photons bring no other classes than `wanted`: none, if that is none; else without those
-    /// of caustics, or with those alone.
+    /// Limits photons to the kinds that find the classes in `wanted`. Without any class no paths are traced.
     #[must_use]
     pub fn wanting(self, wanted: ClassSet, indirect: Indirect) -> LightPaths<'a> {
-        LightPaths { paths: if wanted.is_empty() { 0 } else { self.paths }, kinds: indirect.kinds(wanted), ..self }
+        LightPaths { count: if wanted.is_empty() { 0 } else { self.count }, kinds: indirect.kinds(wanted), ..self }
     }
 
-    /// Whose paths take no other wavelengths than these.
+    /// Limits the wavelengths of the paths to those of an iteration.
     #[must_use]
     pub fn with(self, wavelengths: IterationWavelengths) -> LightPaths<'a> {
         LightPaths { wavelengths: Some(wavelengths), ..self }
     }
 
-    /// Which ends where its iteration is given up.
+    /// Stops tracing when `stop` aborts the iteration.
     #[must_use]
     pub fn stopped_by(self, stop: &'a Stop) -> LightPaths<'a> {
         LightPaths { stop: Some(stop), ..self }
     }
 
-    /// Whether path `index` and all others of its iteration are given up.
+    /// Whether the iteration is aborted. Checked at every few paths only; `index` is that of the path.
     #[inline]
     pub fn is_given_up(&self, index: u32) -> bool {
         index.is_multiple_of(ABORT_CHECK_INTERVAL) && self.stop.is_some_and(Stop::should_abort)
@@ -128,7 +137,7 @@ impl<'a> LightPaths<'a> {
         self.wavelength_sample_of(self.stream(u64::from(index)))
     }
 
-    /// The wavelength of a path with these draws.
+    /// The wavelength of the path with these random numbers.
     #[inline]
     pub fn wavelength_sample_of(&self, stream: Stream) -> WavelengthSample {
         let wavelength = WavelengthSample::new(stream.vertex(0).one(Purpose::Wavelength));
@@ -137,7 +146,7 @@ impl<'a> LightPaths<'a> {
 
     /// Number of light paths.
     pub fn count(&self) -> u32 {
-        self.paths
+        self.count
     }
 
     #[inline]
@@ -145,20 +154,24 @@ impl<'a> LightPaths<'a> {
         self.streams.path(index)
     }
 
-    /// The beginning of path `index`, its flux divided by the number of paths.
+    /// The start of path `index`. Its flux is divided by the number of paths.
     #[inline]
     pub fn emit(&self, scene: &Scene, initial_media: &InitialMedia, index: u32) -> Option<Emitted> {
-        let draws = (self.choice.point_f64(index), self.point.point(index), self.direction.point(index));
+        let draws = EmissionDraws {
+            choice: self.choice.point_f64(index),
+            point: self.point.point(index),
+            direction: self.direction.point(index),
+        };
         self.emit_by(scene, initial_media, self.stream(u64::from(index)), draws)
     }
 
-    /// The beginning of a path all of whose draws are those of `stream`.
+    /// The start of a path whose random numbers all come from `stream`.
     pub fn emit_from(&self, scene: &Scene, initial_media: &InitialMedia, stream: Stream) -> Option<Emitted> {
         let draws = stream.vertex(0);
         let choice =
             DVec2::new(draws.one_fine(Purpose::EmitterChoice), f64::from(draws.nth(1).one(Purpose::EmitterChoice)));
         let (point, direction) = (draws.two(Purpose::EmitterPoint), draws.two(Purpose::EmitterDirection));
-        self.emit_by(scene, initial_media, stream, (choice, point, direction))
+        self.emit_by(scene, initial_media, stream, EmissionDraws { choice, point, direction })
     }
 
     #[inline(always)]
@@ -167,7 +180,7 @@ impl<'a> LightPaths<'a> {
         scene: &Scene,
         initial_media: &InitialMedia,
         stream: Stream,
-        (choice, point, direction): (DVec2, Vec2, Vec2),
+        EmissionDraws { choice, point, direction }: EmissionDraws,
     ) -> Option<Emitted> {
         let (lights, shapes, materials) = (&scene.lights, &scene.shapes, &scene.materials);
         let (emission, cell, ratio, weight, unaimed) = match self.guide {
@@ -183,18 +196,19 @@ impl<'a> LightPaths<'a> {
                 (emission, guide::UNGUIDED, 1.0, 1.0, unaimed / mixed)
             }
         };
-        let mut flux = emission.flux / self.paths as f32;
+        let mut flux = emission.flux / self.count as f32;
         if emission.infinite
             && let Some(medium) = scene.medium
         {
-            // It has come through the medium that fills all space, from infinity.
+            // The light has crossed the medium that fills all space, from infinity.
             flux *= medium.transmittance(f32::INFINITY);
         }
         let (origin, direction) = (emission.origin, emission.direction);
         let mut interior = initial_media.light(scene, emission.light, origin);
         let leaving = ContactPoint::on_light(scene, emission.light, origin);
         if let Some(place) = &leaving {
-            interior = interior.before(scene, place, direction, token(scene, stream.vertex(0), Purpose::Alpha));
+            interior =
+                interior.before_entering(scene, place, direction, token(scene, stream.vertex(0), Purpose::Alpha));
         }
         Some(Emitted {
             start: PathStart {
@@ -220,80 +234,80 @@ impl<'a> LightPaths<'a> {
     }
 }
 
-/// Photons of some light paths, in the order of paths and vertices.
+/// Photons of several light paths, in the order of paths and vertices.
 #[derive(Default)]
 pub struct Photons {
-    /// On surfaces.
+    /// Photons on surfaces, by kind.
     pub surface: ByKind<Vec<Photon>>,
-    /// In media.
+    /// Photons in media.
     pub volume: Vec<VolumePhoton>,
-    /// Paths that ended because their weight was not finite.
+    /// Number of paths that ended because their throughput was not finite.
     pub lost: u64,
 }
 
-/// Leaves a photon at every vertex after the first (direct light is not the photons') that is not a perfect mirror or
-/// clear glass.
+/// Visitor that leaves a photon at every vertex after the first, except at perfect mirrors and clear glass. The first
+/// vertex receives direct light, which photons do not carry.
 ///
-/// Paths that were sent where caustics are made are many and carry little. After its first broad bounce such a path is
-/// one among those that light everything: it goes on with a probability, their share of the density of its start, and
-/// then carries as much as they do. Else bandwidths would be set by dense photons of little flux, and filled by sparse
-/// ones of much. But in a solid that scatters light, such as milk in a glass, it is one of the few that get there at
-/// all, and that scattering is what it was sent for: until it comes to an opaque surface it goes on as it is.
+/// Paths aimed at what makes caustics are many, and each carries little flux. After its first broad bounce such a path
+/// contributes to general indirect light. It survives with probability `unaimed`, and then carries as much flux as
+/// unaimed paths. Otherwise dense photons of low flux would set the bandwidths, and sparse photons of high flux would
+/// fill them. In a solid that scatters light, such as milk in a glass, the aimed paths are the ones that arrive, and
+/// they are aimed there for that scattering. So inside, thinning waits until the path meets an opaque surface.
 struct Deposit<'a> {
     scene: &'a Scene,
     photons: &'a mut Photons,
-    /// Lobes that a path goes on with.
+    /// Lobes by which a path continues.
     onward: LobeSet,
     kinds: ByKind<bool>,
     caustic: bool,
     flags: PhotonFlags,
-    /// A medium in a solid has scattered it, and it has come to nothing opaque since.
-    within: bool,
-    /// It has been made one among those that light everything.
+    /// A medium in a solid has scattered the path, and it has met nothing opaque since.
+    inside_solid: bool,
+    /// The roulette after the first broad bounce has taken place.
     thinned: bool,
-    /// The path may go on then, and its flux is multiplied by this.
+    /// Outcome of that roulette; a surviving path's flux is multiplied by `gain`.
     goes_on: bool,
     gain: f32,
-    /// What flux is multiplied by here.
+    /// Current factor of the flux.
     scale: f32,
-    /// What photons would weigh if it were 1; `None` where no light path is guided.
+    /// Weight of photons at a factor of 1; `None` if no light path is guided.
     weight: Option<f32>,
-    /// Vertices so far.
+    /// Number of vertices so far.
     vertices: u32,
 }
 
 impl<'a> Deposit<'a> {
-    /// Of a light path just begun, which goes on after a broad bounce with a probability.
+    /// The visitor of a light path that survives its first broad bounce with `probability`.
     fn new(
         scene: &'a Scene,
         photons: &'a mut Photons,
-        pass: &LightPaths,
+        paths: &LightPaths,
         emitted: &Emitted,
         probability: f32,
     ) -> Deposit<'a> {
-        let onward = if pass.kinds[Kind::Indirect as usize] { LobeSet::ALL } else { LobeSet::SHARP | LobeSet::DELTA };
+        let onward = if paths.kinds[Kind::Indirect as usize] { LobeSet::ALL } else { LobeSet::SHARP | LobeSet::DELTA };
         Deposit {
             scene,
             photons,
             onward,
-            kinds: pass.kinds,
+            kinds: paths.kinds,
             caustic: true,
             flags: if emitted.delta {
                 PhotonFlags::UNREACHABLE
             } else {
                 PhotonFlags::from_area_light(emitted.density.ray_density())
             },
-            within: false,
+            inside_solid: false,
             thinned: false,
             goes_on: emitted.stream.vertex(0).one(Purpose::Loss) < probability,
             gain: 1.0 / probability,
             scale: 1.0,
-            weight: pass.guide.is_some().then_some(emitted.weight),
+            weight: paths.guide.is_some().then_some(emitted.weight),
             vertices: 0,
         }
     }
 
-    /// At a vertex that a bounce has sent the path to: whether it goes on there.
+    /// Arrives at a vertex. Returns false if the path ends there.
     #[inline]
     fn arrives(&mut self, scattered: Option<Scattered>) -> bool {
         self.vertices += 1;
@@ -301,9 +315,9 @@ impl<'a> Deposit<'a> {
         if scattered.lobe != LobeSet::DELTA {
             self.flags = PhotonFlags::default();
         }
-        // A medium, which focuses nothing, is as broad as can be.
+        // Scattering in a medium counts as broad.
         self.caustic &= !scattered.lobe.intersects(LobeSet::BROAD);
-        if self.caustic || self.thinned || self.within {
+        if self.caustic || self.thinned || self.inside_solid {
             return true;
         }
         (self.thinned, self.scale) = (true, self.gain);
@@ -314,12 +328,12 @@ impl<'a> Deposit<'a> {
 impl<'a> Visitor<'a> for Deposit<'_> {
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
-        self.within &= vertex.shading.bsdf.transmits();
+        self.inside_solid &= vertex.shading.bsdf.transmits();
         if !self.arrives(scattered) {
             return Next::Stop;
         }
-        // Whatever the lobes just here: photons measure the light that arrives around a gathering point, across borders
-        // of materials and dark texels.
+        // Whatever lobes the point has: photons represent the light that arrives around a gathering point, across
+        // borders of materials and dark texels.
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {
@@ -340,7 +354,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
-        self.within = vertex.arrival.interior.host(self.scene).is_some();
+        self.inside_solid = vertex.arrival.interior.host(self.scene).is_some();
         if !self.arrives(scattered) {
             return Next::Stop;
         }
@@ -362,76 +376,75 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 }
 
-/// Traces light path `index` of the pass and appends its photons. Returns the component of the guide that made it, if
-/// it began at all, and how many vertices it had.
+/// Traces light path `index` and appends its photons. Returns the guide's component that sampled it and the number of
+/// its vertices; `None` if no light emits.
 #[inline]
 pub fn light_path(
     scene: &Scene,
     arena: &Bump,
     initial_media: &InitialMedia,
-    pass: &LightPaths,
+    paths: &LightPaths,
     index: u32,
     photons: &mut Photons,
 ) -> Option<(usize, u32)> {
-    let emitted = pass.emit(scene, initial_media, index)?;
-    let mut deposit = Deposit::new(scene, photons, pass, &emitted, emitted.unaimed);
-    walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, pass.max_depth, &mut deposit);
+    let emitted = paths.emit(scene, initial_media, index)?;
+    let mut deposit = Deposit::new(scene, photons, paths, &emitted, emitted.unaimed);
+    walk(scene, arena, &emitted.start, emitted.stream, Transport::Importance, paths.max_depth, &mut deposit);
     let vertices = deposit.vertices;
     Some((emitted.cell, vertices))
 }
 
-/// Flux of all lights (W), from the beginnings of light paths.
+/// Flux of all lights (W), estimated from starts of light paths.
 pub fn emitted_flux(scene: &Scene, initial_media: &InitialMedia) -> DVec3 {
     const SAMPLES: u32 = 4096;
-    let pass = LightPaths::new(0, 0, Domain::PilotLight, SAMPLES, u32::MAX);
-    let emitted = (0..SAMPLES).filter_map(|index| pass.emit(scene, initial_media, index));
+    let paths = LightPaths::new(0, 0, Domain::PilotLight, SAMPLES, u32::MAX);
+    let emitted = (0..SAMPLES).filter_map(|index| paths.emit(scene, initial_media, index));
     // `emit` divides by the number of paths.
     emitted.map(|emitted| emitted.start.throughput.as_dvec3()).sum()
 }
 
-/// Light paths of one channel, all of the same flux: lights send them in proportion to what they emit, and what a path
-/// would lose is the probability that it ends. So photons differ in number only, and their density alone tells where
-/// light varies \[CPPM 2020, 9.4\].
+/// Light paths of a single channel with equal flux. Lights send them in proportion to their emission, and losses become
+/// the probability that a path ends. So photons differ in number only, and their density follows the light \[CPPM 2020,
+/// 9.4\].
 #[derive(Clone, Copy, Debug)]
 pub struct EqualFlux {
     channel: usize,
-    /// Flux of a path (W), for passes of one path.
+    /// Flux (W) of a path if an iteration has one path only.
     flux: f32,
 }
 
 impl EqualFlux {
-    /// Of a channel (0 to 2): as much flux as a light path carries on average, so that paths are as many. A channel
-    /// that the sample has not seen may be that of a rare light: it gets the mean of all three, for any flux above zero
-    /// leaves every light what it is, in more paths or fewer. `None` where no light shines.
+    /// For a channel (0 to 2), with the mean flux of a light path, so that the number of paths stays the same. If the
+    /// sample sees no light in the channel, a rare light may still have some: any flux above zero is unbiased, and the
+    /// mean of all channels is used. `None` if no light shines.
     pub fn new(scene: &Scene, initial_media: &InitialMedia, channel: usize) -> Option<EqualFlux> {
         let flux = emitted_flux(scene, initial_media);
         let flux = if flux[channel] > 0.0 { flux[channel] } else { flux.element_sum() / 3.0 };
         (flux > 0.0).then_some(EqualFlux { channel, flux: flux as f32 })
     }
 
-    /// Traces what light path `index` of the pass stands for: copies of it, as many as the common flux goes into its
-    /// own on average.
+    /// Traces copies of light path `index`; their expected number is the path's own flux over the common flux.
     pub fn light_path(
         &self,
         scene: &Scene,
         arena: &mut Bump,
         initial_media: &InitialMedia,
-        pass: &LightPaths,
+        paths: &LightPaths,
         index: u32,
         photons: &mut Photons,
     ) {
-        let Some(emitted) = pass.emit(scene, initial_media, index) else { return };
-        let flux = self.flux / pass.paths as f32;
+        let Some(emitted) = paths.emit(scene, initial_media, index) else { return };
+        let flux = self.flux / paths.count as f32;
         let copies = emitted.start.throughput[self.channel] / flux;
         let copies = (copies + emitted.stream.vertex(0).one(Purpose::Loss)) as u64;
         let mut throughput = Rgb::ZERO;
         throughput[self.channel] = flux;
         let start = PathStart { throughput, channel: Some(self.channel), ..emitted.start };
         for copy in 0..copies {
-            let stream = if copy == 0 { emitted.stream } else { pass.stream(u64::from(index) | copy << 32) };
-            // All carry the same already.
-            let mut deposit = Deposit::new(scene, photons, pass, &emitted, 1.0);
-            walk(scene, arena, &start, stream, Transport::Importance, pass.max_depth, &mut deposit);
+            let stream = if copy == 0 { emitted.stream } else { paths.stream(u64::from(index) | copy << 32) };
+            // All copies carry equal flux already.
+            let mut deposit = Deposit::new(scene, photons, paths, &emitted, 1.0);
+            walk(scene, arena, &start, stream, Transport::Importance, paths.max_depth, &mut deposit);
             arena.reset();
         }
     }

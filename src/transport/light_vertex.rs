@@ -1,4 +1,4 @@
-//! Vertices of light paths that camera vertices are connected to.
+//! Vertices of light paths to which camera vertices are connected.
 
 use super::mis::MisState;
 use crate::bsdf::{LobeSet, Shading, Transport};
@@ -9,35 +9,35 @@ use crate::medium::HenyeyGreenstein;
 use crate::plan::LightPrefix;
 use crate::scene::contact::ContactPoint;
 
-/// How a light path's vertex scatters.
+/// Scattering at a light vertex.
 // Boxing the large variant would allocate once per vertex.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 pub enum Scatterer<'s> {
-    /// A surface.
+    /// A surface point with its BSDF.
     Surface(Surface, Shading<'s>),
-    /// A point of a medium.
+    /// A point in a medium with its phase function.
     Medium(Vec3, HenyeyGreenstein),
 }
 
-/// A light path's vertex that camera vertices can be connected to.
+/// A vertex of a light path to which camera vertices are connected.
 #[derive(Clone, Copy, Debug)]
 pub struct LightVertex<'s> {
-    /// Where and how it scatters.
+    /// Position and scattering.
     pub scatterer: Scatterer<'s>,
-    /// Unit direction towards where the light came from.
+    /// Unit direction towards the previous vertex.
     pub wo: Vec3,
-    /// Flux (W) of the path as if it were the only one.
+    /// Flux (W) as if the path were the only one.
     pub throughput: Rgb,
-    /// Number of segments up to here.
+    /// Number of segments up to the vertex.
     pub depth: u32,
-    /// Partial sums of the weights.
+    /// Partial sums of MIS weights.
     pub mis: MisState,
-    /// What has happened on the way here.
+    /// Class of the light path up to the vertex.
     pub prefix: LightPrefix,
-    /// The path has taken a wavelength, the one its camera path takes if it does.
+    /// The path has a wavelength; its camera path uses the same.
     pub dispersed: bool,
-    /// Of its light.
+    /// Group of the light that the path starts from.
     pub group: Group,
 }
 
@@ -51,13 +51,13 @@ impl LightVertex<'_> {
         }
     }
 
-    /// Whether it is in a medium.
+    /// Whether the vertex is in a medium.
     #[inline]
     pub fn in_medium(&self) -> bool {
         matches!(self.scatterer, Scatterer::Medium(..))
     }
 
-    /// Where a shadow ray of length `distance` ends that comes against `w`.
+    /// End of a shadow ray of length `distance` that arrives against `w`.
     #[inline]
     pub fn shadow_end(&self, w: Vec3, distance: f32) -> Vec3 {
         match &self.scatterer {
@@ -66,7 +66,7 @@ impl LightVertex<'_> {
         }
     }
 
-    /// The surface it is on, if others lie on that.
+    /// The surface of the vertex, if other surfaces lie on it.
     #[inline]
     pub fn touching(&self) -> Option<ContactPoint> {
         match &self.scatterer {
@@ -84,7 +84,7 @@ impl LightVertex<'_> {
         }
     }
 
-    /// Its lobes that are not delta.
+    /// Lobes that are not delta.
     #[inline]
     pub fn smooth(&self) -> LobeSet {
         match &self.scatterer {
@@ -93,13 +93,14 @@ impl LightVertex<'_> {
         }
     }
 
-    /// Scattering of its light into `wi` times the cosine, and the density of drawing `wi`.
+    /// Value of all lobes for light scattered into `wi`, times the cosine, and the density of sampling `wi`.
     #[inline]
     pub fn evaluate_cos(&self, wi: Vec3) -> (Rgb, f32) {
         self.evaluate_set_cos(wi, LobeSet::ALL)
     }
 
-    /// The same of some lobes; a medium has but one.
+    /// Value of the lobes in `set` for light scattered into `wi`, times the cosine, and the density of sampling `wi`.
+    /// In a medium `set` is ignored.
     #[inline]
     pub fn evaluate_set_cos(&self, wi: Vec3, set: LobeSet) -> (Rgb, f32) {
         match &self.scatterer {
@@ -111,7 +112,7 @@ impl LightVertex<'_> {
         }
     }
 
-    /// Density with which a camera path that comes along `wi` would go back along the light path.
+    /// Density with which a camera path that arrives along `wi` would continue along the light path.
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3) -> f32 {
         match &self.scatterer {

@@ -1,4 +1,4 @@
-//! Light transport: the one bounce loop, and the visitors that make algorithms of it.
+//! Light transport: the bounce loop ([`walk`]), and the visitors that make algorithms of it.
 
 mod bandwidths;
 pub mod bidirectional;
@@ -34,7 +34,7 @@ mod volume;
 mod walk;
 
 pub use bandwidths::{FoundPhotons, GatherBandwidths, LevelRadii, MAX_LEVELS, PhotonCounter};
-pub use bidirectional::{Bidirectional, Division, MergeLevels, Record, Technique, TechniqueSet};
+pub use bidirectional::{Bidirectional, Division, MergeLevels, PathRecorder, Technique, TechniqueSet};
 pub use bidirectional_camera::CameraWalkContext;
 pub use bidirectional_light::{Deposits, LightVertices, Splat};
 pub use camera_paths::{CameraPathStart, CameraPaths, Indirect};

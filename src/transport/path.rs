@@ -1,9 +1,9 @@
-//! Unidirectional path tracing with next-event estimation: the independent oracle.
+//! Unidirectional path tracing with next-event estimation; tests use it as an independent reference.
 //!
-//! It shares the walk with the other methods, but keeps its own two-way multiple importance sampling over all lobes of
-//! a vertex at once (`direct_light` splits them), so that the two check each other.
+//! It shares the walk with the other methods, but computes its own weights of two techniques, over all lobes of a
+//! vertex at once (`direct_light` treats two sets of lobes), so that tests can compare the two.
 
-use super::bidirectional::{Record, Technique};
+use super::bidirectional::{PathRecorder, Technique};
 use super::bidirectional_camera::{record_medium, record_surface};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
@@ -12,7 +12,7 @@ use super::path_history::PathHistory;
 use super::pixel_sample::PixelSample;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::token;
-use super::shares::{shares, wanted};
+use super::shares::{Incident, PathHalves, shares, wanted};
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{LobeSet, Transport};
@@ -36,8 +36,8 @@ struct PathTracer<'a, R> {
     record: &'a mut R,
 }
 
-impl<R: Record> PathTracer<'_, R> {
-    /// Weight of having run into an emitter: full where next-event estimation could not have found it.
+impl<R: PathRecorder> PathTracer<'_, R> {
+    /// Weight of hitting a light; 1 if next-event estimation could not have sampled it.
     fn weight(scattered: Option<Scattered>, pdf_light: f32) -> f32 {
         match scattered {
             Some(s) if !s.lobe.intersects(LobeSet::DELTA) => s.pdf_w / (s.pdf_w + pdf_light),
@@ -45,10 +45,11 @@ impl<R: Record> PathTracer<'_, R> {
         }
     }
 
-    /// Light straight from a light at a vertex.
+    /// Next-event estimation at a vertex.
     fn lit<S: ScatterPoint>(&mut self, vertex: &S) {
-        let (scene, draws, prefix) = (self.scene, vertex.draws(), LightPrefix::start(false));
-        if vertex.depth() >= self.max_depth || !wanted(vertex, self.history.suffix, prefix, self.classes) {
+        let (scene, draws) = (self.scene, vertex.draws());
+        let halves = PathHalves { suffix: self.history.suffix, prefix: LightPrefix::start(false) };
+        if vertex.depth() >= self.max_depth || !wanted(vertex, halves, self.classes) {
             return;
         }
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
@@ -69,13 +70,14 @@ impl<R: Record> PathTracer<'_, R> {
         let weight = if light.delta { 1.0 } else { light.pdf_w / (light.pdf_w + pdf) };
         let value = vertex.throughput() * (f * light.radiance * (weight / light.pdf_w) * visibility.transmittance);
         let technique = Technique::NextEvent { camera: self.depth };
-        let shares = shares(vertex, (self.history.suffix, prefix), (light.wi, Transport::Radiance, f), self.classes);
+        let incident = Incident { wi: light.wi, transport: Transport::Radiance, f };
+        let shares = shares(vertex, halves, incident, self.classes);
         for (class, share) in shares.iter() {
             self.add(technique, (class, scene.lights.group(light.light)), value * share, weight);
         }
     }
 
-    /// Adds weighted light.
+    /// Adds light whose weight is applied already.
     fn add(&mut self, technique: Technique, of: (PathClass, Group), light: Rgb, weight: f32) {
         let (class, _) = of;
         if !self.classes.has(class) {
@@ -97,16 +99,15 @@ impl<R: Record> PathTracer<'_, R> {
         } += light;
     }
 
-    /// What the walk does after the last vertex.
+    /// Decides how the walk continues.
     fn next(&self) -> Next {
         if self.history.leads(self.classes) { Next::Continue(LobeSet::ALL) } else { Next::Stop }
     }
 }
 
-impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
-    /// What ends early has to be made up for by what goes on with a larger weight. Roulette from the first bounce on
-    /// saves nearly half of the time, but doubles squared errors and more; a quarter is about where paths are worth
-    /// their time.
+impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
+    /// Roulette increases the weight of surviving paths. From the first bounce on, it would save nearly half of the
+    /// time but more than double squared errors; this value is about optimal.
     const SPARED: f32 = 0.25;
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
@@ -168,12 +169,12 @@ impl<'a, R: Record> Visitor<'a> for PathTracer<'_, R> {
     }
 }
 
-/// What one path measures, on one level, into `measure` in place of what was there.
+/// Traces one path and overwrites `sample` with its light, at level 0.
 pub fn path_sample(
     camera_paths: &CameraPaths<'_>,
     arena: &Bump,
     (start, stream): &(PathStart, Stream),
-    record: &mut impl Record,
+    record: &mut impl PathRecorder,
     sample: &mut PixelSample,
 ) {
     *sample = PixelSample::default();

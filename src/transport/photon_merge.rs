@@ -1,8 +1,8 @@
-//! Photons that are merged with multiple importance sampling.
+//! Merging of photons with multiple importance sampling.
 
-use super::bidirectional::{MergeLevels, Record, Technique};
+use super::bidirectional::{MergeLevels, PathRecorder, Technique};
 use super::mis::{self, Merges, MisState};
-use super::shares::Merged;
+use super::shares::PhotonShares;
 use super::vertex::Vertex;
 use crate::bsdf::{LobeSet, Transport};
 use crate::light::Group;
@@ -12,28 +12,28 @@ use crate::plan::{CameraSuffix, ClassSet, LightPrefix, PathClass};
 use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
-/// A light-path vertex, as small as merging in the next pass allows.
+/// A light vertex, reduced to the data that merging in the next iteration needs.
 #[derive(Clone, Copy, Debug)]
 pub struct MergePhoton {
     /// World position.
     pub p: Vec3,
-    /// Unit direction towards where the light came from.
+    /// Unit direction towards the previous vertex.
     pub wi: Vec3,
     /// Unit geometric normal of the surface.
     pub ng: Vec3,
-    /// Flux (W), already divided by the number of light paths of the pass.
+    /// Flux (W), already divided by the number of merged light paths of the iteration.
     pub flux: Rgb,
-    /// Partial sums of the weights: dVCM, and dVC's coefficients; the merges of a light path are of one kind.
+    /// Partial sums of MIS weights: dVCM, and the coefficients of dVC. Light paths have merges of one kind only.
     d_vcm: f32,
     plain: f32,
     merged: f32,
-    /// Segments of the light path up to here.
+    /// Number of segments of the light path.
     pub depth: u16,
-    /// What has happened on the way here.
+    /// Class of the light path.
     pub prefix: LightPrefix,
-    /// Of the light path's wavelength.
+    /// Band of the light path's wavelength.
     band: Band,
-    /// Of its light.
+    /// Group of the light that the path starts from.
     group: Group,
 }
 
@@ -54,8 +54,8 @@ impl Located for MergePhoton {
     }
 }
 
-/// A partial sum as a photon keeps it. What is too large for it leaves merging no weight, and may be anything large but
-/// infinite, of which nothing would be no number.
+/// A partial sum as a photon stores it. Merging has no weight against larger sums, so they are clamped; infinity times
+/// zero would give NaN.
 #[inline]
 fn single(sum: f64) -> f32 {
     sum.min(f64::from(f32::MAX)) as f32
@@ -64,12 +64,7 @@ fn single(sum: f64) -> f32 {
 impl MergePhoton {
     /// The photon that a light path leaves at `vertex`.
     #[inline]
-    pub fn new(
-        vertex: &Vertex<'_, '_>,
-        flux: Rgb,
-        (prefix, group): (LightPrefix, Group),
-        mis: &MisState,
-    ) -> MergePhoton {
+    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, prefix: LightPrefix, group: Group, mis: &MisState) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
@@ -85,7 +80,7 @@ impl MergePhoton {
         }
     }
 
-    /// Partial sums of the weights.
+    /// Partial sums of MIS weights.
     #[inline]
     pub fn mis(&self) -> MisState {
         let [d_vcm, plain, merged] = [self.d_vcm, self.plain, self.merged].map(f64::from);
@@ -93,61 +88,70 @@ impl MergePhoton {
     }
 }
 
-/// Merges the photons around `vertex`, of all levels with one query: calls `add(class, level, radiance)`. Returns whether
-/// all that was found is finite.
-#[inline]
-#[allow(clippy::too_many_arguments, reason = "what a merge needs, by reference")]
-pub(super) fn merge_photons<R: Record>(
-    (photons, levels): (&PhotonMap<MergePhoton>, &MergeLevels),
-    vertex: &Vertex<'_, '_>,
-    (mis, own): (&MisState, Merges),
-    (suffix, classes): (CameraSuffix, ClassSet),
-    longest: u32,
-    record: &mut R,
-    mut add: impl FnMut(PathClass, usize, Rgb),
-) -> bool {
-    let radii = levels.radius2();
-    let mut finite = true;
-    let Some(&largest) = radii.last() else { return finite };
-    let (ng, shading) = (vertex.surface.ng, vertex.shading);
-    let mut merged = Merged::new(vertex, suffix, classes);
-    photons.within(vertex.surface.p, largest, |photon, distance2| {
-        if !same_surface(photon, ng) || u32::from(photon.depth) > longest {
-            return;
-        }
-        let meets =
-            vertex.wavelength.as_ref().map_or(Some(Rgb::ONE), |wavelength| wavelength.connection_factor(photon.band));
-        let Some(weight) = meets else { return };
-        let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, LobeSet::ALL);
-        // Photons measure irradiance on the geometric surface where they are, see `Shading::gather`: the cosine in f
-        // belongs to a direction, not to them.
-        let cosine = photon.wi.dot(photon.ng).abs();
-        let value = vertex.throughput * f * photon.flux * weight / cosine;
-        if cosine <= 0.0 || !is_lit(value) {
-            finite &= cosine <= 0.0 || value.is_finite();
-            return;
-        }
-        finite &= value.is_finite();
-        let shares = merged.shares(photon.prefix, photon.wi, f);
-        let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
-        let ratios = mis::merge(&photon.mis(), mis, pdf, reverse, own);
-        let technique = Technique::Merge { light: u32::from(photon.depth), camera: vertex.depth };
-        record.contribution(technique, value, photon.p, ratios);
-        for (level, (&radius2, &eta)) in radii.iter().zip(levels.eta()).enumerate() {
-            if distance2 < radius2 {
-                let weight = ratios.merge_weight(eta);
-                for (class, share) in shares.iter() {
-                    record.arrival(
-                        technique,
-                        (class, photon.group),
-                        level,
-                        value * share * (FRAC_1_PI / radius2),
-                        weight,
-                    );
-                    add(class, level, value * share * (weight * FRAC_1_PI / radius2));
+/// Merging at one vertex of a camera path.
+pub(super) struct Merge<'a> {
+    pub photons: &'a PhotonMap<MergePhoton>,
+    pub levels: &'a MergeLevels,
+    /// Partial sums of the camera path.
+    pub mis: &'a MisState,
+    /// The vertex's [`mis::one_merge`].
+    pub own: Merges,
+    /// Class of the camera path up to the vertex.
+    pub suffix: CameraSuffix,
+    /// Classes that are switched on.
+    pub classes: ClassSet,
+    /// Largest number of segments of a photon's light path.
+    pub longest: u32,
+}
+
+impl Merge<'_> {
+    /// Merges the photons around `vertex` at all levels with one query. Calls `add(class, level, radiance)`. Returns
+    /// whether all contributions are finite.
+    #[inline]
+    pub fn run<R: PathRecorder>(
+        &self,
+        vertex: &Vertex<'_, '_>,
+        record: &mut R,
+        mut add: impl FnMut(PathClass, usize, Rgb),
+    ) -> bool {
+        let radii = self.levels.radius2();
+        let mut finite = true;
+        let Some(&largest) = radii.last() else { return finite };
+        let (ng, shading) = (vertex.surface.ng, vertex.shading);
+        let mut photon_shares = PhotonShares::new(vertex, self.suffix, self.classes);
+        self.photons.within(vertex.surface.p, largest, |photon, distance2| {
+            if !same_surface(photon, ng) || u32::from(photon.depth) > self.longest {
+                return;
+            }
+            let wavelength = vertex.wavelength.as_ref();
+            let factor = wavelength.map_or(Some(Rgb::ONE), |wavelength| wavelength.connection_factor(photon.band));
+            let Some(weight) = factor else { return };
+            let (f, pdf) = shading.evaluate_cos(photon.wi, Transport::Radiance, LobeSet::ALL);
+            // Photons represent irradiance on the geometric surface at their own position, see `Shading::gather`. The
+            // cosine in `f` belongs to the vertex.
+            let cosine = photon.wi.dot(photon.ng).abs();
+            let value = vertex.throughput * f * photon.flux * weight / cosine;
+            if cosine <= 0.0 || !is_lit(value) {
+                finite &= cosine <= 0.0 || value.is_finite();
+                return;
+            }
+            finite &= value.is_finite();
+            let shares = photon_shares.shares(photon.prefix, photon.wi, f);
+            let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
+            let ratios = mis::merge(&photon.mis(), self.mis, pdf, reverse, self.own);
+            let technique = Technique::Merge { light: u32::from(photon.depth), camera: vertex.depth };
+            record.contribution(technique, value, photon.p, ratios);
+            for (level, (&radius2, &eta)) in radii.iter().zip(self.levels.eta()).enumerate() {
+                if distance2 < radius2 {
+                    let weight = ratios.merge_weight(eta);
+                    for (class, share) in shares.iter() {
+                        let light = value * share * (FRAC_1_PI / radius2);
+                        record.arrival(technique, (class, photon.group), level, light, weight);
+                        add(class, level, value * share * (weight * FRAC_1_PI / radius2));
+                    }
                 }
             }
-        }
-    });
-    finite
+        });
+        finite
+    }
 }

@@ -1,4 +1,4 @@
-//! Where a camera path first gathers photons, and what a photon there would count in its pixel.
+//! The first vertex where a camera path gathers photons, and the contribution of a photon there.
 
 use super::camera_paths::CameraPaths;
 use super::direct::direct_light;
@@ -11,29 +11,30 @@ use crate::random::Stream;
 use bumpalo::Bump;
 use std::f32::consts::FRAC_1_PI;
 
-/// Where a camera path would gather photons first.
+/// The first point where a camera path gathers photons.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
     /// World position.
     pub p: Vec3,
     /// Unit geometric normal; [`crate::photon::NO_NORMAL`] in a medium.
     pub ng: Vec3,
-    /// Length of the camera path.
+    /// Length of the camera path up to the point; in a medium, up to the surface behind it, if there is one (scene
+    /// units).
     pub length: f32,
 }
 
-/// The first vertex of a camera path that gathers photons on a surface, and its light.
+/// The first surface vertex where a camera path gathers photons, with its light.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
-    /// Where it is.
+    /// Position of the vertex.
     pub point: GatherPoint,
-    /// Radiance that a photon adds to the pixel, per flux over area: that of a Lambertian surface of the same albedo.
+    /// Radiance that a photon adds to the pixel, per flux over area, for a Lambertian surface of the vertex's albedo.
     pub weight: Rgb,
     /// Radiance that direct light adds to the pixel.
     pub direct: Rgb,
 }
 
-/// Looks for the vertex, and at it.
+/// Visitor that finds the vertex and evaluates it with `look`.
 struct Find<F, T> {
     look: F,
     found: Option<(GatherPoint, T)>,
@@ -56,12 +57,12 @@ impl<'a, T, F: FnMut(&Vertex<'_, '_>) -> T> Visitor<'a> for Find<F, T> {
 }
 
 impl CameraPaths<'_> {
-    /// The first vertex of a camera path whose lobes gather photons.
+    /// The first surface point where a camera path gathers photons.
     pub fn gather_point(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<GatherPoint> {
         self.find(arena, start, |_| ()).map(|(point, ())| point)
     }
 
-    /// The same with its light.
+    /// The first surface vertex where a camera path gathers photons, with its light.
     pub fn probe(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<Probe> {
         let look = |vertex: &Vertex<'_, '_>| {
             let weight = vertex.throughput * vertex.shading.albedo(LobeSet::BROAD) * FRAC_1_PI;
@@ -84,8 +85,7 @@ impl CameraPaths<'_> {
 }
 
 impl CameraPaths<'_> {
-    /// The first vertex of a camera path in a medium that scatters. Its length is that of the path to the surface behind,
-    /// if there is one.
+    /// The first point of a scattering medium on a camera path.
     pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
         let mut find = FindVolumePoint { found: None, length: 0.0 };
         walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);

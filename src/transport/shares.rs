@@ -1,12 +1,10 @@
-//! Light that techniques find for all lobes of a vertex at once, told apart by class.
+//! Shares of light by class, for techniques that evaluate all lobes of a vertex at once.
 //!
-//! A vertex that has both broad and sharp lobes makes different things of the same light. What each makes of it is
-//! known, so their shares are exact. Where both are in one part of the picture and no class is switched off, nobody
-//! asks, and it costs nothing.
+//! At a vertex with broad and sharp lobes, light of one path belongs to two classes. The values of the lobes give exact
+//! shares. If both classes belong to one part of the picture and none is switched off, shares are not computed.
 //!
-//! A path drawn from all lobes of a vertex at once goes on as if by the lobe that drew it. That shares out light that
-//! it runs into in proportion to densities, not to the lobes' own values, which nearly agree: the sum of the classes is
-//! exact.
+//! A path that samples all lobes at once continues with the class of the lobe that it sampled. So light that it hits is
+//! shared in proportion to densities, which nearly agree with the values of the lobes; the sum over classes is exact.
 
 use super::light_vertex::LightVertex;
 use super::scattering_vertex::ScatterPoint;
@@ -14,7 +12,7 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, PathClass};
 
-/// Classes and their shares of some light, by channel.
+/// Classes of some light, and the share of each, by channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shares {
     list: [(PathClass, Rgb); 4],
@@ -32,20 +30,39 @@ impl Shares {
         }
     }
 
-    /// All are switched off.
+    /// Whether all classes are switched off.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Those that are not switched off.
+    /// Classes that are switched on, with their shares.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (PathClass, Rgb)> {
         self.list.into_iter().take(self.count)
     }
 }
 
-/// What smooth lobes are there, broad first.
+/// The two halves of a path that meet at a vertex; together they determine its class.
+#[derive(Clone, Copy)]
+pub(super) struct PathHalves {
+    /// Class of the camera path up to the vertex.
+    pub suffix: CameraSuffix,
+    /// Class of the light path up to the vertex.
+    pub prefix: LightPrefix,
+}
+
+/// Light that arrives at a vertex.
+#[derive(Clone, Copy)]
+pub(super) struct Incident {
+    /// Unit direction towards where the light comes from.
+    pub wi: Vec3,
+    pub transport: Transport,
+    /// Value of all lobes for this direction, times the cosine.
+    pub f: Rgb,
+}
+
+/// Events of the smooth lobes of a vertex, broad ones first.
 #[inline]
 fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
     match smooth {
@@ -56,54 +73,48 @@ fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
     }
 }
 
-/// Classes of light that comes to a vertex at the end of `sight` by `beam`: what its lobes make of it, broad ones
-/// first.
+/// Classes of the light of a path through a vertex, for its broad and its sharp lobes.
 #[inline]
-fn classes<S: ScatterPoint>(vertex: &S, suffix: CameraSuffix, prefix: LightPrefix) -> (PathClass, Option<PathClass>) {
+fn classes<S: ScatterPoint>(vertex: &S, halves: PathHalves) -> (PathClass, Option<PathClass>) {
     let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
-    let class = |event| suffix.then(event).class_with(prefix);
+    let class = |event| halves.suffix.then(event).class_with(halves.prefix);
     (class(first), second.map(class))
 }
 
-/// Whether any class of that light is wanted.
+/// Whether any class of a path through a vertex is switched on.
 #[inline]
-pub(super) fn wanted<S: ScatterPoint>(vertex: &S, suffix: CameraSuffix, prefix: LightPrefix, on: ClassSet) -> bool {
+pub(super) fn wanted<S: ScatterPoint>(vertex: &S, halves: PathHalves, on: ClassSet) -> bool {
     on.is_all() || {
-        let (first, second) = classes(vertex, suffix, prefix);
+        let (first, second) = classes(vertex, halves);
         on.has(first) || second.is_some_and(|second| on.has(second))
     }
 }
 
-/// Whether going on by one lobe of `set`, of a surface that has `lobes`, can come to light of a class that is wanted.
+/// Whether continuing by a lobe of `set`, at a surface that has `lobes`, can reach light of a class in `on`.
 pub(super) fn leads(suffix: CameraSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
     let ahead = |lobe: LobeSet| !(suffix.then(Event::of(lobe, lobes)).reachable_classes() & on).is_empty();
     each.filter(|lobe| set.intersects(*lobe)).any(ahead)
 }
 
-/// Share of broad lobes in `all` that lobes scatter.
+/// Fraction of the light that broad lobes scatter.
 #[inline]
 fn ratio(broad: Rgb, all: Rgb) -> Rgb {
     Rgb::select(all.cmpgt(Rgb::ZERO), (broad / all).min(Rgb::ONE), Rgb::ZERO)
 }
 
-/// Shares of light that comes along `wi`, of which all lobes of the vertex scatter `f`.
+/// Shares of light that a vertex scatters.
 #[inline]
-pub(super) fn shares<S: ScatterPoint>(
-    vertex: &S,
-    (suffix, prefix): (CameraSuffix, LightPrefix),
-    (wi, transport, f): (Vec3, Transport, Rgb),
-    on: ClassSet,
-) -> Shares {
-    shares_of(vertex, classes(vertex, suffix, prefix), (wi, transport, f), on)
+pub(super) fn shares<S: ScatterPoint>(vertex: &S, halves: PathHalves, incident: Incident, on: ClassSet) -> Shares {
+    shares_of(vertex, classes(vertex, halves), incident, on)
 }
 
-/// The same where the classes are known.
+/// Shares of light that a vertex scatters, for known classes.
 #[inline]
 fn shares_of<S: ScatterPoint>(
     vertex: &S,
     classes: (PathClass, Option<PathClass>),
-    (wi, transport, f): (Vec3, Transport, Rgb),
+    Incident { wi, transport, f }: Incident,
     on: ClassSet,
 ) -> Shares {
     let mut shares = Shares::NONE;
@@ -118,45 +129,57 @@ fn shares_of<S: ScatterPoint>(
     shares
 }
 
-/// Shares of the light of many photons at one vertex: each kind of [`LightPrefix`] is looked at once.
-pub(super) struct Merged<'v, S> {
+/// Shares of the light of many photons at one vertex. The classes of each [`LightPrefix`] are computed once.
+pub(super) struct PhotonShares<'v, S> {
     vertex: &'v S,
     suffix: CameraSuffix,
     on: ClassSet,
     known: [Option<(PathClass, Option<PathClass>)>; LightPrefix::COUNT],
 }
 
-impl<'v, S: ScatterPoint> Merged<'v, S> {
-    /// At a vertex at the end of `sight`.
+impl<'v, S: ScatterPoint> PhotonShares<'v, S> {
+    /// At a vertex at the end of a camera path of class `suffix`.
     #[inline]
-    pub fn new(vertex: &'v S, suffix: CameraSuffix, on: ClassSet) -> Merged<'v, S> {
-        Merged { vertex, suffix, on, known: [None; LightPrefix::COUNT] }
+    pub fn new(vertex: &'v S, suffix: CameraSuffix, on: ClassSet) -> PhotonShares<'v, S> {
+        PhotonShares { vertex, suffix, on, known: [None; LightPrefix::COUNT] }
     }
 
-    /// Shares of light that comes by `beam` along `wi`, of which the vertex scatters `f` towards the eye.
+    /// Shares of light of a photon that arrives along `wi`, of which all lobes scatter `f` towards the camera.
     #[inline]
     pub fn shares(&mut self, prefix: LightPrefix, wi: Vec3, f: Rgb) -> Shares {
         let known = &mut self.known[prefix.index()];
-        let classes = *known.get_or_insert_with(|| classes(self.vertex, self.suffix, prefix));
-        shares_of(self.vertex, classes, (wi, Transport::Radiance, f), self.on)
+        let classes = *known.get_or_insert_with(|| classes(self.vertex, PathHalves { suffix: self.suffix, prefix }));
+        shares_of(self.vertex, classes, Incident { wi, transport: Transport::Radiance, f }, self.on)
     }
 }
 
-/// The same for light that a light path's vertex sends along `-d`, of which its lobes scatter `f_light`, to one from
-/// where it is along `d`.
+/// A connection of a camera vertex with a light vertex.
+pub(super) struct Connection {
+    /// Unit direction from the camera vertex to the light vertex.
+    pub d: Vec3,
+    /// Value of all lobes of the camera vertex, times the cosine.
+    pub f: Rgb,
+    /// Value of all lobes of the light vertex, times the cosine.
+    pub f_light: Rgb,
+}
+
+/// Shares of the light on a connection.
 #[inline]
-pub(super) fn connected<S: ScatterPoint>(
+pub(super) fn connection_shares<S: ScatterPoint>(
     vertex: &S,
     light: &LightVertex<'_>,
     suffix: CameraSuffix,
-    (d, f, f_light): (Vec3, Rgb, Rgb),
+    connection: &Connection,
     on: ClassSet,
 ) -> Shares {
+    let Connection { d, f, f_light } = *connection;
+    let incident = Incident { wi: d, transport: Transport::Radiance, f };
     let (first, second) = events(light.smooth(), light.in_medium());
-    let of = |event: Event| shares(vertex, (suffix, light.prefix.then(event)), (d, Transport::Radiance, f), on);
+    let halves = |event: Event| PathHalves { suffix, prefix: light.prefix.then(event) };
+    let of = |event: Event| shares(vertex, halves(event), incident, on);
     let Some(second) = second else { return of(first) };
     let parts = |event: Event| {
-        let (first, second) = classes(vertex, suffix, light.prefix.then(event));
+        let (first, second) = classes(vertex, halves(event));
         (first.part(), second.map(PathClass::part))
     };
     if on.is_all() && parts(first) == parts(second) {

@@ -1,4 +1,4 @@
-//! How long paths are: what the cost of a method is estimated from, without a clock.
+//! Mean numbers of vertices of paths. The cost model of methods uses them instead of a clock.
 
 use super::camera_paths::CameraPaths;
 use super::initial_media::InitialMedia;
@@ -14,40 +14,41 @@ use crate::scene::Scene;
 use bumpalo::Bump;
 use rayon::prelude::*;
 
-/// Paths of each kind that are walked.
+/// Number of paths of each kind.
 const PATHS: u32 = 4096;
 /// Paths per unit of work.
 const CHUNK: usize = 256;
 
-/// Mean numbers of vertices of a path.
+/// Mean numbers of vertices of a path. "Full" paths continue by all lobes and collide in media; "short" paths end at
+/// broad lobes and cross media straight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VertexCounts {
-    /// Of a camera path that goes on whatever the lobes; on surfaces, as all that follow.
+    /// Surface vertices of a full camera path.
     pub camera: f64,
-    /// Of one that ends at broad lobes and goes straight through media.
+    /// Surface vertices of a short camera path.
     pub camera_to_broad: f64,
-    /// Of a light path that goes on whatever the lobes.
+    /// Surface vertices of a full light path.
     pub light: f64,
-    /// Of one that ends at broad lobes.
+    /// Surface vertices of a light path that ends at broad lobes.
     pub light_to_broad: f64,
-    /// Those of a camera path that have lobes which are not delta: they ask for light, gather photons and are connected.
+    /// Surface vertices of a full camera path that have lobes other than delta: they sample lights, gather photons and
+    /// are connected.
     pub camera_connectable: f64,
-    /// The same of a light path.
+    /// Surface vertices of a full light path that have lobes other than delta.
     pub light_connectable: f64,
-    /// Vertices in media that scatter: of a camera path and of a light path that go on whatever the lobes, and of an eye
-    /// path that ends at broad lobes and passes through media, looking at points on its way.
+    /// Vertices of a full camera path in scattering media.
     pub camera_media: f64,
-    /// The same of a light path.
+    /// Vertices of a full light path in scattering media.
     pub light_media: f64,
-    /// Points that a camera path which ends at broad lobes looks at on its straight way through media.
+    /// Points in scattering media that a short camera path samples.
     pub media_samples: f64,
-    /// Share of the vertices on surfaces whose material has textures.
+    /// Fraction of surface vertices whose material has textures.
     pub textured: f64,
-    /// Vertices of light paths that one of the eye merges with, where there are as many light paths as pixels.
+    /// Light vertices that a full camera path merges with, if there is one light path per pixel.
     pub merged: f64,
 }
 
-/// Where a vertex is that has lobes which are not delta.
+/// Position of a vertex that has lobes other than delta.
 #[derive(Clone, Copy)]
 struct Open {
     p: Vec3,
@@ -68,8 +69,8 @@ impl Located for Open {
     }
 }
 
-/// Counts vertices, those up to the first with broad lobes, and lists those that are no perfect mirrors or clear glass.
-/// `THROUGH`: goes straight through media.
+/// Visitor that counts vertices, and lists those that are not perfect mirrors or clear glass. `THROUGH`: crosses media
+/// straight.
 struct Count<'a, const THROUGH: bool> {
     scene: &'a Scene,
     all: u32,
@@ -79,7 +80,7 @@ struct Count<'a, const THROUGH: bool> {
     textured: u32,
     open: Vec<Open>,
     narrow: bool,
-    /// Length of the path up to the first of the listed ones.
+    /// Length of the path up to the first listed vertex.
     length: f32,
 }
 
@@ -89,8 +90,8 @@ impl<const THROUGH: bool> Count<'_, THROUGH> {
         Count { scene, all: 0, to_broad: 0, media: 0, media_to_broad: 0, textured: 0, open, narrow: true, length: 0.0 }
     }
 
-    /// Vertices, those up to the first with broad lobes, those that are listed, those in media and those of them up to
-    /// the first with broad lobes, and those with textures.
+    /// Numbers of all surface vertices, of those up to the first broad lobe, of listed ones, of vertices in media, of
+    /// those up to the first broad lobe, and of textured ones.
     fn counts(&self) -> [f64; 6] {
         [self.all, self.to_broad, self.open.len() as u32, self.media, self.media_to_broad, self.textured].map(f64::from)
     }
@@ -134,8 +135,8 @@ impl<'a, const THROUGH: bool> Visitor<'a> for Count<'_, THROUGH> {
 }
 
 impl VertexCounts {
-    /// Of paths of a view, the light paths guided if there is a guide. `reach` is the radius within which a camera path
-    /// merges that is so long up to where it first may.
+    /// Counts the vertices of paths of a view. `guide` guides the light paths. `reach(length)` is the merging radius of
+    /// a camera path of that length at its first merging vertex.
     pub fn new(
         camera_paths: &CameraPaths<'_>,
         initial_media: &InitialMedia,
@@ -200,7 +201,7 @@ impl VertexCounts {
             if camera_paths.scene.survey.scattering { paths().map(through).collect() } else { Vec::new() };
         let camera: Vec<Count<'_, false>> = paths().map(from_camera).collect();
         let map = PhotonMap::build(light.iter().flat_map(|count| &count.open).copied().collect());
-        // As many as are there are found in an area that is larger by as much as these paths are fewer.
+        // Fewer paths than pixels: the same number of vertices is expected in a proportionally larger area.
         let larger = pixels as f32 / PATHS as f32;
         let merged = |count: &Count<'_, false>| {
             let (mut merged, radius2) = (0u64, reach(count.length).powi(2) * larger);
@@ -210,7 +211,7 @@ impl VertexCounts {
             merged
         };
         let merged: Vec<u64> = camera.par_iter().with_min_len(CHUNK).map(merged).collect();
-        // Whole numbers: their sums do not depend on any order.
+        // Integers, so sums do not depend on their order.
         let mean = |counts: &mut dyn Iterator<Item = [f64; 6]>| {
             let sum = counts.fold([0.0; 6], |sum, counts| std::array::from_fn(|k| sum[k] + counts[k]));
             sum.map(|sum| sum / f64::from(PATHS))

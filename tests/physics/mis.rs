@@ -24,7 +24,7 @@ use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
     Bidirectional, CameraPaths, CameraWalkContext, Deposits, Indirect, InitialMedia, LightPaths, LightVertices,
-    MediumVertex, MergeLevels, Next, PathStart, PixelSample, Record, Scattered, Technique, TechniqueSet, Vertex,
+    MediumVertex, MergeLevels, Next, PathRecorder, PathStart, PixelSample, Scattered, Technique, TechniqueSet, Vertex,
     Visitor, lit_side, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
@@ -379,8 +379,14 @@ impl<'s> Whole<'s> {
                     let FlightDensity { forward, reverse: back } = self.flight(0);
                     let chosen = self.light.start / self.light.direct;
                     let arrival = self.light.onward * reach * self.nodes[0].cos[0] as f32 * forward * chosen;
-                    let pdfs = (reverse(0, true) * back, reverse(0, false));
-                    mis::next_event(&eyes[0], pdfs, (self.light.direct * solid, arrival), self.light.delta).weight(eta)
+                    let pdfs = mis::NextEventPdfs {
+                        pdf_w: reverse(0, true) * back,
+                        reverse_pdf_w: reverse(0, false),
+                        light_pdf_w: self.light.direct * solid,
+                        arrival_pdf_a: arrival,
+                        delta: self.light.delta,
+                    };
+                    mis::next_event(&eyes[0], &pdfs).weight(eta)
                 }
                 Candidate::Connect(s) => {
                     let light = mis::End {
@@ -434,7 +440,7 @@ const BUGS: [Bug; 6] =
 #[derive(Default)]
 struct Said(Vec<(Technique, Vec3, Ratios)>);
 
-impl Record for Said {
+impl PathRecorder for Said {
     fn contribution(&mut self, technique: Technique, _: Rgb, from: Vec3, ratios: Ratios) {
         self.0.push((technique, from, ratios));
     }
@@ -502,7 +508,7 @@ impl<'a> Lab<'a> {
             merged_paths: 2.0 * pixels,
             only: None,
         };
-        let eta = Eta::new(radius * radius, 2.0 * pixels).sharing(SHARING);
+        let eta = Eta::new(radius * radius, 2.0 * pixels).sharing_camera_path(SHARING);
         let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
         // Wider than eta implies, so that many photons are merged. Weights do not depend on distances.
         let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));

@@ -184,7 +184,7 @@ impl<'a> Passes<'a> {
                 let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
                 let eta = match (merged, shared.techniques.connect) {
                     (false, _) => Eta::NONE,
-                    (true, true) => Eta::new(radius2, shared.merged_paths).sharing(expected * shrunk),
+                    (true, true) => Eta::new(radius2, shared.merged_paths).sharing_camera_path(expected * shrunk),
                     (true, false) => Eta::MERGE_ONLY,
                 };
                 (radius2, eta)

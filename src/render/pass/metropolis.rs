@@ -30,7 +30,7 @@ use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
     Bidirectional, CameraPaths, CameraWalkContext, Deposits, Division, InitialMedia, LightPaths, LightVertices,
-    MergeLevels, PixelSample, Record, Splat, Technique, TechniqueSet,
+    MergeLevels, PathRecorder, PixelSample, Splat, Technique, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -96,7 +96,7 @@ impl Found {
     }
 }
 
-impl Record for Found {
+impl PathRecorder for Found {
     fn arrival(&mut self, technique: Technique, of: (PathClass, Group), _: usize, value: Rgb, weight: f32) {
         self.add(technique, (of.0, self.pixel), value * weight);
     }

@@ -12,7 +12,7 @@ use crate::math::Rgb;
 use crate::plan::PathClass;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::transport::{MergeLevels, Record, Splat, Technique};
+use crate::transport::{MergeLevels, PathRecorder, Splat, Technique};
 
 /// From this depth of a walk on, deeper ones share a picture: paths have no longest length.
 const DEEPEST: u32 = 6;
@@ -74,7 +74,7 @@ fn technique(index: usize) -> Technique {
 }
 
 /// Watches the light that reaches the pixels of a tile. `()` costs nothing.
-pub(super) trait Watch: Record + Send + Sync {
+pub(super) trait Watch: PathRecorder + Send + Sync {
     /// What the eye path finds from now on belongs to the pixel at `slot`; only `level` of its levels counts, if any.
     #[inline]
     fn begin(&mut self, slot: usize, level: Option<usize>) {
@@ -148,7 +148,7 @@ impl Watched {
     }
 }
 
-impl Record for Watches {
+impl PathRecorder for Watches {
     #[inline]
     fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
         if self.level == Some(level) {

@@ -67,9 +67,16 @@ impl Chain {
         }
         let solid = self.distance2[0] / light.cos;
         let arrival = light.onward * (cos(0) / self.distance2[0]);
+        let pdfs = mis::NextEventPdfs {
+            pdf_w: to_light(0),
+            reverse_pdf_w: to_eye(0),
+            light_pdf_w: light.direct * solid,
+            arrival_pdf_a: arrival,
+            delta: false,
+        };
         let mut all = vec![
             mis::hit(&mis.arrive(self.distance2[0], light.cos), light).weight(eta),
-            mis::next_event(&eyes[0], (to_light(0), to_eye(0)), (light.direct * solid, arrival), false).weight(eta),
+            mis::next_event(&eyes[0], &pdfs).weight(eta),
             mis::camera(&lights[k - 1], from_camera(k - 1), LIGHT_PATHS, to_light(k - 1)).weight(eta),
         ];
         for s in 1..k {
@@ -96,7 +103,7 @@ fn weights_of_any_densities_sum_to_one() {
         let chain = Chain::new(index);
         let eta = match index % 3 {
             0 => Eta::NONE,
-            1 => Eta::new(1e-10, LIGHT_PATHS).sharing(7.0),
+            1 => Eta::new(1e-10, LIGHT_PATHS).sharing_camera_path(7.0),
             _ => Eta::new(10.0, LIGHT_PATHS),
         };
         let techniques = if index % 3 == 0 { TechniqueSet::BDPT } else { techniques };
