@@ -20,7 +20,7 @@ fn main() {
     let levels = number("levels=").map(|levels| Levels::new(levels as usize));
     let plain = |method| Candidate { method, indirect: Indirect::Photons, guided: false };
     let caustics = Candidate { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
-    let ways = [
+    let candidates = [
         plain(Method::Path),
         plain(Method::Bdpt),
         plain(Method::Vcm),
@@ -35,8 +35,8 @@ fn main() {
         let camera = scene
             .camera(&CameraRequest { width: Some(width), ..CameraRequest::default() })
             .unwrap_or_else(|e| panic!("{e}"));
-        for way in ways {
-            let settings = Settings::for_candidate(way);
+        for candidate in candidates {
+            let settings = Settings::for_candidate(candidate);
             let settings = Settings { levels: levels.unwrap_or(settings.levels), ..settings };
             let stage = RenderInput::new(&scene, &camera, &settings);
             let mut session = Session::new(&stage);
@@ -50,13 +50,15 @@ fn main() {
                 .collect();
             taken.sort_by(f64::total_cmp);
             let seconds = taken[ITERATIONS / 2];
-            let counted = counted_cost(&scene, &camera, way, &settings);
+            let counted = counted_cost(&scene, &camera, candidate, &settings);
             println!(
                 "{path:<24} {:<60} counted {counted:7.3}  measured {seconds:7.3}  ratio {:5.2}",
-                way.name(),
+                candidate.name(),
                 counted / seconds
             );
-            rows.push(serde_json::json!({"scene": path, "way": way.name(), "counted": counted, "measured": seconds}));
+            rows.push(
+                serde_json::json!({"scene": path, "way": candidate.name(), "counted": counted, "measured": seconds}),
+            );
         }
     }
     println!("{}", serde_json::json!({ "rows": rows }));

@@ -1,14 +1,14 @@
-//! Cryptomatte against the values that its authors publish.
+//! Compares cryptomatte with the values that its authors publish.
 
 use caustique::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
 use caustique::film::{LayerSet, Naming, check_names};
 
 #[test]
 fn ids_are_those_of_the_specification() {
-    // The example manifest of the Cryptomatte API's documentation.
+    // From the example manifest of the Cryptomatte API's documentation.
     assert_eq!(Id::of("bunny").0, 0x1385_1a76);
     assert_eq!(Id::of("default").0, 0x42c9_679f);
-    // The hashes in the tests of the authors' Nuke decoder (cryptomatte_utilities_tests.py).
+    // From the tests of the authors' Nuke decoder (cryptomatte_utilities_tests.py).
     for (name, value) in [
         ("hello", 6.070_563e-17),
         ("cube", -4.084_619_3e15),
@@ -24,7 +24,7 @@ fn ids_are_those_of_the_specification() {
 
 #[test]
 fn ids_are_ordinary_floats() {
-    // One name in 128 hashes to an exponent that must be moved; enough names reach both cases.
+    // One name in 128 hashes to an exponent that must be changed. There are enough names for both cases.
     let mut moved = 0;
     for i in 0..2000 {
         let name = format!("object{i}");
@@ -79,8 +79,8 @@ fn coverage_is_exact_up_to_six_ids_and_sorted() {
 }
 
 #[test]
-fn what_covers_much_is_kept_however_late_it_comes() {
-    // Forty splinters, then one thing over 3/7 of the pixel, then splinters again.
+fn objects_of_large_coverage_are_kept_even_if_they_come_late() {
+    // Forty objects of small coverage, then one that covers more than 3/7 of the pixel, then small ones again.
     let mut pixel = PixelRanks::default();
     let large = Id::of("large");
     for i in 0..20 {

@@ -1,4 +1,4 @@
-//! EXR files: what is written is read back, the same bytes every time, and no file brings the reader down.
+//! EXR files: written files are read back, have the same bytes every time, and no file crashes the reader.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,8 @@ use caustique::image::{atomic, png, tonemap::ToneMap};
 
 const COMPRESSIONS: [Compression; 4] = [Compression::Zip, Compression::Zips, Compression::Piz, Compression::None];
 
-/// A picture whose every value tells its channel and pixel, odd in size, with half, lone and cryptomatte-like planes.
+/// A picture of odd size in which every value identifies its channel and pixel, with half-float, single-channel and
+/// cryptomatte-like planes.
 fn fixture(width: usize, height: usize) -> LayerSet {
     let mut set = LayerSet::new(width, height);
     let n = width * height;
@@ -44,7 +45,7 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 }
 
 #[test]
-fn what_is_written_is_read_back() {
+fn written_files_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     for (width, height) in [(1, 1), (7, 3), (33, 50)] {
         for compression in COMPRESSIONS {
@@ -60,7 +61,7 @@ fn what_is_written_is_read_back() {
 }
 
 #[test]
-fn values_that_are_not_numbers_survive() {
+fn values_that_are_not_finite_survive() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let values = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, f32::MIN_POSITIVE / 4.0, f32::MAX];
@@ -91,7 +92,7 @@ fn bytes_do_not_depend_on_run_or_threads() {
     }
 }
 
-/// The header's attributes in the order in which they stand.
+/// Names of the header's attributes in their order in the file.
 fn attribute_names(path: &Path) -> Vec<String> {
     let bytes = fs::read(path).unwrap();
     let text = |at: &mut usize| {
@@ -152,16 +153,16 @@ fn blender_names() {
     ] {
         assert!(names.contains(&name.to_owned()), "{name} in {names:?}");
     }
-    // Roles are found under both conventions.
+    // Layers are found by their role under both naming conventions.
     assert_eq!(back.beauty().unwrap(), set.beauty().unwrap());
     assert_eq!(back.find(Role::Albedo).unwrap().triples(), set.get("albedo").unwrap().triples());
-    // Blender's z is up, and its y goes away from us.
+    // In Blender z is up, and y points away from the viewer.
     let turned = |[x, y, z]: [f32; 3]| [x, -z, y];
     let expected: Vec<[f32; 3]> = set.get("normal").unwrap().triples().into_iter().map(turned).collect();
     assert_eq!(back.find(Role::Normal).unwrap().triples(), expected);
 }
 
-/// A window of a picture lies within the display window, and its camera and colours are told.
+/// The header has the data window of a crop within the display window, the camera and the colour space.
 #[test]
 fn windows_cameras_and_colours_are_in_the_header() {
     use ::exr::math::Vec2;
@@ -180,12 +181,12 @@ fn windows_cameras_and_colours_are_in_the_header() {
         assert_eq!(header.shared_attributes.chromaticities.expect("primaries").red, Vec2(0.64, 0.33));
         assert!(header.own_attributes.software_name.expect("a program").to_string().starts_with("caustique "));
         let found = header.own_attributes.world_to_camera.expect("a camera");
-        // The same point by the coordinates of the file: (1, 2, 3), and (1, -3, 2) for Blender.
+        // The same point in the coordinates of the file: (1, 2, 3), and (1, -3, 2) for Blender.
         let point = if naming == Naming::Plain { [1.0, 2.0, 3.0, 1.0] } else { [1.0, -3.0, 2.0, 1.0] };
         let x = |m: &[f32; 16], p: [f32; 4]| (0..4).map(|row| p[row] * m[4 * row]).sum::<f32>();
         assert_eq!(x(&found, point), x(&world_to_camera, [1.0, 2.0, 3.0, 1.0]));
         assert!(header.own_attributes.world_to_normalized_device.is_some());
-        // Reading gives the whole picture, black beside the window.
+        // Reading returns the whole picture, black outside of the data window.
         let (back, _) = exr::read(&path).unwrap();
         assert_eq!((back.width, back.height), (8, 5));
         let beauty = back.beauty().unwrap();
@@ -194,7 +195,7 @@ fn windows_cameras_and_colours_are_in_the_header() {
     }
 }
 
-/// A frame of a film says its number, its rate, and the time code of the two.
+/// The header of an animation frame has its number, the frame rate, and the time code.
 #[test]
 fn frames_of_films_are_in_the_header() {
     let folder = tempfile::tempdir().unwrap();
@@ -211,7 +212,7 @@ fn frames_of_films_are_in_the_header() {
         other.iter().find(|(name, _)| *name == "imageCounter").map(|(_, value)| value.to_i32().unwrap())
     };
     assert_eq!((counter(&found), found.shared_attributes.time_code), (Some(-7), None));
-    // 1 h 2 min 3 s and 4 frames: 23.976 frames in a second are counted as 24.
+    // 1 h 2 min 3 s and 4 frames: a rate of 23.976 counts as 24 frames per second.
     let code = header(Some(((60 + 2) * 60 + 3) * 24 + 4), Some([24000, 1001])).shared_attributes.time_code.unwrap();
     assert_eq!((code.hours, code.minutes, code.seconds, code.frame, code.drop_frame), (1, 2, 3, 4, false));
     let bare = header(None, None);
@@ -219,7 +220,7 @@ fn frames_of_films_are_in_the_header() {
         (bare.own_attributes.frames_per_second, counter(&bare), bare.shared_attributes.time_code),
         (None, None, None)
     );
-    // What a time code cannot say: 60 frames in a second, another day.
+    // A time code cannot express 60 frames per second, or a time beyond one day.
     let code = |number, rate| exr::Moment { number: Some(number), rate: Some(rate) }.time_code();
     assert_eq!((code(1, [60, 1]), code(24 * 3600 * 24, [24, 1])), (None, None));
     assert_eq!(code(24 * 3600 * 24 - 1, [24, 1]), Some([23, 59, 59, 23]));
@@ -276,12 +277,12 @@ fn selections() {
     assert_eq!((error.kind, error.cause.as_str()), (ErrorKind::Usage, "no layer \"albeod\""));
     assert_eq!(error.hint.as_deref(), Some("did you mean \"albedo\"?"));
     assert_eq!(Selection::parse("").unwrap_err().kind, ErrorKind::Usage);
-    // A name of ours that this picture lacks.
+    // A known layer name that this picture lacks.
     let error = Selection::parse("beauty,Level9").unwrap().apply(set.clone()).unwrap_err();
     assert_eq!(error.hint.as_deref(), Some("did you mean \"Level1\"?"));
 }
 
-/// A picture written by the `exr` crate directly: parts, windows and types that ours never have.
+/// A picture written directly by the `exr` crate, with parts, windows and types that this program never writes.
 mod foreign {
     use ::exr::prelude::*;
 
@@ -321,7 +322,7 @@ fn foreign_parts_windows_and_types() {
             foreign::channel("B", FlatSamples::U32(over.iter().map(|&v| v as u32).collect())),
         ],
     );
-    // Part two is a single pixel within the window, in tiles.
+    // Part two is a single tiled pixel within the window.
     let second = foreign::part(
         "N",
         (1, 1),
@@ -378,7 +379,7 @@ fn malformed_files_are_errors() {
     for compression in COMPRESSIONS {
         exr::write(&path, &fixture(19, 37), &attributes(), Options { compression, naming: Naming::Plain }).unwrap();
         let good = fs::read(&path).unwrap();
-        // Most of what can go wrong is in the header and the offset table.
+        // Most invalid bytes are in the header and the offset table.
         let head = 1500.min(good.len());
         for mutant in 0..250 {
             let mut bytes = good.clone();
@@ -413,8 +414,8 @@ fn malformed_files_are_errors() {
     assert!(failed > 300 && read > 100, "{failed} failed, {read} read: the mutants test nothing");
 }
 
-/// The decoder allocates what a DWA chunk says of its sections: a number among them that is too large must stop the
-/// reader before.
+/// The decoder allocates the sizes that a DWA chunk declares for its sections. The reader must reject too large sizes
+/// before.
 #[test]
 fn dwa_sections_larger_than_their_block_are_an_error() {
     use ::exr::prelude::*;
@@ -430,7 +431,8 @@ fn dwa_sections_larger_than_their_block_are_an_error() {
     assert!(plane.iter().zip(&values).all(|(a, b)| (a - b).abs() < 0.05), "DWA is lossy, but not that much");
 
     let good = fs::read(&path).unwrap();
-    // Two chunks of 32 lines; the offset table stands right before the first, whose sections follow its y and size.
+    // Two chunks of 32 lines. The offset table is directly before the first chunk, whose sections follow its y and
+    // size.
     let table = (0..good.len() - 16).find(|&i| good[i..i + 8] == ((i + 16) as u64).to_le_bytes()).unwrap();
     for number in 0..11 {
         let mut bytes = good.clone();
@@ -481,7 +483,7 @@ fn writability_is_known_beforehand() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_an_error_with_advice() {
-    // The device takes the place of a full disk: every write to it fails with ENOSPC.
+    // The device stands for a full disk: every write to it fails with ENOSPC.
     let error =
         exr::write(Path::new("/dev/full"), &fixture(8, 8), &Attributes::default(), Options::default()).unwrap_err();
     assert_eq!((error.kind, error.place.as_str()), (ErrorKind::Io, "/dev/full"));

@@ -1,4 +1,4 @@
-//! The glTF reader: what it reads, what it warns of, what it refuses, and that damaged files never bring it down.
+//! The glTF reader: supported input, warnings and errors, and damaged files, none of which crash it.
 
 pub mod glb;
 
@@ -21,7 +21,7 @@ use caustique::scene::gltf::{ReadOptions, read_bytes};
 use glb::Glb;
 use std::path::Path;
 
-/// Reads a file made in memory.
+/// Reads a file from memory.
 fn read(file: &Glb) -> Description {
     try_read(file).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -30,7 +30,7 @@ fn try_read(file: &Glb) -> Result<Description, Error> {
     read_bytes(&file.bytes(), Path::new("pool.glb"), &ReadOptions::default())
 }
 
-/// An error as the command line shows it.
+/// An error as the command line prints it.
 fn message(error: &Error) -> String {
     let hint = error.hint.as_ref().map_or_else(String::new, |h| format!("\nhint: {h}"));
     format!("{error}{hint}")

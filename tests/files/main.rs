@@ -1,4 +1,4 @@
-//! What is read and written: scenes, pictures, and what is said of them before a render.
+//! Tests of files: scenes, pictures, and plans of scenes.
 
 #[path = "../support/mod.rs"]
 mod support;

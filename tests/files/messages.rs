@@ -1,7 +1,7 @@
-//! Every message of the loaders, word by word: a case for each (`scene`, `image`, `state`) is kept in
-//! `tests/files/messages/snapshots`, and `sources` looks through the code for messages that no case brings up.
+//! Every message of the loaders, word by word. Each has a case (`scene`, `image`, `state`) in a snapshot in
+//! `tests/files/messages/snapshots`. `sources` searches the code for messages without a case.
 //!
-//! `cargo insta review`, or `INSTA_UPDATE=always cargo test`, takes over what a change has changed.
+//! `cargo insta review` or `INSTA_UPDATE=always cargo test` accepts changes.
 
 mod image;
 mod scene;
@@ -11,7 +11,7 @@ mod validator;
 
 use caustique::error::Error;
 
-/// What is said of cases: a line with what each is, and what was said.
+/// The messages of cases: a title per case and its messages.
 #[derive(Default)]
 struct Said(String);
 
@@ -21,18 +21,18 @@ impl Said {
     }
 }
 
-/// An error as the command line shows it.
+/// An error as the command line prints it.
 fn message(error: &Error) -> String {
     error.hint.as_ref().map_or_else(|| error.to_string(), |hint| format!("{error}\nhint: {hint}"))
 }
 
-/// The cases of which nothing is said.
+/// The cases without messages.
 fn silent(said: &str) -> Vec<&str> {
     let cases = said.split("# ").skip(1);
     cases.filter(|case| case.trim_end().lines().count() < 2).map(str::trim_end).collect()
 }
 
-/// All that is said of all cases.
+/// All messages of all cases.
 fn everything_said() -> String {
     [scene::said(), image::said(), state::said()].concat()
 }

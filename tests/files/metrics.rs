@@ -1,5 +1,5 @@
-//! Error metrics against closed forms and against the reference implementation of FLIP; tone curves against published
-//! values.
+//! Compares error metrics with closed forms and with the reference implementation of FLIP, and tone curves with
+//! published values.
 
 use caustique::film::{Layer, LayerSet, Picture, Size};
 use caustique::image::tonemap::{ToneMap, srgb_decode};
@@ -10,9 +10,10 @@ const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
 const SIZE: Size = Size { width: WIDTH, height: HEIGHT };
 
-/// Edges in every direction and a bright square, then noise on each channel; `scale` is 1 for HDR and 1/2 for LDR.
+/// Two pictures: edges in every direction and a bright square, and the same with noise on each channel. `scale` is 1
+/// for HDR and 1/2 for LDR.
 ///
-/// The expected FLIP values come from the authors' implementation, PyPI flip-evaluator 1.7, on the same pixels:
+/// The expected FLIP values are from the authors' implementation, PyPI flip-evaluator 1.7, on the same pixels:
 /// `flip_evaluator.evaluate(reference, test, "HDR", inputsRGB=False, applyMagma=False)`, and `"LDR"` on halved and
 /// clipped ones.
 fn fixture(scale: f32) -> (Picture, Picture) {
@@ -56,7 +57,7 @@ fn ldr_flip_agrees_with_the_authors() {
 
 #[test]
 fn flip_of_odd_pictures() {
-    // Equal pictures do not differ, whatever their size; a picture against black differs.
+    // Equal pictures of any size do not differ; a picture and black differ.
     for (width, height) in [(1, 1), (3, 2), (1, 40)] {
         let size = Size { width, height };
         let picture = Picture::from_fn(size, |i| [i as f32; 3]);
@@ -67,7 +68,7 @@ fn flip_of_odd_pictures() {
             assert!(map.iter().all(|v| (0.0..=1.0).contains(v)), "{map:?}");
         }
     }
-    // A caustic on a black floor: the median luminance is zero, and the difference must still show.
+    // A caustic on a black floor: the median luminance is zero, and the difference must still be visible.
     let black = Picture::filled(Size { width: 10, height: 10 }, [0.0; 3]);
     let mut reference = black.clone();
     reference[55] = [4.0; 3];
@@ -83,14 +84,14 @@ fn picture(width: usize, height: usize, pixel: impl Fn(usize) -> [f32; 3]) -> La
 
 #[test]
 fn metrics_in_closed_form() {
-    // Reference 1, 2, 3 everywhere; half the pixels off by 0.3 in one channel.
+    // The reference is 1, 2, 3 everywhere. Half of the pixels are off by 0.3 in one channel.
     let b = picture(40, 50, |_| [1.0, 2.0, 3.0]);
     let a = picture(40, 50, |i| if i % 2 == 0 { [1.3, 2.0, 3.0] } else { [1.0, 2.0, 3.0] });
     let result = compare(&a, &b).unwrap();
     let pixel = 0.3f64.powi(2) / 3.0;
     assert!((result.mse - pixel / 2.0).abs() < 1e-8);
     assert!((result.relmse - pixel / (4.0 + 0.01) / 2.0).abs() < 1e-8);
-    // Ten of 2000 pixels are left out, all among the wrong ones.
+    // Ten of 2000 pixels are left out, all of them wrong ones.
     assert!((result.relmse_trimmed - pixel / 4.01 * 990.0 / 1990.0).abs() < 1e-8);
     assert!((result.mean_ratio.unwrap() - (6.0 + 0.15) / 6.0).abs() < 1e-6);
     assert_eq!(result.pixels_not_finite, 0);
@@ -111,8 +112,8 @@ fn trimming_leaves_out_the_worst_half_per_cent() {
     assert!(compare(&a(11), &b).unwrap().relmse_trimmed > 1e4);
 }
 
-/// White noise of variance 1 with mean 0: the sum of four uniform numbers of SplitMix64, less its mean, times the root
-/// of three.
+/// White noise of mean 0 and variance 1: the sum of four uniform numbers of SplitMix64, minus its mean, times the
+/// square root of three.
 fn white(i: usize, channel: usize) -> f32 {
     let uniform = |k: usize| {
         let mut z = (((i * 3 + channel) * 4 + k) as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -129,22 +130,22 @@ fn grain_in_closed_form() {
     let b = picture(width, height, |_| [1.0, 2.0, 3.0]);
     let grain = |pixel: &dyn Fn(usize) -> [f32; 3]| compare(&picture(width, height, pixel), &b).unwrap().grain;
     assert_eq!(grain(&|_| [1.0, 2.0, 3.0]), 0.0);
-    // An offset is no grain, up to the rounding of its blur; a ramp is none but at the rim.
+    // A constant offset has no grain, except rounding errors of the blur. A ramp has grain only at the border.
     assert!(grain(&|_| [1.5, 2.25, 2.0]) < 1e-25);
     assert!(grain(&|i| [1.0 + (i % width) as f32 * 0.25, 2.0, 3.0]) < 0.25 / 4.01 / 3.0 * 2.0 / width as f64);
-    // White noise: a share 1 - 1/n of its variance is left where n pixels are averaged. 90,000 numbers: five standard
-    // errors are 2.4 %.
+    // White noise: blurring over n pixels leaves a share 1 - 1/n of its variance as grain. For 90,000 numbers, five
+    // standard errors are 2.4 %.
     let noisy = |i: usize| [0, 1, 2].map(|c| 1.0 + c as f32 + 0.1 * white(i, c));
     let (rim, corners) = ((2 * (width + height) - 8) as f64, 4.0);
     let inside = (width * height) as f64 - rim - corners;
     let kept = (inside * 8.0 / 9.0 + rim * 5.0 / 6.0 + corners * 3.0 / 4.0) / (width * height) as f64;
     let expected = 0.01 * kept / 4.01;
     assert!((grain(&noisy) / expected - 1.0).abs() < 0.024, "{} for {expected}", grain(&noisy));
-    // One pixel off by 0.9 in one channel: 8/9 of it there, a ninth in each of eight neighbours.
+    // One pixel is off by 0.9 in one channel: the grain is 8/9 of it there, and a ninth in each of eight neighbours.
     let planted = grain(&|i| if i == 75 * width + 100 { [1.9, 2.0, 3.0] } else { [1.0, 2.0, 3.0] });
     let squares = (0.8f64.powi(2) + 8.0 * 0.1f64.powi(2)) / 3.0 / 4.01;
     assert!((planted / (squares / (width * height) as f64) - 1.0).abs() < 1e-6, "{planted}");
-    // In a corner: three quarters of it there, a sixth in the two pixels beside, a ninth in the one across.
+    // In a corner: three quarters of it there, a sixth in the two adjacent pixels, a ninth in the diagonal one.
     let planted = grain(&|i| if i == 0 { [1.9, 2.0, 3.0] } else { [1.0, 2.0, 3.0] });
     let shares = 0.75f64.powi(2) + 1.0 / 81.0 + 2.0 / 36.0;
     let expected = 0.81 * shares / 3.0 / 4.01 / (width * height) as f64;
@@ -153,7 +154,7 @@ fn grain_in_closed_form() {
 
 #[test]
 fn grain_leaves_out_what_is_not_finite() {
-    // Without the hole, which would spread, nothing but an offset is left.
+    // Without the infinite pixel, which the blur would spread, only a constant offset is left.
     let b = picture(9, 7, |i| if i == 30 { [f32::INFINITY; 3] } else { [1.0; 3] });
     let a = picture(9, 7, |i| if i == 12 { [f32::NAN, 1.5, 1.5] } else { [1.5; 3] });
     assert!(compare(&a, &b).unwrap().grain < 1e-25);
@@ -222,7 +223,7 @@ fn heat_grows_lighter() {
     assert_eq!(heat::magma(-3.0), heat::magma(0.0));
 }
 
-/// What Blender 4.5 makes of scene-linear colours: view transform AgX, no look, display sRGB.
+/// Display colours of Blender 4.5 for scene-linear colours: view transform AgX, no look, display sRGB.
 const BLENDER_AGX: [([f32; 3], [f32; 3]); 8] = [
     ([0.18, 0.18, 0.18], [0.4614, 0.4613, 0.4613]),
     ([1.0, 1.0, 1.0], [0.771, 0.771, 0.771]),
@@ -256,7 +257,7 @@ fn every_curve_keeps_order_and_bounds() {
             last = shown.x;
         }
         assert!(last > 0.99, "{curve:?}: {last}");
-        // A stop of exposure doubles the light.
+        // One stop of exposure doubles the light.
         let (a, b) = (curve.display(Rgb::new(0.2, 0.1, 0.4), 1.0), curve.display(Rgb::new(0.4, 0.2, 0.8), 0.0));
         assert!((a - b).abs().max_element() < 1e-6);
         for wild in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1.0] {

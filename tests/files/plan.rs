@@ -1,4 +1,4 @@
-//! What a scene calls for, what of it can be switched off, and what looks like a mistake in it.
+//! Plans of scenes: effects of a scene, switching them off, and warnings about likely mistakes.
 
 use crate::support;
 
@@ -21,12 +21,12 @@ fn floor() -> Description {
     description
 }
 
-/// The plan of a scene by a kind of method.
+/// The plan of a scene for a kind of method.
 fn plan_by(description: Description, search: Search) -> Plan {
     plan_to(description, search, None)
 }
 
-/// The same with a longest path.
+/// The plan of a scene for a kind of method, with a limit on path length.
 fn plan_to(description: Description, search: Search, max_depth: Option<u32>) -> Plan {
     let scene = build(description);
     let camera = scene.camera(&square(64)).expect("there is a camera");

@@ -1,4 +1,4 @@
-//! Animations, morph targets and skins: a moment of them against closed form.
+//! Animations, morph targets and skins at a given time, compared with closed forms.
 
 use super::glb::Glb;
 use super::message;
@@ -11,13 +11,13 @@ use glam::DQuat;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Reads a frame at 10 frames a second; a frame that is a fraction is reached by another rate.
+/// Reads the file at a time, as a frame at 10 frames per second, or at another rate if the frame would be fractional.
 fn at(file: &Glb, seconds: f64) -> Result<Description, Error> {
     let frame = Some(FrameTime { number: 1, rate: Some(1.0 / seconds.max(1e-12)), of_sequence: false });
     read_bytes(&file.bytes(), Path::new("pool.glb"), &ReadOptions { frame, ..ReadOptions::default() })
 }
 
-/// A cube on a node called "thing", and an animation called "act" without channels.
+/// A cube on a node named "thing", and an animation named "act" without channels.
 fn thing() -> Glb {
     let mut file = Glb::new();
     let mesh = file.cube("cube", None);
@@ -50,7 +50,7 @@ fn moves(kind: &str, times: &[f32], values: &[[f32; 3]]) -> Glb {
     file
 }
 
-/// Where the thing stands.
+/// Position of the thing.
 fn place(file: &Glb, seconds: f64) -> DVec3 {
     at(file, seconds).unwrap_or_else(|e| panic!("{e}")).instances[0].to_world.translation
 }
@@ -78,9 +78,9 @@ fn steps_and_lines() {
     }
 }
 
-/// The time of a key in f32 may lie past that of its frame: the frame shows the key all the same.
+/// A frame shows a key even if the key's time in f32 is rounded to after the frame.
 #[test]
-fn frames_meet_their_keys() {
+fn frames_show_their_keys() {
     for number in 1..200u32 {
         let key = number as f32 / 24.0;
         let file = moves("STEP", &[key - 0.01, key], &KEYS[..2]);
@@ -91,7 +91,7 @@ fn frames_meet_their_keys() {
     }
 }
 
-/// A cubic is met by its own spline; tangents count per second, whatever the step.
+/// A cubic spline reproduces a cubic polynomial. Tangents are per second, for any distance between keys.
 #[test]
 fn cubic_splines_are_hermite() {
     let cubic = |t: f64| DVec3::new(t * t * t - t, 2.0 - t * t, 0.5 * t);
@@ -110,7 +110,7 @@ fn cubic_splines_are_hermite() {
     near(place(&file, 7.0), cubic(4.5).as_vec3().as_dvec3());
 }
 
-/// Along the shorter arc at even speed, whichever sign the quaternions have.
+/// Rotations follow the shorter arc at constant speed, for any signs of the quaternions.
 #[test]
 fn rotations_are_slerped() {
     let (start, end) = (DQuat::from_rotation_y(0.3), DQuat::from_rotation_y(0.3 + 2.4));
@@ -123,7 +123,7 @@ fn rotations_are_slerped() {
             near(turned, DQuat::from_rotation_y(0.3 + 2.4 * seconds) * DVec3::X);
         }
     }
-    // A spline between quaternions is made unit.
+    // A spline of quaternions is normalized.
     let mut file = thing();
     let still = [0.0; 4];
     let keys = [still, start.as_quat().to_array(), still, still, end.as_quat().to_array(), still];
@@ -133,7 +133,7 @@ fn rotations_are_slerped() {
     near(matrix * DVec3::X, DQuat::from_rotation_y(1.5) * DVec3::X);
 }
 
-/// What moves a camera, a lamp or a material, by node and by pointer; parents take children along.
+/// Cameras, lamps and materials are animated, by node and by pointer, and children follow their parents.
 #[test]
 fn cameras_lamps_and_materials_move() {
     let mut file = thing();
@@ -145,7 +145,7 @@ fn cameras_lamps_and_materials_move() {
     let lamp = file.push("nodes", json!({"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}}));
     file.json["nodes"][0]["children"] = json!([camera, lamp]);
     channel(&mut file, 0, json!({"node": 0, "path": "translation"}), "LINEAR", &[0.0, 1.0], &KEYS[..2]);
-    // As exporters write them: an animation for each action.
+    // As exporters write them, one animation per action.
     file.push("animations", json!({"name": "light", "channels": [], "samplers": []}));
     let pointer = |to: &str| json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": to}}});
     let lamp = "/extensions/KHR_lights_punctual/lights/0/intensity";
@@ -166,7 +166,7 @@ fn cameras_lamps_and_materials_move() {
     assert_eq!(scene.warnings, [lost]);
 }
 
-/// Two animations of the same thing cannot both be played.
+/// Of two animations of the same property, only the first is played.
 #[test]
 fn the_first_of_two_actions_is_played() {
     let mut file = moves("LINEAR", &[0.0, 1.0], &KEYS[..2]);
@@ -179,7 +179,7 @@ fn the_first_of_two_actions_is_played() {
     assert_eq!(scene.warnings, [both]);
 }
 
-/// By the scene, else by the option, else 24; without a frame the first key.
+/// The frame rate of the scene, else of the option, else 24. Without a frame, the first key is used.
 #[test]
 fn frame_rates() {
     let mut file = moves("LINEAR", &[0.5, 100.5], &[[0.5, 0.0, 0.0], [100.5, 0.0, 0.0]]);
@@ -216,7 +216,7 @@ fn frame_rates() {
     near(seconds(&still, None, None), 0.0, &[]);
 }
 
-/// A shape between targets: positions and normals, by the mesh's weights, the node's, or moving ones.
+/// A shape between targets: positions and normals, with the weights of the mesh, of the node, or animated ones.
 #[test]
 fn morph_targets() {
     let mut file = Glb::new();
@@ -225,7 +225,7 @@ fn morph_targets() {
     let up = file.floats(&[[0.0, 0.0, 1.0], [0.0; 3], [0.0; 3]]);
     let turned = file.floats(&[[1.0, 0.0, -1.0]; 3]);
     let wide = file.floats(&[[0.0; 3], [2.0, 0.0, 0.0], [0.0; 3]]);
-    // Nothing moves: the file may leave that out.
+    // Targets without displacements, which the file may leave out.
     let none = file.push("accessors", json!({"componentType": 5126, "type": "VEC3", "count": 3}));
     let primitive = json!({"attributes": {"POSITION": positions, "NORMAL": normals},
         "targets": [{"POSITION": up, "NORMAL": turned}, {"POSITION": wide, "NORMAL": none}]});
@@ -261,7 +261,7 @@ fn morph_targets() {
     assert!(error.starts_with(fault), "{error}");
 }
 
-/// A bar whose upper half a joint bends: by the joints alone, wherever its node stands.
+/// A bar whose upper half is bent by a joint. The position of the bar's own node does not matter.
 #[test]
 fn skins() {
     let mut file = Glb::new();
@@ -277,7 +277,7 @@ fn skins() {
     attributes["NORMAL"] = normals;
     attributes["JOINTS_0"] = json!(joints);
     attributes["WEIGHTS_0"] = json!(weights);
-    // The upper joint is bound at (0, 1, 0), the lower at the origin.
+    // The upper joint is bound at (0, 1, 0), the lower one at the origin.
     let mut binds = [[0.0f32; 4]; 8];
     for (i, column) in binds.iter_mut().enumerate() {
         column[i % 4] = 1.0;
@@ -299,7 +299,7 @@ fn skins() {
     let vertex = |i: usize| placed.to_world.transform_point3(mesh.positions[i].as_dvec3());
     near(vertex(0), DVec3::new(5.1, 0.0, 0.0));
     near(vertex(1), DVec3::new(5.0, 1.0, 0.0));
-    // A quarter turn about (0, 1, 0) takes (0, 2, 0) to (-1, 1, 0).
+    // A rotation by 90 degrees about (0, 1, 0) moves (0, 2, 0) to (-1, 1, 0).
     near(vertex(2), DVec3::new(4.0, 1.0, 0.0));
     let half = Vec3::new(1.0, 1.0, 0.0).normalize();
     for (found, expected) in mesh.normals.iter().zip([Vec3::X, half, Vec3::Y]) {
@@ -323,7 +323,7 @@ fn skins() {
 }
 
 #[test]
-fn animations_that_cannot_be() {
+fn invalid_animations_are_errors() {
     let said = |file: &Glb| message(&at(file, 1.0).unwrap_err());
     let sampler = "pool.glb: animation \"act\", channel 0: sampler 0: ";
     for (times, cause) in [

@@ -1,4 +1,4 @@
-//! Damaged files: each fault has its message.
+//! Damaged files: the message for each fault.
 
 use super::glb::{Glb, pack};
 use super::{message, try_read};
@@ -6,7 +6,7 @@ use caustique::scene::gltf::{ReadOptions, read, read_bytes};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A quad called "water" on a node called "Pool".
+/// A quad named "water" on a node named "Pool".
 fn pool() -> Glb {
     let mut file = Glb::new();
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
@@ -15,7 +15,7 @@ fn pool() -> Glb {
     file
 }
 
-/// The message about the pool with one value of its JSON changed.
+/// The message about the pool after one value of its JSON was changed.
 fn with(pointer: &str, value: Value) -> String {
     let mut file = pool();
     let (parent, key) = pointer.rsplit_once('/').unwrap();
@@ -197,7 +197,7 @@ fn textures_that_cannot_be_had() {
         textured(json!({}), json!({"source": 5})),
         format!("{place}: image 5 does not exist: the last one is 0\n{EXPORT}")
     );
-    // A bomb: 60000 x 60000 texels in a few bytes.
+    // A decompression bomb: 60000 x 60000 texels in a few bytes.
     let mut header = vec![0u8, 0, 0, 13];
     header.extend(b"IHDR\0\0\xea\x60\0\0\xea\x60\x08\x06\0\0\0");
     let mut bomb = b"\x89PNG\r\n\x1a\n".to_vec();
@@ -214,7 +214,7 @@ fn textures_that_cannot_be_had() {
     assert!(text.contains("emissiveTexture: image 0: it cannot be decoded: ") && text.contains("limit"), "{text}");
 }
 
-/// CRC-32 as PNG has it.
+/// CRC-32 of PNG.
 fn crc(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0u32, |crc, b| {
         (0..8).fold(crc ^ u32::from(*b), |c, _| if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 })
@@ -298,7 +298,7 @@ fn indices_and_accessors_out_of_range() {
     );
 }
 
-/// Counts that no file can hold take no memory.
+/// Counts too large for any file allocate no memory.
 #[test]
 fn absurd_counts() {
     let place = "pool.glb: mesh \"water\", primitive 0, POSITION: accessor 0";
@@ -316,7 +316,7 @@ fn absurd_counts() {
     );
 }
 
-/// Many small promises are as absurd as a large one.
+/// Many small counts are refused like one large count.
 #[test]
 fn absurd_counts_in_parts() {
     let mut file = pool();
@@ -363,7 +363,8 @@ fn nodes_that_are_no_tree() {
     );
 }
 
-/// Joints at the end of a long chain take as long as the chain, not as the chain times their number.
+/// Joints at the end of a long chain take time proportional to the length of the chain, not to the length times their
+/// number.
 #[test]
 fn deep_skeletons() {
     let mut file = pool();

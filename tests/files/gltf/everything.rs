@@ -1,9 +1,9 @@
-//! A file with something of everything that the reader of glTF knows.
+//! A file with every feature that the glTF reader supports.
 
 use super::glb::Glb;
 use serde_json::json;
 
-/// A file with something of everything.
+/// A file with every supported feature.
 pub fn everything() -> Glb {
     let mut file = Glb::new();
     let texture = file.png(2, &[[10, 20, 30, 255], [40, 50, 60, 70], [1, 2, 3, 4], [250, 251, 252, 253]]);
@@ -56,7 +56,7 @@ pub fn everything() -> Glb {
     file
 }
 
-/// Adds a skinned and morphed twin of a mesh, whose joint, weights and light move.
+/// Adds a skinned and morphed copy of a mesh, and animates its joint, its weights and a light.
 fn moving(file: &mut Glb, mesh: usize, joint: usize) {
     let (joints, weights) = (file.floats(&[[0.0; 4]; 8]), file.floats(&[[0.5, 0.5, 0.0, 0.0]; 8]));
     let mut primitive = file.json["meshes"][mesh]["primitives"][0].clone();

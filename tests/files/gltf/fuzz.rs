@@ -1,5 +1,4 @@
-//! Mutants of good files: every one is read or refused with a message, none panics, hangs or takes the machine's
-//! memory.
+//! Mutants of valid files: each is read or refused with a message. None panics, hangs or exhausts memory.
 
 use super::everything::everything;
 use super::glb::{Glb, pack};
@@ -11,7 +10,7 @@ use serde_json::Value;
 use std::panic::catch_unwind;
 use std::path::Path;
 
-/// A file as Blender exports it.
+/// A file like those that Blender exports.
 fn exported() -> Glb {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/gems.glb");
     let bytes = std::fs::read(path).unwrap();
@@ -20,7 +19,7 @@ fn exported() -> Glb {
     Glb { json, binary: bytes[28 + length..].to_vec() }
 }
 
-/// A small generator of our own (SplitMix64), so that a failure names its mutant.
+/// A random number generator (SplitMix64), so that a failure identifies its mutant.
 struct Random(u64);
 
 impl Random {
@@ -42,7 +41,7 @@ fn mutant(file: &Glb, random: &mut Random) -> Vec<u8> {
     let mut json = file.json.to_string().into_bytes();
     let mut binary = file.binary.clone();
     match random.below(6) {
-        // Digits become others, or more of them.
+        // Digits change or multiply.
         0 | 1 => {
             let digits: Vec<usize> = (0..json.len()).filter(|i| json[*i].is_ascii_digit()).collect();
             for _ in 0..=random.below(3) {
@@ -53,7 +52,7 @@ fn mutant(file: &Glb, random: &mut Random) -> Vec<u8> {
                 json.splice(at..at, std::iter::repeat_n(b'9', random.below(25)));
             }
         }
-        // A number becomes something else.
+        // A number is replaced by another value.
         2 => {
             let digits: Vec<usize> = (0..json.len()).filter(|i| json[*i].is_ascii_digit()).collect();
             let at = digits[random.below(digits.len())];
@@ -76,7 +75,7 @@ fn mutant(file: &Glb, random: &mut Random) -> Vec<u8> {
                 }
             }
         }
-        // The file ends early, with a header that knows or one that does not.
+        // The file is truncated, with or without a corrected header.
         _ => {
             if random.below(2) == 0 {
                 binary.truncate(random.below(binary.len()));
@@ -92,7 +91,7 @@ fn mutant(file: &Glb, random: &mut Random) -> Vec<u8> {
         }
     }
     let mut file = pack(&json, &binary);
-    // Now and then the container's own words are hit.
+    // Sometimes the words of the container are changed.
     if random.below(20) == 0 {
         file[random.below(20)] ^= 1 << random.below(8);
     }
@@ -125,12 +124,12 @@ fn mutants_are_read_or_refused() {
             }
         }
         println!("{name}: {good} read, {refused} refused");
-        // Both ways are taken often, or the mutations are not what they should be.
+        // Both outcomes must be frequent, or the mutations are unsuitable.
         assert!(good > count / 10 && refused > count / 10, "{name}: {good} read, {refused} refused");
     }
 }
 
-/// Environment images with flipped bits are read, finite, or refused.
+/// Environment images with flipped bits are either read with finite values or refused.
 #[test]
 fn damaged_environment_images() {
     let folder = tempfile::tempdir().unwrap();

@@ -22,10 +22,10 @@ fn hierarchy_is_composed_and_meshes_are_shared() {
     assert_eq!(scene.meshes.len(), 1);
     assert_eq!(scene.objects, ["parent", "child", "turned"]);
     assert_eq!(scene.instances.iter().map(|i| (i.mesh, i.object)).collect::<Vec<_>>(), [(0, 0), (0, 1), (0, 2)]);
-    // The matrix turns X to Y: the child stands at (5, 6, 7) + Y, twice as large.
+    // The matrix rotates X to Y: the child is at (5, 6, 7) + Y, twice as large.
     let p = scene.instances[1].to_world.transform_point3(DVec3::new(1.0, 0.0, 0.0));
     assert!((p - DVec3::new(5.0, 9.0, 7.0)).length() < 1e-12, "{p}");
-    // A quarter turn about +Y takes X to -Z; digits beyond f32 survive.
+    // A rotation by 90 degrees about +Y moves X to -Z. Digits beyond f32 are kept.
     let p = scene.instances[2].to_world.transform_point3(DVec3::X);
     assert!((p - DVec3::new(100000.0001, 0.0, -1.0)).length() < 1e-9, "{p}");
     let cube = &scene.meshes[0];
@@ -47,7 +47,7 @@ fn nodes_that_are_hidden_or_without_area_are_left_out() {
     assert_eq!(scene.warnings, ["node \"line\": it is left out, because its scale leaves nothing of its area"]);
 }
 
-/// The upper and lower face of a cube remain, where the node stands; the sides have no area.
+/// The upper and lower face of a cube remain, at the position of the node. The sides have no area.
 #[test]
 fn a_scale_of_zero_along_an_axis_flattens() {
     let mut file = Glb::new();
@@ -163,7 +163,7 @@ fn attributes_of_vertices() {
     );
 }
 
-/// KHR_mesh_quantization: bytes and shorts, normalised or not, with strides.
+/// KHR_mesh_quantization: bytes and shorts, normalized or not, with strides.
 #[test]
 fn quantized_attributes() {
     let mut file = Glb::new();
@@ -192,7 +192,7 @@ fn quantized_attributes() {
     let scene = read(&file);
     let mesh = &scene.meshes[0];
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X * 100.0, Vec3::new(0.0, 100.0, -100.0)]);
-    // The smallest byte is -1, not below.
+    // The smallest byte means -1, not less.
     assert_eq!(mesh.normals, [Vec3::Z, Vec3::Z, -Vec3::Z]);
     assert_eq!(mesh.uvs[0], [Vec2::new(0.0, 1.0), Vec2::new(0.2, 0.4), Vec2::ZERO]);
 }
@@ -217,7 +217,7 @@ fn sparse_accessors() {
     );
 }
 
-/// A solid in two materials is closed as a whole; its parts are open.
+/// A solid of two materials is closed as a whole, although each part is open.
 #[test]
 fn solids_of_several_primitives() {
     let mut file = Glb::new();
@@ -236,14 +236,14 @@ fn solids_of_several_primitives() {
     assert_eq!((scene.instances[0].object, scene.instances[1].object), (0, 0));
 }
 
-/// Tangents along growing u; w as glTF has it, so that the bitangent looks to where v falls. A mirrored half gets its
-/// own vertices.
+/// Tangents along increasing u, with glTF's handedness w, so that the bitangent points to decreasing v. A mirrored half
+/// gets its own vertices.
 #[test]
 fn tangents_for_normal_maps() {
     let mut file = Glb::new();
     let texture = file.png(1, &[[128, 128, 255, 255]]);
     let material = file.push("materials", json!({"normalTexture": {"index": texture, "scale": 0.5}}));
-    // Two quads side by side; the right one shows the image mirrored.
+    // Two quads side by side. The right one shows the image mirrored.
     let p = file.floats(&[
         [0.0, 0.0, 0.0],
         [1.0, 0.0, 0.0],
@@ -266,7 +266,7 @@ fn tangents_for_normal_maps() {
         for corner in t.iter().flat_map(|t: &usize| mesh.triangles[*t]) {
             let tangent = mesh.tangents[corner as usize];
             assert!((tangent - Vec4::new(expected, 0.0, 0.0, expected)).length() < 1e-6, "{corner}: {tangent}");
-            // The bitangent is +Y, where v falls, on both halves.
+            // The bitangent is +Y, towards decreasing v, on both halves.
             let bitangent = Vec3::Z.cross(tangent.truncate()) * tangent.w;
             assert!((bitangent - Vec3::Y).length() < 1e-6);
         }
@@ -274,7 +274,7 @@ fn tangents_for_normal_maps() {
     assert_eq!(scene.materials[0].normal_texture.map(|(_, scale)| scale), Some(0.5));
 }
 
-/// A normal map that its transform turns by a quarter and stretches turns its relief along; so does one that it
+/// The relief of a normal map follows a texture transform that rotates by 90 degrees and stretches, and one that
 /// mirrors.
 #[test]
 fn tangents_follow_the_transform_of_the_normal_map() {

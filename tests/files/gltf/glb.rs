@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-/// A document under construction and its binary chunk. Whatever the methods do not cover is set in `json`.
+/// A document with its binary chunk. Features without a method are set in `json`.
 #[derive(Clone)]
 pub struct Glb {
     pub json: Value,
@@ -11,7 +11,7 @@ pub struct Glb {
 }
 
 impl Glb {
-    /// A document with one scene and nothing in it.
+    /// An empty document with one scene.
     pub fn new() -> Glb {
         let json = json!({
             "asset": {"version": "2.0", "generator": "Khronos glTF Blender I/O v4.5.51"},
@@ -20,7 +20,7 @@ impl Glb {
         Glb { json, binary: Vec::new() }
     }
 
-    /// Appends to a list of the document; the index of the item.
+    /// Appends an item to a list of the document, and returns its index.
     pub fn push(&mut self, list: &str, item: Value) -> usize {
         if self.json[list].is_null() {
             self.json[list] = json!([]);
@@ -37,7 +37,7 @@ impl Glb {
         index
     }
 
-    /// Appends bytes; the index of their buffer view.
+    /// Appends bytes, and returns the index of their buffer view.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
         let offset = self.binary.len();
@@ -46,7 +46,7 @@ impl Glb {
         self.push("bufferViews", json!({"buffer": 0, "byteOffset": offset, "byteLength": bytes.len()}))
     }
 
-    /// Appends vectors of floats; the index of their accessor.
+    /// Appends vectors of floats, and returns the index of their accessor.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = values.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         let view = self.view(&bytes);
@@ -54,7 +54,7 @@ impl Glb {
         self.push("accessors", json!({"bufferView": view, "componentType": 5126, "type": kind, "count": values.len()}))
     }
 
-    /// Appends 32-bit indices; the index of their accessor.
+    /// Appends 32-bit indices, and returns the index of their accessor.
     pub fn indices(&mut self, values: &[u32]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
         let view = self.view(&bytes);
@@ -64,7 +64,7 @@ impl Glb {
         )
     }
 
-    /// Appends a mesh of one indexed primitive; its index.
+    /// Appends a mesh with one indexed primitive, and returns its index.
     pub fn mesh(&mut self, name: &str, positions: &[[f32; 3]], indices: &[u32], material: Option<usize>) -> usize {
         let positions = self.floats(positions);
         let indices = self.indices(indices);
@@ -82,20 +82,20 @@ impl Glb {
         self.mesh(name, &corners, &CUBE, material)
     }
 
-    /// Appends a PNG image of RGBA texels as a buffer view, and a texture of it; the texture's index.
+    /// Appends a PNG image of RGBA texels as a buffer view, and a texture of it. Returns the index of the texture.
     pub fn png(&mut self, width: u32, texels: &[[u8; 4]]) -> usize {
         let view = self.view(&png(width, texels));
         let image = self.push("images", json!({"name": "tiles", "bufferView": view, "mimeType": "image/png"}));
         self.push("textures", json!({"source": image}))
     }
 
-    /// The file.
+    /// The bytes of the .glb file.
     pub fn bytes(&self) -> Vec<u8> {
         pack(self.json.to_string().as_bytes(), &self.binary)
     }
 }
 
-/// Triangles of the cube whose corner i lies at the signs of i's bits.
+/// Triangles of the cube. The signs of corner i are the bits of i.
 pub const CUBE: [u32; 36] =
     [0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5];
 

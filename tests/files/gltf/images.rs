@@ -1,4 +1,4 @@
-//! Images of textures: their texels to the bit, the memory they take, and files that are cut off.
+//! Images of textures: exact texels, their memory, and truncated files.
 
 use super::glb::Glb;
 use super::{message, read, try_read};
@@ -8,7 +8,7 @@ use serde_json::json;
 use std::io::Cursor;
 use std::sync::Arc;
 
-/// A cube with an image for its colours and for its roughness.
+/// A cube with an image for its base colour and its roughness.
 pub fn wearing(image: &[u8], mime: &str) -> Glb {
     let mut file = Glb::new();
     let view = file.view(image);
@@ -30,13 +30,13 @@ fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     file.into_inner()
 }
 
-/// Numbers without a pattern, the extremes among them.
+/// Pseudo-random numbers, including the extremes.
 fn noise(count: usize) -> Vec<u16> {
     let random = |i: usize| ((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as u16;
     [0, u16::MAX].into_iter().chain((2..).map(random)).take(count).collect()
 }
 
-/// An image of 16 x 16 texels of each kind that PNG has.
+/// An image of 16 x 16 texels of each PNG colour type.
 fn kinds() -> Vec<DynamicImage> {
     let words = |channels: usize| noise(256 * channels);
     let bytes = |channels: usize| words(channels).into_iter().map(|x| (x >> 8) as u8).collect::<Vec<u8>>();
@@ -53,7 +53,7 @@ fn kinds() -> Vec<DynamicImage> {
     ]
 }
 
-/// What every texel stands for, decoded to floats at once: bytes of sRGB in f64, words in f32.
+/// The texels decoded to floats: sRGB bytes in f64, 16-bit values in f32.
 fn expected(image: &DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
     let deep = image.color().bytes_per_pixel() > image.color().channel_count();
     let byte = |x: u8| {
@@ -78,7 +78,8 @@ fn expected(image: &DynamicImage, encoding: Encoding) -> Vec<[f32; 4]> {
     }
 }
 
-/// Texels are kept as deep as the file has them, once for all textures of an image, and give the floats they stand for.
+/// Texels keep the bit depth of the file, are stored once for all textures of an image, and decode to the expected
+/// floats.
 #[test]
 fn texels_are_exact_and_shared() {
     for image in kinds() {
@@ -109,7 +110,7 @@ fn texels_are_exact_and_shared() {
     }
 }
 
-/// A JPEG of noise, and the same with the size of another image.
+/// A JPEG of noise, and the JPEG with the size of another image in its header.
 pub fn jpegs() -> [Vec<u8>; 2] {
     let data = noise(64 * 64 * 3).into_iter().map(|x| x as u8).collect();
     let whole = encoded(&image::RgbImage::from_raw(64, 64, data).unwrap().into(), ImageFormat::Jpeg);
@@ -119,8 +120,8 @@ pub fn jpegs() -> [Vec<u8>; 2] {
     [whole, bomb]
 }
 
-/// The decoder of JPEG fills in what is missing: that is told, and a file that promises more texels than its bits can be
-/// is refused before it is decoded.
+/// The JPEG decoder fills in missing texels, which gives a warning. A file whose size is impossible for its number of
+/// bits is refused before decoding.
 #[test]
 fn jpegs_that_are_cut_off() {
     let [whole, bomb] = jpegs();

@@ -65,7 +65,7 @@ fn kinds_of_lights() {
     );
 }
 
-/// Blender's lamps are in lumens; who else wrote the file matters, unless somebody says.
+/// The unit of lights depends on the program that wrote the file: lumens for Blender, unless an option sets it.
 #[test]
 fn units_of_lights() {
     let mut file = lamps(json!([{"type": "point", "intensity": 683}]), &[json!({"extensions": on(0)})]);
@@ -97,7 +97,7 @@ fn units_of_lights() {
     assert_eq!(intensity(&file, LightUnits::Radiometric), 683.0);
 }
 
-/// Exporters before 3.6 wrote Blender's watts: whatever the version, the lamps of one Blender file give the same light.
+/// Exporters before 3.6 wrote watts. The lamps of a Blender file give the same light with every exporter version.
 #[test]
 fn lamps_of_old_and_new_exporters_are_alike() {
     let file = |version: &str, sun: f64, lamp: f64| {
@@ -125,11 +125,11 @@ fn lamps_of_old_and_new_exporters_are_alike() {
     }
 }
 
-/// Blender's lighting mode "Unitless" leaves the factor out, and no file says its mode: where lamps are all the light and
-/// too dark to see as lumens, they are watts.
+/// Blender's lighting mode "Unitless" omits the conversion factor, and files do not record the mode. If lamps are the
+/// only lights and too dark for lumens, they count as watts.
 #[test]
 fn lamps_too_dark_for_lumens_are_watts() {
-    // Median distance of the cube's corners from the lamp: about 5 m.
+    // The median distance of the cube's corners from the lamp is about 5 m.
     let read = |light: Value, glows: bool| {
         let mut file = lamps(json!([light]), &[json!({"extensions": on(0), "translation": [0, 5, 0]})]);
         let material = json!({"emissiveFactor": if glows { [1, 1, 1] } else { [0, 0, 0] }});
@@ -147,14 +147,14 @@ fn lamps_too_dark_for_lumens_are_watts() {
         let [warning] = &unitless.warnings[..] else { panic!("{:?}", unitless.warnings) };
         assert!(warning.starts_with("its lamps would give ") && warning.contains("'Unitless'"), "{warning}");
         assert_eq!(unitless.guessed_units.map(|guess| guess.photometric), Some(false));
-        // What glows tells how bright the scene is meant to be.
+        // Emissive surfaces show the intended brightness of the scene.
         let glowing = read(lamp(kind, watts), true);
         assert!((intensity(&glowing) * 683.0 / watts - 1.0).abs() < 1e-6);
     }
     assert_eq!(read(lamp("point", 0.0), false).warnings, [""; 0]);
 }
 
-/// Clip planes are ignored, which is warnings where they would change the picture.
+/// Clip planes are ignored, with a warning if they would change the picture.
 #[test]
 fn clip_planes() {
     let warnings = |camera: Value, at: [f64; 3]| {
@@ -167,7 +167,7 @@ fn clip_planes() {
     };
     let perspective = |znear: f64, zfar: f64| json!({"type": "perspective", "perspective": {"yfov": 0.5, "aspectRatio": 1, "znear": znear, "zfar": zfar}});
     let orthographic = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.5, "zfar": 3}});
-    // The cube's near face is at a depth of 4, its far one at 6.
+    // The near face of the cube is at a depth of 4, the far one at 6.
     let ahead = [0.0, 0.0, 5.0];
     let near = "camera \"CameraPaths\": what is nearer than its znear of 4.5 m is shown all the same: clip planes are ignored \
                 (hide or remove it)";
@@ -181,12 +181,12 @@ fn clip_planes() {
     assert_eq!(warnings(perspective(4.5, 100.0), ahead), [near]);
     assert_eq!(warnings(perspective(0.1, 5.5), ahead), [far("5.5")]);
     assert_eq!(warnings(perspective(4.5, 5.5), ahead), [near.to_string(), far("5.5")]);
-    // Beside the picture, and behind the camera.
+    // Outside of the picture, and behind the camera.
     assert_eq!(warnings(perspective(4.5, 5.5), [9.0, 0.0, 5.0]), [""; 0]);
     assert_eq!(warnings(perspective(4.5, 5.5), [0.0, 0.0, -5.0]), [""; 0]);
     assert_eq!(warnings(orthographic.clone(), ahead), [far("3")]);
     assert_eq!(warnings(orthographic, [2.5, 0.0, 5.0]), [""; 0]);
-    // A cube that is seen from its inside.
+    // A cube around the camera.
     assert_eq!(warnings(perspective(0.5, 1.5), [0.0; 3]), [""; 0]);
 }
 
@@ -255,7 +255,7 @@ fn environment_and_medium_of_the_scene() {
     );
 }
 
-/// Blender's exporter leaves the world out; ours says also that it is black.
+/// Blender's exporter omits the world. This project's exporter also writes a black world.
 #[test]
 fn a_world_that_is_left_out() {
     let mut file = Glb::new();
@@ -270,7 +270,8 @@ fn a_world_that_is_left_out() {
     assert_eq!(environment(&file), (false, false));
 }
 
-/// OpenEXR and Radiance images, the first beside the scene file; what is negative or not finite is clamped and counted.
+/// OpenEXR and Radiance images, the first beside the scene file. Values that are negative or not finite are clamped and
+/// counted.
 #[test]
 fn environment_images() {
     let folder = tempfile::tempdir().unwrap();
@@ -303,7 +304,7 @@ fn environment_images() {
     assert_eq!((width, height, warnings.len()), (3, 2, 0));
     assert!((texels[5][0] - 2.0).abs() < 0.02 && (texels[5][1] - 1.0).abs() < 0.02, "{texels:?}");
 
-    // Damage of every kind ends in a message.
+    // Damaged files give an error.
     for name in ["sky.exr", "sky.hdr"] {
         let whole = std::fs::read(folder.path().join(name)).unwrap();
         let path = folder.path().join("damaged");

@@ -1,4 +1,4 @@
-//! Materials, textures, and the question of what glass is.
+//! Materials, textures, and whether glass is solid or thin.
 
 use super::glb::{Glb, png};
 use super::{message, read, try_read};
@@ -10,7 +10,7 @@ use caustique::texture::{Integers, Texels, Wrap};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A cube of this material with texture coordinates; `texture` is what the file's one texture is called.
+/// A cube of this material with texture coordinates. `texture` stands for the only texture of the file.
 fn wearing(material: Value) -> Glb {
     let mut file = Glb::new();
     file.png(2, &[[255, 0, 0, 255], [0, 188, 0, 128]]);
@@ -57,7 +57,7 @@ fn every_field_is_read() {
     assert_eq!((m.name.as_str(), m.double_sided, m.alpha, m.unlit), ("all", true, Alpha::Mask(0.25), true));
     assert!(!m.culled);
     assert_eq!((m.base_color, m.metallic, m.roughness), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
-    // Colour and data are two textures of one image.
+    // Colours and data use two textures of one image.
     let set = |t: Option<caustique::texture::TextureRef>| t.map(|t| (t.texture, t.set));
     assert_eq!(set(m.base_color_texture), Some((0, 0)));
     assert_eq!(set(m.metallic_roughness_texture), Some((1, 1)));
@@ -149,7 +149,7 @@ fn glass_on(mesh: impl Fn(&mut Glb, usize), glass: Glass, extensions: Value) -> 
     (scene.instances.iter().map(solid).collect(), scene.warnings)
 }
 
-/// `--glass`: what a volume extension leaves open.
+/// `--glass` decides about glass without a volume extension.
 #[test]
 fn glass_is_solid_where_the_mesh_is_closed() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}});
@@ -177,7 +177,7 @@ fn glass_is_solid_where_the_mesh_is_closed() {
         ]
     );
     assert_eq!(glass_on(both, Glass::Thin, clear.clone()), (vec![false, false], vec![]));
-    // A volume extension decides by itself.
+    // A volume extension overrides the option.
     for (thickness, solid) in [(0.0, false), (0.2, true)] {
         let mut volume = clear.clone();
         volume["KHR_materials_volume"] = json!({"thicknessFactor": thickness});
@@ -196,7 +196,7 @@ fn glass_is_solid_where_the_mesh_is_closed() {
     }
 }
 
-/// A hollow cube whose inner faces look the same way as its outer ones is made hollow, which is said.
+/// A hollow cube whose inner and outer faces have the same orientation is made hollow, with a warning.
 #[test]
 fn inner_shells_that_look_outwards_are_turned_over() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
@@ -230,7 +230,7 @@ fn inner_shells_that_look_outwards_are_turned_over() {
     assert!((0..24).all(|t| area(&right, t) == area(&turned, t)));
 }
 
-/// The same where the shells are primitives of a mesh, if they are of one material: a drink within glass stays.
+/// The same for shells that are primitives of a mesh, if they have one material: a drink in a glass stays.
 #[test]
 fn inner_shells_of_other_primitives_are_turned_over() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
@@ -263,7 +263,7 @@ fn inner_shells_of_other_primitives_are_turned_over() {
     assert_eq!(volumes(1), (vec![true, true], vec![]));
 }
 
-/// Solid glass that glows is there or not face by face, which is said.
+/// Solid emissive glass with alpha decides at each face, with a warning.
 #[test]
 fn glowing_glass_with_alpha_is_named() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
@@ -315,12 +315,12 @@ fn textures_keep_wrap_filter_transform_and_encoding() {
     assert_eq!((reference.set, reference.transform), (1, [[2.0, 0.0, 0.25], [0.0, 4.0, 0.5]]));
     let [color, data] = &scene.textures[..] else { panic!("{}", scene.textures.len()) };
     assert_eq!((color.wrap, color.linear, color.name.as_str()), ([Wrap::Clamp, Wrap::Mirror], false, "tiles"));
-    // 188 is 0.503 in linear light.
+    // An sRGB value of 188 is 0.503 in linear light.
     assert!((color.sample(Vec2::new(0.75, 0.5)).y - 0.5029).abs() < 1e-3);
     assert!((data.sample(Vec2::new(0.75, 0.5)).y - 188.0 / 255.0).abs() < 1e-6);
 }
 
-/// Sixteen bits stay sixteen; JPEG is read; images may be files, with percent signs in their names, or data URIs.
+/// 16-bit images keep their depth, and JPEG is read. Images may be files, with percent-encoded names, or data URIs.
 #[test]
 fn images_from_everywhere() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Files that a scene names outside its own folder.
+//! References to files outside of the scene's folder.
 
 use super::glb::Glb;
 use super::message;
@@ -7,7 +7,7 @@ use caustique::scene::gltf::{ReadOptions, read_bytes};
 use serde_json::json;
 use std::path::Path;
 
-/// A scene in `folder/scene` whose mesh, texture or sky is `name`.
+/// Reads a scene in `folder/scene` whose mesh, texture or sky is the file `name`.
 fn reading(folder: &Path, part: &str, name: &str, allow_outside: bool) -> Result<(), String> {
     let mut file = Glb::new();
     let mesh = file.mesh("water", &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[0, 1, 2], None);
@@ -27,8 +27,8 @@ fn reading(folder: &Path, part: &str, name: &str, allow_outside: bool) -> Result
     read.map(drop).map_err(|error| message(&error).replace(&folder.display().to_string(), "DIR"))
 }
 
-/// By a path upwards, a path from the root, a URI, and a link: refused, alike whether the file exists, unless it is
-/// allowed.
+/// References by a relative path upwards, an absolute path, a URI or a link are refused with the same message whether
+/// or not the file exists, unless they are allowed.
 #[test]
 fn files_outside_the_folder_are_not_opened() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -40,7 +40,7 @@ fn files_outside_the_folder_are_not_opened() {
         std::fs::write(folder.join(name), &bytes).expect("it can be written");
     }
     std::os::unix::fs::symlink(folder, folder.join("scene/up")).expect("a link");
-    // A folder whose name begins with the scene's.
+    // A folder whose name begins with that of the scene's folder.
     std::os::unix::fs::symlink(folder, folder.join("scene-2")).expect("a link");
     let root = folder.display().to_string();
     let places = [
@@ -78,7 +78,7 @@ fn files_outside_the_folder_are_not_opened() {
     }
 }
 
-/// Names that are addresses, or that would be paths upwards if they were decoded once more, lead nowhere.
+/// Names that are URLs, or that would be paths upwards if they were decoded twice, are refused.
 #[test]
 fn addresses_are_not_opened() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -108,7 +108,8 @@ fn addresses_are_not_opened() {
     }
 }
 
-/// The hash by which a checkpoint knows its scene follows names as the reader does: decoded, and not outside.
+/// The hash by which a checkpoint identifies its scene resolves names like the reader: decoded, and not outside of the
+/// folder.
 #[test]
 fn hashes_are_of_the_files_in_the_folder() {
     let folder = tempfile::tempdir().expect("a folder");

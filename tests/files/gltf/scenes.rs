@@ -1,9 +1,9 @@
-//! The scenes of this project load, whole and without complaint.
+//! The scenes of this project load completely and without warnings.
 
 use caustique::scene::gltf::{ReadOptions, read};
 use std::path::Path;
 
-/// What a scene must hold at least: triangles, instances, cameras, lights.
+/// Minimum numbers of triangles, instances, cameras and lights of each scene.
 const SCENES: [(&str, [usize; 4]); 8] = [
     ("cornell", [20_000, 9, 1, 0]),
     ("fog", [20_000, 10, 1, 2]),
@@ -33,7 +33,7 @@ fn our_scenes_load() {
             scene.environment.is_some(),
             scene.medium
         );
-        // The scenes are ours: whatever the reader finds wrong with one is a mistake in it.
+        // Warnings would mean that a scene of this project has a mistake.
         assert_eq!(scene.warnings, Vec::<String>::new(), "{name}");
         assert!(found.iter().zip(least).all(|(have, least)| *have >= least), "{name}: {found:?}, not {least:?}");
     }

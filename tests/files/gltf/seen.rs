@@ -1,4 +1,4 @@
-//! Keys of `extras.caustique` about what is seen and how: visibility, lamps, lens shift, the picture, losses.
+//! Keys of `extras.caustique` about visibility, lamps, lens shift, the picture, and losses of the export.
 
 use super::glb::Glb;
 use super::{message, read, try_read};
@@ -111,7 +111,7 @@ fn surfaces_without_a_body_and_objects_that_hide() {
     assert!(message(&try_read(&file).expect_err("refused")).contains("spread_deg must lie between 0 and 180"));
 }
 
-/// A shift of half a width puts what is straight ahead on the picture's border.
+/// A shift of half the width moves the point straight ahead to the edge of the picture.
 #[test]
 fn lens_shift() {
     let mut file = Glb::new();
@@ -125,7 +125,7 @@ fn lens_shift() {
     assert!((ray.direction - camera.forward()).length() < 1e-5, "{:?}", ray.direction);
 }
 
-/// Shares and pixels of a picture, and what is not within it.
+/// Crop windows given as shares and in pixels, and invalid ones.
 #[test]
 fn windows() {
     let window = |crop: Crop| crop.window((200, 100));

@@ -1,4 +1,4 @@
-//! Valid files that are written in unusual ways, and still pictures of files whose animations have a fault.
+//! Valid files with unusual notation, and still pictures of files with invalid animations.
 
 use super::everything::everything;
 use super::glb::Glb;
@@ -14,7 +14,7 @@ fn triangle() -> Glb {
     file
 }
 
-/// Writes every whole number with a fraction of zero.
+/// Writes every integer with a fraction of zero.
 fn with_fractions(value: &mut Value) {
     match value {
         Value::Array(list) => list.iter_mut().for_each(with_fractions),
@@ -45,7 +45,7 @@ fn integers_may_have_a_fraction_of_zero() {
     assert!(error.starts_with("pool.glb: accessors[0]: invalid type: floating point `7.5`"), "{error}");
 }
 
-/// Numbers that are no indices may be larger than an index can be.
+/// Numbers other than indices may be larger than an index.
 #[test]
 fn lengths_may_be_large_integers() {
     let mut file = triangle();
@@ -55,7 +55,7 @@ fn lengths_may_be_large_integers() {
     assert_eq!(read(&file).cameras[0].to_world.translation.z, 5e9);
 }
 
-/// Whatever is wrong with an animation, the still picture does without it; a frame of it is refused.
+/// An invalid animation is ignored for a still picture, and an error for a frame.
 #[test]
 fn faults_of_animations_do_not_refuse_still_pictures() {
     let faults = [
@@ -84,7 +84,7 @@ fn faults_of_animations_do_not_refuse_still_pictures() {
     }
 }
 
-/// An extension that compresses data is optional only where the data is there without it, too.
+/// An extension for compressed data may be ignored only if uncompressed data exists, too.
 #[test]
 fn compressed_data_without_a_substitute_is_refused() {
     let hint = "export without mesh compression (Blender: Data > Compression off)";

@@ -1,4 +1,4 @@
-//! Messages about environments and about EXR files.
+//! Messages about environment images and EXR files.
 
 use super::{Said, message};
 use caustique::image::exr;
@@ -6,7 +6,7 @@ use caustique::scene::environment_file;
 use std::fs;
 use std::path::Path;
 
-/// What is said of bytes as an environment.
+/// The messages about bytes as an environment image.
 fn environment(folder: &Path, bytes: &[u8]) -> Vec<String> {
     let path = folder.join("sky");
     fs::write(&path, bytes).expect("it can be written");
@@ -19,23 +19,23 @@ fn of_environment(path: &Path) -> Vec<String> {
     read.err().map(|error| message(&error)).into_iter().chain(warnings).collect()
 }
 
-/// What is said of bytes as a picture.
+/// The messages about bytes as a picture.
 fn picture(folder: &Path, bytes: &[u8]) -> Vec<String> {
     let path = folder.join("picture");
     fs::write(&path, bytes).expect("it can be written");
     vec![message(&exr::read(&path).expect_err("it is refused"))]
 }
 
-/// What the header of an EXR file says.
+/// The header of an EXR file.
 struct Header {
-    /// Type and flags of the file, beside its version.
+    /// Type and flags of the file, in the version field.
     flags: u32,
     compression: u8,
     sampling: i32,
-    /// Left, top, right and bottom, all of them within.
+    /// Left, top, right and bottom, inclusive.
     data: [i32; 4],
     display: [i32; 4],
-    /// Offsets of chunks behind it.
+    /// Number of chunk offsets behind the header.
     offsets: usize,
 }
 
@@ -43,7 +43,7 @@ const SMALL: Header =
     Header { flags: 0, compression: 0, sampling: 1, data: [0, 0, 1, 0], display: [0, 0, 1, 0], offsets: 1 };
 
 impl Header {
-    /// The file, without any pixels.
+    /// The bytes of the file without pixels.
     fn bytes(&self) -> Vec<u8> {
         let four = |numbers: [i32; 4]| numbers.map(i32::to_le_bytes).concat();
         let channel = |name: &str| {
@@ -72,7 +72,7 @@ impl Header {
         bytes
     }
 
-    /// The file with its only chunk: a line's number, how many bytes, and these.
+    /// The bytes of the file with one chunk: a line number, a number of bytes, and these bytes.
     fn with_chunk(&self, chunk: &[u8]) -> Vec<u8> {
         let mut bytes = Header { offsets: 0, ..*self }.bytes();
         let offset = (bytes.len() + 8) as u64;
@@ -125,7 +125,7 @@ pub fn said() -> String {
     said.0.replace(&folder.display().to_string(), "DIR")
 }
 
-/// The same file with channels of type float.
+/// The file with channels of type float.
 fn float(mut bytes: Vec<u8>) -> Vec<u8> {
     for name in [b"B\0", b"G\0", b"R\0"] {
         let at = bytes.windows(6).position(|w| w.starts_with(name) && w[2] == 1).expect("the channel") + 2;
@@ -134,7 +134,7 @@ fn float(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// A header whose part says that it is deep.
+/// A header of a deep part.
 fn deep() -> Vec<u8> {
     let mut bytes = Header { flags: 1 << 11, ..SMALL }.bytes();
     let said = [b"type\0string\0".to_vec(), 12u32.to_le_bytes().to_vec(), b"deepscanline".to_vec()];

@@ -1,4 +1,4 @@
-//! Messages about scene files. A case changes a file that has something of everything, or one that has little.
+//! Messages about scene files. A case changes a file with every supported feature, or a small one.
 
 use super::{Said, message};
 use crate::gltf::everything::everything;
@@ -8,7 +8,7 @@ use caustique::scene::gltf::{FrameTime, ReadOptions, read, read_bytes};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// What is said of a file.
+/// The messages about a file.
 pub fn messages_of(bytes: &[u8], options: &ReadOptions) -> Vec<String> {
     match read_bytes(bytes, Path::new("a.glb"), options) {
         Ok(scene) => scene.warnings.iter().map(|warning| format!("warning: {warning}")).collect(),
@@ -16,7 +16,7 @@ pub fn messages_of(bytes: &[u8], options: &ReadOptions) -> Vec<String> {
     }
 }
 
-/// Puts a value at a JSON pointer; objects on the way are made.
+/// Sets a value at a JSON pointer, and creates missing objects.
 fn put(json: &mut Value, pointer: &str, value: Value) {
     let mut at = json;
     for word in pointer.split('/').skip(1) {
@@ -39,7 +39,7 @@ fn put(json: &mut Value, pointer: &str, value: Value) {
     *at = value;
 }
 
-/// Puts a number into the data of an accessor: `#A.I` its float I, `#uA.I` its index I.
+/// Sets a number in the data of an accessor: `#A.I` is float I of accessor A, `#uA.I` is index I.
 fn put_number(file: &mut Glb, place: &str, value: &Value) {
     let (accessor, number) = place.trim_start_matches(['#', 'u']).split_once('.').expect("#A.I");
     let view = &file.json["accessors"][accessor.parse::<usize>().expect("a number")]["bufferView"];
@@ -53,7 +53,7 @@ fn put_number(file: &mut Glb, place: &str, value: &Value) {
     file.binary[at..at + 4].copy_from_slice(&bytes);
 }
 
-/// What is said of a file with changes that is not said of it without.
+/// The messages about a changed file that the original file does not have.
 pub fn changed(base: &Glb, changes: &Value) -> Vec<String> {
     let (mut file, mut options) = (base.clone(), ReadOptions::default());
     for (place, value) in changes.as_object().expect("changes") {
@@ -67,7 +67,7 @@ pub fn changed(base: &Glb, changes: &Value) -> Vec<String> {
     messages_of(&file.bytes(), &options).into_iter().filter(|line| !before.contains(line)).collect()
 }
 
-/// A quad called "water" on a node called "Pool".
+/// A quad named "water" on a node named "Pool".
 pub fn pool() -> Glb {
     let mut file = Glb::new();
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];

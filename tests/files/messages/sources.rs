@@ -1,10 +1,10 @@
-//! A look through the sources of the loaders: each message in them is said in some case.
+//! Searches the sources of the loaders: each message must occur in some case.
 
 use super::everything_said;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where loaders are.
+/// Source files and folders of the loaders.
 const LOADERS: [&str; 10] = [
     "src/scene/gltf",
     "src/scene/folder.rs",
@@ -18,7 +18,7 @@ const LOADERS: [&str; 10] = [
     "src/pipeline/shard.rs",
 ];
 
-/// Texts that no case can bring up, and why.
+/// Texts that no case can produce, and the reason.
 const UNSAID: [(&str, &[&str]); 6] = [
     (
         "there is memory enough where tests run",
@@ -68,7 +68,7 @@ const UNSAID: [(&str, &[&str]); 6] = [
     ("they are no messages", &["caustique checkpoint 6n", "caustique checkpoint ", "not said", "default material"]),
 ];
 
-/// The files of the loaders.
+/// The source files of the loaders.
 fn files() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let of = |name: &str| -> Vec<PathBuf> {
@@ -81,7 +81,7 @@ fn files() -> Vec<PathBuf> {
     LOADERS.into_iter().flat_map(of).collect()
 }
 
-/// The texts in a source but for its tests and comments, as they are once escapes are taken out.
+/// The string literals of a source without tests and comments, unescaped.
 fn texts(source: &str) -> Vec<String> {
     let shipped = source.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
     let mut found = Vec::new();
@@ -90,7 +90,7 @@ fn texts(source: &str) -> Vec<String> {
         if c == '/' && shipped[i..].starts_with("//") {
             while at.next_if(|(_, c)| *c != '\n').is_some() {}
         } else if c == '\'' && (shipped[i..].starts_with("'\"'") || shipped[i..].starts_with("'\\")) {
-            // A character, which may be a quotation mark.
+            // A character literal, which may be a quotation mark.
             at.by_ref().skip(1).find(|(_, c)| *c == '\'');
         } else if c == '"' {
             let mut text = String::new();
@@ -110,20 +110,20 @@ fn texts(source: &str) -> Vec<String> {
     found
 }
 
-/// What stands between the braces of a format.
+/// The fixed parts of a format string.
 fn fixed(text: &str) -> Vec<&str> {
     let parts = text.split('{').enumerate();
     parts.map(|(i, part)| if i == 0 { part } else { part.split_once('}').map_or(part, |(_, rest)| rest) }).collect()
 }
 
-/// Whether a text is a message: words that are more than one, and not the place that an error is at.
+/// Whether a text is a message: it has more than one word, and is not the place of an error.
 fn is_message(text: &str) -> bool {
     let words = fixed(text).join(" ");
     let words = words.split_whitespace().filter(|word| word.chars().filter(|c| c.is_alphabetic()).count() > 1);
     words.count() > 1
 }
 
-/// Whether a line holds the fixed parts of a text in their order.
+/// Whether a line contains the fixed parts of a text in order.
 fn is_said(text: &str, line: &str) -> bool {
     let mut rest = Some(line);
     for part in fixed(text) {
@@ -132,9 +132,9 @@ fn is_said(text: &str, line: &str) -> bool {
     rest.is_some()
 }
 
-/// Messages of a source that are nowhere said.
+/// Messages of a source that no case produces.
 fn unsaid(source: &str, said: &str) -> Vec<String> {
-    // Titles of cases are no messages.
+    // Titles of cases do not count as messages.
     let lines: Vec<&str> = said.lines().filter(|line| !line.starts_with("# ")).collect();
     let missing = |text: &String| is_message(text) && !lines.iter().any(|line| is_said(text, line));
     texts(source).into_iter().filter(missing).collect()

@@ -1,4 +1,4 @@
-//! Messages about networks, checkpoints, shards, and what the converter of stages answers.
+//! Messages about networks, checkpoints, shards, and answers of the USD converter.
 
 use super::{Said, message};
 use crate::support::onnx;
@@ -43,7 +43,7 @@ fn networks(said: &mut Said, folder: &Path) {
     load("a network of a flat tensor", &onnx::flat());
 }
 
-/// The same bytes with a word in place of another as long.
+/// Replaces a word by another of the same length.
 fn replaced(mut bytes: Vec<u8>, word: &[u8], other: &[u8]) -> Vec<u8> {
     for at in 0..bytes.len() - word.len() {
         if bytes[at..].starts_with(word) {
@@ -53,13 +53,13 @@ fn replaced(mut bytes: Vec<u8>, word: &[u8], other: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The head of a render's file, of a version of the program.
+/// The header of a state file of a program version.
 fn head(version: &str) -> Vec<u8> {
     let head = json!({"version": version, "scene": "", "arguments": {"width": 2}, "way": null, "plan": {}});
     serde_json::to_vec(&head).expect("it is JSON")
 }
 
-/// Records, and their end.
+/// The bytes of records and their end.
 fn sealed(contents: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = Vec::new();
     contents.iter().for_each(|content| Record::new(content).write(&mut bytes).expect("memory"));
@@ -125,7 +125,7 @@ fn about_what_a_render_leaves() {
     insta::assert_snapshot!("state", said);
 }
 
-/// A file can tell of shards that cannot be, whose numbers would be counted up to or divided by.
+/// A file may contain impossible shard numbers, which would be counted up to or divided by.
 #[test]
 fn shards_that_cannot_be() {
     let is_sound = |index, count| Shard { index, count }.is_sound();

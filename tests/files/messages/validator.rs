@@ -1,8 +1,9 @@
-//! The faults that the glTF validator knows (its list of issues, version 2.0.0-dev.3.10), each made here in a file that
-//! is whole without it: every one is read, read with a warning, or refused with a message. What is said of each stands in
-//! a snapshot, so that a change of it is seen.
+//! The issues of the glTF validator (list of version 2.0.0-dev.3.10), each planted in an otherwise valid file. Each
+//! file is read, read with a warning, or refused with a message. A snapshot holds the messages, so that changes are
+//! noticed.
 //!
-//! Left out: extensions that are not read, hints about what is never used, and what only a validator does (`IO_ERROR`).
+//! Without issues of unsupported extensions, hints about unused objects, and issues that only a validator can have
+//! (`IO_ERROR`).
 
 use super::Said;
 use super::scene::{changed, messages_of, pool};
@@ -11,7 +12,7 @@ use crate::gltf::glb::Glb;
 use caustique::scene::gltf::ReadOptions;
 use serde_json::{Value, json};
 
-/// Codes of the schema: values that the format does not have.
+/// Schema issues: values that the format does not allow.
 fn schema() -> Vec<(&'static str, Value)> {
     vec![
         ("ARRAY_LENGTH_NOT_IN_LIST", json!({"/accessors/0/min": [0, 0, 0, 0, 0]})),
@@ -32,7 +33,7 @@ fn schema() -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Codes of meaning: values that contradict others of their part.
+/// Semantic issues: values that contradict others of their object.
 fn meaning() -> Vec<(&'static str, Value)> {
     let light = "/extensions/KHR_lights_punctual/lights/0";
     vec![
@@ -113,7 +114,7 @@ fn matrix(numbers: [i32; 16]) -> Value {
     json!({"/nodes/0": {"mesh": 1, "matrix": numbers}, "/animations": []})
 }
 
-/// Codes of links: parts that do not fit what they refer to.
+/// Link issues: objects that do not fit their references.
 fn links() -> Vec<(&'static str, Value)> {
     vec![
         ("ACCESSOR_SMALL_BYTESTRIDE", json!({"/bufferViews/1/byteStride": 8})),
@@ -173,7 +174,7 @@ fn links() -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Codes of data: numbers that cannot be.
+/// Data issues: invalid numbers.
 fn data() -> Vec<(&'static str, Value)> {
     vec![
         ("ACCESSOR_ANIMATION_INPUT_NEGATIVE", json!({"#11.0": -1})),
@@ -207,7 +208,7 @@ fn data() -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Codes of the container.
+/// Container issues.
 fn containers() -> Vec<(&'static str, Vec<u8>)> {
     let whole = pool().bytes();
     let with = |at: usize, bytes: &[u8]| {

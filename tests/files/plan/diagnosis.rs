@@ -1,4 +1,4 @@
-//! What looks like a mistake is told, with its name and a remedy; what does not is not.
+//! Likely mistakes in a scene give a warning that names the object and a remedy; other scenes give none.
 
 use super::{floor, plan, plan_by, plan_to};
 use crate::support::scenes::{add, cuboid, glass, matte, point_light, quad, sphere};
@@ -29,7 +29,7 @@ fn ball(material: Material) -> Description {
     with(lit(), "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), material)
 }
 
-/// Its only warning.
+/// The only warning about a scene.
 fn warning(description: Description) -> String {
     let warnings = plan(description).warnings;
     assert_eq!(warnings.len(), 1, "{warnings:?}");
@@ -46,7 +46,7 @@ fn a_good_scene_is_passed_over() {
     silent(lit());
 }
 
-/// Lamps light the scene, but what shines from all around may have been left out by the program that wrote the file.
+/// Lamps light the scene, but the program that wrote the file may have omitted the environment.
 #[test]
 fn an_environment_that_was_not_exported() {
     let unsaid = |description: Description| Description { environment_unknown: true, ..description };
@@ -68,11 +68,11 @@ fn thin_walls_that_were_meant_to_bend_light() {
         "material \"Ball\" on \"Ball\": a thin wall does not bend light and casts no caustic; close the mesh (a bowl has an inside and an \
          outside), or give the material a thickness"
     );
-    // A pane is thin on purpose.
+    // A pane is meant to be thin.
     silent(with(lit(), "Pane", quad(Vec3::new(-1.0, 1.0, 0.0), Vec3::X, Vec3::new(0.0, 1.0, 1.0)), thin));
 }
 
-/// A screen before the floor that shows its back to the camera is named; from its front it is as good as any.
+/// A screen whose back faces the camera is reported; one whose front does is not.
 #[test]
 fn back_faces_that_the_camera_looks_through() {
     let screen = |a, b, culled| {
@@ -121,7 +121,7 @@ fn lamps_and_surfaces_in_different_units() {
     for (intensity, photometric) in [(1.0, false), (1.0, true), (30.0, false), (683.0, true), (1e6, false)] {
         silent(scene(intensity, photometric));
     }
-    // Nothing is guessed where the file or the user states the units.
+    // Units are not guessed if the file or the user states them.
     let mut stated = scene(683.0, false);
     stated.guessed_units = None;
     silent(stated);
@@ -142,7 +142,7 @@ fn suns_and_environments_in_different_units() {
     silent(scene(4.0));
 }
 
-/// A lamp in a globe of glass: photons find it, paths from the eye do not; with a radius, they do.
+/// A point lamp in a glass globe is found by photons but not by camera paths; with a radius, camera paths find it.
 #[test]
 fn lamps_without_size_behind_glass() {
     let globe = || with(lit(), "Globe", sphere(Vec3::new(0.0, 3.0, 0.0), 0.5, 16), glass(1.5));
@@ -158,7 +158,7 @@ fn lamps_without_size_behind_glass() {
     let mut sized = globe();
     sized.lights[0].radius = 0.1;
     assert_eq!(plan_by(sized, Search::CameraPaths).warnings, [""; 0]);
-    // Glass beside the lamp, not around it.
+    // Glass beside the lamp instead of around it.
     let beside = plan_by(ball(glass(1.5)), Search::CameraPaths).warnings;
     assert!(beside.iter().all(|warning| !warning.contains("% of its light")), "{beside:?}");
 }
@@ -187,18 +187,18 @@ fn lamps_in_a_casing() {
          that transmits light"
     );
     silent(around(0.3, glass(1.5)));
-    // A room around the camera is no casing.
+    // A room around the camera is not a casing.
     silent(around(20.0, matte(0.5, 0.0)));
     // An opening.
     let mut open = around(0.3, matte(0.5, 0.0));
     open.meshes[1].triangles.truncate(10);
     silent(open);
-    // Surfaces that glow, too.
+    // Emissive surfaces, too.
     let mut panel = around(0.3, matte(0.5, 0.0));
     panel.lights.clear();
     let panel = with(panel, "Filament", sphere(Vec3::new(0.0, 3.0, 0.0), 0.05, 8), matte(0.0, 100.0));
     assert!(warning(panel).starts_with("object \"Filament\": all its light stays within \"Casing\", "));
-    // A spot that lights nothing but the floor: what it lights scatters its light away.
+    // A spot that lights only the floor, which reflects the light elsewhere.
     let mut spot = lit();
     spot.lights[0].kind = PunctualKind::Spot { inner: 0.1, outer: 0.2, edge: SpotEdge::Squared };
     spot.lights[0].to_world.matrix3 = glam::DMat3::from_rotation_x(-std::f64::consts::FRAC_PI_2);
@@ -217,7 +217,7 @@ fn glass_that_no_light_reaches() {
         "object \"Ball\": no light shines on its glass, so it casts no caustic; what stands in the way is \"Lid\""
     );
     silent(lid(3.5));
-    // Glass in the way lets light through.
+    // Glass between them transmits light.
     let mut clear = lid(2.0);
     clear.materials[2] = Material { thin: true, ..glass(1.5) };
     silent(clear);
@@ -232,8 +232,8 @@ fn glass_that_no_light_reaches() {
     );
 }
 
-/// A beam of half a degree on a slab of two large triangles a face misses the points that are asked for light, and is
-/// light all the same, also through a pane before it; a beam beside the slab is not.
+/// A beam of half a degree on a slab with two large triangles per face misses the test points, but the slab counts as
+/// lit, also through a pane. With a beam beside the slab it does not.
 #[test]
 fn narrow_beams_light_large_glass() {
     let scene = |x: f64, pane: bool| {
@@ -259,7 +259,7 @@ fn narrow_beams_light_large_glass() {
     assert_eq!(warning(scene(4.0, false)), expected);
 }
 
-/// Old models fade glass by alpha. Veils that are open, rough, flat or hardly fade may be meant to.
+/// Old models imitate glass by alpha. Open, rough or flat surfaces, and alpha near 1, may be intended.
 #[test]
 fn alpha_in_place_of_glass() {
     let faded = |alpha: f32, roughness: f32| Material {
@@ -280,7 +280,7 @@ fn alpha_in_place_of_glass() {
     }
     let pane = quad(Vec3::new(-1.0, 0.5, 0.0), Vec3::X, Vec3::Y);
     silent(with(lit(), "Pane", pane, faded(0.1, 0.1)));
-    // The alpha of a texture: nearly even, and cut out.
+    // Texture alpha: nearly uniform, and a cut-out.
     let textured = |alphas: [f32; 4]| {
         let first = TextureRef { texture: 0, set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
         let mut body = sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16);
@@ -327,7 +327,7 @@ fn a_limit_of_depth_is_told() {
     assert!(to(2).reason_if_black.starts_with("what is left out may be all its light: indirect, caustic"));
 }
 
-/// Each reason that a black picture may have.
+/// Each possible reason for a black picture.
 #[test]
 fn reasons_of_black_pictures() {
     let reason = |description: Description| plan(description).reason_if_black;
@@ -336,14 +336,14 @@ fn reasons_of_black_pictures() {
     away.cameras = vec![crate::support::scenes::look_at(DVec3::new(0.0, 5.0, 6.0), DVec3::new(0.0, 9.0, 6.1), 50.0)];
     assert!(warning(away.clone()).starts_with("the camera sees no surface, so the picture will be black; "));
     assert!(reason(away.clone()).starts_with("the camera sees no surface; "));
-    // A sky shows behind nothing.
+    // A sky is visible in an empty scene.
     let source = EnvironmentSource::Color(Rgb::ONE);
     away.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
     silent(away);
     assert!(reason(lit()).ends_with("too hard to find for any"));
 }
 
-/// Where lamps give all light, nothing tells whether the guess of their unit is right.
+/// If lamps are the only lights, the guess of their unit cannot be checked.
 #[test]
 fn guessed_lumens_of_lamps_alone_are_told() {
     let mut description = lit();

@@ -1,4 +1,4 @@
-//! Which effects are there, and because of what.
+//! The effects of a scene, and the objects that cause them.
 
 use super::{floor, plan, plan_by};
 use crate::support::scenes::{add, glass, matte, mirror, point_light, quad, sphere};
@@ -18,13 +18,13 @@ fn effects_are_there_for_reasons() {
     let mut scene = floor();
     scene.lights = vec![point_light(DVec3::new(0.0, 3.0, 0.0), 10.0)];
     assert_eq!(present(&plan(scene.clone())), "direct indirect");
-    // A matte light can be seen; a mirror and glass focus it, and show what they focus.
+    // A diffuse light is visible; a mirror and glass focus its light, and show caustics.
     add(&mut scene, "Panel", quad(Vec3::new(0.0, 4.0, 0.0), Vec3::X, Vec3::Z), matte(0.0, 1.0));
     add(&mut scene, "Ball", sphere(Vec3::new(0.0, 1.0, 0.0), 0.5, 16), Material { dispersion: 0.3, ..glass(1.5) });
     add(&mut scene, "Disc", sphere(Vec3::new(2.0, 1.0, 0.0), 0.5, 16), mirror());
     let everything = plan(scene.clone());
     assert_eq!(present(&everything), "emission direct indirect caustic sds dispersion");
-    // A perfect mirror and clear glass have no gloss of their own; a mirror that is not perfect has, and a coated one.
+    // A perfect mirror and clear glass have no glossy reflection. A rough mirror has, and a coated one.
     let disc = scene.materials.len() - 1;
     for glossy in [Material { roughness: 0.1, ..mirror() }, Material { clearcoat: 1.0, ..mirror() }] {
         let mut scene = scene.clone();
@@ -52,17 +52,16 @@ fn effects_are_there_for_reasons() {
         (Some("photons"), Some("photons"))
     );
     assert!(everything.effect(Effect::Dispersion).simulated);
-    // Photons find it all; connections do not find what a lamp without size throws through glass, and nothing bounds
-    // that.
+    // Photons find all light. Connections miss the light of a point lamp through glass, in an unknown amount.
     assert_eq!(everything.left_out_at_most, Some(0.0));
     assert_eq!(plan_by(scene.clone(), Search::Connections).left_out_at_most, None);
-    // Without light nothing is lit.
+    // Without lights there are no effects.
     scene.lights.clear();
     scene.materials[1].emission = Rgb::ZERO;
     assert_eq!(present(&plan(scene)), "dispersion");
 }
 
-/// Photons take part in gloss only where they may be of lamps that sharp lobes show by way of clear glass or perfect
+/// Photons carry glossy light only if it may come from lamps that sharp lobes show through clear glass or perfect
 /// mirrors.
 #[test]
 fn who_brings_gloss() {
@@ -102,12 +101,12 @@ fn properties_of_the_scene() {
     let because = |effect: Effect| whole.effect(effect).because.join("; ");
     assert_eq!(because(Effect::Volume), "the scene's medium; the medium of material \"Ball\" on \"Ball\"");
     assert_eq!(because(Effect::DepthOfField), "the camera's aperture");
-    // An environment without strength is none.
+    // An environment of strength zero does not count.
     scene.environment.as_mut().expect("it is there").strength = 0.0;
     assert_eq!(present(&plan(scene)), "volume depth_of_field");
 }
 
-/// Lamps that have a radius are lights by name, whatever they are made of.
+/// Lamps with a radius count as lights and have names, although they are built as spheres.
 #[test]
 fn lights_have_their_names() {
     let mut scene = floor();

@@ -1,5 +1,5 @@
-//! A scene without an effect is rendered as the scene that never had it, to the last bit: whether it is left out of the
-//! description or of the scene.
+//! A scene with an effect switched off is rendered like a scene that never had it, to the bit, whether it is removed
+//! from the description or from the scene.
 
 use super::floor;
 use crate::support::scenes::{add, build, glass, matte, point_light, quad, square};
@@ -13,7 +13,7 @@ use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
 use caustique::scene::{Description, Scene};
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 
-/// Its sums, pixel by pixel.
+/// The sums of a render, pixel by pixel.
 fn picture(description: Description) -> String {
     let scene = build(description);
     let camera = scene.camera(&square(12)).expect("there is a camera");
@@ -32,7 +32,7 @@ fn picture_of(scene: &Scene, camera: &Camera) -> String {
         .collect()
 }
 
-/// A pane over the floor under a lamp, and what the pane wears.
+/// A pane over the floor under a lamp; `pane` is its material.
 fn scene(pane: Material) -> Description {
     let mut description = floor();
     description.lights = vec![point_light(DVec3::new(0.5, 4.0, 0.0), 10.0)];
@@ -42,7 +42,8 @@ fn scene(pane: Material) -> Description {
     description
 }
 
-/// `with` has the effect; without it, it is `without`, and differs before. What called for it is told.
+/// Checks that `with` has the effect, caused by `because`, that it differs from `without`, and that with the effect
+/// switched off it equals `without`.
 fn check(effect: Effect, mut with: Description, without: Description, because: &str) {
     let plain = picture(without);
     assert!(picture(with.clone()) != plain, "{effect:?} makes no difference");
@@ -111,7 +112,7 @@ fn dispersion() {
     check(Effect::Dispersion, with, without, "material \"Pane\" on \"Pane\"");
 }
 
-/// The mean of a texture takes its place; cut-outs are another effect and keep theirs.
+/// A texture is replaced by its mean. Cut-outs are another effect and keep their texture.
 #[test]
 fn textures() {
     let tiles = texture(&[[1.0, 0.0, 0.5, 1.0], [0.0, 0.5, 0.5, 0.0]]);
@@ -131,7 +132,7 @@ fn textures() {
     check(Effect::Textures, with, without, "material \"Pane\" on \"Pane\"");
 }
 
-/// Classes of light paths are for a render to leave out, not for the scene.
+/// Classes of light paths are left out by the render, not removed from the scene.
 #[test]
 fn classes_of_paths_leave_the_scene_alone() {
     let mut description = scene(glass(1.5));
