@@ -1,8 +1,8 @@
 //! Aimed emission of light from infinity: half of the light paths start towards objects that can make caustics.
 //!
-//! Unaimed paths enter the scene through a disc as large as the scene, so few of them hit a small glass on a wide floor.
-//! Aimed starts are sampled from a mixture of the scene's disc and the discs of the targets' bounding spheres. The flux
-//! of a path is divided by its density in the mixture, so the estimate remains unbiased.
+//! Unaimed paths enter the scene through a disc as large as the scene, so few of them hit a small glass on a wide
+//! floor. Aimed starts are sampled from a mixture of the scene's disc and the discs of the targets' bounding spheres.
+//! The flux of a path is divided by its density in the mixture, so the estimate remains unbiased.
 
 use super::{Cdf, EmissionSample, EntryDisc, Region, Sky};
 use crate::geometry::Shapes;
@@ -147,8 +147,8 @@ impl CausticTargets {
         }
     }
 
-    /// [`CausticTargets::aim`], with part of the starts on a disc of the region. Flux and density do not account for the
-    /// region: [`CausticTargets::density_with_region`] returns the density of the whole mixture.
+    /// [`CausticTargets::aim`], with part of the starts on a disc of the region. Flux and density do not account for
+    /// the region: [`CausticTargets::density_with_region`] returns the density of the whole mixture.
     pub fn aim_with_region(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
         let share = self.region_share();
         if u < share {
@@ -312,8 +312,8 @@ mod tests {
                 let mean = sum / n as f64;
                 let error = ((squares / n as f64 - mean * mean) / n as f64).sqrt();
                 let expected = f64::from(PI * radius * radius);
-                // Two-sided 4 sigma over eighteen fluxes: one false alarm in 870 seeds. Without the share of the scene's
-                // disc, the error would be far larger.
+                // Two-sided 4 sigma over eighteen fluxes: one false alarm in 870 seeds. Without the share of the
+                // scene's disc, the error would be far larger.
                 assert!((mean - expected).abs() < 4.0 * error, "{mean} +- {error}, expected {expected}, {region:?}");
                 assert!((mean * 1.5 - expected).abs() > 4.0 * error, "half as much again goes unnoticed");
             }

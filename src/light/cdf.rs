@@ -8,8 +8,8 @@ const STEPS: u64 = 1 << 32;
 /// monotonic, so it keeps the stratification of its input.
 #[derive(Clone, Debug)]
 pub struct Cdf {
-    /// For each index, the first step after its interval. An index with a positive weight has at least one step. Entries
-    /// from `last` on are not used: their end is [`STEPS`], which does not fit.
+    /// For each index, the first step after its interval. An index with a positive weight has at least one step.
+    /// Entries from `last` on are not used: their end is [`STEPS`], which does not fit.
     ends: Vec<u32>,
     /// The last index with a positive weight.
     last: usize,

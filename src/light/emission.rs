@@ -89,8 +89,8 @@ pub struct EmissionSample {
 }
 
 impl EmissionSample {
-    /// Replaces the density `onward` by `mixed`, the density of the mixture that the start was sampled from. Returns the
-    /// start, and its flux over the flux before; `None` if the flux is zero.
+    /// Replaces the density `onward` by `mixed`, the density of the mixture that the start was sampled from. Returns
+    /// the start, and its flux over the flux before; `None` if the flux is zero.
     #[inline]
     pub fn reweighted(self, mixed: f32) -> Option<(EmissionSample, f32)> {
         let ratio = self.density.onward / mixed;

@@ -27,8 +27,8 @@ pub struct ImageEnvironment {
 }
 
 impl ImageEnvironment {
-    /// Builds the sampling distribution of `width * height` finite, non-negative texels, already scaled by the strength.
-    /// `rotation` is in radians. `None` if all texels are black.
+    /// Builds the sampling distribution of `width * height` finite, non-negative texels, already scaled by the
+    /// strength. `rotation` is in radians. `None` if all texels are black.
     pub fn new(width: usize, height: usize, radiance: Vec<[f32; 3]>, rotation: f32) -> Option<ImageEnvironment> {
         // Bilinear interpolation spreads a texel over the neighbouring cells. So the weight of a cell is the
         // tent-weighted mean over its 3x3 neighbourhood, which is positive wherever the radiance is.

@@ -42,7 +42,8 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// The group with the name `label` in the scene file, added if it is new. `None` if there are [`MAX_GROUPS`] others.
+    /// The group with the name `label` in the scene file, added if it is new. `None` if there are [`MAX_GROUPS`]
+    /// others.
     pub fn get_or_add(&mut self, label: &str) -> Option<Group> {
         let index = match self.labels.iter().position(|known| known == label) {
             Some(index) => index,

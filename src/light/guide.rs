@@ -1,13 +1,13 @@
 //! Guided emission: most light paths start towards objects that make caustics, or from the lights that matter most for
 //! the picture.
 //!
-//! A start is sampled from a mixture. With probability [`Guide::unguided`] it is sampled by [`Lights::sample_emission`],
-//! otherwise from a cell: a light alone, or a pair of a light and a target. The light determines the origin. Towards a
-//! target, the direction is uniform in the cone that the target's bounding sphere subtends (for light from infinity, the
-//! line is uniform over the sphere's disc); in a cell without a target, the light samples the direction. The flux of a
-//! start is its unguided flux times the ratio of its unguided density to its density in the mixture \[Veach 1997, (9.15),
-//! the balance heuristic\], so the mean does not change. The ratio is at most 1 / `unguided`, or 1.5 / `unguided` with a
-//! region of interest.
+//! A start is sampled from a mixture. With probability [`Guide::unguided`] it is sampled by
+//! [`Lights::sample_emission`], otherwise from a cell: a light alone, or a pair of a light and a target. The light
+//! determines the origin. Towards a target, the direction is uniform in the cone that the target's bounding sphere
+//! subtends (for light from infinity, the line is uniform over the sphere's disc); in a cell without a target, the
+//! light samples the direction. The flux of a start is its unguided flux times the ratio of its unguided density to its
+//! density in the mixture \[Veach 1997, (9.15), the balance heuristic\], so the mean does not change. The ratio is at
+//! most 1 / `unguided`, or 1.5 / `unguided` with a region of interest.
 //!
 //! [`Guide::learn`] sets the probabilities of the cells from the error that their photons leave in the picture.
 
@@ -121,8 +121,8 @@ impl Guide {
 
     /// Sets the probabilities of the cells that minimise the error for equal work. For each cell c, `error[c]` is the
     /// sum of the squared relative errors that its photons left in the picture, `paths[c]` the number of its light
-    /// paths, `work[c]` their total cost. With n paths in each cell, the error is the sum of `error * paths / n` and the
-    /// work the sum of `n * work / paths`. The optimal n is proportional to `sqrt(error * paths / (work / paths))`.
+    /// paths, `work[c]` their total cost. With n paths in each cell, the error is the sum of `error * paths / n` and
+    /// the work the sum of `n * work / paths`. The optimal n is proportional to `sqrt(error * paths / (work / paths))`.
     pub fn learn(&mut self, error: &[f64], paths: &[f64], work: &[f64]) {
         let best = |(&error, (&paths, &work)): (&f64, (&f64, &f64))| {
             if work > 0.0 { (error * paths * paths / work).sqrt() } else { 0.0 }
@@ -173,8 +173,8 @@ impl Guide {
         }
     }
 
-    /// Samples a start. Part of the starts from infinity without a target go through the region of interest, if there is
-    /// one. `choice`, `point` and `direction` are uniform on the unit square.
+    /// Samples a start. Part of the starts from infinity without a target go through the region of interest, if there
+    /// is one. `choice`, `point` and `direction` are uniform on the unit square.
     #[inline]
     pub fn emit(
         &self,

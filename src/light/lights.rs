@@ -401,9 +401,9 @@ impl Lights {
         }
     }
 
-    /// Radiance that a surface hit by a ray emits along `wo`, back to the ray's origin `from`, and the density per solid
-    /// angle with which [`Lights::sample_direct`] samples that point from there. The density is 0 for a light that
-    /// touches the surface at the origin.
+    /// Radiance that a surface hit by a ray emits along `wo`, back to the ray's origin `from`, and the density per
+    /// solid angle with which [`Lights::sample_direct`] samples that point from there. The density is 0 for a light
+    /// that touches the surface at the origin.
     #[inline]
     pub fn hit_radiance(
         &self,
@@ -429,8 +429,8 @@ impl Lights {
         self.targets.density(&self.sky, p, wi)
     }
 
-    /// Radiance that a surface emits along `wo` towards `from`, and the densities of starting a light path at that point
-    /// along `wo`.
+    /// Radiance that a surface emits along `wo` towards `from`, and the densities of starting a light path at that
+    /// point along `wo`.
     #[inline]
     pub fn emitted(
         &self,
@@ -462,9 +462,9 @@ impl Lights {
         Some((radiance, EmissionDensity { direct, start, onward, cos, infinite: false, delta: false }))
     }
 
-    /// Calls `each(radiance, direct, start, group)` for every light at infinity that a ray from `from` along `d` reaches
-    /// when it leaves the scene, with the densities of [`EmissionDensity`]. Camera rays skip lights that are hidden from
-    /// cameras.
+    /// Calls `each(radiance, direct, start, group)` for every light at infinity that a ray from `from` along `d`
+    /// reaches when it leaves the scene, with the densities of [`EmissionDensity`]. Camera rays skip lights that are
+    /// hidden from cameras.
     #[inline]
     pub fn for_each_infinite(
         &self,

@@ -48,8 +48,9 @@ impl Region {
         self.radius * (disc + 1.0).exp2()
     }
 
-    /// Density per area, in the mixture of discs, of a line at a squared distance from the centre. `drawn` is the radius
-    /// of the disc that the line was sampled through, so that rounding at its rim does not matter; 0 for other lines.
+    /// Density per area, in the mixture of discs, of a line at a squared distance from the centre. `drawn` is the
+    /// radius of the disc that the line was sampled through, so that rounding at its rim does not matter; 0 for other
+    /// lines.
     #[inline]
     pub(super) fn density(&self, distance2: f32, drawn: f32) -> f32 {
         let drawn2 = drawn * drawn;

@@ -7,8 +7,8 @@ use super::tree::LightTree;
 use crate::math::luminance;
 use std::f32::consts::PI;
 
-/// Share of the selection probability that is proportional to power for every receiver. It limits how much probability a
-/// near light behind a wall can take from the other lights.
+/// Share of the selection probability that is proportional to power for every receiver. It limits how much probability
+/// a near light behind a wall can take from the other lights.
 const POWER_SHARE: f64 = 0.1;
 /// Smallest share of the remaining probability for lights at infinity and for finite lights, if a scene has both.
 const MIN_SHARE: f32 = 0.0625;

@@ -1,11 +1,11 @@
 //! Light selection by expected irradiance: a tree of clusters with bounds on their positions and directions [Conty and
 //! Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018].
 //!
-//! A cluster has a bounding sphere of its lights and a bounding cone of their axes. Selection descends from the root to a
-//! leaf. At each node, the probability of a child is proportional to a bound on its irradiance at the receiver: intensity
-//! at the smallest possible angle to an axis, over the squared distance. A cluster that cannot light the receiver is
-//! never selected. In a small and distant cluster whose lights have similar axes, all lights are seen alike, so selection
-//! there is by power.
+//! A cluster has a bounding sphere of its lights and a bounding cone of their axes. Selection descends from the root to
+//! a leaf. At each node, the probability of a child is proportional to a bound on its irradiance at the receiver:
+//! intensity at the smallest possible angle to an axis, over the squared distance. A cluster that cannot light the
+//! receiver is never selected. In a small and distant cluster whose lights have similar axes, all lights are seen
+//! alike, so selection there is by power.
 
 mod bounds;
 

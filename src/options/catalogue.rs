@@ -101,8 +101,8 @@ const OF_SCENE: [(&str, &str); 10] = [
 const STAGE_HEADINGS: [&str; 6] = ["Method", "When to stop", "Expert", "Light and glass", "Effects", "Finish"];
 /// Options under other headings that a stage may set.
 const ALSO_IN_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compression", "reproducible"];
-/// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has other
-/// means.
+/// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has
+/// other means.
 const NOT_IN_STAGES: [&str; 6] = ["env", "model", "allow_outside", "strict", "photon_memory", "light_units"];
 
 /// Describes the options of a command, in the order of its help.

@@ -68,8 +68,8 @@ impl Serialize for Frames {
     }
 }
 
-/// The path of one frame of a sequence: the frame number replaces `%d`, `%04d`, and each run of `#` (padded to the length
-/// of the run) in the file name. `None` if the file name has no such placeholder.
+/// The path of one frame of a sequence: the frame number replaces `%d`, `%04d`, and each run of `#` (padded to the
+/// length of the run) in the file name. `None` if the file name has no such placeholder.
 pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let (mut made, mut rest, mut found) = (String::new(), name, false);

@@ -1,4 +1,5 @@
-//! Options about the run of a render: what is saved, how much memory and how many threads it takes, which layers it writes.
+//! Options about the run of a render: what is saved, how much memory and how many threads it takes, which layers it
+//! writes.
 
 use super::number::{Ranged, threads};
 use crate::error::Result;
@@ -81,8 +82,8 @@ impl RunOptions {
         self.memory.map(|mib| MemoryLimit { bytes: u64::from(mib) << 20 })
     }
 
-    /// Where and how often the checkpoint is saved: in the file of `--checkpoint`, or beside `output`. `None` if nothing
-    /// is saved.
+    /// Where and how often the checkpoint is saved: in the file of `--checkpoint`, or beside `output`. `None` if
+    /// nothing is saved.
     pub fn saving(&self, output: Option<&Path>) -> Option<Saving> {
         let beside = |output: &Path| {
             let mut name = output.file_name().filter(|_| output.extension().is_some())?.to_owned();

@@ -108,8 +108,8 @@ impl SceneOptions {
         }
     }
 
-    /// The options for one frame of the animation. If the name of the scene is a pattern such as `a.####.glb`, and no file
-    /// has exactly this name, each frame is a file of its own.
+    /// The options for one frame of the animation. If the name of the scene is a pattern such as `a.####.glb`, and no
+    /// file has exactly this name, each frame is a file of its own.
     pub fn at(&self, frame: u32) -> SceneOptions {
         let file = numbered(&self.path, frame).filter(|_| !self.path.exists());
         let of_sequence = self.of_sequence || file.is_some();

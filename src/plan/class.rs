@@ -1,9 +1,9 @@
 //! Classes of light paths in Heckbert's notation. Every path is in exactly one class.
 //!
-//! A path is a string of the events ([`Event`]) at its vertices, from the camera to the light: `C` is a perfect mirror or
-//! clear glass, `M` the perfect mirror of a surface that has other lobes (a coat), `S` a sharp lobe, `B` a broad lobe, `V`
-//! a medium. `N` is any of `C M S`, `G` is `M` or `S`, `D` is `C` or `M`. The path ends on a light of finite size, `L`, or
-//! on a delta light, `P`. The table writes `L` where both are possible.
+//! A path is a string of the events ([`Event`]) at its vertices, from the camera to the light: `C` is a perfect mirror
+//! or clear glass, `M` the perfect mirror of a surface that has other lobes (a coat), `S` a sharp lobe, `B` a broad
+//! lobe, `V` a medium. `N` is any of `C M S`, `G` is `M` or `S`, `D` is `C` or `M`. The path ends on a light of finite
+//! size, `L`, or on a delta light, `P`. The table writes `L` where both are possible.
 //!
 //! | class | path | effect | part |
 //! | --- | --- | --- | --- |
@@ -22,12 +22,12 @@
 //! | `Single` | `C* V L` | volume | volume |
 //! | `Volume` | `C* V`, then at least one event | volume | volume |
 //!
-//! The effect *glossy* contains the paths whose first event after `C*` is a narrow lobe, except caustics. A delta light is
-//! visible only through a lobe that is not a delta lobe. If this lobe is sharp, and only perfect mirrors and clear glass
-//! are between the lobe and the light, the lobe shows a caustic.
+//! The effect *glossy* contains the paths whose first event after `C*` is a narrow lobe, except caustics. A delta light
+//! is visible only through a lobe that is not a delta lobe. If this lobe is sharp, and only perfect mirrors and clear
+//! glass are between the lobe and the light, the lobe shows a caustic.
 //!
-//! [`CameraSuffix`] reads a path from the camera, [`LightPrefix`] reads it from the light. Together they determine the class
-//! of the whole path ([`CameraSuffix::class_with`]).
+//! [`CameraSuffix`] reads a path from the camera, [`LightPrefix`] reads it from the light. Together they determine the
+//! class of the whole path ([`CameraSuffix::class_with`]).
 
 mod camera_suffix;
 mod present;

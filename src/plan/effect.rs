@@ -67,8 +67,8 @@ impl Effect {
         }
     }
 
-    /// Whether the effect is a set of path classes. The other effects are properties of the scene: to remove one changes
-    /// the scene.
+    /// Whether the effect is a set of path classes. The other effects are properties of the scene: to remove one
+    /// changes the scene.
     pub fn is_class(self) -> bool {
         self <= Effect::Sds
     }

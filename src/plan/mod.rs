@@ -1,10 +1,10 @@
 //! The plan of a render: the effects that the scene calls for and why, the techniques that simulate them, and likely
 //! mistakes in the scene.
 //!
-//! [`PathClass`] is the class of a light path, and [`Search::owner`] is the technique that carries its light. `presence`
-//! lists the effects of a scene, `search` the effects that a method finds, [`switch`] removes effects that the user
-//! switches off, and `diagnosis` explains why an expected effect may be missing. The plan does not trace light paths; a
-//! pilot render measures the shares and costs in [`EffectPlan`].
+//! [`PathClass`] is the class of a light path, and [`Search::owner`] is the technique that carries its light.
+//! `presence` lists the effects of a scene, `search` the effects that a method finds, [`switch`] removes effects that
+//! the user switches off, and `diagnosis` explains why an expected effect may be missing. The plan does not trace light
+//! paths; a pilot render measures the shares and costs in [`EffectPlan`].
 
 mod class;
 mod diagnosis;
@@ -59,11 +59,11 @@ pub struct Plan {
     pub because: String,
     /// All effects, in the order of [`Effect::ALL`].
     pub effects: Vec<EffectPlan>,
-    /// Upper bound on the relative error (the root of relMSE) from missing light: 0 if all effects are simulated. `None`
-    /// if some are left out, whose light has no bound ([`EffectPlan::error_if_off`] is a measurement).
+    /// Upper bound on the relative error (the root of relMSE) from missing light: 0 if all effects are simulated.
+    /// `None` if some are left out, whose light has no bound ([`EffectPlan::error_if_off`] is a measurement).
     pub left_out_at_most: Option<f64>,
-    /// Missing effects and likely mistakes in the scene, each with a remedy. Warnings from reading and building the scene
-    /// are in [`Scene::warnings`].
+    /// Missing effects and likely mistakes in the scene, each with a remedy. Warnings from reading and building the
+    /// scene are in [`Scene::warnings`].
     pub warnings: Vec<String>,
     /// Explanation in case the whole picture is black; empty if a warning of the scene already explains it.
     #[serde(skip)]

@@ -30,8 +30,8 @@ pub enum Search {
 pub enum Owner {
     /// Camera paths that hit lights.
     Hits,
-    /// Next-event estimation, and camera paths that hit lights. For hits by way of a sharp lobe and then mirrors or clear
-    /// glass, also photons of caustics.
+    /// Next-event estimation, and camera paths that hit lights. For hits by way of a sharp lobe and then mirrors or
+    /// clear glass, also photons of caustics.
     Lit,
     /// Photons, gathered or merged.
     Photons,

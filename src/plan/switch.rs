@@ -1,5 +1,5 @@
-//! `--effects`: removes effects that are properties of the scene, from its description before the scene is built, or from
-//! a built scene to measure what they contribute.
+//! `--effects`: removes effects that are properties of the scene, from its description before the scene is built, or
+//! from a built scene to measure what they contribute.
 
 use super::effect::{Effect, EffectSet};
 use super::names::{truncate_reasons, used_materials};

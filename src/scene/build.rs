@@ -12,8 +12,8 @@ use crate::texture::Texture;
 use crate::trace::{CAMERA_RAY_BIT, HitFilter, Tracer};
 use std::sync::Arc;
 
-/// Distance of the scene's centre from the origin, in scene radii, from which on the scene is moved to the origin, because
-/// f32 coordinates would lose digits.
+/// Distance of the scene's centre from the origin, in scene radii, from which on the scene is moved to the origin,
+/// because f32 coordinates would lose digits.
 const FAR_FROM_ORIGIN: f64 = 8.0;
 
 /// Builds the scene.
@@ -134,9 +134,9 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
     groups
 }
 
-/// Adds a warning for each glass solid whose alpha is only approximated. If alpha varies over the solid, the alpha where a
-/// ray enters also decides at its exit, so reversed paths may differ. If an emissive solid has alpha, each face decides by
-/// itself, so that light samples and hits agree, and a ray may pass one wall of the solid alone.
+/// Adds a warning for each glass solid whose alpha is only approximated. If alpha varies over the solid, the alpha
+/// where a ray enters also decides at its exit, so reversed paths may differ. If an emissive solid has alpha, each face
+/// decides by itself, so that light samples and hits agree, and a ray may pass one wall of the solid alone.
 fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
     let mut named = vec![false; materials.list.len()];
     for instance in &shapes.instances {
@@ -288,8 +288,8 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
     Shapes::new(meshes, instances)
 }
 
-/// Transforms a mesh to world space. A mirroring transform also flips the winding, so that the front stays the front, and
-/// the handedness of the tangents.
+/// Transforms a mesh to world space. A mirroring transform also flips the winding, so that the front stays the front,
+/// and the handedness of the tangents.
 fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     let mirrored = to_world.matrix3.determinant() < 0.0;
     let normals = to_world.matrix3.inverse().transpose();

@@ -181,7 +181,8 @@ impl Scene {
     }
 }
 
-/// Orthonormal axes of a node's transform. They are left-handed if the transform mirrors, so that +X stays to the right.
+/// Orthonormal axes of a node's transform. They are left-handed if the transform mirrors, so that +X stays to the
+/// right.
 fn rotation(to_world: &DAffine3) -> Mat3 {
     let back = to_world.matrix3.z_axis.normalize_or(DVec3::Z);
     let up = to_world.matrix3.y_axis;

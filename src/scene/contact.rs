@@ -1,9 +1,9 @@
 //! Surfaces that touch: a glass on a table, a liquid in a glass, a stack of sheets.
 //!
-//! A ray starts at a small offset from the surface it leaves ([`Surface::error`]). Rounding decides which of two surfaces
-//! within the offset is nearer, so rays cannot find the order of touching surfaces. Where triangles may touch
-//! ([`Contacts`](super::Contacts)), a query collects all surfaces at the point, and the ray crosses them in an order that
-//! does not depend on Embree's first hit.
+//! A ray starts at a small offset from the surface it leaves ([`Surface::error`]). Rounding decides which of two
+//! surfaces within the offset is nearer, so rays cannot find the order of touching surfaces. Where triangles may touch
+//! ([`Contacts`](super::Contacts)), a query collects all surfaces at the point, and the ray crosses them in an order
+//! that does not depend on Embree's first hit.
 //!
 //! Transmitting surfaces are in optical contact with each other:
 //!
@@ -11,14 +11,14 @@
 //!   (`transport/interior.rs`) determine what fills the space. Liquid and glass meet without air between them.
 //! - A sheet, which has no inside, is behind the solids in front of it.
 //!
-//! Transmitting surfaces are separated from an opaque surface by a film of air, as rigid bodies are. So a picture does not
-//! change when a glass is lifted off its table by a tiny distance:
+//! Transmitting surfaces are separated from an opaque surface by a film of air, as rigid bodies are. So a picture does
+//! not change when a glass is lifted off its table by a tiny distance:
 //!
 //! - The ray leaves solids before it hits the opaque surface, and enters solids after it has left the opaque surface.
 //! - A sheet is on the side of the opaque surface that its front points to.
 //!
-//! A material with `Material::optical_contact` (paint, a label, water on the floor of a pool) has no such film: if one of
-//! the two materials has it, the ray hits the opaque surface alone.
+//! A material with `Material::optical_contact` (paint, a label, water on the floor of a pool) has no such film: if one
+//! of the two materials has it, the ray hits the opaque surface alone.
 //!
 //! A reversed ray crosses the surfaces in the reverse order, so light paths and camera paths are the same.
 
@@ -124,8 +124,8 @@ fn others(scene: &Scene, at: &ContactPoint, token: u32) -> Stack {
     others
 }
 
-/// Removes transmitting surfaces that are in optical contact with an opaque surface. Returns whether an opaque surface is
-/// in the stack, so that a film of air separates the others from it.
+/// Removes transmitting surfaces that are in optical contact with an opaque surface. Returns whether an opaque surface
+/// is in the stack, so that a film of air separates the others from it.
 fn remove_optical_contacts(scene: &Scene, stack: &mut Stack) -> bool {
     let material = |point: &ContactPoint| &scene.materials.list[point.material as usize];
     let opaque = |point: &ContactPoint| !material(point).transmits();
@@ -207,7 +207,8 @@ pub struct RaySurfaces {
 }
 
 impl RaySurfaces {
-    /// Starts at the ray's origin. `leaving` is the point of the surface that the ray leaves, if other surfaces touch it.
+    /// Starts at the ray's origin. `leaving` is the point of the surface that the ray leaves, if other surfaces touch
+    /// it.
     #[inline(always)]
     pub fn new(ray: Ray, leaving: Option<ContactPoint>) -> RaySurfaces {
         RaySurfaces { ray, here: leaving }
@@ -219,8 +220,8 @@ impl RaySurfaces {
         &self.ray
     }
 
-    /// The next surface and its distance from the current point; `None` at the end of the ray. `inside`: the ray is in a
-    /// solid, which it may leave before it hits an opaque surface.
+    /// The next surface and its distance from the current point; `None` at the end of the ray. `inside`: the ray is in
+    /// a solid, which it may leave before it hits an opaque surface.
     #[inline(always)]
     pub fn next(&mut self, scene: &Scene, inside: bool) -> Option<(Surface, f32)> {
         if let Some(point) = self.here.take()

@@ -1,4 +1,5 @@
-//! Finds triangles that may touch transmitting triangles. Only there do rays query touching surfaces (`scene/contact.rs`).
+//! Finds triangles that may touch transmitting triangles. Only there do rays query touching surfaces
+//! (`scene/contact.rs`).
 
 use crate::geometry::{Extent, Shapes, coordinate_error};
 use crate::material::Materials;
@@ -14,13 +15,13 @@ const MIN_PARALLEL_COSINE: f32 = 0.99;
 /// Maximum number of triangles of a scene, instances included, that are searched for contacts. In a larger scene, every
 /// hit queries touching surfaces.
 const MAX_TRIANGLES: usize = 1 << 26;
-/// Maximum number of transmitting triangles that are searched. A tree over more of them takes as long and as much memory
-/// as the scene itself (20,000 instances of a glass ball: minutes and gigabytes); queries at every hit take a tenth of the
-/// render time.
+/// Maximum number of transmitting triangles that are searched. A tree over more of them takes as long and as much
+/// memory as the scene itself (20,000 instances of a glass ball: minutes and gigabytes); queries at every hit take a
+/// tenth of the render time.
 const MAX_TRANSMITTING: usize = 1 << 21;
 
-/// Whether two triangles of one mesh at the same point are opposite walls that touch. Otherwise they are neighbours on one
-/// surface.
+/// Whether two triangles of one mesh at the same point are opposite walls that touch. Otherwise they are neighbours on
+/// one surface.
 pub(super) fn face_each_other(a: Vec3, b: Vec3) -> bool {
     a.dot(b) < -MIN_PARALLEL_COSINE
 }
@@ -87,8 +88,8 @@ impl RTreeObject for Triangle {
 /// Triangles that may touch others, if at least one of the two transmits light.
 #[derive(Clone, Debug, Default)]
 pub struct Contacts {
-    /// For each instance and triangle, the maximum distance of touching surfaces (metres), or 0 without contact. Empty for
-    /// an instance without contacts.
+    /// For each instance and triangle, the maximum distance of touching surfaces (metres), or 0 without contact. Empty
+    /// for an instance without contacts.
     reach: Vec<Box<[f32]>>,
     /// Contacts were not searched, so every hit queries them.
     unknown: bool,

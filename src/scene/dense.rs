@@ -1,9 +1,9 @@
 //! Media whose mean free path is shorter than the offset of ray origins from a surface ([`triangle_error`]). Scattering
 //! within the offset is skipped, so such media would look too dark.
 //!
-//! A medium this dense looks like a half-space of it. The reflectance of a half-space depends on albedo and phase function
-//! alone, not on the density \[Chandrasekhar 1950, section 13: all lengths are optical depths\]. So the density is reduced,
-//! channel by channel, to the highest that positions resolve; the albedo stays.
+//! A medium this dense looks like a half-space of it. The reflectance of a half-space depends on albedo and phase
+//! function alone, not on the density \[Chandrasekhar 1950, section 13: all lengths are optical depths\]. So the
+//! density is reduced, channel by channel, to the highest that positions resolve; the albedo stays.
 
 use crate::geometry::{Shapes, triangle_error};
 use crate::material::{Materials, MediumParameters};
@@ -13,8 +13,8 @@ use crate::math::Rgb;
 /// this share.
 const MAX_SKIPPED_SHARE: f32 = 0.005;
 
-/// Reduces the density of media that positions do not resolve, with a warning for each object that contains one, and for
-/// the medium outside all solids.
+/// Reduces the density of media that positions do not resolve, with a warning for each object that contains one, and
+/// for the medium outside all solids.
 pub(super) fn limit_densities(
     shapes: &Shapes,
     materials: &mut Materials,
@@ -60,7 +60,8 @@ fn warning(owner: &str, medium: MediumParameters, skipped: f32) -> String {
     )
 }
 
-/// The medium with the highest extinction that ray offsets of `skipped` metres allow; `None` if the medium is not denser.
+/// The medium with the highest extinction that ray offsets of `skipped` metres allow; `None` if the medium is not
+/// denser.
 fn limit_density(medium: MediumParameters, skipped: f32) -> Option<MediumParameters> {
     let (most, sigma_t) = (MAX_SKIPPED_SHARE / skipped, medium.sigma_t());
     if !medium.scatters() || sigma_t.max_element() <= most {

@@ -20,8 +20,8 @@ const MAX_HALF: f32 = 65_504.0;
 /// Width, height and texels, top row first.
 type Pixels = (u32, u32, Vec<[f32; 3]>);
 
-/// Reads the radiance of an environment from an OpenEXR or Radiance HDR file, recognised by its first bytes. Texels that
-/// are negative or not finite are clamped, with a warning.
+/// Reads the radiance of an environment from an OpenEXR or Radiance HDR file, recognised by its first bytes. Texels
+/// that are negative or not finite are clamped, with a warning.
 ///
 /// # Errors
 /// The file cannot be opened, is in another format, is damaged, or is too large.

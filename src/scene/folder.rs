@@ -35,8 +35,8 @@ impl<'a> Folder<'a> {
     }
 }
 
-/// Whether Windows takes a name for a path with a drive, on a share, or to a parent folder. On other systems such a name
-/// would be a plain file name.
+/// Whether Windows takes a name for a path with a drive, on a share, or to a parent folder. On other systems such a
+/// name would be a plain file name.
 fn is_windows_path(name: &Path) -> bool {
     let bytes = name.as_os_str().as_encoded_bytes();
     let drive = matches!(bytes, [letter, b':', b'\\' | b'/', ..] if letter.is_ascii_alphabetic());
@@ -45,8 +45,8 @@ fn is_windows_path(name: &Path) -> bool {
         || bytes.split(|byte| matches!(byte, b'\\' | b'/')).any(|part| part == b".." && bytes.contains(&b'\\'))
 }
 
-/// The path with symbolic links resolved. A path that does not exist is resolved as far as it exists, then by its text, so
-/// that the result does not reveal whether a file outside the folder exists.
+/// The path with symbolic links resolved. A path that does not exist is resolved as far as it exists, then by its text,
+/// so that the result does not reveal whether a file outside the folder exists.
 fn resolve(path: &Path) -> PathBuf {
     let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     path.canonicalize().unwrap_or_else(|_| {

@@ -81,8 +81,8 @@ pub struct Scene {
 
 impl Scene {
     /// Distance from the scene's centre beyond which paths from `origin` in an unbounded medium only move away: outside
-    /// the scene's bounding sphere plus one mean free path, and farther out than `origin`. Infinite if no medium scatters
-    /// outside solids.
+    /// the scene's bounding sphere plus one mean free path, and farther out than `origin`. Infinite if no medium
+    /// scatters outside solids.
     pub fn reach(&self, origin: Vec3) -> f32 {
         let Some(medium) = self.medium.filter(MediumParameters::scatters) else { return f32::INFINITY };
         let sky = self.lights.sky();

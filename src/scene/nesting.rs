@@ -26,9 +26,9 @@ pub struct SolidStack {
     pub host: u32,
 }
 
-/// Rank of the solid of each instance. Where two solids of equal priority overlap, the one of higher rank fills the space,
-/// in any order of entry. Smaller solids have higher ranks, because a small solid may be inside a large one. All instances
-/// of an object are one solid.
+/// Rank of the solid of each instance. Where two solids of equal priority overlap, the one of higher rank fills the
+/// space, in any order of entry. Smaller solids have higher ranks, because a small solid may be inside a large one. All
+/// instances of an object are one solid.
 pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
     let mut of_mesh = HashMap::new();
     let mut volumes = BTreeMap::<u32, f64>::new();

@@ -27,8 +27,8 @@ fn kill_after_checkpoint(folder: &Folder, arguments: &str, checkpoint: &Path, de
     render.wait().expect("it ends");
 }
 
-/// Every method, killed at some time and resumed, gives the same bytes. The choice of `auto` depends on the budget, so its
-/// first run already has the final number of iterations.
+/// Every method, killed at some time and resumed, gives the same bytes. The choice of `auto` depends on the budget, so
+/// its first run already has the final number of iterations.
 #[test]
 fn a_killed_render_resumes_to_the_same_bytes() {
     let methods = Method::ALL.iter().map(|method| method.name()).chain(["auto"]);
@@ -113,8 +113,8 @@ fn a_checkpoint_of_another_render_or_a_damaged_one_is_rejected() {
     refused("--method path --resume state", "another scene");
 }
 
-/// A new render replaces the checkpoint of a stopped one only with --overwrite. A file that is not a checkpoint is never
-/// replaced.
+/// A new render replaces the checkpoint of a stopped one only with --overwrite. A file that is not a checkpoint is
+/// never replaced.
 #[test]
 fn the_checkpoint_of_a_stopped_render_is_not_replaced() {
     let folder = Folder::new();

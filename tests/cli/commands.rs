@@ -39,8 +39,8 @@ fn finishing_later_gives_the_picture_of_finishing_at_once() {
     assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
 }
 
-/// A picture with Blender's layer names can be finished: combined, albedo, normal, and either two halves or the equivalent
-/// variance, which give the same picture.
+/// A picture with Blender's layer names can be finished: combined, albedo, normal, and either two halves or the
+/// equivalent variance, which give the same picture.
 #[test]
 fn pictures_of_other_renderers_can_be_finished() {
     let folder = Folder::new();
@@ -139,8 +139,8 @@ fn strict_turns_warnings_into_an_error() {
     assert!(alpha.iter().all(|a| *a == 1.0));
 }
 
-/// Every command that reads scenes rejects files that the scene names outside its folder, unless --allow-outside is given.
-/// Files that the command line names may be anywhere.
+/// Every command that reads scenes rejects files that the scene names outside its folder, unless --allow-outside is
+/// given. Files that the command line names may be anywhere.
 #[test]
 fn files_outside_the_scenes_folder_are_rejected() {
     let folder = Folder::new();
@@ -163,7 +163,8 @@ fn files_outside_the_scenes_folder_are_rejected() {
     assert_eq!(folder.run(&format!("render scenes/in.glb --env sky.hdr {render}")).code, Some(0));
 }
 
-/// Four million instances of a kilobyte each exceed a limit of two gigabytes. The error comes before they are allocated.
+/// Four million instances of a kilobyte each exceed a limit of two gigabytes. The error comes before they are
+/// allocated.
 #[test]
 fn scenes_larger_than_memory_are_rejected() {
     let folder = Folder::new();

@@ -137,8 +137,8 @@ fn the_report_of_a_small_comparison() {
     assert!(csv.starts_with(header) && !csv.contains("NaN") && !page.contains("NaN") && !page.contains("inf "));
 }
 
-/// The alternation between runs does not change pictures: after equal iterations they equal those of `render`, finished or
-/// not. A reference that was rendered has its error in the file.
+/// The alternation between runs does not change pictures: after equal iterations they equal those of `render`, finished
+/// or not. A reference that was rendered has its error in the file.
 #[test]
 fn pictures_equal_those_of_render_and_references_have_their_error() {
     let folder = Folder::new();

@@ -120,8 +120,8 @@ fn the_header_has_the_plan_and_the_phases() {
     assert!((sum - total).abs() < 0.1, "{sum} of {total}");
 }
 
-/// Every method writes levels and bandwidths if it has them, parts that sum to its estimate, and a warning about effects
-/// that it does not find.
+/// Every method writes levels and bandwidths if it has them, parts that sum to its estimate, and a warning about
+/// effects that it does not find.
 #[test]
 fn every_method_writes_its_layers() {
     let folder = Folder::new();
@@ -175,8 +175,8 @@ fn every_method_writes_its_layers() {
     );
 }
 
-/// `--debug-techniques` writes a weighted and an unweighted picture per technique. The weighted ones sum to the estimate,
-/// and none is brighter than its unweighted picture.
+/// `--debug-techniques` writes a weighted and an unweighted picture per technique. The weighted ones sum to the
+/// estimate, and none is brighter than its unweighted picture.
 #[test]
 fn weighted_pictures_of_all_techniques_sum_to_the_estimate() {
     let folder = Folder::new();
@@ -350,8 +350,8 @@ fn options_set_levels_layers_names_and_bandwidths() {
     assert_eq!((refused.code, refused.stderr.as_str()), (Some(2), error));
 }
 
-/// Photons in media have separate bandwidths, and the volume of the kernel doubles from level to level. Methods that gather
-/// no photons in media do not write these layers.
+/// Photons in media have separate bandwidths, and the volume of the kernel doubles from level to level. Methods that
+/// gather no photons in media do not write these layers.
 #[test]
 fn media_add_layers_of_their_own() {
     let folder = Folder::new();

@@ -1,4 +1,5 @@
-//! Compares generated files with the definition of a render's options (`src/options`). `scripts/generate.sh` writes them.
+//! Compares generated files with the definition of a render's options (`src/options`). `scripts/generate.sh` writes
+//! them.
 
 use crate::Folder;
 use caustique::options::catalogue;

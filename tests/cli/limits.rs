@@ -97,8 +97,8 @@ fn files_that_a_scene_names_repeatedly_are_counted_each_time() {
     }
 }
 
-/// With --memory, warnings report the smaller number of light paths or the smaller photon map. A limit that cannot be met
-/// is an error.
+/// With --memory, warnings report the smaller number of light paths or the smaller photon map. A limit that cannot be
+/// met is an error.
 #[test]
 fn a_memory_limit_reduces_light_paths_with_a_warning() {
     let folder = Folder::new();
@@ -135,8 +135,8 @@ fn a_memory_limit_reduces_light_paths_with_a_warning() {
     );
 }
 
-/// The estimate is on disk during the finish. Afterwards it is there only if the program was killed, or ended at once by a
-/// second signal.
+/// The estimate is on disk during the finish. Afterwards it is there only if the program was killed, or ended at once
+/// by a second signal.
 #[test]
 fn the_estimate_outlives_a_killed_finish() {
     let folder = Folder::new();

@@ -21,8 +21,8 @@ fn merge(folder: &Folder, names: &[String], more: &str) -> Outcome {
     folder.run(&format!("merge {} -o merged.exr {more}", names.join(" ")))
 }
 
-/// For every method with independent iterations, merged shards have the bits of one render in every channel: in any order,
-/// finished or not, with quarters and cryptomattes.
+/// For every method with independent iterations, merged shards have the bits of one render in every channel: in any
+/// order, finished or not, with quarters and cryptomattes.
 #[test]
 fn shards_make_the_bits_of_one_render_in_any_order() {
     let finished = "--layers all";
@@ -165,8 +165,8 @@ fn shards_that_do_not_belong_together_are_rejected_by_name() {
     assert_eq!((&header["iterations"], &header["merged"]["missing"]), (&4.into(), &serde_json::json!([1])));
 }
 
-/// Merged renders of other seeds are their mean weighted by iterations. Variances are weighted by squared shares, counts
-/// are summed, and cryptomattes averaged.
+/// Merged renders of other seeds are their mean weighted by iterations. Variances are weighted by squared shares,
+/// counts are summed, and cryptomattes averaged.
 #[test]
 fn renders_of_other_seeds_give_their_mean() {
     let folder = Folder::new();

@@ -1,5 +1,5 @@
-//! `caustique converge --with`: the protocol between the program and drivers of other renderers. A shell script replaces
-//! the Python that runs the drivers; `test_peers.py` tests the drivers themselves.
+//! `caustique converge --with`: the protocol between the program and drivers of other renderers. A shell script
+//! replaces the Python that runs the drivers; `test_peers.py` tests the drivers themselves.
 
 use crate::{Folder, Outcome};
 use serde_json::Value;
@@ -8,8 +8,8 @@ use std::process::{Command, Stdio};
 /// Arguments of a comparison with other renderers, without the finish of our own pictures.
 const SMALL: &str = "converge scene.glb --width 48 --height 36 --methods path --no-finish --reference reference.exr --progress none -o out";
 
-/// A folder with a reference, and with a script in place of Python. The program calls it as `-I -B -c PROBE MODULES`, which
-/// always succeeds, or as `-I -B FOLDER DRIVER SCENE OUT --mode=.. ..`.
+/// A folder with a reference, and with a script in place of Python. The program calls it as `-I -B -c PROBE MODULES`,
+/// which always succeeds, or as `-I -B FOLDER DRIVER SCENE OUT --mode=.. ..`.
 fn folder(script: &str) -> Folder {
     let folder = Folder::new();
     let size = "--width 48 --height 36 --no-combine --layers beauty";

@@ -62,8 +62,8 @@ fn the_plan_as_json_has_the_documented_keys() {
     assert_eq!(plan["warnings"], json!(["--effects -environment: left out, though called for by the environment"]));
 }
 
-/// The render of a scene without an environment has the same bits as one with the environment switched off. The header of
-/// the latter names the removed effect.
+/// The render of a scene without an environment has the same bits as one with the environment switched off. The header
+/// of the latter names the removed effect.
 #[test]
 fn an_effect_switched_off_gives_the_picture_of_a_scene_without_it() {
     let folder = Folder::new();
@@ -123,8 +123,8 @@ fn path_classes_can_be_left_out() {
     assert!(black.planes.iter().all(|plane| plane.values.iter().all(|value| *value == 0.0)));
 }
 
-/// The header of a render has the plan that `plan` prints for the same options, with the measurements of the pilot and all
-/// warnings. All shards have the same plan.
+/// The header of a render has the plan that `plan` prints for the same options, with the measurements of the pilot and
+/// all warnings. All shards have the same plan.
 #[test]
 fn the_header_has_the_plan_that_plan_prints() {
     let folder = Folder::new();

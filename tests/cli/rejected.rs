@@ -3,8 +3,8 @@
 use crate::{Folder, support, values};
 use serde_json::Value;
 
-/// Non-finite samples are counted in the layer `Rejected` and, by cause, in the header; many of them give a warning. The
-/// picture is finite. Merged shards have the counts of the whole render, and merged renders of other seeds the sum.
+/// Non-finite samples are counted in the layer `Rejected` and, by cause, in the header; many of them give a warning.
+/// The picture is finite. Merged shards have the counts of the whole render, and merged renders of other seeds the sum.
 #[test]
 fn samples_that_are_not_finite_are_counted_and_reported() {
     let folder = Folder::new();

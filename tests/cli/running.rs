@@ -153,7 +153,8 @@ fn signals_end_a_running_iteration() {
     assert_eq!(folder.files(), [""; 0]);
 }
 
-/// Methods that trace the light paths of the whole picture warn about the time of an iteration, also for a small window.
+/// Methods that trace the light paths of the whole picture warn about the time of an iteration, also for a small
+/// window.
 #[test]
 fn a_window_of_a_huge_picture_gives_a_warning_about_its_time() {
     let folder = Folder::new();
@@ -232,8 +233,8 @@ fn a_closed_stdout_is_not_an_error() {
     }
 }
 
-/// If the network fails when it runs, the unfinished render is written. Its stride is changed to 3, which does not fit its
-/// grids of 4.
+/// If the network fails when it runs, the unfinished render is written. Its stride is changed to 3, which does not fit
+/// its grids of 4.
 #[test]
 fn a_network_that_fails_leaves_the_unfinished_render() {
     let folder = Folder::new();
@@ -304,8 +305,8 @@ fn a_preview_shows_the_picture_and_does_not_change_it() {
     assert!(outcome.stderr.contains("name the same file"), "{}", outcome.stderr);
 }
 
-/// The error of a finished picture is estimated with an interval and the tiles with the largest error, which `info` prints.
-/// A plan predicts the time for a target error.
+/// The error of a finished picture is estimated with an interval and the tiles with the largest error, which `info`
+/// prints. A plan predicts the time for a target error.
 #[test]
 fn the_error_of_the_finished_picture_is_estimated() {
     let folder = Folder::new();

@@ -153,8 +153,8 @@ enum NarrowPart {
 }
 
 /// Events of a light path so far, as far as they determine the class of a whole path. Photons store it in one byte: two
-/// bits for the `NarrowPart`, two bits for the number of broad lobes and media (at most 2), one bit if the first of these
-/// is a medium, one bit for a delta light.
+/// bits for the `NarrowPart`, two bits for the number of broad lobes and media (at most 2), one bit if the first of
+/// these is a medium, one bit for a delta light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightPrefix(u8);
 

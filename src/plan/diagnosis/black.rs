@@ -18,8 +18,8 @@ pub(super) fn nothing_seen(scene: &Scene, camera: &Camera) -> Option<String> {
     })
 }
 
-/// The most likely reason for a black picture, with a remedy. Empty for a scene without light, because building it already
-/// warns. `warned`: the plan has other warnings.
+/// The most likely reason for a black picture, with a remedy. Empty for a scene without light, because building it
+/// already warns. `warned`: the plan has other warnings.
 pub(in super::super) fn reason(
     scene: &Scene,
     camera: &Camera,

@@ -34,8 +34,8 @@ fn is_glass(material: &Material) -> bool {
     material.transmission >= 0.5 && material.ior != 1.0
 }
 
-/// Warns about curved thin walls. Most are meant to be solid, and are thin because the exporter wrote no thickness and the
-/// mesh is open. Flat walls are panes, where a thickness would change little.
+/// Warns about curved thin walls. Most are meant to be solid, and are thin because the exporter wrote no thickness and
+/// the mesh is open. Flat walls are panes, where a thickness would change little.
 pub(super) fn thin(scene: &Scene) -> Vec<String> {
     let (meshes, materials) = (&scene.shapes.meshes, &scene.materials.list);
     let mut flat: BTreeMap<u32, bool> = BTreeMap::new();
@@ -134,7 +134,8 @@ struct Shade {
     blockers: BTreeMap<String, usize>,
 }
 
-/// Warns about glass without direct light. Mirrors and walls may still light it, but such light makes hardly any caustic.
+/// Warns about glass without direct light. Mirrors and walls may still light it, but such light makes hardly any
+/// caustic.
 pub(super) fn unlit(scene: &Scene) -> Vec<String> {
     let mut objects: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
@@ -163,8 +164,8 @@ pub(super) fn unlit(scene: &Scene) -> Vec<String> {
     warnings
 }
 
-/// Objects that rays from the lights hit, through transmitting surfaces. These rays find narrow beams, which miss the few
-/// sampled points of a large face.
+/// Objects that rays from the lights hit, through transmitting surfaces. These rays find narrow beams, which miss the
+/// few sampled points of a large face.
 fn objects_lit(scene: &Scene) -> BTreeSet<u32> {
     /// Steps of the additive sequence that fills the hypercube evenly \[Roberts 2018\].
     const STEPS: [f64; 4] =

@@ -24,9 +24,9 @@ const MAX_EMITTING_TRIANGLES: usize = 8;
 /// Number of directions from each of these triangles.
 const DIRECTIONS_PER_TRIANGLE: u32 = 64;
 
-/// Warns if the guessed units of punctual lights seem wrong: their ratio to other lights is about the ratio of lumens to
-/// watts, so the other units would make them comparable. Points and spots are compared with emissive surfaces, suns with
-/// the environment. Without anything to compare lumens with, the warning states the guess.
+/// Warns if the guessed units of punctual lights seem wrong: their ratio to other lights is about the ratio of lumens
+/// to watts, so the other units would make them comparable. Points and spots are compared with emissive surfaces, suns
+/// with the environment. Without anything to compare lumens with, the warning states the guess.
 pub(super) fn units(scene: &Scene) -> Option<String> {
     let guessed = scene.guessed_units.as_ref()?;
     let sky = scene.lights.sky();
@@ -66,8 +66,8 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
     ))
 }
 
-/// Warns about a missing environment if the exporter never writes one. For a scene without any light, building the scene
-/// already warns.
+/// Warns about a missing environment if the exporter never writes one. For a scene without any light, building the
+/// scene already warns.
 pub(super) fn no_environment(scene: &Scene, request: &PlanRequest) -> Option<String> {
     let dark = scene.environment_unknown && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
     (dark && !request.switches.off.has(Effect::Environment)).then(|| {

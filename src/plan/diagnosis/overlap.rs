@@ -13,11 +13,12 @@ const MAX_SOLIDS: usize = 64;
 const MAX_TRIANGLES: usize = 256;
 /// Maximum number of surfaces along an edge.
 const MAX_SURFACES: usize = 16;
-/// An edge touches a surface, instead of crossing it, at a smaller cosine, or within this share of its length from an end.
+/// An edge touches a surface, instead of crossing it, at a smaller cosine, or within this share of its length from an
+/// end.
 const TOUCH_TOLERANCE: f32 = 1e-3;
 
-/// Warnings about pairs of solids of different materials and equal priority, if an edge of one crosses the surface of the
-/// other.
+/// Warnings about pairs of solids of different materials and equal priority, if an edge of one crosses the surface of
+/// the other.
 pub(super) fn unordered(scene: &Scene) -> Vec<String> {
     let materials = &scene.materials.list;
     let solid = |instance: &&Instance| materials[instance.material as usize].is_solid_glass();

@@ -1,5 +1,5 @@
-//! Reads accessors (specification, section 3.6.2; KHR_mesh_quantization, section 2.8). Every range is checked before memory
-//! is allocated.
+//! Reads accessors (specification, section 3.6.2; KHR_mesh_quantization, section 2.8). Every range is checked before
+//! memory is allocated.
 
 use super::document::{Document, at, get};
 use super::fault;

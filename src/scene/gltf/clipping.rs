@@ -1,5 +1,5 @@
-//! Warns about objects before the near plane or behind the far plane of a camera (specification, section 3.10.3), because
-//! clip planes are not applied.
+//! Warns about objects before the near plane or behind the far plane of a camera (specification, section 3.10.3),
+//! because clip planes are not applied.
 
 use crate::math::{DAffine3, DVec3};
 use crate::scene::Description;

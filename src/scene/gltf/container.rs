@@ -1,4 +1,5 @@
-//! Splits a file into JSON and the binary chunk (specification, section 4.4), and checks version and required extensions.
+//! Splits a file into JSON and the binary chunk (specification, section 4.4), and checks version and required
+//! extensions.
 
 use super::fault;
 use crate::error::{Error, Result};

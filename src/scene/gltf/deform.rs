@@ -1,4 +1,5 @@
-//! Deforms meshes by morph targets (specification, section 3.7.2.2), then by skins (section 3.7.3.3: linear blend skinning).
+//! Deforms meshes by morph targets (specification, section 3.7.2.2), then by skins (section 3.7.3.3: linear blend
+//! skinning).
 
 use super::document::{Document, get, named};
 use super::transform::{WorldTransforms, affine, is_finite};
@@ -246,7 +247,8 @@ fn transform_vertex(mesh: &mut Mesh, i: usize, matrix: &DAffine3) {
     }
 }
 
-/// The inverse transpose of a matrix up to a positive factor, defined for singular matrices, too. It transforms normals.
+/// The inverse transpose of a matrix up to a positive factor, defined for singular matrices, too. It transforms
+/// normals.
 fn cofactors(m: &DMat3) -> DMat3 {
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
     let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };

@@ -107,8 +107,8 @@ pub(super) fn divisors(
     }
 }
 
-/// Takes intensities for watts instead of lumens, if as lumens they would be too dark to see. Blender's exporter omits the
-/// factor in its lighting mode "Unitless", and files do not state the mode.
+/// Takes intensities for watts instead of lumens, if as lumens they would be too dark to see. Blender's exporter omits
+/// the factor in its lighting mode "Unitless", and files do not state the mode.
 pub(super) fn reconsider_units(out: &mut Description) {
     let Some(guessed) = out.guessed_units.as_mut().filter(|guessed| guessed.photometric) else { return };
     let glows = out.materials.iter().any(|material| material.emission.max_element() > 0.0);

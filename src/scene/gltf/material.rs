@@ -199,8 +199,8 @@ impl Reader<'_> {
         self.textures.reference(self.document, &info, usage, &place, self.warnings).map(Some)
     }
 
-    /// KHR_materials_pbrSpecularGlossiness: a dielectric with the specular colour as reflectance at normal incidence. The
-    /// legacy index 0 of KHR_materials_ior expresses this, because it makes the Fresnel factor 1.
+    /// KHR_materials_pbrSpecularGlossiness: a dielectric with the specular colour as reflectance at normal incidence.
+    /// The legacy index 0 of KHR_materials_ior expresses this, because it makes the Fresnel factor 1.
     fn specular_glossiness(&mut self, material: &mut Material) -> Result<()> {
         const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
         let Some(old) = self.extension::<SpecularGlossiness>(NAME)? else { return Ok(()) };

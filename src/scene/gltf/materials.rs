@@ -1,5 +1,5 @@
-//! The materials that a scene uses. A material is listed once, or twice if its closed meshes are solid and its open ones
-//! thin.
+//! The materials that a scene uses. A material is listed once, or twice if its closed meshes are solid and its open
+//! ones thin.
 
 use super::document::{Document, get, named};
 use super::material::{self, Loaded};
@@ -32,8 +32,8 @@ impl Library {
         Library { glass, list, textures, loaded: HashMap::new(), known: HashMap::new(), occluded: 0 }
     }
 
-    /// Index in `list` of the material `index` for a mesh. `bounds` is the topology of the mesh, which decides whether glass
-    /// is solid.
+    /// Index in `list` of the material `index` for a mesh. `bounds` is the topology of the mesh, which decides whether
+    /// glass is solid.
     pub(super) fn material_for_mesh(
         &mut self,
         document: &Document,
@@ -125,8 +125,8 @@ fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &m
     }
 }
 
-/// The texture coordinates that define the tangents of a material, with the transform of the normal map, which also rotates
-/// its tangent space (specification, section 3.9.3). `None` if the material needs no tangents.
+/// The texture coordinates that define the tangents of a material, with the transform of the normal map, which also
+/// rotates its tangent space (specification, section 3.9.3). `None` if the material needs no tangents.
 pub(super) fn tangent_coordinates(material: &Material) -> Option<TextureRef> {
     let set = material.anisotropy_texture.map_or(0, |t| t.set);
     let plain = TextureRef { texture: 0, set, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };

@@ -1,12 +1,13 @@
 //! Reads glTF 2.0 files (`.glb`, `.gltf`) from Blender and other programs into a [`Description`].
 //!
-//! The specification is at <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>. The `gltf` crate defines the types
-//! of a document. Indices, ranges and lengths are checked here, because files come from untrusted sources. An invalid file
-//! gives an error that names the place in the file; a feature that is ignored or approximated gives a warning.
+//! The specification is at <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>. The `gltf` crate defines the
+//! types of a document. Indices, ranges and lengths are checked here, because files come from untrusted sources. An
+//! invalid file gives an error that names the place in the file; a feature that is ignored or approximated gives a
+//! warning.
 //!
 //! Data flow one way: `container` (bytes to JSON and buffers) -> `document` (typed parts) -> `animation` (applies the
-//! chosen time to the document) -> `nodes` (the hierarchy). `nodes` reads meshes, materials and textures on demand, so data
-//! that no node uses are not decoded.
+//! chosen time to the document) -> `nodes` (the hierarchy). `nodes` reads meshes, materials and textures on demand, so
+//! data that no node uses are not decoded.
 
 mod accessor;
 mod animation;
@@ -99,8 +100,8 @@ pub struct ReadOptions {
 /// `options` allow other files.
 ///
 /// # Errors
-/// The file, or one that it names, cannot be read, is damaged, or requires an unsupported extension. The error names the
-/// file and the place in it.
+/// The file, or one that it names, cannot be read, is damaged, or requires an unsupported extension. The error names
+/// the file and the place in it.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
     let bytes = std::fs::read(path)
         .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;

@@ -339,8 +339,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Adds a flattened copy of a mesh for a transform that is singular, and returns its index. `None` if the copy has no
-    /// area.
+    /// Adds a flattened copy of a mesh for a transform that is singular, and returns its index. `None` if the copy has
+    /// no area.
     fn flattened(&mut self, mesh: u32, transform: &DMat3, place: &str) -> Result<Option<u32>> {
         let Some(flat) = flattened(&self.out.meshes[mesh as usize], transform) else { return Ok(None) };
         let bytes = flat.positions.len() as u64 * VERTEX_BYTES + flat.triangles.len() as u64 * TRIANGLE_BYTES;
@@ -364,8 +364,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The primitives of a mesh with their materials, read at the first call. `owner` is the node that deforms the mesh, if
-    /// one does.
+    /// The primitives of a mesh with their materials, read at the first call. `owner` is the node that deforms the
+    /// mesh, if one does.
     fn parts(&mut self, index: usize, owner: Option<usize>, shape: &Deformation) -> Result<Vec<Part>> {
         if let Some(parts) = self.meshes.get(&(index, owner)) {
             return Ok(parts.clone());
@@ -431,8 +431,8 @@ impl Reader<'_> {
         Ok((meshes, whole))
     }
 
-    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), relative to the node. Without the extension, the
-    /// identity alone.
+    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), relative to the node. Without the
+    /// extension, the identity alone.
     fn copies(&self, raw: &Value, place: &str) -> Result<Vec<DAffine3>> {
         const NAME: &str = "EXT_mesh_gpu_instancing";
         let Some(instancing) = extension::<Instancing>(raw, NAME, place)? else { return Ok(vec![DAffine3::IDENTITY]) };

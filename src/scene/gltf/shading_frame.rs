@@ -4,7 +4,8 @@ use crate::geometry::Mesh;
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::texture::TextureRef;
 
-/// Replaces zero normals by the area-weighted mean normal of the adjacent faces. Returns the number of replaced normals.
+/// Replaces zero normals by the area-weighted mean normal of the adjacent faces. Returns the number of replaced
+/// normals.
 pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
     if mesh.normals.iter().all(|n| *n != Vec3::ZERO) {
         return 0;
@@ -22,9 +23,10 @@ pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
     repaired
 }
 
-/// Computes tangents in the direction of increasing u of `coordinates`: the angle-weighted mean over the adjacent faces,
-/// made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF prescribes, faces that are
-/// mirrored in the texture do not contribute to the tangents of others: a vertex between both kinds is split.
+/// Computes tangents in the direction of increasing u of `coordinates`: the angle-weighted mean over the adjacent
+/// faces, made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF prescribes,
+/// faces that are mirrored in the texture do not contribute to the tangents of others: a vertex between both kinds is
+/// split.
 pub(super) fn make_tangents(mesh: &mut Mesh, coordinates: &TextureRef) {
     let set = usize::from(coordinates.set);
     if mesh.uvs[set].is_empty() {

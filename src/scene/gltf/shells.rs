@@ -28,8 +28,8 @@ struct Shell {
     high: DVec3,
 }
 
-/// Flips each shell that is inside another and has the same orientation. A second surface of the same glass would have no
-/// effect, so the shell was meant to bound a hollow. Together, `meshes` are closed.
+/// Flips each shell that is inside another and has the same orientation. A second surface of the same glass would have
+/// no effect, so the shell was meant to bound a hollow. Together, `meshes` are closed.
 pub(super) fn flip_inner(meshes: &mut [&mut Mesh]) -> ShellReport {
     let mut shells = shells(&meshes.iter().map(|mesh| &**mesh).collect::<Vec<_>>());
     // From the largest to the smallest, so that the orientation of an outer shell is final before its inner shells.
@@ -111,7 +111,8 @@ fn root(parents: &mut [u32], mut place: u32) -> u32 {
     place
 }
 
-/// Whether a shell contains all of another one, tested at a few corners. Shells that intersect do not contain each other.
+/// Whether a shell contains all of another one, tested at a few corners. Shells that intersect do not contain each
+/// other.
 fn contains(meshes: &[&Mesh], outer: &Shell, inner: &Shell) -> bool {
     const CORNERS: usize = 3;
     let step = inner.triangles.len().div_ceil(CORNERS);

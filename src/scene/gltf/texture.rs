@@ -26,8 +26,8 @@ pub(super) enum Use {
     Color,
     /// Linear numbers.
     Data,
-    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness), converted to roughness in G. The field has
-    /// the bits of the f32 factor of glossiness.
+    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness), converted to roughness in G. The field
+    /// has the bits of the f32 factor of glossiness.
     Glossiness(u32),
 }
 
@@ -224,8 +224,8 @@ fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<Str
     Ok(Decoded { width, height, channels, data: Arc::new(data) })
 }
 
-/// Checks that the decoded image fits in memory, because a few bytes can expand to a gigabyte. Returns whether the file of
-/// a JPEG is truncated, which its decoder does not report.
+/// Checks that the decoded image fits in memory, because a few bytes can expand to a gigabyte. Returns whether the file
+/// of a JPEG is truncated, which its decoder does not report.
 fn check_size(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<bool> {
     // The decoder itself rejects invalid and too large images.
     let Ok(decoder) = ImageReader::with_format(Cursor::new(bytes), format).into_decoder() else { return Ok(false) };
@@ -288,7 +288,8 @@ fn wrap(mode: &Checked<WrappingMode>) -> Wrap {
     }
 }
 
-/// Whether a texture is filtered linearly. There are no mipmaps, so the magnification filter decides, if the file has one.
+/// Whether a texture is filtered linearly. There are no mipmaps, so the magnification filter decides, if the file has
+/// one.
 fn linear(sampler: &Sampler) -> bool {
     match (&sampler.mag_filter, &sampler.min_filter) {
         (Some(Checked::Valid(mag)), _) => *mag == MagFilter::Linear,

@@ -7,7 +7,8 @@ use std::collections::HashMap;
 /// Topology of a set of triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Solid {
-    /// Whether exactly two triangles share every edge, in opposite directions. Vertices at equal positions count as one.
+    /// Whether exactly two triangles share every edge, in opposite directions. Vertices at equal positions count as
+    /// one.
     pub(super) closed: bool,
     /// Whether two triangles share every edge, but some in the same direction, because part of the faces is flipped.
     pub(super) flipped: bool,

@@ -1,5 +1,6 @@
-//! Reading USD stages (`.usd`, `.usda`, `.usdc`, `.usdz`). A converter in Python (`scripts/usd`, embedded in the program)
-//! composes the stage with Pixar's library and writes a .glb, which [`gltf`] reads. So both formats give the same scene.
+//! Reading USD stages (`.usd`, `.usda`, `.usdc`, `.usdz`). A converter in Python (`scripts/usd`, embedded in the
+//! program) composes the stage with Pixar's library and writes a .glb, which [`gltf`] reads. So both formats give the
+//! same scene.
 
 pub mod answer;
 mod python;

@@ -27,8 +27,8 @@ pub struct Interpreter {
 }
 
 impl Interpreter {
-    /// Finds the interpreter: `CAUSTIQUE_USD_PYTHON` if it is set; otherwise the Python in `.venv-usd` if `scripts/setup.sh
-    /// usd` has installed it (see [`installed`]); otherwise `python3`.
+    /// Finds the interpreter: `CAUSTIQUE_USD_PYTHON` if it is set; otherwise the Python in `.venv-usd` if
+    /// `scripts/setup.sh usd` has installed it (see [`installed`]); otherwise `python3`.
     ///
     /// # Errors
     /// [`ErrorKind::Library`]: the variable is set, but not to a file.
@@ -53,8 +53,8 @@ impl Interpreter {
         installed::origin(VARIABLE, ENVIRONMENT, &self.path)
     }
 
-    /// A command that runs the interpreter in isolated mode (`-I`), so that it does not import untrusted modules from the
-    /// current folder.
+    /// A command that runs the interpreter in isolated mode (`-I`), so that it does not import untrusted modules from
+    /// the current folder.
     pub(super) fn command(&self) -> Command {
         let mut command = Command::new(&self.path);
         command.arg("-I");
