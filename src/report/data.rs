@@ -153,7 +153,7 @@ fn peer_object(subject: &Subject, outcome: &Outcome, summary: &Summary, peer: us
         "startup_seconds": startup,
         "approximations": account.approximations,
         "unfinished": account.unfinished,
-        "out": account.out,
+        "out": account.left_out,
         "mean_ratio": ratio.map(|of| json!({"value": finite(of.ratio), "standard_error": finite(of.error)})),
         "same_scene": ratio.map(|of| of.is_same()),
     })

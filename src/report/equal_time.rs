@@ -1,12 +1,11 @@
-//! The race: one iteration of the run that has used the least so far, and so on, so that a noisy machine hurts all
-//! alike.
+//! Renders all entries in turns on one machine and measures them.
 //!
-//! Clocks decide the order and the end, never a picture: after so many iterations it is the one that `caustique render`
-//! makes.
+//! The next iteration always goes to the run that has used the least time, so that other load on the machine affects all
+//! runs alike. Clocks decide the order and the end only: after n iterations a picture is that of `caustique render`.
 
 use super::entry::Entry;
 use super::entry_run::EntryRun;
-use super::outcome::Look;
+use super::outcome::Round;
 use super::peer_renders::{PeerRenders, PeerTurn};
 use super::picture_store::PictureStore;
 use super::point::Point;
@@ -20,27 +19,58 @@ use std::path::Path;
 pub use super::entry_run::Rules;
 pub use super::outcome::{Outcome, Participants};
 
-/// What is told after every step.
+/// Progress after an iteration of an entry or a render of a peer.
 pub struct Step<'a> {
-    /// The name of who made it.
+    /// Name of the entry or peer.
     pub name: &'a str,
-    /// Whether it is ours.
+    /// Whether it is an entry of caustique.
     pub is_ours: bool,
-    /// Iterations it has done; samples per pixel of other renderers, 0 where no picture came of it.
+    /// Iterations done; for peers samples per pixel, 0 if the render gave no picture.
     pub iterations: u64,
-    /// Its seconds.
+    /// Seconds that the run has taken.
     pub seconds: f64,
-    /// Share of the whole race that is done, 0 to 1.
+    /// Completed share of all runs with all seeds, 0 to 1.
     pub fraction: f64,
-    /// The measurement, if this was a moment.
+    /// The measurement, if one was made.
     pub point: Option<&'a Point>,
 }
 
-/// Races all that take part, with each seed in turn. Pictures of the first seed are kept in `folder` until the outcome
-/// is dropped. `observe` is called after every step and may stop the race.
+/// The runs of one seed, and the renders of peers that are still to come.
+struct Queue<'a> {
+    runs: Vec<EntryRun<'a>>,
+    turns: VecDeque<PeerTurn>,
+    all_turns: usize,
+    peers: usize,
+}
+
+impl Queue<'_> {
+    /// The next render of a peer, once every open run has rendered for the peer's time: all then meet the same load on the
+    /// machine.
+    fn due(&mut self) -> Option<PeerTurn> {
+        let budget = self.turns.front()?.budget;
+        let is_far = |run: &EntryRun<'_>| !run.open || run.session.spent().seconds >= budget;
+        if self.runs.iter().all(is_far) { self.turns.pop_front() } else { None }
+    }
+
+    /// The open run that has used the least time; the first of equals.
+    fn next(&self, rules: &Rules) -> Option<usize> {
+        let open = (0..self.runs.len()).filter(|&run| self.runs[run].open);
+        open.min_by(|&a, &b| self.runs[a].used(rules).total_cmp(&self.runs[b].used(rules)))
+    }
+
+    /// Completed share, 0 to 1.
+    fn fraction(&self, rules: &Rules) -> f64 {
+        let runs = self.runs.iter().map(|run| run.fraction(rules)).sum::<f64>();
+        let peers = self.peers as f64 * (1.0 - self.turns.len() as f64 / self.all_turns.max(1) as f64);
+        (runs + peers) / (self.runs.len() + self.peers) as f64
+    }
+}
+
+/// Renders and measures all participants, one seed after the other. Pictures of the first seed are stored in `folder`
+/// until the outcome is dropped. `observe` is called after every step and can stop the comparison.
 ///
 /// # Errors
-/// The file system, before anything is rendered.
+/// The store of pictures cannot be created in `folder`.
 pub fn render_in_turns(
     View { scene, camera }: View<'_>,
     mut participants: Participants<'_>,
@@ -51,70 +81,51 @@ pub fn render_in_turns(
 ) -> Result<Outcome> {
     let entries = participants.entries;
     let mut outcome = Outcome::new(&participants, PictureStore::new(folder, reference.picture.size())?);
-    for (round, &seed) in rules.seeds.iter().enumerate() {
-        let of_entry = |entry: &Entry| {
+    for (index, &seed) in rules.seeds.iter().enumerate() {
+        let input = |entry: &Entry| {
             let settings =
                 Settings { seed, iterations: None, time: None, target_error: None, ..entry.settings.clone() };
             RenderInput::new(scene, camera, &settings)
         };
-        let stages: Vec<RenderInput<'_>> = entries.iter().map(of_entry).collect();
-        let sessions = stages.iter().zip(entries).map(|(stage, entry)| Session::with_time_spent(stage, entry.decided));
-        let mut entry_runs: Vec<EntryRun<'_>> = sessions.map(|session| EntryRun::new(session, rules)).collect();
-        let mut turns: VecDeque<PeerTurn> = participants.peers.iter().flat_map(PeerRenders::turns).collect();
-        let all = turns.len();
-        let look = Look { seed, keep: round == 0, reference };
-        let peers = outcome.peers.len() as f64;
-        let share = |entry_runs: &[EntryRun<'_>], left: usize| {
-            let ours = entry_runs.iter().map(|entry_run| entry_run.fraction(rules)).sum::<f64>();
-            let theirs = peers * (1.0 - left as f64 / all.max(1) as f64);
-            (round as f64 + (ours + theirs) / (entry_runs.len() as f64 + peers)) / rules.seeds.len() as f64
+        let inputs: Vec<RenderInput<'_>> = entries.iter().map(input).collect();
+        let sessions = inputs.iter().zip(entries).map(|(input, entry)| Session::with_time_spent(input, entry.decided));
+        let turns: VecDeque<PeerTurn> = participants.peers.iter().flat_map(PeerRenders::turns).collect();
+        let mut queue = Queue {
+            runs: sessions.map(|session| EntryRun::new(session, rules)).collect(),
+            all_turns: turns.len(),
+            turns,
+            peers: outcome.peers.len(),
         };
+        let round = Round { seed, keep_pictures: index == 0, reference };
         loop {
             let (name, iterations, seconds, measured, is_ours);
-            if let Some(turn) = due(&turns, &entry_runs) {
-                turns.pop_front();
-                let peer = turn.peer;
-                match outcome.host(turn, &mut participants, &look) {
-                    None => {
-                        outcome.interrupted = true;
-                        break;
-                    }
-                    Some(found) => measured = found,
-                }
-                name = participants.peers.as_ref().map_or("", |peers| peers.peers[peer].name);
-                (iterations, seconds) = outcome.last_of(measured);
-                is_ours = false;
-            } else if let Some(run) = next(&entry_runs, rules) {
-                measured = outcome.step(run, &mut entry_runs[run], &mut participants, rules, &look);
+            if let Some(turn) = queue.due() {
+                let Some(found) = outcome.render_peer(turn, &mut participants, &round) else {
+                    outcome.interrupted = true;
+                    break;
+                };
+                (measured, is_ours) = (found, false);
+                name = participants.peers.as_ref().map_or("", |peers| peers.peers[turn.peer].name);
+                (iterations, seconds) = outcome.last_point(measured);
+            } else if let Some(run) = queue.next(rules) {
+                (measured, is_ours) = (outcome.step(run, &mut queue.runs[run], &mut participants, rules, &round), true);
                 name = &entries[run].name;
-                (iterations, seconds) = (entry_runs[run].session.iterations(), entry_runs[run].session.spent().seconds);
-                is_ours = true;
+                let session = &queue.runs[run].session;
+                (iterations, seconds) = (session.iterations(), session.spent().seconds);
             } else {
                 break;
             }
             let point = outcome.points.last().filter(|_| measured);
-            let fraction = share(&entry_runs, turns.len());
+            let fraction = (index as f64 + queue.fraction(rules)) / rules.seeds.len() as f64;
             if observe(&Step { name, is_ours, iterations, seconds, fraction, point }) == Control::Stop {
                 outcome.interrupted = true;
                 break;
             }
         }
-        outcome.end(entry_runs, &mut participants, &look);
+        outcome.end_round(queue.runs, &mut participants, &round);
         if outcome.interrupted {
             break;
         }
     }
     Ok(outcome)
-}
-
-/// The peers' next turn, once all of ours that go on have rendered as long.
-fn due(turns: &VecDeque<PeerTurn>, entry_runs: &[EntryRun<'_>]) -> Option<PeerTurn> {
-    let far = |entry_run: &EntryRun<'_>| !entry_run.open || entry_run.session.spent().seconds >= turns[0].budget;
-    turns.front().filter(|_| entry_runs.iter().all(far)).copied()
-}
-
-/// The run that has used the least; the first of equals.
-fn next(entry_runs: &[EntryRun<'_>], rules: &Rules) -> Option<usize> {
-    let open = (0..entry_runs.len()).filter(|&run| entry_runs[run].open);
-    open.min_by(|&a, &b| entry_runs[a].used(rules).total_cmp(&entry_runs[b].used(rules)))
 }

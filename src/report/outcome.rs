@@ -1,4 +1,4 @@
-//! What comes of a race while it goes on.
+//! Results of a comparison, collected while it runs.
 
 use super::entry::{Entry, Line, PictureSource, lines};
 use super::entry_run::{EntryRun, Rules};
@@ -12,59 +12,49 @@ use crate::finish::Finish;
 use crate::image::errors;
 use crate::render::{Rendered, StopReason, TimeSpent};
 
-/// Who takes part.
+/// The entries and other renderers that are compared.
 pub struct Participants<'a> {
-    /// Ours.
+    /// Entries of caustique.
     pub entries: &'a [Entry],
-    /// What finishes their pictures, as many.
+    /// The finish of each entry, if its finished pictures are measured.
     pub finishes: &'a mut [Option<Finish>],
     /// Other renderers.
     pub peers: Option<PeerRenders>,
 }
 
-/// A race's result.
+/// Results of a comparison.
 pub struct Outcome {
     /// The curves.
     pub lines: Vec<Line>,
-    /// What is known of the peers.
+    /// Facts about each peer and its renders.
     pub peers: Vec<PeerSummary>,
-    /// By seed, then in the order they were measured.
+    /// Measurements, by seed and then in order of time.
     pub points: Vec<Point>,
-    /// PictureSource every run and seed.
+    /// Times of every run with every seed.
     pub endings: Vec<RunEnd>,
-    /// Runs of the first seed as renders leave them, without their pixels.
+    /// Renders of all entries with the first seed, without their pixels.
     pub renders: Vec<Rendered>,
-    /// Whether it was stopped.
+    /// Whether the user has stopped the comparison.
     pub interrupted: bool,
-    /// What went wrong on the way; the run in question ended there.
+    /// Errors that have ended a run early.
     pub failures: Vec<Error>,
     pictures: PictureStore,
 }
 
-impl Outcome {
-    /// The picture of a point.
-    ///
-    /// # Errors
-    /// The file system.
-    pub fn picture(&mut self, point: &Point) -> Result<Option<Picture>> {
-        point.picture.map(|number| self.pictures.get(number)).transpose()
-    }
-}
-
-/// How a race with a seed is looked at.
-pub(super) struct Look<'a> {
+/// The comparison with one seed.
+pub(super) struct Round<'a> {
     /// The seed.
     pub(super) seed: u64,
-    /// Whether pictures are kept.
-    pub(super) keep: bool,
-    /// What it is measured against.
+    /// Whether the pictures are stored.
+    pub(super) keep_pictures: bool,
+    /// The reference.
     pub(super) reference: &'a Reference,
 }
 
 impl Outcome {
     pub(super) fn new(participants: &Participants<'_>, pictures: PictureStore) -> Outcome {
         let peers = participants.peers.as_ref().map_or(&[][..], |peers| &peers.peers);
-        let denoised = participants.peers.as_ref().is_some_and(|peers| peers.denoising.is_some());
+        let denoised = participants.peers.as_ref().is_some_and(|peers| peers.denoiser.is_some());
         Outcome {
             lines: lines(participants.entries, peers, denoised),
             peers: vec![PeerSummary::default(); peers.len()],
@@ -77,84 +67,95 @@ impl Outcome {
         }
     }
 
-    /// Iterations and seconds of the last point, if there is a new one.
-    pub(super) fn last_of(&self, measured: bool) -> (u64, f64) {
-        self.points.last().filter(|_| measured).map_or((0, 0.0), |point| (point.iterations, point.seconds))
+    /// The stored picture of a measurement; `None` if it is not stored.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn picture(&mut self, point: &Point) -> Result<Option<Picture>> {
+        point.picture.map(|number| self.pictures.get(number)).transpose()
     }
 
-    /// One iteration of ours, measured if this is a moment; whether it was.
+    /// Iterations and seconds of the last measurement if it is new, else zero.
+    pub(super) fn last_point(&self, is_new: bool) -> (u64, f64) {
+        self.points.last().filter(|_| is_new).map_or((0, 0.0), |point| (point.iterations, point.seconds))
+    }
+
+    /// Renders one iteration of an entry, and measures it if its moment has come; returns whether it was measured.
     pub(super) fn step(
         &mut self,
-        run: usize,
-        entry_run: &mut EntryRun<'_>,
+        entry: usize,
+        run: &mut EntryRun<'_>,
         participants: &mut Participants<'_>,
         rules: &Rules,
-        look: &Look<'_>,
+        round: &Round<'_>,
     ) -> bool {
-        entry_run.session.step();
-        let iterations = entry_run.session.iterations();
-        let done = entry_run.done(rules);
-        let moment = entry_run.moments.reached(iterations) || rules.more.contains(&(run, iterations)) || done;
-        let measured = moment && self.measure(run, entry_run, &mut participants.finishes[run], look);
-        entry_run.open &= !done;
+        run.session.step();
+        let iterations = run.session.iterations();
+        let done = run.is_done(rules);
+        let moment = run.moments.reached(iterations) || rules.extra_moments.contains(&(entry, iterations)) || done;
+        let measured = moment && self.measure(entry, run, &mut participants.finishes[entry], round);
+        run.open &= !done;
         measured
     }
 
-    /// A peer's render; whether it was measured, `None` if it was stopped.
-    pub(super) fn host(
+    /// Renders and measures a peer; returns whether it was measured, or `None` if the user has stopped it.
+    pub(super) fn render_peer(
         &mut self,
         turn: PeerTurn,
         participants: &mut Participants<'_>,
-        look: &Look<'_>,
+        round: &Round<'_>,
     ) -> Option<bool> {
-        let Some(peers) = participants.peers.as_mut().filter(|_| self.peers[turn.peer].out.is_none()) else {
+        let Some(peers) = participants.peers.as_mut().filter(|_| self.peers[turn.peer].left_out.is_none()) else {
             return Some(false);
         };
-        match peers.take(turn, look.seed, look.reference, &mut self.peers[turn.peer]) {
+        match peers.render(turn, round.seed, round.reference, &mut self.peers[turn.peer]) {
             PeerResult::Stopped => None,
             PeerResult::Nothing => Some(false),
             PeerResult::Points(points) => {
-                for ((point, picture), of) in
-                    points.into_iter().zip([PictureSource::Peer(turn.peer), PictureSource::Denoised(turn.peer)])
-                {
-                    let kept = self.keep(point, of, &picture, look);
-                    self.failures.extend(kept.err());
+                let sources = [PictureSource::Peer(turn.peer), PictureSource::Denoised(turn.peer)];
+                for ((point, picture), source) in points.into_iter().zip(sources) {
+                    let added = self.add_point(point, source, &picture, round);
+                    self.failures.extend(added.err());
                 }
                 Some(true)
             }
         }
     }
 
-    /// What is left to do when a race with a seed ends.
-    pub(super) fn end(&mut self, entry_runs: Vec<EntryRun<'_>>, participants: &mut Participants<'_>, look: &Look<'_>) {
-        for (run, mut entry_run) in entry_runs.into_iter().enumerate() {
-            let iterations = entry_run.session.iterations();
-            if entry_run.open && iterations > entry_run.measured {
-                self.measure(run, &mut entry_run, &mut participants.finishes[run], look);
+    /// Measures the last iterations of interrupted runs and records the times of all runs.
+    pub(super) fn end_round(
+        &mut self,
+        runs: Vec<EntryRun<'_>>,
+        participants: &mut Participants<'_>,
+        round: &Round<'_>,
+    ) {
+        for (entry, mut run) in runs.into_iter().enumerate() {
+            let iterations = run.session.iterations();
+            if run.open && iterations > run.measured {
+                self.measure(entry, &mut run, &mut participants.finishes[entry], round);
             }
-            let (spent, phases, finish) =
-                (entry_run.session.spent(), entry_run.session.phases(), entry_run.finishing());
+            let (spent, phases, finish) = (run.session.spent(), run.session.phases(), run.finish_time());
             if let Some(finish) = finish {
-                self.charge(PictureSource::Finished(run), look.seed, finish);
+                self.add_finish_time(entry, round.seed, finish);
             }
-            self.endings.push(RunEnd { run, seed: look.seed, iterations, spent, phases, finish });
-            if look.keep {
+            self.endings.push(RunEnd { run: entry, seed: round.seed, iterations, spent, phases, finish });
+            if round.keep_pictures {
                 let stop = if self.interrupted { StopReason::Interrupted } else { StopReason::Iterations };
-                let mut rendered = entry_run.session.finish(stop);
+                let mut rendered = run.session.finish(stop);
                 rendered.pixels = Vec::new();
                 self.renders.push(rendered);
             }
         }
     }
 
-    /// The number of a curve.
-    fn line(&self, of: PictureSource) -> usize {
-        self.lines.iter().position(|line| line.source == of).unwrap_or_default()
+    /// Index of the curve with a source.
+    fn line(&self, source: PictureSource) -> usize {
+        self.lines.iter().position(|line| line.source == source).unwrap_or_default()
     }
 
-    /// Adds the finish's time to all points of finished pictures.
-    fn charge(&mut self, of: PictureSource, seed: u64, finish: TimeSpent) {
-        let line = self.line(of);
+    /// Adds the time of one finish to every measurement of finished pictures.
+    fn add_finish_time(&mut self, entry: usize, seed: u64, finish: TimeSpent) {
+        let line = self.line(PictureSource::Finished(entry));
         for point in self.points.iter_mut().filter(|point| point.line == line && point.seed == seed) {
             point.seconds += finish.seconds;
             point.cpu_seconds += finish.cpu_seconds;
@@ -162,40 +163,47 @@ impl Outcome {
         }
     }
 
-    /// Adds points; a run that cannot be measured ends. Whether there is a new one.
+    /// Measures the estimate and, if there is a finish, the finished picture; an error ends the run. Returns whether a
+    /// measurement was added.
     fn measure(
         &mut self,
-        run: usize,
-        entry_run: &mut EntryRun<'_>,
+        entry: usize,
+        run: &mut EntryRun<'_>,
         finish: &mut Option<Finish>,
-        look: &Look<'_>,
+        round: &Round<'_>,
     ) -> bool {
-        entry_run.measured = entry_run.session.iterations();
+        run.measured = run.session.iterations();
         let before = self.points.len();
-        let mut add = |entry_run: &mut EntryRun<'_>| -> Result<()> {
-            let picture = entry_run.session.picture();
-            self.add(PictureSource::Estimate(run), &picture, entry_run, look)?;
+        let mut measure = |run: &mut EntryRun<'_>| -> Result<()> {
+            let picture = run.session.picture();
+            self.measure_picture(PictureSource::Estimate(entry), &picture, run, round)?;
             let Some(finish) = finish else { return Ok(()) };
-            let picture = entry_run.finished(finish)?;
-            self.add(PictureSource::Finished(run), &picture, entry_run, look)
+            let picture = run.finished(finish)?;
+            self.measure_picture(PictureSource::Finished(entry), &picture, run, round)
         };
-        if let Err(error) = add(entry_run) {
+        if let Err(error) = measure(run) {
             self.failures.push(error);
-            entry_run.open = false;
+            run.open = false;
         }
         self.points.len() > before
     }
 
-    /// Adds a measurement; none where the picture has no finite pixel yet.
-    fn add(&mut self, of: PictureSource, picture: &Picture, entry_run: &EntryRun<'_>, look: &Look<'_>) -> Result<()> {
-        let Some(errors) = errors(picture, &look.reference.picture) else { return Ok(()) };
-        let spent = entry_run.session.spent();
-        let estimate = entry_run.session.estimate_error().estimate.filter(|_| of.is_raw());
+    /// Adds the measurement of a picture, unless it has no finite pixel.
+    fn measure_picture(
+        &mut self,
+        source: PictureSource,
+        picture: &Picture,
+        run: &EntryRun<'_>,
+        round: &Round<'_>,
+    ) -> Result<()> {
+        let Some(errors) = errors(picture, &round.reference.picture) else { return Ok(()) };
+        let spent = run.session.spent();
+        let estimate = run.session.estimate_error().estimate.filter(|_| source.is_raw());
         let point = Point {
             line: 0,
-            seed: look.seed,
-            iterations: entry_run.session.iterations(),
-            light_paths: entry_run.session.light_paths(),
+            seed: round.seed,
+            iterations: run.session.iterations(),
+            light_paths: run.session.light_paths(),
             seconds: spent.seconds,
             cpu_seconds: spent.cpu_seconds,
             finish_seconds: None,
@@ -203,13 +211,13 @@ impl Outcome {
             estimate: estimate.map(|e| e.root().powi(2)),
             picture: None,
         };
-        self.keep(point, of, picture, look)
+        self.add_point(point, source, picture, round)
     }
 
-    /// Adds a point to its curve, with its picture if it is of the first seed.
-    fn keep(&mut self, point: Point, of: PictureSource, picture: &Picture, look: &Look<'_>) -> Result<()> {
-        let number = if look.keep { Some(self.pictures.push(picture)?) } else { None };
-        self.points.push(Point { line: self.line(of), picture: number, ..point });
+    /// Adds a measurement to its curve, and stores its picture if the round stores pictures.
+    fn add_point(&mut self, point: Point, source: PictureSource, picture: &Picture, round: &Round<'_>) -> Result<()> {
+        let number = if round.keep_pictures { Some(self.pictures.push(picture)?) } else { None };
+        self.points.push(Point { line: self.line(source), picture: number, ..point });
         Ok(())
     }
 }

@@ -1,6 +1,5 @@
-//! Other renderers in a race: renders of their own at growing budgets, for they give no pictures in between.
-//!
-//! A render takes place when ours have got as far, so that all meet the same machine.
+//! Renders by other renderers. They return no intermediate pictures, so that each point of their curves is a render of its
+//! own, with a growing time budget.
 
 use super::point::Point;
 use super::reference::Reference;
@@ -13,27 +12,27 @@ use crate::peers::{Answer, Drivers, Peer, Rendering, Task};
 use crate::render::{Method, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::Scene;
 
-/// Budgets double from this share of the whole time.
-const FIRST: f64 = 1.0 / 16.0;
-/// Iterations of path tracing that the denoiser's guides are the mean of.
-const GUIDES: u64 = 32;
+/// The smallest time budget, as a share of the time of the runs; the others are its doubles.
+const MIN_BUDGET: f64 = 1.0 / 16.0;
+/// Iterations of path tracing for the denoiser's guides.
+const GUIDE_ITERATIONS: u64 = 32;
 
-/// What is known of a peer in the end.
+/// Facts about a peer and its renders.
 #[derive(Clone, Debug, Default)]
 pub struct PeerSummary {
     /// Version of the renderer.
     pub version: String,
-    /// Seconds of starting up, of each render.
+    /// Seconds of startup, one for each render.
     pub startups: Vec<f64>,
-    /// What of the scene means something else there.
+    /// Features of the scene that the renderer approximates, in words.
     pub approximations: Vec<String>,
-    /// Renders that ended before every pixel had a sample.
+    /// Number of renders that ended before every pixel had a sample.
     pub unfinished: usize,
-    /// Why it does not take part, or stopped to.
-    pub out: Option<String>,
+    /// Why the peer is left out, or was left out after an error.
+    pub left_out: Option<String>,
 }
 
-/// The denoiser of peers' pictures, and its guides.
+/// Denoiser of the peers' pictures, with its guides.
 pub struct PeerDenoiser {
     /// Open Image Denoise.
     pub denoiser: Denoiser,
@@ -44,15 +43,15 @@ pub struct PeerDenoiser {
 }
 
 impl PeerDenoiser {
-    /// With guides by our own path tracing, the same for all and not counted.
+    /// Renders the guides by our own path tracing. They are the same for all peers, and their time does not count.
     ///
     /// # Errors
-    /// Memory's alone.
+    /// None beyond lack of memory.
     pub fn new(denoiser: Denoiser, scene: &Scene, camera: &Camera, seed: u64) -> Result<PeerDenoiser> {
         let settings = Settings { method: Method::Path, seed, ..Settings::default() };
         let stage = RenderInput::new(scene, camera, &settings);
         let mut session = Session::new(&stage);
-        (0..GUIDES).for_each(|_| {
+        (0..GUIDE_ITERATIONS).for_each(|_| {
             session.step();
         });
         let set = session.layers(|name| ["albedo", "normal"].contains(&name))?;
@@ -60,7 +59,7 @@ impl PeerDenoiser {
         Ok(PeerDenoiser { denoiser, albedo, normal })
     }
 
-    /// The denoised picture, and what that took.
+    /// Denoises a picture; returns it with the time taken.
     fn run(&mut self, picture: &Picture) -> Result<(Picture, TimeSpent)> {
         let estimate = Estimate {
             mean: picture.clone(),
@@ -75,74 +74,80 @@ impl PeerDenoiser {
     }
 }
 
-/// Who drives the peers.
+/// The drivers of the peers, or the reason why none runs.
 pub enum Driver {
-    /// Their drivers.
-    By(Drivers),
-    /// Nobody, for a reason that holds for all.
+    /// Drivers that can render.
+    Ready(Drivers),
+    /// The reason why no peer can render the comparison.
     Refused(String),
 }
 
-/// The peers of a race.
+/// The peers of a comparison, and how they render.
 pub struct PeerRenders {
-    /// Who they are.
+    /// The peers.
     pub peers: Vec<Peer>,
-    /// Who drives them.
+    /// Their drivers.
     pub driver: Driver,
-    /// What denoises their pictures.
-    pub denoising: Option<PeerDenoiser>,
-    /// Seconds of the longest renders.
+    /// Denoiser of their pictures, if denoised pictures are compared as well.
+    pub denoiser: Option<PeerDenoiser>,
+    /// Time budget of the longest renders in seconds.
     pub time: f64,
-    /// Whether to stop, asked while one of them renders.
+    /// Returns true to stop; called while a peer renders.
     pub stop: Box<dyn Fn() -> bool>,
 }
 
-/// A render to come: a peer by number, and its seconds.
+/// A render to be made by a peer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeerTurn {
-    /// Which peer.
+    /// Index of the peer.
     pub peer: usize,
-    /// Seconds of rendering.
+    /// Time budget for rendering in seconds.
     pub budget: f64,
 }
 
-/// What came of a turn.
+/// Result of a render by a peer.
 pub enum PeerResult {
-    /// Points without their lines and pictures' numbers: of the picture, and of the denoised one.
+    /// Measurements of the picture and of the denoised picture; the caller sets their `line` and `picture`.
     Points(Vec<(Point, Picture)>),
-    /// Nothing that can be measured.
+    /// No picture that can be measured.
     Nothing,
-    /// It was stopped.
+    /// The user has stopped it.
     Stopped,
 }
 
 impl PeerRenders {
-    /// All turns of a seed, by budget.
+    /// The renders of one seed, by budget.
     pub fn turns(&self) -> Vec<PeerTurn> {
-        let doublings = (1.0 / FIRST).log2().round() as i32;
-        let budgets = (0..=doublings).map(|i| self.time * FIRST * f64::from(i).exp2());
+        let doublings = (1.0 / MIN_BUDGET).log2().round() as i32;
+        let budgets = (0..=doublings).map(|i| self.time * MIN_BUDGET * f64::from(i).exp2());
         budgets.flat_map(|budget| (0..self.peers.len()).map(move |peer| PeerTurn { peer, budget })).collect()
     }
 
-    /// Makes a render and measures it. What goes wrong ends the peer's part, and `account` says why.
-    pub fn take(&mut self, turn: PeerTurn, seed: u64, reference: &Reference, account: &mut PeerSummary) -> PeerResult {
+    /// Renders and measures. An error leaves the peer out from then on, with the reason in `summary`.
+    pub fn render(
+        &mut self,
+        turn: PeerTurn,
+        seed: u64,
+        reference: &Reference,
+        summary: &mut PeerSummary,
+    ) -> PeerResult {
         let task = Task { budget: turn.budget, seed };
         let answer = match &self.driver {
             Driver::Refused(why) => {
-                account.out = Some(why.clone());
+                summary.left_out = Some(why.clone());
                 return PeerResult::Nothing;
             }
-            Driver::By(drivers) => drivers.render(&self.peers[turn.peer], task, &*self.stop),
+            Driver::Ready(drivers) => drivers.render(&self.peers[turn.peer], task, &*self.stop),
         };
         match answer {
-            Ok(Answer::Rendered(rendering)) => self.measure(*rendering, seed, reference, account),
+            Ok(Answer::Rendered(rendering)) => self.measure(*rendering, seed, reference, summary),
             Ok(Answer::Cannot(why)) => {
-                account.out = Some(format!("cannot say the scene: {}", why.join("; ")));
+                summary.left_out = Some(format!("cannot say the scene: {}", why.join("; ")));
                 PeerResult::Nothing
             }
             Ok(Answer::Stopped) => PeerResult::Stopped,
             Err(error) => {
-                account.out = Some(error.to_string());
+                summary.left_out = Some(error.to_string());
                 PeerResult::Nothing
             }
         }
@@ -153,14 +158,14 @@ impl PeerRenders {
         rendering: Rendering,
         seed: u64,
         reference: &Reference,
-        account: &mut PeerSummary,
+        summary: &mut PeerSummary,
     ) -> PeerResult {
         let Rendering { picture, seconds, core_seconds, startup_seconds, passes, version, approximations } = rendering;
-        account.version = version;
-        account.approximations = approximations;
-        account.startups.push(startup_seconds);
+        summary.version = version;
+        summary.approximations = approximations;
+        summary.startups.push(startup_seconds);
         if passes < 1.0 {
-            account.unfinished += 1;
+            summary.unfinished += 1;
             return PeerResult::Nothing;
         }
         let point = |picture: &Picture, denoised: Option<TimeSpent>| {
@@ -180,10 +185,10 @@ impl PeerRenders {
         };
         let mut made = Vec::new();
         made.extend(point(&picture, None).map(|point| (point, picture.clone())));
-        if let Some(denoising) = &mut self.denoising {
-            match denoising.run(&picture) {
+        if let Some(denoiser) = &mut self.denoiser {
+            match denoiser.run(&picture) {
                 Ok((denoised, spent)) => made.extend(point(&denoised, Some(spent)).map(|point| (point, denoised))),
-                Err(error) => account.out = Some(error.to_string()),
+                Err(error) => summary.left_out = Some(error.to_string()),
             }
         }
         PeerResult::Points(made)

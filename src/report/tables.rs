@@ -160,7 +160,7 @@ pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> 
                     td { (summary.mean_ratios[peer].as_ref().map_or("–".into(), verdict)) }
                     td.number { (seconds(&account.startups)) }
                     td { small {
-                        @if let Some(why) = &account.out { b { "Left out: " } (why) ". " }
+                        @if let Some(why) = &account.left_out { b { "Left out: " } (why) ". " }
                         @if account.unfinished > 0 { (account.unfinished) " renders ended before every pixel had a \
                             sample. " }
                         (account.approximations.join("; "))

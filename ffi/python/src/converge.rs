@@ -207,7 +207,7 @@ impl Comparison {
             time: self.time(),
             iterations,
             ratio: self.moments,
-            more: Vec::new(),
+            extra_moments: Vec::new(),
             seeds: (0..self.seeds).map(|i| seed.wrapping_add(i)).collect(),
         };
         // Where pictures of the race are kept meanwhile.

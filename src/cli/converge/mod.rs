@@ -72,7 +72,13 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     std::fs::create_dir_all(&args.output).map_err(|cause| Error::io(&args.output, &cause))?;
 
     let reference = reference::get(args, source, view, &interrupt, &mut notes, entries.len())?;
-    let rules = Rules { time: time(args), iterations: args.iterations, ratio: args.moments, more: more.clone(), seeds };
+    let rules = Rules {
+        time: time(args),
+        iterations: args.iterations,
+        ratio: args.moments,
+        extra_moments: more.clone(),
+        seeds,
+    };
     let mut reporter = Reporter::new(args.progress);
     let participants = Participants { entries: &entries, finishes: &mut finishes, peers: renders };
     let mut outcome = render_in_turns(view, participants, &rules, &reference, &args.output, |step| {

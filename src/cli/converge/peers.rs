@@ -37,10 +37,10 @@ pub fn prepare(
             say(&format!("warning: --with: {why}; other renderers are left out"));
             Driver::Refused(why)
         }
-        None => Driver::By(drivers),
+        None => Driver::Ready(drivers),
     };
     let denoising = match Denoiser::open(DenoiserChoice::Oidn) {
-        Ok((denoiser, _)) if matches!(driver, Driver::By(_)) => {
+        Ok((denoiser, _)) if matches!(driver, Driver::Ready(_)) => {
             Some(PeerDenoiser::new(denoiser, scene, camera, args.seed)?)
         }
         Ok(_) => None,
@@ -53,7 +53,7 @@ pub fn prepare(
     let interrupt = interrupt.clone();
     let stop = Box::new(move || interrupt.requested());
     let peers = renderers.into_iter().flat_map(Renderer::peers).collect();
-    Ok(Some(PeerRenders { peers, driver, denoising, time, stop }))
+    Ok(Some(PeerRenders { peers, driver, denoiser: denoising, time, stop }))
 }
 
 /// An option or a kind of file that the drivers do not support, so that the peers would render another scene.
