@@ -12,7 +12,7 @@ use crate::math::Rgb;
 use crate::texture::TextureRef;
 use std::f32::consts::FRAC_PI_2;
 
-/// The alpha mode.
+/// The effect of the alpha channel: the alpha mode of glTF.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Alpha {
     /// Alpha is ignored.

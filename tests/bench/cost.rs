@@ -57,7 +57,7 @@ fn main() {
                 counted / seconds
             );
             rows.push(
-                serde_json::json!({"scene": path, "way": candidate.name(), "counted": counted, "measured": seconds}),
+                serde_json::json!({"scene": path, "candidate": candidate.name(), "counted": counted, "measured": seconds}),
             );
         }
     }

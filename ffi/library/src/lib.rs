@@ -32,7 +32,7 @@ impl fmt::Display for Version {
 pub struct Refusal {
     /// Path of the file, or the name that was passed to the system's loader.
     pub path: PathBuf,
-    /// Reason why it cannot be used, without the path.
+    /// Reason why the library cannot be used, without the path.
     pub reason: String,
 }
 

@@ -23,7 +23,7 @@ pub enum Error {
     Unusable {
         /// Path of the library file.
         path: PathBuf,
-        /// Reason why it cannot be used.
+        /// Reason why the library cannot be used.
         reason: String,
     },
     /// Open Image Denoise reported an error.

@@ -71,7 +71,7 @@ fn apart(a: &Rendered, b: &Rendered, sum: &Rendered) -> f64 {
 #[test]
 fn a_class_and_all_others_are_the_whole() {
     let scene = room(true);
-    let searches = [
+    let methods = [
         (Method::Path, Indirect::Photons),
         (Method::Light, Indirect::Photons),
         (Method::Bdpt, Indirect::Photons),
@@ -80,7 +80,7 @@ fn a_class_and_all_others_are_the_whole() {
         (Method::Sppm, Indirect::Photons),
         (Method::Sppm, Indirect::Paths),
     ];
-    for (method, indirect) in searches {
+    for (method, indirect) in methods {
         let whole = picture(&scene, 24, &settings(method, indirect, ClassSet::ALL));
         for effect in CLASSES {
             let photons = method == Method::Sppm && indirect == Indirect::Photons;
