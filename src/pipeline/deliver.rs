@@ -246,7 +246,7 @@ impl Reached {
             last.finished = error;
         }
         let last = *last;
-        Some(Reached { accuracy: Accuracy::of(&history)?, history, last })
+        Some(Reached { accuracy: Accuracy::fit(&history)?, history, last })
     }
 
     /// Estimated relative error of the finished picture: the root of relMSE, without the worst 0.5 % of the pixels.

@@ -24,7 +24,7 @@ pub(super) fn estimate(
     target: Option<f64>,
 ) -> Result<Option<Accuracy>> {
     let Some(finish) = finish else { return Ok(None) };
-    let (iterations, known) = (session.iterations(), Accuracy::of(session.history()));
+    let (iterations, known) = (session.iterations(), Accuracy::fit(session.history()));
     let last = session.history().iter().rev().find(|moment| moment.finished.is_some());
     let last = last.map_or(0, |moment| moment.iterations);
     let due = match target {
@@ -44,7 +44,7 @@ pub(super) fn estimate(
     });
     session.add_time(spent);
     session.record_finished_error(error?);
-    Ok(Accuracy::of(session.history()))
+    Ok(Accuracy::fit(session.history()))
 }
 
 /// Progress with the error of the finished picture, and the time at which the error reaches the target, or half of its
@@ -68,7 +68,7 @@ pub(super) fn add_to_progress(
 pub(super) fn is_reached(progress: &Progress, session: &Session<'_>, accuracy: Option<Accuracy>, target: f64) -> bool {
     let iterations = session.iterations();
     let error = match accuracy {
-        Some(accuracy) => Some(accuracy.error(iterations)).filter(|_| accuracy.judged == iterations),
+        Some(accuracy) => Some(accuracy.error(iterations)).filter(|_| accuracy.measured_at == iterations),
         None => progress.error,
     };
     // A scene without lights is black, without any error.

@@ -49,7 +49,7 @@ pub fn forecast(
     let start = session.spent();
     run_pilot(&mut session, finish)?;
     let done = session.iterations();
-    let Some(accuracy) = Accuracy::of(session.history()) else { return Ok(None) };
+    let Some(accuracy) = Accuracy::fit(session.history()) else { return Ok(None) };
     let Some(iterations) = accuracy.iterations_to(target) else { return Ok(None) };
     let iterations = iterations.max(MIN_ITERATIONS_FOR_ERROR as f64);
     let TimeSpent { seconds, cpu_seconds } = session.spent();

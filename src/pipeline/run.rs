@@ -13,7 +13,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::finish::reads_for_picture;
 use crate::image::atomic::is_same_file;
 use crate::image::exr;
-use crate::render::{Control, Progress, RenderInput, Rendered, Session, State, StopReason, TimeSpent, drive};
+use crate::render::{Control, Progress, RenderInput, Rendered, Session, State, StopReason, TimeSpent, run_session};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -79,7 +79,7 @@ impl<'a> Running<'a> {
     pub fn iterate(self, observer: &mut dyn Observer) -> Result<Iterated> {
         let Running { mut session, mut between, head } = self;
         let mut failed = None;
-        let stop = drive(&mut session, |progress, session| {
+        let stop = run_session(&mut session, |progress, session| {
             between.after_iteration(progress, session, observer).unwrap_or_else(|error| {
                 failed = Some(error);
                 Control::Stop

@@ -1,15 +1,15 @@
-//! Clocks and memory of the process. The clocks of a render are here and in [`crate::stop`]; they decide nothing but when
-//! it stops.
+//! Clocks and memory of the process. Only this module and [`crate::stop`] read clocks, which decide only when a render
+//! stops.
 
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 
-/// Wall clock since its making.
+/// A stopwatch.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock(std::time::Instant);
 
 impl Clock {
-    /// Starts now.
+    /// Starts the stopwatch.
     #[allow(clippy::disallowed_methods, reason = "progress and stop conditions are what clocks are for")]
     pub fn start() -> Clock {
         Clock(std::time::Instant::now())
@@ -21,13 +21,13 @@ impl Clock {
     }
 }
 
-/// Processor time of the process in seconds.
+/// Processor time of the process (seconds).
 pub fn cpu_seconds() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Peak resident memory of the process in bytes, from `/proc`; 0 where there is none.
+/// Peak resident memory of the process (bytes), from `/proc`; 0 on systems without `/proc`.
 pub fn peak_memory() -> u64 {
     let read = || -> Option<u64> {
         let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -38,7 +38,7 @@ pub fn peak_memory() -> u64 {
     read().unwrap_or(0)
 }
 
-/// Time that a render has taken: its own, not that of others between its iterations.
+/// Time spent on a render, without the time between its iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TimeSpent {
     /// Wall-clock seconds.
@@ -48,7 +48,7 @@ pub struct TimeSpent {
 }
 
 impl TimeSpent {
-    /// Does some work and adds the time it takes.
+    /// Runs `work` and adds its time.
     pub fn measure<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let (clock, cpu_start) = (Clock::start(), cpu_seconds());
         let done = work();
@@ -57,22 +57,22 @@ impl TimeSpent {
         done
     }
 
-    /// Adds other time.
+    /// Adds `other`.
     pub fn add(&mut self, other: TimeSpent) {
         self.seconds += other.seconds;
         self.cpu_seconds += other.cpu_seconds;
     }
 }
 
-/// Where the time went: core-seconds (processor time of the whole process) per phase.
+/// Core-seconds (processor time of the whole process) per phase of a render.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Phases {
-    /// Pilot pass and initial bandwidths.
+    /// Choice of the method, pilots, and initial bandwidths.
     pub pilot: f64,
-    /// Tracing light paths.
+    /// Light paths.
     pub light: f64,
-    /// Building photon maps.
+    /// Construction of photon maps.
     pub map: f64,
-    /// Tracing eye paths and gathering.
+    /// Camera paths, and gathering of photons.
     pub eye: f64,
 }

@@ -59,7 +59,7 @@ fn rendered(scene: &Scene, settings: &Settings) -> (Rendered, Accuracy) {
     let set = session.layers(|_| true).expect("all layers");
     let error = Finish::new(Denoiser::Own, None).estimate_error(&set).expect("our own denoiser does not fail");
     session.record_finished_error(error);
-    let accuracy = Accuracy::of(session.history()).expect("there is noise");
+    let accuracy = Accuracy::fit(session.history()).expect("there is noise");
     (session.finish(StopReason::Iterations), accuracy)
 }
 

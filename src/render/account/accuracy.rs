@@ -1,124 +1,141 @@
-//! What accuracy costs: the error of the picture as it would be delivered, how it falls, and when it will be small
-//! enough.
+//! How the error of the finished picture falls with the number of iterations, and when it reaches a target.
 //!
-//! Now and then pictures finished from half of the iterations are judged by the other half ([`FinishedError`]). Their squared
-//! error falls as a power of the iterations, `e^2 = a n^(-2 s)`, and the whole picture's is that of twice as many
-//! iterations. Few moments tell `s` badly, so they are joined by what is usual: the square of a finished picture's error
-//! falls with the power 0.7 ([`DEFAULT_CONVERGENCE_RATE`]), as if that had been measured with a spread of one in the logarithm of
-//! iterations. Moments count by how sure they are. Bias that all quarters have in common is told by bandwidth levels,
-//! and added.
+//! At some moments a picture is finished from half of the iterations, and its error is measured against the other half
+//! ([`FinishedError`]). The squared error is modelled as a power of the iterations, `e^2 = a n^(-2 s)`; the picture of all
+//! iterations has the error of twice as many. The exponent `s` is a weighted least-squares fit with a prior: the mean
+//! [`DEFAULT_CONVERGENCE_RATE`], with a spread of one in the logarithm of the iterations. Moments have weights by their
+//! noise. Bias that all quarters share is estimated from bandwidth levels, and added.
 
 use super::history::HistoryEntry;
 use crate::finish::{DEFAULT_CONVERGENCE_RATE, FinishedError};
 
-/// What a power may come out as: noise alone falls with a half, and nothing rises.
-const RANGE: (f64, f64) = (0.1, 0.55);
-/// Moments that tell the level of the error: the last ones.
-const LATEST: usize = 3;
-/// Spread of the logarithm of squared errors from moment to moment, what judges add apart.
-const SCATTER: f64 = 0.2;
-/// Spread of the logarithm of an error that is told from what it is, what judges add apart: fitted on twelve scenes, and
-/// checked on others (`docs/lab/accuracy.md`).
-const MODEL: f64 = 0.25;
-/// Squared bias over what levels tell of it, where it grows with the bandwidth and not with its square, as it does at
-/// edges and on things narrower than the kernel: the next larger level has sqrt(2) times the bias then, not twice.
-const OF_EDGES: f64 = 5.828_427;
-/// Squared light of three photons over that of the square root of two: no more than three are expected, with a
-/// probability of 95 %, where none has come.
-const OF_THREE: f64 = 4.5;
-/// The share of pictures whose error lies in the interval.
+/// Range of the fitted exponent. Pure noise has 0.5; an error does not grow with the iterations.
+const EXPONENT_RANGE: (f64, f64) = (0.1, 0.55);
+/// Number of moments, the last ones, that determine the level of the error.
+const LATEST_MOMENTS: usize = 3;
+/// Standard deviation of log(squared error) between moments, without the noise of the measurement.
+const MOMENT_SPREAD: f64 = 0.2;
+/// Standard deviation of log(estimated error / true error), without the noise of the measurement. Fitted on twelve scenes
+/// and checked on others (`docs/lab/accuracy.md`).
+const MODEL_SPREAD: f64 = 0.25;
+/// Squared bias relative to its estimate, if bias grows with the bandwidth and not with its square. That happens at edges
+/// and on objects narrower than the kernel: there the next larger level has sqrt(2) times the bias, not twice the bias.
+const EDGE_BIAS_FACTOR: f64 = 5.828_427;
+/// Squared light of three photons relative to that of sqrt(2) photons. Where no photon has arrived, the expected number
+/// is below three with a probability of 95 %.
+const UNSEEN_FACTOR: f64 = 4.5;
+/// Share of pictures whose error is inside [`Accuracy::interval`].
 pub const CONFIDENCE: f64 = 0.9;
-/// Standard deviations to each side of a normal distribution that hold that share.
-const DEVIATIONS: f64 = 1.645;
+/// Half the width, in standard deviations, of the interval of a normal distribution with probability [`CONFIDENCE`].
+const CONFIDENCE_DEVIATIONS: f64 = 1.645;
 
-/// How the error of the finished picture falls.
+/// Model of the finished picture's error over the number of iterations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
-    /// The power `s`.
+    /// The exponent `s`.
     pub exponent: f64,
-    /// Logarithm of the squared error of noise after one iteration, as the latest moments tell it.
-    level: f64,
-    /// Squared bias, which is taken to stay.
+    /// Logarithm of the squared noise after one iteration, fitted to the latest moments.
+    log_noise: f64,
+    /// Squared bias, which does not change with the iterations.
     pub squared_bias: f64,
     /// Squared error by light that photons have not brought ([`FinishedError::unseen`]).
     pub squared_unseen: f64,
-    /// Standard error of the logarithm of the latest squared error, of what judges add.
-    doubt: f64,
-    /// Share of the noise that few bright samples hold ([`FinishedError::rare`]).
+    /// Standard error of the logarithm of the latest squared error, from the noise of its measurement.
+    measurement_error: f64,
+    /// Share of the noise that a few bright samples hold ([`FinishedError::rare`]).
     pub rare: f64,
-    /// Iterations at the last moment that was judged.
-    pub judged: u64,
+    /// Iterations at the last moment with a measurement.
+    pub measured_at: u64,
 }
 
-/// A moment that was judged, on logarithmic scales.
+/// Measured error at a moment, on logarithmic scales.
 struct Moment {
-    /// Logarithm of the iterations of the picture that was judged, half of all.
-    iterations: f64,
-    squared: f64,
-    /// Standard error of `squared`.
-    doubt: f64,
+    /// Logarithm of the iterations of the measured picture, half of all.
+    log_iterations: f64,
+    /// Logarithm of the squared error.
+    log_squared: f64,
+    /// Standard error of `log_squared`.
+    measurement_error: f64,
     weight: f64,
 }
 
 impl Moment {
-    /// `None` where there was no noise at all.
-    fn of(iterations: u64, verdict: &FinishedError) -> Option<Moment> {
-        // An error that the judges' noise hides is no larger than that, most likely.
-        let squared = verdict.noise.max(verdict.deviation);
-        let doubt = verdict.deviation / squared;
-        let weight = SCATTER.powi(2) / (SCATTER.powi(2) + doubt.powi(2));
+    /// `None` if the picture has no noise.
+    fn new(iterations: u64, measured: &FinishedError) -> Option<Moment> {
+        // If the noise of the measurement hides the error, the error is most likely not larger than that noise.
+        let squared = measured.noise.max(measured.deviation);
+        let measurement_error = measured.deviation / squared;
+        let weight = MOMENT_SPREAD.powi(2) / (MOMENT_SPREAD.powi(2) + measurement_error.powi(2));
         let known = squared > 0.0 && squared.is_finite();
-        known.then(|| Moment { iterations: (iterations as f64 / 2.0).ln(), squared: squared.ln(), doubt, weight })
+        known.then(|| Moment {
+            log_iterations: (iterations as f64 / 2.0).ln(),
+            log_squared: squared.ln(),
+            measurement_error,
+            weight,
+        })
     }
 }
 
+/// Weighted mean over moments.
+fn mean(moments: &[Moment], value: impl Fn(&Moment) -> f64) -> f64 {
+    let add = |(sum, weight): (f64, f64), m: &Moment| (sum + m.weight * value(m), weight + m.weight);
+    let (sum, weight) = moments.iter().fold((0.0, 0.0), add);
+    sum / weight
+}
+
+/// The exponent `s` by weighted least squares with a prior.
+fn fit_exponent(moments: &[Moment]) -> f64 {
+    let (x, y) = (mean(moments, |m| m.log_iterations), mean(moments, |m| m.log_squared));
+    let variance: f64 = moments.iter().map(|m| m.weight * (m.log_iterations - x).powi(2)).sum();
+    let slope = |m: &Moment| -0.5 * m.weight * (m.log_iterations - x) * (m.log_squared - y);
+    let covariance: f64 = moments.iter().map(slope).sum();
+    let (min, max) = EXPONENT_RANGE;
+    ((covariance + DEFAULT_CONVERGENCE_RATE) / (variance + 1.0)).clamp(min, max)
+}
+
 impl Accuracy {
-    /// From a history; `None` while no moment was judged, or none had noise.
-    pub fn of(history: &[HistoryEntry]) -> Option<Accuracy> {
-        let judged = || history.iter().filter_map(|moment| Some((moment.iterations, moment.finished?)));
-        let moments: Vec<Moment> = judged().filter_map(|(n, verdict)| Moment::of(n, &verdict)).collect();
-        let (last, verdict) = judged().next_back()?;
-        let latest = &moments[moments.len().saturating_sub(LATEST)..];
-        let doubt = latest.last()?.doubt;
-        let mean = |of: &[Moment], value: &dyn Fn(&Moment) -> f64| {
-            let (sum, weight) = of.iter().fold((0.0, 0.0), |(s, w), m| (s + m.weight * value(m), w + m.weight));
-            sum / weight
-        };
-        let (middle, average) = (mean(&moments, &|m| m.iterations), mean(&moments, &|m| m.squared));
-        let spread: f64 = moments.iter().map(|m| m.weight * (m.iterations - middle).powi(2)).sum();
-        let fall = |m: &Moment| -0.5 * m.weight * (m.iterations - middle) * (m.squared - average);
-        let falls: f64 = moments.iter().map(fall).sum();
-        let exponent = ((falls + DEFAULT_CONVERGENCE_RATE) / (spread + 1.0)).clamp(RANGE.0, RANGE.1);
-        let level = mean(latest, &|m| m.squared + 2.0 * exponent * m.iterations);
-        let FinishedError { bias: squared_bias, rare, unseen: squared_unseen, .. } = verdict;
-        Some(Accuracy { exponent, level, squared_bias, squared_unseen, doubt, rare, judged: last })
+    /// Fits the model to a history; `None` if no moment has a measured error, or the pictures have no noise.
+    pub fn fit(history: &[HistoryEntry]) -> Option<Accuracy> {
+        let measured = || history.iter().filter_map(|entry| Some((entry.iterations, entry.finished?)));
+        let moments: Vec<Moment> = measured().filter_map(|(n, error)| Moment::new(n, &error)).collect();
+        let (measured_at, last) = measured().next_back()?;
+        let latest = &moments[moments.len().saturating_sub(LATEST_MOMENTS)..];
+        let measurement_error = latest.last()?.measurement_error;
+        let exponent = fit_exponent(&moments);
+        Some(Accuracy {
+            exponent,
+            log_noise: mean(latest, |m| m.log_squared + 2.0 * exponent * m.log_iterations),
+            squared_bias: last.bias,
+            squared_unseen: last.unseen,
+            measurement_error,
+            rare: last.rare,
+            measured_at,
+        })
     }
 
-    /// Relative error of the picture finished after so many iterations: the root of trimmed relMSE.
+    /// Relative error of the picture finished after `iterations`: the root of trimmed relMSE.
     pub fn error(&self, iterations: u64) -> f64 {
-        (self.noise(iterations) + self.squared_bias + self.squared_unseen).sqrt()
+        (self.squared_noise(iterations) + self.squared_bias + self.squared_unseen).sqrt()
     }
 
-    /// Squared error of noise.
-    fn noise(&self, iterations: u64) -> f64 {
-        (self.level - 2.0 * self.exponent * (iterations as f64).ln()).exp()
+    fn squared_noise(&self, iterations: u64) -> f64 {
+        (self.log_noise - 2.0 * self.exponent * (iterations as f64).ln()).exp()
     }
 
-    /// Between what the error lies in [`CONFIDENCE`] of all pictures. Where few bright samples hold the noise, the upper
-    /// end is what the error would be with all of it: as if the pixels that were left out were as well told as others.
-    /// The bias is that of edges there. Light that photons have not brought is none at the lower end, and at the upper as
-    /// much as the rule of three says, but no more than all.
+    /// Interval that contains the error of [`CONFIDENCE`] of all pictures. The upper end assumes that the pixels with few
+    /// bright samples are as noisy as these samples suggest, that the bias is of edges, and that up to three photons are
+    /// expected where none has arrived. The lower end assumes that no light is missing.
     pub fn interval(&self, iterations: u64) -> [f64; 2] {
-        let factor = (DEVIATIONS * MODEL.hypot(0.5 * self.doubt)).exp();
-        let (noise, bias) = (self.noise(iterations), self.squared_bias);
-        let most = (noise + OF_EDGES * bias) * factor * factor / (1.0 - self.rare).max(1e-4);
-        [(noise + bias).sqrt() / factor, (most + (OF_THREE * self.squared_unseen).min(1.0)).sqrt()]
+        let factor = (CONFIDENCE_DEVIATIONS * MODEL_SPREAD.hypot(0.5 * self.measurement_error)).exp();
+        let (noise, bias) = (self.squared_noise(iterations), self.squared_bias);
+        let most = (noise + EDGE_BIAS_FACTOR * bias) * factor * factor / (1.0 - self.rare).max(1e-4);
+        [(noise + bias).sqrt() / factor, (most + (UNSEEN_FACTOR * self.squared_unseen).min(1.0)).sqrt()]
     }
 
-    /// Iterations after which the error is this small; `None` where bias forbids it for longer than can be told.
+    /// Iterations after which the error is `error`; `None` if bias or missing light keep it larger.
     pub fn iterations_to(&self, error: f64) -> Option<f64> {
         let noise = error * error - self.squared_bias - self.squared_unseen;
-        let iterations = ((self.level - noise.ln()) / (2.0 * self.exponent)).exp();
+        let iterations = ((self.log_noise - noise.ln()) / (2.0 * self.exponent)).exp();
         (noise > 0.0 && iterations.is_finite()).then_some(iterations)
     }
 }
@@ -127,9 +144,9 @@ impl Accuracy {
 mod tests {
     use super::*;
 
-    /// A history judged at some iterations, whose finished error falls as said.
-    fn history(judged: &[u64], squared: impl Fn(f64) -> f64, bias: f64) -> Vec<HistoryEntry> {
-        let moment = |&iterations: &u64| HistoryEntry {
+    /// A history with measured errors at these iterations; `squared` gives the squared noise.
+    fn history(iterations: &[u64], squared: impl Fn(f64) -> f64, bias: f64) -> Vec<HistoryEntry> {
+        let entry = |&iterations: &u64| HistoryEntry {
             seconds: 0.0,
             cpu_seconds: 0.0,
             iterations,
@@ -143,55 +160,58 @@ mod tests {
                 unseen: 0.0,
             }),
         };
-        judged.iter().map(moment).collect()
+        iterations.iter().map(entry).collect()
     }
 
     #[test]
-    fn a_power_that_is_usual_is_found_from_one_moment_and_another_from_many() {
-        let usual = |n: f64| 0.01 * n.powf(-2.0 * DEFAULT_CONVERGENCE_RATE);
-        let one = Accuracy::of(&history(&[8], usual, 0.0)).expect("one moment");
+    fn one_moment_gives_the_default_exponent_and_many_give_their_own() {
+        let default = |n: f64| 0.01 * n.powf(-2.0 * DEFAULT_CONVERGENCE_RATE);
+        let one = Accuracy::fit(&history(&[8], default, 0.0)).expect("one moment");
         assert!(
             (one.exponent - DEFAULT_CONVERGENCE_RATE).abs() < 1e-9
-                && (one.error(64) / usual(64.0).sqrt() - 1.0).abs() < 1e-9
+                && (one.error(64) / default(64.0).sqrt() - 1.0).abs() < 1e-9
         );
         let steep = |n: f64| 0.01 / n;
         let many: Vec<u64> = (3..12).map(|power| 1 << power).collect();
-        let many = Accuracy::of(&history(&many, steep, 0.0)).expect("nine moments");
+        let many = Accuracy::fit(&history(&many, steep, 0.0)).expect("nine moments");
         assert!((many.exponent - 0.5).abs() < 0.01, "{}", many.exponent);
         let wanted = 0.5 * many.error(4096);
-        let iterations = many.iterations_to(wanted).expect("it comes");
+        let iterations = many.iterations_to(wanted).expect("the error is reached");
         assert!((iterations / (4096.0 * 4.0) - 1.0).abs() < 0.1, "{iterations}");
         assert!((many.error(iterations as u64) / wanted - 1.0).abs() < 1e-3);
     }
 
     #[test]
-    fn bias_stays_and_nothing_is_told_where_nothing_is_known() {
-        let told = Accuracy::of(&history(&[8, 16], |n| 0.01 / n, 0.04)).expect("two moments");
-        assert!((told.error(1 << 40) - 0.2).abs() < 1e-3 && told.iterations_to(0.19).is_none());
-        // Bias that grows with the bandwidth alone is 1 / (sqrt(2) - 1) times what the levels tell.
-        let [_, high] = told.interval(1 << 40);
-        assert!((high / (0.2 / (2f64.sqrt() - 1.0)) / (DEVIATIONS * MODEL).exp() - 1.0).abs() < 1e-3, "{high}");
-        assert_eq!(Accuracy::of(&[]), None);
+    fn bias_limits_the_error_and_an_empty_history_has_no_model() {
+        let biased = Accuracy::fit(&history(&[8, 16], |n| 0.01 / n, 0.04)).expect("two moments");
+        assert!((biased.error(1 << 40) - 0.2).abs() < 1e-3 && biased.iterations_to(0.19).is_none());
+        // Bias that is linear in the bandwidth is 1 / (sqrt(2) - 1) times the estimate from levels.
+        let [_, high] = biased.interval(1 << 40);
+        assert!(
+            (high / (0.2 / (2f64.sqrt() - 1.0)) / (CONFIDENCE_DEVIATIONS * MODEL_SPREAD).exp() - 1.0).abs() < 1e-3,
+            "{high}"
+        );
+        assert_eq!(Accuracy::fit(&[]), None);
     }
 
-    /// An error that judges' noise hides is told as that noise, a moment that is unsure counts little, and few bright
-    /// samples raise the upper end alone.
+    /// An error that is hidden by the noise of its measurement is taken as that noise. A noisy measurement has little
+    /// weight. A few bright samples raise the upper end alone.
     #[test]
-    fn doubt_is_told() {
+    fn noise_of_measurements_widens_the_interval() {
         let mut moments = history(&[8, 16, 32, 64], |n| 0.01 * n.powf(-2.0 * DEFAULT_CONVERGENCE_RATE), 0.0);
-        let sure = Accuracy::of(&moments).expect("four moments");
+        let sure = Accuracy::fit(&moments).expect("four moments");
         let [low, high] = sure.interval(64);
-        let model = (1.645f64 * MODEL).exp();
+        let model = (1.645f64 * MODEL_SPREAD).exp();
         assert!(
             (high / sure.error(64) / model - 1.0).abs() < 1e-6
                 && (low * high / sure.error(64).powi(2) - 1.0).abs() < 1e-6
         );
         moments[2].finished = Some(FinishedError { noise: -1.0, deviation: 0.5, bias: 0.0, rare: 0.0, unseen: 0.0 });
-        let unsure = Accuracy::of(&moments).expect("four moments");
+        let unsure = Accuracy::fit(&moments).expect("four moments");
         // A weight of 1/26 for a squared error that is 350 times too large.
         assert!((unsure.error(64) / sure.error(64)).ln().abs() < 0.15, "{}", unsure.error(64) / sure.error(64));
         moments[3].finished = Some(FinishedError { noise: -1e-6, deviation: 1e-6, bias: 0.0, rare: 0.96, unseen: 0.0 });
-        let rare = Accuracy::of(&moments[3..]).expect("one moment");
+        let rare = Accuracy::fit(&moments[3..]).expect("one moment");
         assert!((rare.error(32) - 1e-3).abs() < 1e-9, "{}", rare.error(32));
         let [low, high] = rare.interval(32);
         assert!((high / 1e-3 / (1e-3 / low) - 5.0).abs() < 1e-6, "{low} {high}");

@@ -1,29 +1,29 @@
-//! What an estimated error knows of.
+//! Which parts of the error an error estimate includes.
 //!
-//! Variance is told by independent iterations, bias by the next larger of several bandwidth levels
-//! ([`crate::estimator::SquaredError`]). Where there is no such level, or the points that gather photons stay where
-//! they are, the number lacks a part of the error, and whoever reads it is told so beside it.
+//! The variance is estimated from independent iterations, the bias from the next larger of several bandwidth levels
+//! ([`crate::estimator::SquaredError`]). Without such a level, or with fixed gather points, the estimate lacks a part of
+//! the error, and a note beside the number says so.
 
 use crate::render::settings::Settings;
 use serde::Serialize;
 
-/// What the estimate of a render's error is made of.
+/// Parts of the error that an estimate includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum ErrorCoverage {
-    /// All of the error: of noise, and of bias where the method has any.
+    /// Noise, and bias if the method has any.
     #[serde(rename = "noise and bias")]
     All,
-    /// Noise alone: the bias of the bandwidth is not known.
+    /// Noise alone: the bias by the bandwidth is unknown.
     #[serde(rename = "noise")]
     Noise,
-    /// The noise of photons alone: eye paths are the same in every iteration \[Hachisuka et al. 2008\], and what
-    /// another set of them would show differs by more than iterations do.
+    /// Noise of photons alone: camera paths are the same in every iteration \[Hachisuka et al. 2008\], so their noise is
+    /// not visible as a difference between iterations.
     #[serde(rename = "noise of photons")]
     PhotonNoise,
 }
 
 impl ErrorCoverage {
-    /// In words.
+    /// Name in the file's header.
     pub fn name(self) -> &'static str {
         match self {
             ErrorCoverage::All => "noise and bias",
@@ -32,7 +32,7 @@ impl ErrorCoverage {
         }
     }
 
-    /// What is lacking, to be printed behind the number: ` (noise only)`; nothing where nothing is.
+    /// Note to print after the number, such as ` (noise only)`; empty if the estimate is complete.
     pub fn note(self) -> &'static str {
         match self {
             ErrorCoverage::All => "",
@@ -43,7 +43,7 @@ impl ErrorCoverage {
 }
 
 impl Settings {
-    /// What the estimated error of such a render knows of.
+    /// Parts of the error that estimates of such a render include.
     pub fn error_coverage(&self) -> ErrorCoverage {
         let compared = self.levels.picture_level() + 1 < self.compared_levels();
         match self.method {
@@ -61,18 +61,18 @@ mod tests {
     use crate::render::{Levels, Method, RadiusRule};
 
     #[test]
-    fn bias_is_told_by_a_larger_level() {
-        let of = |method: Method, levels: usize, radius_rule: RadiusRule| {
+    fn bias_is_included_if_there_is_a_larger_level_to_compare_with() {
+        let coverage = |method: Method, levels: usize, radius_rule: RadiusRule| {
             Settings { method, levels: Levels::new(levels), radius_rule, ..Settings::default() }.error_coverage()
         };
         let memoryless = RadiusRule::Memoryless;
-        assert_eq!(of(Method::Sppm, 5, memoryless), ErrorCoverage::All);
-        assert_eq!(of(Method::Sppm, 1, memoryless), ErrorCoverage::Noise);
-        assert_eq!(of(Method::Sppm, 5, RadiusRule::Local), ErrorCoverage::Noise);
-        assert_eq!(of(Method::Cppm, 5, memoryless), ErrorCoverage::Noise);
-        assert_eq!(of(Method::Vcm, 1, memoryless), ErrorCoverage::Noise);
-        assert_eq!(of(Method::Path, 1, memoryless), ErrorCoverage::All);
-        assert_eq!(of(Method::Pm, 1, memoryless), ErrorCoverage::Noise);
-        assert_eq!(of(Method::Ppm, 1, RadiusRule::Local), ErrorCoverage::PhotonNoise);
+        assert_eq!(coverage(Method::Sppm, 5, memoryless), ErrorCoverage::All);
+        assert_eq!(coverage(Method::Sppm, 1, memoryless), ErrorCoverage::Noise);
+        assert_eq!(coverage(Method::Sppm, 5, RadiusRule::Local), ErrorCoverage::Noise);
+        assert_eq!(coverage(Method::Cppm, 5, memoryless), ErrorCoverage::Noise);
+        assert_eq!(coverage(Method::Vcm, 1, memoryless), ErrorCoverage::Noise);
+        assert_eq!(coverage(Method::Path, 1, memoryless), ErrorCoverage::All);
+        assert_eq!(coverage(Method::Pm, 1, memoryless), ErrorCoverage::Noise);
+        assert_eq!(coverage(Method::Ppm, 1, RadiusRule::Local), ErrorCoverage::PhotonNoise);
     }
 }

@@ -1,4 +1,4 @@
-//! What a render leaves in its file: layers, and the account in the header.
+//! Layers and header of the file that a render writes.
 
 use super::history::{HistoryEntry, StopReason};
 use super::rendered::Rendered;
@@ -10,12 +10,12 @@ use crate::render::settings::Settings;
 use crate::scene::{Scene, Survey};
 use serde_json::{Map, Value, json};
 
-/// Which layers a render of a scene with these settings has.
+/// Layers that a render of a scene has with these settings.
 pub fn layer_shape(settings: &Settings, scene: &Scene) -> output::Shape {
     layer_shape_of(settings, &scene.survey, &scene.lights.groups().names)
 }
 
-/// The same of any scene with such a survey and groups of lights.
+/// Layers of a render, for a scene with these features and names of light groups.
 pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -> output::Shape {
     output::Shape {
         levels: settings.levels.count,
@@ -31,10 +31,10 @@ pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -
 }
 
 impl Rendered {
-    /// The layers that are `wanted` by name, cryptomattes excepted.
+    /// Layers whose names are `wanted`, without cryptomattes.
     ///
     /// # Errors
-    /// None for a render of ours: its pixels are as many as its size says.
+    /// None for renders: the number of pixels fits the size of the picture.
     pub fn layers(&self, shape: &output::Shape, wanted: impl Fn(&str) -> bool) -> Result<LayerSet> {
         output::layers((self.width, self.height), &self.pixels, &self.bandwidths, shape, wanted)
     }
@@ -75,7 +75,7 @@ impl Rendered {
         header
     }
 
-    /// Photons stored and gathered by kind, and the relative error by light that they have hardly brought.
+    /// Photons stored and gathered, by kind, and the relative error by light that photons have hardly brought.
     fn unseen_header(&self) -> Value {
         let PhotonCounts { stored, gathered } = self.stats.photon_record.counts;
         let counts = |kind: Kind| json!({"stored": stored[kind as usize], "gathered": gathered[kind as usize]});
@@ -100,7 +100,7 @@ fn history_header(entry: &HistoryEntry, with_clocks: bool) -> Value {
     value
 }
 
-/// Why a render stopped, in a word.
+/// Name of the reason in the header's `stopped`.
 pub fn stop_name(reason: StopReason) -> &'static str {
     match reason {
         StopReason::Iterations => "iterations",

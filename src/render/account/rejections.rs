@@ -1,27 +1,27 @@
-//! What a render has left out because it was not finite, and when that is too much.
+//! Counts of samples, photons and light paths that were rejected because they were not finite.
 
 use crate::estimator::PixelAccumulator;
 use crate::transport::Cause;
 use serde_json::{Map, Value, json};
 
-/// Share of the samples above which a picture may be wrong for want of them.
-const ALLOWED: f64 = 1e-6;
+/// Share of rejected samples above which the picture may be wrong.
+const MAX_REJECTED_SHARE: f64 = 1e-6;
 
-/// Counts of what was left out.
+/// Counts of rejected samples, photons and light paths.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rejections {
-    /// Samples of pixels that were looked at, rejected ones included.
+    /// Samples of pixels, rejected ones included.
     samples: u64,
     /// Rejected samples, in the order of [`Cause::ALL`].
     by_cause: [u64; Cause::ALL.len()],
-    /// Photons that were left out of their map, and light paths that ended.
+    /// Photons that are not in their map, and light paths that ended early.
     light: u64,
-    /// Eye paths whose albedo, normal or depth was left out.
+    /// Camera paths whose albedo, normal or depth was rejected.
     features: u64,
 }
 
 impl Rejections {
-    /// Those of pixels, and of the light paths that served them.
+    /// Adds up the counts of `pixels`. `light` is the number of rejected photons and light paths.
     pub fn count(pixels: &[PixelAccumulator], light: u64) -> Rejections {
         let mut all = Rejections { light, ..Rejections::default() };
         for pixel in pixels {
@@ -33,41 +33,41 @@ impl Rejections {
         all
     }
 
-    /// Samples that were rejected.
+    /// Number of rejected samples.
     pub fn rejected(&self) -> u64 {
         self.by_cause.iter().sum()
     }
 
-    /// What was left out, by the names of the header's `rejected_by`.
+    /// Counts by the names in the header's `rejected_by`.
     fn counts(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let samples = Cause::ALL.into_iter().map(Cause::name).zip(self.by_cause);
         samples.chain([("light_paths", self.light), ("features", self.features)])
     }
 
-    /// For the header.
+    /// The header's `rejected_by`.
     pub fn header(&self) -> Map<String, Value> {
         self.counts().map(|(name, count)| (name.to_owned(), json!(count))).collect()
     }
 
-    /// For people; `None` where nothing was left out.
+    /// A sentence for users; `None` if nothing was rejected.
     pub fn sentence(&self) -> Option<String> {
-        let there: Vec<String> = self
+        let counts: Vec<String> = self
             .counts()
             .filter(|(_, count)| *count > 0)
             .map(|(name, count)| format!("{} {count}", name.replace('_', " ")))
             .collect();
         let (rejected, samples) = (self.rejected(), self.samples);
-        (!there.is_empty()).then(|| {
+        (!counts.is_empty()).then(|| {
             format!(
                 "{rejected} of {samples} samples were not finite and are left out ({}); the layer Rejected shows where",
-                there.join(", ")
+                counts.join(", ")
             )
         })
     }
 
-    /// Whether so much is missing that the picture may be wrong: light paths count as samples do, features do not.
+    /// Whether so many samples and light paths are missing that the picture may be wrong. Features do not count.
     pub fn are_too_many(&self) -> bool {
-        (self.rejected() + self.light) as f64 > ALLOWED * self.samples as f64
+        (self.rejected() + self.light) as f64 > MAX_REJECTED_SHARE * self.samples as f64
     }
 }
 
@@ -77,17 +77,16 @@ mod tests {
     use crate::math::Rgb;
     use crate::transport::PixelSample;
 
-    /// One sample of a million is none too many, two are.
     #[test]
-    fn more_than_one_in_a_million_is_many() {
+    fn more_than_one_rejected_sample_in_a_million_is_too_many() {
         let pixel = |broken: u64| {
             let mut pixel = PixelAccumulator::new(1, 0, [1.0; 2]);
             for pass in 1..=1000 {
-                let mut measure = PixelSample { direct: Rgb::ONE, ..PixelSample::default() };
+                let mut sample = PixelSample { direct: Rgb::ONE, ..PixelSample::default() };
                 if pass <= broken {
-                    measure.reject(Cause::Connection);
+                    sample.reject(Cause::Connection);
                 }
-                pixel.add(pass, &measure, None);
+                pixel.add(pass, &sample, None);
             }
             pixel
         };
@@ -100,8 +99,8 @@ mod tests {
         let two = Rejections::count(&pixels, 0);
         assert!(two.are_too_many());
         assert_eq!((two.rejected(), two.header()["connection"].as_u64()), (2, Some(2)));
-        let said =
+        let sentence =
             "2 of 1000000 samples were not finite and are left out (connection 2); the layer Rejected shows where";
-        assert_eq!(two.sentence().as_deref(), Some(said));
+        assert_eq!(two.sentence().as_deref(), Some(sentence));
     }
 }

@@ -1,40 +1,40 @@
-//! Progress of a render, and what its observer answers.
+//! Progress of a render, and the observer's answer to it.
 
 use crate::render::account::ErrorCoverage;
 
-/// What an observer wants after an iteration.
+/// Answer of an observer after an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
-    /// Go on.
+    /// Render another iteration.
     Continue,
-    /// Stop here; what is finished is kept.
+    /// Stop and keep the picture.
     Stop,
-    /// Stop here: the error that was asked for is reached.
+    /// Stop because the target error is reached.
     Reached,
 }
 
-/// State after an iteration.
+/// State of a render after an iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Iterations done.
     pub iteration: u64,
-    /// Iterations asked for, when that is what stops the render.
+    /// Iterations of the render, if their number stops it.
     pub iterations: Option<u64>,
     /// Wall-clock seconds since the render began.
     pub seconds: f64,
-    /// Estimated seconds to go, when that can be told.
+    /// Estimated seconds to the end; `None` if neither iterations nor time stop the render.
     pub remaining: Option<f64>,
     /// Light paths emitted so far.
     pub light_paths: u64,
-    /// Photons of the last map.
+    /// Photons in the map of the last iteration.
     pub photons: usize,
-    /// Estimated relative error of the method's own image (root of relMSE), when two iterations are done and light is
-    /// seen.
+    /// Estimated relative error (root of relMSE) of the method's own picture; `None` before two iterations and while the
+    /// picture is black.
     pub error: Option<f64>,
     /// Which parts of the error that estimate includes.
     pub error_coverage: ErrorCoverage,
-    /// Relative error of the picture as it would be delivered, in place of that above, where it is known.
+    /// Estimated relative error of the finished picture, if it has been measured. Shown instead of `error`.
     pub finished: Option<f64>,
-    /// An error that is still to be reached, and in how many seconds it may be.
+    /// The next error to reach (relative), and the seconds until then.
     pub expected: Option<(f64, f64)>,
 }

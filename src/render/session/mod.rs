@@ -1,13 +1,13 @@
 //! A render that advances by one iteration at a time, so that several renders can take turns.
 
 mod control;
-mod drive;
 mod input;
+mod run;
 mod state;
 
 pub use control::{Control, Progress};
-pub use drive::{MIN_ITERATIONS_FOR_ERROR, drive, render};
 pub use input::RenderInput;
+pub use run::{MIN_ITERATIONS_FOR_ERROR, render, run_session};
 pub use state::State;
 
 use crate::error::Result;
@@ -100,7 +100,7 @@ impl<'a> Session<'a> {
     /// Returns false if the iteration was discarded.
     fn iterate(&mut self) -> bool {
         let Counters { next, stats, .. } = &mut self.counters;
-        // Iterations are numbered from 1; 0 is the pilot.
+        // Iterations are numbered from 1; the pilot has the number 0.
         let Some(work) = self.integrator.iterate(*next + 1, &mut self.pixels, &mut stats.phases) else { return false };
         stats.add_iteration(&work);
         *next += self.input.settings.shard.count;
@@ -274,8 +274,8 @@ impl<'a> Session<'a> {
 }
 
 impl Settings {
-    /// Seconds to go, when that can be told: after `done` of `total` iterations and `seconds`, of which the pilot took
-    /// `pilot`.
+    /// Estimated seconds to the end, after `done` of `total` iterations and `seconds`, of which `pilot` were spent before
+    /// the first iteration.
     fn remaining(&self, done: u64, total: Option<u64>, seconds: f64, pilot: f64) -> Option<f64> {
         let by_count = total.map(|n| (n - done) as f64 * (seconds - pilot) / done as f64);
         let by_time = self.time.map(|t| (t - seconds).max(0.0));
@@ -293,10 +293,9 @@ mod tests {
     use crate::scene::description::{CameraDescription, Projection};
     use crate::scene::{CameraRequest, Description, Scene};
 
-    /// Pixels count iterations in 32 bits, and their sums are exact for 2^23: no render goes on beyond, however many
-    /// are asked for, nor does the last of many shards.
+    /// The sums of a pixel are exact for 2^23 terms.
     #[test]
-    fn no_more_iterations_than_can_be_summed() {
+    fn a_render_ends_at_the_number_of_iterations_that_pixels_sum_exactly() {
         let mut description = Description::default();
         let projection = Projection::Perspective { yfov: 1.0, aspect: Some(1.0) };
         description.cameras.push(CameraDescription {
@@ -311,8 +310,8 @@ mod tests {
         let camera =
             scene.camera(&CameraRequest { width: Some(2), height: Some(1), ..CameraRequest::default() }).unwrap();
         for (iterations, last) in [(None, MAX_TERMS), (Some(1 << 40), MAX_TERMS), (Some(100), 100)] {
-            let stage = RenderInput::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
-            let mut session = Session::new(&stage);
+            let input = RenderInput::new(&scene, &camera, &Settings { iterations, ..Settings::default() });
+            let mut session = Session::new(&input);
             session.counters.next = last - 1;
             assert!(!session.is_finished());
             session.step();
