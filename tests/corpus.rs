@@ -28,7 +28,7 @@ static ALONE: Mutex<()> = Mutex::new(());
 
 /// The value of a line of `/proc/self/status` (bytes).
 fn memory(key: &str) -> u64 {
-    let text = fs::read_to_string("/proc/self/status").expect("Linux tells");
+    let text = fs::read_to_string("/proc/self/status").expect("a line");
     let line = text.lines().find_map(|line| line.strip_prefix(key)).expect("the line is there");
     line.split_whitespace().nth(1).and_then(|kib| kib.parse::<u64>().ok()).expect("a number") << 10
 }
@@ -66,7 +66,7 @@ fn kept(name: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn what_was_kept_of_fuzzing_is_read_or_refused() {
+fn kept_inputs_of_fuzzing_are_read_or_refused() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut faults = Vec::new();
     for reader in READERS {

@@ -271,7 +271,7 @@ fn forbidden(text: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn nothing_is_left_undone_or_unwrapped() {
+fn shipped_code_has_no_unfinished_work_or_panics() {
     let mut faults = Vec::new();
     for file in files("src").into_iter().chain(files("ffi")) {
         let path = file.to_string_lossy().replace('\\', "/");

@@ -153,7 +153,7 @@ fn grain_in_closed_form() {
 }
 
 #[test]
-fn grain_leaves_out_what_is_not_finite() {
+fn grain_ignores_pixels_that_are_not_finite() {
     // Without the infinite pixel, which the blur would spread, only a constant offset is left.
     let b = picture(9, 7, |i| if i == 30 { [f32::INFINITY; 3] } else { [1.0; 3] });
     let a = picture(9, 7, |i| if i == 12 { [f32::NAN, 1.5, 1.5] } else { [1.5; 3] });
@@ -175,7 +175,7 @@ fn pixels_that_are_not_finite_are_counted_and_left_out() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_an_error() {
+fn incomparable_pictures_are_an_error() {
     let error = compare(&picture(4, 2, |_| [0.0; 3]), &picture(2, 4, |_| [0.0; 3])).unwrap_err();
     assert_eq!(error.cause, "pictures of 4 x 2 and 2 x 4 pixels");
     let mut empty = LayerSet::new(4, 2);

@@ -84,7 +84,7 @@ fn check(what: &str, photons: &[Vec<f64>], paths: &[Vec<f64>], bias: f64, plante
     for seed in &mut wrong {
         seed[5] *= 1.0 + planted;
     }
-    assert!(!disagreeing(&wrong, paths, bias).is_empty(), "{what}: a tile brighter by {planted} goes unnoticed");
+    assert!(!disagreeing(&wrong, paths, bias).is_empty(), "{what}: a tile brighter by {planted} is not detected");
 }
 
 /// Plastic and rough metal in a room: wide and narrow layered lobes, at which camera paths gather photons or continue.

@@ -278,7 +278,7 @@ fn cut_outs_and_matched_boundaries_are_no_bounces() {
 /// The two camera paths of a pixel share only photons. Without photons, the errors of levels 1 and 2 in a soft shadow
 /// are uncorrelated over 64 seeds, and those of levels 2 and 3, which share a path, are correlated.
 #[test]
-fn the_two_eye_paths_are_independent() {
+fn the_two_camera_paths_are_independent() {
     let mut description = Description::default();
     add(&mut description, "plane", floor(5.0), matte(0.5, 0.0));
     let lamp = quad(Vec3::new(-0.5, 2.0, -0.5), Vec3::X, Vec3::Z);

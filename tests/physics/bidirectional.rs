@@ -256,7 +256,7 @@ fn agree_with(
             seed[5] *= 1.0 + planted;
         }
         let noticed = !disagreeing(&wrong, reference, tests, bias).is_empty();
-        assert!(noticed, "{what}, {:?}: a tile brighter by {planted} goes unnoticed", method.0);
+        assert!(noticed, "{what}, {:?}: a tile brighter by {planted} is not detected", method.0);
     }
 }
 

@@ -462,7 +462,7 @@ fn smooth_glass_by_the_book() {
 
 /// Reflectance of KHR_materials_specular, of metal and of a clear coat at normal incidence.
 #[test]
-fn reflectance_at_normal_incidence_is_the_extensions() {
+fn reflectance_at_normal_incidence_follows_the_extensions() {
     let mirror = |p: Parameters| {
         let bsdf = bsdf(&p, &TABLES);
         let s = bsdf.sample(Vec3::Z, Transport::Radiance, LobeSet::DELTA, 0.5, Vec2::splat(0.5)).expect("a direction");
@@ -482,7 +482,7 @@ fn reflectance_at_normal_incidence_is_the_extensions() {
 
 /// Every lobe is in exactly one class: values of single classes sum to the value of all classes.
 #[test]
-fn classes_share_the_lobes_out() {
+fn every_lobe_is_in_one_class() {
     assert_eq!(bsdf(&metal(DELTA_ALPHA * 0.9), &TABLES).lobes(), LobeSet::DELTA);
     assert_eq!(bsdf(&metal(SHARP_ALPHA * 0.9), &TABLES).lobes(), LobeSet::SHARP);
     assert_eq!(bsdf(&metal(SHARP_ALPHA * 1.1), &TABLES).lobes(), LobeSet::BROAD);

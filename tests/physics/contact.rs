@@ -54,7 +54,7 @@ fn is_white(what: &str, scene: &Scene, methods: &[Method]) {
         let detects = if method == Method::Sppm { 0.12 } else { 0.05 };
         assert!(
             !passes(1.0 - detects) && !passes(1.0 + detects),
-            "{what}, {method:?}: cannot tell {detects} ({mean} +- {error})"
+            "{what}, {method:?}: an error of {detects} is not detected ({mean} +- {error})"
         );
     }
 }
@@ -119,7 +119,7 @@ fn what_is_below_a_hole_is_seen() {
 /// A glass filled with a liquid, whose faces coincide with those of the glass, on a white floor. When the second of two
 /// coinciding faces was skipped, the mean was 2.16.
 #[test]
-fn a_liquid_in_a_glass_on_a_floor_is_no_lamp() {
+fn a_liquid_in_a_glass_adds_no_light() {
     let mut description = white_sky();
     add(&mut description, "floor", quad(Vec3::new(-9.0, 0.0, -9.0), Vec3::Z * 18.0, Vec3::X * 18.0), matte(1.0, 0.0));
     let wall = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 1.0), false);
@@ -132,7 +132,7 @@ fn a_liquid_in_a_glass_on_a_floor_is_no_lamp() {
 
 /// Stacks of blocks: of one glass, of two glasses, and of one mesh.
 #[test]
-fn stacks_of_blocks_are_no_lamps() {
+fn stacks_of_blocks_add_no_light() {
     let block = |k: i32| {
         let (low, high) = (0.7 * k as f32, 0.7 * (k + 1) as f32);
         cuboid(Vec3::new(-1.0, low, -1.0), Vec3::new(1.0, high, 1.0), false)
@@ -168,7 +168,7 @@ fn stacks_of_blocks_are_no_lamps() {
 /// Thin panes far from the origin, 16 and 41 rounding errors thick. When rays started 32 rounding errors beyond a
 /// plane, they skipped both faces, and the mean was 0.46.
 #[test]
-fn panes_far_away_are_panes() {
+fn thin_panes_far_from_the_origin_are_not_skipped() {
     for (away, thickness) in [(900.0, 1e-3), (3000.0, 1e-2)] {
         let mut description = white_sky();
         let at = away as f32;
@@ -183,7 +183,7 @@ fn panes_far_away_are_panes() {
 /// The plan reports a pane that is too thin for single precision at its position (3 rounding errors of 0.24 mm in a
 /// scene of kilometres), and does not report a thicker one.
 #[test]
-fn panes_too_thin_to_tell_are_named() {
+fn panes_too_thin_for_single_precision_are_reported() {
     for (thickness, named) in [(7e-4, true), (0.02, false)] {
         let mut description = white_sky();
         let pane = cuboid(Vec3::new(3000.0, -1.0, -1.0), Vec3::new(3000.0 + thickness, 1.0, 1.0), false);
@@ -227,7 +227,7 @@ fn look_alike(what: &str, scenes: &[Scene], methods: &[Method]) {
         assert!(others.iter().all(|&other| alike(other)), "{what}, {method:?}: {means:?}");
         let off = (1.15 * others[0].0, others[0].1);
         let rejects = !alike(planted) || method == Method::Sppm && !alike(off);
-        assert!(rejects, "{what}, {method:?}: cannot tell the two apart {means:?}");
+        assert!(rejects, "{what}, {method:?}: the two are not distinguished {means:?}");
     }
 }
 
@@ -246,7 +246,7 @@ fn block_on(table: Material, gap: f32, optical_contact: bool) -> Scene {
 /// A glass on a table looks as if it were lifted by a hair. When table and glass counted as in optical contact, there
 /// was no total internal reflection at its foot.
 #[test]
-fn a_glass_on_a_table_looks_as_just_above_it() {
+fn a_glass_on_a_table_looks_like_one_just_above_it() {
     let metal = Material { base_color: [0.7, 0.7, 0.7, 1.0], roughness: 0.4, ..mirror() };
     for (what, table) in [("matte table", matte(0.6, 0.0)), ("metal table", metal)] {
         let of = |gap, optical| block_on(table.clone(), gap, optical);
@@ -256,7 +256,7 @@ fn a_glass_on_a_table_looks_as_just_above_it() {
 
 /// A lamp that touches the foot of a glass shines through its surface, like a lamp just below it.
 #[test]
-fn a_lamp_that_touches_a_glass_shines_as_from_below_it() {
+fn a_lamp_that_touches_a_glass_shines_like_one_just_below_it() {
     let of = |gap: f32, optical_contact: bool| {
         let mut description = Description::default();
         add(&mut description, "wall", quad(Vec3::new(-2.0, -1.0, -2.0), Vec3::X * 4.0, Vec3::Y * 4.0), matte(0.7, 0.0));
@@ -288,7 +288,7 @@ fn foggy_room(beyond: f32, density: f32) -> Scene {
 /// Fog that ends on the walls of a room surrounds cameras, lamps and points in the room. It did not when the search for
 /// the solids around a point stopped at the walls.
 #[test]
-fn fog_that_ends_on_walls_is_there() {
+fn fog_that_ends_on_walls_is_found() {
     let scenes = [foggy_room(0.0, 1.0), foggy_room(0.05, 1.0), foggy_room(0.0, 0.1)];
     look_alike("fog", &scenes, &[Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm]);
 }

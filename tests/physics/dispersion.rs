@@ -97,7 +97,7 @@ fn weights_are_white_on_average() {
 
 /// The mean weight of one iteration is nearly white, and the mean over iterations converges fast.
 #[test]
-fn the_wavelengths_of_a_pass_are_nearly_white() {
+fn the_wavelengths_of_an_iteration_are_nearly_white() {
     let of_pass = |pass| {
         let wavelengths = IterationWavelengths::new(9, pass);
         let band = |band: u8| {
@@ -167,7 +167,7 @@ fn put_together(carried: impl Fn(f32) -> bool, weight: impl Fn(&Wavelength, &Wav
 }
 
 #[test]
-fn two_paths_put_together_have_one_wavelength() {
+fn connected_paths_have_one_wavelength() {
     let carried = |nm: f32| nm > 530.0 && nm < 610.0;
     let expected = over_spectrum(|u| {
         let (nm, weight) = observer::sample(u);
@@ -179,11 +179,11 @@ fn two_paths_put_together_have_one_wavelength() {
     assert!(off(found) < 0.02, "{found:?} {expected:?}");
     // The planted bugs: colours multiplied as if wavelengths were independent; and equal bands connected with the
     // colour counted twice.
-    assert!(off(put_together(carried, |_, _| Rgb::ONE)) > 0.2, "a product of colours goes unnoticed");
+    assert!(off(put_together(carried, |_, _| Rgb::ONE)) > 0.2, "a product of colours is not detected");
     let twice = |eye: &Wavelength, light: &Wavelength| {
         if eye.band == light.band { Rgb::splat(f32::from(BANDS)) } else { Rgb::ZERO }
     };
-    assert!(off(put_together(carried, twice)) > 0.2, "a colour counted twice goes unnoticed");
+    assert!(off(put_together(carried, twice)) > 0.2, "a colour counted twice is not detected");
     // White subpaths are connected to all others.
     let eye = WavelengthSample::new(0.3).wavelength();
     assert_eq!(eye.connection_factor(Band::WHITE), Some(Rgb::ONE));
@@ -305,7 +305,7 @@ fn a_prism_bends_each_wavelength_by_its_index() {
         assert!((angle - expected).abs() < 1e-4, "{nm} nm: {angle} for {expected}");
         wrong = wrong.max((deviated(&plain, wavelength, fixed) - expected).abs());
     }
-    assert!(wrong > 0.02, "glass that does not disperse goes unnoticed: {wrong}");
+    assert!(wrong > 0.02, "glass that does not disperse is not detected: {wrong}");
 }
 
 /// The sun shines through the prism on to a screen. Photons land where their wavelength is refracted to, with its
@@ -401,7 +401,7 @@ fn photons_behind_a_prism_land_where_their_colour_belongs() {
         (0..3).filter(|&c| fault(c)).count()
     };
     assert_eq!(faults(&trace(dispersive(IOR, ABBE))), 0);
-    assert_eq!(faults(&trace(glass(IOR))), 3, "glass that does not disperse goes unnoticed");
+    assert_eq!(faults(&trace(glass(IOR))), 3, "glass that does not disperse is not detected");
 }
 
 /// The weight of a wavelength (nm), by bisection.
@@ -504,7 +504,7 @@ fn a_rainbow_agrees() {
     let scene = rainbow(strong, false);
     let light = seeds(&scene, Method::Light, |seed| settings(200, seed));
     let plain = seeds(&rainbow(glass, false), Method::Light, |seed| settings(50, seed));
-    assert!(!disagreeing(&plain, &light, 0.2).is_empty(), "glass that does not disperse goes unnoticed");
+    assert!(!disagreeing(&plain, &light, 0.2).is_empty(), "glass that does not disperse is not detected");
     let path = seeds(&scene, Method::Path, |seed| settings(600, seed));
     agree("rainbow, path", &path, &light, 2e-3, 0.35);
     let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(100, seed));
@@ -526,7 +526,7 @@ fn a_rainbow_behind_dispersive_glass_agrees() {
     let scene = rainbow(strong, true);
     let path = seeds(&scene, Method::Path, |seed| settings(1000, seed));
     let plain = seeds(&rainbow(glass, true), Method::Sppm, |seed| photons(10_000, 0.06, 12, seed));
-    assert!(!disagreeing(&plain, &path, 0.2).is_empty(), "glass that does not disperse goes unnoticed");
+    assert!(!disagreeing(&plain, &path, 0.2).is_empty(), "glass that does not disperse is not detected");
     let bdpt = seeds(&scene, Method::Bdpt, |seed| settings(150, seed));
     agree("rainbow behind glass, bdpt", &bdpt, &path, 2e-3, 0.5);
     for method in [Method::Vcm, Method::Bpm] {
@@ -619,7 +619,10 @@ fn furnace() {
                 let bias = if roughness > 0.0 { 0.01 } else { 1e-3 };
                 let passes = |expected: f64| (mean - expected).abs() < critical * error + bias;
                 assert!(passes(1.0), "roughness {roughness}, {method:?}, channel {c}: {mean} +- {error}");
-                assert!(!passes(1.1) && !passes(0.9), "{method:?}, channel {c}: cannot tell ({mean} +- {error})");
+                assert!(
+                    !passes(1.1) && !passes(0.9),
+                    "{method:?}, channel {c}: the error is not detected ({mean} +- {error})"
+                );
             }
         }
     }

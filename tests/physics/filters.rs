@@ -82,7 +82,7 @@ fn wrong(found: &[Vec<f64>], filter: Filter) -> Vec<String> {
 }
 
 #[test]
-fn eye_paths_and_light_paths_weigh_by_the_filter() {
+fn camera_paths_and_light_paths_are_weighted_by_the_filter() {
     let scene = strip();
     for filter in [Filter::Box(1.0), Filter::Box(3.0), Filter::Gaussian(3.0), Filter::BlackmanHarris(3.0)] {
         for method in [Method::Path, Method::Light, Method::Bdpt] {
@@ -90,7 +90,7 @@ fn eye_paths_and_light_paths_weigh_by_the_filter() {
             let faults = wrong(&found, filter);
             assert!(faults.is_empty(), "{filter:?}, {method:?}: {faults:#?}");
             let other = if filter == Filter::Box(1.0) { Filter::Box(3.0) } else { Filter::Box(1.0) };
-            assert!(!wrong(&found, other).is_empty(), "{filter:?}, {method:?}: {other:?} goes unnoticed");
+            assert!(!wrong(&found, other).is_empty(), "{filter:?}, {method:?}: {other:?} is not detected");
         }
     }
 }

@@ -89,7 +89,7 @@ fn means(scene: &Scene, method: Method) -> Vec<f64> {
 
 #[test]
 #[ignore = "long"]
-fn nothing_white_is_seen_under_a_white_sky() {
+fn white_objects_are_invisible_under_a_white_sky() {
     let materials = white();
     let critical = t_critical(sidak(ERROR_RATE, materials.len() * METHODS.len()), 1, SEEDS as f64 - 1.0);
     let mut faults = Vec::new();
@@ -118,7 +118,7 @@ fn nothing_white_is_seen_under_a_white_sky() {
                 faults.push(format!("{what}, {method:?}: {mean} +- {error}"));
             }
             if passes(1.0 - detects) || passes(1.0 + detects) {
-                faults.push(format!("{what}, {method:?}: cannot tell {detects} ({mean} +- {error})"));
+                faults.push(format!("{what}, {method:?}: an error of {detects} is not detected ({mean} +- {error})"));
             }
         }
     }
@@ -158,6 +158,6 @@ fn steep_normal_maps_look_the_same_by_all_methods() {
         let (bias, detects) = if matches!(method, Method::Bdpt | Method::Vcm) { (2e-3, 0.05) } else { (0.02, 0.2) };
         let passes = |expected: f64| (mean - expected).abs() < critical * error.hypot(own) + bias * expected;
         assert!(passes(expected), "{method:?}: {mean} +- {error}, {expected}");
-        assert!(!passes((1.0 - detects) * expected), "{method:?}: cannot tell {detects}");
+        assert!(!passes((1.0 - detects) * expected), "{method:?}: an error of {detects} is not detected");
     }
 }

@@ -49,7 +49,7 @@ fn mean(scene: &Scene, settings: &Settings) -> (f64, f64) {
 /// All light is found with any share of photons: with small bandwidths nearly no photons, with large ones nearly only
 /// photons.
 #[test]
-fn all_light_is_there_once() {
+fn all_light_is_counted_once() {
     for (roughness, radius) in [(0.3, 0.02), (0.3, 0.2), (0.15, 0.3)] {
         let scene = furnace(roughness);
         for (method, indirect, levels) in [
@@ -77,7 +77,10 @@ fn all_light_is_there_once() {
             let critical = t_critical(ERROR_RATE, 12, SEEDS as f64 - 1.0);
             let passes = |expected: f64| (mean - expected).abs() <= critical * error + BIAS * expected;
             assert!(passes(1.0), "{mean} +- {error}");
-            assert!(!passes(1.0 - DETECTS) && !passes(1.0 + DETECTS), "{mean} +- {error} tells nothing");
+            assert!(
+                !passes(1.0 - DETECTS) && !passes(1.0 + DETECTS),
+                "{mean} +- {error} is too inaccurate for the test"
+            );
         }
     }
 }
@@ -149,7 +152,7 @@ fn pane() -> Scene {
 /// many, and as paths alone.
 #[test]
 #[ignore = "long"]
-fn empty_maps_bring_nothing_and_take_nothing() {
+fn empty_photon_maps_do_not_change_the_mean() {
     let scene = pane();
     let by = |method, photons| {
         let settings = |seed| Settings {
@@ -172,7 +175,7 @@ fn empty_maps_bring_nothing_and_take_nothing() {
         assert!(passes(many.0), "{mean} +- {error}, {many:?}");
         assert!(
             !passes(many.0 * (1.0 - PLANTED)) && !passes(many.0 * (1.0 + PLANTED)),
-            "{mean} +- {error} tells nothing"
+            "{mean} +- {error} is too inaccurate for the test"
         );
     }
 }

@@ -104,7 +104,7 @@ fn flux(scene: &Scene, guide: Option<&Guide>, region: Option<Region>, first: u64
 }
 
 #[test]
-fn guided_light_is_the_same_light() {
+fn guiding_does_not_change_the_mean() {
     let scenes = lit();
     let critical = t_critical(1e-3, 5 * scenes.len() * REGIONS.len(), (PASSES - 1) as f64);
     for (name, scene) in &scenes {
@@ -137,14 +137,14 @@ fn guided_light_is_the_same_light() {
             }
             unnoticed += usize::from((a - wrong).abs() <= critical * error_a.hypot(error_wrong));
         }
-        assert!(unnoticed < REGIONS.len(), "{name}: flux that forgets the guide goes unnoticed");
+        assert!(unnoticed < REGIONS.len(), "{name}: flux that forgets the guide is not detected");
     }
 }
 
 /// Cells with nine times the error get three times the light paths, and cells with nine times the cost a third. A fifth
 /// of the paths stays unguided.
 #[test]
-fn cells_follow_the_error_they_leave() {
+fn light_paths_follow_error_and_cost_of_cells() {
     let scene = &lit()[2].1;
     let mut guide = Guide::new(&scene.lights, false).expect("something to aim at");
     assert_eq!(guide.cells(), 3);
@@ -194,7 +194,7 @@ fn light_and_variance(scene: &Scene, settings: Settings, part: impl Fn(&PixelAcc
 /// Two lamps in separate rooms, and the camera in one. Guiding sends more light paths from the lamp that is visible,
 /// and the picture has less noise after the same number of paths.
 #[test]
-fn lamps_have_budgets_of_their_own() {
+fn visible_lamps_get_more_light_paths() {
     let scene = {
         let mut d = Description::default();
         for (name, x, power) in [("seen", 0.0, 2.0), ("next door", 6.0, 40.0)] {
@@ -225,7 +225,7 @@ fn lamps_have_budgets_of_their_own() {
 /// Rules with photon statistics find the same light with guided paths as with unguided ones: means of 16 seeds, Welch's
 /// test, one false alarm in a thousand.
 #[test]
-fn rules_that_count_photons_can_be_guided() {
+fn rules_with_photon_statistics_can_be_guided() {
     let scene = room_with(0.15);
     let critical = t_critical(1e-3, 2, 15.0);
     for method in [Method::Appm, Method::Cppm] {
@@ -243,7 +243,7 @@ fn rules_that_count_photons_can_be_guided() {
         println!("{method:?}: {a:.4} +- {error_a:.4}, guided {b:.4} +- {error_b:.4}");
         assert!(a != b, "not guided");
         assert!((a - b).abs() <= allowed, "{method:?}: {a} and guided {b}, allowed {allowed}");
-        assert!((a - 1.5 * b).abs() > allowed, "{method:?}: half as much again goes unnoticed");
+        assert!((a - 1.5 * b).abs() > allowed, "{method:?}: half as much again is not detected");
     }
 }
 
@@ -371,7 +371,7 @@ fn effects_are_weighed() {
 /// A point light shines into a clear ball of cloudy glass. No connection finds light that scatters once in it, and
 /// `vcm` merges photons only on surfaces: it prints a warning, and `auto` chooses photons in media.
 #[test]
-fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
+fn cloudy_glass_under_a_point_light_is_rendered_by_photons_in_media() {
     let cloudy = |size: bool, ior: f32| {
         let mut description = Description::default();
         let medium = Some(MediumParameters { sigma_a: Rgb::splat(0.5), sigma_s: Rgb::splat(2.0), g: 0.3 });
@@ -401,7 +401,7 @@ fn cloudy_glass_under_a_lamp_without_size_is_rendered_by_photons_in_media() {
 /// Effects that are switched off are weighed as if they were on, because this is the light that the picture lacks.
 /// Scattering media have a share of the light. Media that only absorb are not weighed.
 #[test]
-fn what_is_left_out_is_weighed_too() {
+fn switched_off_effects_are_weighed_too() {
     let weights = |scene: &Scene, off: ClassSet| {
         let camera = scene.camera(&square(24)).expect("a camera");
         let make = |candidate| {
@@ -465,9 +465,9 @@ fn properties_of_the_scene_are_weighed() {
         let pixels = whole.iter().zip(&without);
         let floor = floor::relative_to_mean(whole.iter().copied());
         let found = pixels.map(|(a, b)| (a - b).powi(2) / (a * a + floor)).sum::<f64>() / whole.len() as f64;
-        let estimated = weight(&weights, effect).expect("it is weighed");
+        let estimated = weight(&weights, effect).expect("a weight");
         println!("{estimated:?}, {:.4} found", found.sqrt());
-        let error = estimated.error_if_off.expect("it stands out");
+        let error = estimated.error_if_off.expect("an error");
         assert!((error / found.sqrt() - 1.0).abs() < 0.2, "{effect:?}: {error} estimated, {} found", found.sqrt());
         let share = 1.0 - without.iter().sum::<f64>() / whole.iter().sum::<f64>();
         match estimated.energy {
@@ -476,7 +476,7 @@ fn properties_of_the_scene_are_weighed() {
         }
         assert!(estimated.saved.is_some_and(f64::is_finite));
     }
-    let lens = weight(&weights, Effect::DepthOfField).expect("it is weighed");
+    let lens = weight(&weights, Effect::DepthOfField).expect("a weight");
     assert!(lens.error_if_off.is_none_or(|error| error < 0.02) && lens.energy.is_none(), "{lens:?}");
 }
 
@@ -536,7 +536,7 @@ fn caustics_are_left_to_guided_light_paths() {
 
 /// Candidates that the scene does not need are not tried, and a short render tries none.
 #[test]
-fn only_what_is_called_for_is_tried() {
+fn only_needed_candidates_are_tried() {
     let scene = matte_room();
     let matte_only = auto(&scene, 2, 20_000);
     let tried: Vec<Method> = matte_only.pilots.iter().map(|trial| trial.candidate.method).collect();

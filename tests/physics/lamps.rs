@@ -55,7 +55,10 @@ fn check(what: &str, scene: &Scene, expected: f64, bias: f64, detects: f64) {
         println!("{what}, {method:?}: {mean:.5} +- {error:.5}, {expected:.5}");
         let passes = |expected: f64| (mean - expected).abs() <= critical * error + bias * expected.abs();
         assert!(passes(expected), "{what}, {method:?}: {mean} +- {error}, expected {expected}");
-        assert!(!passes((1.0 - detects) * expected), "{what}, {method:?}: cannot tell {detects} ({mean} +- {error})");
+        assert!(
+            !passes((1.0 - detects) * expected),
+            "{what}, {method:?}: an error of {detects} is not detected ({mean} +- {error})"
+        );
     }
 }
 
@@ -68,7 +71,7 @@ fn agree(what: &str, scene: &Scene, methods: &[Method]) {
     for &(mean, error) in &found[1..] {
         let passes = |expected: f64| (mean - expected).abs() <= critical * error.hypot(own) + 0.01 * expected.abs();
         assert!(passes(expected), "{what}: {found:?}");
-        assert!(!passes(0.8 * expected), "{what}: cannot tell 0.2 {found:?}");
+        assert!(!passes(0.8 * expected), "{what}: an error of 0.2 is not detected {found:?}");
     }
 }
 
@@ -246,7 +249,7 @@ fn spreads_keep_the_flux() {
 
 /// All methods agree if a lamp with a narrow cone is seen in a mirror and through glass.
 #[test]
-fn all_methods_see_spreads_alike() {
+fn all_methods_agree_on_spreads() {
     let mut description = lit_room(matte(0.5, 0.0));
     description.materials[1].spread = 0.5;
     add(&mut description, "mirror", sphere(Vec3::new(-0.4, 0.5, 0.0), 0.3, 48), mirror());

@@ -84,7 +84,7 @@ fn each_group_has_its_colour_and_nothing_else_in_all_pixels_by_all_methods() {
 
 /// Lights without a group are in no layer, and the other methods have no layers of groups.
 #[test]
-fn light_of_no_group_is_left_out_and_layers_bear_the_names() {
+fn light_without_a_group_is_left_out_and_layers_have_the_names_of_groups() {
     let mut description = coloured();
     description.lights.iter_mut().for_each(|light| light.light_group = None);
     let scene = build(description);

@@ -42,7 +42,7 @@ fn check(what: &str, values: &[f64], expected: f64, (bias, detects): (f64, f64))
     let passes = |expected: f64| (mean - expected).abs() <= critical * error + bias * expected;
     assert!(passes(expected), "{what}: {mean} +- {error}, expected {expected}");
     for shift in [1.0 - detects, 1.0 + detects] {
-        assert!(!passes(expected * shift), "{what}: cannot tell {shift} ({mean} +- {error})");
+        assert!(!passes(expected * shift), "{what}: an error of {shift} is not detected ({mean} +- {error})");
     }
 }
 

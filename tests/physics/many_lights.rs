@@ -98,7 +98,7 @@ fn irradiance_is_correct_and_near_lamps_are_sampled_most() {
         let wrong = |light: &DirectSample| if light.target.is_none() { chosen } else { 1.0 };
         let values = estimates(&scene, &receiver, 50_000, wrong);
         let (mean, error) = mean_and_error(&values);
-        assert!((mean - expected).abs() > critical * error, "at {p}: a wrong probability goes unnoticed");
+        assert!((mean - expected).abs() > critical * error, "at {p}: a wrong probability is not detected");
     }
     println!("variance by power over that by what arrives: {least:.1} at least");
     assert!(least > 3.0, "the nearest lamps are not asked more often: {least}");

@@ -175,7 +175,7 @@ fn frames_of_mirrored_nodes_are_mirror_images() {
 /// roughness are computed for both sides, and for index 1.5, which gives the loss of facets. Their values do not depend
 /// on when or by which thread they are computed.
 #[test]
-fn rows_are_tabulated_when_they_are_asked_for() {
+fn rows_are_computed_at_first_use() {
     let glass = |i: usize| {
         let ior = 1.3 + 0.037 * i as f32;
         Material { ior, metallic: 0.0, roughness: 0.5, transmission: 1.0, thin: false, ..Material::default() }
@@ -363,7 +363,7 @@ fn a_clear_coat_keeps_its_own_normal() {
 /// importance per geometric cosine \[Veach 1997, 5.3\]. No light leaks through an opaque surface, and photons are
 /// weighted consistently.
 #[test]
-fn shading_normals_keep_light_and_eye_agreed() {
+fn shading_normals_treat_radiance_and_importance_alike() {
     let tables = EnergyTables::new([1.5]);
     let plastic = Parameters { specular: 1.0, alpha_x: 0.3, alpha_y: 0.3, ..Parameters::default() };
     let glass = Parameters { transmission: 1.0, ..plastic };
@@ -400,7 +400,7 @@ fn shading_normals_keep_light_and_eye_agreed() {
 
 /// The mean weight of samples is the integral of [`Shading::eval_cos`], in both transport modes: a t test at 0.1 %.
 #[test]
-fn drawn_weights_are_the_integral() {
+fn mean_sample_weights_are_the_integral() {
     let tables = EnergyTables::new([1.5]);
     let plastic = Parameters { specular: 1.0, alpha_x: 0.4, alpha_y: 0.4, ..Parameters::default() };
     let coated = Parameters { clearcoat: 0.8, clearcoat_alpha: 0.4, ..Parameters::default() };

@@ -67,7 +67,7 @@ fn phase_function_is_sampled_normalised_and_symmetric() {
     assert!(p > sidak(ERROR_RATE, 5), "p {p}");
     assert!(deviation < 4.0, "mean cosine off by {deviation} standard errors");
     let (p, deviation) = phase_tests(0.02);
-    assert!(p < sidak(ERROR_RATE, 5) && deviation > 4.0, "a bent phase function goes unnoticed: {p}, {deviation}");
+    assert!(p < sidak(ERROR_RATE, 5) && deviation > 4.0, "a bent phase function is not detected: {p}, {deviation}");
     let phase = HenyeyGreenstein { g: 0.6 };
     let (a, b) = (Vec3::new(0.6, 0.8, 0.0), phase.sample(Vec3::Y, Vec2::new(0.3, 0.4)));
     assert!((phase.pdf_w(a, b) - phase.pdf_w(b, a)).abs() < 1e-6);
@@ -125,7 +125,7 @@ fn sharp_phase_functions_keep_their_mean_cosine() {
         assert!(density < 1e-5, "g {g}: the density is off by {density}");
     }
     let [_, angle, _] = forward_errors(0.99999, by_cosine);
-    assert!(angle > 0.5, "a cosine's rounding goes unnoticed");
+    assert!(angle > 0.5, "a cosine's rounding is not detected");
 }
 
 // ---------------------------------------------------------------- scenes and renders
@@ -286,7 +286,7 @@ fn single_scattered_share(scene: &Scene, size: u32, sigma: f32, half: f32) -> f6
 /// 0.495 instead of 0.536.
 #[test]
 #[ignore = "long"]
-fn kernels_that_reach_behind_borders_lose_nothing() {
+fn kernels_at_boundaries_are_compensated() {
     let sigma = [1.5, 0.5, 1.0];
     for mesh in [false, true] {
         let mut description = Description::default();

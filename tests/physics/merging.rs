@@ -134,7 +134,7 @@ fn caustics_on_glossy_surfaces_stay_noisy() {
 /// 24` of them, for every size of the picture if the kernel shrinks with its pixels. Sixteen seeds give the mean within
 /// half a percent (about 1,400 vertices are in view). Discs at edges lose `8 r / (3 pi s)` on a wall of side s.
 #[test]
-fn as_many_are_merged_as_are_there() {
+fn merges_match_the_density_of_light_vertices() {
     const SEEDS: u64 = 16;
     let mut description = Description::default();
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.5, 0.5));

@@ -743,7 +743,7 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         if !possible {
             continue;
         }
-        assert!(worst > 100.0 * TOLERANCE, "{what}: {bug:?} goes unnoticed ({worst})");
+        assert!(worst > 100.0 * TOLERANCE, "{what}: {bug:?} is not detected ({worst})");
     }
 }
 

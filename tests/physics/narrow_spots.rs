@@ -40,7 +40,7 @@ fn flux(inner: f64, outer: f64, mean: f64) -> f64 {
 /// every angle. With cosines that had to differ by at least 1e-6, a spot that is all edge had the solid angle of 0.08
 /// degrees: 2.7 times the flux at 0.05 degrees, 6,600 times at 0.001 degrees.
 #[test]
-fn narrow_spots_send_what_they_should() {
+fn narrow_spots_emit_their_flux() {
     for degrees in [0.001f32, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 30.0] {
         let edges = [(SpotEdge::Squared, 1.0 / 3.0), (SpotEdge::Smooth, 0.5)];
         for (share, (edge, mean)) in [0.0, 0.5, 1.0].into_iter().flat_map(|share| edges.map(|edge| (share, edge))) {
@@ -77,7 +77,7 @@ fn narrow_spots_send_what_they_should() {
                 arrives += f64::from(irradiance) * area / n as f64;
             }
             assert!((arrives / expected - 1.0).abs() < 4e-3, "{degrees} {share}: {arrives} of {expected} arrives");
-            assert!((1.04 * sent / expected - 1.0).abs() > 4e-3, "one part in 25 goes unnoticed");
+            assert!((1.04 * sent / expected - 1.0).abs() > 4e-3, "one part in 25 is not detected");
         }
     }
 }
@@ -85,7 +85,7 @@ fn narrow_spots_send_what_they_should() {
 /// Directions of light paths in the edge have the density of the intensity: in tenths of the ramp, by a chi-squared
 /// test at an error rate of 0.1 %.
 #[test]
-fn edges_are_sampled_as_they_shine() {
+fn edges_are_sampled_in_proportion_to_intensity() {
     for (edge, integral) in [
         (SpotEdge::Squared, (|t: f64| t.powi(3)) as fn(f64) -> f64),
         (SpotEdge::Smooth, |t: f64| 2.0 * t.powi(3) - t.powi(4)),
@@ -106,7 +106,7 @@ fn edges_are_sampled_as_they_shine() {
         println!("{edge:?}: p {p:.4}, {counts:?}");
         assert!(p > 1e-3, "{edge:?}: {counts:?}, {expected:?}");
         let wrong: Vec<f64> = (0..10).map(|k| 0.1 * f64::from(paths) * f64::from(2 * k + 1) / 10.0).collect();
-        assert!(chi_squared_p(&counts, &wrong) < 1e-6, "a linear edge goes unnoticed");
+        assert!(chi_squared_p(&counts, &wrong) < 1e-6, "a linear edge is not detected");
     }
 }
 

@@ -25,7 +25,7 @@ fn foggy(far: bool) -> Scene {
 
 /// Light paths store some dozens of photons instead of thousands, and camera paths end as early.
 #[test]
-fn paths_that_leave_everything_end() {
+fn paths_far_from_all_objects_end() {
     let scene = foggy(false);
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let photons = photons_per_path(&scene, &camera, &Settings { method: Method::Bpm, ..Settings::default() });
@@ -37,7 +37,7 @@ fn paths_that_leave_everything_end() {
 /// A far object makes the scene so wide that hardly any path leaves it, so there is no roulette, and the mean is the
 /// same. Both renders have the same random numbers, so their noise is similar, too.
 #[test]
-fn roulette_takes_no_light() {
+fn roulette_does_not_change_the_mean() {
     let (near, far) = (foggy(false), foggy(true));
     let mean = |scene: &Scene, seed| {
         let camera = scene.camera(&square(SIZE)).expect("a camera");

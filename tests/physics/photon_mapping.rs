@@ -51,7 +51,7 @@ fn check(what: &str, values: &[f64], expected: f64, bias: f64, detects: f64) {
     let passes = |expected: f64| (mean - expected).abs() <= critical * error + bias * expected;
     assert!(passes(expected), "{what}: {mean} +- {error}, expected {expected}");
     for planted in [expected * (1.0 - detects), expected * (1.0 + detects)] {
-        assert!(!passes(planted), "{what}: cannot tell {planted} ({mean} +- {error})");
+        assert!(!passes(planted), "{what}: an error of {planted} is not detected ({mean} +- {error})");
     }
 }
 
@@ -110,7 +110,7 @@ fn photons_are_forecast() {
 
 /// If memory limits the number of photons, flux is divided by the number of traced light paths.
 #[test]
-fn a_full_map_is_no_darker() {
+fn a_full_map_is_not_darker() {
     let scene = furnace(40.0);
     let most = 30_000;
     let mut values = vec![];

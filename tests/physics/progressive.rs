@@ -150,7 +150,7 @@ fn all_agree_with_path_tracing() {
         for seed in &mut wrong {
             seed[5] *= 1.25;
         }
-        assert!(!disagreeing(&wrong, &paths, critical, 0.03).is_empty(), "{name}: a brighter tile goes unnoticed");
+        assert!(!disagreeing(&wrong, &paths, critical, 0.03).is_empty(), "{name}: a brighter tile is not detected");
     }
 }
 
@@ -212,9 +212,9 @@ fn errors_are_the_sums_over_bandwidths() {
         // Low-discrepancy emission makes photons more regular than a Poisson process, never less.
         assert!(poisson.0 < 1.0 + critical * poisson.1 && poisson.0 > 0.25, "{poisson:?}");
         let other = share.0 - if alpha == 1.0 { 0.312 } else { 1.0 };
-        assert!(other.abs() > critical * share.1, "cannot tell a bandwidth that stays from one that shrinks");
+        assert!(other.abs() > critical * share.1, "a bandwidth that does not shrink is not detected");
         // The bug: photons that all iterations share.
-        assert!((2.0 * ratio.0 - 1.0).abs() > critical * 2.0 * ratio.1, "twice the variance goes unnoticed");
+        assert!((2.0 * ratio.0 - 1.0).abs() > critical * 2.0 * ratio.1, "twice the variance is not detected");
     }
 }
 
@@ -252,7 +252,7 @@ fn merging_alone_has_the_bias_of_its_bandwidths() {
     let critical = t_critical(ERROR_RATE, 1, seeds as f64 - 1.0);
     println!("{ratio:.5} +- {error:.5} of what is expected, which has a bias of {bias:.4}");
     assert!((ratio - 1.0).abs() < critical * error, "{ratio} +- {error}");
-    assert!((ratio * (1.0 - 1.0 / n as f64) - 1.0).abs() > critical * error, "an empty iteration goes unnoticed");
+    assert!((ratio * (1.0 - 1.0 / n as f64) - 1.0).abs() > critical * error, "an empty iteration is not detected");
 }
 
 /// The curves of the first talk of the course: in a uniform field, the squared radius at fixed points falls as the
@@ -287,7 +287,7 @@ fn measurement_points_follow_the_talks_curves() {
         let expected = alpha * radius2_factor(n, alpha);
         println!("{n} iterations: squared radius {radius2:.4}, expected {expected:.4}, error {error:.4}");
         assert!((radius2 / expected - 1.0).abs() < 0.05, "{n} iterations: {radius2}, {expected}");
-        assert!((radius2 / radius2_factor(n, alpha) - 1.0).abs() > 0.05, "the memoryless rule goes unnoticed");
+        assert!((radius2 / radius2_factor(n, alpha) - 1.0).abs() > 0.05, "the memoryless rule is not detected");
         assert!(radius2 < last_radius2 && error < last_error);
         (last_radius2, last_error) = (radius2, error);
     }

@@ -79,7 +79,7 @@ fn a_black_picture_is_not_finished() {
 /// A picture without noise ends after two iterations per quarter, and so does the black picture of a scene without
 /// lights.
 #[test]
-fn a_least_number_of_iterations() {
+fn renders_have_a_minimum_number_of_iterations() {
     for emission in [1.0, 0.0] {
         let mut description = Description::default();
         add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(0.0, emission));
@@ -118,7 +118,7 @@ fn comparisons_above_a_relative_floor() {
 /// An aborted iteration of any method has no effect: the render continues from the finished iterations, to the bits of
 /// an undisturbed render.
 #[test]
-fn iterations_are_given_up_as_a_whole() {
+fn iterations_are_aborted_as_a_whole() {
     let scene = lit(1.0);
     let camera = scene.camera(&square(48)).expect("a camera");
     let mut aborted = 0;
@@ -156,7 +156,7 @@ fn rendered_by<'a>(stage: &'a RenderInput<'a>, between: impl FnOnce(&mut Session
 
 /// The deadline does not end the first iteration, but a stop request does.
 #[test]
-fn the_first_iteration_ends_by_request_alone() {
+fn only_a_request_ends_the_first_iteration() {
     let scene = lit(1.0);
     let camera = scene.camera(&square(SIZE)).expect("a camera");
     let asked = Arc::new(AtomicBool::new(false));

@@ -73,7 +73,7 @@ fn mean(rendered: &Rendered) -> f64 {
 /// interval includes it, and a message names it. With the planted bug of counts that report photons, the estimated
 /// error is below a fifth.
 #[test]
-fn light_that_no_photon_has_brought_is_in_the_interval() {
+fn light_without_photons_is_in_the_error_interval() {
     let scene = dial();
     let wide = settings(Method::Sppm, InitialBandwidth::Fixed(0.05));
     let truth = mean(&rendered(&scene, &wide).0);
@@ -106,7 +106,7 @@ fn light_that_no_photon_has_brought_is_in_the_interval() {
 /// With kernels that contain photons, almost nothing is added to the error of a room, and less than the rest to the
 /// error of the dial, which about seven photons reach: over seeds, 2 / (7 + 2) of the squared error is expected.
 #[test]
-fn errors_are_as_they_were_where_photons_come() {
+fn errors_are_unchanged_where_photons_arrive() {
     let nearest = InitialBandwidth::Nearest(20);
     for method in [Method::Sppm, Method::Vcm, Method::Cppm] {
         let (picture, accuracy) = rendered(&room(), &settings(method, nearest));

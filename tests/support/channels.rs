@@ -58,5 +58,5 @@ pub fn agree(what: &str, a: &[Vec<f64>], b: &[Vec<f64>], bias: f64, planted: f64
     let found = disagreeing(a, b, bias);
     assert!(found.is_empty(), "{what}: {found:#?}");
     let wrong: Vec<Vec<f64>> = a.iter().map(|image| image.iter().map(|x| x * (1.0 + planted)).collect()).collect();
-    assert!(!disagreeing(&wrong, b, bias).is_empty(), "{what}: a picture brighter by {planted} goes unnoticed");
+    assert!(!disagreeing(&wrong, b, bias).is_empty(), "{what}: a picture brighter by {planted} is not detected");
 }

@@ -48,7 +48,7 @@ impl Check {
         println!("{what}: {mean:.6} +- {error:.6}, expected {expected:.6}");
         assert!(passes(expected), "{what}: {mean} +- {error}, expected {expected}");
         for planted in [1.0 - detects, 1.0 + detects].map(|shift| expected * shift) {
-            assert!(!passes(planted), "{what}: cannot tell {expected} from {planted} ({mean} +- {error})");
+            assert!(!passes(planted), "{what}: cannot distinguish {expected} from {planted} ({mean} +- {error})");
         }
     }
 }

@@ -157,7 +157,7 @@ fn missing_buffers() {
 }
 
 #[test]
-fn textures_that_cannot_be_had() {
+fn textures_that_cannot_be_read() {
     let textured = |image: Value, texture: Value| {
         let mut file = pool();
         file.json["materials"] = json!([{"name": "tiles", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
@@ -222,7 +222,7 @@ fn crc(bytes: &[u8]) -> u32 {
 }
 
 #[test]
-fn positions_that_are_no_numbers() {
+fn positions_that_are_not_finite() {
     for (x, said) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf")] {
         let mut file = pool();
         file.binary[24..28].copy_from_slice(&x.to_le_bytes());
@@ -337,7 +337,7 @@ fn absurd_counts_in_parts() {
 }
 
 #[test]
-fn nodes_that_are_no_tree() {
+fn nodes_that_are_not_a_tree() {
     let text = "it is its own ancestor, or the child of two nodes";
     assert_eq!(with("/nodes/0/children", json!([0])), format!("pool.glb: node \"Pool\": {text}\n{EXPORT}"));
     assert_eq!(with("/scenes/0/nodes", json!([0, 0])), format!("pool.glb: node \"Pool\": {text}\n{EXPORT}"));

@@ -265,7 +265,7 @@ fn inner_shells_of_other_primitives_are_turned_over() {
 
 /// Solid emissive glass with alpha decides at each face, with a warning.
 #[test]
-fn glowing_glass_with_alpha_is_named() {
+fn emissive_glass_with_alpha_is_reported() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});
     let warnings = |alpha: f32, glow: f32| {
         let mut file = Glb::new();
@@ -322,7 +322,7 @@ fn textures_keep_wrap_filter_transform_and_encoding() {
 
 /// 16-bit images keep their depth, and JPEG is read. Images may be files, with percent-encoded names, or data URIs.
 #[test]
-fn images_from_everywhere() {
+fn images_may_be_files_or_data_uris() {
     let folder = tempfile::tempdir().unwrap();
     let deep = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(1, 1, vec![40_000u16]).unwrap();
     deep.save(folder.path().join("deep map.png")).unwrap();

@@ -92,7 +92,7 @@ fn lamps_as_blender_has_them() {
 }
 
 #[test]
-fn surfaces_without_a_body_and_objects_that_hide() {
+fn pass_through_surfaces_and_hidden_objects() {
     let mut file = Glb::new();
     let mesh = file.cube("lamp", Some(0));
     file.node(json!({"mesh": mesh, "extras": caustique(json!({"visible": {"camera": false}}))}));

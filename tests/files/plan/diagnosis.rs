@@ -41,7 +41,7 @@ fn silent(description: Description) {
 }
 
 #[test]
-fn a_good_scene_is_passed_over() {
+fn a_good_scene_has_no_warnings() {
     silent(ball(glass(1.5)));
     silent(lit());
 }
@@ -144,7 +144,7 @@ fn suns_and_environments_in_different_units() {
 
 /// A point lamp in a glass globe is found by photons but not by camera paths; with a radius, camera paths find it.
 #[test]
-fn lamps_without_size_behind_glass() {
+fn point_lamps_behind_glass() {
     let globe = || with(lit(), "Globe", sphere(Vec3::new(0.0, 3.0, 0.0), 0.5, 16), glass(1.5));
     silent(globe());
     let warnings = plan_by(globe(), Search::CameraPaths).warnings;
@@ -316,7 +316,7 @@ fn a_dome_shuts_the_environment_out() {
 }
 
 #[test]
-fn a_limit_of_depth_is_told() {
+fn a_limit_of_depth_is_reported() {
     let to = |most| plan_to(ball(glass(1.5)), Search::Photons, Some(most));
     assert_eq!(
         to(2).warnings,
@@ -345,7 +345,7 @@ fn reasons_of_black_pictures() {
 
 /// If lamps are the only lights, the guess of their unit cannot be checked.
 #[test]
-fn guessed_lumens_of_lamps_alone_are_told() {
+fn guessed_lumens_are_reported_if_lamps_are_the_only_lights() {
     let mut description = lit();
     description.guessed_units = Some(GuessedUnits { photometric: true, from: "generator \"Any\"".into() });
     assert_eq!(

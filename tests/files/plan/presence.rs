@@ -64,7 +64,7 @@ fn effects_are_there_for_reasons() {
 /// Photons carry glossy light only if it may come from lamps that sharp lobes show through clear glass or perfect
 /// mirrors.
 #[test]
-fn who_brings_gloss() {
+fn photons_carry_gloss_only_of_lamps_behind_glass_or_mirrors() {
     let by = |lamp: bool, ball: Material, shining: Material| {
         let mut scene = floor();
         scene.lights = vec![point_light(DVec3::new(0.0, 3.0, 0.0), 10.0)];

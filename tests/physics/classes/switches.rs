@@ -69,7 +69,7 @@ fn apart(a: &Rendered, b: &Rendered, sum: &Rendered) -> f64 {
 /// part. A render with photons only for caustics draws other numbers at surfaces with broad lobes; it is compared
 /// below.
 #[test]
-fn a_class_and_all_others_are_the_whole() {
+fn one_class_and_all_others_sum_to_the_whole() {
     let scene = room(true);
     let methods = [
         (Method::Path, Indirect::Photons),
@@ -96,7 +96,7 @@ fn a_class_and_all_others_are_the_whole() {
             if method != Method::Light || effect != Effect::Sds {
                 assert!(light(&one) > 0.0 && light(&others) < light(&whole), "{method:?} {effect:?}");
                 // The planted bug: the class counts twice.
-                assert!(apart(&one, &whole, &whole) > 1e-3, "{method:?} {effect:?}: twice goes unnoticed");
+                assert!(apart(&one, &whole, &whole) > 1e-3, "{method:?} {effect:?}: twice is not detected");
             }
         }
     }
@@ -129,7 +129,7 @@ fn every_method_leaves_out_what_is_switched_off() {
 /// The remaining light has the same bits if bandwidths do not depend on the switched-off light. Without effects that
 /// photons carry no photon is traced, and without effects of surfaces light paths end early.
 #[test]
-fn photons_that_nobody_wants_are_not_traced() {
+fn unneeded_photons_are_not_traced() {
     let scene = room(true);
     let of = |classes| picture(&scene, 24, &settings(Method::Sppm, Indirect::Photons, classes));
     let whole = of(ClassSet::ALL);
@@ -183,7 +183,7 @@ fn differ(a: &[Vec<f64>], b: &[Vec<f64>]) -> bool {
 /// Each class alone has the same light by photons, by paths, and by MIS. A class that is carried twice or not at all
 /// would be twice as bright or black.
 #[test]
-fn a_class_is_the_same_light_by_every_method() {
+fn every_class_has_the_same_light_by_every_method() {
     let scene = room(false);
     let critical = t_critical(1e-3, TILES, 9.0);
     for effect in CLASSES {
@@ -203,7 +203,7 @@ fn a_class_is_the_same_light_by_every_method() {
             let found = disagreeing(&others, &paths, critical, 0.03);
             assert!(found.is_empty() && !differ(&others, &paths), "{effect:?} {method:?}: {found:#?}");
             others.iter_mut().flatten().for_each(|tile| *tile *= 2.0);
-            assert!(differ(&others, &paths), "{effect:?} {method:?}: twice goes unnoticed");
+            assert!(differ(&others, &paths), "{effect:?} {method:?}: twice is not detected");
         }
     }
 }

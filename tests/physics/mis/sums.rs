@@ -47,7 +47,7 @@ fn worst(what: &str, scene: &Scene, radius: f32, bug: Bug) -> [f64; 2] {
 
 fn checked(what: &str, description: Description, radius: f32, bug: Bug) {
     let [_, planted] = worst(what, &build(description), radius, bug);
-    assert!(planted > 100.0 * TOLERANCE, "{what}: {bug:?} goes unnoticed ({planted:e})");
+    assert!(planted > 100.0 * TOLERANCE, "{what}: {bug:?} is not detected ({planted:e})");
 }
 
 /// A square lamp of this side below the ceiling of a glossy room.

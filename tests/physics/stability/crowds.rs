@@ -15,7 +15,7 @@ fn visited(map: &PhotonMap, p: Vec3, radius2: f32) -> u64 {
 }
 
 #[test]
-fn none_one_and_fewer_than_are_asked_for() {
+fn maps_of_no_photons_one_and_fewer_than_requested() {
     for count in 0..20usize {
         let map = PhotonMap::build((0..count).map(|k| photon(Vec3::X * k as f32, 1.0)).collect());
         assert_eq!((map.photons().len(), map.rejected()), (count, 0));

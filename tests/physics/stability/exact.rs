@@ -80,7 +80,7 @@ impl Div for Exact {
 
 /// A third, ten times a tenth, and a sum whose terms cancel except for the last digit.
 #[test]
-fn it_has_the_digits_that_f64_lacks() {
+fn exact_numbers_have_the_digits_that_f64_lacks() {
     let third = Exact::new(1.0) / Exact::new(3.0);
     let nine = third * Exact::new(9.0) - Exact::new(3.0);
     assert!(nine.value().abs() < 1e-30, "{nine:?}");

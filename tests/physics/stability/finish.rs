@@ -59,7 +59,7 @@ fn no_denoiser_leaves_the_bounds() {
                 assert!(found.is_empty(), "{choice:?}, {name}, {size:?}: pixels {found:?} of {picture:?}");
                 if *name == "constant" {
                     let wrong = picture.map(|value| 1.5 * value);
-                    assert_eq!(outside(&estimate, &wrong).len(), size.pixels(), "what is too bright goes unnoticed");
+                    assert_eq!(outside(&estimate, &wrong).len(), size.pixels(), "what is too bright is not detected");
                 }
             }
         }
@@ -69,7 +69,7 @@ fn no_denoiser_leaves_the_bounds() {
 /// Means over sliding windows beside pixels that are 10^12 times as bright, as in squared errors: a pixel that has left
 /// the window leaves only the rounding error of f64, 2^-50 of the largest value. In f32 it would leave 2^-24.
 #[test]
-fn windows_forget_what_has_left_them() {
+fn windows_forget_pixels_that_have_left() {
     let (size, reach) = (Size { width: 64, height: 48 }, 3);
     let value = |i: usize| if i % 37 == 5 { 1e12 } else { 1.0 + (i % 7) as f32 };
     let values: Vec<[f32; 1]> = (0..size.pixels()).map(|i| [value(i)]).collect();

@@ -52,7 +52,7 @@ fn checked(rendered: &Rendered) -> Rejections {
 /// With a weaker lamp nothing is rejected. With the strong one some samples are, and the rest of the picture is
 /// unaffected. Methods that connect and merge have their own causes.
 #[test]
-fn what_overflows_is_counted_by_cause() {
+fn overflows_are_counted_by_cause() {
     let (dim, bright) = (corner(1e29), corner(2.5e37));
     for (method, causes) in [
         (Method::Path, &["direct_light"][..]),
@@ -76,7 +76,7 @@ fn what_overflows_is_counted_by_cause() {
 
 /// A lamp whose flux overflows f32 emits no light path, and this is reported.
 #[test]
-fn light_paths_that_cannot_begin_are_counted() {
+fn light_paths_that_cannot_start_are_counted() {
     let mut description = Description::default();
     add(&mut description, "floor", quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0), matte(0.5, 0.0));
     description.lights.push(point_light(DVec3::Y * 9.0, 2e38));

@@ -52,7 +52,7 @@ fn a_million_values_keep_their_digits() {
 
 /// `MAX_TERMS` terms, each with all digits of its grid set, have the exact integer sum.
 #[test]
-fn as_many_terms_as_are_allowed_lose_no_digit() {
+fn the_largest_number_of_terms_loses_no_digit() {
     // A grid of whole numbers, and the finer grid of multiples of 2^-30.
     let rounding = Grid::default().with_room_for(1.0).rounding();
     for unit in [1.0, 2f64.powi(-30)] {
@@ -72,7 +72,7 @@ fn as_many_terms_as_are_allowed_lose_no_digit() {
 /// For a pixel without light for a million iterations, one with light once, and one whose samples are all rejected,
 /// means are zero or correct, variances and errors are finite, and counts are correct.
 #[test]
-fn pixels_that_see_nothing() {
+fn pixels_without_light_have_finite_statistics() {
     let pixel = |measure: &dyn Fn(u32) -> PixelSample| {
         let mut pixel = PixelAccumulator::new(1, 0, [1.0; 2]);
         (1..=MILLION).for_each(|pass| pixel.add(u64::from(pass), &measure(pass), None));

@@ -123,7 +123,7 @@ fn weights_of_any_densities_sum_to_one() {
 /// Over a million starts, this factor has the mean 1 within four standard errors (6.3e-5 false alarms) and a
 /// ten-thousandth, and the unguided part has its share. Starts with a doubled probability are detected.
 #[test]
-fn guided_starts_share_out_all_light() {
+fn guided_starts_conserve_the_flux() {
     let mut description = Description::default();
     add(&mut description, "room", cuboid(Vec3::ZERO, Vec3::new(4.0, 2.0, 4.0), true), matte(0.5, 0.0));
     for (x, side) in [(1.0, 0.4), (3.0, 1e-3)] {
