@@ -1,4 +1,4 @@
-//! The drivers, and what is asked of them.
+//! Runs the Python drivers of other renderers.
 
 use super::process::{self, End, Stop};
 use super::python::Interpreter;
@@ -10,11 +10,12 @@ use crate::temporary;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Runs a driver's module with its folder on the search path, which an isolated Python leaves out of it.
+/// `__main__.py` of the drivers' folder. Running the folder puts it on the search path, which an isolated Python leaves
+/// out; the first argument is the driver's module.
 const MAIN: &str = "import runpy, sys
 runpy.run_module(sys.argv.pop(1), run_name='__main__')
 ";
-/// The drivers' files, as they lie in `scripts/compare/peers`, and what starts them.
+/// Names and contents of the files in `scripts/compare/peers`, and `__main__.py`.
 const SOURCES: [(&str, &str); 12] = [
     ("__main__.py", MAIN),
     ("cycles_driver.py", include_str!("../../scripts/compare/peers/cycles_driver.py")),
@@ -30,20 +31,22 @@ const SOURCES: [(&str, &str); 12] = [
     ("variant.py", include_str!("../../scripts/compare/peers/variant.py")),
 ];
 
-/// What a render may take beyond its budget: seconds, and so many times the budget. Starting up and converting a large
-/// scene takes half a minute, a photon map its time.
-const LIMIT: (f64, f64) = (300.0, 5.0);
+/// Seconds, besides [`MAX_BUDGETS`], after which a driver is killed: startup and conversion of a large scene take half a
+/// minute.
+const MAX_OVERHEAD_SECONDS: f64 = 300.0;
+/// Time budgets, besides [`MAX_OVERHEAD_SECONDS`], after which a driver is killed: photon maps can exceed the budget.
+const MAX_BUDGETS: f64 = 5.0;
 
-/// A render that is asked for.
+/// A render to be made by a driver.
 #[derive(Clone, Copy, Debug)]
 pub struct Task {
-    /// Seconds of rendering.
+    /// Time budget for rendering in seconds.
     pub budget: f64,
     /// Seed.
     pub seed: u64,
 }
 
-/// A render that was made.
+/// A render made by a driver.
 #[derive(Clone, Debug)]
 pub struct Rendering {
     /// The picture.
@@ -52,31 +55,31 @@ pub struct Rendering {
     pub seconds: f64,
     /// Core-seconds of rendering.
     pub core_seconds: f64,
-    /// Wall-clock seconds before it: starting up, reading and converting the scene.
+    /// Wall-clock seconds of startup, and of reading and converting the scene.
     pub startup_seconds: f64,
-    /// Samples per pixel.
+    /// Samples per pixel; below 1 if some pixels have none.
     pub passes: f64,
     /// Version of the renderer.
     pub version: String,
-    /// What of the scene means something else there, in words.
+    /// Features of the scene that the renderer approximates, in words.
     pub approximations: Vec<String>,
 }
 
-/// What a driver answers.
+/// Reply of a driver.
 #[derive(Clone, Debug)]
-pub enum Answer {
+pub enum Reply {
     /// A render.
     Rendered(Box<Rendering>),
-    /// The renderer cannot say the scene, in words.
-    Cannot(Vec<String>),
-    /// It was stopped.
+    /// The renderer cannot render the scene; holds the reasons, in words.
+    Unsupported(Vec<String>),
+    /// The user has stopped the render.
     Stopped,
 }
 
-/// The line of a driver.
+/// The JSON line that a driver prints.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Said {
+enum ReplyLine {
     Cannot {
         cannot: Vec<String>,
     },
@@ -90,7 +93,7 @@ enum Said {
     },
 }
 
-/// The drivers of some renderers on a scene, laid out in a folder that ends with them.
+/// Drivers of some renderers for a scene, in a temporary folder.
 pub struct Drivers {
     scene: PathBuf,
     camera: Option<String>,
@@ -101,10 +104,11 @@ pub struct Drivers {
 }
 
 impl Drivers {
-    /// Finds the Pythons of some renderers. `size`: width and height in pixels.
+    /// Finds the Python interpreters of the renderers and writes the drivers to a temporary folder. `size` is the width and
+    /// height in pixels.
     ///
     /// # Errors
-    /// A renderer is not installed; the file system.
+    /// A renderer is not installed, or the folder cannot be written.
     pub fn new(
         renderers: &[Renderer],
         scene: &Path,
@@ -112,7 +116,10 @@ impl Drivers {
         size: (u32, u32),
         threads: usize,
     ) -> Result<Drivers> {
-        let interpreters = renderers.iter().map(|&of| Ok((of, Interpreter::find(of)?))).collect::<Result<Vec<_>>>()?;
+        let interpreters = renderers
+            .iter()
+            .map(|&renderer| Ok((renderer, Interpreter::find(renderer)?)))
+            .collect::<Result<Vec<_>>>()?;
         let folder = temporary::create_folder("caustique-peers-")?;
         for (name, source) in SOURCES {
             let path = folder.path().join(name);
@@ -121,20 +128,20 @@ impl Drivers {
         Ok(Drivers { scene: scene.into(), camera: camera.map(Into::into), size, threads, interpreters, folder })
     }
 
-    /// Lets a peer render.
+    /// Renders the scene with a peer.
     ///
     /// # Errors
-    /// The driver fails, takes far too long, or does not answer.
-    pub fn render(&self, peer: &Peer, task: Task, stop: Stop<'_>) -> Result<Answer> {
+    /// The driver fails, exceeds its time limit, or prints no reply.
+    pub fn render(&self, peer: &Peer, task: Task, stop: Stop<'_>) -> Result<Reply> {
         let failed = |cause: &dyn std::fmt::Display| {
             Error::new(ErrorKind::Library, peer.name, cause)
                 .hint(format!("its driver is scripts/compare/peers/{}", peer.renderer.driver()))
         };
-        let Some((_, python)) = self.interpreters.iter().find(|(of, _)| *of == peer.renderer) else {
+        let Some((_, python)) = self.interpreters.iter().find(|(renderer, _)| *renderer == peer.renderer) else {
             return Err(failed(&"its Python was not looked for"));
         };
         let file = self.folder.path().join("picture.exr");
-        // What an earlier render has left is no answer.
+        // A picture of an earlier render must not be taken for the result.
         let _ = std::fs::remove_file(&file);
         let (width, height) = self.size;
         let mut command = python.command();
@@ -146,27 +153,28 @@ impl Drivers {
             ("height", height.to_string()),
             ("budget", task.budget.to_string()),
             ("threads", self.threads.to_string()),
-            // Some take no more than 31 bits.
+            // Some renderers take seeds of at most 31 bits.
             ("seed", (task.seed % (1 << 16)).to_string()),
         ] {
             command.arg(format!("--{name}={value}"));
         }
         command.args(self.camera.iter().map(|name| format!("--camera={name}")));
-        let limit = LIMIT.0 + LIMIT.1 * task.budget;
+        let limit = MAX_OVERHEAD_SECONDS + MAX_BUDGETS * task.budget;
         let (status, [out, err]) = match process::run(command, limit, stop).map_err(|cause| failed(&cause))? {
-            End::Exit(status, said) => (status, said),
-            End::Stopped => return Ok(Answer::Stopped),
+            End::Exit(status, output) => (status, output),
+            End::Stopped => return Ok(Reply::Stopped),
             End::TooLong => return Err(failed(&format!("it was ended after {limit:.0} s of {:.1} s", task.budget))),
         };
-        // Some crash when all is done, while they shut down.
-        let said = out.lines().rev().find_map(|line| serde_json::from_str::<Said>(line.strip_prefix("PEER ")?).ok());
-        match said {
-            Some(Said::Cannot { cannot }) => Ok(Answer::Cannot(cannot)),
-            Some(Said::Rendered { seconds, core_seconds, startup_seconds, passes, version, approximations })
+        // The exit status is ignored if there is a reply, because some renderers crash at shutdown.
+        let reply =
+            out.lines().rev().find_map(|line| serde_json::from_str::<ReplyLine>(line.strip_prefix("PEER ")?).ok());
+        match reply {
+            Some(ReplyLine::Cannot { cannot }) => Ok(Reply::Unsupported(cannot)),
+            Some(ReplyLine::Rendered { seconds, core_seconds, startup_seconds, passes, version, approximations })
                 if file.exists() =>
             {
                 let picture = self.picture(&file).map_err(|error| failed(&error))?;
-                Ok(Answer::Rendered(Box::new(Rendering {
+                Ok(Reply::Rendered(Box::new(Rendering {
                     picture,
                     seconds,
                     core_seconds,

@@ -1,12 +1,13 @@
-//! Other renderers on our scenes: Mitsuba, LuxCore and Cycles, each driven by a script in Python. The scripts
-//! (`scripts/compare`) are part of the program as the converter of USD is, so that they are those of its version and are
-//! found wherever it lies. What both say to each other is in `scripts/compare/peers/driver.py`.
+//! Renders our scenes with other renderers: Mitsuba, LuxCore and Cycles, each run by a Python script.
+//!
+//! The scripts (`scripts/compare/peers`) are compiled into the program, like the USD converter, so that they have its
+//! version and are always found. `driver.py` there documents their command line and reply.
 
 mod drivers;
 mod process;
 mod python;
 
-pub use drivers::{Answer, Drivers, Rendering, Task};
+pub use drivers::{Drivers, Rendering, Reply, Task};
 pub use process::Stop;
 
 /// A renderer.
@@ -21,19 +22,19 @@ pub enum Renderer {
     Cycles,
 }
 
-/// A renderer in one of its ways.
+/// A renderer in one of its modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peer {
-    /// Which renderer.
+    /// The renderer.
     pub renderer: Renderer,
-    /// What its driver calls the way.
+    /// Name of the mode for the driver.
     pub mode: &'static str,
-    /// What reports call it.
+    /// Name in reports.
     pub name: &'static str,
 }
 
 impl Renderer {
-    /// Its ways that are compared.
+    /// The modes that are compared.
     pub fn peers(self) -> Vec<Peer> {
         let names: &[(&str, &str)] = match self {
             Renderer::Mitsuba => &[("path", "Mitsuba")],
@@ -45,7 +46,7 @@ impl Renderer {
         names.iter().map(|&(mode, name)| Peer { renderer: self, mode, name }).collect()
     }
 
-    /// Its driver's file.
+    /// File name of the driver.
     fn driver(self) -> &'static str {
         match self {
             Renderer::Mitsuba => "mitsuba_driver.py",

@@ -1,4 +1,4 @@
-//! Running a program that may take too long, or be asked to stop.
+//! Runs a program that can exceed a time limit or be stopped by the user.
 
 use crate::render::Clock;
 use rustix::process::{Pid, Signal, kill_process_group};
@@ -8,50 +8,50 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus};
 use std::time::Duration;
 
-/// Whether to stop.
+/// Returns true when the program must stop.
 pub type Stop<'a> = &'a dyn Fn() -> bool;
 
-/// How long to sleep between looks.
-const EVERY: Duration = Duration::from_millis(20);
+/// Time between two polls of the program.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// How a program ended.
 pub(super) enum End {
-    /// By itself, with what it wrote on its standard output and error.
+    /// It has exited; holds the status, standard output and standard error.
     Exit(ExitStatus, [String; 2]),
-    /// It was killed, for it took longer than it may.
+    /// It was killed after its time limit.
     TooLong,
-    /// It was killed, for somebody asked.
+    /// It was killed because [`Stop`] returned true.
     Stopped,
 }
 
-/// Kills what is left of a program, and of what that has started, when it goes.
+/// Kills the process group of a program, and so its children, when dropped.
 struct Group(Child);
 
 impl Drop for Group {
     fn drop(&mut self) {
         if let Some(group) = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw) {
-            // Nothing to tell if all have ended.
+            // An error means that all processes have ended.
             let _ = kill_process_group(group, Signal::KILL);
         }
         let _ = self.0.wait();
     }
 }
 
-/// Runs a program, for so many seconds at most. It is in a process group of its own: a terminal's Ctrl-C reaches this
-/// program alone, which ends the other.
+/// Runs a program for at most `limit` seconds. It has its own process group, so that Ctrl-C in a terminal reaches only
+/// caustique, which then stops the program.
 ///
 /// # Errors
-/// It cannot be started.
+/// The program cannot be started.
 pub(super) fn run(mut command: Command, limit: f64, stop: Stop<'_>) -> std::io::Result<End> {
-    // Files, because pipes that nobody reads fill up.
-    let mut said: [File; 2] = [tempfile::tempfile()?, tempfile::tempfile()?];
-    command.stdin(std::process::Stdio::null()).stdout(said[0].try_clone()?).stderr(said[1].try_clone()?);
+    // Files, because pipes that are not read fill up.
+    let mut outputs: [File; 2] = [tempfile::tempfile()?, tempfile::tempfile()?];
+    command.stdin(std::process::Stdio::null()).stdout(outputs[0].try_clone()?).stderr(outputs[1].try_clone()?);
     let mut child = Group(command.process_group(0).spawn()?);
     let clock = Clock::start();
     loop {
         if let Some(status) = child.0.try_wait()? {
             let mut texts = [const { String::new() }; 2];
-            for (file, text) in said.iter_mut().zip(&mut texts) {
+            for (file, text) in outputs.iter_mut().zip(&mut texts) {
                 let mut bytes = Vec::new();
                 file.rewind()?;
                 file.read_to_end(&mut bytes)?;
@@ -65,7 +65,7 @@ pub(super) fn run(mut command: Command, limit: f64, stop: Stop<'_>) -> std::io::
         if clock.seconds() > limit {
             return Ok(End::TooLong);
         }
-        std::thread::sleep(EVERY);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
@@ -79,14 +79,14 @@ mod tests {
         command
     }
 
-    /// Whether a process is there and no zombie.
-    fn lives(id: &str) -> bool {
+    /// Whether a process exists and is not a zombie.
+    fn is_alive(id: &str) -> bool {
         let state = std::fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
         state.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with('Z'))
     }
 
     #[test]
-    fn what_a_program_says_comes_back() {
+    fn output_and_exit_status_are_returned() {
         let script = "head -c 300000 /dev/zero | tr '\\0' x; echo fault >&2; exit 3";
         let End::Exit(status, [out, err]) = run(shell(script), 60.0, &|| false).expect("it starts") else {
             panic!("it ends by itself")
@@ -95,9 +95,9 @@ mod tests {
         assert!(run(Command::new("/nowhere/at/all"), 60.0, &|| false).is_err());
     }
 
-    /// Also what the program has started ends with it.
+    /// Children of the program are killed with it.
     #[test]
-    fn who_takes_too_long_or_is_asked_to_stop_is_killed_with_its_children() {
+    fn programs_are_killed_with_their_children_after_the_limit_or_a_stop() {
         let folder = tempfile::tempdir().expect("a folder");
         for (limit, stops) in [(0.5, false), (600.0, true)] {
             let noted = folder.path().join("pid");
@@ -108,10 +108,10 @@ mod tests {
             assert!(matches!((stops, end), (true, End::Stopped) | (false, End::TooLong)));
             assert!(clock.seconds() < 60.0);
             let id = there().expect("it was started");
-            while lives(&id) && clock.seconds() < 60.0 {
-                std::thread::sleep(EVERY);
+            while is_alive(&id) && clock.seconds() < 60.0 {
+                std::thread::sleep(POLL_INTERVAL);
             }
-            assert!(!lives(&id), "{id} goes on");
+            assert!(!is_alive(&id), "{id} still runs");
             std::fs::remove_file(&noted).expect("it is there");
         }
     }

@@ -1,4 +1,4 @@
-//! Finding the Pythons that have the renderers.
+//! Finds the Python interpreters that have the renderers installed.
 
 use super::Renderer;
 use crate::error::{Error, ErrorKind, Result};
@@ -6,32 +6,32 @@ use crate::installed;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// What to do where there is none.
+/// Remedy for a missing interpreter.
 const HINT: &str = "run 'scripts/compare/setup.sh peers'";
 
-/// Environment variable that tells the drivers where more modules lie.
+/// Environment variable with an additional module folder for the drivers.
 const PACKAGES: &str = "CAUSTIQUE_PEERS_PACKAGES";
 
-/// Fails unless all modules that it is given can be found; imports none, which takes seconds.
+/// Python code that fails unless all modules in its arguments are found. Importing them would take seconds.
 const PROBE: &str = "import importlib.util, os, sys\n\
                      sys.path += filter(None, [os.environ.get('CAUSTIQUE_PEERS_PACKAGES')])\n\
                      missing = [name for name in sys.argv[1:] if importlib.util.find_spec(name) is None]\n\
                      sys.exit('no module ' + ', '.join(missing) if missing else 0)";
 
-/// A Python with a renderer.
+/// A Python interpreter with a renderer.
 #[derive(Clone, Debug)]
 pub(super) struct Interpreter {
     path: PathBuf,
-    /// Where more modules lie.
+    /// Additional module folder.
     packages: Option<PathBuf>,
 }
 
 impl Interpreter {
-    /// The Python that a renderer's variable names, and then no other; else that of the environment which
-    /// `scripts/compare/setup.sh peers` makes (see [`installed`]).
+    /// Finds the interpreter of a renderer: the one that its environment variable names, if set, else the one in the
+    /// virtual environment that `scripts/compare/setup.sh peers` makes (see [`installed`]).
     ///
     /// # Errors
-    /// [`ErrorKind::Library`]: there is none, it does not run, or it lacks the renderer.
+    /// [`ErrorKind::Library`]: there is no interpreter, it does not run, or it lacks the renderer.
     pub(super) fn find(renderer: Renderer) -> Result<Interpreter> {
         let (variable, environment, module) = match renderer {
             Renderer::Mitsuba => ("CAUSTIQUE_PEERS_PYTHON", ".venv-peers", "mitsuba"),
@@ -55,7 +55,7 @@ impl Interpreter {
         Ok(found)
     }
 
-    /// A command that runs this Python, isolated (`-I`), because modules in the current folder may be anybody's.
+    /// A command that runs the interpreter isolated (`-I`), without modules from the current folder.
     pub(super) fn command(&self) -> Command {
         let mut command = Command::new(&self.path);
         command.args(["-I", "-B"]);
@@ -72,7 +72,7 @@ impl Interpreter {
         if output.status.success() {
             return Ok(());
         }
-        let told = String::from_utf8_lossy(&output.stderr);
-        Err(error(told.lines().last().unwrap_or("it does not run").trim().to_owned()))
+        let message = String::from_utf8_lossy(&output.stderr);
+        Err(error(message.lines().last().unwrap_or("it does not run").trim().to_owned()))
     }
 }

@@ -1,4 +1,4 @@
-//! Parts of pictures side by side: where the runs differ most.
+//! Crops of pictures, at the places where runs differ most, and their heat maps.
 
 use crate::error::Result;
 use crate::film::{Picture, Size};
@@ -6,26 +6,26 @@ use crate::image::tonemap::ToneMap;
 use crate::image::{heat, png, relative_squared_error};
 use std::ops::Range;
 
-/// A part of the picture in pixels.
+/// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Window {
-    /// Left column.
+    /// Leftmost column.
     pub x: usize,
     /// Top row.
     pub y: usize,
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
 }
 
 impl Window {
-    /// All of a picture.
+    /// The window of a whole picture.
     pub fn whole(Size { width, height }: Size) -> Window {
         Window { x: 0, y: 0, width, height }
     }
 
-    /// Whether it lies within a picture and is not empty.
+    /// Whether the window is not empty and lies within a picture of this size.
     pub fn fits(&self, Size { width, height }: Size) -> bool {
         let within = |start: usize, length: usize, size: usize| {
             length > 0 && start.checked_add(length).is_some_and(|end| end <= size)
@@ -33,11 +33,11 @@ impl Window {
         within(self.x, self.width, width) && within(self.y, self.height, height)
     }
 
-    fn meets(&self, other: &Window) -> bool {
+    fn overlaps(&self, other: &Window) -> bool {
         let span = |start: usize, length: usize| start..start + length;
-        let cross = |a: Range<usize>, b: Range<usize>| a.start < b.end && b.start < a.end;
-        cross(span(self.x, self.width), span(other.x, other.width))
-            && cross(span(self.y, self.height), span(other.y, other.height))
+        let overlap = |a: Range<usize>, b: Range<usize>| a.start < b.end && b.start < a.end;
+        overlap(span(self.x, self.width), span(other.x, other.width))
+            && overlap(span(self.y, self.height), span(other.y, other.height))
     }
 
     fn size(self) -> Size {
@@ -50,23 +50,23 @@ impl Window {
     }
 }
 
-/// How pictures look.
+/// Exposure and tone curve of the pictures in the report.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// Stops.
+    /// Exposure in stops.
     pub exposure: f32,
-    /// Curve.
+    /// Tone curve.
     pub tonemap: ToneMap,
 }
 
-/// The relative error of a pixel, at most 1: the root of its share of relMSE.
+/// The relative error of a pixel, clamped to 1: the root of its term of relMSE.
 fn relative_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     let error = relative_squared_error(x, r).sqrt();
     if error.is_nan() { 1.0 } else { error.min(1.0) }
 }
 
-/// Up to `count` windows, apart from each other, in which the mean error of the worst picture exceeds that of the best
-/// by most; with one picture those in which it is largest.
+/// Up to `count` disjoint windows with the largest difference between the mean errors of the worst and the best picture,
+/// or with the largest mean error if there is only one picture.
 pub fn choose(pictures: &[Picture], reference: &Picture, count: usize) -> Vec<Window> {
     let Size { width, height } = reference.size();
     let least = width.min(height);
@@ -90,14 +90,14 @@ pub fn choose(pictures: &[Picture], reference: &Picture, count: usize) -> Vec<Wi
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<Window> = Vec::new();
     for (_, window) in scored {
-        if chosen.len() < count && chosen.iter().all(|other| !other.meets(&window)) {
+        if chosen.len() < count && chosen.iter().all(|other| !other.overlaps(&window)) {
             chosen.push(window);
         }
     }
     chosen
 }
 
-/// Sums of relative errors over all rectangles that begin in the corner, one row and column more than pixels.
+/// Summed-area table of relative errors, with one row and column more than the picture.
 fn integral(picture: &Picture, reference: &Picture) -> Vec<f64> {
     let width = reference.size().width;
     let mut table = vec![0.0; width + 1];
@@ -113,8 +113,8 @@ fn integral(picture: &Picture, reference: &Picture) -> Vec<f64> {
     table
 }
 
-/// The relative error that is shown as the largest: the 95th percentile over all pictures within the windows, so that
-/// fireflies do not turn all else black.
+/// The relative error with the palest colour of the heat maps: the 95th percentile over all pictures within the windows,
+/// so that fireflies do not make the rest black.
 pub fn scale(pictures: &[Picture], reference: &Picture, windows: &[Window]) -> f64 {
     let pixels = windows.iter().flat_map(|window| window.indices(reference.size().width));
     let mut errors: Vec<f64> =
@@ -123,28 +123,28 @@ pub fn scale(pictures: &[Picture], reference: &Picture, windows: &[Window]) -> f
     errors.get(errors.len() * 95 / 100).copied().unwrap_or(1.0).max(1e-6)
 }
 
-/// A window of a picture as PNG.
+/// A window of a picture as a PNG.
 ///
 /// # Errors
-/// None for a window within the picture.
+/// The window is empty.
 pub fn picture(picture: &Picture, window: Window, look: Look) -> Result<Vec<u8>> {
     let pixels = window.indices(picture.size().width);
     png::encode(window.size(), pixels.map(|i| look.tonemap.display(picture[i].into(), look.exposure)))
 }
 
-/// The relative error in a window as a heat map, `largest` being the palest.
+/// Heat map, as a PNG, of the relative error in a window; the error `largest` has the palest colour.
 ///
 /// # Errors
-/// None for a window within the picture.
+/// The window is empty.
 pub fn heat_map(picture: &Picture, reference: &Picture, window: Window, largest: f64) -> Result<Vec<u8>> {
     let error = |i: usize| relative_error(picture[i], reference[i]) / largest;
     png::encode(window.size(), window.indices(reference.size().width).map(|i| heat::magma(error(i) as f32)))
 }
 
-/// The colours of heat maps from left to right.
+/// The colours of heat maps from left to right, as a PNG.
 ///
 /// # Errors
-/// None.
+/// None beyond lack of memory.
 pub fn heat_bar() -> Result<Vec<u8>> {
     png::encode(Size { width: 256, height: 1 }, (0..256).map(|i| heat::magma(i as f32 / 255.0)))
 }
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_windows_are_where_pictures_differ_and_apart() {
+    fn the_windows_are_disjoint_and_where_pictures_differ() {
         let size = Size { width: 96, height: 64 };
         let reference = Picture::filled(size, [1.0; 3]);
         let with = |x: Range<usize>, y: Range<usize>, value: f32| {
@@ -168,7 +168,7 @@ mod tests {
             |w: &Window, x: usize, y: usize| (w.x..w.x + w.width).contains(&x) && (w.y..w.y + w.height).contains(&y);
         assert_eq!(windows.len(), 2);
         assert!(holds(&windows[0], 65, 35) && holds(&windows[1], 13, 8), "{windows:?}");
-        assert!(!windows[0].meets(&windows[1]) && windows.iter().all(|w| w.fits(size)));
+        assert!(!windows[0].overlaps(&windows[1]) && windows.iter().all(|w| w.fits(size)));
         assert!(!Window { x: 90, y: 0, width: 7, height: 1 }.fits(size));
         assert!(!Window { x: usize::MAX, y: 0, width: 7, height: 1 }.fits(size));
         let largest = scale(&pictures, &reference, &[Window::whole(size)]);

@@ -1,4 +1,4 @@
-//! From points to a curve per run, and its slope.
+//! Error curves of runs, and their slopes.
 
 use super::entry::Metric;
 use super::point::Point;
@@ -7,17 +7,17 @@ use crate::image::Errors;
 use crate::stat::{PowerLaw, TRIMMED_SHARE};
 use std::fmt;
 
-/// A mean over seeds and its standard error, which one seed does not tell.
+/// A mean over seeds and its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
     /// The mean.
     pub value: f64,
-    /// Its standard error.
+    /// Its standard error; `None` for a single value.
     pub error: Option<f64>,
 }
 
 impl Mean {
-    /// PictureSource values; `None` if there are none.
+    /// The mean of `values`; `None` if there are none.
     pub fn of(values: &[f64]) -> Option<Mean> {
         let n = values.len() as f64;
         let value = values.iter().sum::<f64>() / n;
@@ -27,7 +27,7 @@ impl Mean {
     }
 }
 
-/// A run at a moment.
+/// A point of an error curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurvePoint {
     /// Iterations done.
@@ -36,18 +36,18 @@ pub struct CurvePoint {
     pub seconds: f64,
     /// Core-seconds.
     pub cpu_seconds: f64,
-    /// The error without the reference's own.
+    /// The error after subtraction of the reference's own error.
     pub figure: f64,
-    /// Its standard error over seeds.
+    /// Standard error of `figure` over seeds.
     pub spread: Option<f64>,
-    /// Whether the figure is above the reference's own error, so that it may be reported.
+    /// Whether the figure exceeds the reference's own error; smaller figures are not reported.
     pub reported: bool,
-    /// Whether fireflies rule the error of all pixels, with some seed at least, see [`fireflies`].
+    /// Whether fireflies dominate the error with at least one seed, see [`fireflies`].
     pub fireflies: bool,
 }
 
-/// Whether a few bright samples rule a picture's error: the worst 0.5 % of its pixels hold more than half of its
-/// relMSE. PictureSource Gaussian noise as large everywhere they hold 2 to 5 %.
+/// Whether a few bright samples dominate a picture's error: the worst 0.5 % of the pixels hold more than half of its
+/// relMSE. Of uniform Gaussian noise they hold 2 to 5 %.
 pub fn fireflies(errors: &Errors) -> bool {
     (1.0 - TRIMMED_SHARE) * errors.relmse_trimmed < 0.5 * errors.relmse
 }
@@ -55,21 +55,21 @@ pub fn fireflies(errors: &Errors) -> bool {
 /// A run's error against iterations and seconds.
 #[derive(Clone, Debug, Default)]
 pub struct Curve {
-    /// Mean over seeds, by iterations.
+    /// Mean over seeds, in order of iterations.
     pub mean: Vec<CurvePoint>,
-    /// PictureSource every seed.
+    /// The curve of every seed.
     pub by_seed: Vec<Vec<CurvePoint>>,
     /// The reference's own error.
     pub own: f64,
 }
 
-/// A share `t` of the way from `a` to `b`: a power where both are above zero.
-pub(super) fn between(a: f64, b: f64, t: f64) -> f64 {
+/// Interpolates from `a` to `b` at `t` in 0 to 1: geometrically if both are above zero, else linearly.
+pub(super) fn interpolate(a: f64, b: f64, t: f64) -> f64 {
     if a > 0.0 && b > 0.0 { a * (b / a).powf(t) } else { a + t * (b - a) }
 }
 
-/// Seconds, core-seconds and figure after so many iterations, between two moments as a power of iterations.
-fn at(curve: &[CurvePoint], iterations: u64) -> Option<[f64; 3]> {
+/// Seconds, core-seconds and figure after `iterations`, interpolated as a power of iterations; `None` outside the curve.
+fn values_at(curve: &[CurvePoint], iterations: u64) -> Option<[f64; 3]> {
     let values = |curve_point: &CurvePoint| [curve_point.seconds, curve_point.cpu_seconds, curve_point.figure];
     let next = curve.iter().position(|curve_point| curve_point.iterations >= iterations)?;
     let after = &curve[next];
@@ -79,34 +79,34 @@ fn at(curve: &[CurvePoint], iterations: u64) -> Option<[f64; 3]> {
     let t =
         (iterations as f64 / before.iterations as f64).ln() / (after.iterations as f64 / before.iterations as f64).ln();
     let (before, after) = (values(before), values(after));
-    Some(std::array::from_fn(|i| between(before[i], after[i], t)))
+    Some(std::array::from_fn(|i| interpolate(before[i], after[i], t)))
 }
 
-/// A fitted exponent.
+/// A fitted exponent of the error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
-    /// Exponent with its standard error: over seeds, or, with one, from the scatter about the line.
+    /// Exponent with its standard error: over seeds, or from the scatter about the line with a single seed.
     pub exponent: Mean,
-    /// The line through the mean curve.
+    /// The power law fitted to the mean curve.
     pub line: PowerLaw,
-    /// The axis where the fit begins and ends.
+    /// First and last value on the axis.
     pub range: (f64, f64),
-    /// Points on the mean curve.
+    /// Number of points fitted.
     pub points: usize,
 }
 
-/// Why no exponent is fitted.
+/// The reason why no exponent is reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FitFailure {
-    /// Fewer than four measurements above the reference's own error in the last decade.
+    /// Fewer than [`MIN_POINTS`] measurements in the last decade exceed the reference's own error.
     Few(usize),
-    /// They span less than a factor of four.
+    /// The measurements span less than [`MIN_SPAN`].
     Narrow,
-    /// So many of them are ruled by fireflies.
+    /// Fireflies dominate this number of the measurements.
     Fireflies(usize),
-    /// They do not lie on a line: the exponent's standard error.
+    /// The exponent's standard error, which is given, exceeds [`MAX_EXPONENT_ERROR`].
     Scattered(f64),
-    /// Denoised pictures follow no power.
+    /// The pictures are denoised, and their error follows no power law.
     Denoised,
 }
 
@@ -122,14 +122,14 @@ impl fmt::Display for FitFailure {
     }
 }
 
-/// Least points of a fit.
-const POINTS: usize = 4;
-/// Least ratio of the last to the first of them.
-const SPAN: f64 = 4.0;
-/// Largest standard error of an exponent that says something: half of what lies between the exponents of theory.
-const SCATTER: f64 = 1.0 / 6.0;
+/// Minimum number of points of a fit.
+const MIN_POINTS: usize = 4;
+/// Minimum ratio of the last to the first value on the axis.
+const MIN_SPAN: f64 = 4.0;
+/// Maximum standard error of a reported exponent: half the difference between the exponents of theory, 2/3 and 1.
+const MAX_EXPONENT_ERROR: f64 = 1.0 / 6.0;
 
-/// The axis of a curve.
+/// The horizontal axis of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Iterations.
@@ -141,7 +141,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// A curve_point's place on it.
+    /// The value of a point on this axis.
     pub fn of(self, curve_point: &CurvePoint) -> f64 {
         match self {
             Axis::Iterations => curve_point.iterations as f64,
@@ -152,7 +152,7 @@ impl Axis {
 }
 
 impl Curve {
-    /// The curve of a line, by its number.
+    /// The curve of the line with index `line`.
     pub fn of(line: usize, points: &[Point], metric: Metric, reference: &Reference) -> Curve {
         let own = reference.error.of(metric).unwrap_or(0.0);
         let mut by_seed: Vec<(u64, Vec<CurvePoint>)> = Vec::new();
@@ -171,14 +171,14 @@ impl Curve {
         Curve::from_seeds(by_seed.into_iter().map(|(_, curve_points)| curve_points).collect(), own)
     }
 
-    /// The mean of curves, as far as all of them go. Those that a clock has stopped end after different numbers of
-    /// iterations: a curve without a moment that another has is interpolated there.
+    /// The curve of several seeds; its mean ends where the shortest of them ends. Curves that a clock has stopped end at
+    /// different iterations: a curve is interpolated where only others have a point.
     pub fn from_seeds(by_seed: Vec<Vec<CurvePoint>>, own: f64) -> Curve {
         let mut moments: Vec<u64> = by_seed.iter().flatten().map(|curve_point| curve_point.iterations).collect();
         moments.sort_unstable();
         moments.dedup();
         let mean = |&iterations: &u64| {
-            let all: Vec<[f64; 3]> = by_seed.iter().map(|curve| at(curve, iterations)).collect::<Option<_>>()?;
+            let all: Vec<[f64; 3]> = by_seed.iter().map(|curve| values_at(curve, iterations)).collect::<Option<_>>()?;
             let mean = |i: usize| Mean::of(&all.iter().map(|curve_point| curve_point[i]).collect::<Vec<_>>());
             let figure = mean(2)?;
             let here = |curve_point: &&CurvePoint| curve_point.iterations == iterations;
@@ -195,7 +195,7 @@ impl Curve {
         Curve { mean: moments.iter().filter_map(mean).collect(), by_seed, own }
     }
 
-    /// The curves that leave one seed out; none with a single seed.
+    /// For each seed the curve without it, for the jackknife; empty with a single seed.
     pub fn without_each_seed(&self) -> Vec<Curve> {
         let without = |left: usize| {
             let rest = self.by_seed.iter().enumerate().filter(|(seed, _)| *seed != left);
@@ -204,15 +204,15 @@ impl Curve {
         if self.by_seed.len() > 1 { (0..self.by_seed.len()).map(without).collect() } else { Vec::new() }
     }
 
-    /// Where it ends.
+    /// The last point of the mean curve.
     pub fn last(&self) -> Option<&CurvePoint> {
         self.mean.last()
     }
 
-    /// The exponent of the error over the last decade of iterations, where it means something.
+    /// Fits the exponent of the error over the last decade of iterations.
     ///
     /// # Errors
-    /// Why it means nothing.
+    /// The reason why the exponent would be meaningless.
     pub fn slope(&self, axis: Axis) -> Result<Slope, FitFailure> {
         let last = self.last().ok_or(FitFailure::Few(0))?.iterations;
         let decade = |curve_point: &&CurvePoint| curve_point.reported && curve_point.iterations * 10 >= last;
@@ -221,14 +221,14 @@ impl Curve {
             let points: Vec<(f64, f64)> =
                 curve_points.iter().map(|curve_point| (axis.of(curve_point), curve_point.figure)).collect();
             let ends = points.first().zip(points.last()).map(|(first, last)| (first.0, last.0));
-            let Some(range) = ends.filter(|_| points.len() >= POINTS) else {
+            let Some(range) = ends.filter(|_| points.len() >= MIN_POINTS) else {
                 return Err(FitFailure::Few(points.len()));
             };
             let ruled = curve_points.iter().filter(|curve_point| curve_point.fireflies).count();
             match PowerLaw::fit(points.iter().copied()) {
-                _ if range.1 < SPAN * range.0 => Err(FitFailure::Narrow),
+                _ if range.1 < MIN_SPAN * range.0 => Err(FitFailure::Narrow),
                 _ if ruled > 0 => Err(FitFailure::Fireflies(ruled)),
-                Some(line) if line.exponent_error <= SCATTER => Ok((line, range, points.len())),
+                Some(line) if line.exponent_error <= MAX_EXPONENT_ERROR => Ok((line, range, points.len())),
                 Some(line) => Err(FitFailure::Scattered(line.exponent_error)),
                 None => Err(FitFailure::Narrow),
             }
@@ -247,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mean_goes_as_far_as_all_seeds_do() {
+    fn a_mean_curve_ends_with_the_shortest_seed() {
         let curve_point = |iterations: u64, figure: f64| CurvePoint {
             iterations,
             seconds: 0.5 * iterations as f64,
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn exponents_that_mean_nothing_are_not_fitted() {
+    fn meaningless_exponents_are_not_reported() {
         let curve_point = |&(iterations, figure): &(u64, f64)| CurvePoint {
             iterations,
             seconds: iterations as f64,
@@ -296,9 +296,9 @@ mod tests {
         assert!(matches!(fit(&[(10, 1.0), (20, 0.1), (40, 0.9), (80, 0.1)]), Err(FitFailure::Scattered(_))));
     }
 
-    /// Equal Gaussian noise is no firefly; one pixel of a thousand that is a hundred times as wrong is.
+    /// Uniform Gaussian noise has no fireflies; a few pixels with a hundred times the error are fireflies.
     #[test]
-    fn fireflies_are_told_from_noise() {
+    fn fireflies_are_distinguished_from_noise() {
         let of = |relmse: f64, relmse_trimmed: f64| {
             fireflies(&Errors { relmse, relmse_trimmed, mse: 1.0, mean_ratio: None })
         };

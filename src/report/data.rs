@@ -10,7 +10,7 @@ use crate::error::{Error, ErrorKind, Result};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// A measurement: a row of the CSV, an object of the JSON.
+/// A measurement: a row of the CSV and an object of the JSON.
 #[derive(Serialize)]
 struct Row<'a> {
     run: &'a str,
@@ -21,7 +21,7 @@ struct Row<'a> {
     seconds: f64,
     cpu_seconds: f64,
     finish_seconds: Option<f64>,
-    /// The error of the report's metric without the reference's own; none at or below that.
+    /// The error in the report's metric after subtraction of the reference's own; `None` if it does not exceed that.
     figure: Option<f64>,
     relmse: f64,
     relmse_trimmed: f64,
@@ -54,7 +54,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// The method of a curve; another renderer's is its way there.
+/// The method of a curve, or the mode of another renderer.
 fn method(subject: &Subject, of: PictureSource) -> &'static str {
     match of {
         PictureSource::Estimate(entry) | PictureSource::Finished(entry) => {
@@ -64,10 +64,10 @@ fn method(subject: &Subject, of: PictureSource) -> &'static str {
     }
 }
 
-/// `points.csv`: a header line, then a row per run, seed and moment.
+/// `points.csv`: a header line, then a row for each measurement.
 ///
 /// # Errors
-/// None that memory would not have.
+/// None beyond lack of memory.
 pub fn csv(subject: &Subject, outcome: &Outcome) -> Result<Vec<u8>> {
     let failed = |cause: &dyn std::fmt::Display| Error::new(ErrorKind::Io, "points.csv", cause);
     let mut writer = csv::Writer::from_writer(Vec::new());
@@ -77,7 +77,7 @@ pub fn csv(subject: &Subject, outcome: &Outcome) -> Result<Vec<u8>> {
     writer.into_inner().map_err(|cause| failed(&cause))
 }
 
-/// `points.json`: everything that the page shows, but for pictures.
+/// `points.json`: the contents of the page without its pictures.
 pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
     let map = |pairs: &[(String, String)]| {
         pairs.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str()))).collect::<Value>()
@@ -114,7 +114,7 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
     })
 }
 
-/// A curve with what made it.
+/// A curve, with the settings of its entry or the facts about its peer.
 fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> Value {
     let of = subject.lines[line].source;
     let mut object = match of {
@@ -141,7 +141,7 @@ fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> 
     object
 }
 
-/// What is known of another renderer.
+/// Facts about another renderer.
 fn peer_object(subject: &Subject, outcome: &Outcome, summary: &Summary, peer: usize) -> Value {
     let account = &outcome.peers[peer];
     let startup = Mean::of(&account.startups).map(|mean| mean.value);

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 pub struct Entry {
     /// Name in the report.
     pub name: String,
-    /// The same run as options of `caustique render`.
+    /// Options of `caustique render` that give the same run.
     pub options: String,
     /// Settings; the seed comes from [`Rules::seeds`](super::equal_time::Rules::seeds).
     pub settings: Settings,
@@ -103,7 +103,7 @@ pub enum Metric {
     #[default]
     #[cfg_attr(feature = "cli", value(name = "relmse"))]
     RelMse,
-    /// The same without the worst 0.5 % of pixels, which fireflies dominate
+    /// relMSE without the worst 0.5 % of pixels, which fireflies dominate
     #[serde(rename = "relmse_trimmed")]
     #[cfg_attr(feature = "cli", value(name = "relmse-trimmed"))]
     RelMseTrimmed,

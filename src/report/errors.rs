@@ -1,5 +1,5 @@
-//! A picture's errors as pictures, in one page that needs nothing from outside: what differs from a reference, what the
-//! render itself has told, and what people see of it.
+//! A self-contained HTML page with the errors of a picture: its difference from a reference, the error that the render has
+//! estimated, and FLIP.
 
 use super::crop::heat_bar;
 use super::number::short;
@@ -11,27 +11,27 @@ use crate::image::tonemap::ToneMap;
 use crate::image::{Comparison, heat, png};
 use maud::{Markup, html};
 
-/// Share of the pixels whose errors the scale has room for, so that fireflies do not turn all else black.
-const SHOWN: f64 = 0.95;
+/// Percentile of the errors that gets the palest colour, so that fireflies do not make the rest black.
+const PERCENTILE: f64 = 0.95;
 
-/// The page for a picture beside its reference, both of the same size, with what was compared.
+/// The page for `image` and its reference, which have the same size.
 ///
 /// # Errors
-/// There is no picture in one of them.
+/// One of the two sets has no picture.
 pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison: &Comparison) -> Result<String> {
     let (pixels, truth) = (image.beauty()?, reference.beauty()?);
     let floor = truth.relative_floor();
-    // PictureSource a pixel, whose squared error is given by channel.
+    // Relative error of a pixel, from its squared error summed over channels.
     let relative =
         |square: f64, worth: &[f32; 3]| (square / 3.0 / (channel_mean(*worth).powi(2) + floor)).sqrt() as f32;
     let distance =
         |(a, b): (&[f32; 3], &[f32; 3])| relative((0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum(), b);
     let found: Vec<f32> = pixels.iter().zip(&truth).map(distance).collect();
-    let told = image.picture(ERROR).map(|told| -> Vec<f32> {
-        let squares = told.iter().map(|error| error.iter().map(|e| f64::from(*e).powi(2)).sum::<f64>());
+    let estimated = image.picture(ERROR).map(|estimated| -> Vec<f32> {
+        let squares = estimated.iter().map(|error| error.iter().map(|e| f64::from(*e).powi(2)).sum::<f64>());
         squares.zip(&truth).map(|(square, worth)| relative(square, worth)).collect()
     });
-    let largest = scale(found.iter().chain(told.iter().flatten()).copied());
+    let largest = scale(found.iter().chain(estimated.iter().flatten()).copied());
     let look = |pixels: &Picture| {
         png::encode(pixels.size(), pixels.iter().map(|rgb| ToneMap::default().display((*rgb).into(), 0.0)))
     };
@@ -46,9 +46,9 @@ pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison
         figure(names[1], &data_url(&look(&truth)?), None),
         figure("relative error against it", &data_url(&map(&found, largest)?), Some((&bar, &percents(largest)))),
     ];
-    if let Some(told) = &told {
-        let told = data_url(&map(told, largest)?);
-        figures.push(figure("error that the render has told", &told, Some((&bar, &percents(largest)))));
+    if let Some(estimated) = &estimated {
+        let estimated = data_url(&map(estimated, largest)?);
+        figures.push(figure("error that the render has estimated", &estimated, Some((&bar, &percents(largest)))));
     }
     figures.push(figure("FLIP", &data_url(&map(&comparison.flip_map, 1.0)?), Some((&bar, &plain))));
     let lead = format!(
@@ -62,7 +62,7 @@ pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison
     Ok(document(&format!("Errors of {}", names[0]), &lead, &body))
 }
 
-/// A picture with what it shows, and the bar of its scale with the labels of its ends and its middle.
+/// A picture with a title, and the bar of its colour scale with three labels.
 fn figure(title: &str, url: &str, scale: Option<(&str, &[String; 3])>) -> Markup {
     html! {
         figure {
@@ -78,11 +78,11 @@ fn figure(title: &str, url: &str, scale: Option<(&str, &[String; 3])>) -> Markup
     }
 }
 
-/// The error that is shown as the largest.
+/// The error that gets the palest colour.
 fn scale(errors: impl Iterator<Item = f32>) -> f32 {
     let mut errors: Vec<f32> = errors.filter(|error| error.is_finite()).collect();
     errors.sort_unstable_by(f32::total_cmp);
-    errors.get((SHOWN * errors.len() as f64) as usize).copied().unwrap_or(1.0).max(1e-6)
+    errors.get((PERCENTILE * errors.len() as f64) as usize).copied().unwrap_or(1.0).max(1e-6)
 }
 
 #[cfg(test)]
@@ -92,7 +92,7 @@ mod tests {
     use crate::image::compare;
 
     #[test]
-    fn the_page_has_all_pictures_and_a_scale_that_one_firefly_does_not_rule() {
+    fn the_page_has_all_pictures_and_a_scale_without_fireflies() {
         let set = |value: f32| -> LayerSet {
             let mut set = LayerSet::new(16, 16);
             let pixels = (0..256).map(|i| if i == 9 { [1e6; 3] } else { [value; 3] });

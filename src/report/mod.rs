@@ -1,9 +1,10 @@
-//! Accuracy against time: several methods and settings in one run, and the report on it.
+//! Comparison of methods and settings by accuracy against time, and its report.
 //!
-//! [`race`] renders the [`entry`] list against a [`reference`](mod@reference), one iteration of each at a time, with
-//! [`peers`] (other renderers) in between, and measures pictures at a geometric series of moments. From the points come
-//! [`curve`]s, exponents beside [`theory`], the [`time to targets`](target) (Table 1 of \[CPPM 2020\]), the [`overhead`]
-//! (Table 2 of \[post-reconstruction 2021\]) and [`crop`]s; [`data`], [`plot`] and [`page`] write them down.
+//! [`equal_time`] renders every [`entry`] against a [`reference`](mod@reference), one iteration of each at a time, with
+//! renders by other renderers ([`peer_renders`]) in between, and measures pictures at a geometric series of iterations. The
+//! measurements give [`curve`]s, exponents to compare with [`theory`], the [`time to targets`](target) (Table 1 of \[CPPM
+//! 2020\]), the [`overhead`] (Table 2 of \[post-reconstruction 2021\]) and [`crop`]s, which [`data`], [`plot`] and [`page`]
+//! write.
 
 pub mod crop;
 pub mod curve;

@@ -1,8 +1,8 @@
-//! Numbers as the report's tables and plots show them.
+//! Number formats of the report's tables and plots.
 
 use super::curve::Mean;
 
-/// Three digits: `0.0123`, `12.3`, `4.56e-5`.
+/// Three significant digits: `0.0123`, `12.3`, `4.56e-5`.
 pub fn short(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
@@ -14,7 +14,7 @@ pub fn short(x: f64) -> String {
     }
 }
 
-/// As [`short`] without zeros at the end: `6`, `0.5`, `2e-5`.
+/// [`short`] without trailing zeros: `6`, `0.5`, `2e-5`.
 pub fn plain(x: f64) -> String {
     let shown = short(x);
     let trimmed = |text: &str| match text.split_once('.') {
@@ -30,7 +30,7 @@ pub fn with_error(mean: &Mean, digits: usize) -> String {
     mean.error.map_or(value.clone(), |error| format!("{value} ± {error:.digits$}"))
 }
 
-/// A value to two digits of its standard error: `0.7283 ± 0.0056`; as [`short`] without one.
+/// A value rounded to two digits of its standard error: `0.7283 ± 0.0056`; [`short`] without a standard error.
 pub fn short_with_error(mean: &Mean) -> String {
     match mean.error.filter(|error| *error > 0.0 && error.is_finite()) {
         Some(error) => with_error(mean, (1.0 - error.log10().floor()).clamp(0.0, 8.0) as usize),
@@ -43,7 +43,7 @@ pub fn iterations(n: u64) -> String {
     if n == 1 { "1 iteration".into() } else { format!("{n} iterations") }
 }
 
-/// The typographic minus.
+/// Replaces hyphens by minus signs.
 pub fn minus(text: &str) -> String {
     text.replace('-', "−")
 }
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_three_digits() {
+    fn numbers_have_three_significant_digits() {
         let shown = [0.0123456, 1.0, 12.345, 1234.0, 0.0000456, 1234567.0, 0.0].map(short);
         assert_eq!(shown, ["0.0123", "1.00", "12.3", "1234", "4.56e-5", "1.23e6", "0"]);
         assert_eq!([1000.0, 0.001, 0.5, 2e-5, 1e6].map(plain), ["1000", "0.001", "0.5", "2e-5", "1e6"]);

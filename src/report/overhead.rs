@@ -1,38 +1,39 @@
-//! What an iteration costs and of what, and what levels and finish add, as Table 2 of \[post-reconstruction 2021\].
+//! Cost of an iteration by phase, and the overhead of bandwidth levels and the finish, as Table 2 of
+//! \[post-reconstruction 2021\].
 
 use super::entry::Entry;
 use super::point::RunEnd;
 use crate::render::Phases;
 use serde::Serialize;
 
-/// A row of the table; means over seeds.
+/// A row of the table: means over seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Overhead {
     /// Iterations done.
     pub iterations: f64,
     /// Wall-clock seconds of pilot and iterations.
     pub render_seconds: f64,
-    /// Wall-clock seconds of the finish with its layers, once at the end.
+    /// Wall-clock seconds of the finish with its layers; it runs once.
     pub finish_seconds: Option<f64>,
-    /// All seconds over iterations.
+    /// Wall-clock seconds of render and finish, divided by iterations.
     pub seconds_per_iteration: f64,
-    /// All processor seconds over iterations.
+    /// Core-seconds of render and finish, divided by iterations.
     pub cpu_seconds_per_iteration: f64,
-    /// Core-seconds of the pilot, once.
+    /// Core-seconds of the pilot; it runs once.
     pub pilot: f64,
     /// Core-seconds per iteration for light paths.
     pub light: f64,
     /// Core-seconds per iteration for photon maps.
     pub map: f64,
-    /// Core-seconds per iteration for eye paths, with those light paths that take turns with them.
+    /// Core-seconds per iteration for camera paths, and for light paths that are traced in turns with them.
     pub eye: f64,
-    /// Seconds per iteration over those of the first run.
+    /// Seconds per iteration relative to the first run.
     pub over_first: f64,
-    /// Seconds per iteration over those of the first run with the same method, if that is another.
+    /// Seconds per iteration relative to the first run with the same method, if that is another run.
     pub over_plain: Option<f64>,
 }
 
-/// The table, a row per entry; `None` for a run that did nothing.
+/// One row for each entry; `None` for a run without iterations.
 pub fn table(entries: &[Entry], endings: &[RunEnd]) -> Vec<Option<Overhead>> {
     let rows: Vec<Option<Overhead>> = (0..entries.len()).map(|run| row(run, endings)).collect();
     let cost = |run: usize| rows[run].as_ref().map(|row| row.seconds_per_iteration).filter(|cost| *cost > 0.0);

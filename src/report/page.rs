@@ -1,4 +1,4 @@
-//! The report as one page that needs nothing from outside: pictures, plots and style are in it.
+//! The report as a self-contained HTML page with pictures, plots and style.
 
 use super::crop;
 use super::entry::{Metric, PictureSource};
@@ -13,18 +13,18 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
 
-/// Plots side by side: SVG documents with the metrics that they show.
+/// Plots side by side under a heading.
 pub struct Plots {
-    /// What they go under.
+    /// The heading.
     pub heading: &'static str,
-    /// The plots.
+    /// Metric and SVG document of each plot.
     pub plots: Vec<(Metric, String)>,
 }
 
-/// The page.
+/// Builds the page.
 ///
 /// # Errors
-/// None that memory would not have.
+/// None beyond lack of memory.
 pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Plots]) -> Result<String> {
     let bar = data_url(&crop::heat_bar()?);
     let title = format!("Accuracy against time: {}", subject.scene);
@@ -47,7 +47,7 @@ pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Pl
     Ok(document(&title, &lead(subject), &body))
 }
 
-/// A page with our style: its title, a sentence under that, and what follows.
+/// An HTML document with the style of the report: title, a sentence below it, and body.
 pub(super) fn document(title: &str, lead: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -96,7 +96,7 @@ fn lead(subject: &Subject) -> String {
     format!("{runs}, {each}, {width} × {height} pixels{seeds}.")
 }
 
-/// What a metric is, in a few words.
+/// Heading of the plot of a metric.
 fn meaning(metric: Metric) -> &'static str {
     match metric {
         Metric::RelMse => "relMSE, all pixels",
@@ -105,7 +105,7 @@ fn meaning(metric: Metric) -> &'static str {
     }
 }
 
-/// What the marks of the plots mean.
+/// Legend of the marks in the plots.
 fn marks(subject: &Subject, summary: &Summary) -> Markup {
     let any = |found: &dyn Fn(PictureSource) -> bool| subject.lines.iter().any(|line| found(line.source));
     html! {

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::film::Picture;
 use crate::finish::{Denoiser, Estimate, Quality};
 use crate::image::errors;
-use crate::peers::{Answer, Drivers, Peer, Rendering, Task};
+use crate::peers::{Drivers, Peer, Rendering, Reply, Task};
 use crate::render::{Method, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::Scene;
 
@@ -132,20 +132,20 @@ impl PeerRenders {
         summary: &mut PeerSummary,
     ) -> PeerResult {
         let task = Task { budget: turn.budget, seed };
-        let answer = match &self.driver {
+        let reply = match &self.driver {
             Driver::Refused(why) => {
                 summary.left_out = Some(why.clone());
                 return PeerResult::Nothing;
             }
             Driver::Ready(drivers) => drivers.render(&self.peers[turn.peer], task, &*self.stop),
         };
-        match answer {
-            Ok(Answer::Rendered(rendering)) => self.measure(*rendering, seed, reference, summary),
-            Ok(Answer::Cannot(why)) => {
-                summary.left_out = Some(format!("cannot say the scene: {}", why.join("; ")));
+        match reply {
+            Ok(Reply::Rendered(rendering)) => self.measure(*rendering, seed, reference, summary),
+            Ok(Reply::Unsupported(why)) => {
+                summary.left_out = Some(format!("cannot render the scene: {}", why.join("; ")));
                 PeerResult::Nothing
             }
-            Ok(Answer::Stopped) => PeerResult::Stopped,
+            Ok(Reply::Stopped) => PeerResult::Stopped,
             Err(error) => {
                 summary.left_out = Some(error.to_string());
                 PeerResult::Nothing

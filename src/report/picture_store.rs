@@ -1,4 +1,4 @@
-//! Pictures kept on disk while a race goes on: a gigabyte of them is nothing there, and much in memory.
+//! Pictures stored on disk during a comparison, because they can take gigabytes.
 
 use crate::error::{Error, Result};
 use crate::film::{Picture, Size};
@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A file without a name, gone with the process, full of pictures of one size.
+/// Pictures of one size in an unnamed temporary file, which disappears with the process.
 pub struct PictureStore {
     folder: PathBuf,
     file: File,
@@ -15,19 +15,19 @@ pub struct PictureStore {
 }
 
 impl PictureStore {
-    /// An empty one in a folder, for pictures of this size.
+    /// An empty store in a folder, for pictures of this size.
     ///
     /// # Errors
-    /// The file system.
+    /// The file cannot be created.
     pub fn new(folder: &Path, size: Size) -> Result<PictureStore> {
         let file = tempfile::tempfile_in(folder).map_err(|cause| Error::io(folder, &cause))?;
         Ok(PictureStore { folder: folder.into(), file, size, count: 0 })
     }
 
-    /// Keeps a picture; returns its number.
+    /// Stores a picture; returns its number.
     ///
     /// # Errors
-    /// The file system, as when the disk is full.
+    /// The picture cannot be written, for example because the disk is full.
     pub fn push(&mut self, picture: &Picture) -> Result<u64> {
         let bytes: Vec<u8> = picture.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         let number = self.count;
@@ -37,10 +37,10 @@ impl PictureStore {
         Ok(number)
     }
 
-    /// The picture of that number.
+    /// Reads the picture with a number.
     ///
     /// # Errors
-    /// The file system.
+    /// The file cannot be read.
     pub fn get(&mut self, number: u64) -> Result<Picture> {
         let mut bytes = vec![0; self.size.pixels() * 12];
         let read = self.seek(number).and_then(|()| self.file.read_exact(&mut bytes));

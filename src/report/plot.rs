@@ -1,4 +1,4 @@
-//! The plots: error against iterations and against seconds, both axes logarithmic, as SVG.
+//! Log-log plots of error against iterations or seconds, as SVG.
 
 use super::curve::{Axis, Curve, CurvePoint};
 use super::entry::{Metric, PictureSource};
@@ -9,30 +9,30 @@ use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// Width and height of a plot.
+/// Width and height of a plot in pixels.
 const SIZE: (u32, u32) = (860, 520);
-/// Room on the right for the runs' names.
-const NAMES: i32 = 190;
-/// Most ticks on an axis.
-const TICKS: usize = 12;
-/// Least distance of two names.
-const LINE: i32 = 17;
+/// Margin on the right for the names of the curves.
+const NAME_MARGIN: i32 = 190;
+/// Maximum number of ticks on an axis.
+const MAX_TICKS: usize = 12;
+/// Minimum vertical distance of two names.
+const NAME_SPACING: i32 = 17;
 const FONT: &str = "Helvetica, Arial, sans-serif";
 const INK: RGBColor = RGBColor(40, 40, 40);
 const GREY: RGBColor = RGBColor(150, 150, 150);
 const GUIDE: RGBColor = RGBColor(190, 190, 190);
 const FAINT: RGBColor = RGBColor(228, 228, 228);
 
-/// Colours that all eyes tell apart \[Okabe and Ito 2008\], without the yellow that no paper shows.
+/// Colours for readers with and without colour blindness \[Okabe and Ito 2008\], without the pale yellow.
 pub const COLOURS: [(u8, u8, u8); 7] =
     [(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (0, 0, 0)];
 
-/// The colour of a curve: an entry's or a peer's, whatever is made of its pictures.
+/// The colour of a curve. Curves of the same entry or peer share it.
 pub fn colour(subject: &Subject, line: usize) -> (u8, u8, u8) {
     COLOURS[number(subject, line) % COLOURS.len()]
 }
 
-/// The number of an entry, or of a peer after them.
+/// Index of the curve's entry, or of its peer counted after the entries.
 fn number(subject: &Subject, line: usize) -> usize {
     match subject.lines[line].source {
         PictureSource::Estimate(entry) | PictureSource::Finished(entry) => entry,
@@ -41,25 +41,25 @@ fn number(subject: &Subject, line: usize) -> usize {
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-/// A logarithmic axis whose ticks are chosen here.
+/// A logarithmic axis with explicit ticks.
 type Log = WithKeyPoints<LogCoord<f64>>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Log, Log>>;
 
-/// What is drawn.
-struct Picture<'a> {
+/// Contents of a plot.
+struct Plot<'a> {
     subject: &'a Subject,
     summary: &'a Summary,
     metric: Metric,
     axis: Axis,
-    /// What is reported, by line.
+    /// Reported points of each curve.
     curves: Vec<Vec<CurvePoint>>,
 }
 
-/// Error in a metric against an axis; `None` where no curve has a figure to show. Samples of other renderers are no
-/// iterations: against these there are ours alone.
+/// Plots the error in a metric against an axis; `None` if no curve has a point. Plots against iterations leave other
+/// renderers out, which count samples.
 ///
 /// # Errors
-/// None that memory would not have.
+/// None beyond lack of memory.
 pub fn svg(
     subject: &Subject,
     summary: &Summary,
@@ -74,12 +74,12 @@ pub fn svg(
     let curves: Vec<Vec<CurvePoint>> = curves.iter().enumerate().map(shown).collect();
     let Some((across, up)) = ranges(&curves, axis) else { return Ok(None) };
     let mut text = String::new();
-    let drawn = draw(&mut text, &Picture { subject, summary, metric, axis, curves }, (across, up));
+    let drawn = draw(&mut text, &Plot { subject, summary, metric, axis, curves }, (across, up));
     drawn.map_err(|cause| Error::new(ErrorKind::Image, "plot", cause))?;
     Ok(Some(text))
 }
 
-/// What both axes span.
+/// Ranges of both axes.
 fn ranges(curves: &[Vec<CurvePoint>], axis: Axis) -> Option<((f64, f64), (f64, f64))> {
     let span = |values: &dyn Fn(&CurvePoint) -> f64, room: f64| {
         let all = || curves.iter().flatten().map(values).filter(|v| *v > 0.0 && v.is_finite());
@@ -89,7 +89,7 @@ fn ranges(curves: &[Vec<CurvePoint>], axis: Axis) -> Option<((f64, f64), (f64, f
     Some((span(&|curve_point| axis.of(curve_point), 1.15)?, span(&|curve_point| curve_point.figure, 1.4)?))
 }
 
-/// A logarithmic axis with ticks at powers of ten, and at 2 and 5 times these where there is room.
+/// A logarithmic axis with ticks at powers of ten, and between them on short axes.
 fn log(low: f64, high: f64) -> Log {
     let decades = (high / low).log10();
     let digits: &[f64] = match decades {
@@ -98,7 +98,7 @@ fn log(low: f64, high: f64) -> Log {
         _ => &[1.0],
     };
     let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
-    let every = (decades / TICKS as f64).ceil().max(1.0) as i32;
+    let every = (decades / MAX_TICKS as f64).ceil().max(1.0) as i32;
     let ticks = powers.filter(|power| power.rem_euclid(every) == 0);
     let ticks = ticks.flat_map(|power| digits.iter().map(move |digit| digit * 10f64.powi(power)));
     let ticks = ticks.filter(|tick| (low..=high).contains(tick)).collect();
@@ -107,56 +107,56 @@ fn log(low: f64, high: f64) -> Log {
 
 fn draw(
     text: &mut String,
-    picture: &Picture<'_>,
+    plot: &Plot<'_>,
     ((left, right), (low, high)): ((f64, f64), (f64, f64)),
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let root: Area<'_> = SVGBackend::with_string(text, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&root)
         .margin(12)
-        .margin_right(NAMES)
+        .margin_right(NAME_MARGIN)
         .x_label_area_size(46)
         .y_label_area_size(74)
         .build_cartesian_2d(log(left, right), log(low, high))?;
     chart
         .configure_mesh()
-        .x_desc(match picture.axis {
+        .x_desc(match plot.axis {
             Axis::Iterations => "iterations",
             Axis::Seconds => "seconds (wall clock)",
             Axis::CoreSeconds => "core-seconds",
         })
-        .y_desc(picture.metric.name())
+        .y_desc(plot.metric.name())
         .x_label_formatter(&|x| minus(&plain(*x)))
         .y_label_formatter(&|y| minus(&plain(*y)))
-        .x_labels(TICKS)
-        .y_labels(TICKS)
+        .x_labels(MAX_TICKS)
+        .y_labels(MAX_TICKS)
         .axis_style(GREY)
         .bold_line_style(FAINT)
         .light_line_style(WHITE)
         .label_style((FONT, 15).into_font().color(&INK))
         .axis_desc_style((FONT, 16).into_font().color(&INK))
         .draw()?;
-    floor(&mut chart, picture, (left, right), low)?;
-    guides(&mut chart, picture)?;
-    for line in 0..picture.curves.len() {
-        series(&mut chart, picture, line)?;
+    floor(&mut chart, plot, (left, right), low)?;
+    guides(&mut chart, plot)?;
+    for line in 0..plot.curves.len() {
+        series(&mut chart, plot, line)?;
     }
-    names(&root, &chart, picture)?;
+    names(&root, &chart, plot)?;
     root.present()?;
     Ok(())
 }
 
-/// A curve's line, markers and, with several seeds, bars of one standard error. Finished and denoised pictures have
-/// dashes and hollow markers; measurements that fireflies rule are crossed out.
+/// Draws a curve with markers and, with several seeds, bars of one standard error. Curves of finished and denoised
+/// pictures are dashed with hollow markers; points that fireflies dominate are crossed out.
 fn series(
     chart: &mut Chart<'_, '_>,
-    picture: &Picture<'_>,
+    plot: &Plot<'_>,
     line: usize,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let (r, g, b) = colour(picture.subject, line);
-    let (ink, of, curve) = (RGBColor(r, g, b), picture.subject.lines[line].source, &picture.curves[line]);
+    let (r, g, b) = colour(plot.subject, line);
+    let (ink, of, curve) = (RGBColor(r, g, b), plot.subject.lines[line].source, &plot.curves[line]);
     let points: Vec<(f64, f64)> =
-        curve.iter().map(|curve_point| (picture.axis.of(curve_point), curve_point.figure)).collect();
+        curve.iter().map(|curve_point| (plot.axis.of(curve_point), curve_point.figure)).collect();
     let thick = ink.stroke_width(2);
     match of.is_raw() {
         true => chart.draw_series(LineSeries::new(points.iter().copied(), thick)).map(drop)?,
@@ -164,13 +164,13 @@ fn series(
     }
     let bar = |curve_point: &CurvePoint| {
         let spread = curve_point.spread?;
-        let (x, low) = (picture.axis.of(curve_point), (curve_point.figure - spread).max(0.1 * curve_point.figure));
+        let (x, low) = (plot.axis.of(curve_point), (curve_point.figure - spread).max(0.1 * curve_point.figure));
         Some(PathElement::new(vec![(x, low), (x, curve_point.figure + spread)], ink.stroke_width(1)))
     };
     chart.draw_series(curve.iter().filter_map(bar))?;
     let fill = if of.is_raw() { ink.filled() } else { ink.stroke_width(1) };
-    // Beyond seven colours they come again, with other markers.
-    if number(picture.subject, line) < COLOURS.len() {
+    // After seven curves the colours repeat with another marker.
+    if number(plot.subject, line) < COLOURS.len() {
         chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, fill)))?;
     } else {
         chart.draw_series(points.iter().map(|&point| TriangleMarker::new(point, 5, fill)))?;
@@ -178,19 +178,19 @@ fn series(
     let ruled = curve
         .iter()
         .filter(|curve_point| curve_point.fireflies)
-        .map(|curve_point| (picture.axis.of(curve_point), curve_point.figure));
+        .map(|curve_point| (plot.axis.of(curve_point), curve_point.figure));
     chart.draw_series(ruled.map(|point| Cross::new(point, 6, INK.stroke_width(1))))?;
     Ok(())
 }
 
-/// The reference's own error, if that is near what is shown.
+/// Draws the reference's own error, if it lies within the plot.
 fn floor(
     chart: &mut Chart<'_, '_>,
-    picture: &Picture<'_>,
+    plot: &Plot<'_>,
     (left, right): (f64, f64),
     low: f64,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let Some(own) = picture.subject.reference.error.of(picture.metric).filter(|own| *own > low) else { return Ok(()) };
+    let Some(own) = plot.subject.reference.error.of(plot.metric).filter(|own| *own > low) else { return Ok(()) };
     let ends = [(left, own), (right, own)];
     chart.draw_series(LineSeries::new(ends, GREY.stroke_width(1)))?;
     let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Left, VPos::Bottom));
@@ -198,17 +198,17 @@ fn floor(
     Ok(())
 }
 
-/// How far below the data a line of theory runs.
+/// Factor by which a line of theory lies below the data.
 const BELOW: f64 = 0.7;
 
-/// Thin lines with the exponents of theory against iterations, each below the last decade of the first curve that it is
-/// about.
-fn guides(chart: &mut Chart<'_, '_>, picture: &Picture<'_>) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    if picture.axis != Axis::Iterations {
+/// Draws lines with the exponents of theory against iterations, each below the last decade of the first curve with that
+/// exponent.
+fn guides(chart: &mut Chart<'_, '_>, plot: &Plot<'_>) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    if plot.axis != Axis::Iterations {
         return Ok(());
     }
     let mut drawn: Vec<f64> = Vec::new();
-    for (theory, curve) in picture.summary.theories.iter().zip(&picture.curves) {
+    for (theory, curve) in plot.summary.theories.iter().zip(&plot.curves) {
         let Some(exponent) = theory.map(|theory| theory.exponent).filter(|exponent| *exponent < 0.0) else { continue };
         let Some(last) = curve.last().map(|curve_point| curve_point.iterations as f64) else { continue };
         let decade: Vec<&CurvePoint> =
@@ -218,7 +218,7 @@ fn guides(chart: &mut Chart<'_, '_>, picture: &Picture<'_>) -> std::result::Resu
             continue;
         }
         drawn.push(exponent);
-        // Below the lowest of the points, so that it crosses none.
+        // Below the lowest point relative to the slope, so that the line crosses no point.
         let height = |curve_point: &&CurvePoint| curve_point.figure / (curve_point.iterations as f64).powf(exponent);
         let lowest = BELOW * decade.iter().map(height).fold(f64::INFINITY, f64::min);
         let at = |x: f64| (x, lowest * x.powf(exponent));
@@ -239,44 +239,48 @@ fn nice(exponent: f64) -> String {
     format!("{exponent}")
 }
 
-/// Every curve's name beside the end of its line, moved apart where they would overlap.
+/// Writes the name of every curve beside its end, moved apart if names would overlap.
 fn names(
     root: &Area<'_>,
     chart: &Chart<'_, '_>,
-    picture: &Picture<'_>,
+    plot: &Plot<'_>,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let end = |(line, curve): (usize, &Vec<CurvePoint>)| {
         let curve_point = curve.last()?;
-        let (x, y) = chart.backend_coord(&(picture.axis.of(curve_point), curve_point.figure));
+        let (x, y) = chart.backend_coord(&(plot.axis.of(curve_point), curve_point.figure));
         Some((line, x, y))
     };
-    let mut ends: Vec<(usize, i32, i32)> = picture.curves.iter().enumerate().filter_map(end).collect();
+    let mut ends: Vec<(usize, i32, i32)> = plot.curves.iter().enumerate().filter_map(end).collect();
     ends.sort_by_key(|end| end.2);
     let mut places: Vec<i32> = ends.iter().map(|end| end.2).collect();
     for i in 1..places.len() {
-        places[i] = places[i].max(places[i - 1] + LINE);
+        places[i] = places[i].max(places[i - 1] + NAME_SPACING);
     }
     let limit = SIZE.1 as i32 - 60;
     for i in (0..places.len()).rev() {
-        let below = if i + 1 < places.len() { places[i + 1] - LINE } else { limit };
+        let below = if i + 1 < places.len() { places[i + 1] - NAME_SPACING } else { limit };
         places[i] = places[i].min(below);
     }
-    let margin = SIZE.0 as i32 - NAMES + 10;
+    let margin = SIZE.0 as i32 - NAME_MARGIN + 10;
     for ((line, x, y), place) in ends.into_iter().zip(places) {
-        let (r, g, b) = colour(picture.subject, line);
+        let (r, g, b) = colour(plot.subject, line);
         let ink = RGBColor(r, g, b);
         let leader = vec![(x + 5, y), (margin - 4, place)];
         root.draw(&PathElement::new(leader, ink.mix(0.35).stroke_width(1)))?;
         let style = (FONT, 15).into_font().color(&ink).pos(Pos::new(HPos::Left, VPos::Center));
-        root.draw(&Text::new(clip(&picture.subject.lines[line].name), (margin, place), style))?;
+        root.draw(&Text::new(clip(&plot.subject.lines[line].name), (margin, place), style))?;
     }
     Ok(())
 }
 
-/// A name that fits beside the plot; the page's tables have it whole.
+/// A name shortened to fit beside the plot; the tables of the page have the full name.
 fn clip(name: &str) -> String {
-    const MOST: usize = 25;
-    if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
+    const MAX_CHARS: usize = 25;
+    if name.chars().count() <= MAX_CHARS {
+        name.into()
+    } else {
+        name.chars().take(MAX_CHARS - 1).chain(['…']).collect()
+    }
 }
 
 #[cfg(test)]

@@ -1,40 +1,40 @@
-//! What is measured.
+//! Measurements and times of runs.
 
 use crate::image::Errors;
 use crate::render::{Phases, TimeSpent};
 
-/// A curve measured at a moment.
+/// A measurement: the error of one picture.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Which curve of [`Outcome::lines`](super::equal_time::Outcome), from 0.
+    /// Index of the curve in [`Outcome::lines`](super::equal_time::Outcome::lines).
     pub line: usize,
-    /// Its seed.
+    /// Seed of the run.
     pub seed: u64,
-    /// Iterations done; samples per pixel of other renderers.
+    /// Iterations done; samples per pixel for other renderers.
     pub iterations: u64,
     /// Light paths emitted.
     pub light_paths: u64,
-    /// Wall-clock seconds, the finish's included, were it to stop here.
+    /// Wall-clock seconds of a run that ends here, including the finish.
     pub seconds: f64,
-    /// Processor seconds, likewise.
+    /// Core-seconds of a run that ends here, including the finish.
     pub cpu_seconds: f64,
-    /// Wall-clock seconds of the finish and its layers, of finished pictures: the median of all its uses with this
-    /// seed, which do the same work; or of denoising another renderer's picture.
+    /// Wall-clock seconds of the finish, for finished pictures: the median over the run, because every finish does the
+    /// same work. For denoised pictures of other renderers, seconds of the denoiser.
     pub finish_seconds: Option<f64>,
-    /// Its error as measured against the reference, the reference's own included.
+    /// Error against the reference, including the reference's own error.
     pub errors: Errors,
-    /// The squared relative error that it estimates itself, of estimates.
+    /// Squared relative error that the render has estimated itself; for estimates that are not finished.
     pub estimate: Option<f64>,
-    /// Number of the picture among those that are kept.
+    /// Number of the picture in the store, if it is stored.
     pub picture: Option<u64>,
 }
 
-/// Where a run's time went.
+/// Times of a run at its end.
 #[derive(Clone, Debug)]
 pub struct RunEnd {
-    /// Which entry, from 0.
+    /// Index of the entry.
     pub run: usize,
-    /// Its seed.
+    /// Seed of the run.
     pub seed: u64,
     /// Iterations done.
     pub iterations: u64,
@@ -42,6 +42,6 @@ pub struct RunEnd {
     pub spent: TimeSpent,
     /// Core-seconds by phase.
     pub phases: Phases,
-    /// Time of the finish: the median of its uses.
+    /// Median time of the finish.
     pub finish: Option<TimeSpent>,
 }

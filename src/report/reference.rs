@@ -1,9 +1,8 @@
-//! The picture that all others are judged by, and how wrong it is itself.
+//! The reference picture and an estimate of its own error.
 //!
-//! A reference made here is the mean `(a + b) / 2` of two independent halves of as many iterations each. If a half has
-//! the variance `v`, the mean has `v / 2`, and `(a - b)^2` expects `2 v`: a quarter of the halves' squared difference
-//! estimates the squared error of the mean. What both halves have in common, the bias of a method that has some, does
-//! not show in it.
+//! A reference rendered here is the mean `(a + b) / 2` of two independent halves with equal numbers of iterations. If a half
+//! has the variance `v`, the mean has `v / 2`, and the expectation of `(a - b)^2` is `2 v`: a quarter of the squared
+//! difference of the halves estimates the squared error of the mean. Bias that both halves share does not show.
 
 use super::entry::Metric;
 use crate::camera::Camera;
@@ -16,19 +15,19 @@ use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A reference's own error, as [`Errors`] measures it.
+/// A reference's own error, in the metrics of [`Errors`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnError {
     /// Mean relative squared error.
     pub relmse: Option<f64>,
-    /// The same without the worst 0.5 % of pixels.
+    /// Mean relative squared error without the worst 0.5 % of the pixels.
     pub relmse_trimmed: Option<f64>,
     /// Mean squared error.
     pub mse: Option<f64>,
 }
 
 impl OwnError {
-    /// In a metric; `None` if it is not known.
+    /// The error in a metric; `None` if it is unknown.
     pub fn of(&self, metric: Metric) -> Option<f64> {
         match metric {
             Metric::RelMse => self.relmse,
@@ -37,45 +36,46 @@ impl OwnError {
         }
     }
 
-    /// An error in one metric.
+    /// An error that is known in one metric only.
     pub fn in_metric(metric: Metric, error: f64) -> OwnError {
         let of = |other: Metric| (metric == other).then_some(error);
         let [relmse, relmse_trimmed, mse] = [Metric::RelMse, Metric::RelMseTrimmed, Metric::Mse].map(of);
         OwnError { relmse, relmse_trimmed, mse }
     }
 
-    /// As data.
+    /// The error as JSON.
     pub fn object(&self) -> Value {
         json!({"relmse": self.relmse, "relmse_trimmed": self.relmse_trimmed, "mse": self.mse})
     }
 }
 
-/// The reference.
+/// A reference picture.
 #[derive(Clone, Debug)]
 pub struct Reference {
     /// The picture.
     pub picture: Picture,
     /// Its own error.
     pub error: OwnError,
-    /// Where it is from, for people.
+    /// Its origin, in words.
     pub about: String,
 }
 
 impl Reference {
-    /// A picture's error without the reference's own, in a metric; `None` where too little is left: no figure below the
-    /// reference's own error is reported.
+    /// The error of a picture in a metric after subtraction of the reference's own error; `None` if the difference does not
+    /// exceed the reference's own error.
     ///
-    /// Errors of the picture and of the reference are independent, so their squares add in what is measured.
+    /// The errors of picture and reference are independent, so that the measured squared error is the sum of theirs.
     pub fn figure(&self, metric: Metric, errors: &Errors) -> Option<f64> {
         let own = self.error.of(metric).unwrap_or(0.0);
         let figure = metric.of(errors) - own;
         (figure > own && figure > 0.0).then_some(figure)
     }
 
-    /// Reads one, with the error that its header tells, if it is ours. Also returns the header's object.
+    /// Reads a reference, and its own error from the header if caustique has written the file. Also returns the header's
+    /// JSON object.
     ///
     /// # Errors
-    /// A file that cannot be read, without a picture, or of another size.
+    /// The file cannot be read, has no picture, or has another size.
     pub fn read(path: &Path, size: (u32, u32)) -> Result<(Reference, Value)> {
         let (set, attributes) = exr::read(path)?;
         let header = attributes.object().unwrap_or(Value::Null);
@@ -83,10 +83,10 @@ impl Reference {
         Ok((reference, header))
     }
 
-    /// A picture, with the error that its header's object tells. `about` says where it is from.
+    /// The reference in a layer set, with its own error from the `header`'s JSON object. `about` is its origin, in words.
     ///
     /// # Errors
-    /// A set without a picture, or of another size.
+    /// The set has no picture or another size.
     pub fn of(set: &LayerSet, header: &Value, size: (u32, u32), about: String) -> Result<Reference> {
         let Size { width, height } = size.into();
         if (set.width, set.height) != (width, height) {
@@ -98,13 +98,13 @@ impl Reference {
         if !picture.iter().flatten().any(|v| v.is_finite()) {
             return Err(Error::new(ErrorKind::Image, about, "the reference has no finite value"));
         }
-        Ok(Reference { picture, error: told(header), about })
+        Ok(Reference { picture, error: stated_error(header), about })
     }
 
-    /// Writes it as a beauty with its estimated standard error, and its own error in the header.
+    /// Writes the reference as an EXR with its estimated standard error, and its own error in the header.
     ///
     /// # Errors
-    /// The file system.
+    /// The file cannot be written.
     pub fn write(&self, path: &Path, halves: &Halves) -> Result<()> {
         let mut set = LayerSet::new(self.picture.size().width, self.picture.size().height);
         set.push(Layer::interleaved("", "RGB", self.picture.iter().copied()))?;
@@ -122,8 +122,8 @@ impl Reference {
     }
 }
 
-/// The error that a header of ours tells: as a reference, or as a render that was not finished and estimates itself.
-fn told(header: &Value) -> OwnError {
+/// The error that a header states: that of a reference, or the estimated error of a render that was not finished.
+fn stated_error(header: &Value) -> OwnError {
     let own = &header["reference_error"];
     if own.is_object() {
         let [relmse, relmse_trimmed, mse] = ["relmse", "relmse_trimmed", "mse"].map(|key| own[key].as_f64());
@@ -133,15 +133,15 @@ fn told(header: &Value) -> OwnError {
     OwnError { relmse: estimate.map(|error| error * error), ..OwnError::default() }
 }
 
-/// Two independent renders of as many iterations.
+/// Two independent renders with equal numbers of iterations.
 pub struct Halves {
-    /// One.
+    /// The first render.
     pub a: Picture,
-    /// The other.
+    /// The second render.
     pub b: Picture,
-    /// Their method.
+    /// Method of both.
     pub method: &'static str,
-    /// Their seeds.
+    /// Seed of each.
     pub seeds: [u64; 2],
     /// Iterations of each.
     pub iterations: u64,
@@ -150,15 +150,15 @@ pub struct Halves {
 }
 
 impl Halves {
-    /// Renders both in turns until `settings` say stop, iterations counting for each and time for both together; at
-    /// least two iterations. `observe` gets iterations of each and seconds, and may stop it.
+    /// Renders both in turns for the iterations (of each) or the time (of both together) in `settings`, at least two
+    /// iterations. `observe` receives the iterations of each and the seconds of both, and can stop the render.
     pub fn render(
         scene: &Scene,
         camera: &Camera,
         settings: &Settings,
         mut observe: impl FnMut(u64, f64) -> Control,
     ) -> Halves {
-        // Numbers that nobody gives to a render.
+        // Seeds that no user is likely to choose.
         let seeds = [0, 1].map(|half| settings.seed ^ (0x8000_cafe_0000_0000 + half));
         let stages = seeds.map(|seed| RenderInput::new(scene, camera, &Settings { seed, ..settings.clone() }));
         let [mut a, mut b] = [0, 1].map(|half| Session::new(&stages[half]));
@@ -182,7 +182,7 @@ impl Halves {
         }
     }
 
-    /// Their mean, and its error.
+    /// The mean of both renders as a reference, with its own error.
     pub fn reference(&self) -> Reference {
         let about = format!(
             "Two independent halves by {}, {} iterations each, {:.0} s in all",
@@ -207,8 +207,8 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Pictures of known truth and noise: the stated error is that against the truth. Over 20000 pixels its standard
-    /// error is below one percent; the halves' difference itself would be four times as much, half of it twice.
+    /// For pictures with known truth and noise the stated error equals the error against the truth. Over 20000 pixels its
+    /// standard error is below one percent; the squared difference of the halves would be four times as large.
     #[test]
     fn the_stated_error_of_two_halves_is_their_means_error() {
         let size = Size { width: 200, height: 100 };
@@ -231,7 +231,7 @@ mod tests {
         assert!((stated.relmse.expect("known") / real.relmse - 1.0).abs() < 0.04, "{stated:?}, {real:?}");
         let trimmed = stated.relmse_trimmed.expect("known");
         assert!((trimmed / real.relmse_trimmed - 1.0).abs() < 0.04, "{stated:?}, {real:?}");
-        // Against this reference an independent picture's figure is its true error.
+        // The figure of an independent picture against this reference is its true error.
         let other = noisy(3);
         let measured = errors(&other, &reference.picture).expect("finite pixels");
         let figure = reference.figure(Metric::Mse, &measured).expect("twice the reference's error");

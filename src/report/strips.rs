@@ -1,4 +1,4 @@
-//! Crops of all curves beside each other.
+//! Crops of all curves side by side, at equal time and at equal error.
 
 use super::crop::{self, Look, Window};
 use super::curve::Curve;
@@ -10,34 +10,34 @@ use super::reference::Reference;
 use crate::error::Result;
 use crate::film::Picture;
 
-/// A picture of the report as PNG, with what stands below it.
-pub struct Shown {
-    /// The run's name, or the reference's.
+/// Crops of one picture, with a caption.
+pub struct Crops {
+    /// Name of the curve, or of the reference.
     pub name: String,
     /// Iterations, seconds, error; empty for the reference.
     pub caption: String,
-    /// A PNG per window.
+    /// One PNG for each window.
     pub pictures: Vec<Vec<u8>>,
-    /// A heat map per window; none for the reference.
+    /// One heat map for each window; empty for the reference.
     pub heat_maps: Vec<Vec<u8>>,
 }
 
-/// Crops of all runs at moments that have something in common.
+/// Crops of all curves at equal time or at equal error.
 pub struct Strip {
-    /// What it is.
+    /// Heading.
     pub title: String,
-    /// The runs.
-    pub runs: Vec<Shown>,
-    /// The relative error that is palest in the heat maps.
+    /// Crops of each curve.
+    pub runs: Vec<Crops>,
+    /// The relative error with the palest colour in the heat maps.
     pub largest: f64,
 }
 
-/// The points of a curve whose pictures are kept.
-fn kept(points: &[Point], line: usize) -> impl Iterator<Item = &Point> {
+/// The measurements of a curve whose pictures are stored.
+fn stored(points: &[Point], line: usize) -> impl Iterator<Item = &Point> {
     points.iter().filter(move |point| point.line == line && point.picture.is_some())
 }
 
-/// Where runs are beside each other: at about the same time, and at about the same error.
+/// The measurement of each curve that is nearest to a common time, and to a common error.
 struct Alignment {
     time: f64,
     error: f64,
@@ -48,13 +48,13 @@ struct Alignment {
 impl Alignment {
     fn of(runs: usize, outcome: &Outcome, metric: Metric) -> Alignment {
         let raw = |point: &Point| metric.of(&point.errors);
-        // The time that all runs have.
-        let last = |run: usize| kept(&outcome.points, run).last();
+        // The time that all curves reach.
+        let last = |run: usize| stored(&outcome.points, run).last();
         let ends: Vec<&Point> = (0..runs).filter_map(last).collect();
         let time = ends.iter().map(|p| p.seconds).fold(f64::INFINITY, f64::min);
-        // PictureSource the errors that runs end with the one that most runs pass, and of several the smallest.
+        // The final error that most curves cross; among equals the smallest.
         let passes = |error: f64, run: usize| {
-            let errors = || kept(&outcome.points, run).map(raw);
+            let errors = || stored(&outcome.points, run).map(raw);
             errors().any(|e| e >= error) && errors().any(|e| e <= error)
         };
         let count = |error: f64| (0..runs).filter(|&run| passes(error, run)).count();
@@ -62,7 +62,7 @@ impl Alignment {
         finals.sort_by(f64::total_cmp);
         let error = finals.iter().rev().copied().max_by_key(|&error| count(error)).unwrap_or(0.0);
         let nearest = |distance: &dyn Fn(&Point) -> f64| -> Vec<Point> {
-            let of_run = |run| kept(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
+            let of_run = |run| stored(&outcome.points, run).min_by(|a, b| distance(a).total_cmp(&distance(b))).cloned();
             (0..runs).filter_map(of_run).collect()
         };
         let at_time = nearest(&|p| (p.seconds / time).ln().abs());
@@ -71,16 +71,17 @@ impl Alignment {
     }
 }
 
-/// The windows, the reference, and the crops. `wanted`: windows that are asked for; where curves differ most otherwise.
+/// The windows, the crops of the reference, and the crops of the curves. The windows are `wanted`, or if that is empty
+/// those in which the curves differ most.
 ///
 /// # Errors
-/// Pictures that cannot be read again.
+/// A stored picture cannot be read.
 pub(super) fn pictures(
     (metric, reference): (Metric, &Reference),
     outcome: &mut Outcome,
     (wanted, look): (&[Window], Look),
     curves: &[Curve],
-) -> Result<(Vec<Window>, Shown, Vec<Strip>)> {
+) -> Result<(Vec<Window>, Crops, Vec<Strip>)> {
     let lines = outcome.lines.clone();
     let Alignment { time, error, at_time, at_error } = Alignment::of(lines.len(), outcome, metric);
     let mut load = |points: &[Point]| -> Result<Vec<Picture>> {
@@ -93,7 +94,7 @@ pub(super) fn pictures(
     }
     let strip = |title: String, points: &[Point], pictures: &[Picture]| -> Result<Strip> {
         let largest = crop::scale(pictures, &reference.picture, &windows);
-        let shown = |(point, picture): (&Point, &Picture)| -> Result<Shown> {
+        let shown = |(point, picture): (&Point, &Picture)| -> Result<Crops> {
             let curve_point = curves[point.line].by_seed.first().and_then(|curve| {
                 curve.iter().find(|curve_point| curve_point.iterations == point.iterations && curve_point.reported)
             });
@@ -106,7 +107,7 @@ pub(super) fn pictures(
                 true => iterations(point.iterations),
                 false => format!("{} samples a pixel", point.iterations),
             };
-            Ok(Shown {
+            Ok(Crops {
                 name: line.name.clone(),
                 caption: format!("{count}, {seconds} s, {figure}"),
                 pictures: windows.iter().map(|w| crop::picture(picture, *w, look)).collect::<Result<_>>()?,
@@ -127,7 +128,7 @@ pub(super) fn pictures(
     }
     let mut parts = vec![Window::whole(reference.picture.size())];
     parts.extend(&windows);
-    let truth = Shown {
+    let truth = Crops {
         name: "reference".into(),
         caption: String::new(),
         pictures: parts.into_iter().map(|part| crop::picture(&reference.picture, part, look)).collect::<Result<_>>()?,

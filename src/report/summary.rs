@@ -1,4 +1,4 @@
-//! A race with all that is told from it: what [`data`](super::data), [`plot`](super::plot) and [`page`](super::page)
+//! Evaluation of a comparison, which [`data`](super::data), [`plot`](super::plot) and [`page`](super::page)
 //! write down.
 
 use super::crop::{Look, Window};
@@ -16,48 +16,48 @@ use crate::error;
 use crate::peers::Peer;
 use serde_json::Value;
 
-pub use super::strips::{Shown, Strip};
+pub use super::strips::{Crops, Strip};
 
-/// What was compared and how.
+/// The subject of a report: the compared runs and the conditions.
 pub struct Subject {
-    /// The scene's name for people.
+    /// Name of the scene in the report.
     pub scene: String,
-    /// Size of the picture.
+    /// Width and height of the picture.
     pub size: (u32, u32),
-    /// Ours.
+    /// Entries of caustique.
     pub entries: Vec<Entry>,
     /// Other renderers.
     pub peers: Vec<Peer>,
     /// The curves.
     pub lines: Vec<Line>,
-    /// Seeds, moments, ends.
+    /// Seeds, moments and end of the runs.
     pub rules: Rules,
-    /// The figure of curves, targets and fits.
+    /// Metric of curves, targets and fits.
     pub metric: Metric,
     /// The reference.
     pub reference: Reference,
-    /// Processor, threads, versions: names and values.
+    /// Names and values of facts about the machine: processor, threads, versions.
     pub machine: Vec<(String, String)>,
-    /// Options that concern all runs.
+    /// Names and values of options that hold for all runs.
     pub settings: Vec<(String, String)>,
 }
 
-/// How a peer's picture compares with the reference as a whole.
+/// Mean of a peer's picture relative to the reference, which shows whether the scene is the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanRatio {
-    /// The mean of its longest renders over the reference's.
+    /// Mean of the peer's longest renders over the mean of the reference.
     pub ratio: f64,
-    /// Its standard error, taking errors of pixels for independent.
+    /// Standard error of the ratio, if the errors of pixels are independent.
     pub error: f64,
 }
 
-/// A ratio of means that is so near to one is of the same scene.
-const SAME: f64 = 0.01;
+/// Largest deviation of the ratio from 1, without noise, for the same scene.
+const MAX_DEVIATION: f64 = 0.01;
 
 impl MeanRatio {
-    /// Whether it is one within a hundredth and twice the noise.
+    /// Whether the ratio is 1 within [`MAX_DEVIATION`] and two standard errors.
     pub fn is_same(&self) -> bool {
-        (self.ratio - 1.0).abs() <= SAME + 2.0 * self.error
+        (self.ratio - 1.0).abs() <= MAX_DEVIATION + 2.0 * self.error
     }
 }
 
@@ -65,56 +65,56 @@ impl MeanRatio {
 pub struct MetricCurves {
     /// The metric.
     pub metric: Metric,
-    /// A curve per line.
+    /// One curve for each line.
     pub curves: Vec<Curve>,
 }
 
-/// Everything that is told.
+/// Evaluation of a comparison.
 pub struct Summary {
-    /// A curve per line.
+    /// One curve for each line.
     pub curves: Vec<Curve>,
-    /// The same in the metric beside: trimmed, or of all pixels where the report's is trimmed itself.
+    /// Curves in a second metric: trimmed relMSE, or relMSE if the report's metric is the trimmed one.
     pub beside: MetricCurves,
-    /// Fitted exponents per line, by iterations and by seconds.
+    /// Fitted exponents of each line, in iterations and in seconds.
     pub slopes: Vec<[Result<Slope, FitFailure>; 2]>,
-    /// What theory says, per line.
+    /// Exponent by theory of each line.
     pub theories: Vec<Option<Theory>>,
     /// Errors to reach.
     pub targets: Vec<Target>,
-    /// Per target and line.
+    /// When each target is reached by each line.
     pub reached: Vec<Vec<Reached>>,
-    /// Per peer, of those that have made a picture.
+    /// Mean ratio of each peer that has rendered a picture.
     pub mean_ratios: Vec<Option<MeanRatio>>,
-    /// Per entry.
+    /// Overhead of each entry.
     pub overhead: Vec<Option<Overhead>>,
-    /// Parts of the picture that are shown.
+    /// Windows of the crops.
     pub windows: Vec<Window>,
-    /// The reference, whole and in parts.
-    pub reference: Shown,
+    /// The whole reference and its crops.
+    pub reference: Crops,
     /// Crops at equal time and at equal error.
     pub strips: Vec<Strip>,
     /// Remarks.
     pub notes: Vec<String>,
 }
 
-/// What decides about the report, besides the race.
+/// Options of the report.
 pub struct ReportOptions {
-    /// Targets that were asked for; the usual ones otherwise.
+    /// Target errors; if there are none, [`target::default_targets`].
     pub targets: Vec<f64>,
-    /// More targets: the error of an entry's estimate (from 0) after so many iterations.
+    /// Additional targets: the error of an entry's estimate after some iterations, as (index of the entry, iterations).
     pub targets_of: Vec<(usize, u64)>,
-    /// Windows to show; where runs differ most otherwise.
+    /// Windows of the crops; if there are none, those in which the curves differ most.
     pub windows: Vec<Window>,
     /// Exposure and tone curve.
     pub look: Look,
-    /// Remarks from outside.
+    /// Additional remarks.
     pub notes: Vec<String>,
 }
 
-/// Tells everything from a race.
+/// Evaluates a comparison.
 ///
 /// # Errors
-/// Pictures that cannot be read again.
+/// A stored picture cannot be read.
 pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptions) -> error::Result<Summary> {
     let Subject { entries, lines, metric, reference, .. } = subject;
     let own = reference.error.of(*metric).unwrap_or(0.0);
@@ -140,7 +140,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
         }
     }
     if targets.is_empty() {
-        targets = target::usual(&curves, own);
+        targets = target::default_targets(&curves, own);
     }
     let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error)).collect()).collect();
     let left_out = outcome.points.iter().filter(|p| reference.figure(*metric, &p.errors).is_none()).count();
@@ -167,7 +167,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
     Ok(Summary {
         slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.source, curve)).collect(),
         theories: lines.iter().map(|line| theory_of(line.source, entries)).collect(),
-        mean_ratios: (0..subject.peers.len()).map(|peer| mean_ratios(peer, subject, outcome)).collect(),
+        mean_ratios: (0..subject.peers.len()).map(|peer| mean_ratio(peer, subject, outcome)).collect(),
         curves,
         beside,
         targets,
@@ -186,7 +186,7 @@ fn slopes(of: PictureSource, curve: &Curve) -> [Result<Slope, FitFailure>; 2] {
         .map(|axis| if of.is_raw() { curve.slope(axis) } else { Err(FitFailure::Denoised) })
 }
 
-/// What theory says of a curve.
+/// Exponent by theory of a curve.
 fn theory_of(of: PictureSource, entries: &[Entry]) -> Option<Theory> {
     match of {
         PictureSource::Estimate(entry) => theory(&entries[entry].settings),
@@ -194,8 +194,8 @@ fn theory_of(of: PictureSource, entries: &[Entry]) -> Option<Theory> {
     }
 }
 
-/// A peer's mean over the reference's: of its longest render with every seed.
-fn mean_ratios(peer: usize, subject: &Subject, outcome: &Outcome) -> Option<MeanRatio> {
+/// Mean ratio of a peer, over its longest render with every seed.
+fn mean_ratio(peer: usize, subject: &Subject, outcome: &Outcome) -> Option<MeanRatio> {
     let Subject { lines, reference, rules, .. } = subject;
     let line = lines.iter().position(|line| line.source == PictureSource::Peer(peer))?;
     let last = |seed: &u64| outcome.points.iter().rfind(|point| point.line == line && point.seed == *seed);
@@ -210,12 +210,12 @@ fn mean_ratios(peer: usize, subject: &Subject, outcome: &Outcome) -> Option<Mean
     Some(MeanRatio { ratio: ratios.iter().sum::<f64>() / n, error })
 }
 
-/// The run of a name.
+/// Index of the entry with a name.
 pub fn find(entries: &[Entry], name: &str) -> Option<usize> {
     entries.iter().position(|entry| entry.name == name)
 }
 
-/// A value that JSON can hold.
+/// A number as JSON; `null` if it is not finite.
 pub(super) fn finite(x: f64) -> Value {
     if x.is_finite() { x.into() } else { Value::Null }
 }

@@ -1,4 +1,4 @@
-//! The tables of the page.
+//! Tables of the page.
 
 use super::curve::Mean;
 use super::entry::PictureSource;
@@ -10,7 +10,7 @@ use super::summary::{MeanRatio, Subject, Summary};
 use super::target::Reached;
 use maud::{Markup, html};
 
-/// A curve's name beside its colour.
+/// Name and colour of a curve.
 fn name(subject: &Subject, line: usize) -> Markup {
     let ((r, g, b), of) = (colour(subject, line), &subject.lines[line]);
     let style = match of.source.is_raw() {
@@ -20,12 +20,12 @@ fn name(subject: &Subject, line: usize) -> Markup {
     html! { span.dot style=(style) {} (of.name) }
 }
 
-/// The name of what an entry leaves, or a peer.
+/// Name and colour of the curve with a source.
 fn name_of(subject: &Subject, of: PictureSource) -> Markup {
     subject.lines.iter().position(|line| line.source == of).map_or_else(|| html! {}, |line| name(subject, line))
 }
 
-/// Times to given errors.
+/// Times to target errors.
 pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
     if summary.targets.is_empty() {
         return html! {};
@@ -47,11 +47,11 @@ pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
                 } }
             } }
             @if let Some(own) = subject.reference.error.of(subject.metric) {
-                p { "The limit: the reference's own error is " (subject.metric.name()) " " (short(own)) ". Nothing \
-                    at or below it can be told." }
+                p { "The limit: the reference's own error is " (subject.metric.name()) " " (short(own)) ". Errors \
+                    at or below it cannot be measured." }
             }
-            p.note { "From where on the error stays at or below the target; between two measurements it is taken for \
-                a power of iterations and of seconds. "
+            p.note { "The time after which the error stays at or below the target; between two measurements it is \
+                interpolated as a power of iterations and of seconds. "
                 "“Relative” is the time over that of the first run listed that gets there. “≤”: the first \
                     measurement was below the target already."
                 @if subject.rules.seeds.len() > 1 { " Standard errors are the jackknife's over seeds." } }
@@ -59,7 +59,7 @@ pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
-/// Seconds of the first run that reaches a target, in the order of the list.
+/// Seconds of the first listed run that reaches a target.
 fn base(reached: &[Reached]) -> Option<f64> {
     reached.iter().find_map(|reached| match reached {
         Reached::After { seconds, at_once: false, .. } => Some(seconds.value),
@@ -88,7 +88,7 @@ fn answer(reached: &Reached, base: Option<f64>) -> Markup {
     }
 }
 
-/// Iterations, interpolated: whole where that says enough.
+/// Interpolated iterations: with one decimal below 10, else rounded.
 fn whole(n: f64) -> String {
     if n < 10.0 { format!("{n:.1}") } else { format!("{n:.0}") }
 }
@@ -140,7 +140,7 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
-/// Other renderers: whether their picture is of the same scene, what they took, and why some are missing.
+/// Other renderers: whether the scene is the same, startup times, approximations, and why some are left out.
 pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Markup {
     if subject.peers.is_empty() {
         return html! {};
@@ -152,7 +152,7 @@ pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> 
             div.wide { table {
                 thead { tr { th { "Renderer" } th { "Version" } th.number { "mean" br; small { "over the reference's" } }
                     th { "Same scene" }
-                    th.number { "starting up" br; small { "s, not counted" } } th { "What is another there" } } }
+                    th.number { "starting up" br; small { "s, not counted" } } th { "Approximations" } } }
                 tbody { @for (peer, account) in outcome.peers.iter().enumerate() { tr {
                     td { (name_of(subject, PictureSource::Peer(peer))) }
                     td { (if account.version.is_empty() { "–" } else { &account.version }) }
@@ -189,7 +189,7 @@ fn verdict(of: &MeanRatio) -> String {
     }
 }
 
-/// What an iteration costs.
+/// Cost of an iteration by phase.
 pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
     let cell = |row: &Option<Overhead>, get: &dyn Fn(&Overhead) -> Option<f64>| {
         row.as_ref().and_then(get).map_or("–".into(), short)
@@ -197,7 +197,7 @@ pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
     let percent = |ratio: f64| minus(&format!("{:+.1} %", 100.0 * (ratio - 1.0)));
     html! {
         section {
-            h2 { "What it costs" }
+            h2 { "Cost" }
             div.wide { table {
                 thead { tr { th { "Run" } th.number { "iterations" } th.number { "render" br; small { "s" } }
                     th.number { "finish" br; small { "s, once" } }
@@ -228,7 +228,7 @@ pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
-/// What the runs are.
+/// Settings of the runs.
 pub(super) fn runs(subject: &Subject) -> Markup {
     html! {
         section {

@@ -1,20 +1,20 @@
-//! Time to target: iterations and seconds until a run's error has fallen to a given one, as Table 1 of \[CPPM 2020\].
+//! Time to target: iterations and seconds until the error of a run has fallen to a target, as Table 1 of \[CPPM 2020\].
 
-use super::curve::{Curve, CurvePoint, Mean, between};
+use super::curve::{Curve, CurvePoint, Mean, interpolate};
 
-/// An error to reach, and why this one.
+/// A target error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// The error, in the report's metric.
     pub error: f64,
-    /// Where it is from, such as `sppm after 1000 iterations`; empty for a number that was given.
+    /// Origin of the target, such as `sppm after 1000 iterations`; empty for a given number.
     pub of: String,
 }
 
-/// When a run reaches a target.
+/// Result of a run for a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reached {
-    /// Means over seeds.
+    /// The target is reached; means over seeds.
     After {
         /// Iterations, interpolated.
         iterations: Mean,
@@ -22,20 +22,20 @@ pub enum Reached {
         seconds: Mean,
         /// Core-seconds, interpolated.
         core_seconds: Mean,
-        /// Whether the first measurement was below already, so that these are upper bounds.
+        /// Whether the first measurement was already below the target, so that the numbers are upper bounds.
         at_once: bool,
     },
-    /// Not within the run, which ended after so many iterations and seconds.
+    /// The run ended before; its iterations and seconds.
     Never(u64, f64),
-    /// The reference is no better than the target.
+    /// The target is not above the reference's own error.
     BelowReference,
     /// Nothing was measured.
     Unknown,
 }
 
-/// From where on a curve stays at or below `target`: iterations, seconds, core-seconds, and whether it always was.
-/// Between two moments the error is a power of each.
-pub fn fall(curve: &Curve, target: f64) -> Option<([f64; 3], bool)> {
+/// Iterations, seconds and core-seconds from which on a curve stays at or below `target`, and whether it was always there.
+/// The error is interpolated as a power of each; `None` if the curve ends above the target.
+pub fn crossing(curve: &Curve, target: f64) -> Option<([f64; 3], bool)> {
     let place =
         |curve_point: &CurvePoint| [curve_point.iterations as f64, curve_point.seconds, curve_point.cpu_seconds];
     let curve_points = &curve.mean;
@@ -43,24 +43,23 @@ pub fn fall(curve: &Curve, target: f64) -> Option<([f64; 3], bool)> {
         return curve_points.first().map(|first| (place(first), true));
     };
     let (before, after) = (&curve_points[last_above], curve_points.get(last_above + 1)?);
-    // What is below the reference's own error is not known.
+    // Errors below the reference's own are unknown.
     let [high, low] = [before.figure, after.figure].map(|figure| figure.max(curve.own));
     let t = if low > 0.0 && high > low { (high / target).ln() / (high / low).ln() } else { 1.0 };
     let (before, after) = (place(before), place(after));
-    Some((std::array::from_fn(|i| between(before[i], after[i], t)), false))
+    Some((std::array::from_fn(|i| interpolate(before[i], after[i], t)), false))
 }
 
-/// When a run reaches a target: of the mean curve, with the jackknife's standard error, for which each seed is left out
-/// in turn.
+/// When a run reaches a target, by its mean curve, with the jackknife's standard error over seeds.
 pub fn reach(curve: &Curve, target: f64) -> Reached {
     if target <= curve.own {
         return Reached::BelowReference;
     }
-    let Some((place, at_once)) = fall(curve, target) else {
+    let Some((place, at_once)) = crossing(curve, target) else {
         return curve.last().map_or(Reached::Unknown, |end| Reached::Never(end.iterations, end.seconds));
     };
     let without: Vec<Curve> = curve.without_each_seed();
-    let others: Vec<[f64; 3]> = without.iter().filter_map(|curve| Some(fall(curve, target)?.0)).collect();
+    let others: Vec<[f64; 3]> = without.iter().filter_map(|curve| Some(crossing(curve, target)?.0)).collect();
     let jackknife = |i: usize| {
         let n = others.len() as f64;
         let mean = others.iter().map(|other| other[i]).sum::<f64>() / n;
@@ -71,9 +70,9 @@ pub fn reach(curve: &Curve, target: f64) -> Reached {
     Reached::After { iterations, seconds, core_seconds, at_once }
 }
 
-/// Targets where none are asked for: at most four errors of 1, 2, 5 times a power of ten, the smallest that two runs
-/// reach (one, if it is alone).
-pub fn usual(curves: &[Curve], own: f64) -> Vec<Target> {
+/// Default targets: at most four errors of 1, 2 or 5 times a power of ten, the smallest that two runs reach (or the only
+/// run).
+pub fn default_targets(curves: &[Curve], own: f64) -> Vec<Target> {
     let reported = |curve: &Curve| {
         curve.mean.iter().filter(|curve_point| curve_point.reported).map(|s| s.figure).collect::<Vec<_>>()
     };
@@ -108,21 +107,21 @@ mod tests {
     }
 
     #[test]
-    fn between_moments_the_error_is_a_power_of_time() {
+    fn the_error_is_interpolated_as_a_power_of_time() {
         // N^-1/2 and a tenth of a second an iteration.
         let curve = one(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (16, 1.6, 0.25)]);
-        let ([n, s, c], at_once) = fall(&curve, 1.0 / 3.0).expect("it is reached");
+        let ([n, s, c], at_once) = crossing(&curve, 1.0 / 3.0).expect("it is reached");
         assert!((n - 9.0).abs() < 1e-9 && (s - 0.9).abs() < 1e-9 && (c - 1.8).abs() < 1e-9 && !at_once, "{n} {s} {c}");
-        assert_eq!(fall(&curve, 2.0), Some(([1.0, 0.1, 0.2], true)));
-        assert_eq!(fall(&curve, 0.25).map(|f| f.0[0]), Some(16.0));
-        assert_eq!(fall(&curve, 0.2), None);
-        // A firefly takes it back: what counts is from where on the error stays.
+        assert_eq!(crossing(&curve, 2.0), Some(([1.0, 0.1, 0.2], true)));
+        assert_eq!(crossing(&curve, 0.25).map(|f| f.0[0]), Some(16.0));
+        assert_eq!(crossing(&curve, 0.2), None);
+        // After a firefly the error must fall again: the last crossing counts.
         let curve = one(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (8, 0.8, 2.0), (32, 3.2, 0.5)]);
-        assert_eq!(fall(&curve, 1.0), Some(([16.0, 1.6, 3.2], false)));
+        assert_eq!(crossing(&curve, 1.0), Some(([16.0, 1.6, 3.2], false)));
     }
 
     #[test]
-    fn answers_of_the_table() {
+    fn targets_have_the_right_results() {
         let of = |factor: f64| curve_points(&[(1, 0.1, factor), (4, 0.4, 0.5 * factor), (16, 1.6, 0.25 * factor)]);
         let two = |own: f64| Curve::from_seeds(vec![of(1.0), of(1.0)], own);
         assert_eq!(reach(&two(0.2), 0.1), Reached::BelowReference);
@@ -130,7 +129,7 @@ mod tests {
         let Reached::After { iterations, .. } = reach(&two(0.0), 0.5) else { panic!("it is reached") };
         assert_eq!(iterations, Mean { value: 4.0, error: Some(0.0) });
         assert_eq!(reach(&Curve::default(), 0.5), Reached::Unknown);
-        let targets: Vec<f64> = usual(&[two(0.0), two(0.0)], 0.0).iter().map(|t| t.error).collect();
+        let targets: Vec<f64> = default_targets(&[two(0.0), two(0.0)], 0.0).iter().map(|t| t.error).collect();
         assert_eq!(targets, [0.5]);
     }
 }

@@ -1,18 +1,18 @@
-//! How fast the squared error should fall with iterations.
+//! Convergence rates by theory.
 
 use crate::plan::Search;
 use crate::render::{BandwidthRule, Settings};
 
-/// An exponent of the squared error in the number of iterations, and why.
+/// Exponent of the squared error in the number of iterations, with its reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Theory {
-    /// In the limit of many iterations.
+    /// Exponent in the limit of many iterations.
     pub exponent: f64,
     /// The reason, in a clause.
     pub because: &'static str,
 }
 
-/// What theory says of a method; `None` where it says nothing in closed form.
+/// Exponent of a method; `None` if theory has no closed form.
 ///
 /// With squared bandwidths that shrink as i^(alpha - 1) the variance of the mean falls as N^-alpha and its squared bias
 /// as N^(2 alpha - 2) \[Knaus and Zwicker 2011\]; the slower of the two is the exponent, best at alpha = 2/3

@@ -88,7 +88,7 @@ fn peers_have_a_curve_or_a_row_with_a_reason() {
     let path = run("LuxCore path");
     assert_eq!((&path["version"], &path["startup_seconds"], &path["out"]), (&"9.9".into(), &1.5.into(), &Value::Null));
     assert_eq!((&path["approximations"][0], &path["same_scene"]), (&"red is blue".into(), &true.into()));
-    assert_eq!(run("LuxCore cache")["out"], "cannot say the scene: spots; fog");
+    assert_eq!(run("LuxCore cache")["out"], "cannot render the scene: spots; fog");
     let failed = run("LuxCore bidir")["out"].as_str().expect("it failed").to_string();
     assert!(failed.contains("it is broken") && failed.contains("exit status: 3"), "{failed}");
     assert_eq!(points("LuxCore cache").len() + points("LuxCore bidir").len(), 0);

@@ -350,5 +350,5 @@ fn compare_shows_errors_on_a_page() {
     let outcome = folder.run("compare a.exr b.exr --page errors.html");
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let page = std::fs::read_to_string(folder.path("errors.html")).expect("the page is there");
-    assert!(page.contains("error that the render has told") && page.matches("<figure>").count() == 5);
+    assert!(page.contains("error that the render has estimated") && page.matches("<figure>").count() == 5);
 }
