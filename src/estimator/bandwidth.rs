@@ -1,13 +1,12 @@
-//! Initial bandwidths: one per pixel and kind of photons, for both camera paths, from a pilot pass whose photons are not
-//! accumulated.
+//! Initial bandwidths, one per pixel and kind of photons. They come from a pilot whose photons are not accumulated.
 //!
-//! The pilot depends on the arguments alone, so shards and resumed renders make the same bandwidths. A pixel's largest
-//! bandwidth is the distance to the k-th nearest photon of the kind on its own surface around its pilot path's
-//! gathering point, at most [`SCREEN_CAP`] of the picture's width there (by default). With fewer than k photons within
-//! the cap it is the cap. A magnified view may be so small that no photon ever lies within its cap, and all the light
-//! that photons bring would be missing: the cap is no smaller than the radius in which one photon is expected where
-//! photons usually lie. A pixel whose pilot path gathers nowhere gets the median of the others (or, with no others,
-//! the cap at the scene's size).
+//! The pilot depends on the arguments only, so shards and resumed renders compute the same bandwidths. A pixel's
+//! largest bandwidth is the distance to the k-th nearest photon of the kind on the surface around the gathering point
+//! of its pilot path. It is at most [`SCREEN_CAP`] (by default) of the picture's width at that distance; this cap is
+//! also the bandwidth if fewer than k photons lie within it. In a strongly magnified view hardly any photon would lie
+//! within the cap, and indirect light would be missing. So the cap is at least the radius in which one photon is
+//! expected where photon density is typical. A pixel whose pilot path gathers nowhere gets the median of the others; if
+//! there are none, the cap at the distance of the scene's radius.
 
 use crate::camera::{Camera, par_pixels, pixels_per_band};
 use crate::photon::{Located, Nearest, PhotonMap, VolumePhoton};
@@ -18,46 +17,45 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Largest bandwidth over the width that the picture spans at the gathering point: a kernel wider than a tenth of the
-/// picture says nothing about a place.
+/// Largest bandwidth over the picture's width at the gathering point. A kernel wider than a tenth of the picture has no
+/// local information.
 pub const SCREEN_CAP: f32 = 0.05;
-/// `--initial-bandwidth footprint`: radius over the width of a pixel at the gathering point.
+/// Radius over the width of a pixel at the gathering point, for `--initial-bandwidth footprint`.
 pub const FOOTPRINT_PIXELS: f32 = 3.0;
-/// Smallest bandwidth over the scene's radius: where photons fall on one point (a perfect focus) the distance is zero.
-pub const LEAST: f32 = 1e-7;
+/// Smallest bandwidth over the scene's radius. At a perfect focus the distance between photons is zero.
+pub const MIN_RADIUS_RATIO: f32 = 1e-7;
 
-/// Smallest bandwidth over the scene's radius that may be asked for: positions are single precision numbers, a hundred
-/// of whose steps (2^-24) it is, and the smallest of five levels a quarter of that. Photons are not found where their
-/// distance is rounding.
-pub const LEAST_ASKED: f32 = 1e-5;
+/// Smallest bandwidth over the scene's radius that a user may set. It is a hundred steps (2^-24) of single precision
+/// positions; the smallest of five levels is a quarter of it. Below that, distances of photons are rounding errors.
+pub const MIN_USER_RADIUS_RATIO: f32 = 1e-5;
 
-/// Pixels to each side that [`initial_volume_bandwidths`] looks at.
+/// Half width, in pixels, of the neighbourhood of [`initial_volume_bandwidths`].
 const NEIGHBOURHOOD: usize = 3;
 
-/// What sets the largest initial bandwidth.
+/// Rule of the largest initial bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum InitialBandwidth {
-    /// Distance to the k-th nearest pilot photon.
+    /// Distance to the k-th nearest photon of the pilot.
     Nearest(usize),
     /// [`FOOTPRINT_PIXELS`] pixels.
     Footprint,
-    /// The same everywhere (scene units).
+    /// One radius for all pixels (scene units).
     Fixed(f32),
 }
 
-/// Width that the picture spans at the end of a path of some length.
-pub fn span(camera: &Camera, length: f32) -> f32 {
+/// Width of the picture at the end of a path of this length (scene units).
+pub fn picture_width_at(camera: &Camera, length: f32) -> f32 {
     let (slope, at_zero) = camera.span();
     slope * length + at_zero
 }
 
-/// [`InitialBandwidth::Footprint`] at the end of a path of some length.
+/// [`InitialBandwidth::Footprint`] at the end of a path of this length.
 pub fn footprint(camera: &Camera, length: f32) -> f32 {
-    FOOTPRINT_PIXELS * span(camera, length) / camera.whole_width()
+    FOOTPRINT_PIXELS * picture_width_at(camera, length) / camera.whole_width()
 }
 
-/// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row; at most `widest` of the
-/// picture's width, if one photon is expected within that.
+/// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row. It is at most `widest` times
+/// the picture's width, or the radius in which one photon is expected if that is larger.
 pub fn initial_bandwidths<const MAPS: usize>(
     camera_paths: &CameraPaths<'_>,
     rule: InitialBandwidth,
@@ -65,19 +63,18 @@ pub fn initial_bandwidths<const MAPS: usize>(
     seed: u64,
     pilots: [&PhotonMap; MAPS],
 ) -> Vec<[f32; MAPS]> {
-    let enough = pilots.map(|pilot| enough(rule, pilot, f32::sqrt));
-    bandwidths(camera_paths, (rule, Bounds { widest, enough }), seed, pilots, |arena, start| {
+    let allowed = pilots.map(|pilot| radius_of_one(rule, pilot, f32::sqrt));
+    bandwidths(camera_paths, rule, Bounds { widest, allowed }, seed, pilots, |arena, start| {
         camera_paths.gather_point(arena, start)
     })
 }
 
-/// Largest initial bandwidth of every pixel for photons in media: around a point of the first medium on its pilot path,
-/// in three dimensions.
+/// Largest initial bandwidth of every pixel for photons in media, around a point in the first medium on its pilot path.
 ///
-/// Where on the way that point lies is chance, and what is true near the eye is not true of the whole way: each pixel
-/// takes the median of those around it, and what bounds it is the picture's width at the surface behind. From within a
-/// medium that bound may be so near that hardly a pixel ever finds a photon, and all are dark: it is not below the
-/// radius in which one is expected.
+/// The position of the point on the path is random, and density near the camera differs from density further away. So
+/// each pixel takes the median of its neighbourhood, and the cap is derived from the picture's width at the surface
+/// behind. From inside a medium that cap may be so small that hardly any pixel finds a photon. So it is at least the
+/// radius in which one photon is expected.
 pub fn initial_volume_bandwidths(
     camera_paths: &CameraPaths<'_>,
     rule: InitialBandwidth,
@@ -85,13 +82,13 @@ pub fn initial_volume_bandwidths(
     seed: u64,
     pilot: &PhotonMap<VolumePhoton>,
 ) -> Vec<f32> {
-    let bounds = Bounds { widest, enough: [enough(rule, pilot, f32::cbrt)] };
+    let bounds = Bounds { widest, allowed: [radius_of_one(rule, pilot, f32::cbrt)] };
     let found =
-        bandwidths(camera_paths, (rule, bounds), seed, [pilot], |arena, start| camera_paths.volume_point(arena, start));
+        bandwidths(camera_paths, rule, bounds, seed, [pilot], |arena, start| camera_paths.volume_point(arena, start));
     medians(found.as_flattened(), camera_paths.camera.size().0 as usize)
 }
 
-/// The median of every pixel's neighbourhood, of `2 NEIGHBOURHOOD + 1` pixels squared within the picture.
+/// The median of every pixel's neighbourhood, a square of `2 NEIGHBOURHOOD + 1` pixels within the picture.
 fn medians(values: &[f32], width: usize) -> Vec<f32> {
     let height = values.len() / width.max(1);
     let around = |at: usize, end: usize| at.saturating_sub(NEIGHBOURHOOD)..(at + NEIGHBOURHOOD + 1).min(end);
@@ -104,31 +101,31 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
     (0..values.len()).into_par_iter().map(around_pixel).collect()
 }
 
-/// The radius in which one photon is expected where photons usually lie, of which those within the k-th nearest take
-/// `root` of k times that; 0 where it is not known.
-fn enough<P: Located>(rule: InitialBandwidth, pilot: &PhotonMap<P>, root: impl Fn(f32) -> f32) -> f32 {
+/// Radius in which one photon is expected where photon density is typical: the distance to the k-th nearest photon over
+/// `root(k)`; 0 if it is unknown.
+fn radius_of_one<P: Located>(rule: InitialBandwidth, pilot: &PhotonMap<P>, root: impl Fn(f32) -> f32) -> f32 {
     let InitialBandwidth::Nearest(k) = rule else { return 0.0 };
     let one = median_radius2(pilot, k).sqrt() / root(k as f32);
     if one.is_finite() { one } else { 0.0 }
 }
 
-/// What bandwidths are not to exceed.
+/// Upper bounds of bandwidths.
 #[derive(Clone, Copy)]
 struct Bounds<const MAPS: usize> {
-    /// Over the picture's width.
+    /// Relative to the picture's width.
     widest: f32,
-    /// They may be as large as this at least, by map.
-    enough: [f32; MAPS],
+    /// Radius that is always allowed, by map.
+    allowed: [f32; MAPS],
 }
 
 impl<const MAPS: usize> Bounds<MAPS> {
-    /// For a map, at the end of a path where the picture spans so much.
+    /// The bound for a map, where the picture is `span` wide.
     fn at(self, map: usize, span: f32) -> f32 {
-        (self.widest * span).max(self.enough[map])
+        (self.widest * span).max(self.allowed[map])
     }
 }
 
-/// Median over photons of the squared distance to the k-th nearest; infinite where there are too few.
+/// Median over photons of the squared distance to the k-th nearest photon; infinite if there are too few.
 pub fn median_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
     const SAMPLES: usize = 256;
     let mut nearest = Nearest::default();
@@ -140,7 +137,8 @@ pub fn median_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
 
 fn bandwidths<P: Located, const MAPS: usize>(
     camera_paths: &CameraPaths<'_>,
-    (rule, bounds): (InitialBandwidth, Bounds<MAPS>),
+    rule: InitialBandwidth,
+    bounds: Bounds<MAPS>,
     seed: u64,
     pilots: [&PhotonMap<P>; MAPS],
     find: impl Fn(&Bump, &(PathStart, Stream)) -> Option<GatherPoint> + Sync,
@@ -151,9 +149,9 @@ fn bandwidths<P: Located, const MAPS: usize>(
     if let InitialBandwidth::Fixed(r) = rule {
         return vec![[r; MAPS]; pixels];
     }
-    let least = LEAST * scene.lights.sky().radius;
+    let least = MIN_RADIUS_RATIO * scene.lights.sky().radius;
     let of_point = |map: usize, nearest: &mut Nearest<P>, point: &GatherPoint| {
-        let cap = bounds.at(map, span(camera, point.length));
+        let cap = bounds.at(map, picture_width_at(camera, point.length));
         let r = match rule {
             InitialBandwidth::Nearest(k) => {
                 nearest.radius2(pilots[map], point.p, point.ng, k, cap * cap).map_or(cap, f32::sqrt)
@@ -179,7 +177,7 @@ fn bandwidths<P: Located, const MAPS: usize>(
     );
     let fallback = std::array::from_fn(|map| {
         let mut known: Vec<f32> = found.iter().flatten().map(|r| r[map]).collect();
-        let usual = || bounds.at(map, span(camera, scene.lights.sky().radius)).max(least);
+        let usual = || bounds.at(map, picture_width_at(camera, scene.lights.sky().radius)).max(least);
         median(&mut known, f32::total_cmp).unwrap_or_else(usual)
     });
     found.into_iter().map(|r| r.unwrap_or(fallback)).collect()
@@ -190,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn medians_forget_what_is_odd_and_keep_edges() {
+    fn medians_remove_outliers_and_keep_edges() {
         let (width, height) = (20, 12);
         let side = |index: usize| if index % width < 10 { 1.0 } else { 2.0 };
         let values = (0..width * height).map(|i| if i % 7 == 0 { 1e-3 } else { side(i) }).collect::<Vec<f32>>();

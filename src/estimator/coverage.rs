@@ -1,22 +1,22 @@
-//! Which instances a pixel's camera paths hit first, and how often: what cryptomattes and alpha are made of.
+//! First hits of a pixel's camera paths by instance, for cryptomattes and alpha.
 
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-/// Instances of which a pixel has room without a list apart.
-const USUAL: usize = 4;
+/// Number of instances that a pixel stores without an allocation.
+const INLINE_INSTANCES: usize = 4;
 
-/// Counts of first hits by instance, which do not depend on the order of paths.
+/// Counts of first hits by instance. They do not depend on the order of paths.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Coverage {
-    /// Instances and the paths that hit them first, in order of appearance.
-    counts: SmallVec<[(u32, u32); USUAL]>,
-    /// All paths.
+    /// Instances and the number of paths that hit them first, in order of appearance.
+    counts: SmallVec<[(u32, u32); INLINE_INSTANCES]>,
+    /// Number of all paths.
     paths: u32,
 }
 
 impl Coverage {
-    /// Counts one camera path that hit `instance` first, or nothing.
+    /// Counts one camera path, with the instance that it hit first, if any.
     #[inline]
     pub fn add(&mut self, instance: Option<u32>) {
         self.paths += 1;
@@ -33,13 +33,13 @@ impl Coverage {
         }
     }
 
-    /// Adds other paths.
+    /// Adds the counts of other paths.
     pub fn join(&mut self, other: &Coverage) {
         self.paths += other.paths;
         other.counts.iter().for_each(|&(instance, count)| self.count(instance, count));
     }
 
-    /// All paths.
+    /// Number of all paths.
     pub fn paths(&self) -> u32 {
         self.paths
     }
@@ -49,7 +49,7 @@ impl Coverage {
         self.fraction(self.counts.iter().map(|(_, count)| count).sum())
     }
 
-    /// Instances and the fractions of paths that hit them first, the largest first.
+    /// Instances and the fractions of paths that hit them first, in descending order of fractions.
     pub fn fractions(&self) -> impl Iterator<Item = (u32, f32)> {
         let mut counts = self.counts.clone();
         counts.sort_unstable_by_key(|&(instance, count)| (!count, instance));

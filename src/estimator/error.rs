@@ -1,16 +1,16 @@
-//! The squared error of a pixel's own level, bias included, without a reference.
+//! The squared error of a pixel without a reference, bias included.
 //!
-//! The kernel's bias grows with the bandwidth squared \[Knaus and Zwicker 2011, 3\], and the next larger level has
-//! twice the squared bandwidth in every iteration: with bias `b` at level k it has `2 b`. The difference of the two
-//! levels' means therefore expects `b` itself. Squared, it expects `b^2` plus the variance of the difference, which its
-//! own iterations tell; what is left estimates the squared bias. It may come out negative where there is little
-//! bias: sums over pixels keep the sign and stay unbiased, a single pixel cuts it off at zero.
+//! The kernel's bias grows with the squared bandwidth \[Knaus and Zwicker 2011, 3\]. The next larger level has twice
+//! the squared bandwidth in every iteration, so its bias is `2 b` if that of level k is `b`, and the difference of the
+//! two means has the expectation `b`. Its square has the expectation `b^2` plus the variance of the difference, which
+//! is estimated from the iterations and subtracted. The estimate may be negative where bias is small. Sums over pixels
+//! keep the sign and stay unbiased; a single pixel clamps it to zero.
 //!
-//! In media squared bandwidths are a factor 2^(2/3) apart; the difference is scaled to tell the bias there, too
-//! ([`PixelAccumulator::add`]).
+//! In media, squared bandwidths of neighbouring levels differ by 2^(2/3). The difference is scaled so that it equals
+//! the bias there, too ([`PixelAccumulator::add`]).
 //!
-//! This holds where light varies smoothly over the kernel. At edges narrower than the bandwidth the bias falls
-//! more slowly than that, and the estimate is too small.
+//! This holds where light varies smoothly over the kernel. At edges narrower than the bandwidth, bias falls more slowly
+//! with the bandwidth, and the estimate is too small.
 
 use super::PixelAccumulator;
 use crate::math::DVec3;
@@ -20,12 +20,12 @@ use crate::math::DVec3;
 pub struct SquaredError {
     /// Variance of the mean.
     pub variance: DVec3,
-    /// Squared bias; negative values are noise around zero. Zero when there is no larger level to compare with.
+    /// Squared bias. Negative values are noise around zero. Zero if there is no larger level for comparison.
     pub squared_bias: DVec3,
 }
 
 impl SquaredError {
-    /// The error of level `own` (from 0) of `count`; `None` before two iterations.
+    /// The error of level `own` (from 0) of `count` levels; `None` before two iterations.
     pub fn of(pixel: &PixelAccumulator, own: usize, count: usize) -> Option<SquaredError> {
         if pixel.iterations < 2 {
             return None;
@@ -37,7 +37,8 @@ impl SquaredError {
         Some(SquaredError { variance: pixel.variance_of_mean(own), squared_bias })
     }
 
-    /// Estimated standard error with bias: the root of variance plus squared bias, the latter at least zero.
+    /// Estimated standard error including bias: the root of variance plus squared bias, with the latter clamped to
+    /// zero.
     pub fn root(&self) -> DVec3 {
         let total = self.variance + self.squared_bias.max(DVec3::ZERO);
         total.map(f64::sqrt)
@@ -51,11 +52,11 @@ mod tests {
     use crate::random::{Domain, Purpose, Stream};
     use crate::transport::PixelSample;
 
-    /// Levels whose bias halves from one to the next and whose noise is uniform: over many pixels the estimates average
-    /// to the bias squared, and to nothing without bias. Over 4000 pixels of 16 iterations the mean of (D^2 - var) has
-    /// a standard error of about 0.0004; a missing variance term would add 0.007.
+    /// Levels with bias `b` and `2 b` and uniform noise: averaged over pixels, the estimate is the squared bias, and
+    /// zero without bias. Over 4000 pixels of 16 iterations the mean of (D^2 - var) has a standard error of about
+    /// 0.0004; a missing variance term would add 0.007.
     #[test]
-    fn the_squared_bias_is_found_and_noise_is_not_taken_for_it() {
+    fn squared_bias_is_estimated_without_noise() {
         for bias in [0.0, 0.3] {
             let (mut squared_bias, mut variance) = (0.0, 0.0);
             for index in 0..4000 {
@@ -82,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn one_iteration_tells_nothing() {
+    fn one_iteration_gives_no_error() {
         let mut pixel = PixelAccumulator::new(5, 0, [1.0; 2]);
         pixel.add(1, &PixelSample::default(), None);
         assert_eq!(SquaredError::of(&pixel, 3, 5), None);

@@ -1,4 +1,4 @@
-//! From what camera paths measure to estimates: the state per pixel and level, and the rules for bandwidths.
+//! Estimates from samples: accumulators of pixels, errors, and the rules of bandwidths.
 
 pub mod bandwidth;
 mod coverage;

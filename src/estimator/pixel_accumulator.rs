@@ -1,4 +1,4 @@
-//! The state of a pixel: plain numbers that can be saved and joined.
+//! The accumulator of a pixel: sums and counts that can be saved and joined.
 
 use super::{Coverage, Rejected};
 use crate::math::{DVec3, Rgb, Vec3};
@@ -13,130 +13,129 @@ use std::cmp::Ordering;
 /// Camera depth where nothing is hit.
 pub const FAR: f32 = 1e10;
 
-/// What is added to the differences of levels for light gathered in media, relative: bias grows with the radius
-/// squared, which from one level to the next grows by 2^(2/3) there and by 2 on surfaces. With this, a difference is
-/// the bias of the smaller level for both: `1 / (2^(2/3) - 1) - 1`.
+/// Relative correction of level differences for light gathered in media. Bias grows with the squared radius, which
+/// grows by 2^(2/3) per level in media, and by 2 on surfaces. With the correction `1 / (2^(2/3) - 1) - 1` a difference
+/// is the bias of the smaller level for both.
 const VOLUME_DIFFERENCE: f32 = 0.702_414_4;
 
-/// Sums over iterations of the additive parts of the level that is the method's own image.
+/// Sums over iterations of the additive parts of the picture level.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts {
-    /// Emitters seen directly or through perfect mirrors and clear glass.
+    /// Lights seen directly or through perfect mirrors and clear glass.
     pub emission: DVec3,
     /// Direct light.
     pub direct: DVec3,
     /// Caustics.
     pub caustic: DVec3,
-    /// Everything else from surfaces.
+    /// All other light from surfaces.
     pub indirect: DVec3,
-    /// Light scattered by media on its way to the eye.
+    /// Light that media scatter towards the camera.
     pub volume: DVec3,
 }
 
-/// Independent groups of iterations ([`random::QUARTERS`]).
+/// Number of independent groups of iterations ([`random::QUARTERS`]).
 pub const QUARTERS: usize = random::QUARTERS as usize;
-/// Additive parts.
+/// Number of additive parts.
 const PARTS: usize = 5;
 
-/// Estimates of one quarter of the iterations, of the level that is the method's own image.
+/// Sum of the picture level over one quarter of the iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Quarter {
     sum: Sum<DVec3>,
     count: u32,
 }
 
-/// Statistics of one pixel over the iterations so far. All of it are sums and counts that do not depend on the order of
-/// iterations: those of disjoint iterations join to the ones of all ([`PixelAccumulator::join`]).
+/// Statistics of one pixel over the iterations so far: sums and counts that do not depend on the order of iterations.
+/// Accumulators of disjoint iterations join to that of all ([`PixelAccumulator::join`]).
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct PixelAccumulator {
-    /// Grids of all sums of light.
+    /// Rounding grids of all sums of light.
     grids: Grids,
-    /// Squares of the own image's estimates; their sum is that of the quarters.
+    /// Sum of squares of the picture level. Its plain sum is that of the quarters.
     own_squares: Sum<DVec3>,
-    /// The own image by independent groups of iterations, whose points share no scramble: what variance and error are
-    /// measured by.
+    /// Sums of the picture level by quarters, whose random points are scrambled independently. Variance and error are
+    /// estimated from them.
     quarters: [Quarter; QUARTERS],
-    /// The other levels' estimates, the smallest bandwidth first, and the next larger level minus the own one:
-    /// neighbours are correlated, so their difference's variance cannot be had from theirs. Where photons are gathered
-    /// in media, the difference is scaled there to tell the bias ([`super::SquaredError`]). Nothing where there is one
-    /// level.
+    /// Moments of the other levels, smallest bandwidth first, and of the difference between the next larger level and
+    /// the picture level. Levels are correlated, so the variance of the difference does not follow from theirs. In
+    /// media the difference is scaled to equal the bias ([`super::SquaredError`]). Empty with one level.
     others: Box<[Moments]>,
-    /// Emission, direct, caustic, indirect light, light from media.
+    /// Emission, direct, caustic and indirect light, and light from media.
     parts: [Sum<DVec3>; PARTS],
-    /// Light of each group of lights, and its caustics.
+    /// Light of each light group, and its caustics.
     groups: Box<[[Sum<DVec3>; 2]]>,
     /// Sums of G-buffers over all camera paths.
     albedo: DVec3,
     normal: DVec3,
-    /// Sum over those paths that have such a hit.
+    /// Sum of path lengths up to the first rough hit.
     depth: Total,
-    /// Camera paths whose measure was finite.
+    /// Number of camera paths whose features are finite.
     features: u32,
-    /// Those of them with a hit that is not a perfect mirror or clear glass.
+    /// Number of camera paths with a rough hit: one that is not on a perfect mirror or clear glass.
     depths: u32,
     /// First hits of all camera paths.
     pub coverage: Coverage,
-    /// Iterations counted.
+    /// Number of iterations accumulated.
     pub iterations: u32,
-    /// Iterations rejected as not finite.
+    /// Rejected iterations, by cause.
     pub rejected: Rejected,
     /// Largest initial bandwidth by kind of photons (scene units).
     pub bandwidths: ByKind<f32>,
-    /// The same for photons in media; 0 where there are none.
+    /// Largest initial bandwidth of photons in media (scene units); 0 without media.
     pub volume_bandwidth: f32,
-    /// First visible hit of the first iteration counted.
-    first: FirstSeen,
+    /// First visible hit of the first accumulated iteration.
+    first: FirstVisible,
 }
 
-/// What an iteration sees first through a pixel.
+/// First visible hit of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct FirstSeen {
+struct FirstVisible {
     /// The iteration, from 1.
-    pass: u64,
+    iteration: u64,
     /// Camera depth; [`FAR`] where there is none.
     z: f32,
     /// Position.
     p: Vec3,
 }
 
-impl Default for FirstSeen {
-    fn default() -> FirstSeen {
-        FirstSeen { pass: u64::MAX, z: FAR, p: Vec3::ZERO }
+impl Default for FirstVisible {
+    fn default() -> FirstVisible {
+        FirstVisible { iteration: u64::MAX, z: FAR, p: Vec3::ZERO }
     }
 }
 
 impl PixelAccumulator {
-    /// A pixel of an image of so many levels before its first iteration. Sums of light scale exactly with it by powers
-    /// of two if `exponent`, that of the scene's light, does ([`Grids::new`]).
+    /// The accumulator of a pixel with `levels` levels before its first iteration. If the light of the scene is scaled
+    /// by a power of two, and `exponent` with it, all sums of light scale exactly ([`Grids::new`]).
     pub fn new(levels: usize, exponent: i32, bandwidths: ByKind<f32>) -> PixelAccumulator {
         let others = vec![Moments::default(); PixelAccumulator::others(levels)].into_boxed_slice();
         PixelAccumulator { grids: Grids::new(exponent), others, bandwidths, ..PixelAccumulator::default() }
     }
 
-    /// With so many groups of lights.
+    /// Adds sums for `groups` light groups.
     #[must_use]
     pub fn with_groups(self, groups: usize) -> PixelAccumulator {
         PixelAccumulator { groups: vec![[Sum::default(); 2]; groups].into_boxed_slice(), ..self }
     }
 
-    /// Bytes of a pixel with so many levels and groups.
+    /// Bytes of an accumulator with `levels` levels and `groups` light groups.
     pub fn bytes(levels: usize, groups: usize) -> usize {
         size_of::<PixelAccumulator>()
             + PixelAccumulator::others(levels) * size_of::<Moments>()
             + groups * size_of::<[Sum<DVec3>; 2]>()
     }
 
-    /// Bytes of this one.
+    /// Bytes of this accumulator.
     pub fn size(&self) -> usize {
         PixelAccumulator::bytes(self.levels(), self.groups.len())
     }
 
-    /// Whether there are sums of so many levels and groups of lights.
+    /// Whether the accumulator has sums for `levels` levels and `groups` light groups.
     pub fn holds(&self, levels: usize, groups: usize) -> bool {
         self.others.len() == PixelAccumulator::others(levels) && self.groups.len() == groups
     }
 
-    /// Sums of other levels beside the own image's: theirs, and a difference.
+    /// Length of `others`: moments of the other levels, and of a difference.
     fn others(levels: usize) -> usize {
         if levels > 1 { levels } else { 0 }
     }
@@ -147,16 +146,16 @@ impl PixelAccumulator {
         self.others.len().max(1)
     }
 
-    /// The level (from 0) that is the method's own image, the second largest.
+    /// The level (from 0) of the picture: the second largest.
     #[inline]
-    fn own(&self) -> usize {
+    fn picture_level(&self) -> usize {
         self.levels().saturating_sub(2)
     }
 
     /// Mean of a level (from 0, the smallest bandwidth); zero before the first iteration.
     pub fn mean(&self, level: usize) -> DVec3 {
         let count = f64::from(self.iterations);
-        match level.cmp(&self.own()) {
+        match level.cmp(&self.picture_level()) {
             Ordering::Less => self.others[level].mean(count),
             Ordering::Equal if self.iterations == 0 => DVec3::ZERO,
             Ordering::Equal => self.sum() / count,
@@ -167,39 +166,39 @@ impl PixelAccumulator {
     /// Variance of the mean of a level; infinite before two iterations.
     pub fn variance_of_mean(&self, level: usize) -> DVec3 {
         let count = f64::from(self.iterations);
-        match level.cmp(&self.own()) {
+        match level.cmp(&self.picture_level()) {
             Ordering::Less => self.others[level].variance_of_mean(count),
             Ordering::Equal => variance_of_mean(self.sum(), self.own_squares.value(), count),
             Ordering::Greater => self.others[level - 1].variance_of_mean(count),
         }
     }
 
-    /// Mean of the next larger level minus the own one, and the variance of that mean; `None` without levels.
+    /// Mean of the next larger level minus the picture level, and the variance of that mean; `None` with one level.
     pub fn difference(&self) -> Option<[DVec3; 2]> {
         let count = f64::from(self.iterations);
         self.others.last().map(|difference| [difference.mean(count), difference.variance_of_mean(count)])
     }
 
-    /// Sum of the own image.
+    /// Sum of the picture level.
     fn sum(&self) -> DVec3 {
         let mut sum = self.quarters[0].sum;
         self.quarters[1..].iter().for_each(|quarter| sum.join(&quarter.sum));
         sum.value()
     }
 
-    /// Mean of a quarter's iterations of the own image; zero without any.
+    /// Mean of the picture level over a quarter of the iterations; zero without any.
     pub fn quarter(&self, quarter: usize) -> DVec3 {
         let Quarter { sum, count } = self.quarters[quarter];
         if count == 0 { DVec3::ZERO } else { sum.value() / f64::from(count) }
     }
 
-    /// Sums of the additive parts of the own image.
+    /// Sums of the additive parts of the picture level.
     pub fn parts(&self) -> Parts {
         let [emission, direct, caustic, indirect, volume] = self.parts.map(|part| part.value());
         Parts { emission, direct, caustic, indirect, volume }
     }
 
-    /// Mean light of a group of lights, and of its caustics.
+    /// Mean light of a light group, and of its caustics.
     pub fn group(&self, group: usize) -> [DVec3; 2] {
         let count = f64::from(self.iterations.max(1));
         self.groups[group].map(|sum| sum.value() / count)
@@ -210,29 +209,28 @@ impl PixelAccumulator {
         if self.features == 0 { DVec3::ZERO } else { self.albedo / f64::from(self.features) }
     }
 
-    /// Camera paths whose albedo, normal or depth was not finite.
+    /// Number of camera paths whose albedo, normal or depth was not finite.
     pub fn features_rejected(&self) -> u32 {
         self.coverage.paths() - self.features
     }
 
-    /// Direction of the mean normal; zero where there is none.
+    /// Direction of the mean normal; zero without any.
     pub fn normal(&self) -> DVec3 {
         self.normal.normalize_or_zero()
     }
 
-    /// Mean distance along camera paths to their first rough hit, of those that have one.
+    /// Mean length of camera paths up to their first rough hit, over those that have one.
     pub fn depth(&self) -> Option<f64> {
         (self.depths > 0).then(|| self.depth.value() / f64::from(self.depths))
     }
 
-    /// Camera depth of the first visible hit of the first iteration ([`FAR`] where there is none), and its position.
+    /// Camera depth of the first visible hit of the first iteration ([`FAR`] without a hit), and its position.
     pub fn first(&self) -> (f32, Vec3) {
         (self.first.z, self.first.p)
     }
 
-    /// Variance of the mean of the own image as the quarters tell it, which is right also where iterations are not
-    /// independent within a quarter: the scatter of group means about their weighted mean, over the degrees of freedom.
-    /// `None` where a quarter is empty.
+    /// Variance of the mean of the picture level from the scatter of the quarters' means. It is correct even if
+    /// iterations within a quarter are not independent. `None` if a quarter is empty.
     #[inline]
     pub fn variance_by_quarters(&self) -> Option<DVec3> {
         if self.quarters.iter().any(|quarter| quarter.count == 0) {
@@ -247,32 +245,32 @@ impl PixelAccumulator {
         Some(scatter.sum::<DVec3>() / ((QUARTERS - 1) as f64 * total))
     }
 
-    /// Keeps what iteration `pass` (from 1) sees first, its camera depth and position, if none has been counted before.
-    /// To be called before [`PixelAccumulator::add`].
+    /// Records the first visible hit of iteration `i` (from 1), its camera depth and position, unless an iteration has
+    /// been accumulated. Call it before [`PixelAccumulator::add`].
     #[inline]
-    pub fn record_first_hit(&mut self, pass: u64, first: impl FnOnce() -> Option<(f32, Vec3)>) {
+    pub fn record_first_hit(&mut self, i: u64, first: impl FnOnce() -> Option<(f32, Vec3)>) {
         if self.iterations == 0 {
             let (z, p) = first().unwrap_or((FAR, Vec3::ZERO));
-            self.first = FirstSeen { pass, z, p };
+            self.first = FirstVisible { iteration: i, z, p };
         }
     }
 
-    /// Adds iteration `pass` (from 1): level 1 from `independent`, the others from `correlated` (of one level less), or
-    /// all from `independent` when they share one camera path.
+    /// Adds iteration `i` (from 1). With `correlated`, level 1 comes from `independent` and the other levels from
+    /// `correlated`, which has one level less; without, all levels come from `independent`.
     #[inline]
-    pub fn add(&mut self, pass: u64, independent: &PixelSample, correlated: Option<&PixelSample>) {
-        self.add_with_groups(pass, independent, correlated, &[]);
+    pub fn add(&mut self, i: u64, independent: &PixelSample, correlated: Option<&PixelSample>) {
+        self.add_with_groups(i, independent, correlated, &[]);
     }
 
-    /// The same with the light of each group of lights, and its caustics, in the own image.
+    /// [`PixelAccumulator::add`] with the light of each light group, and its caustics, at the picture level.
     pub fn add_with_groups(
         &mut self,
-        pass: u64,
+        i: u64,
         independent: &PixelSample,
         correlated: Option<&PixelSample>,
         groups: &[[Rgb; 2]],
     ) {
-        let (count, own) = (self.levels(), self.own());
+        let (count, own) = (self.levels(), self.picture_level());
         let mut values = [Rgb::ZERO; MAX_LEVELS];
         for (level, value) in values[..count].iter_mut().enumerate() {
             *value = match correlated {
@@ -280,7 +278,7 @@ impl PixelAccumulator {
                 _ => independent.radiance(level),
             };
         }
-        let (sample, level) = self.own_of(independent, correlated);
+        let (sample, level) = self.picture_sample(independent, correlated);
         let parts: [Rgb; PARTS] = [
             sample.emission,
             sample.direct,
@@ -299,7 +297,7 @@ impl PixelAccumulator {
         let most = all().fold(Rgb::ZERO, |most, value| most.max(value.abs()));
         self.coarsen_grids(self.grids.with_room_for(f64::from(most.max_element())));
         let rounding = self.grids.rounding();
-        let quarter = &mut self.quarters[random::quarter(pass) as usize];
+        let quarter = &mut self.quarters[random::quarter(i) as usize];
         let light = values[own].as_dvec3();
         quarter.sum.add(light, rounding[0]);
         quarter.count += 1;
@@ -316,33 +314,37 @@ impl PixelAccumulator {
         for (sum, light) in self.groups.as_flattened_mut().iter_mut().zip(groups.as_flattened()) {
             sum.add(light.as_dvec3(), rounding[0]);
         }
-        for sample in std::iter::once(independent).chain(correlated) {
-            self.coverage.add(sample.first.map(|first| first.instance));
-            let features = sample.features;
-            if features.albedo.is_finite() && features.normal.is_finite() && features.depth.is_finite() {
-                self.albedo += on_fixed_grid(features.albedo);
-                self.normal += on_fixed_grid(features.normal);
-                self.depth.add(f64::from(features.depth));
-                self.features += 1;
-                self.depths += u32::from(features.depth > 0.0);
-            }
+        std::iter::once(independent).chain(correlated).for_each(|sample| self.add_features(sample));
+    }
+
+    /// Adds the first hit and the G-buffer of a camera path.
+    #[inline]
+    fn add_features(&mut self, sample: &PixelSample) {
+        self.coverage.add(sample.first.map(|first| first.instance));
+        let features = sample.features;
+        if features.albedo.is_finite() && features.normal.is_finite() && features.depth.is_finite() {
+            self.albedo += on_fixed_grid(features.albedo);
+            self.normal += on_fixed_grid(features.normal);
+            self.depth.add(f64::from(features.depth));
+            self.features += 1;
+            self.depths += u32::from(features.depth > 0.0);
         }
     }
 
-    /// The measure that has the own image's level, and where.
+    /// The sample that contains the picture level, and the index of the level in it.
     #[inline]
-    pub fn own_of<'m>(
+    pub fn picture_sample<'m>(
         &self,
         independent: &'m PixelSample,
         correlated: Option<&'m PixelSample>,
     ) -> (&'m PixelSample, usize) {
-        match (correlated, self.own()) {
+        match (correlated, self.picture_level()) {
             (Some(correlated), own @ 1..) => (correlated, own - 1),
             (_, own) => (independent, own),
         }
     }
 
-    /// The next larger level minus the own one.
+    /// The next larger level minus the picture level.
     #[inline]
     fn difference_of(
         &self,
@@ -350,7 +352,7 @@ impl PixelAccumulator {
         independent: &PixelSample,
         correlated: Option<&PixelSample>,
     ) -> Rgb {
-        let own = self.own();
+        let own = self.picture_level();
         let mut difference = values[own + 1] - values[own];
         if self.volume_bandwidth > 0.0 {
             let in_media = |level: usize| match correlated {
@@ -362,7 +364,7 @@ impl PixelAccumulator {
         difference
     }
 
-    /// Takes all sums of light to grids that are no finer.
+    /// Rounds all sums of light to grids that are at least as coarse.
     #[inline]
     fn coarsen_grids(&mut self, to: Grids) {
         let from = std::mem::replace(&mut self.grids, to);
@@ -378,7 +380,8 @@ impl PixelAccumulator {
         self.others.iter_mut().for_each(|moments| moments.coarsen(from, to));
     }
 
-    /// Adds other iterations of the same pixel: the same bits as if all had been added here, whatever their order.
+    /// Adds other iterations of the same pixel. The result has the bits of one accumulator of all iterations, in any
+    /// order.
     pub fn join(&mut self, mut other: PixelAccumulator) {
         let grids = self.grids.max(other.grids);
         self.coarsen_grids(grids);
@@ -398,9 +401,9 @@ impl PixelAccumulator {
         self.features += other.features;
         self.depths += other.depths;
         self.coverage.join(&other.coverage);
-        // The first that is counted; where none is, the last one looked at.
+        // The first accumulated iteration; if there is none, the last rejected one.
         let of = |pixel: &PixelAccumulator| {
-            if pixel.iterations > 0 { (0, pixel.first.pass) } else { (1, !pixel.first.pass) }
+            if pixel.iterations > 0 { (0, pixel.first.iteration) } else { (1, !pixel.first.iteration) }
         };
         if of(&other) < of(self) {
             self.first = other.first;
@@ -410,10 +413,10 @@ impl PixelAccumulator {
     }
 }
 
-/// Of sizes up to a few, whose sums are exact: rounded to multiples of 2^-28.
+/// Rounds a value of order one to a multiple of 2^-28, so that sums are exact in any order.
 #[inline]
 fn on_fixed_grid(value: Vec3) -> DVec3 {
-    /// Neighbours in f64 are 2^-28 apart.
+    /// Numbers of this size in f64 are multiples of 2^-28.
     const MAGIC: f64 = 1.5 * (1u64 << 24) as f64;
     value.as_dvec3().rounded(MAGIC)
 }
@@ -424,10 +427,10 @@ mod tests {
     use crate::random::{Domain, Purpose, Stream};
     use crate::transport::{Features, FirstHit};
 
-    /// A bias of r^2 on surfaces and of r^2 in media, whose levels' radii are apart by other factors: differences tell
-    /// their sum.
+    /// With a bias of r^2 on surfaces and in media, where radii of levels differ by other factors, differences of
+    /// levels equal the sum of both biases.
     #[test]
-    fn differences_of_levels_are_the_bias_on_surfaces_and_in_media() {
+    fn level_differences_equal_the_bias_on_surfaces_and_in_media() {
         let biases = |level: i32| (0.01 * 2f32.powi(level), 0.02 * (2.0 / 3.0 * level as f32).exp2());
         let sample = |first: i32| {
             let mut sample = PixelSample { direct: Rgb::ONE, volume: Rgb::ONE, ..PixelSample::default() };
@@ -451,17 +454,17 @@ mod tests {
         }
     }
 
-    /// An iteration of a pixel that sees all kinds of light of sizes far apart, and now and then a sample that is not
-    /// finite.
-    fn iteration(pass: u64) -> [PixelSample; 2] {
+    /// An iteration of a pixel with all kinds of light, of very different magnitudes, and with some samples that are
+    /// not finite.
+    fn iteration(i: u64) -> [PixelSample; 2] {
         [0, 1].map(|path| {
             let draw = |index| {
-                let draws = Stream::new(1, pass, Domain::Test, 100 * path + index).vertex(0);
+                let draws = Stream::new(1, i, Domain::Test, 100 * path + index).vertex(0);
                 let [a, b] = [draws.two(Purpose::Pixel), draws.two(Purpose::Lens)];
                 Rgb::new(a.x, a.y, b.x) * 10f32.powf(16.0 * b.y - 8.0)
             };
             let photons = |first: u64| std::array::from_fn(|level| draw(first + level as u64));
-            let rejection = pass % 11 == 1;
+            let rejection = i % 11 == 1;
             PixelSample {
                 emission: if rejection { Rgb::splat(f32::NAN) } else { draw(0) },
                 direct: draw(1),
@@ -475,24 +478,24 @@ mod tests {
                     normal: (draw(5) - draw(6)).normalize(),
                     depth: draw(7).x,
                 },
-                first: (!pass.is_multiple_of(3)).then(|| FirstHit { p: draw(8), instance: (pass % 10) as u32 }),
-                rejection: (pass % 13 == 1).then_some(Cause::Splat),
+                first: (!i.is_multiple_of(3)).then(|| FirstHit { p: draw(8), instance: (i % 10) as u32 }),
+                rejection: (i % 13 == 1).then_some(Cause::Splat),
             }
         })
     }
 
-    fn pixel(levels: usize, passes: impl Iterator<Item = u64>) -> PixelAccumulator {
+    fn pixel(levels: usize, iterations: impl Iterator<Item = u64>) -> PixelAccumulator {
         let mut pixel = PixelAccumulator { volume_bandwidth: 0.1, ..PixelAccumulator::new(levels, 7, [0.1; 2]) };
-        for pass in passes {
-            let [independent, correlated] = iteration(pass);
-            pixel.record_first_hit(pass, || independent.first.map(|first| (first.p.x, first.p)));
-            pixel.add(pass, &independent, (levels > 1).then_some(&correlated));
+        for i in iterations {
+            let [independent, correlated] = iteration(i);
+            pixel.record_first_hit(i, || independent.first.map(|first| (first.p.x, first.p)));
+            pixel.add(i, &independent, (levels > 1).then_some(&correlated));
         }
         pixel
     }
 
-    /// All that is told of a pixel, to the last bit.
-    fn told(pixel: &PixelAccumulator, levels: usize) -> Vec<u64> {
+    /// All results of a pixel, as bits.
+    fn all_bits(pixel: &PixelAccumulator, levels: usize) -> Vec<u64> {
         let mut all = vec![pixel.albedo(), pixel.normal(), DVec3::splat(pixel.depth().unwrap_or(-1.0))];
         for level in 0..levels {
             all.extend([pixel.mean(level), pixel.variance_of_mean(level)]);
@@ -512,34 +515,37 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_the_iterations_join_in_any_order_to_the_bits_of_all() {
+    fn shards_join_in_any_order_to_the_same_bits() {
         for levels in [1, 2, 5] {
-            let whole = told(&pixel(levels, 1..=100), levels);
+            let whole = all_bits(&pixel(levels, 1..=100), levels);
             for shards in [2, 3, 7, 100] {
                 let part = |index: usize| pixel(levels, (1..=100).skip(index).step_by(shards));
                 let mut forward = part(0);
                 (1..shards).for_each(|index| forward.join(part(index)));
                 let mut backward = part(shards - 1);
                 (0..shards - 1).rev().for_each(|index| backward.join(part(index)));
-                assert!(told(&forward, levels) == whole && told(&backward, levels) == whole, "{shards} of {levels}");
+                assert!(
+                    all_bits(&forward, levels) == whole && all_bits(&backward, levels) == whole,
+                    "{shards} of {levels}"
+                );
             }
-            // An iteration that is missing, or there twice, is seen.
-            assert_ne!(told(&pixel(levels, 1..=99), levels), whole);
+            // A missing iteration, and one that is there twice, change the bits.
+            assert_ne!(all_bits(&pixel(levels, 1..=99), levels), whole);
             let mut twice = pixel(levels, 1..=100);
             twice.join(pixel(levels, 5..=5));
-            assert_ne!(told(&twice, levels), whole);
+            assert_ne!(all_bits(&twice, levels), whole);
         }
     }
 
-    /// Plain sums in f64 of the same values, where no large one takes the digits of the others.
+    /// Compared with plain sums in f64. No value is so large that others lose digits.
     #[test]
-    fn means_and_variances_are_those_of_two_passes() {
+    fn means_and_variances_agree_with_two_pass_formulas() {
         let mut values = Vec::new();
         let mut pixel = PixelAccumulator::new(1, 0, [0.0; 2]);
-        for pass in 1..=200u64 {
-            let draw = Stream::new(2, pass, Domain::Test, 0).vertex(0).two(Purpose::Pixel);
+        for i in 1..=200u64 {
+            let draw = Stream::new(2, i, Domain::Test, 0).vertex(0).two(Purpose::Pixel);
             let direct = Rgb::new(draw.x, draw.y, 0.01 * draw.x);
-            pixel.add(pass, &PixelSample { direct, ..PixelSample::default() }, None);
+            pixel.add(i, &PixelSample { direct, ..PixelSample::default() }, None);
             values.push(direct.as_dvec3());
         }
         let mean = values.iter().sum::<DVec3>() / 200.0;
@@ -547,7 +553,7 @@ mod tests {
         let apart = |a: DVec3, b: DVec3| (a / b - 1.0).abs();
         let direct = pixel.parts().direct / 200.0;
         assert!(apart(pixel.mean(0), mean).max_element() < 1e-7 && apart(direct, mean).max_element() < 1e-7);
-        // Squares are cut off at 2^-31 of the largest: of the dark channel's, a part in 10^4 at most.
+        // Squares are cut off at 2^-31 of the largest: in the dark channel a relative error of at most 1e-4.
         let apart = apart(pixel.variance_of_mean(0), variance);
         assert!(apart.max_element() < 1e-4 && apart.x.max(apart.y) < 1e-7, "{apart}");
         assert_eq!(pixel.parts().caustic, DVec3::ZERO);

@@ -1,19 +1,19 @@
-//! What four independent groups of iterations tell of the noise.
+//! Variance of noise from the four quarters of the iterations.
 //!
-//! Iterations within a quarter share low-discrepancy points: they are not independent, and the sample variance over
-//! them tells more than their mean has. Quarters are scrambled apart, so the scatter of their means is right,
-//! but has three degrees of freedom a pixel. The layers take the shape of the noise from the sample variance and its size,
-//! over windows, from the quarters.
+//! Iterations within a quarter share low-discrepancy points and are not independent, so the sample variance over them
+//! is larger than the variance of their mean. Quarters are scrambled independently, so the scatter of their means is
+//! unbiased, but has only three degrees of freedom per pixel. So layers take the shape of the noise from the sample
+//! variance, and scale it, over windows, to the variance by quarters.
 
 use super::{PixelAccumulator, SquaredError};
 use rayon::prelude::*;
 
-/// Pixels to each side of the windows over which either variance is summed: 81 pixels have 243 degrees of freedom.
+/// Half width, in pixels, of the windows: 81 pixels have 243 degrees of freedom.
 const REACH: usize = 4;
 
-/// Variance by quarters over the sample variance, of the own image at every pixel over a window; 1 where
-/// neither is known or there is no variance. `own` is the level (from 0) that quarters are of. Pixels row by row,
-/// `width` a row.
+/// Ratio of the variance by quarters to the sample variance of the picture level, over a window around every pixel; 1
+/// if one of them is unknown or there is no variance. `own` is the picture level (from 0). Pixels are in rows of
+/// `width`.
 pub fn variance_ratio(pixels: &[PixelAccumulator], width: usize, own: usize) -> Vec<f32> {
     let of_pixel = |pixel: &PixelAccumulator| {
         let sample = SquaredError::of(pixel, own, own + 1).map(|error| error.variance);
@@ -29,8 +29,8 @@ pub fn variance_ratio(pixels: &[PixelAccumulator], width: usize, own: usize) -> 
     sums.par_iter().map(ratio).collect()
 }
 
-/// Sums over windows along lines of values that are `step` apart; `place` is where in its line an index is, and the
-/// line's length.
+/// Sums over windows along lines of values that are `step` apart. `place` maps an index to its position in its line and
+/// the length of the line.
 fn window_sums(values: &[[f64; 2]], place: impl Fn(usize) -> (usize, usize) + Sync, step: usize) -> Vec<[f64; 2]> {
     let sum = |index: usize| {
         let (at, length) = place(index);
@@ -50,27 +50,27 @@ mod tests {
     use crate::random::{Domain, Purpose, QUARTERS, Stream, quarter};
     use crate::transport::PixelSample;
 
-    /// A picture whose iterations are uniform; `antithetic` ones of a quarter come in pairs that cancel, as
-    /// low-discrepancy points do.
+    /// A picture with uniform noise. With `antithetic`, the iterations of a quarter form pairs that cancel, similar to
+    /// low-discrepancy points.
     fn picture(antithetic: bool) -> Vec<PixelAccumulator> {
         let pixel = |index: u64| {
             let mut pixel = PixelAccumulator::new(1, 0, [0.0; 2]);
-            for pass in 1..=32u64 {
-                let (quarter, at) = (quarter(pass), (pass - 1) / QUARTERS);
+            for i in 1..=32u64 {
+                let (quarter, at) = (quarter(i), (i - 1) / QUARTERS);
                 let pair = if antithetic { at / 2 } else { at };
                 let draw = Stream::new(3, quarter * 100 + pair, Domain::Test, index).vertex(0).one(Purpose::Pixel);
                 let value = if antithetic && at % 2 == 1 { 1.0 - draw } else { draw };
                 let sample = PixelSample { direct: Rgb::splat(value), ..PixelSample::default() };
-                pixel.add(pass, &sample, None);
+                pixel.add(i, &sample, None);
             }
             pixel
         };
         (0..32 * 24).map(pixel).collect()
     }
 
-    /// Independent iterations have a ratio of one: windows have at least 25 pixels of three degrees of freedom each
-    /// (channels are equal), so a ratio is off by more than five of its standard errors of sqrt(2 / 75) with less than
-    /// 1e-5. Iterations that cancel have none.
+    /// Independent iterations have a ratio of one. Windows have at least 25 pixels with three degrees of freedom each
+    /// (channels are equal), so a ratio deviates by more than five of its standard errors of sqrt(2 / 75) with a
+    /// probability below 1e-5. Iterations that cancel have a ratio of zero.
     #[test]
     fn independent_iterations_have_a_ratio_of_one_and_stratified_ones_less() {
         let ratios = variance_ratio(&picture(false), 32, 0);

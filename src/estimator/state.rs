@@ -1,14 +1,13 @@
-//! Where bandwidths stand: the one place that says what the bandwidth of a pixel, kind of photons and level is.
+//! Current bandwidths by pixel, kind of photons and level.
 //!
-//! Levels nest: each kernel's measure (an area on surfaces, a volume in media) is half that of the next larger
+//! From each level to the next larger one, the kernel's size doubles: its area on surfaces, its volume in media
 //! \[post-reconstruction 2021, 4.1\].
 
 use super::PixelAccumulator;
 use super::rule::{memoryless, volume};
 use crate::photon::{ByKind, Kind};
 
-/// The memoryless rules at one iteration: bandwidths follow from the initial ones and the iteration's number alone,
-/// so they are kept nowhere.
+/// The memoryless rules at one iteration. Bandwidths follow from the initial ones and the iteration's number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
     levels: usize,
@@ -19,8 +18,8 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// At iteration `i` (from 1) of so many levels, with the reduction rates `alpha` on surfaces and `volume_alpha` in
-    /// media.
+    /// The rules at iteration `i` (from 1) for `levels` levels, with the reduction rates `alpha` on surfaces and
+    /// `volume_alpha` in media.
     pub fn new(i: u64, levels: usize, alpha: f64, volume_alpha: f64) -> Schedule {
         let surface2 = memoryless::radius2_factor(i, alpha) as f32;
         Schedule { levels, surface2, volume: volume::radius_factor(i, volume_alpha) as f32 }
@@ -31,19 +30,20 @@ impl Schedule {
         self.levels
     }
 
-    /// Squared radius over the initial one of the largest level.
+    /// Squared radius of the largest level over the initial one.
     #[inline]
     pub fn factor2(&self) -> f32 {
         self.surface2
     }
 
-    /// Squared radius of a level (from 0, the smallest) whose largest began with the radius `initial` (scene units).
+    /// Squared radius of a level (from 0, the smallest) on surfaces, where `initial` is the initial radius of the
+    /// largest (scene units).
     #[inline]
     pub fn radius2(&self, initial: f32, level: usize) -> f32 {
         initial * initial * self.surface2 * level_factor2(level, self.levels)
     }
 
-    /// The same in media: a radius (scene units).
+    /// Radius of a level in media, where `initial` is the initial radius of the largest (scene units).
     #[inline]
     pub fn volume_radius(&self, initial: f32, level: usize) -> f32 {
         initial * self.volume * volume::level_factor(level, self.levels)
@@ -60,23 +60,23 @@ pub fn level_factor2(level: usize, levels: usize) -> f32 {
 #[derive(Clone, Debug)]
 pub struct BandwidthState {
     schedule: Schedule,
-    /// Where they follow from the photons found: squared radii on surfaces by kind of every pixel and level (square
-    /// scene units).
+    /// Squared radii on surfaces by kind of every pixel and level (square scene units), under a rule that counts
+    /// photons.
     counted: Option<ByKind<Vec<f32>>>,
 }
 
 impl BandwidthState {
-    /// Those that follow `schedule`.
+    /// Bandwidths that follow `schedule`.
     pub fn memoryless(schedule: Schedule) -> BandwidthState {
         BandwidthState { schedule, counted: None }
     }
 
-    /// Those that a rule has made of the photons found, if any; in media they follow `schedule`.
+    /// Bandwidths of a rule that counts photons, if there is one; in media, and without one, they follow `schedule`.
     pub fn new(schedule: Schedule, counted: Option<ByKind<Vec<f32>>>) -> BandwidthState {
         BandwidthState { schedule, counted }
     }
 
-    /// Squared radius of a level (from 0, the smallest) of the pixel that has this index (square scene units).
+    /// Squared radius of a level (from 0, the smallest) of the pixel with this index (square scene units).
     #[inline]
     pub fn radius2(&self, index: usize, pixel: &PixelAccumulator, kind: Kind, level: usize) -> f32 {
         match &self.counted {
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_level_halves_the_measure_of_the_next_larger_and_the_first_iteration_has_the_initial_bandwidth() {
+    fn each_level_has_half_the_size_of_the_next_and_the_first_iteration_has_the_initial_bandwidth() {
         let first = Schedule::new(1, 5, 0.5, 0.5);
         assert_eq!((first.radius2(3.0, 4), first.volume_radius(3.0, 4)), (9.0, 3.0));
         let later = Schedule::new(100, 5, 0.5, 0.5);
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_rule_has_counted_takes_the_place_of_the_schedule_on_surfaces_alone() {
+    fn counted_radii_replace_the_schedule_on_surfaces_only() {
         let schedule = Schedule::new(1, 2, 0.5, 0.5);
         let mut pixel = PixelAccumulator::new(2, 0, [1.0, 2.0]);
         pixel.volume_bandwidth = 5.0;

@@ -1,35 +1,35 @@
-//! Kernels of density estimation: how much a photon counts by its distance.
+//! Kernels of density estimation: the weight of a photon by its distance.
 //!
-//! All have the bandwidth as the radius of their support, and the squared distance over the squared bandwidth, `s` in
-//! [0, 1), as their argument. What is written here is a kernel over the box kernel: on surfaces, times 1 / (pi r^2) it
-//! integrates to one over the disc of radius r; in media, times 3 / (4 pi r^3), over the ball.
+//! The bandwidth is the radius of the support of all kernels. Their argument `s`, in [0, 1), is the squared distance
+//! over the squared bandwidth. Values are relative to the box kernel: on surfaces a kernel times 1 / (pi r^2)
+//! integrates to one over the disc of radius r, in media a kernel times 3 / (4 pi r^3) over the ball.
 
 use std::f32::consts::PI;
 use wide::f32x8;
 
-/// A kernel.
+/// A kernel of density estimation.
 pub trait Kernel: Copy + Send + Sync + 'static {
-    /// Constant over its support, so that a photon counts alike in all bandwidths that hold it.
+    /// Whether the kernel is constant, so that a photon has equal weight at all bandwidths that contain it.
     const BOX: bool;
-    /// Second moment along an axis, over the squared bandwidth: it scales the bias.
+    /// Second moment along an axis over the squared bandwidth; bias is proportional to it.
     const SECOND_MOMENT: f32;
-    /// Integral of the squared kernel, times pi r^2: it scales the variance.
+    /// Integral of the squared kernel times pi r^2; variance is proportional to it.
     const ROUGHNESS: f32;
-    /// The kernel over the box kernel, on surfaces.
+    /// The kernel relative to the box kernel, on surfaces.
     fn weight(s: f32) -> f32;
-    /// The same in media: of the same shape, normalised over the ball.
+    /// The kernel relative to the box kernel, in media: of equal shape, normalised over the ball.
     fn ball_weight(s: f32) -> f32;
 }
 
-/// One within the bandwidth \[post-reconstruction 2021, (3)\].
+/// The box kernel: one within the bandwidth \[post-reconstruction 2021, (3)\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Box;
 
-/// `2 (1 - s)`, over the ball `5/2 (1 - s)`: of all kernels the one of least asymptotic error \[Epanechnikov 1969\].
+/// `2 (1 - s)`, and `5/2 (1 - s)` in media: the kernel of least asymptotic error \[Epanechnikov 1969\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Epanechnikov;
 
-/// A normal distribution cut off at three standard deviations, and normalised on what is left.
+/// A normal distribution, cut off at three standard deviations and normalised.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Gaussian;
 
@@ -61,11 +61,11 @@ impl Kernel for Epanechnikov {
     }
 }
 
-/// Half the squared bandwidth over the variance: the exponent at the rim.
+/// Half the squared bandwidth over the variance, which is the exponent at the rim.
 const RIM: f32 = 4.5;
-/// Share of the normal distribution within three standard deviations, in two dimensions: `1 - exp(-RIM)`.
+/// Fraction of the normal distribution within three standard deviations, in two dimensions: `1 - exp(-RIM)`.
 const KEPT: f32 = 0.988_891;
-/// At the centre, the kernel over the ball over its box kernel: `1 / int_0^1 3 x^2 exp(-RIM x^2) dx`.
+/// Value at the centre relative to the box kernel, in media: `1 / int_0^1 3 x^2 exp(-RIM x^2) dx`.
 const BALL_PEAK: f32 = 7.397_645;
 
 impl Kernel for Gaussian {
@@ -82,9 +82,8 @@ impl Kernel for Gaussian {
     }
 }
 
-/// Second derivatives of a smooth kernel, the triweight `4 / pi (1 - s)^3`, summed over both axes: the Laplacian of
-/// what photons estimate. Per photon at `s` within the squared bandwidth; in 1/m4 for a bandwidth of 1 m, else over its
-/// fourth power.
+/// Laplacian of a smooth kernel, the triweight `4 / pi (1 - s)^3`. Summed over photons, with the fourth power of the
+/// bandwidth as divisor, it estimates the Laplacian of the photon density. `s` must be below 1.
 #[inline]
 pub fn laplacian(s: f32x8) -> f32x8 {
     (f32x8::ONE - s) * (s * 3.0 - 1.0) * (48.0 / PI)
@@ -94,7 +93,7 @@ pub fn laplacian(s: f32x8) -> f32x8 {
 mod tests {
     use super::*;
 
-    /// Midpoint sums over s of `f(s) weight`: ds stands for the area element over pi r^2.
+    /// Midpoint sum over s of `f(s)`; ds is the area element over pi r^2.
     fn integral(f: impl Fn(f64) -> f64) -> f64 {
         let n = 200_000;
         (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)
@@ -103,11 +102,11 @@ mod tests {
     fn check<K: Kernel>() {
         let weight = |s: f64| f64::from(K::weight(s as f32));
         assert!((integral(weight) - 1.0).abs() < 1e-5);
-        // Of a round kernel half of the mean squared distance lies along each axis.
+        // A round kernel has half of the mean squared distance along each axis.
         assert!((integral(|s| 0.5 * s * weight(s)) - f64::from(K::SECOND_MOMENT)).abs() < 1e-5);
         assert!((integral(|s| weight(s) * weight(s)) - f64::from(K::ROUGHNESS)).abs() < 1e-4);
         assert_eq!(K::BOX, weight(0.0) == weight(0.9));
-        // Over the ball the volume element over 4/3 pi r^3 is 3/2 sqrt(s) ds.
+        // In a ball the volume element over 4/3 pi r^3 is 3/2 sqrt(s) ds.
         let over_ball = |w: fn(f32) -> f32| integral(|s| 1.5 * s.sqrt() * f64::from(w(s as f32)));
         assert!((over_ball(K::ball_weight) - 1.0).abs() < 1e-5);
         assert!(K::BOX || (over_ball(K::weight) - 1.0).abs() > 0.1, "the disc's normalisation goes unnoticed");
@@ -116,15 +115,15 @@ mod tests {
     }
 
     #[test]
-    fn kernels_are_normal_and_know_their_moments() {
+    fn kernels_are_normalised_and_moments_are_right() {
         check::<Box>();
         check::<Epanechnikov>();
         check::<Gaussian>();
     }
 
-    /// It gives nothing for a constant, and 4 for x^2 + y^2, whose Laplacian is 4, at any bandwidth.
+    /// The Laplacian is zero for a constant and 4 for x^2 + y^2, at any bandwidth.
     #[test]
-    fn the_laplacian_is_that_of_the_field() {
+    fn the_laplacian_of_the_kernel_estimates_that_of_the_field() {
         for radius2 in [0.25f32, 1.0, 9.0] {
             let area = f64::from(PI * radius2);
             let of = |field: &dyn Fn(f64) -> f64| {

@@ -1,8 +1,8 @@
 //! Photons sorted along a Morton curve, eight to a leaf, under a complete 8-ary tree of bounding boxes.
 //!
-//! The tree has no pointers: node `i` of a level has the nodes `8 i .. 8 i + 8` of the level below as children. A query
-//! tests the eight boxes of a node, or the eight photons of a leaf, with one vector instruction each. Unlike a grid it
-//! does not care how photons cluster (caustics) or how bandwidths spread, and nothing can be counted twice.
+//! The tree has no pointers: the children of node `i` are the nodes `8 i .. 8 i + 8` of the next level. A query tests
+//! the eight boxes of a node, or the eight photons of a leaf, with one vector instruction each. Unlike a grid, the tree
+//! is insensitive to clusters of photons (caustics) and to the range of bandwidths, and it never finds a photon twice.
 
 use super::ThinningKey;
 use crate::math::{Rgb, Vec3};
@@ -10,29 +10,29 @@ use crate::spectrum::Band;
 use rayon::prelude::*;
 use wide::{CmpLt, f32x8};
 
-/// Photons (and children) per node.
+/// Number of photons per leaf, and of children per node.
 const WIDTH: usize = 8;
-/// Levels of nodes that a map of 2^32 photons needs: log8(2^32 / 8) rounded up.
+/// Levels of a map of 2^32 photons: log8(2^32 / 8), rounded up.
 const MAX_LEVELS: usize = 10;
 /// Bits per axis of the Morton code.
 const MORTON_BITS: u32 = 21;
 
-/// What kind of light path left a photon: how hard to find its light is for camera paths, where all bounces so far were
-/// delta; nothing is known of others.
+/// Whether, and how likely, camera paths find the light of a photon, if all bounces so far were delta. Unknown (0) for
+/// other photons.
 ///
-/// A byte: 1 if the light is a delta light, else twice the exponent of the density of emission, which so is known to a
-/// factor of two and no number is 1.
+/// One byte: 1 for a delta light, otherwise twice the biased exponent of the density of emission. So the density is
+/// known up to a factor of two, and no density is stored as 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct PhotonFlags(u8);
 
 impl PhotonFlags {
-    /// The light is a delta light: no camera path that continues can find it.
+    /// The photon comes from a delta light: no continued camera path can find it.
     pub const UNREACHABLE: PhotonFlags = PhotonFlags(1);
-    /// What is added to exponents, and the least and the largest that there are.
+    /// Bias of exponents, and the range of exponents.
     const BIAS: i32 = 64;
     const EXPONENTS: (i32, i32) = (-63, 63);
 
-    /// The light has a size and is emitted with this density ([`crate::light::EmissionDensity::ray_density`]).
+    /// For a light with a size that emits with this density ([`crate::light::EmissionDensity::ray_density`]).
     #[inline]
     pub fn from_area_light(density: f32) -> PhotonFlags {
         let exponent = (density.to_bits() >> 23 & 0xff) as i32 - 127;
@@ -40,44 +40,44 @@ impl PhotonFlags {
         PhotonFlags(((exponent.clamp(least, largest) + Self::BIAS) << 1) as u8)
     }
 
-    /// That density, rounded down to a power of two; 0 where there is none.
+    /// The density of emission, rounded down to a power of two; 0 if there is none.
     #[inline]
     pub fn density(self) -> f32 {
         if self.0 < 2 { 0.0 } else { f32::from_bits(((i32::from(self.0 >> 1) - Self::BIAS + 127) as u32) << 23) }
     }
 }
 
-/// A light-path vertex, as small as gathering allows, and in the order in which gathering loads it.
+/// A light vertex, reduced to the data that gathering needs, in the order in which gathering loads it.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 pub struct Photon {
     /// World position.
     pub p: Vec3,
-    /// Unit direction towards where the light came from.
+    /// Unit direction towards the previous vertex.
     pub wi: Vec3,
     /// Unit geometric normal of the surface.
     pub ng: Vec3,
-    /// Flux (W), already divided by the number of light paths of the pass.
+    /// Flux (W), already divided by the number of light paths of the iteration.
     pub flux: Rgb,
-    /// Segments of the light path up to here.
+    /// Number of segments of the light path.
     pub depth: u16,
-    /// Kind of light path.
+    /// Whether camera paths find its light.
     pub flags: PhotonFlags,
-    /// Of the light path's wavelength.
+    /// Band of the light path's wavelength.
     pub band: Band,
-    /// Its weight; nothing where light paths are not guided.
+    /// Weight and rank, for rules that count photons; zero if light paths are not guided.
     pub thinning_key: ThinningKey,
 }
 
 impl Photon {
-    /// Cosine of the direction with the normal.
+    /// Cosine between direction and normal.
     #[inline]
     pub fn cosine(&self) -> f32 {
         self.wi.dot(self.ng).abs()
     }
 }
 
-/// Eight positions, structure of arrays; absent photons are infinitely far away.
+/// Positions of eight photons; absent photons are infinitely far away.
 #[derive(Clone, Copy)]
 struct Leaf {
     x: f32x8,
@@ -85,20 +85,20 @@ struct Leaf {
     z: f32x8,
 }
 
-/// Bounding boxes of eight children; absent children are empty boxes.
+/// Bounding boxes of eight children; boxes of absent children are empty.
 #[derive(Clone, Copy)]
 struct Node {
     min: [f32x8; 3],
     max: [f32x8; 3],
 }
 
-/// What a map can hold.
+/// A photon that a map can store.
 pub trait Located: Copy + Send + Sync {
     /// World position.
     fn position(&self) -> Vec3;
     /// Unit geometric normal of the surface.
     fn normal(&self) -> Vec3;
-    /// Whether it is fit for the map.
+    /// Whether all its data are finite.
     fn is_finite(&self) -> bool;
 }
 
@@ -119,19 +119,19 @@ impl Located for Photon {
     }
 }
 
-/// Photons of one pass, ready for range queries.
+/// Photons of one iteration with a tree for range queries.
 pub struct PhotonMap<P = Photon> {
     photons: Vec<P>,
-    /// Photons that were not finite.
+    /// Number of photons that were not finite.
     rejected: u64,
     paths: u32,
     leaves: Vec<Leaf>,
     quantiser: Quantiser,
-    /// `levels[0]` is the root's level (one node); the last level's children are leaves.
+    /// `levels[0]` has the root node; the children of the last level are leaves.
     levels: Vec<Vec<Node>>,
 }
 
-/// Spreads the low 21 bits of `v`, two zeros between neighbours.
+/// Spreads the low 21 bits of `v`: two zeros between neighbouring bits.
 #[inline]
 fn spread(v: u64) -> u64 {
     let mut x = v & 0x1f_ffff;
@@ -178,8 +178,8 @@ impl Aabb {
 }
 
 impl<P: Located> PhotonMap<P> {
-    /// Builds a map. `photons` come in a fixed order (by path, then vertex); photons that share a Morton cell keep it,
-    /// so the map and every query's order of visits depend on the photons alone. Photons that are not finite are left
+    /// Builds a map. The order of `photons` must be fixed (by path, then vertex). Photons in one Morton cell keep it,
+    /// so the order in which queries visit photons depends on the photons alone. Photons that are not finite are left
     /// out.
     pub fn build(mut photons: Vec<P>) -> PhotonMap<P> {
         let all = photons.len();
@@ -230,19 +230,19 @@ impl<P: Located> PhotonMap<P> {
         PhotonMap { photons, rejected, paths: 0, leaves, quantiser, levels }
     }
 
-    /// The same, of so many light paths that estimates can tell how many photons to expect.
+    /// Sets the number of light paths, from which expected numbers of photons are derived.
     #[must_use]
     pub fn of_paths(self, paths: u32) -> PhotonMap<P> {
         PhotonMap { paths, ..self }
     }
 
-    /// Light paths that have left the photons; 0 where that is not told.
+    /// Number of light paths that left the photons; 0 if unknown.
     #[inline]
     pub fn paths(&self) -> u32 {
         self.paths
     }
 
-    /// Photons that were left out because they were not finite.
+    /// Number of photons that were left out because they were not finite.
     pub fn rejected(&self) -> u64 {
         self.rejected
     }
@@ -252,21 +252,21 @@ impl<P: Located> PhotonMap<P> {
         &self.photons
     }
 
-    /// Bytes held.
+    /// Memory used, in bytes.
     pub fn bytes(&self) -> usize {
         self.photons.len() * size_of::<P>()
             + self.leaves.len() * size_of::<Leaf>()
             + self.levels.iter().map(|l| l.len() * size_of::<Node>()).sum::<usize>()
     }
 
-    /// About `2 * reach` photons around `p` along the Morton curve: a good guess at its neighbourhood.
+    /// About `2 * reach` photons before and after `p` along the Morton curve, most of which are near `p`.
     pub(super) fn around(&self, p: Vec3, reach: usize) -> &[P] {
         let code = self.quantiser.code(p);
         let at = self.photons.partition_point(|photon| self.quantiser.code(photon.position()) < code);
         &self.photons[at.saturating_sub(reach)..(at + reach).min(self.photons.len())]
     }
 
-    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p`, in Morton
+    /// Calls `visit(photon, squared distance)` for every photon strictly nearer to `p` than `sqrt(radius2)`, in Morton
     /// order.
     #[inline]
     pub fn within(&self, p: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
@@ -276,7 +276,8 @@ impl<P: Located> PhotonMap<P> {
         });
     }
 
-    /// As [`PhotonMap::within`], where `visit` also gets and returns the radius squared, which it may shrink.
+    /// As [`PhotonMap::within`], but `visit` also receives the squared radius and returns a new one, which must not be
+    /// larger.
     #[inline]
     pub(super) fn traverse(&self, p: Vec3, mut radius2: f32, mut visit: impl FnMut(&P, f32, f32) -> f32) {
         if self.levels.is_empty() {
@@ -284,7 +285,7 @@ impl<P: Located> PhotonMap<P> {
         }
         let (px, py, pz) = (f32x8::splat(p.x), f32x8::splat(p.y), f32x8::splat(p.z));
         let leaf_level = self.levels.len();
-        // (index, children still to visit) of the node being visited on each level.
+        // For each level: the node being visited, and the bits of its children still to visit.
         let mut stack = [(0u32, 0u32); MAX_LEVELS];
         let mut level = 0;
         stack[0] = (0, self.hit_children(0, 0, px, py, pz, radius2));
@@ -317,7 +318,7 @@ impl<P: Located> PhotonMap<P> {
         }
     }
 
-    /// Bits of the children of a node whose boxes come nearer than the radius.
+    /// Bits of the children of a node whose boxes are nearer than the radius.
     #[inline]
     fn hit_children(&self, level: usize, node: usize, px: f32x8, py: f32x8, pz: f32x8, radius2: f32) -> u32 {
         let node = &self.levels[level][node];
@@ -335,7 +336,7 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Clustered photons: a sheet, a tight caustic cluster, duplicates.
+    /// Photons on a sheet, in a tight cluster, at one point, and scattered.
     fn photons(n: u64) -> Vec<Photon> {
         (0..n)
             .map(|i| {
@@ -387,9 +388,9 @@ mod tests {
         }
     }
 
-    /// Kernel of equation (3) is strict: a photon exactly on the rim is not counted.
+    /// The kernel of equation (3) is strict: a photon exactly on the rim is not counted.
     #[test]
-    fn the_rim_is_outside() {
+    fn photons_on_the_rim_are_not_found() {
         let map = PhotonMap::build(vec![Photon {
             p: Vec3::X,
             wi: Vec3::Y,

@@ -1,13 +1,13 @@
-//! Queries that follow one another closely: photons around a place are kept and scanned, instead of looked for again.
+//! Cache for range queries at neighbouring points: the photons around a point are copied and scanned.
 //!
-//! The camera paths of neighbouring pixels gather within a fraction of the bandwidth of each other. What a scan visits,
-//! and in which order, is what the tree would have visited, so nothing depends on what happens to be kept.
+//! Camera paths of neighbouring pixels gather within a fraction of the bandwidth of each other. A scan visits the
+//! photons that the tree would visit, in the order of the tree, so results do not depend on the state of the cache.
 
 use super::map::{Located, PhotonMap};
 use crate::math::Vec3;
 use wide::{CmpGt, CmpLt, f32x8};
 
-/// Photons of a surface whose normal turns further than this (cosine) from the gathering point's are not its own.
+/// A photon belongs to another surface if the cosine between its normal and that of the gathering point is smaller.
 const NORMAL_COSINE: f32 = 0.7;
 
 /// Whether a photon lies on the surface around a point with geometric normal `ng`.
@@ -16,16 +16,17 @@ pub fn same_surface(photon: &impl Located, ng: Vec3) -> bool {
     photon.normal().dot(ng) > NORMAL_COSINE
 }
 
-/// Kept radius over the radius of the query that filled it. Larger ones serve more queries and are scanned for longer.
-const REACH: f32 = 1.75;
-/// Most photons kept; where there are more, the tree is faster.
-const MOST: usize = 512;
-/// A query this much of its radius away from the one before it is likely to be followed by others like it.
-const COHERENT: f32 = 0.75;
-/// What rounding may do to distances, relative.
+/// Radius of the cache over the radius of the query that filled it. A larger cache serves more queries but takes longer
+/// to scan.
+const CACHE_RADIUS_RATIO: f32 = 1.75;
+/// Largest number of cached photons; with more, the tree is faster.
+const MAX_CACHED: usize = 512;
+/// A query fills the cache if its distance from the previous query, relative to the radius, is below this.
+const MAX_MOVE: f32 = 0.75;
+/// Bound of the relative rounding error of distances.
 const ROUNDING: f32 = 1e-4;
 
-/// Positions and normals of eight photons; absent ones are infinitely far away.
+/// Positions and normals of eight photons; absent photons are infinitely far away.
 #[derive(Clone, Copy)]
 struct Eight {
     p: [f32x8; 3],
@@ -36,22 +37,22 @@ struct Eight {
 #[derive(Clone, Copy)]
 struct Hits {
     distance2: f32x8,
-    /// One bit each.
+    /// A bit for each photon found.
     inside: u32,
-    /// Index of the first.
+    /// Index of the first photon of the eight.
     first: u32,
 }
 
-/// The photons around a place. One per worker and map.
+/// Cache of the photons around a point. Each thread has one per map.
 pub struct Near<P> {
     center: Vec3,
-    /// All photons nearer than this to the centre are kept; 0: none are.
+    /// All photons nearer to the centre are cached; 0 if none are.
     radius: f32,
-    /// Where the last query was.
+    /// Position of the last query.
     last: Vec3,
     photons: Vec<P>,
     eights: Vec<Eight>,
-    /// What the last scan has found, room for as many as there are eights and one.
+    /// Result of the last scan. Its length is the number of eights plus one.
     hits: Vec<Hits>,
 }
 
@@ -63,15 +64,15 @@ impl<P> Default for Near<P> {
 }
 
 impl<P: Located> PhotonMap<P> {
-    /// Calls `visit(photon, distance squared)` for every photon strictly nearer than `sqrt(radius2)` to `p` whose
-    /// surface is that of normal `ng`, in Morton order.
+    /// Calls `visit(photon, squared distance)` for every photon strictly nearer to `p` than `sqrt(radius2)` on the
+    /// surface with normal `ng`, in Morton order.
     #[inline]
     pub fn gather(&self, near: &mut Near<P>, p: Vec3, ng: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
         let radius = radius2.sqrt();
         let moved = near.last.distance_squared(p);
         near.last = p;
         let covered = (near.center.distance(p) + radius) * (1.0 + ROUNDING) <= near.radius;
-        if covered || (moved < COHERENT * COHERENT * radius2 && self.fill(near, p, radius * REACH)) {
+        if covered || (moved < MAX_MOVE * MAX_MOVE * radius2 && self.fill(near, p, radius * CACHE_RADIUS_RATIO)) {
             near.scan(p, ng, radius2, visit);
         } else {
             self.within(p, radius2, |photon, distance2| {
@@ -82,17 +83,17 @@ impl<P: Located> PhotonMap<P> {
         }
     }
 
-    /// Keeps the photons around `center`; `false`, and none are kept, if there are too many.
+    /// Caches the photons around `center`. Returns false, with an empty cache, if there are too many.
     #[cold]
     fn fill(&self, near: &mut Near<P>, center: Vec3, radius: f32) -> bool {
         near.photons.clear();
         near.eights.clear();
         self.traverse(center, radius * radius, |photon, _, radius2| {
             near.photons.push(*photon);
-            // Shrunk to nothing, the search ends early.
-            if near.photons.len() > MOST { 0.0 } else { radius2 }
+            // A radius of zero ends the search.
+            if near.photons.len() > MAX_CACHED { 0.0 } else { radius2 }
         });
-        if near.photons.len() > MOST {
+        if near.photons.len() > MAX_CACHED {
             near.radius = 0.0;
             return false;
         }
@@ -114,7 +115,7 @@ impl<P: Located> PhotonMap<P> {
 impl<P: Located> Near<P> {
     #[inline]
     fn scan(&mut self, p: Vec3, ng: Vec3, radius2: f32, mut visit: impl FnMut(&P, f32)) {
-        // First all distances, without a branch or a call between them, then the visits.
+        // All distances first, without branches or calls between them, then the visits.
         let found = self.find(p, ng, radius2);
         for hits in &self.hits[..found] {
             let (photons, distance2) = (&self.photons[hits.first as usize..], hits.distance2.to_array());
@@ -127,7 +128,7 @@ impl<P: Located> Near<P> {
         }
     }
 
-    /// Puts what is near into [`Near::hits`] and says how many those are.
+    /// Writes the photons near `p` to [`Near::hits`] and returns the number of entries.
     #[inline(never)]
     fn find(&mut self, p: Vec3, ng: Vec3, radius2: f32) -> usize {
         let (p, ng) = (p.to_array().map(f32x8::splat), ng.to_array().map(f32x8::splat));
@@ -136,10 +137,10 @@ impl<P: Located> Near<P> {
         for (k, eight) in self.eights.iter().enumerate() {
             let d: [f32x8; 3] = std::array::from_fn(|a| eight.p[a] - p[a]);
             let distance2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            // As `Vec3::dot` adds.
+            // In the order of `Vec3::dot`.
             let cos = eight.n[0] * ng[0] + eight.n[1] * ng[1] + eight.n[2] * ng[2];
             let inside = (distance2.cmp_lt(radius2) & cos.cmp_gt(cosine)).move_mask() as u32;
-            // The next takes the place of those without any.
+            // An entry without hits is overwritten by the next.
             self.hits[found] = Hits { distance2, inside, first: 8 * k as u32 };
             found += usize::from(inside != 0);
         }
@@ -154,9 +155,9 @@ mod tests {
     use crate::random::{Domain, Purpose, Stream};
     use crate::spectrum::Band;
 
-    /// Clusters, duplicates and a sheet with two kinds of normals; queries that walk, jump, and change their radius.
+    /// Clusters, coincident photons and a sheet with two normals; queries that walk, jump and change their radius.
     #[test]
-    fn what_is_kept_changes_nothing() {
+    fn cached_queries_find_what_the_tree_finds() {
         let photons: Vec<Photon> = (0..20_000)
             .map(|i| {
                 let draws = Stream::new(5, 0, Domain::Test, i).vertex(0);

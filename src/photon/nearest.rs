@@ -1,22 +1,22 @@
-//! k-th nearest neighbour, for initial bandwidths.
+//! Distance to the k-th nearest photon, for initial bandwidths.
 
 use super::map::Located;
 use super::near::{Near, same_surface};
 use super::{Photon, PhotonMap};
 use crate::math::Vec3;
 
-/// Most neighbours that can be asked for.
+/// Largest k.
 pub const MAX_NEIGHBOURS: usize = 1024;
 
-/// The last distance over which the next search begins: a little more, so that it mostly suffices.
-const GUESS: f32 = 1.3;
+/// First search radius over the result of the last search; a little larger, so that it mostly suffices.
+const GUESS_RATIO: f32 = 1.3;
 
-/// Searches for the k-th nearest photon; one per worker and map. A search that follows another nearby begins with its
-/// result, which changes the effort, never the outcome.
+/// Searches for the k-th nearest photon. Each thread has one per map. The result of the last search is the first guess
+/// of the next, which affects the time only.
 pub struct Nearest<P = Photon> {
     near: Near<P>,
     distances2: Vec<f32>,
-    /// Squared distance that the last search found.
+    /// Squared distance found by the last search.
     last2: f32,
 }
 
@@ -27,15 +27,15 @@ impl<P> Default for Nearest<P> {
 }
 
 impl<P: Located> Nearest<P> {
-    /// Squared distance from `p` to its `k`-th nearest photon among those whose surface is that of normal `ng` and that
-    /// lie nearer than `sqrt(limit2)`; `None` when there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
+    /// Squared distance from `p` to its `k`-th nearest photon on the surface with normal `ng`, among those nearer than
+    /// `sqrt(limit2)`; `None` if there are fewer than `k`. `1 <= k <=` [`MAX_NEIGHBOURS`].
     pub fn radius2(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
-        let guess2 = (self.last2 * (GUESS * GUESS)).min(limit2);
+        let guess2 = (self.last2 * (GUESS_RATIO * GUESS_RATIO)).min(limit2);
         let mut found = None;
         if guess2 > 0.0 {
             self.distances2.clear();
             map.gather(&mut self.near, p, ng, guess2, |_, distance2| self.distances2.push(distance2));
-            // As many as that within a smaller radius: the k-th of them is the k-th of all.
+            // At least k photons within the guessed radius: the k-th of them is the k-th of all.
             if self.distances2.len() >= k {
                 found = Some(*self.distances2.select_nth_unstable_by(k - 1, f32::total_cmp).1);
             } else if guess2 == limit2 {
@@ -47,12 +47,12 @@ impl<P: Located> Nearest<P> {
         found
     }
 
-    /// Without a guess.
+    /// Searches without a guess.
     fn search(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
-        // A sorted run of the best distances: k is small, and an insertion moves half of it.
+        // The k smallest distances, sorted: k is small, and an insertion moves half of them.
         let best = &mut self.distances2;
         best.clear();
-        // The neighbourhood along the curve bounds the distance, so that the search proper starts small.
+        // Photons near `p` on the Morton curve bound the distance, so that the tree search starts with a small radius.
         let mut bound = limit2;
         for photon in map.around(p, 2 * k) {
             let distance2 = photon.position().distance_squared(p);
@@ -61,10 +61,10 @@ impl<P: Located> Nearest<P> {
             }
         }
         best.clear();
-        // The bound itself was reached by some photon: it must stay within.
+        // A photon lies at the bound itself, so the start is just above it.
         let start = if bound < limit2 { bound.next_up() } else { limit2 };
         map.traverse(p, start, |photon, distance2, radius2| {
-            // The other photons of a leaf were found before the radius shrank.
+            // The leaf was tested before the radius shrank.
             if distance2 >= radius2 || !same_surface(photon, ng) {
                 radius2
             } else {
@@ -75,11 +75,11 @@ impl<P: Located> Nearest<P> {
     }
 }
 
-/// Puts a distance into the sorted run of the `k` best; returns the radius squared that matters from now on.
+/// Inserts a distance into the `k` smallest, which are sorted. Returns the squared radius within which others matter.
 fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
     best.insert(best.partition_point(|&d| d <= distance2), distance2);
     best.truncate(k);
-    // Strictly nearer photons only may still displace the k-th.
+    // Only photons strictly nearer can replace the k-th.
     if best.len() == k { best[k - 1].min(radius2) } else { radius2 }
 }
 
@@ -91,7 +91,7 @@ mod tests {
     use crate::spectrum::Band;
 
     #[test]
-    fn agrees_with_sorting() {
+    fn the_kth_nearest_agrees_with_sorting() {
         let photons: Vec<Photon> = (0..3000)
             .map(|i| {
                 let draws = Stream::new(3, 0, Domain::Test, i).vertex(0);
@@ -113,7 +113,7 @@ mod tests {
         let mut nearest = Nearest::<Photon>::default();
         for q in 0..200 {
             let k = [1, 10, 20, 500][q as usize % 4];
-            // Some near the one before, some far.
+            // Queries near the previous one, and far from it.
             let u = Stream::new(4, 0, Domain::Test, q / 8).vertex((q % 8) as u32).two(Purpose::Pixel);
             let base = Stream::new(4, 1, Domain::Test, q / 8).vertex(0).two(Purpose::Pixel);
             let p = Vec3::new(base.x, base.y, 0.0) + 0.01 * Vec3::new(u.x, u.y, 0.0);

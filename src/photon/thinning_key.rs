@@ -1,52 +1,52 @@
-//! What lets photons of different weights be counted as if all weighed the same.
+//! Thinning of photons with different weights, so that counts follow the light.
 
-/// The weight of a photon and its rank among those of any weight.
+/// Weight and rank of a photon, in 32 bits.
 ///
-/// Where light paths are sent more often than their light asks for, each carries less: its weight is what it carries
-/// over what it would if starts were drawn by power alone. A rank is the weight over a number that is uniform on (0,
-/// 1), so that of photons of weight w those with a rank above W are a share `min(1, w / W)`, each on its own: a Poisson
-/// process, thinned \[Lewis and Shedler 1979\]. With W no less than any weight, they are as dense as photons that all
-/// weigh W and bring the same light.
+/// If more light paths are sent somewhere than power alone would send, each carries less flux. Its weight is its flux
+/// relative to that of a path sampled by power alone. Its rank is the weight over a uniform number in (0, 1). Of
+/// photons of weight w, a fraction `min(1, w / W)` has a rank above W, independently of each other: a thinned Poisson
+/// process \[Lewis and Shedler 1979\]. If W is the largest weight, the remaining photons are as dense as photons of
+/// weight W that carry the light in question.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ThinningKey(u32);
 
-/// The leading bits of a number that is not negative, in the order of numbers.
+/// The leading bits of a nonnegative number, which sort like the number.
 fn leading(x: f32) -> u32 {
     x.to_bits() >> 15
 }
 
 impl ThinningKey {
-    /// Of a weight above 0; `u` is uniform on `[0, 1)`.
+    /// The key of a weight above 0; `u` is uniform on `[0, 1)`.
     pub fn new(weight: f32, u: f32) -> ThinningKey {
         ThinningKey(leading(weight) << 16 | leading(weight / u))
     }
 
-    /// The weight, to one in 250.
+    /// The weight, with a relative error of at most 1/250.
     #[inline]
     pub fn weight(self) -> f32 {
         f32::from_bits(weight(self.0) << 15)
     }
 
-    /// All of it, in order of weight.
+    /// The packed bits; the upper half is the weight, the lower half the rank.
     #[inline]
     pub fn bits(self) -> u32 {
         self.0
     }
 }
 
-/// Weights of [`ThinningKey::bits`], in their order.
+/// The weight in [`ThinningKey::bits`], as an integer that sorts like the weight.
 #[inline]
 pub fn weight(bits: u32) -> u32 {
     bits >> 16
 }
 
-/// Whether the rank of a mark is above the largest number of a weight.
+/// Whether the rank in [`ThinningKey::bits`] exceeds a weight.
 #[inline]
 pub fn above(bits: u32, weight: u32) -> bool {
     bits & 0xffff > weight
 }
 
-/// The number that ranks above a weight are not below.
+/// Lower bound of all ranks that `above(_, weight)` accepts.
 pub fn bound(weight: u32) -> f32 {
     f32::from_bits((weight + 1) << 15)
 }

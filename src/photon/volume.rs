@@ -4,25 +4,25 @@ use super::map::Located;
 use crate::math::{Rgb, Vec3};
 use crate::spectrum::Band;
 
-/// A light-path vertex in a medium.
+/// A light vertex in a medium, reduced to the data that gathering needs.
 #[derive(Clone, Copy, Debug)]
 pub struct VolumePhoton {
     /// World position.
     pub p: Vec3,
-    /// Unit direction towards where the light came from.
+    /// Unit direction towards the previous vertex.
     pub wi: Vec3,
-    /// Flux times length (W m), already divided by the number of light paths of the pass: summed over a volume and
-    /// divided by it, it is the fluence there, whatever the medium.
+    /// Flux times length (W m), already divided by the number of light paths of the iteration. The sum over a volume,
+    /// divided by the volume, is the fluence.
     pub flux: Rgb,
-    /// Which medium it is in: gathering points in others do not see it.
+    /// Identifier of its medium; gathering points in other media ignore it.
     pub medium: u32,
-    /// Segments of the light path up to here.
+    /// Number of segments of the light path.
     pub depth: u16,
-    /// Of the light path's wavelength.
+    /// Band of the light path's wavelength.
     pub band: Band,
 }
 
-/// The normal of all photons in media, which have none: queries with it leave none out.
+/// The normal of all photons in media. Queries with this normal find all of them.
 pub const NO_NORMAL: Vec3 = Vec3::Z;
 
 impl Located for VolumePhoton {

@@ -6,7 +6,7 @@ use super::request::{PictureRequest, Request};
 use crate::camera::Camera;
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::InitialBandwidth;
-use crate::estimator::bandwidth::LEAST_ASKED;
+use crate::estimator::bandwidth::MIN_USER_RADIUS_RATIO;
 use crate::plan::Search;
 use crate::render::Settings;
 use crate::render::output::layer_shape;
@@ -83,7 +83,7 @@ fn check_media(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
 /// that most of the area of a density estimate lies outside.
 fn check_bandwidth(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let radius = scene.lights.sky().radius;
-    let least = LEAST_ASKED * radius;
+    let least = MIN_USER_RADIUS_RATIO * radius;
     let (cause, bound) = match settings.initial_bandwidth {
         InitialBandwidth::Fixed(length) if length < least => (
             format!(

@@ -61,7 +61,7 @@ fn sizes() -> Vec<Value> {
     let rule = ChiSquared::new(&ChiSquaredSettings { significance: 1e-300, ..ChiSquaredSettings::default() });
     let frame = Frame::from_normal(Vec3::Z);
     let critical = Distribution::new(11.0).map_or(f64::NAN, |d| d.inverse_cdf(0.95));
-    let mut bandwidth = [rule.begin(1.0, 10.0, 0)];
+    let mut bandwidth = [rule.initial(1.0, 10.0, 0)];
     let mut all = Vec::new();
     for photons in [3u64, 4, 5, 6, 8, 10, 12, 15, 20, 30, 60, 120, 1000] {
         let trials = if photons > 120 { TRIALS / 5 } else { TRIALS };
@@ -91,7 +91,7 @@ fn looks() -> Value {
     let mut first_rejection = Vec::new();
     let mut areas = Vec::new();
     for pixel in 0..PIXELS {
-        let mut bandwidth = [rule.begin(1.0, 10.0, 0)];
+        let mut bandwidth = [rule.initial(1.0, 10.0, 0)];
         let mut counts = [0u32; 12];
         let mut rejected = None;
         for i in 1..=LOOKS {

@@ -1,20 +1,20 @@
 //! The adaptive rule \[Kaplanyan and Dachsbacher 2013\]: the bandwidth of least asymptotic error, from estimates of
 //! variance and bias.
 //!
-//! Photons of density q of squared contributions give one iteration the variance `q R / (pi r^2)`, and a field of
-//! Laplacian D biases its estimate by `r^2 k D / 2`, where R and k are the kernel's roughness and second moment. Over N
-//! iterations whose squared radii fall as `i^(-1/3)`, the variance is 3/4 of that at the last radius over N, and the
-//! bias 3/2 of that at the last radius. The sum of variance and squared bias is least at
+//! Photons with a density q of squared contributions give one iteration the variance `q R / (pi r^2)`; a field with
+//! Laplacian D gives it the bias `r^2 k D / 2`. R and k are the kernel's roughness and second moment. Over N iterations
+//! whose squared radii fall as `i^(-1/3)`, the variance of the mean is 3/4 of the last iteration's over N, and the bias
+//! is 3/2 of the last iteration's. The sum of variance and squared bias is least at
 //!
 //! `r^6 = 2 q R / (3 pi N k^2 D^2)`.
 //!
-//! q is estimated within the bandwidth. D is estimated with a smooth kernel of a bandwidth of its own, which shrinks as
-//! `i^(-1/10)`, the rate of least error for second derivatives in the plane. Both are means over all iterations. A
-//! square of an estimate is too large by its variance, which is taken off D^2; else noise would be taken for curvature,
-//! and bandwidths in dim light shrink to nothing.
+//! q is estimated within the bandwidth. D is estimated with a smooth kernel of its own bandwidth, which shrinks as
+//! `i^(-1/10)`, the best rate for second derivatives in the plane. Both are means over all iterations. The square of an
+//! estimate of D is too large by its variance, which is subtracted. Otherwise noise would count as curvature, and
+//! bandwidths in dim light would shrink without bound.
 //!
 //! Bandwidths may grow, but stay within constant factors of the memoryless rule's, so that the estimate is consistent
-//! whatever is found.
+//! in any case.
 
 use super::CountingRule;
 use super::memoryless::radius2_factor;
@@ -26,50 +26,50 @@ use std::f64::consts::PI;
 use std::marker::PhantomData;
 use wide::{CmpLt, f32x8};
 
-/// Squared bandwidth of the Laplacian's first estimate over that of the usual image's.
-const PILOT: f32 = 4.0;
-/// Least and largest squared bandwidth, over that of the memoryless rule with alpha 2/3.
+/// Initial squared bandwidth of the Laplacian over the squared bandwidth of the picture level.
+const PILOT_RATIO: f32 = 4.0;
+/// Smallest and largest squared bandwidth, relative to the memoryless rule with alpha 2/3.
 const BOUNDS: (f64, f64) = (1.0 / 64.0, 4.0);
 
-/// Photons it takes for estimates to be worth anything.
-const LEAST_PHOTONS: u32 = 10;
+/// Smallest number of photons from which bandwidths are estimated.
+const MIN_PHOTONS: u32 = 10;
 
-/// The rule for a kernel.
+/// The adaptive rule for a kernel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Adaptive<K>(PhantomData<K>);
 
-/// The bandwidth of one level of one pixel. The sums of the largest level of a camera path stand for all of them, and the
-/// levels keep their ratio.
+/// The bandwidth of one level of one pixel. The sums of the largest level of a camera path determine all levels, which
+/// keep their ratio.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Bandwidth {
     /// Radius squared (m2).
     pub radius2: f32,
-    /// Its first value.
+    /// Initial squared radius (m2).
     initial2: f32,
-    /// Radius squared over that of the usual image.
+    /// Squared radius over that of the picture level.
     scale: f32,
-    /// Radius squared of the Laplacian's kernel.
+    /// Squared radius of the Laplacian's kernel.
     pilot2: f32,
-    /// Photons found within the bandwidth.
+    /// Number of photons found within the bandwidth.
     photons: u32,
     /// Sum over iterations of the estimates of q.
     shot: f64,
     /// Sum over iterations of the estimates of D.
     laplacian: f64,
-    /// Sum over iterations of the variances of these estimates.
+    /// Sum over iterations of the variances of the estimates of D.
     noise: f64,
 }
 
-/// What a camera path finds.
+/// Photons that a camera path has found.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Photons within the bandwidth.
+    /// Number of photons within the bandwidth.
     photons: u32,
     /// Sum of their squared contributions.
     squares: f64,
     /// Estimate of D.
     laplacian: f64,
-    /// Sum of the squares of what photons add to it: its variance, for a Poisson process.
+    /// Sum of the squared contributions to it: its variance, for a Poisson process.
     noise: f64,
 }
 
@@ -80,9 +80,9 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
 
     const BEYOND: bool = true;
 
-    fn begin(&self, radius2: f32, _: f32, above: i32) -> Bandwidth {
+    fn initial(&self, radius2: f32, _: f32, above: i32) -> Bandwidth {
         let scale = 2f32.powi(above);
-        let pilot2 = PILOT * radius2 / scale;
+        let pilot2 = PILOT_RATIO * radius2 / scale;
         Bandwidth { radius2, initial2: radius2, scale, pilot2, photons: 0, shot: 0.0, laplacian: 0.0, noise: 0.0 }
     }
 
@@ -104,7 +104,7 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         tally.squares += f64::from((within & (photons.light * photons.light)).reduce_add());
         let s = photons.distance2 / bandwidth.pilot2;
         let near = photons.distance2.cmp_lt(f32x8::splat(bandwidth.pilot2));
-        // What is not there is infinitely far away, and its product not a number: masked last.
+        // Unused lanes are infinitely far away, where the product is NaN, so the mask comes last.
         let parts = near & (photons.light * laplacian(s));
         let scale = f64::from(bandwidth.pilot2).powi(-2);
         tally.laplacian += f64::from(parts.reduce_add()) * scale;
@@ -117,23 +117,23 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
         last.shot += found.squares / (PI * f64::from(last.radius2));
         last.laplacian += found.laplacian;
         last.noise += found.noise;
-        let usual2 = f64::from(last.initial2 / last.scale);
+        let picture2 = f64::from(last.initial2 / last.scale);
         let next = i + 1;
-        last.pilot2 = (f64::from(PILOT) * usual2 * (next as f64).powf(-0.2)) as f32;
+        last.pilot2 = (f64::from(PILOT_RATIO) * picture2 * (next as f64).powf(-0.2)) as f32;
         let n = i as f64;
-        let memoryless2 = usual2 * radius2_factor(next, 2.0 / 3.0);
+        let memoryless2 = picture2 * radius2_factor(next, 2.0 / 3.0);
         let squared = (last.laplacian * last.laplacian - last.noise).max(0.0) / (n * n);
         let optimum = optimum2::<K>(last.shot / n, squared, n);
-        let known = last.photons >= LEAST_PHOTONS && !optimum.is_nan();
-        let usual2 = if known { optimum } else { memoryless2 };
-        let usual2 = usual2.clamp(BOUNDS.0 * memoryless2, BOUNDS.1 * memoryless2) as f32;
+        let known = last.photons >= MIN_PHOTONS && !optimum.is_nan();
+        let picture2 = if known { optimum } else { memoryless2 };
+        let picture2 = picture2.clamp(BOUNDS.0 * memoryless2, BOUNDS.1 * memoryless2) as f32;
         for bandwidth in bandwidths {
-            bandwidth.radius2 = (usual2 * bandwidth.scale).max(f32::MIN_POSITIVE);
+            bandwidth.radius2 = (picture2 * bandwidth.scale).max(f32::MIN_POSITIVE);
         }
     }
 }
 
-/// Squared radius of least error after `n` iterations where D^2 is `squared`; not a number where nothing is known.
+/// Squared radius of least error after `n` iterations, where `squared` is D^2; NaN if nothing is known.
 fn optimum2<K: Kernel>(shot: f64, squared: f64, n: f64) -> f64 {
     let bias2 = f64::from(K::SECOND_MOMENT).powi(2) * squared;
     (2.0 * shot * f64::from(K::ROUGHNESS) / (3.0 * PI * n * bias2)).cbrt()
@@ -147,9 +147,9 @@ mod tests {
     use crate::photon::kernel::{Box, Epanechnikov};
     use crate::random::{Domain, Purpose, Stream};
 
-    /// The optimum of the closed form against a search over constants c of radii `c i^(-1/6)`.
+    /// The closed form against a search over constants c of radii `c i^(-1/6)`.
     #[test]
-    fn the_optimum_is_the_least_error() {
+    fn the_optimum_has_the_least_error() {
         fn check<K: Kernel>() {
             let (q, d, n) = (3.0, 20.0, 4096.0);
             let error = |last2: f64| {
@@ -168,14 +168,13 @@ mod tests {
         check::<Epanechnikov>();
     }
 
-    /// Photons of density 30,000 (1 + d / 4 (x^2 + y^2)), whose Laplacian is 30,000 d: the estimates are unbiased
-    /// within five standard errors (3 % for that of d = 80), and the bandwidth is positive, grows where there is no
-    /// curvature and shrinks where there is.
+    /// Photons of density 30,000 (1 + d / 4 (x^2 + y^2)), whose Laplacian is 30,000 d. Estimates are unbiased within
+    /// five standard errors (3 % for d = 80). The bandwidth grows without curvature and shrinks with it.
     #[test]
-    fn curvature_is_found_and_shrinks_bandwidths() {
+    fn curvature_is_estimated_and_shrinks_bandwidths() {
         let run = |d: f64| {
             let rule = Adaptive::<Box>::default();
-            let mut bandwidth = rule.begin(0.01, 10.0, 0);
+            let mut bandwidth = rule.initial(0.01, 10.0, 0);
             for i in 1..=400u64 {
                 let mut tally = Tally::default();
                 for k in 0..54_000u64 {

@@ -1,9 +1,9 @@
-//! The chi-squared rule \[CPPM 2020\]: a bandwidth is kept as long as the photons within it look uniform, and shrinks
-//! only when a test says they do not.
+//! The chi-squared rule \[CPPM 2020\]: a bandwidth stays while the photons within it look uniform, and shrinks when a
+//! test rejects that.
 //!
-//! The disc of the bandwidth is cut into annuli of equal area and these into equal sectors (section 5.3). Photons of
-//! all iterations since the last reduction are counted where they fall, turned into the frame of their gathering point
-//! and laid flat \[(27)\].
+//! The disc of the bandwidth is divided into annuli of equal area, and these into equal sectors (section 5.3). Photons
+//! of all iterations since the last reduction are counted by cell, in the frame of their gathering point and projected
+//! to its plane \[(27)\].
 
 use super::CountingRule;
 use crate::math::{Frame, Vec3};
@@ -15,17 +15,17 @@ use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, i32x4, u32x4, u64x4};
 /// Parameters, with the paper's defaults (section 9.1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChiSquaredSettings {
-    /// Annuli, n_a.
+    /// Number of annuli, n_a.
     pub annuli: usize,
-    /// Sectors of an annulus, n_s.
+    /// Number of sectors per annulus, n_s.
     pub sectors: usize,
-    /// Bandwidth squared after a reduction over that before, where no smaller disc looks uniform, k.
+    /// Factor of the squared bandwidth in a reduction if no smaller disc looks uniform, k.
     pub k: f64,
-    /// Growth of the least count for a test with every reduction, beta.
+    /// Factor by which the smallest count for a test grows with every reduction, beta.
     pub beta: f64,
-    /// Probability of rejecting what is uniform, alpha_chi.
+    /// Probability of rejecting uniform photons, alpha_chi.
     pub significance: f64,
-    /// Channels apart, with photons of equal flux (section 9.4): what varies in flux alone does not escape the test.
+    /// Separate channels with photons of equal flux (section 9.4), so that the test also detects variations of flux.
     pub plus: bool,
 }
 
@@ -35,72 +35,73 @@ impl Default for ChiSquaredSettings {
     }
 }
 
-/// Least count for the first test, B_1, however few neighbours set the bandwidth: below it the statistic does not
-/// follow its distribution.
-pub const LEAST_BOUND: f32 = 10.0;
+/// Smallest count for the first test, B_1, even if fewer neighbours set the bandwidth. With fewer photons the statistic
+/// does not follow its distribution.
+pub const MIN_BOUND: f32 = 10.0;
 
-/// Photons of a level that are counted at most: see [`ChiSquared::sums`].
-const MOST_COUNTED: f64 = (1u32 << 30) as f64;
+/// Largest total count of a level; see [`ChiSquared::sums`].
+const MAX_COUNT: f64 = (1u32 << 30) as f64;
 
-/// The rule.
+/// The chi-squared rule.
 #[derive(Clone, Debug)]
 pub struct ChiSquared {
     annuli: usize,
     sectors: usize,
     k: f32,
     beta: f32,
-    /// Quantile for the disc of the `j + 1` innermost annuli; infinite where there is but one cell.
+    /// Quantile for the disc of the `j + 1` innermost annuli; infinite for a single cell.
     critical: Vec<f64>,
     /// Borders between annuli: squared radii over that of the disc.
     rings: Vec<f32>,
-    /// Directions of the borders between sectors, from the first axis, on one half of the disc if their number is even.
+    /// Directions of the borders between sectors, from the first axis. Of an even number only those in one half of the
+    /// disc.
     rays: Vec<(f32, f32)>,
-    /// Whether there are two annuli of six sectors: asked for every eight photons.
-    usual: bool,
+    /// Whether there are two annuli of six sectors.
+    has_default_cells: bool,
 }
 
 /// Cells of two annuli of six sectors.
-const USUAL: usize = 12;
-/// Bits of a cell in [`Tally::packed`], and how many times eight photons they count at most, of which a quarter are in
-/// each number.
+const DEFAULT_CELLS: usize = 12;
+/// Bits of a cell in [`Tally::packed`], and the largest number of octets of photons that they can count. Each of four
+/// numbers counts a quarter of the photons.
 const BITS: u32 = 5;
-const MOST_EIGHTS: u32 = 15;
-const _: () = assert!(2 * MOST_EIGHTS < 1 << BITS && USUAL as u32 * BITS < u64::BITS);
-/// Bits of a cell beside every other in the sum of those numbers, and all that every other cell has in them.
+const MAX_OCTETS: u32 = 15;
+const _: () = assert!(2 * MAX_OCTETS < 1 << BITS && DEFAULT_CELLS as u32 * BITS < u64::BITS);
+/// Bits of a cell when the four numbers are summed with every other cell left out, and the mask of every other cell.
 const WIDE: u32 = 2 * BITS;
 const EVEN: u64 = {
     let (mut mask, mut cell) = (0, 0);
-    while cell < USUAL as u32 {
+    while cell < DEFAULT_CELLS as u32 {
         mask |= ((1 << BITS) - 1) << (cell * BITS);
         cell += 2;
     }
     mask
 };
 
-/// What the photons of one camera path add to counts.
+/// Counts of the photons that one camera path finds.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// By level, photons in the usual cells, and last, in the bits that are left over, those that are not within; the
-    /// sum of four numbers.
+    /// By level, photons in each of the default cells. The remaining bits count photons outside. The counts are the
+    /// sums of four numbers.
     packed: [u64x4; MAX_LEVELS],
-    /// How many times eight photons these may be.
-    eights: u32,
-    /// By level, whether something has been counted beside those.
+    /// Number of octets of photons that have been added.
+    octets: u32,
+    /// By level, whether photons have been counted directly.
     counted: [bool; MAX_LEVELS],
 }
 
 impl Tally {
-    /// Adds the photons of a level to its counts, and says whether any were there.
+    /// Adds the photons of a level to its counts. Returns whether there are any.
     #[inline(always)]
     fn unpack(&mut self, level: usize, counts: &mut [u32]) -> bool {
         let packed = std::mem::take(&mut self.packed[level]).to_array();
-        // Sums of cells that have room beside each other.
+        // Sums of every other cell, which do not overflow into each other.
         let even = packed.iter().fold(0, |sum, packed| sum + (packed & EVEN));
         let odd = packed.iter().fold(0, |sum, packed| sum + (packed >> BITS & EVEN));
         if even | odd == 0 {
             return self.counted[level];
         }
-        let Some(counts) = counts.first_chunk_mut::<USUAL>() else { return false };
+        let Some(counts) = counts.first_chunk_mut::<DEFAULT_CELLS>() else { return false };
         let (fours, _) = counts.as_chunks_mut::<4>();
         for (k, four) in fours.iter_mut().enumerate() {
             let [even, odd] = [even, odd].map(|cells| (cells >> (2 * WIDE * k as u32)) as u32);
@@ -114,24 +115,24 @@ impl Tally {
     #[cold]
     #[inline(never)]
     pub fn settle(&mut self, counts: &mut [u32]) {
-        for (level, counts) in counts.chunks_exact_mut(USUAL).enumerate() {
+        for (level, counts) in counts.chunks_exact_mut(DEFAULT_CELLS).enumerate() {
             self.counted[level] = self.unpack(level, counts);
         }
-        self.eights = 0;
+        self.octets = 0;
     }
 }
 
 /// The bandwidth of one level of one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Radius squared (m2).
+    /// Squared radius (m2).
     pub radius2: f32,
-    /// Photons it takes for a test, B.
+    /// Number of photons required for a test, B.
     pub bound: f32,
 }
 
 impl ChiSquared {
-    /// The rule with its critical values. Annuli and sectors at least 1, `significance` in (0, 1).
+    /// The rule with its critical values. Annuli and sectors must be at least 1, `significance` in (0, 1).
     pub fn new(settings: &ChiSquaredSettings) -> ChiSquared {
         let ChiSquaredSettings { annuli, sectors, k, beta, significance, plus: _ } = *settings;
         let quantile = |cells: usize| match Distribution::new((cells - 1) as f64) {
@@ -151,14 +152,14 @@ impl ChiSquared {
             critical: (1..=annuli).map(|annuli| quantile(annuli * sectors)).collect(),
             rings: (1..annuli).map(|ring| ring as f32 / annuli as f32).collect(),
             rays,
-            usual: (annuli, sectors) == (2, 6),
+            has_default_cells: (annuli, sectors) == (2, 6),
         }
     }
 
-    /// Sectors of photons at `offset` from the gathering point with this frame. The direction of its projection decides
-    /// \[(27)\]; a photon on the normal through the point has none and counts in the first sector. The borders are
-    /// lines through the centre, if their number is even, so that a sector is the half it is in and the lines that it
-    /// is beyond: the lower half is numbered backwards.
+    /// Sectors of photons at `offset` from the gathering point with this frame, by the direction of the projected
+    /// offset \[(27)\]. Photons on the normal count in the first sector. An even number of borders forms lines through
+    /// the centre. Then the sector is the half of the disc plus the number of lines that the photon is beyond, so the
+    /// lower half is numbered backwards.
     fn sectors(&self, frame: &Frame, offset: &[f32x8; 3]) -> f32x8 {
         let (u, v) = (along(frame.t, offset), along(frame.b, offset));
         if !self.sectors.is_multiple_of(2) {
@@ -175,7 +176,7 @@ impl ChiSquared {
         sector
     }
 
-    /// [`CountingRule::count`] for any cells.
+    /// [`CountingRule::count`] for any numbers of annuli and sectors.
     #[inline(never)]
     fn count_any(
         &self,
@@ -187,7 +188,7 @@ impl ChiSquared {
     ) {
         let sectors = self.sectors(frame, &photons.offset);
         for (level, (bandwidth, counts)) in bandwidths.iter().zip(counts.chunks_exact_mut(self.counts())).enumerate() {
-            // A border belongs to the annulus outside.
+            // A photon on a border belongs to the outer annulus.
             let mut cell = sectors;
             for ring in &self.rings {
                 let outside = photons.distance2.cmp_ge(f32x8::splat(bandwidth.radius2 * ring));
@@ -203,10 +204,10 @@ impl ChiSquared {
         }
     }
 
-    /// The same for two annuli of six sectors, without a loop over borders, nor one over photons: those of a path are
-    /// first counted by five bits a cell.
+    /// [`CountingRule::count`] for two annuli of six sectors, without loops over borders or photons. The photons of a
+    /// path are first counted with five bits per cell.
     #[inline(always)]
-    fn count_usual(
+    fn count_default_cells(
         bandwidths: &[Bandwidth],
         counts: &mut [u32],
         tally: &mut Tally,
@@ -221,19 +222,19 @@ impl ChiSquared {
         for (bandwidth, packed) in bandwidths.iter().zip(&mut tally.packed) {
             let outside = photons.distance2.cmp_ge(by(bandwidth.radius2 * 0.5));
             let within = photons.distance2.cmp_lt(by(bandwidth.radius2));
-            let place = within.blend(sector + (outside & outer), by((USUAL as u32 * BITS) as f32));
+            let place = within.blend(sector + (outside & outer), by((DEFAULT_CELLS as u32 * BITS) as f32));
             let places = place.fast_trunc_int().to_array();
             let ones = |first: usize| u64x4::from(std::array::from_fn(|k| 1 << places[first + k]));
-            // Those not within may run over the last bit, and are nobody's.
+            // Photons outside may overflow the last bit, which nobody reads.
             *packed += ones(0) + ones(4);
         }
-        tally.eights += 1;
-        if tally.eights == MOST_EIGHTS {
+        tally.octets += 1;
+        if tally.octets == MAX_OCTETS {
             tally.settle(counts);
         }
     }
 
-    /// Sum of counts, and of their squares; exact as long as those are below 2^53, and each count below 2^31.
+    /// Sum of counts, and of their squares. Exact while these are below 2^53 and each count is below 2^31.
     #[inline]
     fn sums(counts: &[u32]) -> (f64, f64) {
         let (mut totals, mut squares) = (f64x4::ZERO, f64x4::ZERO);
@@ -242,10 +243,10 @@ impl ChiSquared {
             squares += count * count;
         };
         let (fours, rest) = counts.as_chunks::<4>();
-        // Numbers with a sign are converted by one instruction, those without by three.
+        // Converting a signed integer takes one instruction, an unsigned one three.
         let signed = |four: &[u32; 4]| f64x4::from_i32x4(i32x4::from(four.map(u32::cast_signed)));
         match fours {
-            // Those of the usual cells without a loop.
+            // Without a loop for the default cells.
             [a, b, c] => [a, b, c].into_iter().for_each(|four| add(signed(four))),
             fours => fours.iter().for_each(|four| add(signed(four))),
         }
@@ -253,7 +254,7 @@ impl ChiSquared {
         (totals.reduce_add(), squares.reduce_add())
     }
 
-    /// Statistic of counts that should be equal \[(12)\]; 0 without any.
+    /// Statistic of counts with equal expectations \[(12)\]; 0 without photons.
     pub fn statistic(counts: &[u32]) -> f64 {
         let (total, squares) = Self::sums(counts);
         if total == 0.0 {
@@ -262,57 +263,57 @@ impl ChiSquared {
         squares * counts.len() as f64 / total - total
     }
 
-    /// Whether counts in the innermost annuli pass the test, by [`ChiSquared::sums`]: the statistic, times the total,
-    /// against the quantile, without a division.
+    /// Whether counts in the innermost annuli pass the test, given their [`ChiSquared::sums`]. Compares the statistic
+    /// times the total with the quantile, which needs no division.
     #[inline]
     fn looks_uniform(&self, annuli: usize, (total, squares): (f64, f64)) -> bool {
         squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
     }
 
-    /// Halves counts before they are no longer numbers with a sign: photons that look uniform after a thousand million
-    /// of them do so by half as many. What an iteration adds is far less than what is left.
+    /// Halves counts before they exceed signed integers. Photons that look uniform after a thousand million still do
+    /// with half of the counts.
     #[cold]
     #[inline(never)]
     fn halve(counts: &mut [u32]) {
         counts.iter_mut().for_each(|count| *count /= 2);
     }
 
-    /// After an iteration: tests if there are photons enough, and shrinks the bandwidth where they do not look uniform.
-    /// Returns whether it shrank.
+    /// Tests the counts after an iteration if there are enough photons, and shrinks the bandwidth if they do not look
+    /// uniform. Returns whether it has shrunk.
     #[inline(always)]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
         let all = Self::sums(counts);
         let rejected = all.0 >= f64::from(bandwidth.bound) && !self.looks_uniform(self.annuli, all);
         if rejected {
             self.shrink(bandwidth, counts);
-        } else if all.0 >= MOST_COUNTED {
+        } else if all.0 >= MAX_COUNT {
             Self::halve(counts);
         }
         rejected
     }
 
-    /// Shrinks the bandwidth to the largest inner disc that looks uniform, or by k where none does \[6.1, (13), (14)\];
-    /// then all counts are dropped.
+    /// Shrinks the bandwidth to the largest inner disc that looks uniform, or by k if none does \[6.1, (13), (14)\],
+    /// and resets the counts.
     #[cold]
     #[inline(never)]
     fn shrink(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) {
         let passes = |annuli: usize| {
             let inner = Self::sums(&counts[..annuli * self.sectors]);
-            // A disc without photons says nothing.
+            // A disc without photons is not tested.
             inner.0 > 0.0 && self.looks_uniform(annuli, inner)
         };
         let factor = match (1..self.annuli).rev().find(|&annuli| passes(annuli)) {
             Some(annuli) => annuli as f32 / self.annuli as f32,
             None => self.k,
         };
-        // A radius that is no longer a number above zero is none.
+        // The radius must stay above zero.
         bandwidth.radius2 = (bandwidth.radius2 * factor).max(f32::MIN_POSITIVE);
         bandwidth.bound *= self.beta;
         counts.fill(0);
     }
 }
 
-/// Along an axis.
+/// Component of vectors along an axis.
 #[inline(always)]
 fn along(axis: Vec3, [x, y, z]: &[f32x8; 3]) -> f32x8 {
     x.mul_add(f32x8::splat(axis.x), y.mul_add(f32x8::splat(axis.y), *z * axis.z))
@@ -323,13 +324,13 @@ impl CountingRule for ChiSquared {
     type Count = u32;
     type Tally = Tally;
 
-    /// One per cell.
+    /// One count per cell.
     fn counts(&self) -> usize {
         self.annuli * self.sectors
     }
 
-    fn begin(&self, radius2: f32, photons: f32, _: i32) -> Bandwidth {
-        Bandwidth { radius2, bound: photons.max(LEAST_BOUND) }
+    fn initial(&self, radius2: f32, photons: f32, _: i32) -> Bandwidth {
+        Bandwidth { radius2, bound: photons.max(MIN_BOUND) }
     }
 
     #[inline]
@@ -346,14 +347,14 @@ impl CountingRule for ChiSquared {
         frame: &Frame,
         photons: &FoundPhotons,
     ) {
-        if self.usual {
-            return Self::count_usual(bandwidths, counts, tally, frame, photons);
+        if self.has_default_cells {
+            return Self::count_default_cells(bandwidths, counts, tally, frame, photons);
         }
-        // A copy, so that photons need not be in memory for the others.
+        // Passing a copy keeps photons in registers on the other branch.
         self.count_any(bandwidths, counts, tally, frame, &photons.clone());
     }
 
-    /// Tests that have been passed need not be taken again before more photons are there.
+    /// Only levels with new photons are tested: the others have passed the test already.
     #[inline(always)]
     fn update(&self, _: u64, bandwidths: &mut [Bandwidth], counts: &mut [u32], tally: &mut Tally) {
         for (level, (bandwidth, counts)) in
@@ -398,16 +399,16 @@ mod tests {
         tally.unpack(0, counts);
     }
 
-    /// Counts that would lose their sign are halved, together; those that are not uniform are rejected first.
+    /// Counts that would exceed signed integers are halved together; those that are not uniform are rejected first.
     #[test]
-    fn counts_stay_numbers() {
+    fn counts_never_exceed_signed_integers() {
         let rule = rule();
         let mut bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
         let each = (1u32 << 30) / 12 + 1;
         let mut counts = [each; 12];
         assert!(!rule.test(&mut bandwidth, &mut counts));
         assert_eq!((counts, bandwidth.radius2), ([each / 2; 12], 1.0));
-        // Many iterations later: never beyond.
+        // Many iterations later counts are still below the limit.
         for _ in 0..10_000 {
             counts.iter_mut().for_each(|count| *count += 1_000_000);
             assert!(!rule.test(&mut bandwidth, &mut counts));
@@ -419,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_what_the_angle_says() {
+    fn sectors_follow_the_angle() {
         for sectors in [1, 2, 3, 4, 5, 6, 8, 12] {
             let rule = ChiSquared::new(&ChiSquaredSettings { sectors, ..ChiSquaredSettings::default() });
             let frame = Frame::from_normal(Vec3::new(0.0, 1.0, 0.0));
@@ -441,13 +442,13 @@ mod tests {
         }
     }
 
-    /// Levels that are counted together have what each has alone, and those with photons are told.
+    /// Levels that are counted together have the counts that each has alone; levels with photons are reported.
     #[test]
-    fn levels_do_not_disturb_each_other() {
+    fn levels_counted_together_have_the_counts_of_each_alone() {
         let rule = rule();
         let frame = Frame::from_normal(Vec3::Z);
         let levels: [Bandwidth; MAX_LEVELS] =
-            std::array::from_fn(|level| rule.begin([0.3, 1.0, 0.05, 0.3, 0.7][level], 10.0, 0));
+            std::array::from_fn(|level| rule.initial([0.3, 1.0, 0.05, 0.3, 0.7][level], 10.0, 0));
         let [mut together, mut apart, mut any] = [[0u32; 12 * MAX_LEVELS]; 3];
         for trial in 0..500 {
             let (mut offset, mut distance2) = ([[0.0f32; 8]; 3], [f32::INFINITY; 8]);
@@ -461,7 +462,7 @@ mod tests {
                 light: f32x8::ONE,
                 thinning_keys: [0; 8],
             };
-            // As often as a path may find photons at its vertices, and more often than a tally holds.
+            // Up to more octets than a tally can hold.
             let times = trial % 37;
             let (mut tally, mut tally_any) = (Tally::default(), Tally::default());
             for _ in 0..times {
@@ -482,12 +483,12 @@ mod tests {
     }
 
     #[test]
-    fn both_forms_of_the_statistic_are_one() {
+    fn both_forms_of_the_statistic_agree() {
         let counts = [3u32, 0, 7, 2, 9, 1];
         let (total, p) = (22.0, 1.0 / 6.0);
         let direct: f64 = counts.iter().map(|&o| (f64::from(o) - total * p).powi(2) / (total * p)).sum();
         assert!((ChiSquared::statistic(&counts) - direct).abs() < 1e-12);
-        // The rule asks without a division.
+        // The rule's test needs no division.
         let rule = rule();
         let critical = rule.critical[1];
         for trial in 0..2000 {
@@ -505,37 +506,37 @@ mod tests {
         }
     }
 
-    /// Of 120 and 1000 uniform photons the test rejects 5 %, within five standard errors of 10^5 trials and the error
-    /// of the chi-squared approximation, which 120 photons in 12 cells keep below half a percent. Photons of a slope
-    /// are told.
+    /// Of 120 and 1000 uniform photons the test rejects 5 %, within five standard errors of 10^5 trials plus the error
+    /// of the chi-squared approximation, which is below half a percent for 120 photons in 12 cells. Photons with a
+    /// gradient are rejected more often.
     #[test]
-    fn the_size_of_the_test_is_its_significance() {
+    fn the_test_rejects_uniform_photons_at_its_significance() {
         let rule = rule();
         for photons in [120, 1000] {
             let trials = if photons == 120 { 100_000 } else { 20_000 };
-            let (mut rejected, mut told) = (0, 0);
+            let (mut rejected, mut detected) = (0, 0);
             for trial in 0..trials {
                 let (mut counts, mut sloped) = ([0; 12], [0; 12]);
                 for i in 0..photons {
                     let (x, y) = uniform(trial, i);
                     count(&rule, &mut counts, (x, y));
-                    // Density 1 + 0.8 x by rejection: what is rejected is mirrored.
+                    // Density 1 + 0.8 x: rejected photons are mirrored.
                     let keep = Stream::new(8, trial, Domain::Test, i).vertex(0).one(Purpose::Lobe) < 0.5 + 0.4 * x;
                     count(&rule, &mut sloped, (if keep { x } else { -x }, y));
                 }
                 rejected += i32::from(ChiSquared::statistic(&counts) > rule.critical[1]);
-                told += i32::from(ChiSquared::statistic(&sloped) > rule.critical[1]);
+                detected += i32::from(ChiSquared::statistic(&sloped) > rule.critical[1]);
             }
             let size = f64::from(rejected) / trials as f64;
             let allowed = 5.0 * (0.05 * 0.95 / trials as f64).sqrt() + 0.005;
-            println!("{photons} photons: size {size}, power {}", f64::from(told) / trials as f64);
+            println!("{photons} photons: size {size}, power {}", f64::from(detected) / trials as f64);
             assert!((size - 0.05).abs() < allowed, "{photons} photons: {size}");
-            assert!(f64::from(told) > 4.0 * 0.05 * trials as f64, "{photons} photons: a slope goes unnoticed");
+            assert!(f64::from(detected) > 4.0 * 0.05 * trials as f64, "{photons} photons: a slope goes unnoticed");
         }
     }
 
     #[test]
-    fn bandwidths_stay_positive_never_grow_and_start_anew() {
+    fn bandwidths_stay_positive_and_never_grow_and_reductions_reset_counts() {
         let rule = rule();
         let mut bandwidth = Bandwidth { radius2: 1.0, bound: 10.0 };
         let mut counts = [0u32; 12];
@@ -543,7 +544,7 @@ mod tests {
         for step in 0..2000u64 {
             let before = bandwidth;
             let u = Stream::new(9, step, Domain::Test, 0).vertex(0).one(Purpose::Lobe);
-            // Now all in one cell, now everywhere.
+            // Photons in one cell, or in all cells.
             let counted = counts;
             for (cell, c) in counts.iter_mut().enumerate() {
                 *c += if u < 0.5 && cell != (step / 40 % 12) as usize { 0 } else { 5 };
@@ -558,22 +559,22 @@ mod tests {
         assert!(reductions > 10);
     }
 
-    /// The largest inner disc that looks uniform is taken, k where none does.
+    /// A reduction takes the largest inner disc that looks uniform, and the factor k if none does.
     #[test]
-    fn reductions_are_the_papers() {
+    fn reductions_follow_the_paper() {
         let rule = rule();
         let shrink = |counts: [u32; 12]| {
             let (mut bandwidth, mut counts) = (Bandwidth { radius2: 1.0, bound: 10.0 }, counts);
             assert!(rule.test(&mut bandwidth, &mut counts));
             (bandwidth.radius2, bandwidth.bound)
         };
-        // Uniform within, empty without.
+        // Uniform inside, empty outside.
         assert_eq!(shrink([9, 10, 11, 10, 9, 11, 0, 0, 0, 0, 0, 0]), (0.5, 12.0));
         // An edge through the middle.
         assert_eq!(shrink([20, 20, 20, 0, 0, 0, 20, 20, 20, 0, 0, 0]), (0.8, 12.0));
-        // All of it in the outer annulus: the inner disc says nothing.
+        // All photons in the outer annulus: the inner disc is not tested.
         assert_eq!(shrink([0, 0, 0, 0, 0, 0, 9, 10, 11, 10, 9, 11]), (0.8, 12.0));
-        // Too few for a test.
+        // Too few photons for a test.
         let (mut bandwidth, mut counts) =
             (Bandwidth { radius2: 1.0, bound: 10.0 }, [9u32, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
         assert!(!rule.test(&mut bandwidth, &mut counts));

@@ -1,11 +1,10 @@
-//! The rule of local statistics \[Hachisuka, Ogaki, Jensen 2008; for shared statistics Hachisuka and Jensen 2009\]: of
-//! the photons that an iteration adds a share alpha is kept, and the disc shrinks as if the others had not been there.
+//! The rule of local statistics \[Hachisuka, Ogaki, Jensen 2008; for shared statistics Hachisuka and Jensen 2009\]. Of
+//! the photons that an iteration adds, a fraction alpha is kept, and the disc shrinks accordingly.
 //!
-//! With N photons so far, M new ones and flux tau, all three are scaled with the area: `N' = N + alpha M`,
-//! `R'^2 / R^2 = N' / (N + M)`, `tau' = (tau + tau_M) R'^2 / R^2` (the course's first talk; its slide leaves `tau_M`
-//! out). The estimate `tau / (pi R^2)` over the number of iterations is therefore the mean over iterations of
-//! `tau_M / (pi R^2)` with the radius each was gathered with: `tau' / R'^2 = tau / R^2 + tau_M / R^2`. So flux needs no
-//! state of its own, and its variance is known.
+//! With N photons so far, M new ones and flux tau, all are scaled with the area: `N' = N + alpha M`, `R'^2 / R^2 = N' /
+//! (N + M)`, `tau' = (tau + tau_M) R'^2 / R^2` (the course's first talk; its slide omits `tau_M`). The estimate `tau /
+//! (pi R^2)` over the number of iterations is therefore the mean over iterations of `tau_M / (pi R^2)`, each with its
+//! own radius: `tau' / R'^2 = tau / R^2 + tau_M / R^2`. So flux needs no state, and its variance is known.
 
 use super::CountingRule;
 use crate::math::Frame;
@@ -13,20 +12,20 @@ use crate::transport::{FoundPhotons, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 use wide::{CmpLt, f32x8};
 
-/// The rule.
+/// The rule of local statistics.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalStatistics {
-    /// Share of new photons kept, in (0, 1].
+    /// Fraction of new photons that is kept, in (0, 1].
     pub alpha: f64,
 }
 
 /// The bandwidth of one level of one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Radius squared (m2): in f32 a factor so near to one as that of the millionth iteration is rounded by a tenth of
-    /// what it takes off.
+    /// Squared radius (m2). In f32, the factor of the millionth iteration would be off by a tenth of its difference to
+    /// one.
     pub radius2: f64,
-    /// Photons so far, N: not whole, since only a share of each iteration's is kept.
+    /// Accumulated number of photons, N. Fractional, because only a fraction of each iteration's photons is kept.
     pub photons: f64,
 }
 
@@ -35,7 +34,7 @@ impl CountingRule for LocalStatistics {
     type Count = ();
     type Tally = [u32; MAX_LEVELS];
 
-    fn begin(&self, radius2: f32, _: f32, _: i32) -> Bandwidth {
+    fn initial(&self, radius2: f32, _: f32, _: i32) -> Bandwidth {
         Bandwidth { radius2: f64::from(radius2), photons: 0.0 }
     }
 
@@ -76,12 +75,12 @@ mod tests {
     use super::*;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// The state of the papers, step by step, against the mean of what each iteration estimates; counts never fall,
-    /// radii never grow and stay positive, and the flux is scaled with the area.
+    /// The papers' recursion against the mean over iterations. Counts never fall, radii never grow and stay positive,
+    /// and flux is scaled with the area.
     #[test]
     fn the_papers_recursion_is_a_mean_over_iterations() {
         let rule = LocalStatistics { alpha: 2.0 / 3.0 };
-        let mut ours = rule.begin(1.0, 10.0, 0);
+        let mut ours = rule.initial(1.0, 10.0, 0);
         let (mut n, mut radius2, mut tau) = (0.0, 1.0f64, 0.0);
         let mut sum = 0.0;
         for i in 1..=3000u64 {
@@ -103,15 +102,15 @@ mod tests {
         assert!(radius2 < 0.1);
     }
 
-    /// Under uniform light an iteration finds photons in proportion to the area, and the product of the factors is that
-    /// of the memoryless rule \[Knaus and Zwicker 2011, 4.2\], begun one step earlier:
-    /// `prod_{k=0}^{i-1} (k + alpha) / (k + 1)`.
+    /// Under uniform light the number of photons is proportional to the area. The product of the factors is that of the
+    /// memoryless rule \[Knaus and Zwicker 2011, 4.2\], started one step earlier: `prod_{k=0}^{i-1} (k + alpha) / (k +
+    /// 1)`.
     #[test]
     fn under_uniform_light_it_shrinks_as_the_memoryless_rule() {
         let rule = LocalStatistics { alpha: 0.7 };
-        let mut bandwidth = rule.begin(1.0, 10.0, 0);
+        let mut bandwidth = rule.initial(1.0, 10.0, 0);
         for i in 1..=1000 {
-            // So many photons that rounding to whole ones is nothing.
+            // Enough photons that rounding to integers is negligible.
             let new = (1e8 * bandwidth.radius2).round() as u32;
             rule.update(i, std::slice::from_mut(&mut bandwidth), &mut [], &mut [new, 0, 0, 0, 0]);
             let expected = 0.7 * super::super::memoryless::radius2_factor(i, 0.7);

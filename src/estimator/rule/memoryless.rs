@@ -1,13 +1,13 @@
-//! The memoryless rule \[Knaus and Zwicker 2011\]: radii depend on the iteration alone, so iterations may run in any
-//! order.
+//! The memoryless rule \[Knaus and Zwicker 2011\]: radii depend on the iteration's number only, so iterations may run
+//! in any order.
 //!
 //! `r_{i+1}^2 / r_i^2 = (i + alpha) / (i + 1)` \[post-reconstruction 2021, (4)\].
 
-/// Default of alpha: the asymptotically best trade of variance against bias \[Kaplanyan and Dachsbacher 2013\].
+/// Default of alpha, which balances variance and bias asymptotically \[Kaplanyan and Dachsbacher 2013\].
 pub const ALPHA: f64 = 2.0 / 3.0;
 
-/// Radius squared of iteration `i` (the first is 1) over that of the first: `prod_{k=1}^{i-1} (k + alpha) / (k + 1)` =
-/// `Gamma(i + alpha) / (Gamma(1 + alpha) Gamma(i + 1))`, in explicit form so that nothing drifts. `alpha` in (0, 1].
+/// Squared radius of iteration `i` (from 1) over the initial one: `prod_{k=1}^{i-1} (k + alpha) / (k + 1)` = `Gamma(i +
+/// alpha) / (Gamma(1 + alpha) Gamma(i + 1))`, in explicit form to avoid drift. `alpha` is in (0, 1].
 pub fn radius2_factor(i: u64, alpha: f64) -> f64 {
     debug_assert!(i >= 1 && alpha > 0.0 && alpha <= 1.0);
     const EXACT: u64 = 32;
@@ -15,16 +15,16 @@ pub fn radius2_factor(i: u64, alpha: f64) -> f64 {
     if i <= EXACT {
         return product(i);
     }
-    // Gamma(x + alpha) / Gamma(x + 1) by Stirling's series of both; the difference of the large terms is taken in
-    // closed form, which a difference of two log-gammas would lose.
+    // Gamma(x + alpha) / Gamma(x + 1) by Stirling's series. The difference of the large terms is in closed form,
+    // because a difference of two log-gammas would lose digits.
     let ratio = |x: f64| {
         let (a, b) = (x + alpha, x + 1.0);
         let series = |z: f64| {
             let z2 = z * z;
             (1.0 / 12.0 - (1.0 / 360.0 - 1.0 / (1260.0 * z2)) / z2) / z
         };
-        // (a - 1/2) ln a - a - (b - 1/2) ln b + b, with ln a = ln b + ln(a / b); b - a is 1 - alpha, of which the sums
-        // themselves keep fewer digits the larger x is.
+        // (a - 1/2) ln a - a - (b - 1/2) ln b + b, with ln a = ln b + ln(a / b). b - a is computed as 1 - alpha,
+        // because the sums lose digits for large x.
         let log_ratio = ((alpha - 1.0) / b).ln_1p();
         ((alpha - 1.0) * b.ln() + (a - 0.5) * log_ratio + (1.0 - alpha) + series(a) - series(b)).exp()
     };

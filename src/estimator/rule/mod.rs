@@ -1,4 +1,4 @@
-//! Bandwidth rules, one a file: from a pass, and what it found, to the next bandwidth.
+//! Bandwidth rules, one per file: each computes the next bandwidth from the last one and the photons of an iteration.
 
 pub mod adaptive;
 pub mod chi_squared;
@@ -12,39 +12,38 @@ use crate::transport::FoundPhotons;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// A rule whose bandwidths follow from the photons found so far. One bandwidth per level of a pixel; the levels of one
-/// camera path are counted and updated together.
+/// A bandwidth rule that counts photons. It has one bandwidth per level of a pixel; the levels of a camera path are
+/// counted and updated together.
 pub trait CountingRule: Clone + Sync {
-    /// State of a level of a pixel, kept between iterations.
+    /// State of a level of a pixel.
     type Bandwidth: Copy + Send + Sync + Serialize + DeserializeOwned;
-    /// What is kept beside it.
+    /// A count that belongs to a bandwidth.
     type Count: Copy + Default + Send + Sync + Serialize + DeserializeOwned;
-    /// What the photons of one camera path add up to, at all its levels.
+    /// Summary of the photons that one camera path finds, at all its levels.
     type Tally: Default;
 
-    /// Whether photons beyond the largest bandwidth may be counted.
+    /// Whether photons beyond the largest bandwidth are counted.
     const BEYOND: bool = false;
 
-    /// Whether it asks for photons' marks.
+    /// Whether the rule needs photons' thinning keys.
     const NEEDS_THINNING_KEYS: bool = false;
 
-    /// Counts per bandwidth.
+    /// Number of counts per bandwidth.
     fn counts(&self) -> usize {
         1
     }
-    /// The bandwidth before the first iteration: its radius squared, the photons that the pilot found within it (0: not
-    /// known), and by how many levels it is larger than the method's own image's.
-    fn begin(&self, radius2: f32, photons: f32, above: i32) -> Self::Bandwidth;
-    /// Its radius squared.
+    /// The bandwidth before the first iteration: `radius2` is the squared radius, `photons` the number of the pilot's
+    /// photons within it (0 if unknown), `above` the number of levels by which it is larger than the picture level.
+    fn initial(&self, radius2: f32, photons: f32, above: i32) -> Self::Bandwidth;
+    /// Squared radius of a bandwidth.
     fn radius2(bandwidth: &Self::Bandwidth) -> f32;
-    /// Radius squared within which photons are to be counted, if [`CountingRule::BEYOND`].
+    /// Squared radius within which photons are counted, if [`CountingRule::BEYOND`].
     #[inline]
     fn reach2(&self, bandwidths: &[Self::Bandwidth], largest2: f32) -> f32 {
         let _ = bandwidths;
         largest2
     }
-    /// Photons within reach of a gathering point with this frame, which is one function of the normal in all
-    /// iterations.
+    /// Counts photons around a gathering point with this frame, which is a fixed function of the normal.
     fn count(
         &self,
         bandwidths: &[Self::Bandwidth],
@@ -53,6 +52,6 @@ pub trait CountingRule: Clone + Sync {
         frame: &Frame,
         photons: &FoundPhotons,
     );
-    /// After the camera path of iteration `i` (from 1), of whose photons `tally` is.
+    /// Updates bandwidths after the camera path of iteration `i` (from 1); `tally` summarises its photons.
     fn update(&self, i: u64, bandwidths: &mut [Self::Bandwidth], counts: &mut [Self::Count], tally: &mut Self::Tally);
 }

@@ -1,12 +1,12 @@
-//! The chi-squared rule where photons differ in weight.
+//! The chi-squared rule for photons of different weights.
 //!
-//! Guided light paths are dense where the guide sends them, and carry little there. The test counts photons, so it
-//! would take the border between what is guided more and what is guided less for an edge in the light. Within a disc
-//! each photon therefore counts with a probability in proportion to its weight ([`ThinningKey`](crate::photon::ThinningKey)): what is
-//! counted is as dense as the light, whatever the guide does, and is still a Poisson process, so that the test means
-//! what it says. Where all weigh the same, one in 250 is lost (weights are told by their leading bits). Where they do
-//! not, the heaviest photon that a disc has seen decides how many of the others count, and the test takes longer; when
-//! a heavier one comes, those counted before are thinned as if it had been known.
+//! Guided light paths are dense where the guide sends them, and carry little flux there. The test counts photons, so it
+//! would mistake a border between more and less guided regions for an edge in the light. So within a disc each photon
+//! counts with a probability proportional to its weight ([`ThinningKey`](crate::photon::ThinningKey)). The counted
+//! photons are as dense as the light and still form a Poisson process, so the test keeps its significance. If all
+//! weights are equal, one photon in 250 is lost, because weights have limited precision. Otherwise the heaviest photon
+//! seen so far determines the probabilities, and the test takes longer. When a heavier one arrives, earlier counts are
+//! thinned accordingly.
 
 use super::CountingRule;
 use super::chi_squared::{self, Bandwidth, ChiSquared, ChiSquaredSettings};
@@ -16,18 +16,18 @@ use crate::random::{GOLDEN, mix};
 use crate::transport::{FoundPhotons, MAX_LEVELS};
 use wide::f32x8;
 
-/// The rule.
+/// The chi-squared rule with thinning.
 #[derive(Clone, Debug)]
 pub struct Thinned(ChiSquared);
 
 impl Thinned {
-    /// The rule with its critical values, as [`ChiSquared::new`].
+    /// Creates the rule as [`ChiSquared::new`].
     pub fn new(settings: &ChiSquaredSettings) -> Thinned {
         Thinned(ChiSquared::new(settings))
     }
 }
 
-/// Keeps each of so many photons in every cell with a probability.
+/// Keeps each of the counted photons with a probability.
 #[cold]
 fn thin(counts: &mut [u32], probability: f64, seed: u64) {
     let threshold = (probability * 2f64.powi(64)) as u64;
@@ -48,13 +48,13 @@ impl CountingRule for Thinned {
 
     const NEEDS_THINNING_KEYS: bool = true;
 
-    /// One per cell, and the largest weight.
+    /// One count per cell, and the largest weight.
     fn counts(&self) -> usize {
         self.0.counts() + 1
     }
 
-    fn begin(&self, radius2: f32, photons: f32, above: i32) -> Bandwidth {
-        self.0.begin(radius2, photons, above)
+    fn initial(&self, radius2: f32, photons: f32, above: i32) -> Bandwidth {
+        self.0.initial(radius2, photons, above)
     }
 
     #[inline]
@@ -100,7 +100,7 @@ impl CountingRule for Thinned {
             let before = bandwidth.radius2;
             self.0.update(i, std::slice::from_mut(bandwidth), counts, tally);
             if bandwidth.radius2 < before {
-                // Counts begin anew, and so does what they are measured by.
+                // Counts start again at zero, and so does the largest weight.
                 *heaviest = 0;
             }
         }
@@ -114,9 +114,9 @@ mod tests {
     use crate::photon::ThinningKey;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Share of a thousand discs that are rejected after so many iterations, by the rule and by the one that takes all
-    /// photons for alike. On one side of a line through the disc photons are `denser` times as many as on the other and
-    /// weigh as much less; beyond that the light is `brighter` on that side.
+    /// Fraction of 1000 discs that are rejected, by this rule and by the rule without thinning. On one side of a line
+    /// photons are `denser` times as dense, with weights smaller by that factor. Beyond that, the light on that side is
+    /// `brighter`.
     fn rejected(denser: f32, brighter: f32) -> [f64; 2] {
         let settings = ChiSquaredSettings::default();
         let (thinned, plain) = (Thinned::new(&settings), ChiSquared::new(&settings));
@@ -124,7 +124,7 @@ mod tests {
         let mut shrunk = [0.0; 2];
         const TRIALS: u64 = 1000;
         for trial in 0..TRIALS {
-            let begin = thinned.begin(1.0, 10.0, 0);
+            let begin = thinned.initial(1.0, 10.0, 0);
             let (mut a, mut b) = ([begin], [begin]);
             let (mut counts_a, mut counts_b) = ([0u32; 13], [0u32; 12]);
             let mut tally_a = <Thinned as CountingRule>::Tally::default();
@@ -134,7 +134,7 @@ mod tests {
                 let u = draws.two(Purpose::Pixel);
                 let (sin, cos) = (std::f32::consts::TAU * u.y).sin_cos();
                 let (x, y) = (u.x.sqrt() * cos, u.x.sqrt() * sin);
-                // Of as many everywhere only some are there.
+                // Uniform points, thinned to the wanted density.
                 let (dense, light) = (x > 0.3, if x > 0.3 { brighter } else { 1.0 });
                 let share = if dense { light } else { light / denser } / brighter.max(1.0);
                 if draws.one(Purpose::Lobe) >= share {
@@ -146,7 +146,7 @@ mod tests {
                 thinned.count(&a, &mut counts_a, &mut tally_a, &frame, &found);
                 plain.count(&b, &mut counts_b, &mut tally_b, &frame, &found);
             }
-            // One look, so that the chance of a rejection is the significance.
+            // A single test, so that the probability of a rejection is the significance.
             thinned.update(1, &mut a, &mut counts_a, &mut tally_a);
             plain.update(1, &mut b, &mut counts_b, &mut tally_b);
             shrunk[0] += f64::from(u8::from(a[0].radius2 < 1.0)) / TRIALS as f64;
@@ -155,11 +155,11 @@ mod tests {
         shrunk
     }
 
-    /// The gradient of a guide is not light, to this rule; it is to the one that counts all photons (the planted bug).
-    /// An edge in the light is seen. The share of 1000 discs that are rejected is 5 % within four standard errors and
-    /// the chi-squared approximation's own error (below 1 % with these counts).
+    /// A gradient of the guide is not rejected by this rule, but by the rule without thinning (the planted bug). An
+    /// edge in the light is rejected. The fraction of 1000 discs rejected is 5 % within four standard errors and the
+    /// error of the chi-squared approximation (below 1 % with these counts).
     #[test]
-    fn a_guides_gradient_is_not_light() {
+    fn gradients_of_the_guide_are_not_rejected() {
         let allowed = 4.0 * (0.05f64 * 0.95 / 1000.0).sqrt() + 0.01;
         let [alike, alike_plain] = rejected(1.0, 1.0);
         let [guided, guided_plain] = rejected(8.0, 1.0);
@@ -171,14 +171,14 @@ mod tests {
         assert!(edge > 0.9, "{edge}");
     }
 
-    /// Photons that were counted before a heavier one came are as many as if it had come first, within four standard
+    /// Photons counted before a heavier one arrives are as many as if it had arrived first, within four standard
     /// errors.
     #[test]
-    fn what_was_counted_before_is_thinned() {
+    fn earlier_counts_are_thinned_when_a_heavier_photon_arrives() {
         let rule = Thinned::new(&ChiSquaredSettings { significance: 1e-300, ..ChiSquaredSettings::default() });
         let frame = Frame::from_normal(Vec3::Z);
         let count = |heavy_first: bool| -> f64 {
-            let mut bandwidths = [rule.begin(1.0, 10.0, 0)];
+            let mut bandwidths = [rule.initial(1.0, 10.0, 0)];
             let (mut counts, mut tally) = ([0u32; 13], <Thinned as CountingRule>::Tally::default());
             let heavy = FoundPhotons::one(Vec3::ZERO, 0.0, 1.0, ThinningKey::new(4.0, 0.5));
             if heavy_first {

@@ -1,23 +1,22 @@
-//! The memoryless rule in volumes \[Knaus and Zwicker 2011; Knaus in Hachisuka et al. 2013, "State of the art in photon
-//! density estimation", participating media\]: the kernel is a ball, so it is the radius cubed that shrinks.
+//! The memoryless rule in media \[Knaus and Zwicker 2011; Knaus in Hachisuka et al. 2013, "State of the art in photon
+//! density estimation", participating media\]: the kernel is a ball, so the rule shrinks the cubed radius.
 //!
-//! `r_{i+1}^3 / r_i^3 = (i + alpha) / (i + 1)`. Bandwidth levels halve the kernel's measure from one to the next as on
-//! surfaces, here the volume: radii are a factor 2^(-1/3) apart.
+//! `r_{i+1}^3 / r_i^3 = (i + alpha) / (i + 1)`. From each level to the next smaller one the kernel's volume halves, so
+//! radii differ by a factor of 2^(-1/3).
 
 use super::memoryless::radius2_factor;
 
-/// Default of alpha. Variance falls as `N^-alpha` and squared bias, of order r^4, as `N^(-4 (1 - alpha) / 3)`: both as
-/// fast for 4/7, where the mean squared error falls as `N^(-4/7)` \[Kaplanyan and Dachsbacher 2013, for kernels of
-/// three dimensions\].
+/// Default of alpha. Variance falls as `N^-alpha`, and squared bias, of order r^4, as `N^(-4 (1 - alpha) / 3)`. Both
+/// are equally fast for 4/7, where the mean squared error falls as `N^(-4/7)` \[Kaplanyan and Dachsbacher 2013, for
+/// kernels in three dimensions\].
 pub const ALPHA: f64 = 4.0 / 7.0;
 
-/// Radius of iteration `i` (the first is 1) over that of the first: the product is the one of [`radius2_factor`], of
-/// the radius cubed.
+/// Radius of iteration `i` (from 1) over the initial one; [`radius2_factor`] is the factor of the cubed radius.
 pub fn radius_factor(i: u64, alpha: f64) -> f64 {
     radius2_factor(i, alpha).cbrt()
 }
 
-/// Radius of level `level` (from 0, the smallest) of `count` over that of the largest.
+/// Radius of level `level` (from 0, the smallest) of `count` over the largest.
 pub fn level_factor(level: usize, count: usize) -> f32 {
     (-((count - 1 - level) as f32) / 3.0).exp2()
 }
@@ -36,7 +35,7 @@ mod tests {
         }
         assert_eq!(radius_factor(1, ALPHA), 1.0);
         assert_eq!(radius_factor(77, 1.0), 1.0);
-        // r^3 ~ i^(alpha - 1): squared bias and variance fall alike.
+        // r^3 ~ i^(alpha - 1): squared bias and variance fall equally fast.
         let slope = (radius_factor(1 << 20, ALPHA) / radius_factor(1 << 16, ALPHA)).ln() / 16f64.ln();
         assert!((slope - (ALPHA - 1.0) / 3.0).abs() < 1e-5);
         assert!((4.0 * slope + ALPHA).abs() < 1e-4, "squared bias falls as {}", 4.0 * slope);

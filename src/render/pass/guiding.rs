@@ -9,7 +9,7 @@
 
 use super::chunks::chunks;
 use super::cost::{Cost, GUIDED_START};
-use crate::estimator::bandwidth::{SCREEN_CAP, span};
+use crate::estimator::bandwidth::{SCREEN_CAP, picture_width_at};
 use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};
 use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
@@ -218,7 +218,7 @@ fn weigh(
     error: &mut CellErrors,
 ) {
     let point = &probe.point;
-    let cap = SCREEN_CAP * span(camera_paths.camera, point.length);
+    let cap = SCREEN_CAP * picture_width_at(camera_paths.camera, point.length);
     let mut light = Vec::with_capacity(2 * NEIGHBOURS);
     let mut sum = Rgb::ZERO;
     for (map, nearest) in maps.iter().zip(nearest) {

@@ -227,7 +227,7 @@ impl<R: CountingRule> PixelBandwidths for Counted<'_, R> {
             // A level has half the area of the next larger one, and so half its expected number of photons.
             let scale = level_factor2(level, levels.count);
             let above = level as i32 - levels.picture_level() as i32;
-            self.rule.begin(bandwidth * bandwidth * scale, neighbours * scale, above)
+            self.rule.initial(bandwidth * bandwidth * scale, neighbours * scale, above)
         };
         let mut bandwidths = Vec::with_capacity(pixels.len() * self.layout.pixel_len());
         for pixel in pixels {

@@ -16,7 +16,7 @@ use super::integrator::{Integrator, Work};
 use super::photon_tracer::trace_range;
 use super::sample_buffer::{self, SampleBuffer};
 use crate::camera::{Camera, par_pixels, pixels_per_band};
-use crate::estimator::bandwidth::{LEAST, SCREEN_CAP, span};
+use crate::estimator::bandwidth::{MIN_RADIUS_RATIO, SCREEN_CAP, picture_width_at};
 use crate::estimator::{InitialBandwidth, PixelAccumulator};
 use crate::math::Vec3;
 use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, PhotonMaps, kernel, kind};
@@ -94,7 +94,7 @@ impl GatherBandwidths for Neighbours<'_> {
     fn frame(_: Vec3) {}
 
     fn radii(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii {
-        let cap = (SCREEN_CAP * span(self.camera, length)).max(self.least);
+        let cap = (SCREEN_CAP * picture_width_at(self.camera, length)).max(self.least);
         let cap2 = cap * cap;
         let nearest = &mut self.nearest[kind as usize];
         let radius2 = nearest.radius2(photons, p, ng, self.count, cap2).unwrap_or(cap2);
@@ -166,7 +166,7 @@ impl Integrator for Pm<'_> {
             InitialBandwidth::Nearest(k) => k.clamp(2, MAX_NEIGHBOURS),
             _ => self.settings.method.default_neighbours(1),
         };
-        let least = LEAST * camera_paths.scene.lights.sky().radius;
+        let least = MIN_RADIUS_RATIO * camera_paths.scene.lights.sky().radius;
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(

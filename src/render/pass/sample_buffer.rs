@@ -133,7 +133,7 @@ pub(super) fn add<'g>(
         let sample = samples[0].get(slot);
         pixel.record_first_hit(i, || camera_paths.first_hit(&sample));
         let others = samples.get(1).map(|samples| samples.get(slot));
-        let (own, level) = pixel.own_of(&sample, others.as_ref());
+        let (own, level) = pixel.picture_sample(&sample, others.as_ref());
         let light = [own.indirect_photons[level], own.caustic_photons[level]];
         pixel.add_with_groups(i, &sample, others.as_ref(), groups(slot));
         light.map(|light| u64::from(is_lit(light)))

@@ -2,7 +2,7 @@
 
 use super::exact::Exact;
 use caustique::estimator::rule::adaptive::Adaptive;
-use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings, LEAST_BOUND};
+use caustique::estimator::rule::chi_squared::{ChiSquared, ChiSquaredSettings, MIN_BOUND};
 use caustique::estimator::rule::local::LocalStatistics;
 use caustique::estimator::rule::thinned::Thinned;
 use caustique::estimator::rule::{CountingRule, memoryless, volume};
@@ -39,7 +39,7 @@ fn memoryless_rules_follow_their_product() {
 #[test]
 fn local_statistics_follow_their_recursion() {
     let rule = LocalStatistics { alpha: 2.0 / 3.0 };
-    let mut ours = [rule.begin(1.0, 10.0, 0)];
+    let mut ours = [rule.initial(1.0, 10.0, 0)];
     let (mut radius2, mut photons, mut single) = (Exact::new(1.0), Exact::default(), 1.0f32);
     let alpha = Exact::new(rule.alpha);
     for i in 1..=MILLION {
@@ -103,9 +103,9 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
     let settings = ChiSquaredSettings { significance: 1e-3, ..ChiSquaredSettings::default() };
     let (rule, thinned) = (ChiSquared::new(&settings), Thinned::new(&settings));
     let frame = Frame::from_normal(Vec3::Z);
-    let (mut ours, mut counts) = ([rule.begin(1.0, 10.0, 0)], [0u32; 12]);
-    let (mut alike, mut alike_counts) = ([thinned.begin(1.0, 10.0, 0)], [0u32; 13]);
-    let bound = Exact::new(f64::from(LEAST_BOUND));
+    let (mut ours, mut counts) = ([rule.initial(1.0, 10.0, 0)], [0u32; 12]);
+    let (mut alike, mut alike_counts) = ([thinned.initial(1.0, 10.0, 0)], [0u32; 13]);
+    let bound = Exact::new(f64::from(MIN_BOUND));
     let mut oracle = Oracle { counts: [0; 12], radius2: Exact::new(1.0), bound, reductions: 0 };
     // Quantiles for 11 and 5 degrees of freedom at 1e-3.
     let critical = [31.264_133_6, 20.515_005_7];
@@ -141,7 +141,7 @@ fn the_chi_squared_rule_decides_as_exact_counts_do() {
 #[test]
 fn the_adaptive_rule_follows_its_sums() {
     let rule = Adaptive::<kernel::Box>::default();
-    let (mut ours, frame) = ([rule.begin(1.0, 10.0, 0)], Frame::from_normal(Vec3::Z));
+    let (mut ours, frame) = ([rule.initial(1.0, 10.0, 0)], Frame::from_normal(Vec3::Z));
     let (mut shot, mut curvature, mut noise) = (Exact::default(), Exact::default(), Exact::default());
     let initial = 1.0f64;
     let mut pilot2 = 4.0f32;
@@ -190,8 +190,8 @@ fn statistics_of_empty_sectors_are_numbers() {
     for settings in [ChiSquaredSettings::default(), ChiSquaredSettings { annuli: 1, sectors: 1, ..Default::default() }]
     {
         let rule = ChiSquared::new(&settings);
-        let (mut bandwidth, mut counts) = ([rule.begin(1.0, 0.0, 0)], vec![0u32; rule.counts()]);
+        let (mut bandwidth, mut counts) = ([rule.initial(1.0, 0.0, 0)], vec![0u32; rule.counts()]);
         rule.update(1, &mut bandwidth, &mut counts, &mut Default::default());
-        assert_eq!((bandwidth[0].radius2, bandwidth[0].bound), (1.0, LEAST_BOUND));
+        assert_eq!((bandwidth[0].radius2, bandwidth[0].bound), (1.0, MIN_BOUND));
     }
 }
