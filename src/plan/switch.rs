@@ -52,7 +52,7 @@ fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
 }
 
 /// A copy of the scene without an effect, as [`off`] removes it from the description. Unchanged data are shared. For
-/// depth of field, see [`crate::camera::Camera::pinhole`].
+/// depth of field, see [`crate::camera::Camera::without_lens`].
 ///
 /// # Errors
 /// The effect is alpha, so shapes are committed to Embree again, and it is out of memory.
