@@ -28,12 +28,12 @@ pub struct Available {
 
 /// Free memory: the least that the machine, `ulimit -v` and the control groups leave. `None` if no limit can be read.
 pub fn available() -> Option<Available> {
-    let machine = || kib(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
+    let machine = || parse_kib(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:");
     let address_space = || {
         let most = getrlimit(Resource::As).current?;
-        Some(most.saturating_sub(kib(&std::fs::read_to_string("/proc/self/status").ok()?, "VmSize:")?))
+        Some(most.saturating_sub(parse_kib(&std::fs::read_to_string("/proc/self/status").ok()?, "VmSize:")?))
     };
-    let groups = || left_by_groups(&std::fs::read_to_string("/proc/self/cgroup").ok()?, Path::new("/sys/fs/cgroup"));
+    let groups = || free_in_groups(&std::fs::read_to_string("/proc/self/cgroup").ok()?, Path::new("/sys/fs/cgroup"));
     let limits = [
         (machine(), "available"),
         (address_space(), "left by 'ulimit -v'"),
@@ -74,7 +74,7 @@ pub fn reserve<T>(count: usize, what: impl Display) -> Result<Vec<T>> {
 }
 
 /// Parses a line of `/proc`, such as `MemAvailable:  123 kB`, and returns the bytes.
-fn kib(text: &str, key: &str) -> Option<u64> {
+fn parse_kib(text: &str, key: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
 }
@@ -82,7 +82,7 @@ fn kib(text: &str, key: &str) -> Option<u64> {
 /// Bytes that the control groups leave. `text` is `/proc/self/cgroup` (version 2: `0::/path`; version 1:
 /// `9:memory:/path`), `root` the mount point. The limits of a group and of all its ancestors apply. In a container, the
 /// process's own group may be the root.
-fn left_by_groups(text: &str, root: &Path) -> Option<u64> {
+fn free_in_groups(text: &str, root: &Path) -> Option<u64> {
     let groups = text.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':').skip(1);
         let (controllers, path) = (fields.next()?, fields.next()?.trim_start_matches('/'));
@@ -97,13 +97,13 @@ fn left_by_groups(text: &str, root: &Path) -> Option<u64> {
     });
     let left = groups.flat_map(|(mount, path, names)| {
         let around: Vec<PathBuf> = Path::new(path).ancestors().map(|group| mount.join(group)).collect();
-        around.into_iter().filter_map(move |group| left_by_group(&group, names))
+        around.into_iter().filter_map(move |group| free_in_group(&group, names))
     });
     left.min()
 }
 
 /// The limit of a group minus the memory in use. Pages of inactive files are reclaimable and do not count as used.
-fn left_by_group(group: &Path, [limit, usage, files]: [&str; 3]) -> Option<u64> {
+fn free_in_group(group: &Path, [limit, usage, files]: [&str; 3]) -> Option<u64> {
     let number = |name: &str| std::fs::read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
     let (limit, usage) = (number(limit)?, number(usage)?);
     let stat = std::fs::read_to_string(group.join("memory.stat")).unwrap_or_default();
@@ -123,7 +123,7 @@ mod tests {
             std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
             std::fs::write(path, text).expect("it can be written");
         };
-        let left = |text: &str| left_by_groups(text, root.path());
+        let left = |text: &str| free_in_groups(text, root.path());
         assert_eq!(left("0::/jobs/7\n"), None);
         write("jobs/7/memory.max", "max\n");
         write("jobs/7/memory.current", "900\n");

@@ -20,7 +20,7 @@ pub(super) struct AnisotropicTables(OnceLock<Box<[OnceLock<Box<Row>>]>>);
 impl AnisotropicTables {
     /// The profile `max(constant + factors . functions, 0)`, with the four functions of group `n`, at the alphas along
     /// x and y. `make` computes all functions from the alpha along x, a smaller one along y, and a direction.
-    pub fn around(
+    pub fn profile(
         &self,
         [along_x, along_y]: [Position; 2],
         (n, constant, factors): (usize, f32, Vec4),
@@ -37,18 +37,18 @@ impl AnisotropicTables {
                 Box::new(from_fn(|azimuth| from_fn(|j| at(azimuth, node(j)))))
             })
         };
-        let turned = along_y.value() > along_x.value();
-        let (wide, narrow) = if turned { (along_y, along_x) } else { (along_x, along_y) };
+        let swapped = along_y.value() > along_x.value();
+        let (wide, narrow) = if swapped { (along_y, along_x) } else { (along_x, along_y) };
         let mut nodes = [[constant; NODES]; AZIMUTHS];
-        for (i, wide_share) in wide.around() {
-            for (k, narrow_share) in narrow.around() {
+        for (i, wide_share) in wide.adjacent_nodes() {
+            for (k, narrow_share) in narrow.adjacent_nodes() {
                 let (row, factors) = (row(i, k), factors * (wide_share * narrow_share));
                 for (sums, values) in nodes.iter_mut().zip(row.iter()) {
                     sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factors.dot(value[n]));
                 }
             }
         }
-        AnisotropicProfile { azimuths: nodes.map(|nodes| Profile::from_nodes(nodes.map(|x| x.max(0.0)))), turned }
+        AnisotropicProfile { azimuths: nodes.map(|nodes| Profile::from_nodes(nodes.map(|x| x.max(0.0)))), swapped }
     }
 }
 
@@ -57,7 +57,7 @@ impl AnisotropicTables {
 pub(super) struct AnisotropicProfile {
     azimuths: [Profile; AZIMUTHS],
     /// Whether the larger alpha is along y.
-    turned: bool,
+    swapped: bool,
 }
 
 /// The functions of both sides of an interface. They are large, so they are stored outside of the interface.
@@ -91,17 +91,17 @@ const LAST: f32 = (AZIMUTHS - 1) as f32;
 impl AnisotropicProfile {
     /// Position of `w` on the axis of azimuths: the index of the node below, and the fraction to the next.
     #[inline]
-    fn place(&self, w: Vec3) -> (usize, f32) {
+    fn azimuth_position(&self, w: Vec3) -> (usize, f32) {
         let (x, y) = (w.x.abs(), w.y.abs());
-        let turn = if self.turned { x.atan2(y) } else { y.atan2(x) } * (FRAC_2_PI * LAST);
-        let k = (turn as usize).min(AZIMUTHS - 2);
-        (k, turn - k as f32)
+        let azimuth = if self.swapped { x.atan2(y) } else { y.atan2(x) } * (FRAC_2_PI * LAST);
+        let k = (azimuth as usize).min(AZIMUTHS - 2);
+        (k, azimuth - k as f32)
     }
 
     /// The value at the direction `w`; `mu` is the position of its cosine.
     #[inline]
     pub fn at(&self, mu: Position, w: Vec3) -> f32 {
-        let (k, t) = self.place(w);
+        let (k, t) = self.azimuth_position(w);
         let [low, high] = [k, k + 1].map(|k| self.azimuths[k].at(mu));
         low + (high - low) * t
     }
@@ -109,7 +109,7 @@ impl AnisotropicProfile {
     /// Density per solid angle with which [`AnisotropicProfile::sample`] draws `w`.
     #[inline]
     pub fn pdf_w(&self, mu: Position, w: Vec3) -> f32 {
-        let (k, t) = self.place(w);
+        let (k, t) = self.azimuth_position(w);
         let [low, high] = [k, k + 1].map(|k| self.azimuths[k].at_with_pdf_w(mu, w.z.abs()).1 * self.azimuths[k].mass());
         (low + (high - low) * t) / self.mass().max(f32::MIN_POSITIVE)
     }
@@ -135,7 +135,7 @@ impl AnisotropicProfile {
         let hat = v.signum() * (1.0 - (1.0 - v.abs()).max(0.0).sqrt());
         let (sin, cos) = ((chosen as f32 + hat) * FRAC_PI_2 / LAST).sin_cos();
         let r = (1.0 - mu * mu).max(0.0).sqrt();
-        let (x, y) = if self.turned { (sin, cos) } else { (cos, sin) };
+        let (x, y) = if self.swapped { (sin, cos) } else { (cos, sin) };
         let sign = |bit: u32| if quarter & bit == 0 { r } else { -r };
         Some(Vec3::new(x * sign(1), y * sign(2), mu))
     }

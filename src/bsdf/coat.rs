@@ -29,7 +29,7 @@ impl<'a> Coat<'a> {
     #[inline]
     pub(super) fn evaluate_cos(&self, wi: Vec3, transport: Transport) -> (f32, f32) {
         let Some((i, cos_ig)) = self.facing.local(wi, transport) else { return (0.0, 0.0) };
-        let Some(i) = self.lit(i) else { return (0.0, 0.0) };
+        let Some(i) = self.on_viewer_side(i) else { return (0.0, 0.0) };
         let (f, pdf) = self.cover.coat(self.o, i);
         let cosine = match transport {
             Transport::Radiance => i.z,
@@ -40,7 +40,7 @@ impl<'a> Coat<'a> {
 
     /// `i` with z > 0, if it is on the viewer's side and the coat is not a delta lobe.
     #[inline]
-    fn lit(&self, i: Vec3) -> Option<Vec3> {
+    fn on_viewer_side(&self, i: Vec3) -> Option<Vec3> {
         let i = Vec3::new(i.x, i.y, i.z * self.side);
         (self.cover.coat_class != LobeSet::DELTA && i.z.min(self.o.z) >= MIN_COSINE).then_some(i)
     }
@@ -48,7 +48,7 @@ impl<'a> Coat<'a> {
     /// Density with which a path from `wi` samples the viewing direction.
     #[inline]
     pub(super) fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32 {
-        let i = self.facing.local(wi, transport.reversed()).and_then(|(i, _)| self.lit(i));
+        let i = self.facing.local(wi, transport.reversed()).and_then(|(i, _)| self.on_viewer_side(i));
         i.map_or(0.0, |i| self.cover.coat(i, self.o).1)
     }
 

@@ -161,7 +161,7 @@ impl SideTables {
     /// The rows adjacent to an alpha.
     #[inline]
     fn albedos(&self, alpha: Position) -> AdjacentRows<'_, 2> {
-        self.albedos.around(alpha, |i| {
+        self.albedos.adjacent_rows(alpha, |i| {
             let smooth = Smooth::new(self.eta);
             let sums = tabulate(i, [0.0f32; 5], |sums, ggx, wo, lambda_o, h, weight| {
                 add_albedos(sums, &smooth, ggx, wo, lambda_o, h, weight);
@@ -205,10 +205,10 @@ impl SideTables {
         self.anisotropic(alphas, (REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90)))
     }
 
-    /// See [`AnisotropicTables::around`] for `functions`.
+    /// See [`AnisotropicTables::profile`] for `functions`.
     fn anisotropic(&self, alphas: [Position; 2], functions: (usize, f32, Vec4)) -> AnisotropicProfile {
         let smooth = Smooth::new(self.eta);
-        self.anisotropic.around(alphas, functions, |alpha_x, alpha_y, wo| {
+        self.anisotropic.profile(alphas, functions, |alpha_x, alpha_y, wo| {
             let ggx = Ggx { alpha_x, alpha_y };
             let mut sums = [0.0; 5];
             over_facets(&ggx, wo, 1.0, |lambda_o, h, weight| {
@@ -245,7 +245,7 @@ impl CoverTables {
     /// The loss at facets of roughness `alpha` below a layer of roughness `cover_alpha`. `cover` returns the albedo of
     /// the layer at a roughness.
     fn profile(&self, alpha: Position, cover_alpha: f32, cover: impl Fn(Position) -> Profile) -> Profile {
-        let losses = self.losses.around(alpha, |i| {
+        let losses = self.losses.adjacent_rows(alpha, |i| {
             let covers = self.covers.get_or_init(|| {
                 std::array::from_fn(|k| cover(Position::new(sqr(k as f32 / (COVER_NODES - 1) as f32))))
             });
@@ -333,7 +333,7 @@ impl EnergyTables {
     #[inline]
     pub(super) fn sheen_albedo(&self, alpha: Position) -> Profile {
         let made = |i: usize| [row(&std::array::from_fn(|j| Vec4::X * sheen::albedo(node(i), node(j))))];
-        Profile::new(self.sheen.around(alpha, made), 0, 0.0, Vec4::X)
+        Profile::new(self.sheen.adjacent_rows(alpha, made), 0, 0.0, Vec4::X)
     }
 
     /// Energy that rough facets below a layer of albedo E lose because they are attenuated by `1 - max(E(o), E(i))` and

@@ -118,12 +118,12 @@ fn lambert(color: Rgb, view: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
 impl<'a> Bsdf<'a> {
     /// The BSDF of `parameters`, with the interface made from them.
     pub fn new(parameters: &Parameters, interface: &'a Interface<'a>) -> Bsdf<'a> {
-        Bsdf::of(parameters.base_color, parameters.metallic, parameters.transmission, interface)
+        Bsdf::from_shares(parameters.base_color, parameters.metallic, parameters.transmission, interface)
     }
 
     /// The BSDF of a surface with this base colour, metalness, transmission and interface.
     #[inline(always)]
-    pub fn of(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Bsdf<'a> {
+    pub fn from_shares(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Bsdf<'a> {
         if metallic == 0.0 && transmission == 0.0 && interface.invisible {
             Bsdf::Matte(base)
         } else {

@@ -98,13 +98,13 @@ impl Position {
     }
 
     /// The two adjacent nodes with their interpolation weights.
-    pub fn around(self) -> [(usize, f32); 2] {
+    pub fn adjacent_nodes(self) -> [(usize, f32); 2] {
         [(self.i, 1.0 - self.t), (self.i + 1, self.t)]
     }
 
     /// Interpolates between values at the nodes.
     #[inline]
-    pub fn between(self, nodes: &[f32; NODES]) -> f32 {
+    pub fn interpolate(self, nodes: &[f32; NODES]) -> f32 {
         let (a, b) = (nodes[self.i], nodes[self.i + 1]);
         a + (b - a) * self.t
     }
@@ -138,7 +138,7 @@ impl<const N: usize> Grid<N> {
     /// them. It must not use the thread pool: while it waited there, the thread could take up a path that needs the
     /// same row, and so wait for itself.
     #[inline]
-    pub fn around(&self, alpha: Position, make: impl Fn(usize) -> [Row; N]) -> AdjacentRows<'_, N> {
+    pub fn adjacent_rows(&self, alpha: Position, make: impl Fn(usize) -> [Row; N]) -> AdjacentRows<'_, N> {
         let at = |i: usize| &**self.0[i].get_or_init(|| Box::new(make(i)));
         AdjacentRows { low: at(alpha.i), high: at(alpha.i + 1), t: alpha.t }
     }
@@ -221,7 +221,7 @@ impl Profile {
     /// The value at a cosine.
     #[inline]
     pub fn at(&self, mu: Position) -> f32 {
-        mu.between(&self.nodes)
+        mu.interpolate(&self.nodes)
     }
 
     /// The value at the cosine `mu`, whose position is `at`, and the density per solid angle with which

@@ -84,7 +84,7 @@ impl<'a> Shading<'a> {
 
     /// The viewing direction in world space. On a light path it points to the light.
     #[inline]
-    fn own(&self) -> Vec3 {
+    fn wo_world(&self) -> Vec3 {
         self.frame.to_world(self.view.wo())
     }
 
@@ -139,7 +139,7 @@ impl<'a> Shading<'a> {
     #[inline(never)]
     fn evaluate_relief(&self, wi: Vec3, i: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let radiance = transport == Transport::Radiance;
-        let Some((relief, second)) = self.relief(if radiance { wi } else { self.own() }) else {
+        let Some((relief, second)) = self.relief(if radiance { wi } else { self.wo_world() }) else {
             return (Rgb::ZERO, 0.0);
         };
         let (f, pdf) = self.bsdf.evaluate_dimmed(relief.diffuse, &self.view, i, transport, set);
@@ -186,7 +186,7 @@ impl<'a> Shading<'a> {
         let Some((i, _)) = self.local(wi, transport.reversed()) else { return 0.0 };
         let to = self.view.wo();
         let pdf = self.bsdf.pdf(i, to, transport, set);
-        let light = if transport == Transport::Radiance { self.own() } else { wi };
+        let light = if transport == Transport::Radiance { self.wo_world() } else { wi };
         let Some((_, Some(second))) = self.relief(light) else { return pdf };
         match transport {
             Transport::Radiance => pdf + self.bsdf.pdf(i, second, transport, set),
@@ -258,7 +258,7 @@ impl<'a> Shading<'a> {
             return None;
         }
         // With a normal map, one of the two directions from which light reaches the facet is chosen.
-        let second = if importance { self.relief(self.own()).and_then(|(_, second)| second) } else { None };
+        let second = if importance { self.relief(self.wo_world()).and_then(|(_, second)| second) } else { None };
         let Some(second) = second else { return self.sample_view(&self.view, 1.0, transport, set, u_lobe, u) };
         if u_lobe < 0.5 {
             return self.sample_view(&self.view, 0.5, transport, set, 2.0 * u_lobe, u);

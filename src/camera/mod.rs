@@ -33,7 +33,7 @@ struct Whole {
 
 impl Whole {
     /// A whole picture that equals the film.
-    fn of(width: u32, height: u32) -> Whole {
+    fn from_size(width: u32, height: u32) -> Whole {
         let film = Vec2::new(width as f32, height as f32);
         Whole { film, corner: Vec2::ZERO, size: (width, height), at: (0, 0) }
     }
@@ -98,7 +98,7 @@ impl Camera {
             height: size.1,
             covered: 1.0,
             filter: Filter::default(),
-            whole: Whole::of(size.0, size.1),
+            whole: Whole::from_size(size.0, size.1),
         }
     }
 
@@ -128,7 +128,7 @@ impl Camera {
         let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
         let (width, height, covered) = (scaled(self.width), scaled(self.height), self.covered * factor.min(1.0) as f32);
         // The new pixels are not pixels of the whole picture, so `size` and `at` are those of a film without a window.
-        let mut whole = Whole::of(width, height);
+        let mut whole = Whole::from_size(width, height);
         let size = Vec2::new(self.width as f32, self.height as f32);
         if self.whole.film != size {
             let scale = whole.film / size;

@@ -29,7 +29,7 @@ pub struct Extent {
 impl Extent {
     /// The extent of a triangle with these corners.
     #[inline]
-    pub fn of(corners: [Vec3; 3]) -> Extent {
+    pub fn from_corners(corners: [Vec3; 3]) -> Extent {
         let [a, b, c] = corners.map(Vec3::abs);
         Extent { largest: a.max(b).max(c), edges: [corners[1] - corners[0], corners[2] - corners[0]] }
     }
@@ -62,7 +62,7 @@ pub fn coordinate_error(p: Vec3) -> f32 {
 /// Bound (scene units) on the distance of a computed position from the plane of a triangle with these corners.
 #[inline]
 pub fn triangle_error(corners: [Vec3; 3]) -> f32 {
-    let extent = Extent::of(corners);
+    let extent = Extent::from_corners(corners);
     extent.plane_error() + coordinate_error(extent.largest)
 }
 

@@ -156,7 +156,7 @@ impl Scattering {
             Some(interface) => interface,
             None => Interface::new_in(&materials.parameters(surface, eta), &self.tables, arena),
         };
-        Bsdf::of(base, metallic, transmission, interface)
+        Bsdf::from_shares(base, metallic, transmission, interface)
     }
 }
 

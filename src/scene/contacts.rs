@@ -43,7 +43,7 @@ impl Triangle {
     fn new(corners: [Vec3; 3], instance: u32, primitive: u32) -> Option<Triangle> {
         let [a, b, c] = corners;
         let normal = (b - a).cross(c - a).try_normalize()?;
-        let extent = Extent::of(corners);
+        let extent = Extent::from_corners(corners);
         let (error, largest) = (extent.plane_error(), extent.largest.max_element());
         Some(Triangle { corners, normal, error, largest, instance, primitive })
     }

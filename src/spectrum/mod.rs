@@ -97,7 +97,7 @@ impl Band {
 
     /// The band of a path's wavelength; [`Band::WHITE`] for `None`.
     #[inline]
-    pub fn of(wavelength: Option<&Wavelength>) -> Band {
+    pub fn of_wavelength(wavelength: Option<&Wavelength>) -> Band {
         wavelength.map_or(Band::WHITE, |wavelength| wavelength.band)
     }
 }

@@ -346,7 +346,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flux: vertex.throughput * self.scale,
                 flags: self.flags,
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
-                band: Band::of(vertex.wavelength.as_ref()),
+                band: Band::of_wavelength(vertex.wavelength.as_ref()),
                 thinning_key: thinning_key.unwrap_or_default(),
             });
         }
@@ -365,7 +365,7 @@ impl<'a> Visitor<'a> for Deposit<'_> {
                 flux: vertex.arriving * self.scale,
                 medium: vertex.medium_id(self.scene),
                 depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
-                band: Band::of(vertex.wavelength.as_ref()),
+                band: Band::of_wavelength(vertex.wavelength.as_ref()),
             });
         }
         Next::Continue(self.onward)

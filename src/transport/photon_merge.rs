@@ -75,7 +75,7 @@ impl MergePhoton {
             merged: single(mis.merged.y + mis.last.y),
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
             prefix,
-            band: Band::of(vertex.wavelength.as_ref()),
+            band: Band::of_wavelength(vertex.wavelength.as_ref()),
             group,
         }
     }

@@ -187,7 +187,7 @@ fn connected_paths_have_one_wavelength() {
     // White subpaths are connected to all others.
     let eye = WavelengthSample::new(0.3).wavelength();
     assert_eq!(eye.connection_factor(Band::WHITE), Some(Rgb::ONE));
-    assert_eq!(Band::of(None), Band::WHITE);
+    assert_eq!(Band::of_wavelength(None), Band::WHITE);
 }
 
 // ---------------------------------------------------------------- a prism, by Snell's law
