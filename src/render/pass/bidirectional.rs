@@ -14,8 +14,8 @@ use super::guiding::learn_guide;
 use super::integrator::{Integrator, Work};
 use super::photon_counts::PhotonCounts;
 use super::sample_buffer::{self, SampleBuffer};
-use super::techniques::{TechniquePicture, Watch, Watched};
-use super::tiles::{Group, TILE_PIXELS, Tiles, WholeTile};
+use super::techniques::{FilmRecorder, TechniquePicture, TileRecorder};
+use super::tiles::{PixelBlock, TILE_PIXELS, Tiles, WholeTile};
 use crate::camera::{Camera, GROUP_SIZE};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, PixelAccumulator, level_factor2};
@@ -70,7 +70,7 @@ pub struct Passes<'a> {
     samples: Vec<SampleBuffer>,
     /// Photons and the pass that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
-    watched: Watched,
+    recorder: FilmRecorder,
     /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it
     /// covers.
     covered: f32,
@@ -95,7 +95,7 @@ impl<'a> Passes<'a> {
         }
         let tiles = Tiles::new(camera);
         let sources: Vec<WholeTile> =
-            if techniques.merge { tiles.of_film().collect() } else { tiles.of_whole().collect() };
+            if techniques.merge { tiles.film_tiles().collect() } else { tiles.whole_tiles().collect() };
         let pixels = light_paths(camera, techniques) as f32;
         let camera_paths = settings.camera_paths(scene, camera, initial_media);
         let merged_paths = pixels * pairs.len() as f32;
@@ -117,7 +117,7 @@ impl<'a> Passes<'a> {
             sources,
             samples,
             photons: None,
-            watched: Watched::new(settings, scene, &tiles),
+            recorder: FilmRecorder::new(settings, scene, &tiles),
             covered: 0.0,
         }
     }
@@ -165,7 +165,7 @@ impl<'a> Passes<'a> {
 
     /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged; `None`
     /// where it was given up.
-    fn pass<W: Watch>(&mut self, i: u64, pixels: &mut [PixelAccumulator], watches: &mut [W]) -> Option<Work> {
+    fn pass<W: TileRecorder>(&mut self, i: u64, pixels: &mut [PixelAccumulator], recorders: &mut [W]) -> Option<Work> {
         let shared = self.shared;
         if shared.techniques.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // Before the first pass of all, too: without photons it would lack the light that only they bring.
@@ -202,12 +202,12 @@ impl<'a> Passes<'a> {
         for ((pair, pass), samples) in self.pairs.iter().zip(&passes).zip(&mut self.samples) {
             let own = pair.own(self.settings.levels.picture_level());
             let streams = Streams::in_sequence(seed, i, pair.camera);
-            let mut on_film = samples.par_tiles().zip(watches.par_iter_mut()).collect::<Vec<_>>().into_iter();
+            let mut on_film = samples.par_tiles().zip(recorders.par_iter_mut()).collect::<Vec<_>>().into_iter();
             let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
             self.sources.par_iter().zip(film).zip(&mut self.left).for_each(|((tile, mut film), left)| {
                 left.clear();
                 let (mut arena, mut sample) = (Bump::new(), PixelSample::default());
-                for Group { keys, places } in tiles.all_groups(*tile) {
+                for PixelBlock { keys, places } in tiles.blocks(*tile) {
                     if shared.camera_paths.is_given_up() {
                         return;
                     }
@@ -220,7 +220,7 @@ impl<'a> Passes<'a> {
                         arena.reset();
                         let mut vertices = LightVertices::new_in(&arena);
                         shared.light_path(pass, index, false, &mut vertices, left, &mut ());
-                        let (Some((samples, watch)), Some(place), Some(start)) =
+                        let (Some((samples, tile_recorder)), Some(place), Some(start)) =
                             (&mut film, &places[k], &mut starts[k])
                         else {
                             continue;
@@ -229,8 +229,8 @@ impl<'a> Passes<'a> {
                         start.0.wavelength_sample = pass.wavelength(index);
                         let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
                         let meets = CameraWalkContext { vertices: &vertices, photons: map, levels: &levels };
-                        watch.begin(place.at, own);
-                        shared.camera_path(&arena, start, &meets, *watch, &mut sample);
+                        tile_recorder.select_pixel(place.at, own);
+                        shared.camera_path(&arena, start, &meets, *tile_recorder, &mut sample);
                         samples.set(place.at, &sample);
                     }
                 }
@@ -239,22 +239,24 @@ impl<'a> Passes<'a> {
                 return None;
             }
             let splats = SplatsByTile::new(&self.left, &tiles);
-            samples.par_tiles().zip(watches.par_iter_mut()).enumerate().for_each(|(tile, (mut samples, watch))| {
-                for splat in splats.of(tile) {
-                    let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
-                    let (_, slot) = tiles.place(splat.pixel);
-                    watch.splat(slot, own, splat, &levels);
-                    let mut sample = samples.get(slot);
-                    splat.apply(&levels, &mut sample);
-                    samples.set(slot, &sample);
-                }
-            });
+            samples.par_tiles().zip(recorders.par_iter_mut()).enumerate().for_each(
+                |(tile, (mut samples, tile_recorder))| {
+                    for splat in splats.of(tile) {
+                        let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
+                        let (_, slot) = tiles.place(splat.pixel);
+                        tile_recorder.record_splat(slot, own, splat, &levels);
+                        let mut sample = samples.get(slot);
+                        splat.apply(&levels, &mut sample);
+                        samples.set(slot, &sample);
+                    }
+                },
+            );
             rejected += self.left.iter().map(|left| left.lost).sum::<u64>();
             photons.reserve(self.left.iter().map(|left| left.photons.len()).sum());
             self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
         }
         let walked = self.pairs.len() as u64 * u64::from(passes[0].count());
-        let groups = |slot: usize| watches[slot / TILE_PIXELS].groups(slot % TILE_PIXELS);
+        let groups = |slot: usize| recorders[slot / TILE_PIXELS].group_light(slot % TILE_PIXELS);
         let gathered = sample_buffer::add(
             &self.samples,
             (&shared.camera_paths, i),
@@ -359,18 +361,18 @@ impl Integrator for Passes<'_> {
 
     fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
         let start = cpu_seconds();
-        let mut watched = std::mem::take(&mut self.watched);
-        let work = match watched.begin() {
-            Some(watches) => self.pass(i, pixels, watches),
+        let mut recorder = std::mem::take(&mut self.recorder);
+        let work = match recorder.start_iteration() {
+            Some(recorders) => self.pass(i, pixels, recorders),
             None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
         };
-        self.watched = watched;
+        self.recorder = recorder;
         // Light and camera paths take turns within a pixel.
         phases.eye += cpu_seconds() - start;
         work
     }
 
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
-        self.watched.collect(&self.tiles, iterations)
+        self.recorder.take_pictures(&self.tiles, iterations)
     }
 }

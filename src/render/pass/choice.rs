@@ -20,7 +20,7 @@ use crate::render::settings::{KernelChoice, Settings};
 use crate::scene::Scene;
 use crate::transport::{InitialMedia, TechniqueSet};
 
-/// The passes of a render, nothing done yet.
+/// The integrator of the method, before the first iteration.
 pub(in crate::render) fn integrator<'a>(
     scene: &'a Scene,
     camera: &'a Camera,

@@ -1,23 +1,23 @@
-//! The light of each group of lights, as it arrives in the pixels of a tile.
+//! Light of each light group in the pixels of a tile.
 
 use super::tiles::TILE_PIXELS;
 use crate::light::Group;
 use crate::math::Rgb;
 use crate::plan::{Part, PathClass};
 
-/// All light of a group, and its caustics.
-pub(super) type OfGroup = [Rgb; 2];
+/// Radiance of a light group: all of it, and its caustics.
+pub(super) type GroupLight = [Rgb; 2];
 
-/// What an iteration brings to the pixels of a tile.
+/// Light of one iteration in the pixels of a tile, by light group.
 pub(super) struct TileGroups {
     groups: usize,
-    light: Vec<OfGroup>,
+    light: Vec<GroupLight>,
 }
 
 impl TileGroups {
-    /// Of so many groups; no light yet.
+    /// No light of `groups` groups.
     pub fn new(groups: usize) -> TileGroups {
-        TileGroups { groups, light: vec![OfGroup::default(); groups * TILE_PIXELS] }
+        TileGroups { groups, light: vec![GroupLight::default(); groups * TILE_PIXELS] }
     }
 
     /// Adds light to the pixel at `slot`.
@@ -31,13 +31,13 @@ impl TileGroups {
         }
     }
 
-    /// What has arrived at `slot`, group by group.
-    pub fn at(&self, slot: usize) -> &[OfGroup] {
+    /// Light of each group at `slot`.
+    pub fn at(&self, slot: usize) -> &[GroupLight] {
         &self.light[slot * self.groups..][..self.groups]
     }
 
-    /// Before the next iteration.
+    /// Removes all light, before an iteration.
     pub fn clear(&mut self) {
-        self.light.fill(OfGroup::default());
+        self.light.fill(GroupLight::default());
     }
 }

@@ -7,8 +7,8 @@
 //! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once
 //! learnt, does not leave less, there is none.
 
-use super::chunks::chunks;
 use super::cost::{Cost, GUIDED_START};
+use super::light_path_ranges::light_path_ranges;
 use crate::estimator::bandwidth::{SCREEN_CAP, picture_width_at};
 use crate::light::{Guide, Region};
 use crate::math::{Rgb, Vec3, luminance};
@@ -138,7 +138,7 @@ fn photons(
         }
         (marked, walked)
     };
-    let parts: Vec<(ByKind<Vec<Marked>>, Vec<Walked>)> = chunks(light_paths).map(trace).collect();
+    let parts: Vec<(ByKind<Vec<Marked>>, Vec<Walked>)> = light_path_ranges(light_paths).map(trace).collect();
     let mut walked = vec![Walked::default(); guide.cells()];
     let mut all = ByKind::<Vec<Marked>>::default();
     for (marked, part) in parts {

@@ -1,4 +1,4 @@
-//! What the passes of a method are to the loop over iterations.
+//! The interface between integrators and the loop over iterations.
 
 use super::photon_counts::PhotonCounts;
 use super::techniques::TechniquePicture;
@@ -7,48 +7,47 @@ use crate::light::Guide;
 use crate::photon::ByKind;
 use crate::render::clock::Phases;
 
-/// What an iteration has done.
+/// Counts of one iteration.
 #[derive(Default)]
 pub(in crate::render) struct Work {
-    /// Light paths walked.
+    /// Light paths traced.
     pub light_paths: u64,
-    /// Photons of the map used.
+    /// Photons in the map.
     pub photons: usize,
-    /// Those that were left out of it and light paths that ended because they were not finite.
+    /// Photons and light paths that were rejected because they were not finite.
     pub rejected: u64,
-    /// Photons on surfaces by kind, where a method has any.
+    /// Photons on surfaces by kind, for methods with photons.
     pub counts: PhotonCounts,
 }
 
-/// The passes of a method.
+/// Renders the iterations of a method.
 pub(in crate::render) trait Integrator {
-    /// The pixels before the first iteration.
+    /// Runs the pilot, if there is one, and makes the pixels for the first iteration.
     fn pixels(&mut self) -> Vec<PixelAccumulator>;
-    /// Adds iteration `i` (from 1) to all pixels, and what it cost to `phases`; `None` where it was given up
-    /// ([`Settings::stop`](crate::render::Settings::stop)) and has changed nothing.
+    /// Adds iteration `i` (from 1) to all pixels, and its core-seconds to `phases`. Returns `None` if the iteration was
+    /// interrupted ([`Settings::stop`](crate::render::Settings::stop)) and has changed nothing.
     fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work>;
-    /// Squared radii by kind of photons of every pixel and level after the last iteration (square scene units), of
-    /// methods where they do not follow from the iteration.
+    /// Squared radii of every pixel and level after the last iteration (square scene units), by kind of photons; `None` if
+    /// they follow from the number of the iteration.
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {
         None
     }
-    /// What it has learnt from iterations and the next one needs, packed; what follows from the settings alone is made
-    /// again.
+    /// State that the next iteration needs from earlier ones, packed. It leaves out data that follow from the settings.
     ///
     /// # Errors
-    /// None: it is written to memory.
+    /// None: the state is packed in memory.
     fn state(&self) -> postcard::Result<Vec<u8>> {
         Ok(Vec::new())
     }
-    /// Takes such a state, after [`Iterate::pixels`]; false where it is another's.
+    /// Restores a state, after [`Integrator::pixels`]. Returns false if the state is of another method or picture.
     fn restore(&mut self, state: &[u8]) -> bool {
         state.is_empty()
     }
-    /// Where its light paths start, if they are guided.
+    /// Learnt distribution of the starts of light paths, if they are guided.
     fn guide(&self) -> Option<&Guide> {
         None
     }
-    /// Pictures per technique after so many iterations, of methods that have them.
+    /// Takes the picture of each technique, as the mean over `iterations`; empty for methods without techniques.
     fn techniques(&mut self, iterations: u64) -> Vec<TechniquePicture> {
         let _ = iterations;
         Vec::new()

@@ -1,13 +1,13 @@
-//! The passes of each method, and what they share.
+//! The integrator of each method, and modules that integrators share.
 
 mod bidirectional;
 mod choice;
-mod chunks;
 mod cost;
 mod forecast;
 mod groups;
 mod guiding;
 mod integrator;
+mod light_path_ranges;
 mod metropolis;
 mod path;
 mod photon_counts;

@@ -1,14 +1,14 @@
-//! Photons of the maps, and samples of pixels that they have reached.
+//! Numbers of photons in the maps, and of pixel samples that photons have reached.
 
 use crate::photon::{ByKind, Kind};
 use serde::{Deserialize, Serialize};
 
-/// Photons of surfaces and what they have brought, by kind.
+/// Numbers of surface photons and of their effects, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotonCounts {
     /// Photons in the maps of all iterations.
     pub stored: ByKind<u64>,
-    /// Samples of pixels to which photons have brought light.
+    /// Samples of pixels that have gathered light from photons.
     pub gathered: ByKind<u64>,
 }
 

@@ -1,9 +1,9 @@
 //! The light paths of stochastic progressive photon mapping: photon maps of an iteration, and initial bandwidths from a
 //! pilot.
 
-use super::chunks::chunks;
 use super::guiding::learn_guide;
 use super::integrator::Work;
+use super::light_path_ranges::light_path_ranges;
 use super::region::region;
 use super::volume::{Maps, VolumeMap};
 use crate::camera::Camera;
@@ -44,7 +44,7 @@ fn trace_by(
     range: Range<u32>,
     light_path: impl Fn(&mut Bump, u32, &mut Photons) + Sync,
 ) -> Photons {
-    let parts: Vec<Photons> = chunks(range.len() as u32)
+    let parts: Vec<Photons> = light_path_ranges(range.len() as u32)
         .map_init(Bump::new, |arena, part| {
             let mut photons = Photons::default();
             for index in part.take_while(|index| !paths.is_given_up(*index)) {

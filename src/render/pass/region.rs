@@ -1,5 +1,5 @@
-//! The region that a picture shows, for light from infinity: of a lamp as wide as the scene few paths would come where
-//! anybody looks.
+//! The visible region of the scene, for light from infinity. Light paths from a sun or an environment cover the whole
+//! scene; without a region to aim at, few of them would arrive where the camera looks.
 
 use crate::camera::{par_pixels, pixels_per_band};
 use crate::light::Region;
@@ -11,21 +11,24 @@ use crate::transport::CameraPaths;
 use bumpalo::Bump;
 use rayon::prelude::*;
 
-/// Eye paths that are asked.
-const PATHS: f64 = 1024.0;
-/// Share of the points seen that it holds, and how much wider it is: what lights them is around them.
-const HELD: (f64, f32) = (0.8, 1.5);
-/// A region of more than this share of the scene's disc is none.
-const WIDEST: f32 = 0.25;
+/// Camera paths that find the region.
+const SAMPLED_PATHS: f64 = 1024.0;
+/// Share of the visible points that determine the radius of the region.
+const COVERED_SHARE: f64 = 0.8;
+/// Factor of that radius: objects that light the points are around them.
+const RADIUS_FACTOR: f32 = 1.5;
+/// Largest area of a region, relative to the scene's disc.
+const MAX_AREA_SHARE: f32 = 0.25;
 
-/// A sphere around most of what the eye's paths see, if that is little of the scene.
+/// A sphere around most of the visible points; `None` if that is most of the scene, or if no light is at infinity.
 pub(super) fn region(camera_paths: &CameraPaths<'_>, seed: u64) -> Option<Region> {
     let Scene { lights, .. } = camera_paths.scene;
     if !lights.emitters().iter().any(|emitter| emitter.is_infinite()) {
         return None;
     }
     let (width, height) = camera_paths.camera.size();
-    let camera = camera_paths.camera.subsample((PATHS / (f64::from(width) * f64::from(height))).sqrt().min(1.0));
+    let camera =
+        camera_paths.camera.subsample((SAMPLED_PATHS / (f64::from(width) * f64::from(height))).sqrt().min(1.0));
     let camera_paths = CameraPaths { camera: &camera, ..*camera_paths };
     let (width, height) = camera.size();
     let mut seen: Vec<Option<Vec3>> = vec![None; width as usize * height as usize];
@@ -43,9 +46,9 @@ pub(super) fn region(camera_paths: &CameraPaths<'_>, seed: u64) -> Option<Region
         median(&mut values, f32::total_cmp)
     };
     let center = Vec3::new(along(0)?, along(1)?, along(2)?);
-    let held = ((seen.len() as f64 * HELD.0) as usize).min(seen.len() - 1);
+    let covered = ((seen.len() as f64 * COVERED_SHARE) as usize).min(seen.len() - 1);
     let mut distances: Vec<f32> = seen.iter().map(|p| p.distance(center)).collect();
-    let radius = HELD.1 * *distances.select_nth_unstable_by(held, f32::total_cmp).1;
+    let radius = RADIUS_FACTOR * *distances.select_nth_unstable_by(covered, f32::total_cmp).1;
     let whole = lights.sky().radius;
-    (radius > 0.0 && radius * radius < WIDEST * whole * whole).then(|| Region::new(center, radius, whole))
+    (radius > 0.0 && radius * radius < MAX_AREA_SHARE * whole * whole).then(|| Region::new(center, radius, whole))
 }

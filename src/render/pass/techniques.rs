@@ -1,10 +1,10 @@
-//! A picture per sampling technique, weighted and unweighted: how the strategies of a method share its light \[Veach
-//! 1997, 10.4\].
+//! A picture per sampling technique, weighted and unweighted, which shows how techniques share the light of a method
+//! \[Veach 1997, 10.4\].
 //!
-//! Tiles keep their own pictures, so that they need no locks and sums do not depend on threads. Light that is not
-//! finite is left out.
+//! Every tile has its own pictures. So they need no locks, and sums do not depend on threads. Light that is not finite is
+//! left out.
 
-use super::groups::{OfGroup, TileGroups};
+use super::groups::{GroupLight, TileGroups};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::film::Picture;
 use crate::light::Group;
@@ -14,30 +14,29 @@ use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::{MergeLevels, PathRecorder, Splat, Technique};
 
-/// From this depth of a walk on, deeper ones share a picture: paths have no longest length.
-const DEEPEST: u32 = 6;
-const DEPTHS: usize = DEEPEST as usize;
-/// Pictures that there can be.
+/// Subpaths of this depth and all deeper ones share a picture, because the depth of paths has no bound.
+const MAX_PICTURE_DEPTH: u32 = 6;
+const DEPTHS: usize = MAX_PICTURE_DEPTH as usize;
+/// Most pictures of a render.
 pub const MAX_TECHNIQUES: usize = 3 * DEPTHS + 2 * DEPTHS * DEPTHS;
 
-/// What one technique finds.
+/// Light that one technique finds.
 pub struct TechniquePicture {
-    /// Which one.
+    /// The technique.
     pub technique: Technique,
-    /// Radiance per pixel, row by row from the top: its share of the method's picture. The shares of all techniques sum
-    /// to it.
+    /// Radiance with MIS weights. The sum over all techniques is the method's picture.
     pub weighted: Picture,
-    /// The same without weights: what the technique would give alone (merging: with the kernel of the method's own
-    /// bandwidth).
+    /// Radiance without MIS weights: the picture of the technique alone. Merging uses the bandwidth of the method's own
+    /// picture.
     pub unweighted: Picture,
 }
 
 impl TechniquePicture {
-    /// A name for files: what is done, and as in \[Veach 1997\] the number of vertices `s` of the light's walk and `t`
-    /// of the eye's, both ends counted; `up` where deeper walks are in it, too. A merged photon is a vertex of both
-    /// walks.
+    /// Name for files: the kind of the technique, and the numbers of vertices `s` of the light subpath and `t` of the
+    /// camera subpath \[Veach 1997\], both ends included. `up` marks a picture that includes deeper subpaths. A merged
+    /// photon is a vertex of both subpaths.
     pub fn name(&self) -> String {
-        let count = |depth: u32| format!("{}{}", depth + 1, if depth >= DEEPEST { "up" } else { "" });
+        let count = |depth: u32| format!("{}{}", depth + 1, if depth >= MAX_PICTURE_DEPTH { "up" } else { "" });
         match self.technique {
             Technique::Hit { camera } => format!("hit_s0_t{}", count(camera)),
             Technique::NextEvent { camera } => format!("nextevent_s1_t{}", count(camera)),
@@ -48,9 +47,9 @@ impl TechniquePicture {
     }
 }
 
-/// Where the picture of a technique is kept; depths are 1 and up.
+/// Index of the picture of a technique. Depths begin at 1.
 fn index(technique: Technique) -> usize {
-    let at = |depth: u32| depth.clamp(1, DEEPEST) as usize - 1;
+    let at = |depth: u32| depth.clamp(1, MAX_PICTURE_DEPTH) as usize - 1;
     match technique {
         Technique::Hit { camera } => at(camera),
         Technique::NextEvent { camera } => DEPTHS + at(camera),
@@ -73,43 +72,43 @@ fn technique(index: usize) -> Technique {
     }
 }
 
-/// Watches the light that reaches the pixels of a tile. `()` costs nothing.
-pub(super) trait Watch: PathRecorder + Send + Sync {
-    /// What the eye path finds from now on belongs to the pixel at `slot`; only `level` of its levels counts, if any.
+/// Records the light that reaches the pixels of a tile, beside the picture itself. `()` records nothing, at no cost.
+pub(super) trait TileRecorder: PathRecorder + Send + Sync {
+    /// Light of the following camera path belongs to the pixel at `slot`. Only light of `level` counts, if any.
     #[inline]
-    fn begin(&mut self, slot: usize, level: Option<usize>) {
+    fn select_pixel(&mut self, slot: usize, level: Option<usize>) {
         let _ = (slot, level);
     }
 
-    /// A light path has sent light to the pixel at `slot`.
+    /// Records light that a light path has sent to the pixel at `slot`.
     #[inline]
-    fn splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
+    fn record_splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
         let _ = (slot, level, splat, levels);
     }
 
-    /// What the iteration has brought to the pixel at `slot`, by groups of lights.
+    /// Light of this iteration at the pixel at `slot`, by light group.
     #[inline]
-    fn groups(&self, slot: usize) -> &[OfGroup] {
+    fn group_light(&self, slot: usize) -> &[GroupLight] {
         let _ = slot;
         &[]
     }
 }
 
-impl Watch for () {}
+impl TileRecorder for () {}
 
-/// What is looked at besides the picture itself, in a tile.
-pub(super) struct Watches {
+/// Recorded light of a tile: pictures of techniques, and light of groups.
+pub(super) struct TileRecords {
     slot: usize,
     level: Option<usize>,
     pictures: Option<TilePictures>,
     groups: Option<TileGroups>,
 }
 
-impl Watches {
-    /// A picture per technique, and light by so many groups, where they are wanted.
-    fn new(techniques: bool, groups: usize) -> Watches {
+impl TileRecords {
+    /// Records pictures of techniques if `techniques` is true, and the light of `groups` groups.
+    fn new(techniques: bool, groups: usize) -> TileRecords {
         let groups = (groups > 0).then(|| TileGroups::new(groups));
-        Watches { slot: 0, level: None, pictures: techniques.then(TilePictures::new), groups }
+        TileRecords { slot: 0, level: None, pictures: techniques.then(TilePictures::new), groups }
     }
 
     fn add(&mut self, technique: Technique, of: (PathClass, Group), value: Rgb, weight: f32) {
@@ -122,33 +121,33 @@ impl Watches {
     }
 }
 
-/// What is looked at besides the picture, by tile, if anything is.
+/// Recorded light of all tiles; `None` if nothing is recorded.
 #[derive(Default)]
-pub(super) struct Watched(Option<Vec<Watches>>);
+pub(super) struct FilmRecorder(Option<Vec<TileRecords>>);
 
-impl Watched {
-    /// As the settings want.
-    pub fn new(settings: &Settings, scene: &Scene, tiles: &Tiles) -> Watched {
+impl FilmRecorder {
+    /// Records what the settings ask for.
+    pub fn new(settings: &Settings, scene: &Scene, tiles: &Tiles) -> FilmRecorder {
         let (techniques, groups) = (settings.techniques, settings.light_groups(scene));
-        let watches = || (0..tiles.count()).map(|_| Watches::new(techniques, groups)).collect();
-        Watched((techniques || groups > 0).then(watches))
+        let records = || (0..tiles.count()).map(|_| TileRecords::new(techniques, groups)).collect();
+        FilmRecorder((techniques || groups > 0).then(records))
     }
 
-    /// Before an iteration: what watches it, tile by tile.
-    pub fn begin(&mut self) -> Option<&mut [Watches]> {
-        let watches = self.0.as_deref_mut()?;
-        watches.iter_mut().filter_map(|watches| watches.groups.as_mut()).for_each(TileGroups::clear);
-        Some(watches)
+    /// Starts an iteration. Returns the recorders of all tiles, `None` if nothing is recorded.
+    pub fn start_iteration(&mut self) -> Option<&mut [TileRecords]> {
+        let tiles = self.0.as_deref_mut()?;
+        tiles.iter_mut().filter_map(|tile| tile.groups.as_mut()).for_each(TileGroups::clear);
+        Some(tiles)
     }
 
-    /// The pictures of all techniques that have found light, after so many iterations; they are taken.
-    pub fn collect(&mut self, tiles: &Tiles, iterations: u64) -> Vec<TechniquePicture> {
-        let parts: Vec<_> = self.0.take().into_iter().flatten().filter_map(|watches| watches.pictures).collect();
+    /// Takes the pictures of all techniques that have found light: means over `iterations`.
+    pub fn take_pictures(&mut self, tiles: &Tiles, iterations: u64) -> Vec<TechniquePicture> {
+        let parts: Vec<_> = self.0.take().into_iter().flatten().filter_map(|tile| tile.pictures).collect();
         if parts.is_empty() { Vec::new() } else { collect(tiles, parts, iterations) }
     }
 }
 
-impl PathRecorder for Watches {
+impl PathRecorder for TileRecords {
     #[inline]
     fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
         if self.level == Some(level) {
@@ -157,15 +156,15 @@ impl PathRecorder for Watches {
     }
 }
 
-impl Watch for Watches {
+impl TileRecorder for TileRecords {
     #[inline]
-    fn begin(&mut self, slot: usize, level: Option<usize>) {
+    fn select_pixel(&mut self, slot: usize, level: Option<usize>) {
         (self.slot, self.level) = (slot, level);
     }
 
     #[inline]
-    fn splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
-        self.begin(slot, level);
+    fn record_splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
+        self.select_pixel(slot, level);
         if let Some(level) = level {
             let weight = splat.ratios.weight(levels.eta()[level]);
             self.add(Technique::Camera { light: splat.light }, (splat.class, splat.group), splat.value, weight);
@@ -173,7 +172,7 @@ impl Watch for Watches {
     }
 
     #[inline]
-    fn groups(&self, slot: usize) -> &[OfGroup] {
+    fn group_light(&self, slot: usize) -> &[GroupLight] {
         self.groups.as_ref().map_or(&[], |groups| groups.at(slot))
     }
 }
@@ -181,13 +180,13 @@ impl Watch for Watches {
 /// Weighted and unweighted sums over iterations, pixel by pixel.
 type Sums = [[Rgb; 2]; TILE_PIXELS];
 
-/// The pictures of a tile.
+/// Pictures of all techniques in a tile.
 struct TilePictures {
     pictures: Vec<Option<Box<Sums>>>,
 }
 
 impl TilePictures {
-    /// All black.
+    /// Black pictures.
     fn new() -> TilePictures {
         let pictures = std::iter::repeat_with(|| None).take(MAX_TECHNIQUES).collect();
         TilePictures { pictures }
@@ -204,7 +203,7 @@ impl TilePictures {
     }
 }
 
-/// The pictures of all techniques that have found light: means over `iterations`.
+/// Pictures of all techniques that have found light: means over `iterations`.
 fn collect(tiles: &Tiles, mut parts: Vec<TilePictures>, iterations: u64) -> Vec<TechniquePicture> {
     let scale = 1.0 / iterations.max(1) as f32;
     let mut pictures = Vec::new();
@@ -215,7 +214,7 @@ fn collect(tiles: &Tiles, mut parts: Vec<TilePictures>, iterations: u64) -> Vec<
         let black = Picture::filled(tiles.size(), [0.0; 3]);
         let mut picture = TechniquePicture { technique: technique(index), weighted: black.clone(), unweighted: black };
         for (tile, part) in parts.iter_mut().enumerate() {
-            // Taken and freed, so that the pictures are not in memory twice.
+            // Sums are freed one by one, so that pictures are not in memory twice.
             let Some(sums) = part.pictures[index].take() else { continue };
             for place in tiles.pixels(tile) {
                 let at = place.index as usize;
@@ -234,7 +233,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_technique_has_its_picture() {
+    fn every_technique_has_a_picture_with_a_unique_name() {
         let mut names = std::collections::HashSet::new();
         for at in 0..MAX_TECHNIQUES {
             assert_eq!(index(technique(at)), at);

@@ -1,20 +1,20 @@
-//! Tiles of constant size: the unit of work of the methods that add to a film.
+//! Tiles of constant size: the unit of work of methods whose paths add light to any pixel.
 
 use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 use crate::film::Size;
 
-/// Width and height of a tile in pixels.
+/// Width and height of a tile (pixels).
 pub const TILE: u32 = 16;
 /// Pixels of a tile.
 pub(super) const TILE_PIXELS: usize = (TILE * TILE) as usize;
 
-/// The film's tiles. They are tiles of the whole picture, of which the film may be a window, so that sums over them are
-/// the same there.
+/// The tiles of the film. If the film is a window, they are tiles of the whole picture, so that sums over a tile are the
+/// same in both.
 #[derive(Clone, Copy)]
 pub(super) struct Tiles {
     width: u32,
     height: u32,
-    /// Size of the whole picture, and where the film begins in it.
+    /// Size of the whole picture, and the first column and row of the film in it.
     whole: [(u32, u32); 2],
     across: u32,
     down: u32,
@@ -23,17 +23,17 @@ pub(super) struct Tiles {
 /// A tile of the whole picture.
 #[derive(Clone, Copy)]
 pub(super) struct WholeTile {
-    /// Its number among the film's tiles, if it is one.
+    /// Index among the tiles of the film; `None` outside the film.
     pub tile: Option<usize>,
-    /// Its first column and row.
+    /// First column and row.
     corner: (u32, u32),
 }
 
-/// Pixels of a tile of the whole picture, neighbours together.
-pub(super) struct Group {
-    /// Their indices in the whole picture, row by row.
+/// A block of neighbouring pixels in a tile of the whole picture.
+pub(super) struct PixelBlock {
+    /// Indices in the whole picture, row by row; `None` outside it.
     pub keys: [Option<u64>; GROUP_SIZE],
-    /// Those of them that are on the film.
+    /// Pixels of the block that are on the film.
     pub places: [Option<TilePixel>; GROUP_SIZE],
 }
 
@@ -48,8 +48,8 @@ impl Tiles {
         self.across as usize * self.down as usize
     }
 
-    /// The tiles of the whole picture, row by row.
-    pub fn of_whole(self) -> impl Iterator<Item = WholeTile> {
+    /// All tiles of the whole picture, row by row.
+    pub fn whole_tiles(self) -> impl Iterator<Item = WholeTile> {
         let [size, at] = self.whole;
         let (across, down) = (size.0.div_ceil(TILE), size.1.div_ceil(TILE));
         (0..down).flat_map(move |y| (0..across).map(move |x| (x, y))).map(move |(x, y)| {
@@ -59,9 +59,9 @@ impl Tiles {
         })
     }
 
-    /// Those of them that are the film's.
-    pub fn of_film(self) -> impl Iterator<Item = WholeTile> {
-        self.of_whole().filter(|tile| tile.tile.is_some())
+    /// Tiles of the whole picture that the film contains a part of.
+    pub fn film_tiles(self) -> impl Iterator<Item = WholeTile> {
+        self.whole_tiles().filter(|tile| tile.tile.is_some())
     }
 
     /// Width and height of the film.
@@ -75,7 +75,7 @@ impl Tiles {
         y * self.width + x
     }
 
-    /// The tile of pixel `index` (row by row), and its slot there.
+    /// The tile of pixel `index` (row by row), and the pixel's slot in the tile.
     #[inline]
     pub fn place(&self, index: u32) -> (usize, usize) {
         let first = (self.whole[1].0 % TILE, self.whole[1].1 % TILE);
@@ -83,15 +83,15 @@ impl Tiles {
         ((y / TILE * self.across + x / TILE) as usize, (y % TILE * TILE + x % TILE) as usize)
     }
 
-    /// Where pixel `index` is kept, tile by tile.
+    /// Position of pixel `index` in buffers that are stored tile by tile.
     #[inline]
     pub fn slot(&self, index: u32) -> usize {
         let (tile, slot) = self.place(index);
         tile * TILE_PIXELS + slot
     }
 
-    /// All pixels of a tile of the whole picture: a group is a block of two rows. [`TilePixel::at`] is the slot in the tile.
-    pub fn all_groups(self, tile: WholeTile) -> impl Iterator<Item = Group> {
+    /// All pixels of a tile of the whole picture, in blocks of two rows. [`TilePixel::at`] is the slot in the tile.
+    pub fn blocks(self, tile: WholeTile) -> impl Iterator<Item = PixelBlock> {
         let [size, at] = self.whole;
         let columns = GROUP_SIZE as u32 / 2;
         let per_row = TILE / columns;
@@ -112,22 +112,22 @@ impl Tiles {
                     at: (dy * TILE + dx) as usize,
                 })
             };
-            Group { keys: pixels.map(key), places: std::array::from_fn(place) }
+            PixelBlock { keys: pixels.map(key), places: std::array::from_fn(place) }
         })
     }
 
-    /// The film's pixels of one of its tiles, in the order of [`Tiles::all_groups`].
-    pub fn groups(self, tile: usize) -> impl Iterator<Item = [Option<TilePixel>; GROUP_SIZE]> {
+    /// Pixels of a tile that are on the film, in the blocks of [`Tiles::blocks`].
+    pub fn film_blocks(self, tile: usize) -> impl Iterator<Item = [Option<TilePixel>; GROUP_SIZE]> {
         let at = self.whole[1];
         let (i, j) = (tile as u32 % self.across + at.0 / TILE, tile as u32 / self.across + at.1 / TILE);
-        self.all_groups(WholeTile { tile: Some(tile), corner: (i * TILE, j * TILE) })
-            .map(|group| group.places)
+        self.blocks(WholeTile { tile: Some(tile), corner: (i * TILE, j * TILE) })
+            .map(|block| block.places)
             .filter(|places| places.iter().any(Option::is_some))
     }
 
-    /// The same, one after the other.
+    /// Pixels of a tile that are on the film, one by one.
     pub fn pixels(self, tile: usize) -> impl Iterator<Item = TilePixel> {
-        self.groups(tile).flat_map(|places| places.into_iter().flatten())
+        self.film_blocks(tile).flat_map(|places| places.into_iter().flatten())
     }
 }
 
@@ -137,20 +137,20 @@ mod tests {
     use crate::camera::Projection;
     use crate::math::{DVec3, Mat3, Vec2};
 
-    /// Tiles of a window are those of the whole picture; every pixel is in one, where its index says.
+    /// Every pixel is in one tile, at the slot of its index.
     #[test]
-    fn windows_have_tiles_of_the_whole_picture() {
+    fn windows_have_the_tiles_of_the_whole_picture() {
         let projection = Projection::Perspective(Vec2::ONE);
         let whole = Camera::new(DVec3::ZERO, Mat3::IDENTITY, projection, (0.0, 1.0), (70, 50));
         for [x, y, width, height] in [[0, 0, 70, 50], [16, 32, 16, 16], [13, 7, 40, 43], [69, 49, 1, 1]] {
             let camera = whole.crop([x, y, width, height]);
             let tiles = Tiles::new(&camera);
             let (mut on_film, mut keys, mut numbers) = (Vec::new(), Vec::<u64>::new(), Vec::<usize>::new());
-            for tile in tiles.of_whole() {
+            for tile in tiles.whole_tiles() {
                 numbers.extend(tile.tile);
-                for group in tiles.all_groups(tile) {
-                    keys.extend(group.keys.iter().flatten());
-                    for (key, place) in group.keys.iter().zip(&group.places) {
+                for block in tiles.blocks(tile) {
+                    keys.extend(block.keys.iter().flatten());
+                    for (key, place) in block.keys.iter().zip(&block.places) {
                         let Some(place) = place else { continue };
                         assert_eq!(*key, Some(camera.pixel_key(place.pixel)));
                         assert_eq!(tiles.place(place.index as u32), (tile.tile.unwrap(), place.at));
@@ -159,7 +159,7 @@ mod tests {
                 }
             }
             let by_tile: Vec<u64> =
-                tiles.of_film().flat_map(|tile| tiles.pixels(tile.tile.unwrap())).map(|place| place.index).collect();
+                tiles.film_tiles().flat_map(|tile| tiles.pixels(tile.tile.unwrap())).map(|place| place.index).collect();
             assert_eq!(on_film, by_tile);
             assert!(numbers.iter().copied().eq(0..tiles.count()));
             on_film.sort_unstable();
