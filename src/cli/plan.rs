@@ -20,7 +20,7 @@ use serde_json::json;
 #[command(next_line_help = true)]
 pub struct PlanArgs {
     #[command(flatten)]
-    job: RenderOptions,
+    options: RenderOptions,
 
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
@@ -33,7 +33,7 @@ pub struct PlanArgs {
 impl PlanArgs {
     /// The options of the scene.
     pub fn scene(&self) -> &SceneOptions {
-        &self.job.scene
+        &self.options.scene
     }
 }
 
@@ -43,13 +43,13 @@ pub fn run(args: &PlanArgs) -> Result<()> {
 }
 
 fn report(args: &PlanArgs) -> Result<()> {
-    let (job, form) = (&args.job, Form::for_output(args.json));
-    let request = job.picture_request()?;
-    let loaded = scene::read(&job.scene, form, rayon::current_num_threads())?;
+    let (options, form) = (&args.options, Form::for_output(args.json));
+    let request = options.picture_request()?;
+    let loaded = scene::read(&options.scene, form, rayon::current_num_threads())?;
     let auto = matches!(request.method, MethodRequest::Auto(_));
     let doing = if auto { "choosing a method" } else { "planning" };
-    let planned = form.during(doing, || plan_picture(request, &job.scene.path, &loaded, || false))?;
-    let forecast = job.target_error.map(|target| Ok((target, forecast_error(args, &loaded, &planned, target)?)));
+    let planned = form.during(doing, || plan_picture(request, &options.scene.path, &loaded, || false))?;
+    let forecast = options.target_error.map(|target| Ok((target, forecast_error(args, &loaded, &planned, target)?)));
     let forecast = forecast.transpose()?;
     let plan = &planned.plan;
     if args.json {
@@ -69,8 +69,8 @@ fn report(args: &PlanArgs) -> Result<()> {
         print(&text)?
     }
     let warnings = &loaded.scene.warnings;
-    if job.scene.strict && !warnings.is_empty() {
-        return Err(scene::strict_error(&job.scene, warnings.len()));
+    if options.scene.strict && !warnings.is_empty() {
+        return Err(scene::strict_error(&options.scene, warnings.len()));
     }
     Ok(())
 }
@@ -78,8 +78,8 @@ fn report(args: &PlanArgs) -> Result<()> {
 /// The cost of a target error.
 fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, target: f64) -> Result<Option<Forecast>> {
     let view = View::new(&loaded.scene, &planned.camera);
-    let settings = with_light_paths(planned.chosen.settings.clone(), args.job.photons, view.camera.size());
-    let mut finish = args.job.forecast_finish()?;
+    let settings = with_light_paths(planned.chosen.settings.clone(), args.options.photons, view.camera.size());
+    let mut finish = args.options.forecast_finish()?;
     let work = || forecast(view, &settings, &mut finish, target);
     Form::for_output(args.json).during("trying how the error falls", work)
 }

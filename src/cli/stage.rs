@@ -17,7 +17,7 @@ const OUTPUT_PREFIX: &str = "--output=";
 /// The stage cannot be read, or its options do not exist or contradict the command line.
 pub fn add_stage_options(command: Command, line: &mut clap::Command) -> Result<Command> {
     let (scene, known) = match &command {
-        Command::Render(args) => (&args.job.scene, None),
+        Command::Render(args) => (&args.options.scene, None),
         Command::Plan(args) => (args.scene(), line.find_subcommand("plan")),
         _ => return Ok(command),
     };

@@ -100,45 +100,24 @@ pub(super) fn deliver(
 ) -> Result<(Delivery, Vec<PixelAccumulator>)> {
     let finishes = finish.is_some();
     let mut header = contents.header(&rendered);
-    let (unseen, settings) = (rendered.error.unseen, rendered.settings.clone());
-    let error_of_estimate = rendered.error.relative();
+    let (error, unseen, settings) = (rendered.error.relative(), rendered.error.unseen, rendered.settings.clone());
     let (clock, cpu_start) = (Clock::start(), cpu_seconds());
     let (mut layers, pixels) = Layers::make(&contents, rendered, finishes)?;
-    if let (Some(observer), true) = (observer, finishes) {
-        let mut attributes = layers.attributes.clone();
-        attributes.insert(exr::ATTRIBUTE, &header)?;
-        observer.event(Event::Estimated { set: &layers.set, attributes: &attributes })?;
-    }
+    observer.filter(|_| finishes).map_or(Ok(()), |observer| layers.send_estimate(&header, observer))?;
     let finished = finish.map(|finish| layers.finish(finish, contents.selection, unseen.squared)).transpose();
     let finishing = clock.seconds();
-    let (finished, refusal) = match finished {
-        Ok(finished) => (finished, None),
-        Err(error) => (None, Some(error)),
-    };
+    let (finished, refusal) = finished.map_or_else(|error| (None, Some(error)), |finished| (finished, None));
     let reached = finished.as_ref().and_then(|finished| Reached::of(layers.history, finished.error));
-    let error = reached.as_ref().map(Reached::error).or(error_of_estimate);
+    let error = reached.as_ref().map(Reached::error).or(error);
     let unseen = unseen.sentence(&settings).filter(|_| error.is_some_and(|error| unseen.dominates(error)));
-    if let (Some(sentence), Some(warnings)) = (&unseen, header.get_mut("warnings").and_then(Value::as_array_mut)) {
-        warnings.push(sentence.as_str().into());
-    }
     let set = contents.select(layers.set, finishes, refusal.is_some())?;
-    let (finished_by, combined, worst) = match finished {
-        Some(FinishedPicture { name, header, worst, .. }) => (Some(name), header, worst),
-        None => (None, Value::Null, None),
-    };
-    if let Some(reached) = &reached {
-        reached.write(&mut header, contents.reproducible);
-    }
-    header.extend(worst.as_ref().map(|worst| ("worst".to_owned(), json!(worst))));
-    header.insert("combined".into(), combined);
-    header.extend(contents.more);
-    if !contents.reproducible {
-        write_costs(&mut header, cpu_seconds() - cpu_start);
-    }
-    let mut attributes = layers.attributes;
+    contents.complete_header(&mut header, finished.as_ref(), reached.as_ref(), unseen.as_ref());
+    contents.add_costs(&mut header, cpu_seconds() - cpu_start);
+    let (mut attributes, techniques) = (layers.attributes, layers.techniques);
     attributes.insert(exr::ATTRIBUTE, &header)?;
-    let (techniques, sums, spent_checkpoint) = (layers.techniques, None, None);
-    let delivery = Delivery {
+    let (finished_by, worst) = finished.map(|finished| (finished.name, finished.worst)).unzip();
+    let (worst, sums, spent_checkpoint) = (worst.flatten(), None, None);
+    let picture = Delivery {
         set,
         attributes,
         techniques,
@@ -151,7 +130,7 @@ pub(super) fn deliver(
         sums,
         spent_checkpoint,
     };
-    Ok((delivery, pixels))
+    Ok((picture, pixels))
 }
 
 impl Contents<'_> {
@@ -168,6 +147,37 @@ impl Contents<'_> {
         header.extend(self.facts.made_for.frame_rate.map(|rate| ("frame_rate".to_owned(), json!(rate))));
         header.insert("error_of".into(), "Noisy".into());
         header
+    }
+
+    /// Adds the results of the finish to the header. `unseen`: a warning.
+    fn complete_header(
+        &self,
+        header: &mut Map<String, Value>,
+        finished: Option<&FinishedPicture>,
+        reached: Option<&Reached>,
+        unseen: Option<&String>,
+    ) {
+        if let (Some(sentence), Some(Value::Array(warnings))) = (unseen, header.get_mut("warnings")) {
+            warnings.push(sentence.as_str().into());
+        }
+        if let Some(reached) = reached {
+            reached.write(header, self.reproducible);
+        }
+        let worst = finished.and_then(|finished| finished.worst.as_ref());
+        header.extend(worst.map(|worst| ("worst".to_owned(), json!(worst))));
+        header.insert("combined".into(), finished.map_or(Value::Null, |finished| finished.header.clone()));
+        header.extend(self.more.clone());
+    }
+
+    /// Adds the cost of the layers and their finish to the header, unless it leaves out clocks.
+    fn add_costs(&self, header: &mut Map<String, Value>, core_seconds: f64) {
+        if self.reproducible {
+            return;
+        }
+        if let Some(Value::Object(phases)) = header.get_mut("phases") {
+            phases.insert("layers_and_finish".into(), core_seconds.into());
+        }
+        header.insert("peak_memory".into(), peak_memory().into());
     }
 
     /// The layers of the request. A render that is still to be finished keeps all that a finish reads.
@@ -218,6 +228,13 @@ impl Layers {
         let visible = if finishes { Visible::of(&rendered.pixels, &facts.names) } else { Visible::default() };
         let pixels = if contents.is_shard { rendered.pixels } else { Vec::new() };
         Ok((Layers { set, attributes, techniques, history, visible }, pixels))
+    }
+
+    /// Sends the layers of the estimate, with all that a finish reads, to the observer.
+    fn send_estimate(&self, header: &Map<String, Value>, observer: &mut dyn Observer) -> Result<()> {
+        let mut attributes = self.attributes.clone();
+        attributes.insert(exr::ATTRIBUTE, header)?;
+        observer.event(Event::Estimated { set: &self.set, attributes: &attributes })
     }
 
     /// Finishes the picture. `unseen`: squared relative error by light that hardly any photon has brought.
@@ -328,12 +345,4 @@ pub fn write_error_of_finish(header: &mut Map<String, Value>, finished: &Finishe
     if let Some(reached) = Reached::of(vec![history], error) {
         reached.write(header, !timed);
     }
-}
-
-/// Writes the cost of the layers and their finish to the header.
-fn write_costs(header: &mut Map<String, Value>, core_seconds: f64) {
-    if let Some(Value::Object(phases)) = header.get_mut("phases") {
-        phases.insert("layers_and_finish".into(), core_seconds.into());
-    }
-    header.insert("peak_memory".into(), peak_memory().into());
 }

@@ -86,7 +86,7 @@ impl Extent {
         let vertices = (1.0 + f64::from(u8::from(settings.levels.two_paths))) * self.photons_per_path;
         let merges = method.has_bandwidths() && !method.takes_photon_count() && !method.has_one_map();
         let merged = if merges { (vertices * MERGED_BYTES as f64) as u64 } else { 0 };
-        // A window receives as many of the whole picture's light paths as it has pixels.
+        // On average a window receives one light path per pixel, as the whole picture does.
         let connects = method.walks_whole_picture() || method.search() == Search::ConnectionsAndMerging;
         let splats = if connects { (vertices * SPLAT_BYTES as f64) as u64 } else { 0 };
         // An upper bound: most scenes leave some of the techniques without a picture.

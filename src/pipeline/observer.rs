@@ -37,7 +37,7 @@ pub enum Event<'a> {
     },
     /// The first iteration is about to begin.
     Begins {
-        /// What the render simulates, with its warnings.
+        /// The effects that the render simulates, and its warnings.
         plan: &'a Plan,
         /// The final settings.
         settings: &'a Settings,

@@ -16,7 +16,7 @@ use crate::render::output::layer_shape;
 use crate::scene::{Scene, View};
 use std::path::Path;
 
-/// What a plan depends on besides the scene.
+/// The input of a plan besides the scene.
 #[derive(Clone, Copy)]
 pub struct PlanInput<'a> {
     /// The method, and how it was chosen.

@@ -22,7 +22,7 @@ pub enum MethodRequest<'a> {
     Auto(AutoRequest<'a>),
 }
 
-/// What `auto` chooses from.
+/// The candidates of `auto`, and the finish of its pilots.
 pub struct AutoRequest<'a> {
     /// Settings for the checks that precede the choice, and for the render if the options leave nothing to compare.
     pub fallback: Settings,

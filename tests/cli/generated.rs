@@ -203,22 +203,22 @@ fn python_help(all: &[Value], option: &Value) -> String {
 #[test]
 fn python_docstrings_match_the_options() {
     let all = options();
-    let progress = "called with a Progress after every iteration, in the thread that called; False ends the render";
+    let progress = "called with a Progress after every iteration, in the calling thread; False stops the render";
     for (call, plan, about, end) in [
         (
             "render",
             false,
             "Renders the scene and returns an Image.\n\n\
-             The options are those of `caustique render`; the same ones with the same seed give the same bytes in every\n\
-             layer, here and there, whatever the number of threads.\n\n",
-            "\nAn exception of `progress`, or Ctrl-C, ends the render: the running iteration is given up, and what is finished,\n\
-             if anything is, is the attribute `image` of the exception. Other threads of Python run meanwhile.\n",
+             The options are those of `caustique render`. Equal options and seeds give the same bytes in every layer, here\n\
+             and on the command line, with any number of threads.\n\n",
+            "\nAn exception of `progress`, or Ctrl-C, stops the render and discards the running iteration. The attribute `image` of\n\
+             the exception holds the picture so far, if there is one. Other threads of Python run meanwhile.\n",
         ),
         (
             "plan",
             true,
-            "What a render would simulate, why, and what it warns of: the object of `caustique plan --json`, a dict. The\n\
-             options are those of `render`.\n",
+            "The plan of a render: which effects it simulates and why, and its warnings. The object of `caustique plan --json`, a\n\
+             dict. The options are those of `render`.\n",
             "",
         ),
     ] {

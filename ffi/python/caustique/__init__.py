@@ -9,8 +9,8 @@
     red = image.layers["Noisy"]["R"]      # (H, W) float32, not copied
 
 Lengths are metres, the world is right-handed with y up, colours are scene-linear Rec. 709. Radiance is in W/(sr m2),
-radiant intensity in W/sr, irradiance in W/m2. Whatever a scene says that is ignored or approximated is a SceneWarning;
-what is refused is an Error, which says what to do.
+radiant intensity in W/sr, irradiance in W/m2. Anything in a scene that is ignored or approximated gives a SceneWarning;
+anything invalid raises an Error, which says what to do.
 """
 
 import os
@@ -49,20 +49,20 @@ combine = finish
 
 
 class Scene(_native.Scene):
-    """A scene, read and built; it can be rendered as often as one likes, and from several threads at once.
+    """A scene that has been read and built. It can be rendered repeatedly, also from several threads at the same time.
 
     `source` is the path of a .glb or .gltf file, or the bytes of a .glb. Options:
 
-    environment            light from all around in place of the scene's own: a path of an .exr or .hdr, radiance
+    environment            environment light instead of the scene's own: a path of an .exr or .hdr, a radiance
                            (r, g, b), or an array (H, W, 3) of radiance in latitude and longitude, the top row first
-    environment_rotation   turn about the vertical, degrees, counter-clockwise seen from above
-    environment_strength   factor on the environment's radiance
+    environment_rotation   rotation about the vertical, degrees, counter-clockwise seen from above
+    environment_strength   factor on the radiance of the environment
     light_units            'auto', 'radiometric' or 'photometric': the unit of the file's lamps
-    glass                  'auto', 'solid' or 'thin': what glass is whose file does not say
-    effects                effects to leave out or ask for, such as '-dispersion,+volume'
+    glass                  'auto', 'solid' or 'thin': the kind of glass if the file does not say
+    effects                effects to switch off or on, such as '-dispersion,+volume'
     frame                  frame of the file's animation
-    allow_outside          let the scene name files outside its own folder
-    strict                 make an error of whatever is ignored or approximated
+    allow_outside          allow the scene to name files outside its own folder
+    strict                 raise an error for anything that is ignored or approximated
     threads                threads that build the scene; 0 takes all cores
     """
 
@@ -77,12 +77,12 @@ class Scene(_native.Scene):
         medium: Medium | None = None,
         **options,
     ) -> "Scene":
-        """A scene of numpy meshes; `options` are those of Scene. `medium` fills the space.
+        """Builds a scene from numpy meshes, with the options of Scene. `medium` fills the space.
 
         The arrays are copied. `pack` makes a file of the same meshes, lights and cameras.
         """
         if environment is None:
-            # Said, so that nobody asks whether light is missing.
+            # An explicit black environment avoids the warning of a missing one.
             environment = (0.0, 0.0, 0.0)
         return cls(pack(meshes, lights=lights, cameras=cameras, medium=medium), environment=environment, **options)
 
@@ -93,12 +93,12 @@ def libraries(
     oidn: str | os.PathLike | None = None,
     onnxruntime: str | os.PathLike | None = None,
 ) -> dict[str, dict]:
-    """The libraries that are loaded when they are needed: which are found, where, and what to do about the others.
+    """Finds the libraries that are loaded on demand: their files and versions, and how to install missing ones.
 
-    Arguments name files to take instead of what is found; the first use decides, so name them before it. They set the
-    variables CAUSTIQUE_EMBREE, CAUSTIQUE_OIDN and CAUSTIQUE_ONNXRUNTIME of this process's environment. Without them
-    the system's loader is asked, then the folder .deps is looked into: of the folder that CAUSTIQUE_HOME names, else
-    of those above this package. The current folder is not searched.
+    Arguments name files to load instead. A library is loaded once, at its first use, so name its file before. The
+    arguments set the variables CAUSTIQUE_EMBREE, CAUSTIQUE_OIDN and CAUSTIQUE_ONNXRUNTIME of this process. Without
+    them, the libraries are searched by the system's loader, then in the folder .deps: in the folder that
+    CAUSTIQUE_HOME names, else in the folders above this package. The current folder is not searched.
 
     Returns a dict for each of 'embree', 'oidn' and 'onnxruntime': 'found', and 'version', 'path' and 'from' (the
     variable, 'scripts/setup.sh' or 'system') or 'cause' and 'hint'.

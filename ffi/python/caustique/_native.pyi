@@ -1,4 +1,4 @@
-"""Types of the native part; what it does is told by the docstrings of the package."""
+"""Types of the native part. The docstrings of the package describe it."""
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Meshes, lights and cameras as the bytes of a .glb, so that scenes from numpy come in by the way of all others."""
+"""Packs meshes, lights and cameras into the bytes of a .glb, so that scenes from numpy are read like all others."""
 
 import io
 import json
@@ -11,8 +11,8 @@ import numpy as np
 from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight, looking
 
 FLOAT, UINT = 5126, 5125
-#: 32 bits, whose largest number glTF keeps for itself.
-MOST_INDEX = 2**32 - 2
+#: The largest index: glTF reserves the largest 32-bit number.
+MAX_INDEX = 2**32 - 2
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 
 
@@ -24,11 +24,11 @@ def pack(
     medium: Medium | None = None,
     extras: dict | None = None,
 ) -> bytes:
-    """The bytes of a .glb that `caustique render` takes; `medium` fills the space.
+    """The bytes of a .glb for `caustique render`; `medium` fills the space.
 
-    `extras` are more keys of the scene's `extras.caustique`, such as {"environment": {"file": "sky.exr"}}.
+    `extras` are further keys of the scene's `extras.caustique`, such as {"environment": {"file": "sky.exr"}}.
 
-    Raises ValueError for arrays that have other shapes than they should.
+    Raises ValueError for arrays of wrong shapes.
     """
     writer = Writer()
     for mesh in meshes:
@@ -41,7 +41,7 @@ def pack(
 
 
 def png(name: str, texture) -> bytes:
-    """An image (H, W, 3) of bytes as PNG."""
+    """An image (H, W, 3) of bytes, encoded as PNG."""
     pixels = np.asarray(texture)
     if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or 0 in pixels.shape:
         raise ValueError(f"{name}: a texture is (H, W, 3) uint8, not {pixels.shape} {pixels.dtype}")
@@ -66,7 +66,7 @@ def numbers(values) -> list[float]:
 
 
 class Writer:
-    """A document that grows, and its buffer."""
+    """A glTF document under construction, and its binary buffer."""
 
     def __init__(self) -> None:
         self.buffer = io.BytesIO()
@@ -77,7 +77,7 @@ class Writer:
         }
         self.lights: list[dict] = []
         self.extensions: set[str] = set()
-        self.worn: dict[int, tuple[Material, int]] = {}
+        self.written: dict[int, tuple[Material, int]] = {}
 
     def add(self, kind: str, item: dict) -> int:
         self.document[kind].append(item)
@@ -90,15 +90,15 @@ class Writer:
         return self.add("bufferViews", {"buffer": 0, "byteOffset": start, "byteLength": len(data)})
 
     def accessor(self, place: str, values, width: int, kind: int = FLOAT) -> int:
-        """An array (N, width)."""
+        """Adds an array (N, width)."""
         array = np.asarray(values)
         if array.ndim != 2 or array.shape[1] != width:
             raise ValueError(f"{place}: an array of shape (N, {width}) is needed, not {array.shape}")
         if kind == UINT:
             if not np.issubdtype(array.dtype, np.integer) or (array.size and int(array.min()) < 0):
                 raise ValueError(f"{place}: indices are whole numbers from 0 up")
-            if array.size and int(array.max()) > MOST_INDEX:
-                raise ValueError(f"{place}: index {array.max()} is past {MOST_INDEX}, the last that a scene can have")
+            if array.size and int(array.max()) > MAX_INDEX:
+                raise ValueError(f"{place}: index {array.max()} is past {MAX_INDEX}, the last that a scene can have")
             flat = np.ascontiguousarray(array, "<u4").reshape(-1)
             return self.add("accessors", {
                 "bufferView": self.view(flat.tobytes()), "componentType": UINT, "count": len(flat), "type": "SCALAR",
@@ -135,9 +135,9 @@ class Writer:
         self.add("nodes", node)
 
     def material(self, material: Material) -> int:
-        """Its index; a material that several meshes wear is written once."""
-        if id(material) in self.worn:
-            return self.worn[id(material)][1]
+        """The index of a material. A material of several meshes is written once."""
+        if id(material) in self.written:
+            return self.written[id(material)][1]
         emission = np.asarray(material.emission, float)
         item: dict = {
             "name": material.name,
@@ -146,7 +146,7 @@ class Writer:
                 "metallicFactor": float(material.metallic),
                 "roughnessFactor": float(material.roughness),
             },
-            # Cameras would look through the back faces of others.
+            # Cameras see through the back faces of single-sided surfaces.
             "doubleSided": bool(material.double_sided) or not emission.any(),
         }
         if material.base_color_texture is not None:
@@ -173,8 +173,8 @@ class Writer:
             item["extensions"] = extensions
             self.extensions.update(extensions)
         index = self.add("materials", item)
-        # With the material itself: another could get its id otherwise.
-        self.worn[id(material)] = material, index
+        # Keeps a reference to the material, so that no other object gets its id.
+        self.written[id(material)] = material, index
         return index
 
     def light(self, light: Light):
@@ -197,7 +197,7 @@ class Writer:
                 said["angle_deg"], power = float(light.angle), light.irradiance
             case _:
                 raise TypeError(f"a light is a PointLight, SpotLight or SunLight, not {type(light).__name__}")
-        # A light's colour ends at one.
+        # glTF limits the colour of a light to one.
         strength = max(numbers(power)) or 1.0
         item |= {"color": [x / strength for x in numbers(power)], "intensity": strength}
         self.lights.append(item)
@@ -240,7 +240,7 @@ class Writer:
 
 
 def matrix(place: str, values) -> list[float]:
-    """Column by column, as glTF has it."""
+    """A matrix (4, 4) in the column-major order of glTF."""
     array = np.asarray(values, float)
     if array.shape != (4, 4):
         raise ValueError(f"{place}: a transform is (4, 4), not {array.shape}")

@@ -1,4 +1,4 @@
-"""What a scene is made of, as numpy arrays and numbers: everything that `Scene.from_meshes` takes.
+"""Meshes, materials, lights and cameras as numpy arrays and numbers, for `Scene.from_meshes`.
 
 Lengths are metres, angles degrees, colours scene-linear Rec. 709; the world is right-handed with y up.
 """
@@ -26,7 +26,7 @@ class Medium:
 
 @dataclass(kw_only=True, eq=False)
 class Material:
-    """A surface as glTF describes it. Matte white unless told otherwise."""
+    """A surface with the parameters of glTF. The default is matte white."""
 
     name: str = "material"
     #: Reflectance (r, g, b); of glass the tint.
@@ -43,21 +43,21 @@ class Material:
     transmission: float = 0.0
     #: Index of refraction, from 1 up.
     ior: float = 1.5
-    #: Transmits as a thin pane, which bends no light; otherwise the mesh is the boundary of a solid and must be closed.
+    #: Whether the mesh is a thin pane, which does not refract; otherwise it bounds a solid and must be closed.
     thin: bool = False
-    #: What fills the solid.
+    #: The medium inside the solid.
     medium: Medium | None = None
-    #: 20 over the Abbe number; 0 is none.
+    #: 20 divided by the Abbe number; 0 is no dispersion.
     dispersion: float = 0.0
     #: Emitted radiance, W/(sr m2) per channel, from the front.
     emission: Triple = (0.0, 0.0, 0.0)
-    #: Emits from its back, too; otherwise cameras look through the back of a surface that emits.
+    #: Whether the back emits, too; otherwise cameras see through the back of an emissive surface.
     double_sided: bool = False
 
 
 @dataclass(kw_only=True, eq=False)
 class Mesh:
-    """Triangles that wear one material."""
+    """Triangles of one material."""
 
     #: Positions (V, 3), m.
     vertices: ArrayLike
@@ -71,7 +71,7 @@ class Mesh:
     #: Mesh to world (4, 4), for column vectors.
     transform: ArrayLike | None = None
     name: str = "mesh"
-    #: The layers LightGroup_NAME and Caustic_NAME that its light goes to.
+    #: The light group: its light is in the layers LightGroup_NAME and Caustic_NAME.
     light_group: str | None = None
 
 
@@ -85,23 +85,23 @@ class Camera:
     up: Triple = (0.0, 1.0, 0.0)
     #: Vertical field of view, degrees.
     fov: float = 40.0
-    #: Width over height of a picture of which one of the two is asked for.
+    #: Width over height, if a render gives only one of the two.
     aspect: float | None = None
     #: Radius of the thin lens, m; 0 is a pinhole.
     aperture_radius: float = 0.0
-    #: Distance in focus, m; None: the target's.
+    #: Distance in focus, m; None: the distance of the target.
     focus_distance: float | None = None
     name: str = "camera"
 
 
 @dataclass(kw_only=True, eq=False)
 class PointLight:
-    """A light that shines alike in all directions."""
+    """A light that is equally bright in all directions."""
 
     position: Triple
     #: Radiant intensity, W/sr per channel.
     intensity: Triple
-    #: Radius of the sphere that it is, m; 0 is a mathematical point.
+    #: Radius of the light, m: it is a sphere, or a mathematical point if 0.
     radius: float = 0.0
     name: str = "point"
     light_group: str | None = None
@@ -109,17 +109,17 @@ class PointLight:
 
 @dataclass(kw_only=True, eq=False)
 class SpotLight:
-    """A light that shines into a cone."""
+    """A light that emits into a cone."""
 
     position: Triple
     target: Triple
-    #: Radiant intensity in the middle, W/sr per channel.
+    #: Radiant intensity on the axis, W/sr per channel.
     intensity: Triple
     #: Half angle of full intensity, degrees.
     inner: float = 0.0
     #: Half angle of no intensity, degrees.
     outer: float = 45.0
-    #: Radius of the disc that it shines from, m.
+    #: Radius of the emitting disc, m.
     radius: float = 0.0
     name: str = "spot"
     light_group: str | None = None
@@ -129,11 +129,11 @@ class SpotLight:
 class SunLight:
     """A light from infinity."""
 
-    #: Where its light travels to.
+    #: Direction in which the light travels.
     direction: Triple
-    #: Irradiance on a surface that faces it, W/m2 per channel.
+    #: Irradiance on a surface that faces the light, W/m2 per channel.
     irradiance: Triple
-    #: Angle of the whole disc, degrees.
+    #: Angular diameter, degrees.
     angle: float = 0.0
     name: str = "sun"
     light_group: str | None = None
@@ -152,7 +152,7 @@ def looking(position: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 1.0, 0
     back /= length
     right = np.cross(np.asarray(up, float), back)
     if np.linalg.norm(right) < 1e-9:
-        # Straight up or down: any other axis tells which way the picture is turned.
+        # The view is parallel to `up`: any other axis fixes the roll of the camera.
         right = np.cross((0.0, 0.0, -1.0) if abs(back[2]) < 0.9 else (0.0, 1.0, 0.0), back)
     right /= np.linalg.norm(right)
     pose = np.eye(4)

@@ -2,7 +2,7 @@
 
 use crate::error::raised;
 use crate::image::{Image, picture};
-use crate::job::finish_request;
+use crate::options::finish_request;
 use crate::value::to_python;
 use crate::work::work;
 use caustique::film::take_plain_names;
@@ -16,7 +16,7 @@ use serde_json::json;
 
 /// The error of a picture against a reference: the figures of `caustique compare --json`, and flip_map, (H, W) float32.
 ///
-/// Both are Images, paths, or arrays (H, W, 3). `layer` takes that layer of both; `relative` adds 0.01 times the
+/// Both are Images, paths, or arrays (H, W, 3). `layer` names the layer to compare. `relative` adds 0.01 times the
 /// squared mean radiance of the reference in relMSE, instead of 0.01.
 #[pyfunction]
 #[pyo3(signature = (image, reference, *, layer = None, relative = false))]
@@ -31,18 +31,18 @@ pub fn compare<'py>(
     let floor = if relative { Floor::Relative } else { Floor::Papers };
     let mut comparison = py.detach(|| compare_with_floor(&a, &b, floor)).map_err(raised)?;
     let map = std::mem::take(&mut comparison.flip_map);
-    let told = to_python(py, &json!(comparison))?;
+    let figures = to_python(py, &json!(comparison))?;
     if let Ok(map) = Array2::from_shape_vec((a.height, a.width), map) {
-        told.set_item("flip_map", map.into_pyarray(py))?;
+        figures.set_item("flip_map", map.into_pyarray(py))?;
     }
-    Ok(told)
+    Ok(figures)
 }
 
-/// A new image whose picture is finished as a render finishes its own; all other layers are kept.
+/// A new image whose picture is finished as a render finishes its own. All other layers stay.
 ///
-/// It needs what tells the noise: the layers of a render, or of another renderer's picture "Variance" (of the mean) or
-/// two independent halves "Half1" and "Half2". "albedo" and "normal" guide the denoiser. Layers that have Blender's names
-/// (ViewLayer.Combined) come back by ours, in our axes.
+/// The image needs an estimate of its noise: the layers of a render, or from another renderer "Variance" (of the mean) or
+/// two independent halves "Half1" and "Half2". The denoiser also uses "albedo" and "normal". Layers with Blender's names
+/// (ViewLayer.Combined) get the names and axes of this package.
 #[pyfunction]
 #[pyo3(signature = (image, *, denoise = "auto", model = None, threads = 0))]
 pub fn finish(
@@ -57,7 +57,7 @@ pub fn finish(
     let done = work(py, threads, |caller| {
         let mut opened = open(&request, None)?;
         let missing = opened.missing.take();
-        caller.warn(&missing.map(|error| super::job::missing(&error)).into_iter().collect::<Vec<_>>());
+        caller.warn(&missing.map(|error| super::options::missing_denoiser(&error)).into_iter().collect::<Vec<_>>());
         let (mut set, mut attributes) = (image.set.clone(), image.attributes.clone());
         let left = |name: String| format!("layer \"{name}\" cannot be written under this name and is left out");
         caller.warn(&take_plain_names(&mut set).into_iter().map(left).collect::<Vec<_>>());

@@ -1,9 +1,9 @@
-//! Accuracy against time.
+//! Compares methods by their accuracy against time.
 
 use crate::error::{raised, usage};
 use crate::image::{Image, picture};
-use crate::job;
 use crate::keywords::{Keywords, choice};
+use crate::options;
 use crate::value::to_python;
 use crate::work::{Caller, work};
 use caustique::camera::Camera;
@@ -31,48 +31,48 @@ use std::ops::Bound::{Excluded, Unbounded};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Seconds of each run where nothing says when to stop, as on the command line.
+/// Seconds of each run if no argument limits it, as on the command line.
 const DEFAULT_TIME: f64 = 60.0;
-/// Options of a render that all runs have in common.
-const COMMON: [&str; 10] =
+/// Options of a render that all runs share.
+const SHARED_OPTIONS: [&str; 10] =
     ["seed", "max_depth", "iterations", "time", "target_error", "width", "height", "camera", "crop", "filter"];
-/// Methods where none are named, as there.
-const USUAL: [&str; 4] = ["path", "sppm", "cppm", "vcm"];
+/// Methods if no runs are named, as on the command line.
+const DEFAULT_METHODS: [&str; 4] = ["path", "sppm", "cppm", "vcm"];
 
-/// A run and how it was asked for.
+/// A run: its name and the options of its render.
 struct Run {
     name: String,
     options: RenderOptions,
 }
 
-/// A comparison that is asked for.
+/// The arguments of a comparison.
 struct Comparison {
     runs: Vec<Run>,
-    /// Seed, longest path and ends, which all runs have in common.
+    /// Options that all runs share: seed, longest path and limits.
     common: RenderOptions,
     moments: f64,
     seeds: u64,
     metric: Metric,
-    /// How a reference is made, where none is given.
-    own: Own,
+    /// How to render a reference, if the caller gives none.
+    reference: ReferenceOptions,
 }
 
-/// A reference to be made.
-struct Own {
+/// Options for rendering a reference.
+struct ReferenceOptions {
     method: Option<Method>,
     iterations: Option<u64>,
     time: Option<f64>,
 }
 
-/// The scene that methods are compared on.
+/// The scene of a comparison.
 pub struct Compared<'a> {
     pub path: &'a Path,
     pub loaded: &'a Loaded,
-    /// The options that the scene was read with.
+    /// The options of the scene.
     pub asked: &'a SceneOptions,
 }
 
-/// The method `converge` of `Scene`.
+/// Implements the method `converge` of `Scene`.
 pub fn converge<'py>(
     scene: &Compared<'_>,
     py: Python<'py>,
@@ -80,8 +80,8 @@ pub fn converge<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut keywords = Keywords::of(py, "converge", options);
     let given: Option<Bound<'_, PyAny>> = keywords.take("reference")?;
-    let (common, _) = job::take(&mut keywords, &job::named(&COMMON), scene.asked)?;
-    let own = Own {
+    let (common, _) = options::take(&mut keywords, &options::named(&SHARED_OPTIONS), scene.asked)?;
+    let reference_options = ReferenceOptions {
         method: keywords.choice::<MethodChoice>("reference_method")?.and_then(|method| method.0),
         iterations: keywords.number("reference_iterations", 1..=MAX_TERMS, "a whole number above 0")?,
         time: keywords.number("reference_time", (Excluded(0.0), Unbounded), "a number of seconds above 0")?,
@@ -94,36 +94,36 @@ pub fn converge<'py>(
             .unwrap_or(std::f64::consts::SQRT_2),
         seeds: keywords.number("seeds", 1..=1000, "from 1 to 1000")?.unwrap_or(1),
         metric: keywords.choice("metric")?.unwrap_or_default(),
-        own,
+        reference: reference_options,
     };
     let threads = keywords.take("threads")?.unwrap_or(0);
     let progress = keywords.take::<Py<PyAny>>("progress")?.map(Arc::new);
-    keywords.finish()?;
+    keywords.check_all_taken()?;
     let camera = scene.loaded.scene.camera(&comparison.common.camera_request().map_err(raised)?).map_err(raised)?;
     let reference = given.map(|given| reference(&given, camera.size())).transpose()?;
-    let settled = comparison.settle()?;
+    let settings = comparison.settings()?;
     let done = work(py, threads, |caller| {
-        let told = ErrorCoverage { caller, progress };
-        comparison.run((scene, &camera), settled, reference, &told)
+        let callback = Callback { caller, progress };
+        comparison.run((scene, &camera), settings, reference, &callback)
     })?;
     to_python(py, &done.whole()?)
 }
 
-/// Runs by method and by name.
+/// The runs of the arguments `methods` and `runs`.
 fn runs(py: Python<'_>, keywords: &mut Keywords<'_>, common: &RenderOptions) -> PyResult<Vec<Run>> {
     let methods: Option<Vec<String>> = keywords.take("methods")?;
     let named: Option<Bound<'_, PyDict>> = keywords.take("runs")?;
-    let usual = || if named.is_none() { USUAL.map(String::from).to_vec() } else { Vec::new() };
+    let default = || if named.is_none() { DEFAULT_METHODS.map(String::from).to_vec() } else { Vec::new() };
     let mut runs = Vec::new();
-    for name in methods.unwrap_or_else(usual) {
+    for name in methods.unwrap_or_else(default) {
         let method: MethodChoice = choice("converge: methods", &name)?;
-        runs.push(Run { options: with(single(method)?, common), name });
+        runs.push(Run { options: with_shared(single(method)?, common), name });
     }
     for (name, options) in named.iter().flat_map(|named| named.iter()) {
         let mut options = Keywords::of(py, "run", Some(options.cast::<PyDict>()?));
-        let (asked, _) = job::take(&mut options, &job::of_run(), &common.scene)?;
-        options.finish()?;
-        runs.push(Run { name: name.extract()?, options: with(asked, common) });
+        let (asked, _) = options::take(&mut options, &options::of_run(), &common.scene)?;
+        options.check_all_taken()?;
+        runs.push(Run { name: name.extract()?, options: with_shared(asked, common) });
     }
     match (1..runs.len()).find(|&run| runs[..run].iter().any(|other| other.name == runs[run].name)) {
         Some(twice) => Err(usage(
@@ -134,33 +134,33 @@ fn runs(py: Python<'_>, keywords: &mut Keywords<'_>, common: &RenderOptions) -> 
     }
 }
 
-/// A method with one level and no finish.
+/// The options of a method with one level and no finish.
 fn single(method: MethodChoice) -> PyResult<RenderOptions> {
-    job::single(method.name(), method.0.is_none_or(Method::has_levels))
+    options::single(method.name(), method.0.is_none_or(Method::has_levels))
 }
 
-/// A run's options with those that all runs have in common.
-fn with(run: RenderOptions, common: &RenderOptions) -> RenderOptions {
+/// The options of a run, completed by the options that all runs share.
+fn with_shared(run: RenderOptions, common: &RenderOptions) -> RenderOptions {
     let RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, .. } = *common;
     RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, scene: common.scene.clone(), ..run }
 }
 
-/// A reference that is given: an image, a file, or an array (H, W, 3).
+/// Reads a reference from an image, a file, or an array (H, W, 3).
 fn reference(given: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<Reference> {
     let header = given.cast::<Image>().ok().and_then(|image| image.get().attributes.object()).unwrap_or(Value::Null);
     let set = picture("reference", given, None)?;
     Reference::of(&set, &header, size, "reference".into()).map_err(raised)
 }
 
-/// Who is told how it goes.
-struct ErrorCoverage<'a> {
+/// Calls the user's callback after each step.
+struct Callback<'a> {
     caller: &'a Caller,
     progress: Option<Arc<Py<PyAny>>>,
 }
 
-impl ErrorCoverage<'_> {
-    /// Tells, and whether to go on.
-    fn tell(&self, state: Value) -> Control {
+impl Callback<'_> {
+    /// Calls the callback with a state. Returns whether to continue.
+    fn call(&self, state: Value) -> Control {
         if let Some(callback) = self.progress.clone() {
             self.caller.ask(move |py| {
                 let answer = callback.call1(py, (to_python(py, &state)?,))?;
@@ -172,18 +172,18 @@ impl ErrorCoverage<'_> {
 }
 
 impl Comparison {
-    /// Settings of all runs, and those of a reference, as far as they do not depend on the scene.
-    fn settle(&self) -> PyResult<(Vec<Settings>, Settings)> {
+    /// Settings of all runs and of a reference, before the size of the picture and the choices of `auto`.
+    fn settings(&self) -> PyResult<(Vec<Settings>, Settings)> {
         let of = |options: &RenderOptions| options.settings().map_err(raised);
         let settings = self.runs.iter().map(|run| of(&run.options)).collect::<PyResult<_>>()?;
-        let method = self.own.method.unwrap_or(Method::Vcm);
+        let method = self.reference.method.unwrap_or(Method::Vcm);
         if method.has_one_map() {
             return Err(usage("pm does not converge: it makes no reference", "choose another reference_method"));
         }
-        Ok((settings, of(&with(single(MethodChoice(Some(method)))?, &self.common))?))
+        Ok((settings, of(&with_shared(single(MethodChoice(Some(method)))?, &self.common))?))
     }
 
-    /// Seconds of each run.
+    /// Seconds of each run; `None`: only the iterations are limited.
     fn time(&self) -> Option<f64> {
         self.common.time.or(self.common.iterations.is_none().then_some(DEFAULT_TIME))
     }
@@ -193,15 +193,15 @@ impl Comparison {
         (scene, camera): (&Compared<'_>, &Camera),
         (settings, own): (Vec<Settings>, Settings),
         reference: Option<Reference>,
-        told: &ErrorCoverage<'_>,
+        callback: &Callback<'_>,
     ) -> Result<Value> {
         let built = &scene.loaded.scene;
         for of in &settings {
             check_settings(of, scene.path, built)?;
         }
-        let (entries, mut finishes) = self.entries((scene, camera), settings, told)?;
+        let (entries, mut finishes) = self.entries((scene, camera), settings, callback)?;
         memory::check_all(View::new(built, camera), entries.iter().map(|entry| &entry.settings))?;
-        let reference = reference.unwrap_or_else(|| self.make(own, View::new(built, camera), told));
+        let reference = reference.unwrap_or_else(|| self.render_reference(own, View::new(built, camera), callback));
         let RenderOptions { seed, iterations, .. } = self.common;
         let rules = Rules {
             time: self.time(),
@@ -210,12 +210,12 @@ impl Comparison {
             extra_moments: Vec::new(),
             seeds: (0..self.seeds).map(|i| seed.wrapping_add(i)).collect(),
         };
-        // Where pictures of the race are kept meanwhile.
+        // Keeps the pictures of the runs until the errors are known.
         let folder = caustique::temporary::create_folder("caustique-")?;
         let view = View::new(built, camera);
         let participants = Participants { entries: &entries, finishes: &mut finishes, peers: None };
         let mut outcome = render_in_turns(view, participants, &rules, &reference, folder.path(), |step| {
-            told.tell(json!({
+            callback.call(json!({
                 "run": step.name,
                 "iterations": step.iterations,
                 "seconds": step.seconds,
@@ -245,12 +245,12 @@ impl Comparison {
         }
     }
 
-    /// What competes: with auto settled, and finishes opened.
+    /// Settles the methods by `auto`, opens the finishes, and issues the warnings of the plans.
     fn entries(
         &self,
         (scene, camera): (&Compared<'_>, &Camera),
         settings: Vec<Settings>,
-        told: &ErrorCoverage<'_>,
+        callback: &Callback<'_>,
     ) -> Result<(Vec<Entry>, Vec<Option<Finish>>)> {
         let view = View::new(&scene.loaded.scene, camera);
         let (mut entries, mut finishes, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
@@ -258,7 +258,7 @@ impl Comparison {
             let settings = with_light_paths(settings, options.photons, camera.size());
             let limited = RenderOptions { time: self.time(), ..options.clone() };
             let mut method = limited.method_request()?;
-            let chosen = choose(&mut method, settings, view, |_| true, || told.caller.stops());
+            let chosen = choose(&mut method, settings, view, |_| true, || callback.caller.stops());
             let decided = chosen.spent();
             let (max_depth, switches) = (self.common.max_depth, scene.asked.switches());
             let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, &scene.loaded.removed);
@@ -268,22 +268,27 @@ impl Comparison {
             let request = (!options.no_finish).then(|| options.finish.request());
             let opened = request.map(|request| finish::open(&request, Some(settings.levels.count))).transpose()?;
             let missing = opened.as_ref().and_then(|finish| finish.missing.as_ref());
-            warnings.extend(missing.map(job::missing));
+            warnings.extend(missing.map(options::missing_denoiser));
             let settings = Settings { iterations: None, time: None, ..settings };
             let finish = opened.as_ref().map(OpenFinish::name);
             entries.push(Entry { name: name.clone(), options: String::new(), settings, decided, finish });
             finishes.push(opened.map(OpenFinish::into_finish));
         }
-        told.caller.warn(&warnings);
+        callback.caller.warn(&warnings);
         Ok((entries, finishes))
     }
 
-    /// Makes a reference: two halves.
-    fn make(&self, settings: Settings, View { scene, camera }: View<'_>, told: &ErrorCoverage<'_>) -> Reference {
+    /// Renders a reference in two halves.
+    fn render_reference(
+        &self,
+        settings: Settings,
+        View { scene, camera }: View<'_>,
+        callback: &Callback<'_>,
+    ) -> Reference {
         let seen_through_glass = Presence::of(scene, camera).has(Effect::Sds);
-        let plain = self.own.method.is_none() && !seen_through_glass;
+        let plain = self.reference.method.is_none() && !seen_through_glass;
         let method = if plain { Method::Bdpt } else { settings.method };
-        let ends = match (self.own.iterations, self.own.time) {
+        let ends = match (self.reference.iterations, self.reference.time) {
             (None, None) => match self.time() {
                 Some(time) => (None, Some(8.0 * time)),
                 None => (self.common.iterations.map(|n| n.saturating_mul(16).max(2)), None),
@@ -293,7 +298,7 @@ impl Comparison {
         let settings = Settings { method, iterations: ends.0, time: ends.1, target_error: None, ..settings };
         let settings = with_light_paths(settings, None, camera.size());
         let halves = Halves::render(scene, camera, &settings, |iterations, seconds| {
-            told.tell(json!({"run": null, "iterations": iterations, "seconds": seconds}))
+            callback.call(json!({"run": null, "iterations": iterations, "seconds": seconds}))
         });
         halves.reference()
     }

@@ -1,4 +1,4 @@
-//! The library's errors as Python's.
+//! Turns errors of the library into Python exceptions.
 
 use caustique::error::{Error as Fault, ErrorKind};
 use pyo3::create_exception;
@@ -9,8 +9,8 @@ create_exception!(
     caustique,
     Error,
     PyException,
-    "What the renderer refuses: str() tells place, fault and remedy; `hint` is the remedy alone or None, `place` the \
-     file and the place in it, `kind` one of 'usage', 'scene', 'image', 'io', 'library', 'model' and 'interrupted'."
+    "An error of the renderer. str() has place, cause and remedy; `hint` is the remedy or None, `place` the file and \
+     the place in it, `kind` one of 'usage', 'scene', 'image', 'io', 'library', 'model' and 'interrupted'."
 );
 create_exception!(
     caustique,
@@ -19,25 +19,25 @@ create_exception!(
     "Something in the scene is ignored or approximated, or looks like a mistake."
 );
 
-/// A fault as the exception that tells of it.
+/// The exception for an error of the library.
 pub fn raised(fault: Fault) -> PyErr {
     Python::attach(|py| {
         let (hint, cause) = (fault.hint.as_deref().map(in_python), in_python(&fault.cause));
-        // Python has no command line; the cause names the option.
+        // The place "command line" means nothing in Python; the cause names the argument.
         let place = if fault.place == "command line" { String::new() } else { in_python(&fault.place) };
         let shown = Fault::new(fault.kind, &place, cause);
         let advice = hint.as_ref().map(|hint| format!("\nhint: {hint}")).unwrap_or_default();
         let error = Error::new_err(format!("{shown}{advice}"));
         let value = error.value(py);
-        let told = value
+        let set = value
             .setattr("hint", hint)
             .and_then(|()| value.setattr("place", place))
             .and_then(|()| value.setattr("kind", name(fault.kind)));
-        told.err().unwrap_or(error)
+        set.err().unwrap_or(error)
     })
 }
 
-/// Options of the command line whose arguments have other names in Python.
+/// Options of the command line, and the Python arguments that have other names.
 const RENAMED: [(&str, &str); 7] = [
     ("no-combine", "finish=False"),
     ("no-finish", "finish=False"),
@@ -48,15 +48,15 @@ const RENAMED: [(&str, &str); 7] = [
     ("png", "save"),
 ];
 
-/// Options whose value follows in messages.
-const NAMED: [&str; 2] = ["method", "indirect"];
+/// Options that messages name together with a value.
+const WITH_VALUE: [&str; 2] = ["method", "indirect"];
 
-/// The letters and digits that a text begins with, and what follows.
-fn word(text: &str) -> (&str, &str) {
+/// Splits a text after its leading letters and digits.
+fn split_word(text: &str) -> (&str, &str) {
     text.split_at(text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len()))
 }
 
-/// A message of the library with arguments in place of the command line's options: `max_depth` for `--max-depth`.
+/// Replaces options of the command line in a message by Python arguments: `--max-depth` by `max_depth`.
 pub fn in_python(text: &str) -> String {
     let is_name = |c: char| c.is_ascii_lowercase() || c == '-';
     let mut out = String::with_capacity(text.len());
@@ -65,14 +65,15 @@ pub fn in_python(text: &str) -> String {
         let (before, option) = (&rest[..at], &rest[at + 2..]);
         let name = option.split(|c| !is_name(c)).next().unwrap_or("").trim_end_matches('-');
         out.push_str(before);
-        // Names of files and nodes may hold dashes.
+        // Dashes within a name of a file or a node start no option.
         let stands_alone = !before.ends_with(|c: char| c.is_alphanumeric() || "-_/.".contains(c));
         if stands_alone && name.starts_with(|c: char| c.is_ascii_lowercase()) {
             let renamed = RENAMED.iter().find(|(from, _)| *from == name).map(|(_, to)| (*to).to_owned());
             out.push_str(&renamed.unwrap_or_else(|| name.replace('-', "_")));
             rest = &option[name.len()..];
-            // The value that follows is a name.
-            if let Some((value, after)) = rest.strip_prefix(' ').filter(|_| NAMED.contains(&name)).map(word) {
+            // Quote the value that follows.
+            if let Some((value, after)) = rest.strip_prefix(' ').filter(|_| WITH_VALUE.contains(&name)).map(split_word)
+            {
                 out.push_str(&format!("='{value}'"));
                 rest = after;
             }
@@ -84,7 +85,7 @@ pub fn in_python(text: &str) -> String {
     out + rest
 }
 
-/// An error of a call's arguments.
+/// An exception for the arguments of a call.
 pub fn usage(cause: impl std::fmt::Display, hint: impl std::fmt::Display) -> PyErr {
     raised(Fault::new(ErrorKind::Usage, "", cause).hint(hint))
 }

@@ -1,4 +1,4 @@
-//! A picture with its layers. Planes are handed out as they lie in memory.
+//! A picture with its layers. Planes are numpy views of its memory.
 
 use crate::error::{raised, usage};
 use crate::keywords::choice;
@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// A picture: named layers of float32 planes, and a header. It does not change once it is there.
+/// A picture: named layers of float32 planes, and a header. Images are immutable.
 ///
 /// image["Noisy"]                   a layer, (H, W, C), a copy; of layers with one plane, such as "Z", a view (H, W)
 /// image["Noisy.R"]                 a plane, (H, W), a view
@@ -25,7 +25,7 @@ use std::path::PathBuf;
 /// image.picture                    the picture itself, (H, W, 3), a copy
 ///
 /// Views are read-only, share the image's memory and keep it alive. Rows run from the top. Radiance is scene-linear
-/// Rec. 709 in W/(sr m2); "Variance1" and its like are squares of that; "Z", "depth" and "P" are metres.
+/// Rec. 709 in W/(sr m2); "Variance1" and other variances are squares of radiance; "Z", "depth" and "P" are metres.
 #[pyclass(frozen, module = "caustique")]
 pub struct Image {
     /// The layers.
@@ -44,7 +44,7 @@ impl Image {
     }
 }
 
-/// Components of a layer by their number.
+/// Component names of a layer with one to four planes.
 const COMPONENTS: [&str; 4] = ["X", "XY", "RGB", "RGBA"];
 /// Layers of vectors.
 const VECTORS: [&str; 2] = ["normal", "P"];
@@ -103,7 +103,7 @@ impl Image {
         Ok(shaped(Array3::from_shape_vec((self.set.height, self.set.width, 3), values))?.into_pyarray(py).into_any())
     }
 
-    /// What the file's header says, a dict: arguments, seed, plan, warnings, error against seconds, and more.
+    /// The header, a dict: arguments, seed, plan, warnings, error against seconds, and more.
     #[getter]
     fn header<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         match self.attributes.object() {
@@ -162,7 +162,7 @@ impl Image {
         format!("<caustique.Image: {} x {} pixels, {} layers>", self.set.width, self.set.height, self.set.layers.len())
     }
 
-    /// Writes an EXR with all layers (of a shard with what `merge` needs), or with a name that ends in .png the picture to look at.
+    /// Writes an EXR with all layers (and the pixel sums of a shard), or a tone-mapped PNG, by the extension of `path`.
     ///
     /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
     /// exposure      of the PNG, stops
@@ -177,7 +177,7 @@ impl Image {
             () if is("exr") => {
                 let options = exr::Options { compression, ..exr::Options::default() };
                 exr::write_followed(&path, set, &self.attributes, options, |file| {
-                    self.sums.as_ref().map_or(Ok(()), |tail| tail.write(file))
+                    self.sums.as_ref().map_or(Ok(()), |sums| sums.write(file))
                 })
             }
             () if is("png") => png::write_tonemapped(&path, &set.beauty()?, exposure, curve),
@@ -188,14 +188,14 @@ impl Image {
     }
 }
 
-/// Reads an EXR of any program: all its layers, by their names in the file.
+/// Reads an EXR of any program with all its layers, under their names in the file.
 #[pyfunction]
 pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Image> {
     let (set, attributes) = py.detach(|| exr::read(&path)).map_err(raised)?;
     Ok(Image { set, attributes, sums: None })
 }
 
-/// A plane as it lies in memory.
+/// A read-only numpy view of a plane, without a copy.
 fn view<'py>(this: &Bound<'py, Image>, plane: &Plane) -> PyResult<Bound<'py, PyAny>> {
     let set = &this.get().set;
     let values = shaped(ArrayView2::from_shape((set.height, set.width), &plane.values))?;
@@ -206,7 +206,7 @@ fn view<'py>(this: &Bound<'py, Image>, plane: &Plane) -> PyResult<Bound<'py, PyA
     Ok(array.into_any())
 }
 
-/// Checks that there is memory for so many single precision numbers, which Rust would end the process without.
+/// Checks that there is memory for `count` single precision numbers, because Rust ends the process if an allocation fails.
 ///
 /// # Errors
 /// MemoryError.
@@ -216,13 +216,14 @@ fn check_memory(count: usize) -> PyResult<()> {
     checked.map_err(|error| PyMemoryError::new_err(error.to_string()))
 }
 
-/// Copies of an array that are there at a time: in single precision, in order of rows, by planes, as triples of pixels.
-const COPIES: usize = 4;
+/// Copies of an array that exist at the same time: in single precision, in row order, by planes, and as triples per
+/// pixel.
+const ARRAY_COPIES: usize = 4;
 
-/// A layer of a numpy array, and its height and width.
+/// Converts a numpy array to a layer. Returns also its height and width.
 fn layer(name: &str, given: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Layer)> {
     let array = given.py().import("numpy")?.call_method1("asarray", (given,))?;
-    check_memory(array.getattr("size")?.extract::<usize>()?.saturating_mul(COPIES))?;
+    check_memory(array.getattr("size")?.extract::<usize>()?.saturating_mul(ARRAY_COPIES))?;
     let array: PyArrayLikeDyn<'_, f32, AllowTypeChange> = array.extract()?;
     let array = array.as_array();
     let shape = array.shape().to_vec();
@@ -248,7 +249,8 @@ fn layer(name: &str, given: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Laye
     Ok(((height, width), Layer { name: name.into(), planes: planes.collect() }))
 }
 
-/// The picture of an image, of a layer of it, of a file or of an array (H, W, 3), alone. `place` names the argument.
+/// The picture, or the layer `name`, of an image or a file, or an array (H, W, 3), without other layers. `place` names the
+/// argument in errors.
 pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyResult<LayerSet> {
     let name = name.unwrap_or("");
     let chosen = |set: &LayerSet| {
@@ -269,12 +271,12 @@ pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyR
     Ok(LayerSet { width, height, layers: vec![layer] })
 }
 
-/// An array whose shape and values come from one place.
+/// The array, or an exception for its shape.
 fn shaped<T, E: std::fmt::Display>(array: Result<T, E>) -> PyResult<T> {
     array.map_err(|cause| raised(Error::new(ErrorKind::Image, "", cause)))
 }
 
-/// Triples per pixel of an array (H, W, 3) of finite, not negative radiance, and its width and height.
+/// Width, height and pixels of an array (H, W, 3) of finite, non-negative radiance.
 pub fn radiance(place: &str, array: &Bound<'_, PyAny>) -> PyResult<(u32, u32, Vec<[f32; 3]>)> {
     let ((height, width), layer) = layer(place, array)?;
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok()).filter(|&(w, h)| w > 0 && h > 0);

@@ -1,4 +1,4 @@
-//! Keyword arguments, taken by name: what is left is unknown, and an error that names the nearest.
+//! Keyword arguments, which are taken by name. An argument that nothing takes is an error, which names the most similar one.
 
 use crate::error::usage;
 use caustique::options::{ValueEnum, one_of};
@@ -17,15 +17,15 @@ pub struct Keywords<'py> {
 }
 
 impl<'py> Keywords<'py> {
-    /// Those that a call was given.
+    /// The keyword arguments of a call.
     pub fn of(py: Python<'py>, call: &'static str, given: Option<&Bound<'py, PyDict>>) -> Self {
         Keywords { call, given: given.cloned().unwrap_or_else(|| PyDict::new(py)), known: Vec::new() }
     }
 
-    /// An argument; `None` where it is None or left out.
+    /// Takes an argument; `None` if it is None or missing.
     ///
     /// # Errors
-    /// It is of another type, or a number that does not fit.
+    /// The argument has the wrong type, or is a number that does not fit the type.
     pub fn take<T: FromPyObjectOwned<'py>>(&mut self, name: &str) -> PyResult<Option<T>> {
         self.known.push(name.to_string());
         let Some(value) = self.given.get_item(name)?.filter(|value| !value.is_none()) else { return Ok(None) };
@@ -39,10 +39,10 @@ impl<'py> Keywords<'py> {
         })
     }
 
-    /// A number within a range, which `say` tells in words.
+    /// Takes a number within a range. `say` describes the range.
     ///
     /// # Errors
-    /// It is not.
+    /// The number is out of range.
     pub fn number<T>(&mut self, name: &str, range: impl RangeBounds<T>, say: &str) -> PyResult<Option<T>>
     where
         T: FromPyObjectOwned<'py> + PartialOrd + Display,
@@ -55,10 +55,10 @@ impl<'py> Keywords<'py> {
         }
     }
 
-    /// One of some names.
+    /// Takes one of several names.
     ///
     /// # Errors
-    /// There is no such name.
+    /// The name does not exist.
     pub fn choice<T: ValueEnum>(&mut self, name: &str) -> PyResult<Option<T>> {
         let Some(given) = self.take::<String>(name)? else { return Ok(None) };
         choice(&format!("{}: {name}", self.call), &given).map(Some)
@@ -69,19 +69,19 @@ impl<'py> Keywords<'py> {
         self.known.iter().any(|known| known == name)
     }
 
-    /// The call that they are arguments of.
+    /// Name of the call.
     pub fn call(&self) -> &'static str {
         self.call
     }
 
-    /// An argument as Python writes it.
+    /// The value of an argument in Python's notation.
     pub fn shown(&self, name: &str) -> String {
         let value = self.given.get_item(name).ok().flatten();
         value.and_then(|value| value.repr().ok()).map_or_else(|| "?".into(), |shown| shown.to_string())
     }
 
     /// Errors: an argument that nothing has taken.
-    pub fn finish(self) -> PyResult<()> {
+    pub fn check_all_taken(self) -> PyResult<()> {
         for (key, _) in self.given.iter() {
             let key: String = key.extract()?;
             if !self.has_taken(&key) {
@@ -95,15 +95,15 @@ impl<'py> Keywords<'py> {
     }
 }
 
-/// The value of a name; `place` says whose it is.
+/// The value with a name. `place` names the argument in errors.
 ///
 /// # Errors
-/// There is no such name.
+/// The name does not exist.
 pub fn choice<T: ValueEnum>(place: &str, given: &str) -> PyResult<T> {
     one_of(given).map_err(|names| usage(format!("{place}='{given}' does not exist"), names))
 }
 
-/// The known name nearest to another, by Python's difflib.
+/// The known name that is most similar to an unknown one, by Python's difflib.
 fn nearest(given: &Bound<'_, PyDict>, key: &str, known: &[String]) -> PyResult<Option<String>> {
     let matches = given.py().import("difflib")?.call_method1("get_close_matches", (key, known.to_vec(), 1))?;
     Ok(matches.extract::<Vec<String>>()?.into_iter().next())

@@ -1,17 +1,16 @@
-//! `caustique._native`: the library as Python sees it. The package around it, with what is plain Python, is in
-//! `caustique/`.
+//! `caustique._native`: the Python bindings. The Python part of the package is in `caustique/`.
 //!
-//! Work is done in threads of its own with the interpreter's lock released; what is to be done in Python meanwhile, the
-//! calling thread does (`work`).
+//! Renders run in separate threads without the interpreter's lock. The calling thread handles signals and callbacks
+//! meanwhile (`work`).
 
 mod compare;
 mod converge;
 mod error;
 mod image;
-mod job;
 mod keywords;
 mod libraries;
 mod merge;
+mod options;
 mod progress;
 mod scene;
 mod value;

@@ -1,4 +1,4 @@
-//! The libraries that are loaded when they are needed.
+//! Finds the libraries that are loaded on demand.
 
 use caustique::combine::Runtime;
 use caustique::finish::denoiser;
@@ -7,10 +7,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 
-/// Version and file of a library and where that comes from, or why it is not found and how to get it.
+/// Version, file and origin of a library, or why it was not found and how to install it.
 type Finding = Result<(String, String, &'static str), (String, Option<String>)>;
 
-/// find_libraries() -> dict: Embree, Open Image Denoise and ONNX Runtime as they are found.
+/// find_libraries() -> dict: where Embree, Open Image Denoise and ONNX Runtime were found.
 #[pyfunction]
 pub fn find_libraries(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let show = |path: &Path| path.display().to_string();

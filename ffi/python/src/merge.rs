@@ -2,7 +2,7 @@
 
 use crate::error::raised;
 use crate::image::Image;
-use crate::job::{self, finish_request};
+use crate::options::{self, finish_request};
 use crate::scene::delivered;
 use crate::work::work;
 use caustique::error::Error;
@@ -13,15 +13,15 @@ use pyo3::prelude::*;
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// The image of the shards of one render, whose files `Image.save` or `caustique render --shard` has written: to the last
-/// bit of every layer what one process would have rendered, in whatever order they are named.
+/// Merges shards of one render, whose files `Image.save` or `caustique render --shard` has written, to the image that one
+/// process would have rendered, to the last bit of every layer. Their order does not matter.
 ///
-/// partial    do with the shards that are there; each that is missing is a warning
+/// partial    merge the shards although some are missing, with a warning for each
 /// finish, denoise, model, layers
-///            as for `render`; what is left out is as the shards were asked
+///            as for `render`; by default as for the shards
 /// threads    0 takes all cores
 ///
-/// An error that is not about the shards, but about the finish, has the unfinished image as its attribute `image`.
+/// An error of the finish has the unfinished image as its attribute `image`.
 #[pyfunction]
 #[pyo3(signature = (
     paths, *, partial = false, finish = None, denoise = None, model = None, layers = None, threads = 0
@@ -48,7 +48,7 @@ pub fn merge(
     };
     let done = work(py, threads, |caller| {
         caller.warn(&shards.warnings());
-        let missing = |error: &Error| caller.warn(&[job::missing(error)]);
+        let missing = |error: &Error| caller.warn(&[options::missing_denoiser(error)]);
         shards.merge(&request, |event| {
             if let MergeEvent::Finishing { missing: Some(error), .. } = event {
                 missing(error);
@@ -65,8 +65,8 @@ fn choose_finish(
     denoise: Option<String>,
     model: Option<String>,
 ) -> PyResult<Option<FinishRequest>> {
-    let here = finish == Some(true) || denoise.is_some() || model.is_some();
-    if finish == Some(false) || (!here && arguments["no-combine"] == true) {
+    let is_set = finish == Some(true) || denoise.is_some() || model.is_some();
+    if finish == Some(false) || (!is_set && arguments["no-combine"] == true) {
         return Ok(None);
     }
     let denoise = denoise.or_else(|| text(arguments, "denoise")).unwrap_or_else(|| "auto".into());

@@ -1,4 +1,4 @@
-//! How far a render is.
+//! The progress of a render, for callbacks.
 
 use caustique::pipeline::FINISHED_PICTURE;
 use pyo3::prelude::*;
@@ -6,19 +6,19 @@ use pyo3::prelude::*;
 /// The state of a render after an iteration.
 #[pyclass(frozen, get_all, module = "caustique")]
 pub struct Progress {
-    /// Iterations done.
+    /// Number of finished iterations.
     pub iteration: u64,
-    /// Iterations asked for, where that is what ends the render; else None.
+    /// Number of iterations after which the render ends; None if another limit ends it.
     pub iterations: Option<u64>,
-    /// Wall-clock seconds since the render began.
+    /// Wall-clock seconds since the start of the render.
     pub seconds: f64,
-    /// Estimated seconds to go, where that can be told.
+    /// Estimated remaining seconds, if known.
     pub remaining: Option<f64>,
     /// Light paths emitted so far.
     pub light_paths: u64,
-    /// Estimated relative error (the root of relMSE), where it is known.
+    /// Estimated relative error (the root of relMSE), if known.
     pub error: Option<f64>,
-    /// What that is the error of: 'finished picture', or what of the estimate's own it knows.
+    /// What the error belongs to: 'finished picture', or the parts of the estimate's error that it includes.
     pub error_of: &'static str,
 }
 

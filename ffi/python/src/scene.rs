@@ -1,10 +1,10 @@
-//! A scene, and what can be done with it.
+//! The class `Scene`: reading, planning, rendering and comparing.
 
 use crate::converge::{self, Compared};
 use crate::error::{raised, usage};
 use crate::image::{Image, radiance};
-use crate::job;
 use crate::keywords::Keywords;
+use crate::options;
 use crate::progress::Progress;
 use crate::value::{to_json, to_python};
 use crate::work::{Caller, warn, work};
@@ -26,20 +26,20 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A scene that has been read and built; it can be rendered as often as one likes, from several threads at once.
+/// A scene that has been read and built. It can be rendered repeatedly, also from several threads at the same time.
 #[pyclass(frozen, subclass, module = "caustique")]
 pub struct Scene {
     pub(crate) loaded: Loaded,
     pub(crate) path: PathBuf,
     pub(crate) asked: SceneOptions,
-    said: Said,
+    identity: Identity,
 }
 
-/// What tells a scene from others: the options it was read with, as JSON, and the environment's file, if it has one.
-struct Said {
+/// The identity of a scene for headers, checkpoints and shards: its options, as JSON, and the file of its environment.
+struct Identity {
     options: Value,
     environment: Option<PathBuf>,
-    /// Files hold all of it, so that another process can read the same scene.
+    /// Whether the scene was read only from files, so that another process can read the same scene.
     of_files: bool,
 }
 
@@ -63,13 +63,13 @@ impl Scene {
         let environment = keywords.take::<Bound<'_, PyAny>>("environment")?;
         let array = environment.as_ref().map(environment_array).transpose()?.flatten();
         let word = environment.filter(|_| array.is_none()).map(|given| environment_word(&given)).transpose()?;
-        let mut asked = job::take_scene(&mut keywords, word.into_iter().collect())?;
-        keywords.finish()?;
+        let mut asked = options::take_scene(&mut keywords, word.into_iter().collect())?;
+        keywords.check_all_taken()?;
         if asked.frames.is_some_and(|frames| frames.single().is_none()) {
             return Err(usage("Scene: a scene is one frame", "give frame a whole number from 0 up"));
         }
         asked.path.clone_from(&path);
-        let said = Said::of(py, bytes.is_none(), options)?;
+        let identity = Identity::of(py, bytes.is_none(), options)?;
         let mut request = asked.request();
         request.environment = array.or(request.environment);
         let done = work(py, threads, |_| match &bytes {
@@ -82,30 +82,30 @@ impl Scene {
             return Err(usage(format!("strict=True, and something is ignored or approximated:\n{list}"), "mend it"));
         }
         warn(py, &loaded.scene.warnings)?;
-        Ok(Scene { loaded, path, asked, said })
+        Ok(Scene { loaded, path, asked, identity })
     }
 
-    /// Whatever of the scene is ignored or approximated, a sentence each.
+    /// Warnings: everything in the scene that is ignored or approximated.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.loaded.scene.warnings.clone()
     }
 
-    /// Names of the cameras; the first is the usual one.
+    /// Names of the cameras. The first is the default.
     #[getter]
     fn cameras(&self) -> Vec<String> {
         self.loaded.scene.cameras.iter().map(|camera| camera.name.clone()).collect()
     }
 
-    // Signature and text are made from the definition of options: scripts/generate.sh.
+    // The signature and the text are generated from the definitions of the options: scripts/generate.sh.
     #[doc = include_str!("render.txt")]
     #[pyo3(signature = (**options), text_signature = None)]
     fn render(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Image> {
         let mut keywords = Keywords::of(py, "render", options);
         let threads = keywords.take("threads")?.unwrap_or(0);
         let progress: Option<Py<PyAny>> = keywords.take("progress")?;
-        let (asked, run) = job::take(&mut keywords, &job::of_render(), &self.asked)?;
-        keywords.finish()?;
+        let (asked, run) = options::take(&mut keywords, &options::of_render(), &self.asked)?;
+        keywords.check_all_taken()?;
         let saving = run.saving(None);
         saving.iter().try_for_each(|saving| atomic::check_writable(&saving.path)).map_err(raised)?;
         let goes_on =
@@ -114,7 +114,7 @@ impl Scene {
             let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
             checkpoint::check_replaceable(path, run.overwrite, &remedy).map_err(raised)?;
         }
-        if !self.said.of_files && (asked.shard.is_some() || saving.is_some() || run.resume.is_some()) {
+        if !self.identity.of_files && (asked.shard.is_some() || saving.is_some() || run.resume.is_some()) {
             let cause = "render: shard, checkpoint and resume need a scene that another process can read";
             return Err(usage(
                 cause,
@@ -142,7 +142,7 @@ impl Scene {
         let delivery = match (done.result, done.raised) {
             (Ok(delivery), None) => delivery,
             (Ok(delivery), Some(error)) => {
-                // What is finished goes with the exception that ended it.
+                // The exception that stopped the render carries the picture so far.
                 let (image, _) = Image::of(delivery);
                 error.value(py).setattr("image", Bound::new(py, image)?)?;
                 return Err(error);
@@ -158,8 +158,8 @@ impl Scene {
     fn plan<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let mut keywords = Keywords::of(py, "plan", options);
         let threads = keywords.take("threads")?.unwrap_or(0);
-        let (asked, _) = job::take(&mut keywords, &job::of_plan(), &self.asked)?;
-        keywords.finish()?;
+        let (asked, _) = options::take(&mut keywords, &options::of_plan(), &self.asked)?;
+        keywords.check_all_taken()?;
         let done = work(py, threads, |caller| {
             let picture = asked.picture_request()?;
             let planned = plan_picture(picture, &self.path, &self.loaded, || caller.stops())?;
@@ -168,23 +168,23 @@ impl Scene {
         to_python(py, &done.whole()?)
     }
 
-    /// Accuracy against time of several methods: the object of `points.json` of `caustique converge`, a dict.
+    /// Compares methods by their accuracy against time: the object of `points.json` of `caustique converge`, a dict.
     ///
-    /// methods                   names, each with its defaults, one bandwidth level and no finish
-    /// runs                      {name: options of render that are about the method or the finish}
-    /// iterations, time          when each run stops; after 60 seconds if neither is given
-    /// reference                 an Image, a path, or an array (H, W, 3); one is made if there is none
+    /// methods                   names of methods, with their defaults, one bandwidth level and no finish
+    /// runs                      {name: options of render about the method or the finish}
+    /// iterations, time          limits of each run; 60 seconds if neither is given
+    /// reference                 an Image, a path, or an array (H, W, 3); rendered if missing
     /// reference_method, reference_iterations, reference_time
-    ///                           of the two halves of one that is made
+    ///                           options of the two halves of a rendered reference
     /// metric                    'relmse', 'relmse_trimmed' or 'mse'
-    /// moments                   ratio of the iterations after which runs are measured; sqrt(2) if not given
-    /// seed, seeds               the first seed, and how many races
+    /// moments                   factor between the iterations of two measurements; sqrt(2) by default
+    /// seed, seeds               the first seed, and the number of seeds
     /// progress                  called with a dict after every iteration: run (None: the reference), iterations,
-    ///                           seconds, and of runs fraction and relmse; False ends it and keeps what is measured
+    ///                           seconds, and for runs fraction and relmse; False stops and keeps the measurements
     ///
     /// 'points' is a list of dicts with run, seed, iterations, light_paths, seconds, cpu_seconds, relmse, mse, and
-    /// figure, the metric without the reference's own error. 'runs' tells of each method what theory expects and what
-    /// is fitted. A run that finishes its picture is two: NAME, the estimate, and 'NAME, finished'.
+    /// figure, the metric without the error of the reference. 'runs' has for each method the exponent of the theory and
+    /// the fitted one. A run with a finish has two entries: NAME, the estimate, and 'NAME, finished'.
     #[pyo3(
         signature = (**options),
         text_signature = "($self, *, methods=None, runs=None, iterations=None, time=None, reference=None, \
@@ -208,7 +208,7 @@ impl Scene {
     fn request(&self) -> SceneRequest {
         SceneRequest {
             path: self.path.clone(),
-            environment: self.said.environment.clone().map(Environment::File),
+            environment: self.identity.environment.clone().map(Environment::File),
             rotation: None,
             strength: None,
             options: gltf::ReadOptions::default(),
@@ -216,11 +216,11 @@ impl Scene {
         }
     }
 
-    /// What was asked for, for the header, by the names of the command line.
+    /// The arguments for the header, under the names of the command line.
     fn arguments(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Value> {
         let own = ["progress", "threads", "checkpoint", "checkpoint_every", "overwrite", "resume"];
-        let mut arguments = said(py, options, &own)?;
-        if let (Value::Object(arguments), Value::Object(of_scene)) = (&mut arguments, &self.said.options) {
+        let mut arguments = arguments_as_json(py, options, &own)?;
+        if let (Value::Object(arguments), Value::Object(of_scene)) = (&mut arguments, &self.identity.options) {
             arguments.extend(of_scene.clone());
         }
         if arguments["finish"] == false {
@@ -231,20 +231,23 @@ impl Scene {
     }
 }
 
-impl Said {
-    fn of(py: Python<'_>, of_file: bool, options: Option<&Bound<'_, PyDict>>) -> PyResult<Said> {
+impl Identity {
+    fn of(py: Python<'_>, of_file: bool, options: Option<&Bound<'_, PyDict>>) -> PyResult<Identity> {
         let given = options.map(|options| options.get_item("environment")).transpose()?.flatten();
         let given = given.filter(|given| !given.is_none());
         let environment = given.as_ref().and_then(|given| given.extract::<PathBuf>().ok());
         let array = given.is_some_and(|given| environment.is_none() && given.extract::<[f32; 3]>().is_err());
-        let options =
-            said(py, options, if array { &["threads", "strict", "environment"] } else { &["threads", "strict"] })?;
-        Ok(Said { options, environment, of_files: of_file && !array })
+        let options = arguments_as_json(
+            py,
+            options,
+            if array { &["threads", "strict", "environment"] } else { &["threads", "strict"] },
+        )?;
+        Ok(Identity { options, environment, of_files: of_file && !array })
     }
 }
 
-/// Keyword arguments as JSON by the names of the command line, but for some.
-fn said(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &[&str]) -> PyResult<Value> {
+/// Keyword arguments as JSON, under the names of the command line, without those in `but`.
+fn arguments_as_json(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &[&str]) -> PyResult<Value> {
     let asked = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
     for own in but {
         if asked.contains(own)? {
@@ -257,7 +260,7 @@ fn said(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &[&str]) -> Py
     })
 }
 
-/// The image of a render; of one that could not be finished the error, with the image as its attribute.
+/// The image of a render. If its finish failed, an exception with the image as its attribute.
 pub fn delivered(py: Python<'_>, delivery: Delivery) -> PyResult<Image> {
     let (image, refusal) = Image::of(delivery);
     let Some(error) = refusal.map(raised) else { return Ok(image) };
@@ -265,7 +268,7 @@ pub fn delivered(py: Python<'_>, delivery: Delivery) -> PyResult<Image> {
     Err(error)
 }
 
-/// The word that stands for an environment that is a path or a colour (r, g, b).
+/// The argument of the command line for an environment that is a path or a radiance (r, g, b).
 fn environment_word(given: &Bound<'_, PyAny>) -> PyResult<OsString> {
     let mut word = OsString::from("--env=");
     match given.extract::<[f32; 3]>() {
@@ -275,7 +278,7 @@ fn environment_word(given: &Bound<'_, PyAny>) -> PyResult<OsString> {
     Ok(word)
 }
 
-/// An environment that is an array (H, W, 3).
+/// The environment, if it is an array (H, W, 3).
 fn environment_array(given: &Bound<'_, PyAny>) -> PyResult<Option<Environment>> {
     if given.extract::<PathBuf>().is_ok() || given.extract::<[f32; 3]>().is_ok() {
         return Ok(None);
@@ -294,7 +297,7 @@ impl Observer for CallerReports<'_> {
     fn event(&mut self, event: Event<'_>) -> Result<()> {
         match event {
             Event::FinishOpened { missing } => {
-                self.caller.warn(&missing.map(job::missing).into_iter().collect::<Vec<_>>());
+                self.caller.warn(&missing.map(options::missing_denoiser).into_iter().collect::<Vec<_>>());
             }
             Event::Begins { plan, .. } => self.caller.warn(&plan.warnings),
             Event::Progress(progress) => self.call_back(progress),

@@ -1,4 +1,4 @@
-//! JSON to Python and back, through Python's own json.
+//! Converts between JSON and Python objects with Python's module json.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -9,13 +9,13 @@ pub fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyA
     py.import("json")?.call_method1("loads", (value.to_string(),))
 }
 
-/// Keyword arguments as JSON: what has no such form as its `str`.
+/// Keyword arguments as JSON. Objects that JSON does not have become their `str`.
 pub fn to_json(arguments: &Bound<'_, PyDict>) -> PyResult<Value> {
     let py = arguments.py();
     let options = PyDict::new(py);
     options.set_item("default", py.import("builtins")?.getattr("str")?)?;
     options.set_item("sort_keys", true)?;
     let text: String = py.import("json")?.call_method("dumps", (arguments,), Some(&options))?.extract()?;
-    // Python writes infinities, which JSON does not have.
+    // Python writes infinities, which are no valid JSON.
     Ok(serde_json::from_str(&text).unwrap_or(Value::String(text)))
 }

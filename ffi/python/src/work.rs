@@ -1,8 +1,8 @@
-//! Work without the interpreter's lock, and what the calling thread does in Python meanwhile.
+//! Runs work without the interpreter's lock, while the calling thread serves Python.
 //!
-//! A thread pool of its own works. The calling thread waits with the lock released: it looks for signals (Ctrl-C),
-//! which Python shows to its main thread alone, and calls back where the work asks for it, so that a callback runs in
-//! the thread that its author expects.
+//! The work runs in a separate thread pool. The calling thread waits with the lock released. It checks for signals
+//! (Ctrl-C), which Python delivers only to its main thread, and runs callbacks on request of the work, so that a callback
+//! runs in the thread that made the call.
 
 use crate::error::{SceneWarning, in_python, raised, usage};
 use caustique::error::{Error, ErrorKind, Result};
@@ -17,39 +17,39 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-/// Between two looks for signals.
-const LOOK: Duration = Duration::from_millis(100);
+/// Time between two checks for signals.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// What is done in Python; whether the work is to go on.
+/// A task for the calling thread. Returns whether the work continues.
 type Request = Box<dyn FnOnce(Python<'_>) -> PyResult<bool> + Send>;
 
-/// The calling thread as the work sees it.
+/// The connection of the work to the calling thread.
 pub struct Caller {
     requests: Sender<(Request, Sender<()>)>,
     stopped: Arc<AtomicBool>,
 }
 
 impl Caller {
-    /// Has something done in Python, and waits for it.
+    /// Runs a task in the calling thread and waits for its end.
     pub fn ask(&self, request: impl FnOnce(Python<'_>) -> PyResult<bool> + Send + 'static) {
         let (done, answered) = channel();
         if self.requests.send((Box::new(request), done)).is_ok() {
-            // An answer that does not come is no other than one that does.
+            // If the calling thread is gone, nothing is left to wait for.
             let _ = answered.recv();
         }
     }
 
-    /// What tells the work to end.
+    /// The stop flag for the work.
     pub fn stop(&self) -> Stop {
         Stop::from_flag(Arc::clone(&self.stopped))
     }
 
-    /// Whether an end was asked for: by a signal, by a callback that said False, or by one that raised.
+    /// Whether the work must stop: after a signal, or a callback that returned False or raised.
     pub fn stops(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    /// Issues warnings; where the user has made errors of them they end the work.
+    /// Issues Python warnings. If the user turns warnings into errors, they stop the work.
     pub fn warn(&self, texts: &[String]) {
         let texts = texts.to_vec();
         if !texts.is_empty() {
@@ -58,7 +58,7 @@ impl Caller {
     }
 }
 
-/// Issues warnings.
+/// Issues Python warnings.
 pub fn warn(py: Python<'_>, texts: &[String]) -> PyResult<()> {
     let category = py.get_type::<SceneWarning>();
     texts.iter().try_for_each(|text| {
@@ -67,16 +67,16 @@ pub fn warn(py: Python<'_>, texts: &[String]) -> PyResult<()> {
     })
 }
 
-/// What work has come to, and what was raised in Python meanwhile.
+/// The result of work, and the exception that was raised in Python meanwhile.
 pub struct Done<T> {
     /// The result.
     pub result: Result<T>,
-    /// A signal's exception, or that of a callback.
+    /// The exception of a signal or a callback.
     pub raised: Option<PyErr>,
 }
 
 impl<T> Done<T> {
-    /// The result alone, of work that leaves nothing when it is stopped.
+    /// The result, for work that has no partial result when it is stopped.
     pub fn whole(self) -> PyResult<T> {
         match self.raised {
             Some(error) => Err(error),
@@ -85,21 +85,22 @@ impl<T> Done<T> {
     }
 }
 
-/// Threads that can be asked for on any machine; on large ones `THREADS_PER_CORE` for each core.
-const THREADS: usize = 64;
-const THREADS_PER_CORE: usize = 4;
+/// Most threads on small machines.
+const MAX_THREADS: usize = 64;
+/// Most threads per core on large machines.
+const MAX_THREADS_PER_CORE: usize = 4;
 
-/// Does a job with so many threads; 0 takes all cores.
+/// Runs a job with `threads` threads; 0 takes all cores.
 ///
 /// # Errors
-/// There are far fewer cores, or the system refuses.
+/// There are far fewer cores, or the system starts no threads.
 pub fn work<T: Send>(
     py: Python<'_>,
     threads: usize,
     job: impl FnOnce(&Caller) -> Result<T> + Send,
 ) -> PyResult<Done<T>> {
     let cores = thread::available_parallelism().map_or(1, NonZero::get);
-    let most = THREADS.max(THREADS_PER_CORE * cores);
+    let most = MAX_THREADS.max(MAX_THREADS_PER_CORE * cores);
     if threads > most {
         let hint = format!("at most {most}, because there are {cores} cores; 0 takes all of them");
         return Err(usage(format!("threads={threads} is out of range"), hint));
@@ -116,12 +117,12 @@ pub fn work<T: Send>(
             let worker = scope.spawn(move || pool.install(|| job(&caller)));
             let mut first = None;
             loop {
-                let (request, done) = match asked.recv_timeout(LOOK) {
+                let (request, done) = match asked.recv_timeout(SIGNAL_INTERVAL) {
                     Ok((request, done)) => (Some(request), Some(done)),
                     Err(RecvTimeoutError::Timeout) => (None, None),
                     Err(RecvTimeoutError::Disconnected) => break,
                 };
-                // After an exception Python is left alone until the work has ended.
+                // After an exception, call no Python code until the work has ended.
                 if first.is_none() {
                     let answer = Python::attach(|py| {
                         py.check_signals()?;
@@ -133,7 +134,7 @@ pub fn work<T: Send>(
                     first = answer.err();
                 }
                 if let Some(done) = done {
-                    // The work waits for it.
+                    // The work waits for this answer.
                     let _ = done.send(());
                 }
             }

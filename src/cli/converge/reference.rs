@@ -139,7 +139,7 @@ pub fn get(
     }
     if settings.method.has_bandwidths() {
         notes.push(format!(
-            "The reference's stated error is its noise. What bias {} has left is common to both halves and does not show in it.",
+            "The reference's stated error is its noise. The remaining bias of {} is common to both halves and does not show in it.",
             settings.method.name()
         ));
     }

@@ -89,9 +89,9 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
     };
     let entry =
         Entry { name: name.into(), options: options.into(), settings, decided: TimeSpent::default(), finish: None };
-    let mut job = render.job;
-    job.no_finish |= args.no_finish;
-    Ok(Run { entry, args: job })
+    let mut options = render.options;
+    options.no_finish |= args.no_finish;
+    Ok(Run { entry, args: options })
 }
 
 /// Errors: an option concerns neither the method nor the finish of one run.

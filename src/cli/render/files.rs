@@ -73,7 +73,7 @@ pub fn check_inputs(args: &RenderArgs) -> Result<()> {
     if outputs.peek().is_none() {
         return Ok(());
     }
-    let scene = &args.job.scene;
+    let scene = &args.options.scene;
     // The render reports a scene that cannot be read. A pipe can be read only once.
     let bytes = scene.path.is_file().then(|| std::fs::read(&scene.path).ok()).flatten().unwrap_or_default();
     let mut inputs = gltf::files(&bytes, &scene.path, true);
@@ -92,7 +92,7 @@ pub fn check_checkpoint(args: &RenderArgs) -> Result<()> {
     args.run.checkpoint.as_deref().map_or(Ok(()), atomic::check_writable)?;
     let goes_on = |path: &Path| args.run.resume.as_ref().is_some_and(|resume| atomic::is_same_file(resume, path));
     let Some(path) = args.saving().map(|saving| saving.path).filter(|path| !goes_on(path)) else { return Ok(()) };
-    let of_frames = args.job.scene.frames.is_some();
+    let of_frames = args.options.scene.frames.is_some();
     let going_on = if of_frames { "--skip-existing".into() } else { format!("--resume {}", path.display()) };
     let remedy = format!("go on with {going_on}, or start anew with --overwrite");
     checkpoint::check_replaceable(&path, args.run.overwrite, &remedy)

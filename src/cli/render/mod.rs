@@ -34,7 +34,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         let cause = "the following required arguments were not provided: --output <OUT.exr>";
         return Err(Error::usage(cause).hint("'--help' explains every option"));
     }
-    super::pool(args.run.threads)?.install(|| match args.job.scene.frames {
+    super::pool(args.run.threads)?.install(|| match args.options.scene.frames {
         Some(frames) => sequence::run(args, frames),
         None => {
             sequence::refuse_patterns(args)?;
@@ -55,9 +55,9 @@ fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
     files::check_checkpoint(args)?;
     techniques::prepare(args)?;
     let request = Request {
-        scene: args.job.scene.request(),
+        scene: args.options.scene.request(),
         picture,
-        finish: (!args.job.no_finish).then(|| args.job.finish.request()),
+        finish: (!args.options.no_finish).then(|| args.options.finish.request()),
         layers,
         naming: args.run.exr_naming,
         arguments: json!(args),
@@ -156,14 +156,14 @@ impl<'a> Reports<'a> {
     /// A phase, for people who wait.
     fn describe(&self, phase: Phase) -> String {
         match phase {
-            Phase::Reading => format!("reading {}", self.args.job.scene.path.display()),
+            Phase::Reading => format!("reading {}", self.args.options.scene.path.display()),
             Phase::Choosing => "choosing a method".into(),
             Phase::Finishing => "finishing the picture".into(),
         }
     }
 
     fn loaded(&mut self, scene: &Scene) -> Result<()> {
-        scene::print_warnings(&self.args.job.scene, &scene.warnings)?;
+        scene::print_warnings(&self.args.options.scene, &scene.warnings)?;
         self.made_for = scene.picture;
         self.interrupt = Some(Interrupt::install()?);
         Ok(())
@@ -176,7 +176,7 @@ impl<'a> Reports<'a> {
         self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         let RenderArgs { output, preview, picture, .. } = self.args;
         self.preview = preview.as_ref().map(|target| Preview::new(target, output, picture, self.made_for));
-        print_plan_warnings(&self.args.job.scene.path, &plan.warnings);
+        print_plan_warnings(&self.args.options.scene.path, &plan.warnings);
         self.reason_if_black.clone_from(&plan.reason_if_black);
     }
 

@@ -32,7 +32,7 @@ pub struct RenderArgs {
 
     #[command(flatten)]
     #[serde(flatten)]
-    pub job: RenderOptions,
+    pub options: RenderOptions,
 
     /// Skip frames whose output exists, so that a run can continue and several machines can share one
     #[arg(long, help_heading = "Running")]
@@ -78,13 +78,13 @@ impl RenderArgs {
     /// # Errors
     /// Options contradict each other.
     pub fn picture_request(&self) -> Result<PictureRequest<'_>> {
-        let mut request = self.job.picture_request()?;
+        let mut request = self.options.picture_request()?;
         if self.debug_techniques.is_none() {
             return Ok(request);
         }
         match &mut request.method {
             MethodRequest::Named(settings) if takes("debug_techniques", settings.method) => settings.techniques = true,
-            _ => return Err(self.job.no_effect("debug_techniques", self.job.method.0, "vcm")),
+            _ => return Err(self.options.no_effect("debug_techniques", self.options.method.0, "vcm")),
         }
         if self.run.checkpoint.is_some() || self.run.resume.is_some() {
             let error = Error::usage("pictures per technique are not part of a checkpoint");
@@ -103,7 +103,7 @@ impl RenderArgs {
         let named = |path: &PathBuf| numbered(path, frame).unwrap_or_else(|| path.clone());
         RenderArgs {
             output: named(&self.output),
-            job: RenderOptions { scene: self.job.scene.at(frame), ..self.job.clone() },
+            options: RenderOptions { scene: self.options.scene.at(frame), ..self.options.clone() },
             picture: PictureArgs { png: self.picture.png.as_ref().map(named), ..self.picture.clone() },
             usd_layer: self.usd_layer.as_ref().map(named),
             run: RunOptions {

@@ -94,7 +94,7 @@ fn check(args: &RenderArgs, frames: Frames) -> Result<()> {
 /// # Errors
 /// A file name has one.
 pub fn refuse_patterns(args: &RenderArgs) -> Result<()> {
-    let scene = Some(("the scene", &args.job.scene.path)).filter(|(_, path)| !path.exists());
+    let scene = Some(("the scene", &args.options.scene.path)).filter(|(_, path)| !path.exists());
     match args.files().chain(scene).find(|(_, path)| is_pattern(path)) {
         None => Ok(()),
         Some((option, path)) => {

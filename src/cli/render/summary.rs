@@ -119,7 +119,7 @@ impl Summary {
         }
         let cause = format!("interrupted after {} iterations, which are written", self.iterations);
         let error = Error::new(ErrorKind::Interrupted, args.output.display(), cause);
-        let of_frames = args.job.scene.frames.is_some();
+        let of_frames = args.options.scene.frames.is_some();
         Err(match args.saving().filter(|saving| saving.path.exists()) {
             Some(_) if of_frames => error.hint("the same command with --skip-existing goes on"),
             None if of_frames => error.hint(format!(

@@ -1,5 +1,5 @@
-//! A render's options from keyword arguments: each becomes a word of the command line, which the library parses. Names,
-//! ranges and defaults are those of [`caustique::options`].
+//! Options from keyword arguments. Each argument becomes an argument of the command line, which the library parses, so
+//! names, ranges and defaults are those of [`caustique::options`].
 
 use crate::error::usage;
 use crate::keywords::{Keywords, choice};
@@ -11,27 +11,27 @@ use pyo3::prelude::*;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// Headings of options about the method or the finish, which may differ between the runs of a comparison.
-const OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
-/// Options of these headings that all runs of a comparison have in common.
-const COMMON: [&str; 2] = ["seed", "max_depth"];
+/// Headings of options that may differ between the runs of a comparison.
+const HEADINGS_OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
+/// Options under these headings that all runs of a comparison share.
+const SHARED: [&str; 2] = ["seed", "max_depth"];
 
 /// Options of `render`.
 pub fn of_render() -> Vec<OptionDescription> {
     of_python()
 }
 
-/// Options of `plan`: those about the picture and the way to it.
+/// Options of `plan`: picture, method and finish, but neither output nor running.
 pub fn of_plan() -> Vec<OptionDescription> {
     chosen(|entry| !["Output", "Running"].contains(&entry.heading.as_str()))
 }
 
 /// Options of one run of a comparison.
 pub fn of_run() -> Vec<OptionDescription> {
-    chosen(|entry| OF_RUN.contains(&entry.heading.as_str()) && !COMMON.contains(&entry.name.as_str()))
+    chosen(|entry| HEADINGS_OF_RUN.contains(&entry.heading.as_str()) && !SHARED.contains(&entry.name.as_str()))
 }
 
-/// Options of these names.
+/// The options with these names.
 pub fn named(names: &[&str]) -> Vec<OptionDescription> {
     chosen(|entry| names.contains(&entry.name.as_str()))
 }
@@ -45,16 +45,16 @@ pub fn finish_request(call: &str, denoise: &str, model: Option<String>) -> PyRes
     Ok(FinishRequest { denoiser: choice(&format!("{call}: denoise"), denoise)?, model })
 }
 
-/// The warning that our own denoiser takes the place of one that is missing.
-pub fn missing(error: &Error) -> String {
+/// The warning that the built-in denoiser replaces a missing one.
+pub fn missing_denoiser(error: &Error) -> String {
     let hint = error.hint.as_ref().map(|hint| format!("; {hint}")).unwrap_or_default();
     format!("{error}: our own denoiser takes its place, whose pictures are grainier{hint}")
 }
 
-/// A render's options from keyword arguments that none has taken yet.
+/// Takes the options of a render from the keyword arguments.
 ///
 /// # Errors
-/// An argument is of another type or out of range.
+/// An argument has the wrong type or is out of range.
 pub fn take(
     keywords: &mut Keywords<'_>,
     options: &[OptionDescription],
@@ -62,20 +62,21 @@ pub fn take(
 ) -> PyResult<(RenderOptions, RunOptions)> {
     let (mut render, run) = parsed(keywords, options, Vec::new())?;
     render.scene = scene.clone();
-    // The scene is one frame, whose noise is that of the seed.
+    // The scene is one frame, so the seed is not varied by the frame's number.
     render.frame_seed = FrameSeed::Same;
     Ok((render, run))
 }
 
-/// The options of a scene from keyword arguments; `more` are words that stand for arguments taken before.
+/// Takes the options of a scene from the keyword arguments. `more`: arguments of the command line for arguments taken
+/// before.
 ///
 /// # Errors
-/// An argument is of another type or out of range.
+/// An argument has the wrong type or is out of range.
 pub fn take_scene(keywords: &mut Keywords<'_>, more: Vec<OsString>) -> PyResult<SceneOptions> {
     Ok(parsed(keywords, &of_scene(), more)?.0.scene)
 }
 
-/// The options of a method with one level and no finish, as a comparison takes it.
+/// The options of a method with one level and no finish, for a comparison.
 pub fn single(method: &str, has_levels: bool) -> PyResult<RenderOptions> {
     let mut words = vec![format!("--method={method}"), "--no-finish".into()];
     words.extend(has_levels.then(|| "--levels=1".to_string()));
@@ -94,11 +95,11 @@ fn parsed(
         words.extend(self::words(keywords, entry)?);
     }
     words.extend(["--".into(), "scene".into()]);
-    parse(words).map_err(|invalid| refused(keywords, options, &invalid))
+    parse(words).map_err(|invalid| invalid_argument(keywords, options, &invalid))
 }
 
-/// The error of an argument that the library refuses.
-fn refused(
+/// The exception for an argument that the library rejects.
+fn invalid_argument(
     keywords: &Keywords<'_>,
     options: &[OptionDescription],
     InvalidOption { option, reason }: &InvalidOption,
@@ -109,7 +110,7 @@ fn refused(
     usage(format!("{}: {name}={} {fault}", keywords.call(), keywords.shown(name)), reason)
 }
 
-/// The words of the command line that an argument stands for.
+/// The arguments of the command line for a keyword argument.
 fn words(keywords: &mut Keywords<'_>, entry: &OptionDescription) -> PyResult<Vec<OsString>> {
     let name = entry.python.as_deref().unwrap_or(&entry.name);
     let option = &entry.option;
@@ -133,12 +134,12 @@ fn words(keywords: &mut Keywords<'_>, entry: &OptionDescription) -> PyResult<Vec
         ValueKind::Text => match keywords.take::<Bound<'_, PyAny>>(name)? {
             None => None,
             Some(value) => Some(match texts(&value)? {
-                // An option of several values, such as `--filter gaussian 2`.
+                // Options with several values, such as `--filter gaussian 2`.
                 texts if entry.values.len() > 1 => std::iter::once(option.into()).chain(texts).collect(),
-                // The value's name shows what parts it: `I/N`, `X,Y,W,H`.
+                // The placeholder of the value shows its separator: `I/N`, `X,Y,W,H`.
                 texts => {
-                    let by = if entry.values.iter().any(|value| value == "I/N") { "/" } else { "," };
-                    word(texts.join(OsString::from(by).as_os_str()))
+                    let separator = if entry.values.iter().any(|value| value == "I/N") { "/" } else { "," };
+                    word(texts.join(OsString::from(separator).as_os_str()))
                 }
             }),
         },
@@ -146,7 +147,7 @@ fn words(keywords: &mut Keywords<'_>, entry: &OptionDescription) -> PyResult<Vec
     Ok(given.unwrap_or_default())
 }
 
-/// A value as text; a sequence as that of its items.
+/// The texts of a value: one, or one for each item of a sequence.
 fn texts(value: &Bound<'_, PyAny>) -> PyResult<Vec<OsString>> {
     if let Ok(text) = value.extract::<PathBuf>() {
         return Ok(vec![text.into()]);
