@@ -43,9 +43,9 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         escape(&mut object);
         return print(&image_text(path, &set, &object));
     }
-    let asked = SceneOptions::of(path, args.allow_outside);
+    let options = SceneOptions::of(path, args.allow_outside);
     let scene = super::pool(0)?
-        .install(|| scene::read(&asked, Form::for_output(args.json), rayon::current_num_threads()))?
+        .install(|| scene::read(&options, Form::for_output(args.json), rayon::current_num_threads()))?
         .scene;
     let mut object = scene_object(path, &scene);
     if args.json {

@@ -24,11 +24,11 @@ impl Interrupt {
             return Ok(interrupt.clone());
         }
         let failed = |error| Error::new(ErrorKind::Io, "signals", error);
-        let asked = Arc::new(AtomicBool::new(false));
+        let flag = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             // In this order: a signal ends the program if the flag is set already, and else sets the flag.
-            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&asked))
-                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&asked)))
+            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
                 .map_err(failed)?;
         }
         let mut pressed = Signals::new([SIGINT]).map_err(failed)?;
@@ -38,7 +38,7 @@ impl Interrupt {
             }
         };
         std::thread::Builder::new().spawn(answer).map_err(failed)?;
-        Ok(INSTALLED.get_or_init(|| Interrupt(asked)).clone())
+        Ok(INSTALLED.get_or_init(|| Interrupt(flag)).clone())
     }
 
     /// Whether a signal has come since the handlers were installed.

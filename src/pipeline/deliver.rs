@@ -57,7 +57,7 @@ pub(super) struct Contents<'a> {
     pub reproducible: bool,
     /// Further keys of the header.
     pub more: Map<String, Value>,
-    /// Whether the render is a shard, which keeps its pixel sums and has no layers for absent light.
+    /// Whether the render is a shard, which keeps its pixel sums and may lack layers of the request.
     pub is_shard: bool,
 }
 

@@ -69,7 +69,7 @@ pub struct Compared<'a> {
     pub path: &'a Path,
     pub loaded: &'a Loaded,
     /// The options of the scene.
-    pub asked: &'a SceneOptions,
+    pub options: &'a SceneOptions,
 }
 
 /// Implements the method `converge` of `Scene`.
@@ -80,7 +80,7 @@ pub fn converge<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut keywords = Keywords::of(py, "converge", options);
     let given: Option<Bound<'_, PyAny>> = keywords.take("reference")?;
-    let (common, _) = options::take(&mut keywords, &options::named(&SHARED_OPTIONS), scene.asked)?;
+    let (common, _) = options::take(&mut keywords, &options::named(&SHARED_OPTIONS), scene.options)?;
     let reference_options = ReferenceOptions {
         method: keywords.choice::<MethodChoice>("reference_method")?.and_then(|method| method.0),
         iterations: keywords.number("reference_iterations", 1..=MAX_TERMS, "a whole number above 0")?,
@@ -121,9 +121,9 @@ fn runs(py: Python<'_>, keywords: &mut Keywords<'_>, common: &RenderOptions) -> 
     }
     for (name, options) in named.iter().flat_map(|named| named.iter()) {
         let mut options = Keywords::of(py, "run", Some(options.cast::<PyDict>()?));
-        let (asked, _) = options::take(&mut options, &options::of_run(), &common.scene)?;
+        let (render, _) = options::take(&mut options, &options::of_run(), &common.scene)?;
         options.check_all_taken()?;
-        runs.push(Run { name: name.extract()?, options: with_shared(asked, common) });
+        runs.push(Run { name: name.extract()?, options: with_shared(render, common) });
     }
     match (1..runs.len()).find(|&run| runs[..run].iter().any(|other| other.name == runs[run].name)) {
         Some(twice) => Err(usage(
@@ -162,7 +162,7 @@ impl Callback<'_> {
     /// Calls the callback with a state. Returns whether to continue.
     fn call(&self, state: Value) -> Control {
         if let Some(callback) = self.progress.clone() {
-            self.caller.ask(move |py| {
+            self.caller.run(move |py| {
                 let answer = callback.call1(py, (to_python(py, &state)?,))?;
                 Ok(!answer.bind(py).is(PyBool::new(py, false)))
             });
@@ -260,7 +260,7 @@ impl Comparison {
             let mut method = limited.method_request()?;
             let chosen = choose(&mut method, settings, view, |_| true, || callback.caller.stops());
             let decided = chosen.spent();
-            let (max_depth, switches) = (self.common.max_depth, scene.asked.switches());
+            let (max_depth, switches) = (self.common.max_depth, scene.options.switches());
             let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, &scene.loaded.removed);
             let Chosen { settings, .. } = chosen;
             warnings
@@ -293,7 +293,7 @@ impl Comparison {
                 Some(time) => (None, Some(8.0 * time)),
                 None => (self.common.iterations.map(|n| n.saturating_mul(16).max(2)), None),
             },
-            asked => asked,
+            limits => limits,
         };
         let settings = Settings { method, iterations: ends.0, time: ends.1, target_error: None, ..settings };
         let settings = with_light_paths(settings, None, camera.size());

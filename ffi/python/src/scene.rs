@@ -31,7 +31,7 @@ use std::sync::Arc;
 pub struct Scene {
     pub(crate) loaded: Loaded,
     pub(crate) path: PathBuf,
-    pub(crate) asked: SceneOptions,
+    pub(crate) options: SceneOptions,
     identity: Identity,
 }
 
@@ -63,26 +63,26 @@ impl Scene {
         let environment = keywords.take::<Bound<'_, PyAny>>("environment")?;
         let array = environment.as_ref().map(environment_array).transpose()?.flatten();
         let word = environment.filter(|_| array.is_none()).map(|given| environment_word(&given)).transpose()?;
-        let mut asked = options::take_scene(&mut keywords, word.into_iter().collect())?;
+        let mut scene_options = options::take_scene(&mut keywords, word.into_iter().collect())?;
         keywords.check_all_taken()?;
-        if asked.frames.is_some_and(|frames| frames.single().is_none()) {
+        if scene_options.frames.is_some_and(|frames| frames.single().is_none()) {
             return Err(usage("Scene: a scene is one frame", "give frame a whole number from 0 up"));
         }
-        asked.path.clone_from(&path);
+        scene_options.path.clone_from(&path);
         let identity = Identity::of(py, bytes.is_none(), options)?;
-        let mut request = asked.request();
+        let mut request = scene_options.request();
         request.environment = array.or(request.environment);
         let done = work(py, threads, |_| match &bytes {
             Some(bytes) => load_bytes(bytes, &request, rayon::current_num_threads()),
             None => load(&request, rayon::current_num_threads(), &Stop::default()),
         })?;
         let loaded = done.whole()?;
-        if asked.strict && !loaded.scene.warnings.is_empty() {
+        if scene_options.strict && !loaded.scene.warnings.is_empty() {
             let list = loaded.scene.warnings.join("\n");
             return Err(usage(format!("strict=True, and something is ignored or approximated:\n{list}"), "mend it"));
         }
         warn(py, &loaded.scene.warnings)?;
-        Ok(Scene { loaded, path, asked, identity })
+        Ok(Scene { loaded, path, options: scene_options, identity })
     }
 
     /// Warnings: everything in the scene that is ignored or approximated.
@@ -104,7 +104,7 @@ impl Scene {
         let mut keywords = Keywords::of(py, "render", options);
         let threads = keywords.take("threads")?.unwrap_or(0);
         let progress: Option<Py<PyAny>> = keywords.take("progress")?;
-        let (asked, run) = options::take(&mut keywords, &options::of_render(), &self.asked)?;
+        let (render, run) = options::take(&mut keywords, &options::of_render(), &self.options)?;
         keywords.check_all_taken()?;
         let saving = run.saving(None);
         saving.iter().try_for_each(|saving| atomic::check_writable(&saving.path)).map_err(raised)?;
@@ -114,7 +114,7 @@ impl Scene {
             let remedy = format!("go on with resume='{}', or start anew with overwrite=True", path.display());
             checkpoint::check_replaceable(path, run.overwrite, &remedy).map_err(raised)?;
         }
-        if !self.identity.of_files && (asked.shard.is_some() || saving.is_some() || run.resume.is_some()) {
+        if !self.identity.of_files && (render.shard.is_some() || saving.is_some() || run.resume.is_some()) {
             let cause = "render: shard, checkpoint and resume need a scene that another process can read";
             return Err(usage(
                 cause,
@@ -127,8 +127,8 @@ impl Scene {
         let done = work(py, threads, |caller| {
             let request = Request {
                 scene: self.request(),
-                picture: asked.picture_request()?,
-                finish: (!asked.no_finish).then(|| asked.finish.request()),
+                picture: render.picture_request()?,
+                finish: (!render.no_finish).then(|| render.finish.request()),
                 layers,
                 naming: Naming::Plain,
                 arguments,
@@ -158,10 +158,10 @@ impl Scene {
     fn plan<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let mut keywords = Keywords::of(py, "plan", options);
         let threads = keywords.take("threads")?.unwrap_or(0);
-        let (asked, _) = options::take(&mut keywords, &options::of_plan(), &self.asked)?;
+        let (render, _) = options::take(&mut keywords, &options::of_plan(), &self.options)?;
         keywords.check_all_taken()?;
         let done = work(py, threads, |caller| {
-            let picture = asked.picture_request()?;
+            let picture = render.picture_request()?;
             let planned = plan_picture(picture, &self.path, &self.loaded, || caller.stops())?;
             Ok(json!(planned.plan))
         })?;
@@ -192,8 +192,8 @@ impl Scene {
             seed=0, seeds=1, max_depth=None, width=None, height=None, camera=None, threads=0, progress=None)"
     )]
     fn converge<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
-        let Scene { path, loaded, asked, .. } = self;
-        converge::converge(&Compared { path, loaded, asked }, py, options)
+        let Scene { path, loaded, options: scene_options, .. } = self;
+        converge::converge(&Compared { path, loaded, options: scene_options }, py, options)
     }
 
     fn __repr__(&self) -> String {
@@ -212,7 +212,7 @@ impl Scene {
             rotation: None,
             strength: None,
             options: gltf::ReadOptions::default(),
-            off: self.asked.switches().off,
+            off: self.options.switches().off,
         }
     }
 
@@ -248,14 +248,14 @@ impl Identity {
 
 /// Keyword arguments as JSON, under the names of the command line, without those in `but`.
 fn arguments_as_json(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &[&str]) -> PyResult<Value> {
-    let asked = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
+    let arguments = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
     for own in but {
-        if asked.contains(own)? {
-            asked.del_item(own)?;
+        if arguments.contains(own)? {
+            arguments.del_item(own)?;
         }
     }
-    Ok(match to_json(&asked)? {
-        Value::Object(asked) => asked.into_iter().map(|(key, value)| (key.replace('_', "-"), value)).collect(),
+    Ok(match to_json(&arguments)? {
+        Value::Object(arguments) => arguments.into_iter().map(|(key, value)| (key.replace('_', "-"), value)).collect(),
         other => other,
     })
 }
@@ -319,6 +319,6 @@ impl CallerReports<'_> {
     fn call_back(&self, progress: &caustique::render::Progress) {
         let Some(callback) = self.progress.clone() else { return };
         let progress = Progress::from(progress);
-        self.caller.ask(move |py| Ok(!callback.call1(py, (progress,))?.bind(py).is(PyBool::new(py, false))));
+        self.caller.run(move |py| Ok(!callback.call1(py, (progress,))?.bind(py).is(PyBool::new(py, false))));
     }
 }

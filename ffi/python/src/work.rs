@@ -1,7 +1,7 @@
 //! Runs work without the interpreter's lock, while the calling thread serves Python.
 //!
 //! The work runs in a separate thread pool. The calling thread waits with the lock released. It checks for signals
-//! (Ctrl-C), which Python delivers only to its main thread, and runs callbacks on request of the work, so that a callback
+//! (Ctrl-C), which Python delivers only to its main thread, and runs callbacks at the request of the work, so that a callback
 //! runs in the thread that made the call.
 
 use crate::error::{SceneWarning, in_python, raised, usage};
@@ -21,19 +21,19 @@ use std::time::Duration;
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A task for the calling thread. Returns whether the work continues.
-type Request = Box<dyn FnOnce(Python<'_>) -> PyResult<bool> + Send>;
+type Task = Box<dyn FnOnce(Python<'_>) -> PyResult<bool> + Send>;
 
 /// The connection of the work to the calling thread.
 pub struct Caller {
-    requests: Sender<(Request, Sender<()>)>,
+    tasks: Sender<(Task, Sender<()>)>,
     stopped: Arc<AtomicBool>,
 }
 
 impl Caller {
     /// Runs a task in the calling thread and waits for its end.
-    pub fn ask(&self, request: impl FnOnce(Python<'_>) -> PyResult<bool> + Send + 'static) {
+    pub fn run(&self, task: impl FnOnce(Python<'_>) -> PyResult<bool> + Send + 'static) {
         let (done, answered) = channel();
-        if self.requests.send((Box::new(request), done)).is_ok() {
+        if self.tasks.send((Box::new(task), done)).is_ok() {
             // If the calling thread is gone, nothing is left to wait for.
             let _ = answered.recv();
         }
@@ -53,7 +53,7 @@ impl Caller {
     pub fn warn(&self, texts: &[String]) {
         let texts = texts.to_vec();
         if !texts.is_empty() {
-            self.ask(move |py| warn(py, &texts).map(|()| true));
+            self.run(move |py| warn(py, &texts).map(|()| true));
         }
     }
 }
@@ -112,13 +112,13 @@ pub fn work<T: Send>(
     let stopped = Arc::new(AtomicBool::new(false));
     Ok(py.detach(|| {
         thread::scope(|scope| {
-            let (requests, asked) = channel::<(Request, Sender<()>)>();
-            let caller = Caller { requests, stopped: Arc::clone(&stopped) };
+            let (sender, tasks) = channel::<(Task, Sender<()>)>();
+            let caller = Caller { tasks: sender, stopped: Arc::clone(&stopped) };
             let worker = scope.spawn(move || pool.install(|| job(&caller)));
             let mut first = None;
             loop {
-                let (request, done) = match asked.recv_timeout(SIGNAL_INTERVAL) {
-                    Ok((request, done)) => (Some(request), Some(done)),
+                let (task, done) = match tasks.recv_timeout(SIGNAL_INTERVAL) {
+                    Ok((task, done)) => (Some(task), Some(done)),
                     Err(RecvTimeoutError::Timeout) => (None, None),
                     Err(RecvTimeoutError::Disconnected) => break,
                 };
@@ -126,7 +126,7 @@ pub fn work<T: Send>(
                 if first.is_none() {
                     let answer = Python::attach(|py| {
                         py.check_signals()?;
-                        request.map_or(Ok(true), |request| request(py))
+                        task.map_or(Ok(true), |task| task(py))
                     });
                     if !matches!(answer, Ok(true)) {
                         stopped.store(true, Ordering::Relaxed);

@@ -94,9 +94,9 @@ impl Summary {
 
     /// Warns if the photon map became full.
     pub fn warn_full_map(&self) {
-        if let Some((photons, asked, bytes)) = self.full {
+        if let Some((photons, light_paths, bytes)) = self.full {
             say(&format!(
-                "warning: the photon map was full at {photons} photons ({} MiB) after {} of {asked} light paths; --photon-memory allows more",
+                "warning: the photon map was full at {photons} photons ({} MiB) after {} of {light_paths} light paths; --photon-memory allows more",
                 bytes >> 20,
                 self.light_paths
             ));
