@@ -46,5 +46,5 @@ pub fn strict_error(args: &SceneOptions, warnings: usize) -> Error {
     let things = if warnings == 1 { "1 thing is" } else { &format!("{warnings} things are") };
     let cause = format!("{things} ignored or approximated, and --strict forbids it");
     Error::new(ErrorKind::Scene, args.path.display(), cause)
-        .hint("mend what the warnings above name, or leave --strict out")
+        .hint("fix what the warnings above name, or leave --strict out")
 }

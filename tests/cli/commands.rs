@@ -129,7 +129,7 @@ fn strict_turns_warnings_into_an_error() {
     std::fs::remove_file(folder.path("out.exr")).expect("it was there");
     let outcome = folder.run(&format!("{render} --strict"));
     let error = "dark.glb: 1 thing is ignored or approximated, and --strict forbids it\n\
-                 hint: mend what the warnings above name, or leave --strict out\n";
+                 hint: fix what the warnings above name, or leave --strict out\n";
     assert_eq!((outcome.code, outcome.stderr), (Some(1), format!("{warning}{error}")));
     assert!(!folder.path("out.exr").exists());
     // An environment gives light, and an opaque background.

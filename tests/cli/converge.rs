@@ -312,14 +312,14 @@ fn errors_of_converge_name_cause_and_remedy() {
     for (arguments, runs, code, error, hint) in cases {
         let outcome = converge(&folder, arguments, runs);
         let hint = if hint.is_empty() { String::new() } else { format!("hint: {hint}\n") };
-        // What a method cannot find is told before.
-        let told: String = outcome
+        // Warnings about effects that a method does not find come first.
+        let errors: String = outcome
             .stderr
             .lines()
             .filter(|line| !line.starts_with("warning: "))
             .map(|line| format!("{line}\n"))
             .collect();
-        assert_eq!(told, format!("{error}\n{hint}"), "{arguments}");
+        assert_eq!(errors, format!("{error}\n{hint}"), "{arguments}");
         assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(code), ""), "{arguments}");
     }
     assert_eq!(folder.files(), ["depth.exr", "other.exr"]);

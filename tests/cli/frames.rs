@@ -203,24 +203,24 @@ fn an_interrupted_sequence_continues() {
     assert!(!folder.files().contains(&"out.2.exr.checkpoint".to_string()));
 }
 
-/// Machines that share a folder render each frame once, and pass over what another one has claimed.
+/// Machines that share a folder render each frame once, and skip frames that another machine has claimed.
 #[test]
-fn frames_are_shared_out() {
+fn machines_share_the_frames_of_a_sequence() {
     let folder = folder();
     std::fs::write(folder.path("out.3.exr.claim"), "render7, process 12\nrender7\n12\n").expect("it can be written");
     let line = format!("render moving.gltf --frames 1-6 -o out.#.exr {SMALL} --skip-existing --progress plain");
     let start = || folder.command(&line).stderr(Stdio::piped()).spawn().expect("the program starts");
-    let told: Vec<String> = [start(), start()]
+    let outputs: Vec<String> = [start(), start()]
         .map(|child| String::from_utf8(child.wait_with_output().expect("it ends").stderr).expect("it is text"))
         .into();
     for frame in [1, 2, 4, 5, 6] {
         let rendered = format!("frame {frame} ({frame} of 6): ");
-        assert_eq!(told.iter().filter(|told| told.contains(&rendered)).count(), 1, "frame {frame}: {told:?}");
+        assert_eq!(outputs.iter().filter(|text| text.contains(&rendered)).count(), 1, "frame {frame}: {outputs:?}");
         assert!(folder.path(&format!("out.{frame}.exr")).exists());
     }
     assert!(
-        told.iter().all(|told| told.contains("frame 3: out.3.exr is rendered by render7, process 12\n")),
-        "{told:?}"
+        outputs.iter().all(|text| text.contains("frame 3: out.3.exr is rendered by render7, process 12\n")),
+        "{outputs:?}"
     );
     let claims: Vec<String> = folder.files().into_iter().filter(|name| name.ends_with(".claim")).collect();
     assert_eq!(claims, ["out.3.exr.claim"]);

@@ -35,10 +35,10 @@ pub(in super::super) fn reason(
     }
     let left: Vec<&str> = effects.iter().filter(|e| e.present && !e.simulated).map(|e| e.effect.name()).collect();
     if !left.is_empty() {
-        return format!("what is left out may be all its light: {}", left.join(", "));
+        return format!("all its light may be in what is left out: {}", left.join(", "));
     }
     if warned {
-        return "what the warnings above name is the likely reason".into();
+        return "the warnings above name the likely reason".into();
     }
     let method = request.method;
     format!("no light has reached the camera: lights may be enclosed or turned away, or too hard to find for {method}")

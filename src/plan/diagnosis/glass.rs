@@ -156,7 +156,7 @@ pub(super) fn unlit(scene: &Scene) -> Vec<String> {
         let names: Vec<String> = blockers.into_iter().map(|(name, _)| name.clone()).collect();
         let why = match names.is_empty() {
             true => "aim a light at it".to_string(),
-            false => format!("what stands in the way is {}", truncate_names(&names)),
+            false => format!("it is in the shadow of {}", truncate_names(&names)),
         };
         let name = &scene.objects[*object as usize];
         warnings.push(format!("object \"{name}\": no light shines on its glass, so it casts no caustic; {why}"));

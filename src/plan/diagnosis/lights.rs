@@ -148,7 +148,7 @@ pub(super) fn shut_out(scene: &Scene, camera: Vec3) -> Option<String> {
     let mut around = enclosure(scene, rays)?;
     around.retain(|object| is_within(scene, &BTreeSet::from([*object]), camera));
     let names: Vec<String> = around.iter().map(|object| format!("\"{}\"", scene.objects[*object as usize])).collect();
-    let by = if names.is_empty() { "what stands around the camera".into() } else { truncate_names(&names) };
+    let by = if names.is_empty() { "everything around the camera".into() } else { truncate_names(&names) };
     Some(format!(
         "the environment lights nothing that the camera sees: {by} shuts it out; make an opening, let it glow if it is the sky, or take it away"
     ))

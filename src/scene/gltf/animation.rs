@@ -73,7 +73,7 @@ pub(super) fn apply(document: &mut Document, frame: Option<FrameTime>, warnings:
                 faults.handle(fault(place, cause).hint("the file is damaged: export it again"), warnings)?;
             }
             Err(PointerError::Unread) => {
-                warnings.push(format!("{place}: it moves {pointer}, which is not read: it stays as it is"));
+                warnings.push(format!("{place}: it moves {pointer}, which cannot be animated: it is ignored"));
             }
         }
     }
@@ -93,7 +93,7 @@ impl FaultPolicy {
         if self.fatal {
             return Err(error);
         }
-        warnings.push(format!("{error}; what it moves stays as it is (--frames would refuse the file)"));
+        warnings.push(format!("{error}; it is ignored (--frames would reject the file)"));
         Ok(())
     }
 }
@@ -110,7 +110,7 @@ fn rate(document: &Document, frame: FrameTime, warnings: &mut Vec<String>) -> Re
     });
     Ok(rate.filter(is_valid).or(frame.rate.filter(is_valid)).unwrap_or_else(|| {
         warnings.push(format!(
-            "the file does not tell its frame rate: {DEFAULT_RATE} frames a second are assumed (--frame-rate decides)"
+            "the file has no frame rate: {DEFAULT_RATE} frames per second are assumed (--frame-rate sets them)"
         ));
         DEFAULT_RATE
     }))
@@ -151,7 +151,7 @@ fn tracks(document: &Document, faults: FaultPolicy, warnings: &mut Vec<String>) 
                     continue;
                 }
                 Some(first) => {
-                    let both = format!("{first} and {name} move the same: {first} is played there");
+                    let both = format!("{first} and {name} move the same value: {first} is used");
                     warnings.push(format!("{both} (export without the other)"));
                     continue;
                 }

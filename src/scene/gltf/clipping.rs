@@ -45,9 +45,11 @@ pub(super) fn check(out: &mut Description, clips: &[Clip], bounds: &[(DVec3, DVe
         let place = format!("camera \"{}\"", camera.name);
         let near = shown(before).then(|| format!("nearer than its znear of {} m", clip.near));
         let far = shown(behind).then(|| format!("farther than its zfar of {} m", clip.far));
-        out.warnings.extend([near, far].into_iter().flatten().map(|what| {
-            format!("{place}: what is {what} is shown all the same: clip planes are ignored (hide or remove it)")
-        }));
+        out.warnings.extend(
+            [near, far].into_iter().flatten().map(|what| {
+                format!("{place}: objects {what} are visible: clip planes are ignored (hide or remove them)")
+            }),
+        );
     }
 }
 

@@ -141,7 +141,7 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
     let mut used = listed("extensionsUsed");
     collect_extensions(document, &mut used);
     for name in used.iter().filter(|name| !is_supported(name)) {
-        warnings.push(format!("extension \"{name}\" is not supported: what it says is ignored"));
+        warnings.push(format!("extension \"{name}\" is not supported and is ignored"));
     }
     Ok(())
 }

@@ -98,7 +98,7 @@ pub(super) fn divisors(
                 Some(version) if version >= FIRST_PHOTOMETRIC => (Divisors::PHOTOMETRIC, None),
                 Some(_) => (Divisors::WATTS, Some("writes lamps in Blender's watts, without 683 lumens for each")),
                 None => {
-                    (Divisors::RADIOMETRIC, Some("does not tell the unit of lamps: they are taken in W/sr and W/m2"))
+                    (Divisors::RADIOMETRIC, Some("does not state the unit of lamps: they are taken in W/sr and W/m2"))
                 }
             };
             warnings.extend(taken.map(|taken| format!("{from} {taken} (--light-units decides)")));
@@ -182,7 +182,7 @@ pub(super) fn light(
         intensity = intensity.max(Rgb::ZERO);
     }
     if light.range.is_some() {
-        warnings.push(format!("{place}: its range is ignored: light reaches as far as it does"));
+        warnings.push(format!("{place}: its range is ignored: light has no maximum distance"));
     }
     extras::check_keys(raw, extras::LIGHT, &place, warnings);
     let (on_light, on_node): (LightExtras, LightExtras) = (extras::read(raw, &place)?, extras::read(node.1, &place)?);
@@ -204,10 +204,10 @@ pub(super) fn light(
     let sun = matches!(kind, PunctualKind::Sun { .. });
     if (sun && radius > 0.0) || (!sun && angle > 0.0) {
         let key = if sun { "radius" } else { "angle_deg" };
-        warnings.push(format!("{place}: extras.caustique.{key} says nothing about a {} light", light.kind));
+        warnings.push(format!("{place}: extras.caustique.{key} has no effect on a {} light", light.kind));
     }
     if !matches!(kind, PunctualKind::Spot { .. }) && on_node.blend.or(on_light.blend).is_some() {
-        warnings.push(format!("{place}: extras.caustique.blend says nothing about a {} light", light.kind));
+        warnings.push(format!("{place}: extras.caustique.blend has no effect on a {} light", light.kind));
     }
     let hidden_from_camera = on_node.visible.or(on_light.visible).is_some_and(|visible| !visible.camera);
     let radius = if sun { 0.0 } else { radius };

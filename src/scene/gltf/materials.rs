@@ -94,7 +94,7 @@ impl Library {
 /// Why a mesh is not closed, with the consequence and a remedy, as the end of a warning.
 fn reason_not_closed(bounds: Solid) -> String {
     match (bounds.flipped, bounds.rim) {
-        (true, _) => "part of its faces is turned over: recalculate its normals".to_string(),
+        (true, _) => "part of its faces is flipped: recalculate its normals".to_string(),
         (false, 0) => "edges join more than two of its faces: light may get lost inside".into(),
         (false, rim) => format!(
             "the mesh is not closed ({}): light may get lost inside; close the holes, or take its thickness away",

@@ -491,13 +491,13 @@ fn orient_shells(mut glass: Vec<&mut MaterialMesh>, whole: Solid, name: &str, wa
         let report = shells::flip_inner(&mut same.into_iter().map(|part| &mut part.mesh).collect::<Vec<_>>());
         if report.inverted > 0 || (open && whole.volume < 0.0) {
             warnings.push(format!(
-                "{place}: its faces look inwards, so the inside of the glass is outside: flip its normals"
+                "{place}: its faces point inwards, so the inside of the glass is outside: flip its normals"
             ));
         }
         if report.flipped > 0 {
             let shells = counted(report.flipped, "closed shell lies", "closed shells lie");
             warnings.push(format!(
-                "{place}: {shells} inside another and looked the same way, which would make no hollow: turned over (flip the normals of one of the two)"
+                "{place}: {shells} inside another with the same orientation, which would make no hollow: flipped (flip the normals of one of the two)"
             ));
         }
     }

@@ -206,8 +206,7 @@ fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<Str
         return Err(broken("it has no texels".into()));
     }
     if truncated {
-        warnings
-            .push(format!("{place}: the file of the image is cut off: what is missing of it is grey (copy it again)"));
+        warnings.push(format!("{place}: the image file is cut off: the missing part is grey (copy it again)"));
     }
     let (width, height, channels) = (image.width(), image.height(), image.color().channel_count());
     let data = match image {

@@ -18,7 +18,7 @@ struct Fault {
 /// The converter printed something else.
 pub fn options(printed: &[u8], stage: &Path) -> Result<Vec<String>> {
     serde_json::from_slice(printed).map_err(|cause| {
-        Error::new(ErrorKind::Scene, stage.display(), format!("the converter does not say options: {cause}"))
+        Error::new(ErrorKind::Scene, stage.display(), format!("the converter printed no options: {cause}"))
     })
 }
 
@@ -29,7 +29,7 @@ pub fn failure(stderr: &[u8], stage: &Path) -> Error {
     let Some(Fault { prim, fault, hint }) = fault else {
         let last = stderr.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
         let cause = format!("the converter (scripts/usd) failed: {}", last.trim());
-        return Error::new(ErrorKind::Scene, stage.display(), cause).hint("'caustique doctor' says what is found");
+        return Error::new(ErrorKind::Scene, stage.display(), cause).hint("'caustique doctor' lists what is found");
     };
     Error { hint, ..Error::new(ErrorKind::Scene, prim, fault).within(stage.display()) }
 }

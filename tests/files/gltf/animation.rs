@@ -161,8 +161,8 @@ fn cameras_lamps_and_materials_move() {
     let Projection::Perspective { yfov, .. } = scene.cameras[0].projection else { panic!("not perspective") };
     assert!((yfov - 0.7).abs() < 1e-6);
     assert_eq!(scene.materials[0].base_color, [0.0, 1.0, 0.0, 1.0]);
-    let lost = "animation \"light\", channel 3: it moves /materials/0/extensions/EXT_odd/factor, which is not read: it stays \
-                as it is";
+    let lost = "animation \"light\", channel 3: it moves /materials/0/extensions/EXT_odd/factor, which cannot be \
+                animated: it is ignored";
     assert_eq!(scene.warnings, [lost]);
 }
 
@@ -174,7 +174,7 @@ fn the_first_of_two_actions_is_played() {
     channel(&mut file, 1, json!({"node": 0, "path": "translation"}), "STEP", &[0.0], &[[9.0; 3]]);
     let scene = at(&file, 1.0).unwrap();
     near(scene.instances[0].to_world.translation, DVec3::new(3.0, 8.0, 0.0));
-    let both = "animation \"act\" and animation \"other\" move the same: animation \"act\" is played there (export without \
+    let both = "animation \"act\" and animation \"other\" move the same value: animation \"act\" is used (export without \
                 the other)";
     assert_eq!(scene.warnings, [both]);
 }
@@ -193,7 +193,7 @@ fn frame_rates() {
         let (x, said) = found.unwrap();
         assert!((x - expected).abs() < 1e-5 && said == warnings, "{x} {said:?}");
     };
-    let guess = "the file does not tell its frame rate: 24 frames a second are assumed (--frame-rate decides)";
+    let guess = "the file has no frame rate: 24 frames per second are assumed (--frame-rate sets them)";
     near(seconds(&file, Some(60), None), 2.5, &[guess]);
     near(seconds(&file, Some(60), Some(30.0)), 2.0, &[]);
     let first = "its animations begin at 0.500 s, which is rendered (--frames chooses)";

@@ -402,8 +402,8 @@ fn extensions_that_are_not_known() {
     assert_eq!(
         try_read(&file).unwrap().warnings,
         [
-            "extension \"EXT_not_listed\" is not supported: what it says is ignored",
-            "extension \"EXT_of_tomorrow\" is not supported: what it says is ignored",
+            "extension \"EXT_not_listed\" is not supported and is ignored",
+            "extension \"EXT_of_tomorrow\" is not supported and is ignored",
         ]
     );
 }

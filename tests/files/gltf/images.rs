@@ -130,7 +130,7 @@ fn jpegs_that_are_cut_off() {
     let mut longer = whole.clone();
     longer.extend([0, 1, 2, 3]);
     assert_eq!(warnings(&longer), [""; 0]);
-    let cut = "image \"tiles\": the file of the image is cut off: what is missing of it is grey (copy it again)";
+    let cut = "image \"tiles\": the image file is cut off: the missing part is grey (copy it again)";
     for share in [2, 3] {
         assert_eq!(warnings(&whole[..whole.len() / share]), [cut]);
     }

@@ -57,7 +57,7 @@ fn kinds_of_lights() {
     assert_eq!(
         scene.warnings,
         [
-            "light \"beam\": its range is ignored: light reaches as far as it does",
+            "light \"beam\": its range is ignored: light has no maximum distance",
             "node \"dark\": extras.caustique has no key \"angle\" (did you mean \"angle_deg\"?)",
             "light \"dark\": its intensity is negative; it is taken as zero",
             "light \"dark\": its cone from 0.5 to 0.25 radians is taken as 0.25 to 0.25",
@@ -86,7 +86,7 @@ fn units_of_lights() {
     assert_eq!(guess(&file, LightUnits::Auto), Some((false, "generator \"THREE.GLTFExporter\"".to_string())));
     assert_eq!(
         scene.warnings,
-        ["generator \"THREE.GLTFExporter\" does not tell the unit of lamps: they are taken in W/sr and W/m2 \
+        ["generator \"THREE.GLTFExporter\" does not state the unit of lamps: they are taken in W/sr and W/m2 \
           (--light-units decides)"]
     );
     assert_eq!(intensity(&file, LightUnits::Photometric), 1.0);
@@ -160,7 +160,7 @@ fn clip_planes() {
     let warnings = |camera: Value, at: [f64; 3]| {
         let mut file = Glb::new();
         file.push("cameras", camera);
-        file.node(json!({"name": "CameraPaths", "camera": 0, "translation": at}));
+        file.node(json!({"name": "Front", "camera": 0, "translation": at}));
         let mesh = file.cube("cube", None);
         file.node(json!({"mesh": mesh}));
         read(&file).warnings
@@ -169,12 +169,12 @@ fn clip_planes() {
     let orthographic = json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.5, "zfar": 3}});
     // The near face of the cube is at a depth of 4, the far one at 6.
     let ahead = [0.0, 0.0, 5.0];
-    let near = "camera \"CameraPaths\": what is nearer than its znear of 4.5 m is shown all the same: clip planes are ignored \
-                (hide or remove it)";
+    let near = "camera \"Front\": objects nearer than its znear of 4.5 m are visible: clip planes are ignored (hide or \
+                remove them)";
     let far = |zfar: &str| {
         format!(
-            "camera \"CameraPaths\": what is farther than its zfar of {zfar} m is shown all the same: clip planes are ignored (hide or \
-                 remove it)"
+            "camera \"Front\": objects farther than its zfar of {zfar} m are visible: clip planes are ignored (hide or \
+             remove them)"
         )
     };
     assert_eq!(warnings(perspective(0.1, 100.0), ahead), [""; 0]);

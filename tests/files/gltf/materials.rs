@@ -104,7 +104,7 @@ fn numbers_out_of_range_are_moved_with_a_warning() {
     assert_eq!(
         warnings,
         [
-            "extension \"KHR_materials_iridescence\" is not supported: what it says is ignored",
+            "extension \"KHR_materials_iridescence\" is not supported and is ignored",
             "material \"odd\": metallicFactor is 1.5; 1 is used",
             "material \"odd\": an index of refraction of 0.5 is raised to 1",
             "material \"odd\": clearcoatNormalTexture is ignored",
@@ -217,10 +217,8 @@ fn inner_shells_that_look_outwards_are_turned_over() {
     assert_eq!(right.warnings, [""; 0]);
     assert_eq!(
         turned.warnings,
-        [
-            "mesh \"hollow\", primitive 0: 1 closed shell lies inside another and looked the same way, which would make no \
-             hollow: turned over (flip the normals of one of the two)"
-        ]
+        ["mesh \"hollow\", primitive 0: 1 closed shell lies inside another with the same orientation, which would \
+             make no hollow: flipped (flip the normals of one of the two)"]
     );
     let area = |scene: &Description, t: usize| {
         let mesh = &scene.meshes[0];
@@ -257,8 +255,8 @@ fn inner_shells_of_other_primitives_are_turned_over() {
         };
         (scene.meshes.iter().map(|mesh| volume(mesh) > 0.0).collect::<Vec<_>>(), scene.warnings)
     };
-    let turned = "mesh \"hollow\", primitives 0, 1: 1 closed shell lies inside another and looked the same way, which would make no \
-                  hollow: turned over (flip the normals of one of the two)";
+    let turned = "mesh \"hollow\", primitives 0, 1: 1 closed shell lies inside another with the same orientation, \
+                  which would make no hollow: flipped (flip the normals of one of the two)";
     assert_eq!(volumes(0), (vec![true, false], vec![turned.to_owned()]));
     assert_eq!(volumes(1), (vec![true, true], vec![]));
 }
@@ -297,8 +295,9 @@ fn glass_that_is_inside_out_is_reported() {
     assert_eq!(
         glass_on(turned, Glass::Auto, clear).1,
         [
-            "mesh \"inverted\", primitive 0: its faces look inwards, so the inside of the glass is outside: flip its normals",
-            "mesh \"torn\": its material \"glass\" is solid, but part of its faces is turned over: recalculate its normals",
+            "mesh \"inverted\", primitive 0: its faces point inwards, so the inside of the glass is outside: flip its \
+             normals",
+            "mesh \"torn\": its material \"glass\" is solid, but part of its faces is flipped: recalculate its normals",
         ]
     );
 }

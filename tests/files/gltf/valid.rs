@@ -74,8 +74,7 @@ fn faults_of_animations_do_not_refuse_still_pictures() {
         let mut file = everything();
         *file.json.pointer_mut(pointer).unwrap() = value;
         let warnings = read(&file).warnings;
-        let names_fault =
-            |warning: &String| warning.starts_with(fault) && warning.contains("; what it moves stays as it is (");
+        let names_fault = |warning: &String| warning.starts_with(fault) && warning.contains("; it is ignored (");
         assert!(warnings.iter().any(names_fault), "{fault}: {warnings:?}");
         let frame = Some(FrameTime { number: 12, rate: None, of_sequence: false });
         let options = ReadOptions { frame, ..ReadOptions::default() };

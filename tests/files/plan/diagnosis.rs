@@ -214,7 +214,7 @@ fn glass_that_no_light_reaches() {
     };
     assert_eq!(
         warning(lid(2.0)),
-        "object \"Ball\": no light shines on its glass, so it casts no caustic; what stands in the way is \"Lid\""
+        "object \"Ball\": no light shines on its glass, so it casts no caustic; it is in the shadow of \"Lid\""
     );
     silent(lid(3.5));
     // Glass between them transmits light.
@@ -309,7 +309,7 @@ fn a_dome_shuts_the_environment_out() {
                 or take it away";
     let plan = plan(under(matte(0.5, 0.0), 50.0));
     assert_eq!(plan.warnings, [expected]);
-    assert_eq!(plan.reason_if_black, "what the warnings above name is the likely reason");
+    assert_eq!(plan.reason_if_black, "the warnings above name the likely reason");
     silent(under(glass(1.0), 50.0));
     // A ball beside the camera.
     silent(under(matte(0.5, 0.0), 1.0));
@@ -324,7 +324,7 @@ fn a_limit_of_depth_is_reported() {
     );
     assert_eq!(to(3).warnings, ["--max-depth 3: left out are sds, whose paths have 4 segments or more"]);
     assert_eq!(to(8).warnings, ["--max-depth 8: light of longer paths is left out"]);
-    assert!(to(2).reason_if_black.starts_with("what is left out may be all its light: indirect, caustic"));
+    assert!(to(2).reason_if_black.starts_with("all its light may be in what is left out: indirect, caustic"));
 }
 
 /// Each possible reason for a black picture.
