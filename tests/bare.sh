@@ -109,7 +109,7 @@ lend() {
     cp -L --remove-destination "$1" "$2$1"
 }
 
-# What this machine needs to reach the package registries: names, certificates, proxies, client settings.
+# Files of this machine for access to the package registries: names, certificates, proxies, client settings.
 lend_network() {
     local file
     for file in /etc/resolv.conf /etc/hosts /etc/ssl/certs/ca-certificates.crt "${SSL_CERT_FILE:-}" "${PIP_CERT:-}" \

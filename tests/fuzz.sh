@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fuzzes every reader of files, one after another, on one core at the lowest priority:
-#     tests/fuzz.sh [SECONDS]             so many seconds for each reader (300)
+#     tests/fuzz.sh [SECONDS]             seconds for each reader (300)
 #     READERS='glb exr' tests/fuzz.sh       some of them
 # Installs what is missing: nightly Rust, cargo-fuzz, and what rendering needs. The corpus lies in
 # ~/.cache/caustique-fuzz, and later runs continue with it; a fault ends its reader's turn and is kept there, below

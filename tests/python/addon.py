@@ -1,6 +1,6 @@
-"""The add-on installed in Blender, scenes to render with it, and what Blender writes. Needs bpy.
+"""Installs the add-on in Blender, makes scenes to render with it, and reads the files that Blender writes. Needs bpy.
 
-The zip is installed as a user would install it, into a repository of extensions that is removed afterwards.
+The zip is installed as by a user, into a temporary repository of extensions.
 """
 
 import os
@@ -20,7 +20,7 @@ import package
 
 _REPOSITORY = "caustique_test"
 ADDON = f"bl_ext.{_REPOSITORY}.caustique"
-#: OpenEXR's own library, which Blender's Python does not have.
+#: A script that reads an EXR with OpenEXR's library, which Blender's Python lacks.
 _READER = """
 import sys, numpy, OpenEXR
 found = {}
@@ -31,7 +31,7 @@ numpy.savez(sys.argv[2], **found)
 
 
 def channels(path):
-    """The channels of an EXR file by name, those of all parts together."""
+    """The channels of all parts of an EXR file, {name: pixels}."""
     with tempfile.NamedTemporaryFile(suffix=".npz") as file:
         python = support.ROOT / ".venv" / "bin" / "python"
         subprocess.run([python, "-c", _READER, path, file.name], check=True, timeout=120)
@@ -45,7 +45,8 @@ def part_of_addon(name):
 
 
 class Installed(support.Scratch):
-    """With the add-on installed and a scene whose engine it is: a lit plane and a glass ball seen from above."""
+    """Installs the add-on and makes it the engine of a scene. `stage` adds a lit plane and a glass ball, seen from
+    above."""
 
     def setUp(self):
         super().setUp()
@@ -75,7 +76,7 @@ class Installed(support.Scratch):
             bpy.ops.extensions.package_uninstall(repo_index=index, pkg_id="caustique")
 
     def registered(self):
-        """All that an add-on may leave behind in Blender."""
+        """All classes, properties and handlers that an add-on may leave in Blender."""
         kinds = {name for name in dir(bpy.types)}
         of_data = {kind: set(dir(getattr(bpy.types, kind))) for kind in ("Scene", "ViewLayer", "WindowManager")}
         handlers = {name: list(getattr(bpy.app.handlers, name)) for name in dir(bpy.app.handlers)
@@ -102,7 +103,7 @@ class Installed(support.Scratch):
         return body
 
     def eye(self, height=10, width=4):
-        """An orthographic camera that looks down from `height` (m) on so many metres."""
+        """Add an orthographic camera that looks down from `height` (m) and shows `width` (m)."""
         data = bpy.data.cameras.new("eye")
         data.type, data.ortho_scale = "ORTHO", width
         self.scene.camera = self.put("eye", data, (0, 0, height))
@@ -138,12 +139,13 @@ class Installed(support.Scratch):
         self.eye()
 
     def passes(self, *names):
-        """Switch passes on: Blender's own and the add-on's."""
+        """Enable passes of Blender and of the add-on."""
         for name in names:
             setattr(self.layer if name.startswith("use_pass") else self.layer.caustique, name, True)
 
     def render(self, name="render", animation=False):
-        """Render through the engine; the channels of the file that Blender writes, without the view layer's name."""
+        """Render with the engine. Returns the channels of the file that Blender writes, without the view layer's
+        name."""
         settings = self.scene.render.image_settings
         if hasattr(settings, "media_type"):
             settings.media_type = "MULTI_LAYER_IMAGE"
@@ -160,7 +162,7 @@ class Installed(support.Scratch):
         return {name.split(".", 1)[1]: pixels for name, pixels in channels(path).items()}
 
     def render_and_keep(self):
-        """Render, and keep the exported file for `by_hand`."""
+        """Render and keep the exported file for `by_hand`."""
         run = part_of_addon("run")
 
         def kept(process, command, folder):
@@ -172,7 +174,7 @@ class Installed(support.Scratch):
             return self.render()
 
     def by_hand(self, *arguments):
-        """What the command line makes of the exported file, in the program's own axes."""
+        """Render the exported file with the command line. Returns its channels, in the program's axes."""
         glb, picture = self.dir / "export" / "scene.glb", self.dir / "by-hand.exr"
         support.run(["render", glb, "-o", picture, "--width", self.scene.render.resolution_x, "--height",
                      self.scene.render.resolution_y, "--exr-naming", "blender", "--progress", "none", "--iterations",
@@ -181,5 +183,5 @@ class Installed(support.Scratch):
 
     @staticmethod
     def temporary():
-        """What renders have left in Blender's temporary folder."""
+        """The files that renders left in Blender's temporary folder."""
         return [name for name in os.listdir(bpy.app.tempdir) if name.startswith("caustique-")]

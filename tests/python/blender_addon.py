@@ -1,4 +1,4 @@
-"""Rendering through the add-on's engine, against the command line and against numbers. Needs bpy."""
+"""Compares renders of the add-on's engine with the command line and with closed forms. Needs bpy."""
 
 import math
 import re
@@ -38,7 +38,7 @@ class Renders(Installed):
         self.passes("use_pass_z", "use_pass_position", "use_pass_normal")
         self.settings.method, self.settings.finish = "path", "off"
         found = self.render()
-        # The plane rises towards +y, and the sun stands straight above: pi W/m2 times the cosine, half of it reflected.
+        # The plane rises towards +y, and the sun is in the zenith: pi W/m2 times the cosine, reflectance 1/2.
         x, y = (numpy.arange(32) + 0.5) / 8 - 2, (11.5 - numpy.arange(24)) / 8
         numpy.testing.assert_allclose(found["Combined.G"], 0.5 * 0.8, rtol=1e-3)
         numpy.testing.assert_allclose(found["Combined.A"], 1, rtol=1e-5)
@@ -50,7 +50,7 @@ class Renders(Installed):
             numpy.testing.assert_allclose(found[f"Normal.{axis}"], value, atol=1e-4)
 
     def test_light_groups_are_passes(self):
-        """Each group's light has its colour; the finished groups make the picture."""
+        """Each group's light has its colour, and the finished groups sum to the picture."""
         self.plane()
         self.eye()
         for colour, group in (((1, 0, 0), "key"), ((0, 1, 0), "rim light")):
@@ -85,9 +85,9 @@ class Renders(Installed):
             self.assertEqual((columns[0], columns[-1]), ((at + 2) * 8, (at + 2.5) * 8 - 1))
 
     def test_files_beside_the_scene_are_found(self):
-        """An image and a library, both with relative paths, of a scene with changes that are not saved."""
+        """A modified, unsaved scene with an image and a library, both with relative paths."""
         picture = bpy.data.images.new("paint", 4, 4)
-        picture.generated_color = (1, 1, 0, 1)  # what is not found is magenta
+        picture.generated_color = (1, 1, 0, 1)  # a missing image is magenta
         picture.filepath_raw, picture.file_format = str(self.dir / "paint.png"), "PNG"
         picture.save()
         tile = bpy.data.meshes.new("tile")
@@ -113,7 +113,7 @@ class Renders(Installed):
         self.settings.method, self.settings.finish = "path", "off"
         found = self.render()
         self.assertAlmostEqual(float(found["Depth.Z"][12, 16]), 7, 4)
-        # pi W/m2 on a Lambertian surface: its reflectance.
+        # pi W/m2 on a Lambertian surface gives a radiance equal to its reflectance.
         for channel, value in zip("RGB", (1, 1, 0)):
             self.assertAlmostEqual(float(found[f"Combined.{channel}"][12, 16]), value, 4)
 
@@ -151,9 +151,9 @@ class Renders(Installed):
         self.assertNotEqual(found["Combined.G"].tobytes(), other["Combined.G"].tobytes())
 
     def composite(self, output):
-        """Render, and let the compositor show `output(tree, layers)`: a socket, made from the Render Layers node.
+        """Render with a compositor that shows the socket `output(tree, layers)`; `layers` is the Render Layers node.
 
-        Returns the green of what it shows, and the passes.
+        Returns the green channel of the result, and the passes.
         """
         if bpy.app.version >= (5, 0, 0):
             tree = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
@@ -192,7 +192,7 @@ class Renders(Installed):
             return node.outputs["Matte"]
 
         shown, found = self.composite(matte)
-        ball = found["Depth.Z"] < 9.9  # of one sample a pixel, at the first hit, which is the ball's or the table's
+        ball = found["Depth.Z"] < 9.9  # depth has one sample per pixel, on the ball or on the table
         self.assertTrue((shown[ball] > 0).all())
         self.assertAlmostEqual(float(shown.sum()), math.pi * (0.7 * 8) ** 2, delta=3)
 
@@ -206,7 +206,7 @@ class Renders(Installed):
             shown.append({name: plane.copy() for name, plane in picture.channels.items()})
             show(self, picture, *where)
 
-        # The finished picture is withheld, so what Blender has is the last one before it.
+        # The finished picture is not delivered, so Blender shows the last picture before it.
         with mock.patch.multiple(engine.Engine, _show=watched, _deliver=lambda *_: None):
             found = self.render_and_keep()
         for channel in "RGBA":
@@ -226,7 +226,7 @@ class Stops(Installed):
         self.settings.iterations = 100_000
 
     def stop_when(self, condition):
-        """Render until `condition(run)` holds, then as if the user had pressed Esc; seconds from then to the end."""
+        """Render until `condition(run)` holds, then press Esc. Returns the seconds from then to the end."""
         engine, runs, pressed = part_of_addon("engine"), [], []
         begin = part_of_addon("run").Run
 

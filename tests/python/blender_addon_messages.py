@@ -1,4 +1,4 @@
-"""What the add-on says: faults with their remedy, warnings, and the diagnosis. Needs bpy."""
+"""Tests the add-on's messages: faults with their remedy, warnings, and the diagnosis. Needs bpy."""
 
 import json
 import os
@@ -16,10 +16,10 @@ from addon import Installed, part_of_addon
 
 
 class Messages(Installed):
-    """What goes wrong, and what is left aside, is said where the user looks."""
+    """The interface shows faults, and warnings of ignored settings."""
 
     def fault(self):
-        """The error that a render ends with, as Blender shows it."""
+        """Render, and return the error that Blender shows."""
         with self.assertRaises(RuntimeError) as raised:
             self.render()
         self.assertFalse((self.dir / "render.exr").exists())
@@ -29,7 +29,7 @@ class Messages(Installed):
         return part_of_addon("session").warnings.get(self.scene.name, [])
 
     def program(self, text):
-        """A stand-in for the program: a shell script."""
+        """Replace the program by a shell script with this text."""
         path = self.dir / "stand-in"
         path.write_text(f"#!/bin/sh\n{text}\n")
         path.chmod(0o755)
@@ -38,9 +38,9 @@ class Messages(Installed):
     def test_a_program_that_is_not_there(self):
         self.stage()
         self.preferences.program = str(self.dir / "nowhere")
-        told = self.fault()
-        self.assertIn("nowhere is not a program", told)
-        self.assertIn("Remedy: clone the repository", told)
+        message = self.fault()
+        self.assertIn("nowhere is not a program", message)
+        self.assertIn("Remedy: clone the repository", message)
         self.assertIn("nowhere", part_of_addon("session").faults[self.scene.name].what)
 
     def test_a_program_that_is_not_on_the_path(self):
@@ -66,16 +66,16 @@ class Messages(Installed):
         self.program('[ "$1" = --version ] && echo caustique 9.9.9 && exit; [ "$2" = --help ] && exit; kill -9 $$')
         self.assertIn("caustique ended by signal 9", self.fault())
 
-    def test_what_the_program_says_and_its_remedy(self):
+    def test_errors_of_the_program_are_shown_with_their_remedy(self):
         self.stage()
         self.settings.arguments = "--layers Nope"
-        told = self.fault()
-        self.assertIn('--layers: no layer "Nope" Remedy: there are beauty,', told)
+        message = self.fault()
+        self.assertIn('--layers: no layer "Nope" Remedy: there are beauty,', message)
         self.settings.arguments = "--seed 'open"
         self.assertIn("close every quotation mark", self.fault())
 
     def test_arguments_of_a_file_name_no_files(self):
-        """A .blend may come from anybody: its arguments choose the picture and touch no other file."""
+        """A .blend may come from an untrusted source, so its arguments must not name files."""
         additional, fault = part_of_addon("command").additional, part_of_addon("fault").Fault
         for text in ("--checkpoint /tmp/x", "--checkpoint=x", "-o x", "-ox", "--output x", "--png x", "--preview x",
                      "--resume x", "--env x", "--allow-outside", "--model x", "--max-depth 8 --debug-techniques x",
@@ -99,7 +99,7 @@ class Messages(Installed):
         self.assertEqual(named - part_of_addon("command").OPTIONS, set())
 
     def test_scripts_run_where_the_preferences_allow_them(self):
-        """A driver in a view layer that is not shown never says that it was kept from running."""
+        """Blender does not report a blocked driver in a hidden view layer."""
         hidden = bpy.data.collections.new("hidden")
         self.scene.collection.children.link(hidden)
         self.layer.name = "B"
@@ -146,9 +146,9 @@ class Messages(Installed):
         support.run(["render", support.scene("cornell"), "-o", picture, "--width", 8, "--iterations", 1,
                      "--compression", "none", "--progress", "none"], check=0)
         whole = picture.read_bytes()
-        for data, told in ((whole[:-1], "is not complete"), (b"P6 8 8 255\n" + bytes(192), "is not an EXR file")):
+        for data, message in ((whole[:-1], "is not complete"), (b"P6 8 8 255\n" + bytes(192), "is not an EXR file")):
             picture.write_bytes(data)
-            with self.assertRaisesRegex(part_of_addon("fault").Fault, told):
+            with self.assertRaisesRegex(part_of_addon("fault").Fault, message):
                 part_of_addon("exr").Picture(str(picture))
 
     def test_an_animation_ends_at_the_first_fault(self):
@@ -169,11 +169,11 @@ class Messages(Installed):
             bpy.ops.caustique.diagnose()
         self.assertEqual(self.temporary(), [])
 
-    def test_what_nobody_has_foreseen(self):
+    def test_unexpected_errors_are_shown(self):
         self.stage()
         with mock.patch.object(part_of_addon("program"), "find", lambda _: 1 / 0):
-            told = self.fault()
-        self.assertIn("the add-on has failed: ZeroDivisionError: division by zero Remedy: report it", told)
+            message = self.fault()
+        self.assertIn("the add-on has failed: ZeroDivisionError: division by zero Remedy: report it", message)
 
     def test_libraries_that_are_missing(self):
         with mock.patch.dict(os.environ, CAUSTIQUE_OIDN="/nowhere/libOpenImageDenoise.so"):
@@ -190,7 +190,7 @@ class Messages(Installed):
         self.render()
         self.assertTrue([line for line in self.said() if "left out, though called for" in line], self.said())
 
-    def test_settings_of_blender_that_are_left_aside(self):
+    def test_ignored_settings_of_blender_are_named(self):
         ignored_settings, render = part_of_addon("ignored_settings"), self.scene.render
         self.assertEqual(ignored_settings.warnings(self.scene), [])
         for name in ("use_motion_blur", "use_multiview", "use_freestyle"):

@@ -1,4 +1,4 @@
-"""The add-on as a package: what Blender thinks of it, where it shows, and that nothing stays of it. Needs bpy."""
+"""Tests the add-on's package: it is valid, its panels show, and uninstalling leaves nothing. Needs bpy."""
 
 import os
 import re

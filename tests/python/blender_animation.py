@@ -1,11 +1,11 @@
-"""Animations that Blender's own exporter writes, against what scripts/blender/export.py writes for a frame alone."""
+"""Compares animations of Blender's own exporter with single frames of scripts/blender/export.py."""
 
 import json
 import math
 import os
 import unittest
 
-import cycles_comparison  # first: it finds the scripts
+import cycles_comparison  # first: it sets the search path
 import bpy
 import export
 import support
@@ -13,7 +13,7 @@ from cycles_comparison import eye, lamp, shared, square
 
 
 def matt(name, *color):
-    """A material that both exporters write alike."""
+    """A material that both exporters write equally."""
     return shared.node_material(name, "ShaderNodeBsdfPrincipled", Base_Color=(*color, 1), Roughness=1, Specular_IOR_Level=0)
 
 
@@ -49,7 +49,7 @@ class Animation(cycles_comparison.CyclesComparison):
         self.keyed(lamp("POINT", (0, 0, 3), 100, shadow_soft_size=0), "location", (0, 0, 3), (2, 0, 3))
 
     def rigged(self):
-        """A strip whose upper half a bone bends."""
+        """A strip with a bone that bends its upper half."""
         bones = bpy.data.armatures.new("rig")
         rig = self.put("rig", bones)
         rig.location = (-2.5, 0, 0)
@@ -74,14 +74,14 @@ class Animation(cycles_comparison.CyclesComparison):
         self.keyed(bone, "rotation_euler", (0, 0, 0), (0, 0, 1.2))
 
     def picture(self, scene, frame, name, *options):
-        """What is seen of a frame, one ray a pixel; returns what the program says."""
+        """Render a frame with one ray per pixel. Returns the program's output."""
         self.out[name] = os.path.join(self.folder, name + ".exr")
         done = support.run(["render", scene, "--frames", frame, "-o", self.out[name], "--method", "path", "--iterations", 1,
                             "--no-combine", "--width", 48, "--height", 48, *options], check=0)
         return done.stderr
 
     def differ(self, layer):
-        """The largest root mean square of what differs in a layer of both pictures."""
+        """The largest root-mean-square difference of a layer's channels between both pictures."""
         said = support.run(["compare", self.out["played"], self.out["alone"], "--layer", layer, "--json"], check=0)
         return math.sqrt(json.loads(said.stdout)["mse"])
 
@@ -98,7 +98,7 @@ class Animation(cycles_comparison.CyclesComparison):
             self.picture(alone, frame, "alone")
             for layer in ("P", "normal", "Direct"):
                 self.assertLess(self.differ(layer), 1e-5, f"{layer} of frame {frame}")
-        # A moment that is off by a frame shows.
+        # The test detects a time that is off by one frame.
         self.picture(alone, 11, "alone")
         for layer in ("P", "normal", "Direct"):
             self.assertGreater(self.differ(layer), 1e-3, layer)

@@ -1,4 +1,4 @@
-"""Materials that glTF has no words for: what is baked against closed forms, what mixes become, and that nothing stays behind."""
+"""Tests materials that glTF cannot express: baked images against closed forms, mixed shaders, and clean-up."""
 
 import math
 import os
@@ -34,13 +34,13 @@ class Case(unittest.TestCase):
         self.stage.body.rotation_euler = (0, 0, 0)
 
     def write(self, size=SIZE):
-        """Export; the material "tested", and the warnings."""
+        """Export. Returns the material "tested", and the warnings."""
         warnings = export.write(self.path, bake_size=size)
         self.document, self.buffer = glb.read(self.path)
         return next(m for m in self.document["materials"] if m["name"] == "tested"), warnings
 
     def texels(self, info):
-        """The stored numbers of a textureInfo's image, 0 to 1, first row at the top."""
+        """The stored values of a textureInfo's image, 0 to 1, top row first."""
         image = self.document["images"][self.document["textures"][info["index"]]["source"]]
         view = self.document["bufferViews"][image["bufferView"]]
         path = os.path.join(self.folder.name, "image.png")
@@ -55,7 +55,7 @@ class Case(unittest.TestCase):
         return values.reshape(shape)[::-1]
 
     def points(self):
-        """Of the body's vertices in the file: positions (count, 3) in Blender's axes, and the UV set that is baked to."""
+        """Positions (count, 3) of the body's exported vertices in Blender's axes, and the baked UV set."""
         node = next(n for n in self.document["nodes"] if n["name"] == "body")
         attributes = self.document["meshes"][node["mesh"]]["primitives"][0]["attributes"]
 
@@ -68,7 +68,7 @@ class Case(unittest.TestCase):
         return numpy.stack([places[:, 0], -places[:, 2], places[:, 1]], 1), read("TEXCOORD_1", 2)
 
     def look_up(self, info):
-        """The stored texels at the body's inner vertices, with their positions."""
+        """The stored texels at the body's inner vertices, and the vertices' positions."""
         places, uv = self.points()
         texels = self.texels(info)
         inner = numpy.abs(places[:, :2]).max(1) < 0.9
@@ -85,11 +85,11 @@ def linear(x):
 
 class Baked(Case):
     def across(self, axis=0):
-        """A number that grows from 0 to 1 along an axis of the plane."""
+        """A node output that increases from 0 to 1 along an axis of the plane."""
         split = self.stage.node("SeparateXYZ", self.stage.node("TexCoord").outputs["Object"])
         return self.stage.node("MapRange", split.outputs[axis], -1.0, 1.0, 0.0, 1.0).outputs[0]
 
-    def test_colour_is_that_of_the_place(self):
+    def test_a_baked_colour_is_that_of_the_position(self):
         self.stage.principled(Base_Color=self.stage.node("CombineXYZ", self.across(0), self.across(1), 0.25))
         entry, warnings = self.write()
         self.assertEqual(warnings, ['material "tested": Base Color is baked to images of 64 x 64 texels'])
@@ -107,7 +107,7 @@ class Baked(Case):
         numpy.testing.assert_allclose(found[:, 2], (places[:, 1] + 1) / 2, atol=0.015)
         self.assertNotIn("KHR_materials_transmission", entry.get("extensions", {}))
 
-    def test_what_is_the_same_everywhere_becomes_a_factor(self):
+    def test_a_constant_value_becomes_a_factor(self):
         checker = self.stage.node("TexChecker", Color1=(0.3, 0.2, 0.1), Color2=(0.3, 0.2, 0.1))
         self.stage.principled(Base_Color=checker.outputs["Color"])
         entry, _ = self.write()
@@ -133,7 +133,7 @@ class Baked(Case):
         numpy.testing.assert_allclose(linear(found[:, :2]) * strength, expected, atol=0.6)
 
     def test_bump_becomes_the_normals_of_its_slope(self):
-        """Heights that rise by 0.3 a metre lean all normals alike; the height image is not in the file."""
+        """A constant slope of 0.3 tilts all normals equally. The file does not contain the height image."""
         heights = self.stage.node("Math", self.across(0), 0.6, operation="MULTIPLY")
         self.stage.principled(Normal=self.stage.node("Bump", Strength=1.0, Distance=1.0, Height=heights))
         entry, _ = self.write()
@@ -152,7 +152,7 @@ class Baked(Case):
         self.assertGreater(reach, 1.4)
         numpy.testing.assert_allclose(linear(found[:, 0]), places[:, 0] / (2 * reach) + 0.5, atol=0.015)
 
-    def test_objects_that_share_a_mesh_share_an_image_unless_their_material_asks_which(self):
+    def test_objects_that_share_a_mesh_share_an_image_unless_their_material_depends_on_the_object(self):
         self.stage.principled(Base_Color=self.across(0))
         twin = self.stage.place("twin", self.stage.body.data, (3, 0, 1))
         self.write()
@@ -212,7 +212,7 @@ class Baked(Case):
         self.assertIn("baseColorTexture", entry["pbrMetallicRoughness"])
         self.assertEqual(state(), before)
 
-    def test_each_loss_is_named_where_nothing_may_be_baked(self):
+    def test_without_baking_each_loss_is_named(self):
         noise = self.stage.node("TexNoise")
         self.stage.principled(Base_Color=noise.outputs["Color"], Roughness=noise.outputs[0],
                               Normal=self.stage.node("Bump", Height=noise.outputs[0]))
@@ -233,7 +233,7 @@ class Baked(Case):
         self.assertIn("baseColorTexture", entry["pbrMetallicRoughness"])
         self.assertEqual(len(self.document["images"]), 1)
 
-    def test_what_is_linked_from_another_file_is_baked(self):
+    def test_objects_linked_from_another_file_are_baked(self):
         self.stage.principled(Base_Color=self.across(0), Roughness=0.25)
         library = os.path.join(self.folder.name, "library.blend")
         bpy.data.libraries.write(library, {self.stage.body})
@@ -273,8 +273,8 @@ class Matched(Case):
         self.assertAlmostEqual(entry["pbrMetallicRoughness"]["roughnessFactor"], 0.3, 5)
         numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.4, 0.3, 0.2, 1), rtol=1e-5)
 
-    def test_gloss_over_matt_keeps_the_light_of_both(self):
-        """Matt 0.7 x 0.5 below facets that reflect 0.3 x 0.8 and keep 1 - 0.24 of what is below."""
+    def test_gloss_over_diffuse_keeps_the_light_of_both(self):
+        """A diffuse base of 0.7 x 0.5 below facets that reflect 0.3 x 0.8 and pass 1 - 0.24 of the base."""
         self.stage.mix(0.3, self.stage.node("BsdfDiffuse", Color=(0.5, 0.5, 0.5)),
                        self.stage.node("BsdfGlossy", Color=(0.8, 0.8, 0.8), Roughness=0.2))
         entry, warnings = self.write()
@@ -283,7 +283,7 @@ class Matched(Case):
         base = entry["pbrMetallicRoughness"]["baseColorFactor"][0]
         self.assertAlmostEqual(base * (1 - 0.24), 0.35, 5)
 
-    def test_a_film_tints_and_shines(self):
+    def test_a_film_tints_and_emits(self):
         self.stage.mix(0.4, self.stage.node("BsdfTransparent", Color=(0.5, 1, 1)),
                        self.stage.node("Emission", Color=(1, 0.5, 0.25), Strength=2.0))
         entry, warnings = self.write()
@@ -293,7 +293,7 @@ class Matched(Case):
         numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.3, 0.6, 0.6, 1), rtol=1e-5)
         numpy.testing.assert_allclose(entry["emissiveFactor"], (0.8, 0.4, 0.2), rtol=1e-5)
 
-    def test_groups_reroutes_and_muted_nodes_are_walked_through(self):
+    def test_groups_reroutes_and_muted_nodes_are_followed(self):
         stage = self.stage
 
         def build(tree, inputs):
@@ -330,7 +330,7 @@ class Matched(Case):
         """Duntley's closed form for diffuse light from outside at an index of 1.5: 9.18 %."""
         self.assertAlmostEqual(closures.mean_reflectance(1.5), 0.0918, 4)
 
-    def test_what_cannot_be_carried_is_named(self):
+    def test_losses_are_named(self):
         losses = {
             "Coat Tint": dict(Coat_Weight=1.0, Coat_Tint=(1, 0.5, 0.5)), "sheen": dict(Sheen_Weight=1.0),
             "Diffuse Roughness": dict(Diffuse_Roughness=0.5), "Subsurface Weight": dict(Subsurface_Weight=0.5),

@@ -1,4 +1,4 @@
-"""The compositor's file: the picture from its parts, and its caustics by two controls, rendered by Blender. Needs bpy."""
+"""Tests the compositor's file in Blender: the sum of the parts, and the two controls of the caustics. Needs bpy."""
 
 import unittest
 
@@ -20,7 +20,7 @@ class Compositor(support.Scratch):
         return path
 
     def shown(self, scene, factor, tint):
-        """What the compositor shows with these settings of its node, as channels."""
+        """The channels of the compositor's result with these inputs of its node."""
         tree = scene.compositing_node_group if bpy.app.version >= (5, 0, 0) else scene.node_tree
         inputs = tree.nodes["Caustics"].inputs
         inputs[compositor.FACTOR].default_value = factor

@@ -1,4 +1,4 @@
-"""scripts/blender/export.py against Cycles and against numbers: what the glTF exporter drops must arrive. Needs bpy."""
+"""Tests features that export.py adds to Blender's glTF exporter, against Cycles and closed forms. Needs bpy."""
 
 import math
 import os
@@ -23,7 +23,8 @@ ROOT = str(support.ROOT)
 
 
 def node_material(name, *shaders, mix=None, volume=None, **values):
-    """A material whose surface is one shader node, or a mix or sum of two; `values` set inputs of all that have them."""
+    """A material with one shader node, or a mix or sum of two. `values`: input values of all nodes with such an
+    input."""
     material = bpy.data.materials.new(name)
     if bpy.app.version < (5, 0, 0):
         material.use_nodes = True
@@ -115,7 +116,7 @@ class Export(unittest.TestCase):
         numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.9, 0.8, 0.7, 1), rtol=1e-5)
 
     def test_normal_maps_on_uneven_scales_are_named(self):
-        """Cycles reads a normal map in the object's own space, and stretches it with the object."""
+        """Cycles reads a normal map in object space, and stretches it with the object."""
         for mapped, scale, named in ((True, (1, 1, 0.2), True), (True, (-2, 2, 2), False), (False, (3, 1, 1), False)):
             with self.subTest(mapped=mapped, scale=scale):
                 bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -150,7 +151,7 @@ class Export(unittest.TestCase):
         self.assertAlmostEqual(entry["extensions"]["KHR_materials_ior"]["ior"], 1.33, 5)
         self.assertIn("KHR_materials_volume", entry["extensions"])
 
-    def test_open_glass_stays_thin_and_says_so(self):
+    def test_open_glass_stays_thin_with_a_warning(self):
         entry, warnings = self.material(node_material("pane", "ShaderNodeBsdfGlass"), sides=5)
         self.assertNotIn("KHR_materials_volume", entry["extensions"])
         self.assertEqual(warnings, ['material "pane": transmissive, but on a mesh that is not closed: it stays a thin sheet that bends no light'])
@@ -234,14 +235,14 @@ class Export(unittest.TestCase):
             said = document["scenes"][0]["extras"]["caustique"]
             self.assertEqual((said["frame"], said["frame_rate"]), (fps, expected))
 
-    def test_closed_meshes_are_told(self):
+    def test_closed_and_open_meshes_are_distinguished(self):
         def mesh(corners, faces):
             made = bpy.data.meshes.new("tested")
             made.from_pydata(corners, [], faces)
             return made
         whole = cube(node_material("m")).data
         corners, faces = [tuple(v.co) for v in whole.vertices], [tuple(p.vertices) for p in whole.polygons]
-        # The same with vertices of its own for every face, a zero with a sign among them.
+        # Separate vertices for every face, with a negative zero among the coordinates.
         apart = mesh([tuple(-0.0 if c == 0 and i % 2 else c for c in corners[v]) for i, f in enumerate(faces) for v in f],
                      [tuple(range(4 * i, 4 * i + 4)) for i in range(6)])
         twice = mesh(corners, faces + faces[:1])
@@ -347,7 +348,7 @@ class Export(unittest.TestCase):
             tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
 
     def gradient(self, turn_deg=0):
-        """A smooth lat-long image f(u + turn) that differs everywhere: 64 x 32, first row at the bottom."""
+        """A smooth lat-long image f(u + turn) without repetition: 64 x 32, bottom row first."""
         v, u = (numpy.mgrid[0:32, 0:64] + 0.5) / [[[32]], [[64]]]
         u = 2 * math.pi * (u + turn_deg / 360)
         return numpy.stack([1 + 0.5 * numpy.cos(u), 1 + 0.5 * numpy.sin(u), 0.2 + v, 1 + 0 * v], -1).astype(numpy.float32)
@@ -365,7 +366,7 @@ class Export(unittest.TestCase):
             said = document["scenes"][0]["extras"]["caustique"]["environment"]
             self.assertEqual((said["file"], said["strength"]), ("scene.environment.exr", 2))
             numpy.testing.assert_allclose(pixels(os.path.join(self.folder.name, said["file"])), self.gradient()[..., :3], atol=1e-3)
-            # What Cycles sees around it, in the layout of the interface: the image turned by rotation_deg about +Y.
+            # The environment of Cycles in the layout of the .glb: the image rotated by rotation_deg about +Y.
             sky.bake_world(bpy.context.scene, self.path, 64)
             seen = pixels(os.path.join(self.folder.name, "scene.environment.exr")) / 2
             numpy.testing.assert_allclose(seen[1:-1], self.gradient(said["rotation_deg"])[1:-1, :, :3], atol=0.03, err_msg=f"{kind} {degrees}")

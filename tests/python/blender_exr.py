@@ -1,4 +1,4 @@
-"""Blender reads what caustique writes: every layer as a pass of the right name, in both naming styles."""
+"""Blender reads the EXRs of caustique: every layer is a pass of the right name, in both naming styles."""
 
 import unittest
 
@@ -10,7 +10,7 @@ LAYERS = ["Combined", "Depth", "Noisy", "Level1", "Level5", "Variance1", "Radius
 
 
 def passes(path):
-    """Names of the passes that Blender's compositor offers for an image."""
+    """Names of the passes in Blender's compositor for an image."""
     if bpy.app.version >= (5, 0, 0):
         tree = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
     else:

@@ -1,8 +1,8 @@
-"""Which geometry the exporter writes, and where: what a render shows. Beside Cycles."""
+"""The exporter writes the geometry that a render shows, compared with Cycles."""
 
 import unittest
 
-import cycles_comparison  # first: it finds the scripts
+import cycles_comparison  # first: it sets the search path
 import bpy
 import export
 import glb
@@ -26,12 +26,12 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.scene.render.resolution_x = self.scene.render.resolution_y = 64
         eye((size / 2 - 0.5, size / 2 - 0.5, 5), (size / 2 - 0.5, size / 2 - 0.5, 0), type="ORTHO", ortho_scale=size)
 
-    def test_what_renders_show(self):
-        """Visibility in renders, not in the viewport, of objects, parents, collections and modifiers."""
+    def test_objects_visible_in_renders_are_exported(self):
+        """Visibility of objects, parents, collections and modifiers is that of renders, not of the viewport."""
         hidden = bpy.data.objects.new("parent", None)
         self.scene.collection.objects.link(hidden)
         hidden.location, hidden.hide_viewport = (1, 0, 0), True
-        self.put("child of what is hidden", 0, 0, (1, 0, 0)).parent = hidden
+        self.put("child of a hidden object", 0, 0, (1, 0, 0)).parent = hidden
         self.put("hidden in the viewport", 2, 0, (0, 1, 0)).hide_viewport = True
         self.put("hidden by its eye", 3, 0, (0, 0, 1)).hide_set(True)
         self.put("hidden in renders", 4, 0, (1, 1, 1)).hide_render = True
@@ -52,7 +52,8 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.assertTrue(hidden.hide_viewport and layers["its eye closed"].hide_viewport and not array.show_viewport)
 
     def test_instances(self):
-        """Of collections, vertices, faces and geometry nodes, nested and mirrored, each in its place."""
+        """Instances of collections, vertices, faces and geometry nodes, nested and mirrored, are in the right
+        places."""
         inner = self.collection("inner", parent=False)
         self.put("red", 0.1, 0, (1, 0, 0), collection=inner)
         for x, scale in ((0, 1), (1.5, -0.5)):
@@ -78,7 +79,7 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.assertEqual({node["name"] for node in document["nodes"]}, {"red", "plant", "by nodes", "raw", "eye"})
 
     def test_particles(self):
-        """Objects on particles, as many as renders show; paths of hair are named."""
+        """Particles have objects in the number of renders. Hair paths are a named loss."""
         mesh = square(glow("ground", (0.3, 0, 0)), 2)
         ground = self.put("ground", 2, 2, (0, 0, 0), mesh)
         leaf = self.put("leaf", 20, 20, (0, 1, 0))
@@ -96,8 +97,8 @@ class Geometry(cycles_comparison.CyclesComparison):
 
     def instance_on_points(self, body, thing, material):
         tree = bpy.data.node_groups.new("instances", "GeometryNodeTree")
-        for way in ("INPUT", "OUTPUT"):
-            tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+        for direction in ("INPUT", "OUTPUT"):
+            tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
         nodes = {kind: tree.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput",
                                                          "GeometryNodeInstanceOnPoints")}
         on_points = nodes["GeometryNodeInstanceOnPoints"]
@@ -116,7 +117,7 @@ class Geometry(cycles_comparison.CyclesComparison):
         body.modifiers.new("nodes", "NODES").node_group = tree
 
     def test_the_current_frame(self):
-        """Moving objects, materials, shape keys, cameras and armatures as they are at frame 10; sheared ones, too."""
+        """Animated objects, materials, shape keys, cameras and armatures at frame 10, also sheared ones."""
         moving = self.put("moving", 0, 0, (1, 0, 0))
         for frame, x in ((1, 0), (20, 4)):
             moving.location.x = x
@@ -147,7 +148,7 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.assertEqual(self.scene.frame_current, 10)
 
     def test_curves_and_text(self):
-        """Curves and text at the resolution of renders, with the materials of their objects."""
+        """Curves and text have the resolution of renders, and the materials of their objects."""
         for x, kind in ((0, "FONT"), (2, "CURVE")):
             curve = bpy.data.curves.new(kind, kind)
             if kind == "FONT":
@@ -170,7 +171,7 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.silhouettes_agree(self.caustique(16), self.cycles(16))
 
     def test_losses_are_named(self):
-        """Hair, holdouts, light linking, and what nodes do in the viewport alone."""
+        """Hair, holdouts, light linking, and nodes that act only in the viewport."""
         hair = bpy.data.hair_curves.new("hair")
         hair.add_curves([4])
         self.put("hair", 0, 0, None, hair)

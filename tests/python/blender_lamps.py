@@ -1,9 +1,9 @@
-"""Lamps and skies as the exporter carries them. Beside Cycles."""
+"""Exported lamps and skies, compared with Cycles."""
 
 import math
 import unittest
 
-import cycles_comparison  # first: it finds the scripts
+import cycles_comparison  # first: it sets the search path
 import bpy
 import export
 import glb
@@ -12,7 +12,8 @@ from cycles_comparison import eye, glow, lamp, shared, square
 
 class Lamps(cycles_comparison.CyclesComparison):
     def test_area_lamps_hide_and_let_light_through(self):
-        """A camera above an area lamp sees the floor below, which a sky lights past the lamp; and so does one below."""
+        """A camera above an area lamp sees the floor below it, which a sky lights through the lamp; so does one
+        below."""
         self.floor()
         lamp("AREA", (0, 0, 1), 20, size=2.0)
         world = bpy.data.worlds.new("world")
@@ -28,7 +29,7 @@ class Lamps(cycles_comparison.CyclesComparison):
             self.assertEqual(self.warnings, [])
 
     def test_light_groups(self):
-        """Lamps of all kinds, glowing meshes, their instances and the world say their group, if the view layer has it."""
+        """Lamps, emissive meshes, their instances and the world have their light group, if the view layer has it."""
         self.floor()
         eye((0, -2.5, 2.5), (0, 0, 0), lens=35)
         for name in ("key", "Sky light"):
@@ -52,7 +53,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         self.assertEqual(environment["light_group"], "Sky light")
 
     def test_mirrored_lamps_and_cameras(self):
-        """By a parent, by their own scale, by the instance of a collection: lamps shine and cameras look as in Cycles."""
+        """Lamps and cameras mirrored by a parent, their scale or a collection instance point as in Cycles."""
         self.floor(4)
         rig = shared.place("rig", None)
         rig.scale = (-1, 1, 1)
@@ -61,7 +62,7 @@ class Lamps(cycles_comparison.CyclesComparison):
             for column, scale in enumerate(((1, 1, 1), (-1, 1, 1), (1, 1, -1), (-1, -1, -1))):
                 body = lamp(kind, (2 * column - 3, 1.5 * row, 1), 30, **({"shape": "RECTANGLE", "size": 0.4, "size_y": 0.2} if kind == "AREA" else
                                              {"spot_size": 1.0, "shadow_soft_size": 0.1, "use_soft_falloff": False}))
-                # What its own scale turns upwards is turned down again.
+                # Rotate the lamp down again if its scale points it upwards.
                 body.scale, body.rotation_euler = scale, (0.3 + (math.pi if scale[2] < 0 else 0), 0.2, 0.5)
         parented = lamp("AREA", (1.0, -1.5, 1.5), 40, size=0.5)
         parented.parent, parented.rotation_euler = rig, tilted
@@ -148,7 +149,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         self.assertAlmostEqual(node["extras"]["caustique"]["angle_deg"], 2, 4)
 
     def test_a_world_hidden_from_cameras(self):
-        """It lights the floor, and black is seen in its place; what else is hidden from it is named."""
+        """The world lights the floor, and cameras see black. Other hidden rays are named losses."""
         self.floor(1.0)
         world = bpy.data.worlds.new("world")
         if bpy.app.version < (5, 0, 0):

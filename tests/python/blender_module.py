@@ -1,4 +1,4 @@
-"""Blender's Python module works here: it starts without a display, exports glTF and renders with Cycles."""
+"""Blender's Python module starts without a display, exports glTF and renders with Cycles."""
 
 import json
 import struct

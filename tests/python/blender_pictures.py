@@ -1,11 +1,11 @@
-"""Cameras, pictures, what is hidden from cameras, frames, and losses that travel. Beside Cycles."""
+"""Exported cameras, picture settings, objects hidden from cameras, frames and losses, compared with Cycles."""
 
 import contextlib
 import io
 import os
 import unittest
 
-import cycles_comparison  # first: it finds the scripts
+import cycles_comparison  # first: it sets the search path
 import bpy
 import export
 import glb
@@ -16,7 +16,7 @@ from cycles_comparison import eye, glow, lamp, shared, square
 
 class Pictures(cycles_comparison.CyclesComparison):
     def test_shift_and_size(self):
-        """Lens shift of wide and tall, perspective and orthographic pictures, at the size of the scene."""
+        """Lens shift of wide and tall, perspective and orthographic pictures, at the scene's resolution."""
         for x in range(-3, 4):
             for y in range(-3, 4):
                 body = shared.place("tile", square(glow("tile", (0.5 + x / 8, 0.5 + y / 8, 0.5)), 0.4), (x, y, 0))
@@ -29,7 +29,7 @@ class Pictures(cycles_comparison.CyclesComparison):
             self.assertEqual(ours.shape, (height // 2, width // 2, 3))
             self.silhouettes_agree(ours, theirs)
 
-    def test_the_picture_is_told(self):
+    def test_picture_settings_are_exported(self):
         self.floor()
         eye((0, -3, 3), (0, 0, 0), clip_start=1.0, clip_end=4.0)
         scene = self.scene
@@ -45,8 +45,8 @@ class Pictures(cycles_comparison.CyclesComparison):
         self.assertNotIn("clip start", warnings)
         self.assertIn("film exposure of 4", warnings)
 
-    def test_losses_travel(self):
-        """What the exporter names is repeated by info, plan, render and the picture, and --strict stops at it."""
+    def test_losses_are_repeated_by_every_command(self):
+        """info, plan, render and the EXR repeat the exporter's warnings, and --strict makes them errors."""
         self.floor().visible_shadow = False
         lamp("POINT", (0, 0, 2), 10, shadow_soft_size=0.0)
         eye((0, -3, 3), (0, 0, 0))
@@ -62,7 +62,7 @@ class Pictures(cycles_comparison.CyclesComparison):
         self.assertIn(lost[0], done.stderr)
 
     def test_objects_hidden_from_cameras(self):
-        """They light the scene and cast shadows, and cameras look through them; so do what is indirect only."""
+        """Hidden and Indirect Only objects light the scene and cast shadows, and cameras see through them."""
         self.floor()
         shared.place("shown", square(glow("white", (3, 3, 3)), 0.5), (1.2, 0, 0.6))
         hidden = shared.place("hidden", square(glow("red", (9, 1, 1)), 0.5), (-0.5, 0, 0.6))
@@ -78,7 +78,7 @@ class Pictures(cycles_comparison.CyclesComparison):
         self.assertEqual(self.warnings, [])
 
     def test_view_layers(self):
-        """The current one of those that are rendered is exported, and the others are named."""
+        """The current view layer is exported if it is enabled, and the others are named."""
         self.floor()
         for name in ("second", "third"):
             self.scene.view_layers.new(name)

@@ -1,4 +1,4 @@
-"""Features of Blender materials rendered by Cycles and by caustique: a part of docs/lab/blender-table.md, which must not get worse."""
+"""Renders features of Blender materials with Cycles and caustique: errors must not exceed docs/lab/blender-table.md."""
 
 import os
 import unittest
@@ -29,7 +29,7 @@ class Torture(support.Scratch):
                 self.assertLessEqual(torture.RANK.index(result.verdict), torture.RANK.index(stored[name]), result)
 
     def test_a_wrong_material_is_found_out(self):
-        """The comparison must tell 5 % of a sphere's colour apart."""
+        """The comparison must detect a difference of 5 % in a sphere's colour."""
         def off(stage):
             stage.principled(Base_Color=(0.5, 0.5, 0.5), Specular_IOR_Level=0.0)
 

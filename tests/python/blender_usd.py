@@ -1,4 +1,4 @@
-"""Blender's own export to USD beside our export to glTF: the same scene gives the same picture through either door."""
+"""Compares Blender's USD export with the glTF export: both give the same picture."""
 
 import os
 import unittest
@@ -9,10 +9,10 @@ from cycles_comparison import CyclesComparison, eye, lamp, shared, square
 
 
 class UsdAgainstGltf(CyclesComparison):
-    """Pictures of one scene by both."""
+    """Renders one scene through both exports."""
 
     def through_usd(self, iterations, *options):
-        """What caustique sees of the stage that Blender writes, and the warnings about it."""
+        """Render the USD stage that Blender writes. Returns the picture and the warnings."""
         path, out = (os.path.join(self.folder, name) for name in ("stage.usda", "usd.exr"))
         bpy.ops.wm.usd_export(filepath=path, generate_materialx_network=True, export_animation=False)
         done = support.run(["render", path, "-o", out, "--iterations", iterations, "--no-combine", "--progress", "none",
@@ -20,7 +20,7 @@ class UsdAgainstGltf(CyclesComparison):
         return shared.pixels(out), done.stderr
 
     def ball(self, name, at, **inputs):
-        """A ball of a Principled BSDF with these inputs."""
+        """Add a ball with a Principled BSDF with these inputs."""
         bpy.ops.mesh.primitive_uv_sphere_add(radius=0.35, location=at, segments=48, ring_count=24)
         material = shared.node_material(name, "ShaderNodeBsdfPrincipled", **{
             key.replace("_", " "): value for key, value in inputs.items()})
@@ -28,7 +28,7 @@ class UsdAgainstGltf(CyclesComparison):
         bpy.ops.object.shade_smooth()
 
     def set_up(self):
-        """A glass ball and a metal one on a floor. A Diffuse BSDF would come out of Blender as a glossy surface."""
+        """Add a glass and a metal ball on a floor. Not with Diffuse BSDF, which Blender exports as a glossy surface."""
         floor = shared.node_material("floor", "ShaderNodeBsdfPrincipled", **{
             "Base Color": (0.8, 0.8, 0.8, 1), "Roughness": 1.0, "Specular IOR Level": 0.0})
         shared.place("floor", square(floor, 3.0, "floor"))
@@ -42,10 +42,10 @@ class UsdAgainstGltf(CyclesComparison):
         lamp("AREA", (-1, 0, 2), 40, size=0.8)
         lamp("SUN", (0, 0, 3), 0.6, angle=0.1)
         ours = self.caustique(96)
-        theirs, told = self.through_usd(96)
+        theirs, warnings = self.through_usd(96)
         self.alike(ours, theirs)
-        self.assertIn("Blender 4 writes suns", told)
-        # A lamp that is a quarter brighter is found.
+        self.assertIn("Blender 4 writes suns", warnings)
+        # The test detects a lamp that is 25 % brighter.
         bpy.data.objects["area"].data.energy *= 1.25
         with self.assertRaises(AssertionError):
             self.alike(ours, self.through_usd(96)[0])
@@ -58,7 +58,7 @@ class UsdAgainstGltf(CyclesComparison):
         self.alike(self.caustique(96), theirs)
 
     def sky(self):
-        """A world of one colour."""
+        """Add a world of one colour."""
         world = bpy.data.worlds.new("sky")
         self.scene.world = world
         world.use_nodes = True
@@ -66,7 +66,7 @@ class UsdAgainstGltf(CyclesComparison):
         background.inputs["Color"].default_value = (0.2, 0.4, 0.8, 1)
         background.inputs["Strength"].default_value = 0.5
 
-    def test_scenes_of_ours(self):
+    def test_scenes_of_the_project(self):
         for name in ("torus", "blocks"):
             with self.subTest(name):
                 bpy.ops.wm.read_factory_settings(use_empty=True)

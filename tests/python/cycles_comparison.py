@@ -1,10 +1,10 @@
-"""Scenes rendered by caustique, as exported, beside Cycles: what tests of the exporter share. Needs bpy and the program."""
+"""Common parts of the exporter's tests, which compare renders of caustique with Cycles. Needs bpy and the program."""
 
 import os
 import tempfile
 import unittest
 
-import blender_export as shared  # first: it finds the scripts
+import blender_export as shared  # first: it sets the search path
 import bpy
 import export
 import numpy
@@ -13,7 +13,7 @@ from mathutils import Vector
 
 
 def glow(name, color):
-    """A material that gives off a radiance and reflects nothing."""
+    """A material that emits a radiance and reflects nothing."""
     return shared.node_material(name, "ShaderNodeEmission", Color=(*color, 1), Strength=1.0)
 
 
@@ -25,7 +25,7 @@ def square(material, half=0.4, name="square"):
 
 
 def lamp(kind, at, energy, **values):
-    """A lamp that shines down, its settings by name."""
+    """A lamp that emits downwards. `values`: its settings by name."""
     light = bpy.data.lights.new(kind.lower(), kind)
     light.energy = energy
     for name, value in values.items():
@@ -44,7 +44,7 @@ def eye(at, to, **values):
 
 
 class CyclesComparison(unittest.TestCase):
-    """An empty scene of small pictures."""
+    """Starts each test with an empty scene and small pictures."""
 
     def setUp(self):
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -56,7 +56,7 @@ class CyclesComparison(unittest.TestCase):
         self.scene.render.resolution_x = self.scene.render.resolution_y = 32
 
     def cycles(self, samples=256):
-        """What Cycles sees, rows from the bottom."""
+        """Render with Cycles. Returns the picture, bottom row first."""
         scene = self.scene
         scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", samples, False
         settings = scene.render.image_settings
@@ -68,7 +68,7 @@ class CyclesComparison(unittest.TestCase):
         return shared.pixels(scene.render.filepath)
 
     def caustique(self, iterations=128, *options):
-        """What caustique sees of the exported scene."""
+        """Export and render with caustique. Returns the picture, bottom row first."""
         self.warnings = export.write(self.path)
         out = os.path.join(self.folder, "caustique.exr")
         support.run(["render", self.path, "-o", out, "--iterations", iterations, "--no-combine", "--progress", "none",
@@ -76,7 +76,7 @@ class CyclesComparison(unittest.TestCase):
         return shared.pixels(out)
 
     def alike(self, ours, theirs, tolerance=0.02, parts=2):
-        """The pictures' means, also of each of `parts` x `parts` tiles, differ by no more than this share."""
+        """Assert that the means of the pictures, and of each of `parts` x `parts` tiles, agree within `tolerance`."""
         self.assertEqual(ours.shape, theirs.shape)
         self.assertGreater(theirs.mean(), 1e-3)
         height, width, _ = ours.shape
@@ -88,7 +88,7 @@ class CyclesComparison(unittest.TestCase):
         numpy.testing.assert_allclose(tiles(ours), tiles(theirs), rtol=2 * tolerance, atol=1e-4)
 
     def silhouettes_agree(self, ours, theirs):
-        """But for pixels on edges the pictures are the same: those that differ are fewer than one in fifty."""
+        """Assert that fewer than 2 % of the pixels differ, because only pixels on edges may."""
         self.assertEqual(ours.shape, theirs.shape)
         differ = (abs(ours - theirs) > 0.2).any(-1)
         self.assertLess(differ.mean(), 0.02, f"rows, columns: {numpy.argwhere(differ)[:20].tolist()}")

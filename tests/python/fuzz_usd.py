@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""Fuzzes the converter of USD: mutates the stages that the tests write, and converts each in a process of its own.
+"""Fuzzes the USD converter: mutates stages of the tests, and converts each in a separate process.
 
     .venv-usd/bin/python tests/python/fuzz_usd.py SECONDS [--seed N]
-    .venv-usd/bin/python tests/python/fuzz_usd.py --replay STAGE...     converts stages and says what becomes of each
+    .venv-usd/bin/python tests/python/fuzz_usd.py --replay STAGE...     converts stages and prints the outcomes
 
-`scripts/setup.sh usd` makes .venv-usd. The first run keeps every stage of tests/python/usd_*.py, with the files beside
-it, below ~/.cache/caustique-fuzz/seeds/usd (or that of $XDG_CACHE_HOME). A stage may convert, raise `faults.Fault`, or
-raise an error of USD's own. All else is a finding, told once by its last line in scripts/usd: another exception, more
-than 20 s, more than 2 GiB. It lies below faults/usd beside the seeds, as a folder to replay, and makes the exit code 1.
-Where USD itself dies, or takes too long or too much to read a file, the stage is kept there too and counted apart. The
-same --seed makes the same stages.
+`scripts/setup.sh usd` makes .venv-usd. The first run saves all stages of tests/python/usd_*.py and their files in
+~/.cache/caustique-fuzz/seeds/usd (or below $XDG_CACHE_HOME). A stage may convert, raise `faults.Fault`, or raise an
+error of USD. All other outcomes are findings, printed once per last line in scripts/usd: other exceptions, more than 20
+s, more than 2 GiB. Each finding is saved in faults/usd beside the seeds, to be replayed, and makes the exit code 1.
+Stages that make USD itself crash or exceed a limit are saved there and counted separately. Equal seeds give equal
+stages.
 """
 
 import argparse
@@ -63,7 +63,7 @@ NUMBER = re.compile(r"-?[\d.]+(e[+-]?\d+)?$")
 
 
 def keep_seeds():
-    """Runs the tests, which keep their stages then, and does not render."""
+    """Run the tests without rendering, and save their stages."""
     def keep(path):
         folder = SEEDS / hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
         if not folder.exists():
@@ -86,7 +86,7 @@ def keep_seeds():
 
 
 def mutated(text, others, rng):
-    """A text of USD with some changes; lines also come from other stages."""
+    """Mutate a USD text, also with lines of other stages."""
     for _ in range(rng.choice((1, 1, 1, 1, 2, 3))):
         lines, tokens = text.split("\n"), list(TOKEN.finditer(text))
         values = list(VALUE.finditer(text))
@@ -95,7 +95,7 @@ def mutated(text, others, rng):
             text = f"{text[:at.start()]}{at[1]}{type_} {at[2]} = {value}{text[at.end():]}"
             continue
         if not tokens or rng.random() < 0.3:
-            # Mostly lines that open and close nothing: more of what comes of it can be read.
+            # Mostly lines without brackets, because more of the results are valid USD.
             flat = [k for k, line in enumerate(lines) if "=" in line] if rng.random() < 0.9 else range(len(lines))
             a, b = (rng.choice(flat or [0]) for _ in range(2))
             other = rng.choice([line for line in rng.choice(others).split("\n") if "=" in line] or [""])
@@ -120,7 +120,7 @@ def mutated(text, others, rng):
 
 
 def flipped(data, rng):
-    """Bytes, some of them changed; now and then fewer."""
+    """Change some bytes, and sometimes truncate them."""
     data = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 4, 16)) if data else 0):
         at = rng.randrange(len(data))
@@ -129,7 +129,7 @@ def flipped(data, rng):
 
 
 def child(task, *args):
-    """Runs a task in a process of its own: the signal that ended it or 0, "hang", "memory" or None, what it said."""
+    """Run a task in a child process. Returns its signal or 0; "hang", "memory" or None; and its output."""
     reads, writes = os.pipe()
     pid = os.fork()
     if not pid:
@@ -149,7 +149,7 @@ def child(task, *args):
     said, part, trouble, end = b"", b"", None, time.monotonic() + LONGEST
     while part is not None:
         if not select.select([reads], [], [], max(0, end - time.monotonic()))[0]:
-            os.kill(pid, signal.SIGKILL if trouble else signal.SIGABRT)  # the first lets it say where it is
+            os.kill(pid, signal.SIGKILL if trouble else signal.SIGABRT)  # SIGABRT first, which prints a traceback
             trouble, end = "hang", time.monotonic() + 2
             continue
         part = os.read(reads, 65536) or None
@@ -161,7 +161,7 @@ def child(task, *args):
 
 
 def converts(path, out, frame):
-    """Both of what the converter does with a stage."""
+    """Convert a stage and read its arguments."""
     try:
         convert.write(path, out, frame)
     finally:
@@ -169,7 +169,8 @@ def converts(path, out, frame):
 
 
 def verdict(path, frame=None):
-    """What becomes of a stage: one of `FINE`, `OF_USD` or the kind of a finding; where in scripts/usd; what is said."""
+    """Convert a stage. Returns the outcome (in `FINE`, `OF_USD`, or a kind of finding), its place in scripts/usd, and
+    text."""
     with tempfile.TemporaryDirectory() as out:
         ended, trouble, said = child(converts, str(path), out + "/out.glb", frame)
     frames = re.findall(r'File "([^"]*/scripts/usd/(\w+)\.py)", line (\d+)', said) or [("", "somewhere", "0")]
@@ -183,13 +184,13 @@ def verdict(path, frame=None):
 
 
 def package(path, base):
-    """The same stage as .usdc and .usdz."""
+    """Write a stage as .usdc and .usdz, too."""
     Sdf.Layer.FindOrOpen(str(path)).Export(f"{base}.usdc")
     UsdUtils.CreateNewUsdzPackage(str(path), f"{base}.usdz")
 
 
 def fuzz(seconds, seed, scratch):
-    """Converts mutated stages for so long, and tells how many came to what; whether anything was found."""
+    """Convert mutated stages for `seconds`, and print the counts of outcomes. Returns whether there are findings."""
     seeds = sorted(SEEDS.iterdir())
     texts = [(folder / "stage.usda").read_text(errors="replace") for folder in seeds]
     rng, found, counts, end = random.Random(seed), set(), {}, time.monotonic() + seconds
@@ -219,7 +220,7 @@ def fuzz(seconds, seed, scratch):
 
 
 def main():
-    """Command line; the exit code."""
+    """Run the command line. Returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("seconds", type=float, nargs="?", default=300)
     parser.add_argument("--seed", type=int, default=0)

@@ -1,4 +1,4 @@
-"""Where the program, the scenes and scratch space are, and how to run the program."""
+"""Paths of the program and the scenes, temporary folders, and running the program."""
 
 import os
 import subprocess
@@ -8,7 +8,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Folders whose modules tests import. Scripts themselves start in their own folder.
+#: Folders of modules that tests import. Scripts start in their own folder.
 MODULES = ("", "scripts", "scripts/blender", "scripts/compare/peers", "scripts/farm", "scripts/usd")
 sys.path += [str(ROOT / folder) for folder in MODULES]
 
@@ -24,8 +24,8 @@ def binary():
 def run(args, *, check=None, timeout=300, cwd=None, env=None):
     """Runs the program with `args` and returns the CompletedProcess, its output as text.
 
-    `check`: the exit code to insist on; an AssertionError shows what the program said. `timeout`: seconds. `env`:
-    variables to add; None as a value removes one.
+    `check`: expected exit code; an AssertionError shows the program's output. `timeout`: seconds. `env`: environment
+    variables to add; the value None removes one.
     """
     variables = dict(os.environ)
     for name, value in (env or {}).items():
@@ -45,7 +45,7 @@ def run(args, *, check=None, timeout=300, cwd=None, env=None):
 
 
 def scene(name):
-    """The path of a scene of ours: scene("torus") is scenes/torus.glb."""
+    """The path of a scene of the project: scene("torus") is scenes/torus.glb."""
     path = ROOT / "scenes" / name
     if not path.suffix:
         path = path.with_suffix(".glb")
@@ -55,7 +55,7 @@ def scene(name):
 
 
 class Scratch(unittest.TestCase):
-    """A test case with an empty folder of its own, `self.dir`, removed afterwards."""
+    """A test case with a temporary folder, `self.dir`."""
 
     def setUp(self):
         super().setUp()

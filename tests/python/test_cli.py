@@ -1,4 +1,4 @@
-"""What a render leaves, read by OpenEXR's own library, and how well its estimated error tells the true one."""
+"""Reads rendered EXRs with OpenEXR's library, and compares the estimated error with the true one."""
 
 import json
 import unittest

@@ -1,4 +1,4 @@
-"""What the comparison with Mitsuba rests on: its glTF reader, its scenes, its statistics. Mitsuba itself is not needed."""
+"""Tests the parts of the comparison with Mitsuba that need no Mitsuba: glTF reader, scenes, statistics."""
 
 import tempfile
 import unittest
@@ -28,7 +28,7 @@ class Statistics(unittest.TestCase):
             self.assertLess(abs(values["mean_ratio"] - 1), 5 * values["mean_ratio_error"])
 
     def test_standard_errors_are_those_of_the_noise(self):
-        # Of 240 tiles' z values the mean square is 14/12 (t with 14 degrees of freedom), its standard error 0.12: four of them.
+        # The mean square of 240 z values is 14/12 (t with 14 degrees of freedom), with a standard error of 0.12.
         squares = [tiles.compare(renders(seed), renders(2000 + seed))["chi2_per_tile"] for seed in range(20)]
         self.assertAlmostEqual(np.mean(squares), 14 / 12, delta=0.5)
 
@@ -45,7 +45,7 @@ class Statistics(unittest.TestCase):
     def test_too_much_noise_is_no_agreement(self):
         self.assertFalse(tiles.compare(renders(5, noise=1.0), renders(6))["agrees"])
 
-    def test_what_is_not_finite_is_no_agreement(self):
+    def test_values_that_are_not_finite_are_no_agreement(self):
         ours = renders(7)
         ours[0, 0, 0, 0] = np.nan
         values = tiles.compare(ours, renders(8))
@@ -76,7 +76,7 @@ class Reader(unittest.TestCase):
         for mesh in scene.meshes:
             a, b, c = mesh.positions[mesh.triangles].transpose(1, 0, 2)
             volumes[mesh.name] = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
-        # Of the sphere's facets, a little less than the sphere's. One node mirrors its mesh: the front stays outside.
+        # Volumes of faceted spheres are a little smaller. One node mirrors its mesh, whose front stays outside.
         for name, sizes in (("gold", (0.4, 0.4, 0.4)), ("steel", (0.5, 0.3, 0.35)), ("mirrored", (0.15, 0.15, 0.2))):
             self.assertAlmostEqual(volumes[name] / (4 / 3 * np.pi * np.prod(sizes)), 0.999, delta=0.002)
         for mesh in scene.meshes:
@@ -93,7 +93,7 @@ class Reader(unittest.TestCase):
         point = self.read("textures").lights[0]
         np.testing.assert_allclose(point.intensity, np.array([1, 0.9, 0.8]) * 800 / 683)
 
-    def test_what_is_unknown_is_an_error(self):
+    def test_unknown_features_are_errors(self):
         path = Path(self.folder.name) / "unknown.gltf"
         path.write_text('{"asset": {"version": "2.0"}, "scenes": [{}], "extensionsUsed": ["KHR_materials_sheen"]}')
         with self.assertRaises(gltf.Unsupported):

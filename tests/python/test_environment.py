@@ -1,4 +1,4 @@
-"""The program starts, and what scripts/setup.sh installs is what the program can use."""
+"""The program starts, and it can use the libraries that scripts/setup.sh installs."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ class Program(unittest.TestCase):
 
 
 class Library(support.Scratch):
-    """What scripts/setup_library.py does is the same for all; the classes below say for which."""
+    """Common tests of scripts/setup_library.py; subclasses name the library."""
 
     def find(self, *args, **env):
         command = [sys.executable, SCRIPT, *args]

@@ -1,4 +1,4 @@
-"""EXR files in and out, and the error metrics, against OpenEXR's own reader and writer, numpy, and the authors' FLIP."""
+"""Tests EXR files and error metrics against OpenEXR's library, numpy, and the authors' FLIP."""
 
 import json
 import re
@@ -43,7 +43,7 @@ def edges_and_noise(width, height):
 
 
 class Written(support.Scratch):
-    """What `render` writes, read by OpenEXR."""
+    """Files of `render`, read by OpenEXR."""
 
     def render(self, name, *extra):
         path = self.dir / name
@@ -65,12 +65,12 @@ class Written(support.Scratch):
         path = self.dir / "frame.exr"
         size = ["--width", "9", "--iterations", "1", "--photons", "100", "--layers", "beauty", "--no-combine", "--allow-outside"]
         support.run(["render", scene, "-o", path, *size, "--progress", "none"], check=0)
-        told = header(path)
-        rate, code = told["framesPerSecond"], told["timeCode"]
+        attributes = header(path)
+        rate, code = attributes["framesPerSecond"], attributes["timeCode"]
         self.assertEqual((rate.numerator, rate.denominator), (24000, 1001))
         self.assertEqual((code.hours, code.minutes, code.seconds, code.frame), (0, 0, 2, 1))
-        self.assertEqual(told["imageCounter"], 49)
-        self.assertEqual(json.loads(told["caustique"])["frame"], 49)
+        self.assertEqual(attributes["imageCounter"], 49)
+        self.assertEqual(json.loads(attributes["caustique"])["frame"], 49)
 
     def test_layers_types_and_header(self):
         path = self.render("plain.exr")
@@ -83,7 +83,7 @@ class Written(support.Scratch):
             self.assertLessEqual(len(name), 31)
             self.assertEqual(values.dtype, np.float32, name)
             self.assertEqual(values.shape, (20, 33), name)
-            # An id of cryptomatte is a float of any size; everything else is a finite quantity.
+            # Cryptomatte ids are arbitrary floats; all other values are finite quantities.
             self.assertTrue(np.isfinite(values).all(), name)
         normal = np.stack([channels[f"normal.{c}"] for c in "XYZ"])
         self.assertLessEqual(np.linalg.norm(normal, axis=0).max(), 1 + 1e-4)
@@ -140,7 +140,7 @@ class Written(support.Scratch):
 
 
 class Compared(support.Scratch):
-    """What `compare` says of files that OpenEXR wrote."""
+    """Output of `compare` for files that OpenEXR wrote."""
 
     def compare(self, image, reference, *extra):
         done = support.run(["compare", image, reference, "--json", *extra], check=0)
@@ -170,7 +170,7 @@ class Compared(support.Scratch):
         )
         self.assertAlmostEqual(self.compare(*files)["flip"], float(flip), delta=1e-3)
 
-    def test_every_way_to_write_is_read(self):
+    def test_every_compression_and_layout_is_read(self):
         reference, _ = edges_and_noise(96, 64)
         plain = write(self.dir / "plain.exr", {"RGB": reference})
         for compression in ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "DWAA", "DWAB"]:
@@ -213,7 +213,7 @@ class Compared(support.Scratch):
         self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(struct.unpack(">IIBB", data[16:26]), (96, 64, 8, 2))
 
-    def test_what_cannot_be_compared(self):
+    def test_pictures_that_cannot_be_compared_are_refused(self):
         reference, _ = edges_and_noise(96, 64)
         good = write(self.dir / "good.exr", {"RGB": reference})
         small = write(self.dir / "small.exr", {"RGB": reference[:10, :10].copy()})

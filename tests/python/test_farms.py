@@ -1,5 +1,5 @@
-"""Farms: the scripts that their tasks run, what is submitted, the job template, and the model of scale. Slurm and Ray
-themselves run in scripts/lab/figures/farms.py."""
+"""Tests the farm scripts, the submitted jobs, the job template, and the model of scale. scripts/lab/figures/farms.py
+runs Slurm and Ray themselves."""
 
 import contextlib
 import itertools
@@ -19,7 +19,7 @@ OPTIONS = ["--width", "24", "--method", "path"]
 
 
 def script(name, *words, check=0, env=None):
-    """Runs a script of farms; an AssertionError shows what it said where its exit code is another."""
+    """Run a farm script. An AssertionError shows its output if the exit code is not `check`."""
     variables = {**os.environ, "CAUSTIQUE_BIN": str(support.binary()), **(env or {})}
     done = subprocess.run([FARM / name, *map(str, words)], capture_output=True, text=True, env=variables, check=False)
     if check is not None and done.returncode != check:
@@ -28,14 +28,14 @@ def script(name, *words, check=0, env=None):
 
 
 def channels(path):
-    """Name to bytes."""
+    """The channels of an EXR, {name: bytes}."""
     found = OpenEXR.File(str(path), separate_channels=True).channels()
     return {name: channel.pixels.tobytes() for name, channel in found.items()}
 
 
 class Tasks(support.Scratch):
     def whole(self, *options):
-        """The channels of one render."""
+        """The channels of an undivided render."""
         file = self.dir / "whole.exr"
         support.run(["render", support.scene("blocks"), "-o", file, *OPTIONS, *options], check=0)
         return channels(file)
@@ -56,7 +56,7 @@ class Tasks(support.Scratch):
         self.assertEqual(channels(out), self.whole("--iterations", 6))
         self.assertEqual(sorted(file.name for file in self.dir.iterdir()), ["a.exr", "a.png", "whole.exr"])
 
-    def test_a_task_that_is_killed_takes_its_render_along_and_goes_on(self):
+    def test_killing_a_task_kills_its_render_and_the_next_task_continues(self):
         out, iterations = self.dir / "a.exr", 3000
         words = [support.scene("blocks"), out, "0/2", "--iterations", iterations, *OPTIONS, "--checkpoint-every", "0.01"]
         variables = {**os.environ, "CAUSTIQUE_BIN": str(support.binary())}
@@ -74,7 +74,7 @@ class Tasks(support.Scratch):
         script("merge.sh", out)
         self.assertEqual(channels(out), self.whole("--iterations", iterations))
 
-    def test_a_task_that_is_told_to_end_saves_itself(self):
+    def test_a_terminated_task_saves_its_checkpoint(self):
         words = [support.scene("blocks"), self.dir / "a.exr", "0/1", "--iterations", 10**6, *OPTIONS]
         variables = {**os.environ, "CAUSTIQUE_BIN": str(support.binary())}
         task = subprocess.Popen(
@@ -88,7 +88,7 @@ class Tasks(support.Scratch):
         self.assertTrue((self.dir / "a.shards" / "part-0.exr.checkpoint").exists())
         self.assertFalse((self.dir / "a.shards" / "shard-0.exr").exists())
 
-    def test_shards_of_another_render_are_not_taken_for_this_one(self):
+    def test_shards_of_another_render_are_refused(self):
         words = [support.scene("blocks"), self.dir / "a.exr", "0/2", "--iterations", 2, *OPTIONS]
         script("shard.sh", *words)
         for other in ([*words, "--seed", 1], [*words[:2], "0/3", *words[3:]], [support.scene("torus"), *words[1:]]):
@@ -97,7 +97,7 @@ class Tasks(support.Scratch):
         self.assertTrue((self.dir / "a.shards" / "shard-0.exr").exists())
 
     def wait(self, what):
-        """Waits for something to be so."""
+        """Wait until a condition holds."""
         end = time.monotonic() + 60
         while not what():
             self.assertLess(time.monotonic(), end)
@@ -105,7 +105,7 @@ class Tasks(support.Scratch):
 
     @staticmethod
     def alive(process):
-        """Whether a process runs."""
+        """Whether a process is running."""
         with contextlib.suppress(OSError), open(f"/proc/{process}/stat", encoding="utf-8") as stat:
             return stat.read().rsplit(")", 1)[1].split()[0] != "Z"
         return False
@@ -128,7 +128,7 @@ class Slurm(support.Scratch):
         for job in jobs:
             subprocess.run(["bash", "-n"], input=job.split("\n", 1)[1], text=True, check=True)
 
-    def test_what_means_nothing_is_refused(self):
+    def test_meaningless_options_are_refused(self):
         for words, fault in (
             (["--shards", "0"], "'0' is no count"),
             (["--shards", "2", "--frames", "3"], None),
@@ -143,7 +143,7 @@ class Slurm(support.Scratch):
 
 class OpenJobDescription(support.Scratch):
     def start(self, **given):
-        """The job of a small picture with these parameters, and a session that takes down its progress in `seen`."""
+        """The job of a small picture with these parameters, and a session that records its progress in `seen`."""
         from openjd.model import create_job, decode_job_template, document_string_to_object, DocumentType
         from openjd.model import preprocess_job_parameters
         from openjd.sessions import Session
@@ -185,7 +185,7 @@ class OpenJobDescription(support.Scratch):
             self.assertFalse(trap.exists(), wrong)
 
     def run_task(self, session, step, shard, end="SUCCESS"):
-        """Runs a task to its end, which has to be a good one unless another is named."""
+        """Run a task, and assert that it ends with `end`."""
         from openjd.model import ParameterValue, ParameterValueType
         from openjd.sessions import ActionState, SessionState
 
@@ -201,7 +201,7 @@ class Scale(unittest.TestCase):
     costs = scale.Costs(load=0.5, pilot=2, iteration=5, write=3, each=0.5, finish=20, file=250e6)
 
     def ratio(self, costs, farm, job):
-        """The formula over the simulation, which may have other costs."""
+        """Time of the formula over that of the simulation, which may have other costs."""
         return scale.seconds(self.costs, farm, job) / scale.simulate(costs, farm, job)
 
     def cases(self):

@@ -1,4 +1,4 @@
-"""What the figures of finished pictures rest on: errors against noisy references, goals, scenes in other terms."""
+"""Tests the parts of the figures of finished pictures: errors against noisy references, goals, simplified scenes."""
 
 import json
 import tempfile
@@ -29,7 +29,7 @@ class Errors(unittest.TestCase):
     def test_noise_of_the_reference_drops_out(self):
         reference = picture_errors.Reference(self.noisy(0.2), self.noisy(0.2))
         found = reference.measure(self.noisy(0.1))
-        # 57600 values: five standard errors of a product of two errors are 8 %.
+        # With 57600 values, five standard errors of a product of two errors are 8 %.
         self.assertAlmostEqual(found["relmse"] / (0.01 / 4.01), 1, delta=0.08)
         self.assertAlmostEqual(found["grain"] / (0.01 / 4.01) * 9 / 8, 1, delta=0.1)
         self.assertAlmostEqual(reference.error / (0.02 / 4.01), 1, delta=0.03)
@@ -50,7 +50,7 @@ class Errors(unittest.TestCase):
         self.assertGreater(found["relmse"], 1)
         self.assertEqual(found["pixels_not_finite"], 1)
 
-    def test_the_program_says_the_same(self):
+    def test_the_program_computes_equal_errors(self):
         picture, truth = self.noisy(0.1).astype(np.float32), self.truth.astype(np.float32)
         found = picture_errors.Reference(truth, truth).measure(picture)
         with tempfile.TemporaryDirectory() as folder:
@@ -92,7 +92,7 @@ class Goals(unittest.TestCase):
 
 
 class Translation(unittest.TestCase):
-    def test_what_drivers_lack_is_named(self):
+    def test_features_that_drivers_lack_are_named(self):
         def blockers(name):
             return plain_scene.Scene(SCENES / f"{name}.glb").blockers
 
@@ -110,7 +110,7 @@ class Translation(unittest.TestCase):
         passed = np.exp(-glass.absorption * volume["attenuationDistance"])
         np.testing.assert_allclose(passed, volume["attenuationColor"], rtol=1e-12)
 
-    def test_twins_are_what_drivers_take(self):
+    def test_twins_have_only_features_that_drivers_support(self):
         with tempfile.TemporaryDirectory() as folder, mock.patch.object(twins, "CACHE", Path(folder)):
             for name in ("torus", "prism", "interior", "cornell"):
                 twin = twins.twin(SCENES / f"{name}.glb")
@@ -122,7 +122,7 @@ class Translation(unittest.TestCase):
                 said = json.loads(support.run(["info", twin, "--json"], check=0).stdout)
                 original = json.loads(support.run(["info", SCENES / f"{name}.glb", "--json"], check=0).stdout)
                 self.assertEqual(said["triangles"], original["triangles"], name)
-            # Nothing is to be taken from the one, no driver has what is left of the other.
+            # One scene has nothing to remove; the rest of the other is unsupported by every driver.
             self.assertIsNone(twins.twin(SCENES / "blocks.glb"))
             self.assertIsNone(twins.twin(SCENES / "fog.glb"))
 
@@ -156,7 +156,7 @@ class Translation(unittest.TestCase):
         np.testing.assert_allclose(middle, toward, atol=2e-3)
 
     def test_environments_are_turned(self):
-        # +X is in the middle where u is 1/2 + atan2(z, x) / 2 pi, and a quarter in where u is atan2(x, -z) / 2 pi.
+        # +X is at u = 1/2 for u = 1/2 + atan2(z, x) / 2 pi, and at u = 1/4 for u = atan2(x, -z) / 2 pi.
         image = np.zeros((4, 64, 3), np.float32)
         image[:, 32] = 1
         at = (np.arange(64) + 0.5) / 64

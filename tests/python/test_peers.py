@@ -1,5 +1,5 @@
-"""The drivers of other renderers, where `scripts/compare/setup.sh peers` has installed them, on a small scene each; and
-what all of them share."""
+"""Tests the drivers of other renderers on small scenes, if `scripts/compare/setup.sh peers` installed the renderers;
+and the drivers' common parts."""
 
 import subprocess
 import unittest
@@ -19,7 +19,7 @@ SIZE = (48, 27)
 
 
 def drive(name, scene, target, mode="path", budget=2.0):
-    """Runs a driver; returns what it says."""
+    """Run a driver. Returns its answer."""
     size = {"width": SIZE[0], "height": SIZE[1]}
     command = caller.command(f"{name}_driver.py", scene, target, mode=mode, budget=budget, **size, threads=2, clock="cpu")
     env = {**caller.environment(f"{name}_driver.py"), "PYTHONDONTWRITEBYTECODE": "1"}
@@ -30,14 +30,14 @@ def drive(name, scene, target, mode="path", budget=2.0):
 
 
 def off(picture, truth):
-    """How far a picture's mean is from the truth's, and the standard error of that."""
+    """Relative deviation of a picture's mean from the truth's, and its standard error."""
     noise = np.sqrt(np.square(picture - truth).mean(-1).sum()) / truth.mean(-1).sum()
     return abs(picture.mean() / truth.mean() - 1), noise
 
 
 class Shared(unittest.TestCase):
-    class Watch:
-        """A watch on which every pass takes so long."""
+    class Stopwatch:
+        """A stopwatch that advances by `each` in every pass."""
 
         def __init__(self, each, budget):
             self.each, self.budget, self.time = each, budget, 0.0
@@ -50,7 +50,7 @@ class Shared(unittest.TestCase):
 
     def test_passes_end_nearest_to_the_budget(self):
         for each, budget, expected in [(1.0, 10.4, 10), (1.0, 10.6, 11), (3.0, 1.0, 1), (4.0, 6.5, 2)]:
-            watch = self.Watch(each, budget)
+            watch = self.Stopwatch(each, budget)
 
             def render(number, watch=watch):
                 watch.time += watch.each
@@ -60,7 +60,7 @@ class Shared(unittest.TestCase):
 
     def test_no_driver_is_left_out_of_the_program(self):
         source = (support.ROOT / "src" / "peers" / "drivers.rs").read_text()
-        # What only scripts run: comparisons, translations of scenes, the denoiser.
+        # Modules for scripts alone: comparisons, conversions of scenes, the denoiser.
         others = {"__main__", "caller", "from_xml", "oidn", "tiles", "to_xml"}
         for name in {path.stem for path in DRIVERS.glob("*.py")} - others:
             self.assertIn(f'"../../scripts/compare/peers/{name}.py"', source)
@@ -69,7 +69,7 @@ class Shared(unittest.TestCase):
 if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
 
     class Installed(support.Scratch):
-        def test_all_renderers_see_the_scene_that_we_see(self):
+        def test_all_renderers_render_the_scene_as_caustique_does(self):
             scene, truth = support.ROOT / "scenes" / "blocks.glb", self.dir / "truth.exr"
             support.run(["render", scene, "-o", truth, "--method", "bdpt", "--width", SIZE[0], "--height", SIZE[1],
                          "--iterations", 300, "--no-combine", "--layers", "beauty", "--progress", "none"])
@@ -77,7 +77,7 @@ if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
             for name, mode in [("mitsuba", "path"), ("luxcore", "path"), ("luxcore", "bidir"), ("cycles", "path")]:
                 with self.subTest(name=name, mode=mode):
                     said = drive(name, scene, self.dir / "picture.exr", mode)
-                    # Of four core-seconds; a pass more or less, and LuxCore's slow farewell.
+                    # The budget is four core-seconds; passes do not end exactly then.
                     self.assertGreater(said["core_seconds"], 2.5)
                     self.assertLess(said["core_seconds"], 9.0)
                     self.assertGreater(min(said["core_seconds"], said["startup_seconds"], said["passes"]), 0)
@@ -85,7 +85,7 @@ if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
                     self.assertEqual(picture.shape, truth.shape)
                     far, noise = off(picture, truth)
                     self.assertLess(far, 0.01 + 3 * noise)
-                    # A scene a tenth darker does not pass, nor does one a row too low.
+                    # The test detects a picture that is 10 % darker, or one row too low.
                     far, noise = off(0.9 * picture, truth)
                     self.assertGreater(far, 0.01 + 3 * noise)
                     moved = np.square(np.roll(picture, 1, 0) - truth)[2:].mean()
@@ -100,7 +100,7 @@ if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
                 means.append(pictures.read(self.dir / "picture.exr").mean())
             self.assertAlmostEqual(means[0] / means[1], 1, delta=0.3)
 
-        def test_what_a_renderer_cannot_say_is_its_answer(self):
+        def test_unsupported_features_are_the_answer_of_a_driver(self):
             target = self.dir / "picture.exr"
             for name, scene, why in [
                 ("mitsuba", "prism", "KHR_materials_dispersion is left out"),

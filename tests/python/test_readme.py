@@ -1,4 +1,4 @@
-"""The README and docs/ do what they say: commands run as they stand, links lead somewhere, options exist, and lines are short."""
+"""Tests the README and docs/: commands run as written, links and options exist, and lines are short."""
 
 import re
 import shlex
@@ -12,7 +12,7 @@ README = support.ROOT / "README.md"
 DOCS = sorted((support.ROOT / "docs").rglob("*.md"))
 PAGES = [README, *DOCS]
 PROGRAM = "target/release/caustique"
-#: What sets everything up: it is there, and too much for a test.
+#: Scripts that set everything up: they exist, but run too long for a test.
 WHOLE = ("./scripts/demo.sh", "./scripts/test.sh", "./scripts/python.sh")
 #: Scripts that need Blender.
 EXPORTER = "scripts/blender/export.py"
@@ -25,7 +25,7 @@ WIDEST = 120
 
 
 def split(page):
-    """Lines of a page outside and inside its code blocks, each with its number from 1."""
+    """Lines of a page outside and inside of code blocks, each with its number from 1."""
     prose, code, inside = [], [], False
     for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         if line.startswith("```"):
@@ -36,7 +36,7 @@ def split(page):
 
 
 def commands(page):
-    """Command lines in the code blocks of a page; what is no command (formulas, printed tables) is left out."""
+    """Command lines in the code blocks of a page, without formulas and printed tables."""
     starts = (PROGRAM + " ", "python3 scripts/", BLENDER + " scripts/", "./scripts/", "blender ")
     return [line for _, line in split(page)[1] if line.startswith(starts)]
 
@@ -50,7 +50,7 @@ def without_code(text):
 
 
 def anchors(page):
-    """The anchors of a page's headings, as GitHub makes them."""
+    """The anchors of a page's headings, as on GitHub."""
     found = set()
     for _, line in split(page)[0]:
         heading = re.match(r"#+ (.*)", line)
@@ -64,7 +64,7 @@ def anchors(page):
 
 
 def shortened(command):
-    """A command that takes seconds: as it stands but for time limits and the width of pictures."""
+    """A command shortened to seconds, by time limits and the width of pictures."""
     command = re.sub(r"--time \S+", "--time 2", command)
     if re.match(rf"{PROGRAM} (render|plan|converge)\b", command) and "--help" not in command:
         command, widths = re.subn(r"--width \S+", "--width 64", command)
@@ -76,7 +76,7 @@ def shortened(command):
 
 
 class Commands(support.Scratch):
-    """In a folder that looks like the repository after scripts/demo.sh."""
+    """Runs commands in a folder that looks like the repository after scripts/demo.sh."""
 
     def setUp(self):
         super().setUp()
@@ -97,7 +97,7 @@ class Commands(support.Scratch):
                     self.assertTrue(path.is_file() and path.stat().st_mode & 0o111, f"{path} is not executable")
                 elif EXPORTER in words:
                     self.assertTrue((support.ROOT / EXPORTER).is_file())
-                    # What it would export stands in for a scene of ours.
+                    # A copy of a scene replaces the export.
                     (self.dir / words[-1]).write_bytes(support.scene("blocks").read_bytes())
                 elif "--with" in words:
                     # Other renderers are not installed where tests run; test_peers.py tests their drivers.

@@ -1,4 +1,4 @@
-"""The scenes in scenes/ and scenes/second/: each exported by Blender, small, closed where it is glass, and with well-formed extras."""
+"""Tests scenes/ and scenes/second/: exported by Blender, small, closed glass, well-formed extras."""
 
 import glob
 import math
@@ -13,7 +13,7 @@ ROOT = str(support.ROOT)
 
 SCENES = os.path.join(ROOT, "scenes")
 NAMES = sorted(f[:-4] for f in [*glob.glob("*.glb", root_dir=SCENES), *glob.glob("second/*.glb", root_dir=SCENES)])
-#: Scenes without solid glass, and glass that is a sheet on purpose.
+#: Scenes without solid glass, and glass that is intentionally a sheet.
 WITHOUT_SOLIDS = {"interior", "blocks", "slide", "second/fairground", "second/stairwell", "second/still"}
 SHEETS = {("slide", "slide"), ("second/dining", "pane")}
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -21,7 +21,7 @@ CODES = {5121: "B", 5123: "H", 5125: "I", 5126: "f"}
 
 
 def accessor(document, buffer, index):
-    """The rows of an accessor: tuples of numbers."""
+    """The elements of an accessor, tuples of numbers."""
     entry = document["accessors"][index]
     view = document["bufferViews"][entry["bufferView"]]
     width, code = COMPONENTS[entry["type"]], CODES[entry["componentType"]]
@@ -39,12 +39,12 @@ def triangles(document, mesh):
 
 
 def instances(document):
-    """Mesh indices as often as nodes wear them."""
+    """Mesh indices, once for each node that uses them."""
     return [node["mesh"] for node in document["nodes"] if "mesh" in node]
 
 
 def open_edges(document, buffer, mesh):
-    """How many edges, with vertices welded by position, have an odd number of triangles."""
+    """Number of edges with an odd number of triangles, with vertices merged by position."""
     places, uses = {}, {}
     for part in mesh["primitives"]:
         points = accessor(document, buffer, part["attributes"]["POSITION"])
@@ -80,7 +80,7 @@ def environment_faults(said, folder):
 
 
 def each_scene(check):
-    """Run check(self, name, document, buffer) for every scene."""
+    """A test that runs check(self, name, document, buffer) for every scene."""
     def run(self):
         for name in NAMES:
             with self.subTest(scene=name):

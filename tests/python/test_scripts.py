@@ -1,4 +1,4 @@
-"""The scripts count results as they should, and record figures as one JSON object a line."""
+"""Tests scripts that count test results, and the laboratory's stored figures."""
 
 import importlib
 import json
@@ -73,7 +73,7 @@ class Counts(unittest.TestCase):
 
 
 class Blender(unittest.TestCase):
-    def test_without_bpy_the_remedy_is_told(self):
+    def test_without_bpy_the_remedy_is_printed(self):
         for name in ("compositor", "export"):
             path = support.ROOT / "scripts" / "blender" / f"{name}.py"
             done = subprocess.run([sys.executable, path, "a", "b"], capture_output=True, text=True, check=False)
@@ -83,7 +83,7 @@ class Blender(unittest.TestCase):
 
 class Requirements(unittest.TestCase):
     def test_all_are_pinned_by_hash(self):
-        """What a file asks for, and what that needs, is in the file that is installed (scripts/lock.sh)."""
+        """Each requirement and its dependencies are in the pinned file (scripts/lock.sh)."""
         folder = support.ROOT / "scripts"
         installed = sorted([*folder.glob("requirements-*.txt"), folder / "lab" / "train" / "requirements.txt"])
         self.assertGreater(len(installed), 8)
@@ -176,7 +176,7 @@ class Laboratory(unittest.TestCase):
 
 class Tables(support.Scratch):
     def stored(self, *rows):
-        """Figures of a file with some rows: values, commit, and what else a row has."""
+        """Figures from a file with these rows: values, commit, and other keys."""
         machine = {"cpu": "a processor", "cores": 2, "memory_gib": 8.0, "system": "a system"}
         file = self.dir / "results.jsonl"
         with file.open("w", encoding="utf-8") as out:
@@ -185,7 +185,7 @@ class Tables(support.Scratch):
                 out.write(json.dumps({**row, "machine": machine, **more}) + "\n")
         return Figures(file=file)
 
-    def test_the_documents_tables_are_what_is_stored(self):
+    def test_tables_of_the_documents_equal_the_stored_figures(self):
         for page in tables.PAGES:
             with self.subTest(page.name):
                 text = page.read_text(encoding="utf-8")
@@ -216,7 +216,7 @@ class Tables(support.Scratch):
         text = "".join(page.read_text(encoding="utf-8") for page in tables.PAGES)
         self.assertEqual({block[2] for block in tables.BLOCK.finditer(text)}, set(tables.KINDS))
 
-    def test_what_is_not_stored_or_not_known_is_named(self):
+    def test_missing_figures_and_unknown_tables_are_named(self):
         for text, said in [
             ("<!-- table: finished nowhere -->\n<!-- end -->", "'finished'.*'nowhere'"),
             ("<!-- table: none -->\n<!-- end -->", "no table 'none'"),
@@ -224,7 +224,7 @@ class Tables(support.Scratch):
             with self.subTest(text), self.assertRaisesRegex(Missing, said):
                 tables.filled(text)
 
-    def test_a_source_says_what_a_figure_is_of(self):
+    def test_a_source_has_commit_date_and_machine(self):
         pool, torus = ({"scene": "pool"}, "a" * 40, {}), ({"scene": "torus"}, "b" * 40 + "-dirty", {"carried": True})
         figures = self.stored(pool)
         figures.all("rays")
@@ -245,8 +245,8 @@ class Tables(support.Scratch):
             figures.one("rays")
 
     def test_numbers_keep_two_digits(self):
-        told = [digits(value) for value in (None, 0.0309, 0.03, 1.0, 11.3, 7e-5)]
-        self.assertEqual(told, ["-", "0.031", "0.030", "1.0", "11", "7.0e-05"])
+        texts = [digits(value) for value in (None, 0.0309, 0.03, 1.0, 11.3, 7e-5)]
+        self.assertEqual(texts, ["-", "0.031", "0.030", "1.0", "11", "7.0e-05"])
 
 
 if __name__ == "__main__":

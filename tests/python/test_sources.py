@@ -1,4 +1,4 @@
-"""The Python of the project: lints, no circle of imports, and module names that are unique."""
+"""Tests the project's Python: lints, no import cycles, unique module names."""
 
 import ast
 import re
@@ -26,7 +26,7 @@ def sources():
 
 
 def imported(path, module_level=True):
-    """The files that a file imports, by all their possible paths; `module_level`: what it imports when it is loaded."""
+    """All possible paths of a file's imports. `module_level`: only imports outside of functions."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     nodes = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
     if module_level:
@@ -46,7 +46,7 @@ def imported(path, module_level=True):
 
 
 def graph(paths, module_level=False):
-    """The imports among some files: {file: files}."""
+    """The imports among `paths`: {file: imported files}."""
     names = {}
     for path in paths:
         names.setdefault(path.stem, path)
@@ -66,7 +66,7 @@ def graph(paths, module_level=False):
 
 
 def circles(edges):
-    """The circles of a graph, as lists of files."""
+    """The cycles of a graph, as lists of files."""
     found, done = [], set()
 
     def walk(file, trail):

@@ -1,4 +1,4 @@
-"""Runs unittest's command line and prints the time of every test that takes a second or more.
+"""Runs unittest's command line and prints the time of each test that takes a second or more.
 
 `tests/test_times.awk` reads these lines.
 """

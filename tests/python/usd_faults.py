@@ -1,4 +1,4 @@
-"""Stages with a fault in them: each ends with a `Fault` or a loss that names the prim, and with no other exception."""
+"""Tests invalid stages: each ends with a `Fault` or a loss that names the prim, and with no other exception."""
 
 import contextlib
 import io
@@ -35,17 +35,17 @@ PREVIEW = 'uniform token info:id = "UsdPreviewSurface"\n'
 
 
 def worn(surface, nodes="", kind=PREVIEW):
-    """A mesh that wears a surface with these inputs, and what else stands in its material."""
+    """A mesh with a surface with these inputs. `nodes`: other nodes of the material."""
     return WORN % (kind + surface, nodes)
 
 
 def textured(surface, texture, output="float3 outputs:rgb", kind="UsdUVTexture"):
-    """A mesh whose surface is fed by a texture."""
+    """A mesh with a textured surface."""
     return worn(surface, f'def Shader "Texture" {{\nuniform token info:id = "{kind}"\n{texture}\n{output}\n}}')
 
 
 def prim(kind, attributes):
-    """A prim, /P, of a kind."""
+    """A prim /P of a type."""
     return f'def {kind} "P" {{\n{attributes}\n}}\n'
 
 
@@ -57,8 +57,8 @@ class Faults(usd_support.Stages):
     names = itertools.count()
 
     def outcome(self, text, frame=None):
-        """What a stage of this text is refused for, or what is lost of it."""
-        # A name of its own: USD holds on to files that it has read.
+        """The text of the Fault or of the losses of a stage with this text."""
+        # A new name, because USD caches files that it has read.
         self.path = self.dir / f"{next(self.names)}.usda"
         self.path.write_bytes(b"#usda 1.0\n" + (text if isinstance(text, bytes) else text.encode()))
         try:
@@ -83,7 +83,7 @@ class Faults(usd_support.Stages):
             (prim("RenderSettings", 'float resolution = 2'), "/P: resolution is a number, not a int2"),
         )
 
-    def test_numbers_that_are_none(self):
+    def test_numbers_that_are_not_finite(self):
         self.check(
             (prim("Camera", 'float fStop = nan'), "/P: fStop is nan, which is not finite"),
             (prim("Camera", 'float exposure = 1e38'), "/P: its exposure brightens by inf"),
@@ -102,7 +102,7 @@ class Faults(usd_support.Stages):
         )
         self.assertIn("its frame is nan", self.outcome("", float("nan")))
 
-    def test_words_that_mean_nothing(self):
+    def test_unknown_tokens(self):
         self.check(
             (prim("Cone", 'uniform token axis = "W"'), "/P: its axis is W (it is X, Y or Z)"),
             (prim("Plane", 'uniform token axis = ""'), "/P: its axis is "),
@@ -111,7 +111,7 @@ class Faults(usd_support.Stages):
             (textured(BASE.format("q"), FILE, "float3 outputs:q"), "/Material/Texture: it has no output q"),
         )
 
-    def test_images_are_of_the_formats_that_are_meant(self):
+    def test_images_of_other_formats_are_refused(self):
         # Pillow hands EPS to Ghostscript, whatever the file is called.
         program = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 2 2\n%%EndComments\nshowpage\n"
         (self.dir / "e.png").write_bytes(program)
@@ -119,11 +119,11 @@ class Faults(usd_support.Stages):
                         "float3 outputs:rgb")
         self.assertIn("the image e.png cannot be read: it is none of PNG, JPEG", self.outcome(text))
 
-    def test_axes_that_are_none(self):
+    def test_an_unknown_up_axis(self):
         self.assertEqual(self.outcome('(\nupAxis = "X"\n)'),
                          "/: upAxis is X, which is neither Y nor Z: Y is up (turn the stage by a transform)")
 
-    def test_bytes_that_are_no_text(self):
+    def test_bytes_that_are_not_utf8(self):
         self.check(
             (b'def Sphere "S" { custom string caustique:name = "\xff" }', "not UTF-8"),
             (b'def \xff\xfe "S" {}', "UTF-8"),
@@ -135,7 +135,7 @@ class Faults(usd_support.Stages):
             self.assertEqual(convert.main([str(self.path), "--arguments"]), 1)
         self.assertIn("USD cannot read it", json.loads(said.getvalue())["fault"])
 
-    def test_what_feeds_itself(self):
+    def test_cycles_and_chains_that_are_too_long(self):
         node = ('def Shader "{0}" {{\nuniform token info:id = "ND_convert_color3_vector3"\n'
                 "color3f inputs:in.connect = </Material/{1}.outputs:out>\nfloat3 outputs:out\n}}\n")
         surface = "color3f inputs:diffuseColor.connect = </Material/A.outputs:out>"
@@ -170,13 +170,13 @@ class Faults(usd_support.Stages):
             (worn("float inputs:base_color = 1", kind=open_pbr).replace("surface.c", "mtlx:surface.c"),
              at + "base_color is a number, not 3 numbers"),
         )
-        # A colour with opacity is one without.
+        # A colour with opacity counts as one without.
         self.assertEqual(self.outcome(worn("color4f inputs:diffuseColor = (1, 0.5, 0, 1)")), "")
         document, _ = usd_support.read_glb(self.dir / "out.glb")
         self.assertEqual(document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"], [1, 0.5, 0, 1])
 
     def image(self, mode):
-        """A grey image of a mode of Pillow's, "L" or with opacity "LA"."""
+        """A grey image in a mode of Pillow: "L", or "LA" with opacity."""
         Image.fromarray(numpy.full((2, 2) if mode == "L" else (2, 2, 2), 128, numpy.uint8)).save(self.dir / "grey.png")
 
     def test_textures(self):
@@ -194,7 +194,7 @@ class Faults(usd_support.Stages):
              "/Material/Texture: what feeds scale is a number, not 4 numbers"),
         )
 
-    def test_what_has_no_values_or_no_surface(self):
+    def test_primvars_without_values_and_lights_without_surface(self):
         self.check(
             (MESH % "color3f[] primvars:displayColor = []",
              "/Mesh: its primvar displayColor has no values and is ignored"),
@@ -207,7 +207,7 @@ class Faults(usd_support.Stages):
         self.outcome('def SphereLight "L" ( prepend apiSchemas = ["ShapingAPI"] ) {\n'
                      "float inputs:shaping:cone:angle = 0\nfloat inputs:shaping:cone:softness = 0.5\n}")
 
-    def test_what_a_stage_may_not_say_of_its_render(self):
+    def test_attributes_that_are_no_option_are_ignored(self):
         self.check(
             ('def RenderSettings "R" {\ncustom int caustique:medium = 1\ncustom int caustique:medium:g = 2\n}',
              "/R: caustique:medium:g is ignored: what it is a part of has a value of its own"),
@@ -217,7 +217,7 @@ class Faults(usd_support.Stages):
              "/P: caustique:seed is a quatf and is ignored"),
         )
 
-    def test_prims_as_deep_as_python_is_not(self):
+    def test_prims_nested_deeper_than_pythons_recursion_limit(self):
         depth = 1500
         self.assertEqual(self.outcome(depth * 'def Xform "P" {\n' + prim("Sphere", "") + depth * "}\n"), "")
         document, _ = usd_support.read_glb(self.dir / "out.glb")

@@ -1,4 +1,4 @@
-"""UsdLux beside closed forms: what lights bring to a point, by kind and by how they are told to shine."""
+"""Compares UsdLux lights with closed forms of irradiance, for all types and attributes."""
 
 import math
 import unittest
@@ -12,15 +12,15 @@ from usd_support import down
 
 ALBEDO = 0.5
 HEIGHT = 2.0
-# Pixels of a picture, and how far from the truth four standard errors may reach (shares).
+# Pixels per side of a picture, and the largest relative size of four standard errors.
 SIZE, WORST = 8, 0.04
 
 
 class Irradiance(usd_support.Stages):
-    """A floor that is seen at its middle: radiance is albedo / pi times irradiance."""
+    """Measures irradiance on a floor, from its radiance albedo / pi times irradiance."""
 
     def measured(self, *options):
-        """Irradiance of the middle, 3 numbers, and its standard error."""
+        """Irradiance at the floor's centre (3 numbers), and its standard error."""
         self.floor(ALBEDO)
         self.camera((1.5, 0.6, 0))
         picture = self.render("--width", SIZE, "--height", SIZE, "--iterations", 256, "--method", "path",
@@ -29,14 +29,14 @@ class Irradiance(usd_support.Stages):
         return picture.mean(0) * scale, picture.std(0) * scale / math.sqrt(len(picture))
 
     def check(self, expected, *options):
-        """Compares with irradiance that is known, a number or three."""
+        """Compare with the expected irradiance, one number or three."""
         expected = numpy.broadcast_to(expected, 3)
         mean, error = self.measured(*options)
         self.assertLess((4 * error / expected).max(), WORST, "too noisy to tell")
-        # The floor is seen over 2 cm, and lamps are polygons: a thousandth is allowed for that.
+        # 0.2 % are allowed because the picture shows 2 cm of the floor and lamps are polygons.
         for got, noise, truth in zip(mean, error, expected):
             self.assertLess(abs(got - truth), 4 * noise + 2e-3 * truth, f"{mean} for {expected}, +- {error}")
-        # The same test finds a light that is 8 % off.
+        # The test detects a light that is 8 % brighter.
         self.assertTrue((abs(mean - 1.08 * expected) > 4 * error + 2e-3 * expected).all())
 
     def test_sphere(self):
@@ -56,7 +56,7 @@ class Irradiance(usd_support.Stages):
     def test_stretched_sphere_keeps_its_power_when_normalized(self):
         stretch = Gf.Matrix4d().SetScale((1, 2, 1))
         self.light("SphereLight", matrix=stretch * down(HEIGHT), radius=0.1, intensity=30.0, normalize=True)
-        # Turned by `down` its long axis lies across the way to the floor: an ellipse of 0.1 by 0.2.
+        # After `down`, the long axis is parallel to the floor: an ellipse of 0.1 by 0.2.
         p = 1.6
         area = 4 * math.pi * (((0.1 * 0.2) ** p * 2 + (0.1 * 0.1) ** p) / 3) ** (1 / p)
         theta, phi = (numpy.arange(400) + 0.5) / 400 * math.pi, (numpy.arange(800) + 0.5) / 800 * 2 * math.pi
@@ -76,7 +76,8 @@ class Irradiance(usd_support.Stages):
         self.check(2 / (math.pi * 0.25) * math.pi * 0.25 / (0.25 + HEIGHT ** 2))
 
     def rectangle(self, x, y, h):
-        """Irradiance under the middle of a rectangle of radiance 1, half x and half y, facing down from h."""
+        """Irradiance below the centre of a rectangle of radiance 1 with half sizes x and y, facing down from height
+        h."""
         part = lambda a, b: a / math.hypot(a, h) * math.atan(b / math.hypot(a, h))
         return 2 * (part(x, y) + part(y, x))
 
@@ -157,17 +158,17 @@ class Irradiance(usd_support.Stages):
 
 
 def _seen(place, normal, element):
-    """Irradiance at the origin, facing +y, of a convex body of radiance 1 outside: points, normals, areas."""
+    """Irradiance at the origin, facing +y, from a convex body of radiance 1, given as points, normals and areas."""
     distance = numpy.linalg.norm(place, axis=2)
     towards = -(normal * place).sum(2) / distance
     return (numpy.clip(towards, 0, None) * place[:, :, 1] / distance / distance ** 2 * element).sum()
 
 
 class Dome(usd_support.Stages):
-    """Where the images of domes are: by OpenEXR their middle is at +Z, and +X is a quarter to the left."""
+    """Orientation of dome images: in OpenEXR their centre is at +Z, and +X is a quarter to the left."""
 
     def seen(self, kind="DomeLight", matrix=None, file="sky.exr", pixels=None, **inputs):
-        """What a camera sees along +X, +Y, +Z, -X, -Y and -Z of the stage."""
+        """Radiance along +X, +Y, +Z, -X, -Y and -Z of the stage."""
         self.stage.RemovePrim("/Light")
         pixels = self.panels() if pixels is None else pixels
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
@@ -186,7 +187,7 @@ class Dome(usd_support.Stages):
 
     @staticmethod
     def panels():
-        """An image with a colour of its own around each axis: [+X, +Y, +Z, -X, -Y, -Z] below."""
+        """An image with a different colour around each axis: [+X, +Y, +Z, -X, -Y, -Z]."""
         pixels = numpy.zeros((32, 64, 3), numpy.float32)
         for at, colour in zip((48, 16, 32, 0), (Dome.NEG_X, Dome.X, Dome.Z, Dome.NEG_Z)):
             for k in range(-8, 8):
@@ -205,12 +206,12 @@ class Dome(usd_support.Stages):
 
     def test_turned_about_the_vertical(self):
         turn = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(0, 1, 0), 90))
-        # +Z goes to +X, +X to -Z.
+        # +Z turns to +X, +X to -Z.
         self.expect(self.seen(matrix=turn), self.Z, self.Y, self.NEG_X, self.NEG_Z, self.NEG_Y, self.X)
 
     def test_tilted_and_tinted(self):
         turn = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(1, 0, 0), 90))
-        # +Y goes to +Z, +Z to -Y.
+        # +Y turns to +Z, +Z to -Y.
         found = self.seen(matrix=turn, color=Gf.Vec3f(1, 2, 4))
         tint = lambda c: tuple(a * b for a, b in zip(c, (1, 2, 4)))
         self.expect(found, *map(tint, (self.X, self.NEG_Z, self.Y, self.NEG_X, self.Z, self.NEG_Y)))

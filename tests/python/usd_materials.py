@@ -1,4 +1,4 @@
-"""Materials of stages: what becomes of UsdPreviewSurface, OpenPBR and Standard Surface, and of their textures."""
+"""Tests conversion of UsdPreviewSurface, OpenPBR and Standard Surface, and of their textures."""
 
 import io
 import math
@@ -21,7 +21,7 @@ class Materials(usd_support.Stages):
         self.closed = UsdGeom.Cube.Define(self.stage, "/Cube")
 
     def worn(self, kind="UsdPreviewSurface", context="", prim=None, **inputs):
-        """The glTF material of a shader with these inputs, and what is lost."""
+        """The glTF material of a shader with these inputs, and the losses."""
         self.bind(prim or self.closed, self.material(kind=kind, context=context, **inputs))
         document, _, lost = self.convert()
         return document["materials"][0], lost
@@ -59,7 +59,7 @@ class Materials(usd_support.Stages):
         shader.CreateInput("opacityMode", Sdf.ValueTypeNames.Token).Set("presence")
         self.assertEqual(self.convert()[0]["materials"][0]["alphaMode"], "BLEND")
 
-    def test_metal_stays_opaque_and_is_told_so(self):
+    def test_metal_stays_opaque_with_a_warning(self):
         found, lost = self.worn(opacity=0.5, metallic=1.0)
         self.assertNotIn("KHR_materials_transmission", found.get("extensions", {}))
         self.assertEqual(lost, ['/Material/Shader: opacity 0.5 is not carried: metal is opaque (opacityMode "presence" '
@@ -100,7 +100,7 @@ class Materials(usd_support.Stages):
         numpy.testing.assert_allclose(medium["sigma_s"], [0.2, 0.4, 0.6], rtol=1e-6)
         numpy.testing.assert_allclose(numpy.add(medium["sigma_a"], medium["sigma_s"]), [2 * math.log(2)] * 3, rtol=1e-6)
 
-    def test_what_materialx_loses_is_named(self):
+    def test_losses_of_materialx_are_named(self):
         _, lost = self.worn(OPEN_PBR, "mtlx", subsurface_weight=0.5, thin_film_weight=1.0)
         self.assertEqual([line.split(": ")[1].split(" is ")[0] for line in lost],
                          ["subsurface scattering", "a thin film"])
@@ -123,7 +123,7 @@ class Materials(usd_support.Stages):
         self.worn("ND_UsdPreviewSurface_surfaceshader", "mtlx", diffuseColor=(0.1, 0.2, 0.3))
         material = UsdShade.Material.Get(self.stage, "/Material")
         shader = UsdShade.Shader.Get(self.stage, "/Material/Shader")
-        # As exporters write it: inputs that the material may set, and of which it sets some.
+        # As exporters write it: interface inputs of the material, some of them set.
         roughness = material.CreateInput("roughness", Sdf.ValueTypeNames.Float)
         roughness.Set(0.25)
         shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).ConnectToSource(roughness)
@@ -146,14 +146,14 @@ class Materials(usd_support.Stages):
                          {"priority": 3, "medium": {"sigma_a": [1, 2, 3]}})
         self.assertEqual(document["nodes"][0]["extras"]["caustique"], {"visible": {"camera": False}})
 
-    def test_what_is_bound_is_not_there(self):
+    def test_a_bound_material_that_does_not_exist_is_named(self):
         UsdShade.MaterialBindingAPI.Apply(self.closed.GetPrim()).GetPrim().CreateRelationship(
             "material:binding").SetTargets(["/Nothing"])
         self.assertIn("/Cube: the material /Nothing is not there", self.convert()[2])
 
 
 class Textures(usd_support.Stages):
-    """A square with coordinates `st` of its own places, and images of 2 by 2 texels, upper row first."""
+    """A square with coordinates `st` equal to its positions, and images of 2 by 2 texels, top row first."""
 
     def setUp(self):
         super().setUp()
@@ -165,7 +165,7 @@ class Textures(usd_support.Stages):
         self.bind(self.square, self.surface)
 
     def texture(self, name, texels, to, output="rgb", transform=None, **inputs):
-        """Feeds an input `to` with an image; `transform`: inputs of a UsdTransform2d."""
+        """Connect an image to the input `to`. `transform`: inputs of a UsdTransform2d."""
         Image.fromarray(numpy.array(texels, numpy.uint8)).save(self.dir / f"{name}.png")
         image = UsdShade.Shader.Define(self.stage, f"/Material/{name}")
         image.CreateIdAttr("UsdUVTexture")
@@ -191,7 +191,7 @@ class Textures(usd_support.Stages):
         given.ConnectToSource(image.CreateOutput(output, kind))
 
     def made(self):
-        """The material, its images (arrays of bytes), and what is lost."""
+        """The material, its images (arrays of bytes), and the losses."""
         document, buffer, lost = self.convert()
         views = [document["bufferViews"][image["bufferView"]] for image in document.get("images", ())]
         images = [numpy.asarray(Image.open(io.BytesIO(buffer[v["byteOffset"]:v["byteOffset"] + v["byteLength"]])))
@@ -255,7 +255,7 @@ class Textures(usd_support.Stages):
         self.texture("colour", self.COLOURS, "diffuseColor", transform=said, sourceColorSpace="sRGB")
         found, _, _ = self.made()
         made = found["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]["KHR_texture_transform"]
-        # The reader's matrix: counter-clockwise with v running down (src/scene/gltf/texture.rs).
+        # The glTF reader's matrix: counter-clockwise with v pointing down (src/scene/gltf/texture.rs).
         cos, sin = math.cos(made["rotation"]), math.sin(made["rotation"])
         x, y = made["scale"]
         matrix = numpy.array([[cos * x, sin * y], [-sin * x, cos * y]])

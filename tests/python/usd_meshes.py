@@ -1,4 +1,4 @@
-"""What a stage's meshes, places, instances and cameras become: the converter's .glb, looked into."""
+"""Tests the conversion of meshes, transforms, instances and cameras in the converter's .glb."""
 
 import math
 import unittest
@@ -10,7 +10,7 @@ import usd_support
 from faults import Fault
 from usd_support import corners
 
-# Two squares beside each other, of points 0 to 5.
+# Two adjacent squares with points 0 to 5.
 POINTS = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0)]
 COUNTS, INDICES = [4, 4], [0, 1, 4, 3, 1, 2, 5, 4]
 
@@ -20,7 +20,7 @@ class Meshes(usd_support.Stages):
         return self.mesh("/Squares", POINTS, COUNTS, INDICES, **options)
 
     def colours(self, interpolation, count):
-        """What a displayColor of so many values is at each corner: pairs of a place and a colour."""
+        """Pairs of a position and a colour at each corner, for a displayColor with `count` values."""
         mesh = self.squares()
         shades = numpy.arange(1, count + 1) / 16
         primvar = mesh.CreateDisplayColorPrimvar(interpolation)
@@ -63,7 +63,7 @@ class Meshes(usd_support.Stages):
         self.assertEqual(lost, ["/Squares: normals has 5 values, and vertex interpolation takes 6: they are left out, and "
                                 "its faces are flat"])
 
-    def test_points_alike_become_one_vertex(self):
+    def test_equal_points_become_one_vertex(self):
         self.squares()
         document, buffer, _ = self.convert()
         position = document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]
@@ -82,7 +82,7 @@ class Meshes(usd_support.Stages):
     def test_holes_and_concave_polygons(self):
         mesh = self.squares()
         mesh.CreateHoleIndicesAttr([0])
-        # An arrow head, and a star of five: fans from their first corners would leave them.
+        # An arrow head and a five-pointed star, which a fan from the first corner would not fill correctly.
         arrow = [(0, 0, 0), (2, -1, 0), (0.5, 0, 0), (2, 1, 0)]
         turns = [math.pi * k / 5 for k in range(10)]
         reach = (0.4, 1)
@@ -101,7 +101,7 @@ class Meshes(usd_support.Stages):
         truth = (1, 0.5, 5 * 0.4 * math.sin(math.pi / 5))
         numpy.testing.assert_allclose([area(m) for m in whole], truth, rtol=1e-5)
 
-    def test_subsets_wear_their_materials(self):
+    def test_subsets_have_their_materials(self):
         mesh = self.squares()
         left, right = self.material("/Left"), self.material("/Right")
         self.bind(mesh, left)
@@ -155,7 +155,7 @@ class Meshes(usd_support.Stages):
                     self.assertEqual("XYZ"[widest], mesh["name"][-1])
 
 
-    def test_shapes_alike_but_for_their_size_share_a_mesh(self):
+    def test_shapes_that_differ_only_in_size_share_a_mesh(self):
         for at, radius in enumerate((1.0, 2.5, 0.1)):
             ball = UsdGeom.Sphere.Define(self.stage, f"/Ball{at}")
             ball.CreateRadiusAttr(radius)
@@ -176,7 +176,7 @@ class Meshes(usd_support.Stages):
 
 class Places(usd_support.Stages):
     def matrices(self, **options):
-        """World matrices of the nodes with meshes, by name, as points are multiplied by them from the right."""
+        """{name: world matrix} of the nodes with meshes, for column vectors."""
         document, _, _ = self.convert(**options)
         nodes = [n for n in document.get("nodes", ()) if "mesh" in n]
         return {n["name"]: numpy.array(n["matrix"]).reshape(4, 4) for n in nodes}, document
@@ -363,7 +363,7 @@ class Cameras(usd_support.Stages):
         said = found["extras"]["caustique"]
         self.assertAlmostEqual(found["perspective"]["yfov"], 2 * math.atan(12 / 50))
         self.assertAlmostEqual(found["perspective"]["aspectRatio"], 1.5)
-        # 50 mm at f/2 is a pupil of 25 mm.
+        # 50 mm at f/2 has an aperture of 25 mm.
         self.assertAlmostEqual(said["aperture_radius"], 0.0125)
         self.assertAlmostEqual(said["focus_distance"], 2.5)
         numpy.testing.assert_allclose(said["shift"], [0.1, -0.1], rtol=1e-6)
@@ -409,14 +409,14 @@ def RenderVar "What" {
         self.assertEqual((said["resolution"], said["crop"]), ([200, 100], [0.25, 0.5, 0.75, 0.5]))
         self.assertTrue(said["film_transparent"])
         self.assertEqual([c["name"] for c in document["cameras"]], ["/Second", "/Camera"])
-        # A picture wider than the aperture shows more at the sides.
+        # A picture with a wider aspect ratio than the aperture shows more at the sides.
         aperture = second.GetVerticalApertureAttr().Get() / second.GetFocalLengthAttr().Get()
         self.assertAlmostEqual(document["cameras"][0]["perspective"]["yfov"], 2 * math.atan(aperture / 2), places=6)
         self.assertEqual(lost, ['/What: there is no layer for the RenderVar\'s sourceName "primvars:fur"'])
         options = usd_support.convert.arguments(str(self.path))
         self.assertEqual(options, ["--layers=beauty,normal", "--max-depth=7", "--method=bdpt", "--no-combine"])
 
-    def test_a_camera_that_is_not_there(self):
+    def test_a_camera_that_does_not_exist_is_named(self):
         root = self.stage.GetRootLayer()
         root.ImportFromString(root.ExportToString() + 'def RenderSettings "S" {\nrel camera = </Nobody>\n}')
         self.assertEqual(self.convert()[2], ["/S: its camera /Nobody is not there: the first of the stage is taken"])
@@ -436,7 +436,7 @@ class Bad(usd_support.Stages):
             with self.assertRaisesRegex(Fault, "/World/Broken: " + fault):
                 self.convert()
 
-    def test_a_stage_that_is_none(self):
+    def test_files_that_are_no_stage(self):
         for text in (b"", b"#usda 1.0\ndef Mesh {", b"PXR-USDC\0\0\0\0"):
             path = self.dir / "broken.usda"
             path.write_bytes(text)
@@ -449,7 +449,7 @@ class Bad(usd_support.Stages):
         self.assertEqual(len(lost), 1)
         self.assertIn("missing.usda", lost[0])
 
-    def test_what_is_not_carried_is_named(self):
+    def test_losses_are_named(self):
         for kind in ("BasisCurves", "Points", "NurbsPatch", "Volume"):
             self.stage.DefinePrim("/" + kind, kind)
         _, _, lost = self.convert()

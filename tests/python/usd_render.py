@@ -1,4 +1,4 @@
-"""The program on stages: render, plan, info and frames, faults as errors, and the layer that tells of an EXR."""
+"""Tests the program with stages: render, plan, info, frames, errors, and the USD layer that describes an EXR."""
 
 import contextlib
 import json
@@ -29,7 +29,7 @@ class Program(usd_support.Stages):
         self.out = self.dir / "out.exr"
 
     def save(self, text=""):
-        """Saves the stage, with more in the words of its format."""
+        """Save the stage, with `text` appended."""
         root = self.stage.GetRootLayer()
         if text:
             root.ImportFromString(root.ExportToString() + text)
@@ -47,14 +47,14 @@ class Program(usd_support.Stages):
         self.assertGreater(ours.mean(), 0.4)
 
     def endless(self):
-        """Makes the path that of a stage of 2^30 prims, by references to references."""
+        """Set the path to a stage of 2^30 prims, by nested references."""
         both = "".join(f'def "{side}" (\nreferences = </A{{1}}>\n) {{{{}}}}\n' for side in "lr")
         levels = "".join(f'def "A{at}" {{\n' + both.format(at, at + 1) + "}\n" for at in range(30))
         self.path = self.dir / "endless.usda"
         self.path.write_text("#usda 1.0\n" + levels + 'def Sphere "A30" {}\n')
 
     def converters(self):
-        """Processes that convert the stage."""
+        """The processes that convert the stage."""
         lines = []
         for entry in Path("/proc").glob("[0-9]*/cmdline"):
             with contextlib.suppress(OSError):
@@ -150,7 +150,7 @@ class Program(usd_support.Stages):
         self.assertLess(first.mean(), 0.9)
         numpy.testing.assert_allclose(second, 1, atol=1e-5)
 
-    def test_what_the_stage_says_holds_until_the_command_line_says_otherwise(self):
+    def test_the_command_line_overrides_options_of_the_stage(self):
         self.save("""
 def RenderSettings "Settings" {
     uniform int2 resolution = (12, 6)
@@ -175,7 +175,7 @@ def RenderVar "Var" {
         self.assertIn("4 x 4 pixels", support.run(["info", self.out], check=0).stdout)
 
     def products(self, *products):
-        """Saves the stage with RenderSettings of products, (prim's name, productName or None) each."""
+        """Save the stage with RenderSettings with these products, (prim's name, productName or None) each."""
         settings = UsdRender.Settings.Define(self.stage, "/Settings")
         for name, file in products:
             product = UsdRender.Product.Define(self.stage, f"/{name}")
@@ -185,7 +185,7 @@ def RenderVar "Var" {
         self.save()
 
     def in_the_folder(self, *options, check=0):
-        """Renders with the test's folder as the current one, and without -o."""
+        """Render in the test's folder, without -o."""
         return support.run(["render", self.path, *QUICK, *options], check=check, cwd=self.dir)
 
     def test_a_product_names_the_output_and_the_command_line_another(self):
@@ -248,7 +248,7 @@ def RenderVar "Var" {
         self.assertIn("stage.usda: RenderSettings", done.stderr)
         self.assertIn("scanline", done.stderr)
 
-    def test_files_and_permissions_are_no_stage_s_business(self):
+    def test_files_and_permissions_in_a_stage_are_refused(self):
         for name in ("png", "output", "checkpoint", "usd_layer", "allow_outside", "env", "model", "preview"):
             with self.subTest(name):
                 self.stage.RemovePrim("/Settings")
@@ -311,16 +311,16 @@ class Layer(usd_support.Stages):
         names = {UsdRender.Var.Get(stage, target).GetSourceNameAttr().Get()
                  for target in product.GetOrderedVarsRel().GetTargets()}
         channels = usd_support.OpenEXR.File(str(out), separate_channels=True).channels()
-        # The picture and Z stand at the file's root.
+        # The picture and Z are at the root of the file.
         of_root = {"R": "beauty", "G": "beauty", "B": "beauty", "A": "beauty", "Z": "Z"}
         self.assertEqual(names, {name.rpartition(".")[0] or of_root[name] for name in channels})
 
-    def test_the_checker_finds_what_is_wrong(self):
+    def test_the_checker_finds_faults(self):
         path = self.dir / "bare.usda"
         Sdf.Layer.CreateNew(str(path)).Save()
         self.assertNotEqual(_faults(Usd.Stage.Open(str(path))), [])
 
-    def test_it_needs_a_name_of_its_kind_and_a_file_to_tell_of(self):
+    def test_the_layer_needs_a_usda_name_and_an_exr(self):
         self.stage.GetRootLayer().Save()
         done = support.run(["render", self.path, "-o", self.dir / "o.exr", "--usd-layer", self.dir / "o.txt"], check=2)
         self.assertIn("does not end in .usda", done.stderr)
@@ -329,7 +329,7 @@ class Layer(usd_support.Stages):
 
 
 def _faults(stage):
-    """What usdchecker says of a stage: it runs all validators of USD."""
+    """The output of usdchecker, which runs all validators of USD, for a stage."""
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     return [error.GetErrorAsString() for error in UsdValidation.ValidationContext(validators).Validate(stage)]
 

@@ -1,4 +1,5 @@
-"""Scenes of Mitsuba that are wrong or are only read in part: an error or a loss that is named, and no file that misses it."""
+"""Scenes of Mitsuba that are wrong or are only read in part: an error or a loss that is named, and no file that misses
+it."""
 
 import contextlib
 import io
@@ -38,7 +39,7 @@ class Reads(unittest.TestCase):
 
     def test_faults_name_the_element(self):
         """No value of an element ends in a traceback."""
-        for wrong, told in [
+        for wrong, message in [
             ('<shape type="obj"/>', 'shape (obj): filename="": there is no such file'),
             ('<shape type="ply"><string name="filename" value="no.ply"/></shape>', 'filename="no.ply": there is no'),
             ('<emitter type="envmap"><string name="filename" value="no.exr"/></emitter>', "there is no such file"),
@@ -57,7 +58,7 @@ class Reads(unittest.TestCase):
             ('<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="0"/></film></sensor>', "0 x 576"),
         ]:
             with self.subTest(wrong):
-                self.assertIn(told, self.refusal(self.write(CAMERA + LIGHT + FLOOR + wrong)))
+                self.assertIn(message, self.refusal(self.write(CAMERA + LIGHT + FLOOR + wrong)))
 
     def test_files_that_are_no_xml(self):
         path = self.folder / "scene.xml"
@@ -77,13 +78,13 @@ class Reads(unittest.TestCase):
         self.assertEqual(found["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"], [1, 0, 0, 1])
 
     def test_includes_that_cannot_be_read(self):
-        for include, told in [
+        for include, message in [
             ('<include filename="no.xml"/>', 'include "no.xml": there is no such file'), ("<include/>", "no such file"),
             ('<include filename="scene.xml"/>', "the file includes itself"),
             ('<shape type="cube"><include filename="scene.xml"/></shape>', "an include within a shape"),
         ]:
             with self.subTest(include):
-                self.assertIn(told, self.refusal(self.write(CAMERA + LIGHT + FLOOR + include)))
+                self.assertIn(message, self.refusal(self.write(CAMERA + LIGHT + FLOOR + include)))
 
     def test_a_scene_without_light_or_camera_is_refused(self):
         self.assertIn("the scene has no light: read are area,", self.refusal(self.write(CAMERA + FLOOR)))

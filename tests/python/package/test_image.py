@@ -95,22 +95,23 @@ class Errors(unittest.TestCase):
         rng = np.random.default_rng(1)
         reference = rng.uniform(0.1, 2.0, (16, 24, 3)).astype(np.float32)
         image = (reference * rng.normal(1.0, 0.1, reference.shape)).astype(np.float32)
-        told = cq.compare(image, reference)
+        metrics = cq.compare(image, reference)
         squares = (image.astype(float) - reference) ** 2
         floor = reference.astype(float).mean(-1) ** 2 + 0.01
-        self.assertAlmostEqual(told["mse"], squares.mean(), delta=1e-6 * squares.mean())
-        self.assertAlmostEqual(told["relmse"], (squares.mean(-1) / floor).mean(), delta=1e-6 * told["relmse"])
-        self.assertAlmostEqual(told["mean_ratio"], image.mean(dtype=float) / reference.mean(dtype=float), places=5)
-        self.assertEqual((told["flip_map"].shape, told["flip_map"].dtype), ((16, 24), np.float32))
-        self.assertAlmostEqual(told["flip"], told["flip_map"].mean(dtype=float), places=5)
+        self.assertAlmostEqual(metrics["mse"], squares.mean(), delta=1e-6 * squares.mean())
+        self.assertAlmostEqual(metrics["relmse"], (squares.mean(-1) / floor).mean(), delta=1e-6 * metrics["relmse"])
+        self.assertAlmostEqual(metrics["mean_ratio"], image.mean(dtype=float) / reference.mean(dtype=float), places=5)
+        self.assertEqual((metrics["flip_map"].shape, metrics["flip_map"].dtype), ((16, 24), np.float32))
+        self.assertAlmostEqual(metrics["flip"], metrics["flip_map"].mean(dtype=float), places=5)
         as_image = cq.Image.from_arrays({"": image, "Level1": reference})
-        self.assertEqual(cq.compare(as_image, reference)["mse"], told["mse"])
+        self.assertEqual(cq.compare(as_image, reference)["mse"], metrics["mse"])
         self.assertEqual(cq.compare(as_image, as_image, layer="Level1")["mse"], 0.0)
         with self.assertRaises(cq.Error):
             cq.compare(image, reference[1:])
 
     def test_combine_knows_the_names_of_blender(self):
-        """The same render under Blender's names: the same picture, under ours, and normals in our axes."""
+        """A render with Blender's layer names gives the same picture under caustique's names, with normals in its
+        axes."""
         program = os.environ.get("CAUSTIQUE_BIN", ROOT / "target" / "release" / "caustique")
         pictures = []
         with tempfile.TemporaryDirectory() as folder:
@@ -144,14 +145,14 @@ class Errors(unittest.TestCase):
 class Convergence(unittest.TestCase):
     def test_points_are_errors_of_renders(self):
         """A point after N iterations is the error that `compare` finds of a render of N iterations."""
-        scene, told = still_life(), []
+        scene, steps = still_life(), []
         options = {"width": 16, "height": 12}
         reference = scene.render(method="bdpt", iterations=256, seed=9, finish=False, **options)
         result = scene.converge(
             methods=["path", "sppm"], reference=reference, iterations=16, moments=2.0,
-            progress=lambda step: told.append((step["run"], step["iterations"])), **options,
+            progress=lambda step: steps.append((step["run"], step["iterations"])), **options,
         )
-        self.assertEqual(set(told), {(run, n) for run in ("path", "sppm") for n in range(1, 17)})
+        self.assertEqual(set(steps), {(run, n) for run in ("path", "sppm") for n in range(1, 17)})
         points = {(point["run"], point["iterations"]): point for point in result["points"]}
         self.assertEqual(set(points), {(run, n) for run in ("path", "sppm") for n in (1, 2, 4, 8, 16)})
         for run, n in [("path", 1), ("path", 16), ("sppm", 8)]:
@@ -164,12 +165,12 @@ class Convergence(unittest.TestCase):
         self.assertGreater(points["path", 1]["relmse"] / points["path", 16]["relmse"], 8)
 
     def test_a_reference_is_made_where_none_is_given(self):
-        told = []
+        steps = []
         result = still_life().converge(
             methods=["path"], reference_iterations=8, iterations=2, width=8, height=8,
-            progress=lambda step: told.append(step["run"]),
+            progress=lambda step: steps.append(step["run"]),
         )
-        self.assertEqual(told.count(None), 8)
+        self.assertEqual(steps.count(None), 8)
         self.assertGreater(result["reference"]["error"]["relmse"], 0.0)
         stopped = still_life().converge(
             methods=["path"], reference=np.ones((8, 8, 3)), iterations=100, width=8, height=8,

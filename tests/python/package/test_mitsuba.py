@@ -106,7 +106,7 @@ class Exchange(unittest.TestCase):
             self.assertIn(loss, said)
             with warnings.catch_warnings(action="ignore"):
                 self.assertTrue(any(loss in warning for warning in cq.Scene(glb).warnings))
-        # What is another scene is told apart: the same with a lamp a twentieth brighter.
+        # The test detects a scene with a lamp that is 5 % brighter.
         xml.write_text(SCENE.replace('scale" value="0.5"', 'scale" value="0.55"'))
         with self.assertRaises(AssertionError):
             self.agree(xml, glb, 1024)

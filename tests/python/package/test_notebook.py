@@ -25,7 +25,8 @@ class Notebook(unittest.TestCase):
                   re.findall(r"(\w+): measured (\S+), theory (\S+)", text)}
         theories = {run: theory for run, (_, theory) in slopes.items()}
         self.assertEqual(theories, {"path": -1.0, "sppm": -0.67, "vcm": -0.5})
-        # What merges falls as theory says or faster, and not faster than noise of independent samples by much.
+        # The error of merging methods falls at least as fast as theory predicts, and little faster than independent
+        # noise.
         for run in ("sppm", "vcm"):
             self.assertLess(slopes[run][0], slopes[run][1], run)
             self.assertGreater(slopes[run][0], -1.6, run)

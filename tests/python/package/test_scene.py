@@ -176,16 +176,16 @@ class Running(unittest.TestCase):
         return self.scene.render(method="path", width=8, height=8, finish=False, **options)
 
     def test_progress_comes_in_the_calling_thread_once_an_iteration(self):
-        told = []
-        self.render(iterations=5, progress=lambda p: told.append((p.iteration, p.iterations, threading.get_ident())))
-        self.assertEqual(told, [(i, 5, threading.get_ident()) for i in range(1, 6)])
+        steps = []
+        self.render(iterations=5, progress=lambda p: steps.append((p.iteration, p.iterations, threading.get_ident())))
+        self.assertEqual(steps, [(i, 5, threading.get_ident()) for i in range(1, 6)])
 
     def test_false_ends_it_and_keeps_what_is_done(self):
         image = self.render(iterations=1000, progress=lambda p: p.iteration < 3)
         self.assertEqual(image.header["iterations"], 3)
         whole = self.render(iterations=3)
         self.assertEqual(image["Noisy"].tobytes(), whole["Noisy"].tobytes())
-        # What is no False goes on.
+        # Values other than False let the render continue.
         self.assertEqual(self.render(iterations=4, progress=lambda p: None).header["iterations"], 4)
 
     def test_an_exception_comes_out_with_the_image(self):
@@ -306,7 +306,7 @@ class Divided(unittest.TestCase):
 
 
 class Faults(unittest.TestCase):
-    """What is wrong is said, with the remedy, and nothing is silent."""
+    """Errors name the fault and the remedy."""
 
     def test_unknown_keywords_name_the_nearest(self):
         scene = ground([])
@@ -428,9 +428,9 @@ class Faults(unittest.TestCase):
         found = cq.libraries()
         self.assertTrue(found["embree"]["found"], found)
         code = "import caustique; print(caustique.libraries(oidn='/no/such.so')['oidn'])"
-        told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-        self.assertIn("no such file", told)
-        self.assertIn("setup.sh", told)
+        output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+        self.assertIn("no such file", output)
+        self.assertIn("setup.sh", output)
 
 
 if __name__ == "__main__":

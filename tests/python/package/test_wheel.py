@@ -21,15 +21,15 @@ print(caustique.__file__)
 
 class Alone(unittest.TestCase):
     def test_it_has_numpy_and_nothing_else(self):
-        told = subprocess.run([PYTHON, "-m", "pip", "list", "--format=json"], capture_output=True, text=True, check=True)
-        names = {package["name"] for package in json.loads(told.stdout)}
+        output = subprocess.run([PYTHON, "-m", "pip", "list", "--format=json"], capture_output=True, text=True, check=True)
+        names = {package["name"] for package in json.loads(output.stdout)}
         self.assertEqual(names - {"pip", "setuptools"}, {"caustique", "numpy"})
 
     def test_it_holds_its_licences(self):
         code = "import importlib.metadata as m; print(*(f.read_text() for f in m.files('caustique') if 'LICENSE' in f.name))"
-        told = subprocess.run([PYTHON, "-I", "-c", code], capture_output=True, text=True, check=True).stdout
+        output = subprocess.run([PYTHON, "-I", "-c", code], capture_output=True, text=True, check=True).stdout
         for name in ("LICENSE-MIT", "LICENSE-APACHE"):
-            self.assertIn((ROOT / name).read_text(), told)
+            self.assertIn((ROOT / name).read_text(), output)
 
     def test_it_renders_far_from_its_sources(self):
         with tempfile.TemporaryDirectory() as folder:
