@@ -130,7 +130,7 @@ fn merge_shards(args: &MergeArgs) -> Result<()> {
     }
     args.write(&delivery.set, &delivery.attributes, naming, &made_for)?;
     let output = args.output.display();
-    delivery.refusal.map_or(Ok(()), |error| {
+    delivery.finish_error.map_or(Ok(()), |error| {
         Err(error.hint(format!("the unfinished picture is in {output}: 'caustique finish' finishes it")))
     })
 }

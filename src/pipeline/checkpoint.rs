@@ -130,15 +130,15 @@ pub fn check(path: &Path, head: &Head, scene: Option<&str>, arguments: &Value) -
         let cause = "is of another scene, or the scene's files have changed since";
         return Err(error(cause.into()).hint("give the same scene, or start anew without --resume"));
     }
-    if let Some((key, there, here)) = difference(&head.arguments, arguments, &FREE_OPTIONS) {
+    if let Some((key, there, here)) = first_difference(&head.arguments, arguments, &FREE_OPTIONS) {
         let cause = format!("was rendered with another --{key}: {there} there, {here} here");
         return Err(error(cause).hint("give the same options, or start anew without --resume"));
     }
     Ok(())
 }
 
-/// The first option by name, not in `free`, whose values `there` and `here` differ, with both values.
-pub(super) fn difference(there: &Value, here: &Value, free: &[&str]) -> Option<(String, Value, Value)> {
+/// The first option by name whose values differ, with both values. Options in `free` may differ.
+pub(super) fn first_difference(there: &Value, here: &Value, free: &[&str]) -> Option<(String, Value, Value)> {
     let none = Map::new();
     let (there, here) = (there.as_object().unwrap_or(&none), here.as_object().unwrap_or(&none));
     let mut keys: Vec<&String> = there.keys().chain(here.keys()).collect();

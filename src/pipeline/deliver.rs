@@ -34,16 +34,16 @@ pub struct Delivery {
     pub reached: Option<Reached>,
     /// Where the error is largest.
     pub worst: Option<Worst>,
-    /// Seconds from the last iteration to the delivery.
-    pub finishing: f64,
-    /// A warning if light that hardly any photon has brought is most of the error.
+    /// Seconds that the layers and the finish took.
+    pub finish_seconds: f64,
+    /// A warning if most of the error is light that hardly any photon has carried.
     pub unseen: Option<String>,
     /// Why the finish failed.
-    pub refusal: Option<Error>,
+    pub finish_error: Option<Error>,
     /// Pixel sums, if the render is a shard.
     pub sums: Option<ShardSums>,
     /// A checkpoint that is no longer needed once the picture is written.
-    pub spent_checkpoint: Option<PathBuf>,
+    pub obsolete_checkpoint: Option<PathBuf>,
 }
 
 /// The choice of layers and the contents of the header.
@@ -65,10 +65,10 @@ pub(super) struct Contents<'a> {
 ///
 /// # Errors
 /// The layers cannot be made, or the observer rejects the estimate. A finish that fails is no error:
-/// [`Delivery::refusal`].
+/// [`Delivery::finish_error`].
 pub(super) fn deliver_render(
     request: &Request<'_>,
-    Iterated { rendered, head, mut finish, spent_checkpoint }: Iterated,
+    Iterated { rendered, head, mut finish, obsolete_checkpoint }: Iterated,
     facts: SceneFacts,
     observer: &mut dyn Observer,
 ) -> Result<Delivery> {
@@ -85,7 +85,7 @@ pub(super) fn deliver_render(
     };
     let (delivery, pixels) = deliver(contents, rendered, finish.as_mut(), Some(observer))?;
     let sums = part.map(|part| ShardSums { head, facts, part, pixels });
-    Ok(Delivery { sums, spent_checkpoint, ..delivery })
+    Ok(Delivery { sums, obsolete_checkpoint, ..delivery })
 }
 
 /// Makes the layers, finishes them and writes the header. Returns also the pixel sums of a shard.
@@ -105,18 +105,18 @@ pub(super) fn deliver(
     let (mut layers, pixels) = Layers::make(&contents, rendered, finishes)?;
     observer.filter(|_| finishes).map_or(Ok(()), |observer| layers.send_estimate(&header, observer))?;
     let finished = finish.map(|finish| layers.finish(finish, contents.selection, unseen.squared)).transpose();
-    let finishing = clock.seconds();
-    let (finished, refusal) = finished.map_or_else(|error| (None, Some(error)), |finished| (finished, None));
+    let finish_seconds = clock.seconds();
+    let (finished, finish_error) = finished.map_or_else(|error| (None, Some(error)), |finished| (finished, None));
     let reached = finished.as_ref().and_then(|finished| Reached::of(layers.history, finished.error));
     let error = reached.as_ref().map(Reached::error).or(error);
     let unseen = unseen.sentence(&settings).filter(|_| error.is_some_and(|error| unseen.dominates(error)));
-    let set = contents.select(layers.set, finishes, refusal.is_some())?;
+    let set = contents.select(layers.set, finishes, finish_error.is_some())?;
     contents.complete_header(&mut header, finished.as_ref(), reached.as_ref(), unseen.as_ref());
     contents.add_costs(&mut header, cpu_seconds() - cpu_start);
     let (mut attributes, techniques) = (layers.attributes, layers.techniques);
     attributes.insert(exr::ATTRIBUTE, &header)?;
     let (finished_by, worst) = finished.map(|finished| (finished.name, finished.worst)).unzip();
-    let (worst, sums, spent_checkpoint) = (worst.flatten(), None, None);
+    let (worst, sums, obsolete_checkpoint) = (worst.flatten(), None, None);
     let picture = Delivery {
         set,
         attributes,
@@ -124,11 +124,11 @@ pub(super) fn deliver(
         finished_by,
         reached,
         worst,
-        finishing,
+        finish_seconds,
         unseen,
-        refusal,
+        finish_error,
         sums,
-        spent_checkpoint,
+        obsolete_checkpoint,
     };
     Ok((picture, pixels))
 }
@@ -192,7 +192,7 @@ impl Contents<'_> {
     }
 }
 
-/// The layers of a render, and what else its pixels are needed for.
+/// The layers of a render, with its techniques, its history and the objects in its pixels.
 struct Layers {
     set: LayerSet,
     attributes: Attributes,
@@ -237,7 +237,7 @@ impl Layers {
         observer.event(Event::Estimated { set: &self.set, attributes: &attributes })
     }
 
-    /// Finishes the picture. `unseen`: squared relative error by light that hardly any photon has brought.
+    /// Finishes the picture. `unseen`: squared relative error by light that hardly any photon has carried.
     fn finish(&mut self, finish: &mut OpenFinish, selection: &Selection, unseen: f64) -> Result<FinishedPicture> {
         let mut finished = finish.finish().apply(&mut self.set, |name| name == ERROR || selection.wants(name))?;
         finished.error = finished.error.map(|error| FinishedError { unseen, ..error });

@@ -7,7 +7,7 @@ use crate::finish::{Denoiser, DenoiserChoice, Finish, Finished, Quality};
 use crate::render::Clock;
 use serde_json::{Value, json};
 
-/// Largest share of the time limit that one run of the denoiser may take at more than the lowest quality.
+/// Largest share of the time limit that one run of the denoiser may take at a quality above the lowest.
 const MAX_DENOISING_SHARE: f64 = 0.07;
 /// Width and height of the picture by which the denoiser is timed.
 const TIMED_SIDE: usize = 192;

@@ -1,6 +1,6 @@
 //! Merges the shards of one render to the picture that one machine would have rendered.
 
-use super::checkpoint::difference;
+use super::checkpoint::first_difference;
 use super::deliver::{Contents, Delivery, deliver};
 use super::facts::SceneFacts;
 use super::finish::{self, FinishRequest};
@@ -192,7 +192,7 @@ fn check_same_render((first, whole): (&Path, &ShardFile), (path, file): (&Path, 
     if file.head.scene != whole.head.scene {
         return Err(error(format!("is of another scene than {first}")).hint("merge shards of one render"));
     }
-    if let Some((key, there, here)) = difference(&whole.head.arguments, &file.head.arguments, &FREE_OPTIONS) {
+    if let Some((key, there, here)) = first_difference(&whole.head.arguments, &file.head.arguments, &FREE_OPTIONS) {
         let cause = format!("was rendered with another --{key} than {first}: {here} here, {there} there");
         return Err(error(cause).hint("merge shards of one render"));
     }

@@ -52,7 +52,7 @@ use resume::Resumption;
 use run::Running;
 
 /// Renders. Everything that can be wrong with a request is found before the first light path, except a finish that
-/// fails, which keeps the estimate ([`Delivery::refusal`]).
+/// fails, which keeps the estimate ([`Delivery::finish_error`]).
 ///
 /// # Errors
 /// The scene; options that contradict it; memory; a stop before the first iteration; an error of the observer.

@@ -33,7 +33,7 @@ pub(super) struct Iterated {
     /// The finish that makes the picture.
     pub finish: Option<OpenFinish>,
     /// A checkpoint that is no longer needed once the picture is written.
-    pub spent_checkpoint: Option<PathBuf>,
+    pub obsolete_checkpoint: Option<PathBuf>,
 }
 
 impl<'a> Running<'a> {
@@ -90,11 +90,11 @@ impl<'a> Running<'a> {
             refuse_stop(observer)?;
         }
         let BetweenIterations { finish, saver, .. } = between;
-        let spent_checkpoint = match saver {
+        let obsolete_checkpoint = match saver {
             Some(saver) => saver.save_at_end(&session, stop, observer)?,
             None => None,
         };
-        Ok(Iterated { rendered: session.finish(stop), head, finish, spent_checkpoint })
+        Ok(Iterated { rendered: session.finish(stop), head, finish, obsolete_checkpoint })
     }
 }
 

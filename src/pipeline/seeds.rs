@@ -1,7 +1,7 @@
 //! The mean of renders that differ only in their seed, weighted by iterations, with its variance and its error. The
 //! renders keep their bandwidths, so the mean has the bias of one render.
 
-use super::checkpoint::difference;
+use super::checkpoint::first_difference;
 use super::deliver::FINISHED_PICTURE;
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::cryptomatte::{Cryptomatte, Id, PixelRanks, RANKS};
@@ -113,7 +113,7 @@ impl Seeds {
         if let Some(first) = self.sources.first() {
             let name = first.path.display();
             if let Some((key, there, here)) =
-                difference(&first.header["arguments"], &header["arguments"], &FREE_OPTIONS)
+                first_difference(&first.header["arguments"], &header["arguments"], &FREE_OPTIONS)
             {
                 let cause = format!("was rendered with another --{key} than {name}: {here} here, {there} there");
                 return Err(error(cause).hint("merge renders that differ in their --seed alone"));
@@ -234,7 +234,7 @@ fn rejected_by(sources: &[Source]) -> Value {
     all.into()
 }
 
-/// The header's key `unseen`: sums of photon counts, and the smallest error by light that hardly any photon has brought,
+/// The header's key `unseen`: sums of photon counts, and the smallest error by light that hardly any photon has carried,
 /// because it is enough that one render has found the light. `None` if the methods count no photons.
 fn unseen(sources: &[Source]) -> Option<Value> {
     let all = || sources.iter().filter_map(|source| source.header.get("unseen"));

@@ -1,8 +1,8 @@
 //! Where the error of a picture is: the worst tiles, and the objects and kinds of light with the largest shares.
 //!
 //! The squared error of a pixel is divided among the kinds of light in proportion to their noise. The noise of a kind is
-//! the difference between neighbouring pixels of its layer, divided by the albedo. Edges of objects count as noise, so the
-//! shares are approximate. A pixel belongs to the object that covers at least half of it.
+//! the difference between neighbouring pixels of its layer, without the texture of the albedo. Edges of objects count as
+//! noise, so the shares are approximate. A pixel belongs to the object that covers at least half of it.
 
 use super::layers::SceneNames;
 use crate::estimator::PixelAccumulator;
@@ -119,8 +119,8 @@ impl Holders {
 }
 
 impl Worst {
-    /// `squared`: squared errors of the pixels; `weight`: factors that make them relative; `set`: the layers of the kinds
-    /// of light.
+    /// Finds the worst places. `squared`: squared errors of the pixels; `weight`: factors that make them relative; `set`:
+    /// the layers of the kinds of light; `visible`: the objects in the pixels.
     pub(super) fn of(squared: &Picture, weight: &[f32], set: &LayerSet, visible: &Visible) -> Worst {
         let relative: Vec<f64> =
             squared.iter().zip(weight).map(|(rgb, weight)| f64::from(rgb.iter().sum::<f32>() / 3.0 * weight)).collect();

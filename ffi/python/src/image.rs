@@ -39,8 +39,8 @@ pub struct Image {
 impl Image {
     /// The image of a render, and the error of its finish if that failed.
     pub fn of(delivery: Delivery) -> (Image, Option<Error>) {
-        let Delivery { set, attributes, sums, refusal, .. } = delivery;
-        (Image { set, attributes, sums }, refusal)
+        let Delivery { set, attributes, sums, finish_error, .. } = delivery;
+        (Image { set, attributes, sums }, finish_error)
     }
 }
 

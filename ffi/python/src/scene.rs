@@ -262,8 +262,8 @@ fn arguments_as_json(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &
 
 /// The image of a render. If its finish failed, an exception with the image as its attribute.
 pub fn delivered(py: Python<'_>, delivery: Delivery) -> PyResult<Image> {
-    let (image, refusal) = Image::of(delivery);
-    let Some(error) = refusal.map(raised) else { return Ok(image) };
+    let (image, finish_error) = Image::of(delivery);
+    let Some(error) = finish_error.map(raised) else { return Ok(image) };
     error.value(py).setattr("image", Bound::new(py, image)?)?;
     Err(error)
 }

@@ -202,12 +202,12 @@ impl<'a> Reports<'a> {
         print_end(args, &summary, &delivery, &reason_if_black);
         written?;
         // A file that is already gone is no error: the picture is safe.
-        let spent = [delivery.spent_checkpoint.as_deref(), estimate.as_deref()];
+        let spent = [delivery.obsolete_checkpoint.as_deref(), estimate.as_deref()];
         spent.into_iter().flatten().for_each(|file| drop(std::fs::remove_file(file)));
         if talk {
             Summary::print_files(args, set, techniques.len());
         }
-        if let Some(error) = delivery.refusal {
+        if let Some(error) = delivery.finish_error {
             let output = args.output.display();
             return Err(error.hint(format!(
                 "the unfinished render is in {output}: 'caustique finish {output} -o OUT.exr' finishes it"

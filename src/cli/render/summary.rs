@@ -152,7 +152,7 @@ pub fn print_finish(name: &str, delivery: &Delivery, coverage: ErrorCoverage) {
         let half = reached.seconds_to_half().map(|seconds| format!(", half of it in about {} more", duration(seconds)));
         error + &half.unwrap_or_default()
     });
-    say(&format!("finished with {name} in {}{}", duration(delivery.finishing), error.unwrap_or_default()));
+    say(&format!("finished with {name} in {}{}", duration(delivery.finish_seconds), error.unwrap_or_default()));
     if let Some(rare) = reached.map(Reached::rare).filter(|rare| *rare > MAX_RARE_SHARE) {
         let share = percent(rare);
         say(&format!(
@@ -165,7 +165,7 @@ pub fn print_finish(name: &str, delivery: &Delivery, coverage: ErrorCoverage) {
     }
 }
 
-/// Warns if light that hardly any photon has brought is most of the error.
+/// Warns if most of the error is light that hardly any photon has carried.
 pub fn warn_unseen(output: &Path, delivery: &Delivery) {
     if let Some(unseen) = &delivery.unseen {
         say(&format!("warning: {}: {unseen}", output.display()));
