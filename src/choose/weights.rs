@@ -218,7 +218,7 @@ pub(super) fn weigh(
     let mut weighed = reference.weigh_light_effects(view, settings, presence);
     for &effect in scene_effects {
         // The lens belongs to the camera, not to the scene.
-        let rebuilt = (effect != Effect::DepthOfField).then(|| switch::without(view.scene, effect));
+        let rebuilt = (effect != Effect::DepthOfField).then(|| switch::without_effect(view.scene, effect));
         let (scene, camera) = match &rebuilt {
             None => (view.scene, view.camera.without_lens()),
             Some(Ok(scene)) => (scene, *view.camera),

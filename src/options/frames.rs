@@ -70,7 +70,7 @@ impl Serialize for Frames {
 
 /// The path of one frame of a sequence: the frame number replaces `%d`, `%04d`, and each run of `#` (padded to the
 /// length of the run) in the file name. `None` if the file name has no such placeholder.
-pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
+pub fn path_of_frame(path: &Path, frame: u32) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     let (mut made, mut rest, mut found) = (String::new(), name, false);
     while let Some((before, digits, after)) = placeholder(rest) {
@@ -84,7 +84,7 @@ pub fn numbered(path: &Path, frame: u32) -> Option<PathBuf> {
 /// Whether a file name is certainly meant as a pattern. A single `#` is not, because it may be part of the name.
 pub fn is_pattern(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-    name.contains("##") || name.contains('%') && numbered(path, 0).is_some_and(|_| !name.contains('#'))
+    name.contains("##") || name.contains('%') && path_of_frame(path, 0).is_some_and(|_| !name.contains('#'))
 }
 
 /// Finds the first placeholder. Returns the text before it, its minimum number of digits, and the text after it.
@@ -134,7 +134,8 @@ mod tests {
 
     #[test]
     fn frame_numbers_replace_placeholders_in_file_names() {
-        let name = |pattern: &str, frame| numbered(Path::new(pattern), frame).map(|path| path.display().to_string());
+        let name =
+            |pattern: &str, frame| path_of_frame(Path::new(pattern), frame).map(|path| path.display().to_string());
         assert_eq!(name("a##/out.####.exr", 7).as_deref(), Some("a##/out.0007.exr"));
         assert_eq!(name("#.exr", 12345).as_deref(), Some("12345.exr"));
         assert_eq!(name("é_##_%03d.exr", 5).as_deref(), Some("é_05_005.exr"));

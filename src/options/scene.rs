@@ -1,6 +1,6 @@
 //! Options about a scene: where it is, how it is read, and which of its effects are simulated.
 
-use super::frames::{Frames, numbered};
+use super::frames::{Frames, path_of_frame};
 use super::number::{Ranged, rgb, strength};
 use crate::pipeline::load::{Environment, SceneRequest};
 use crate::plan::Switches;
@@ -111,7 +111,7 @@ impl SceneOptions {
     /// The options for one frame of the animation. If the name of the scene is a pattern such as `a.####.glb`, and no
     /// file has exactly this name, each frame is a file of its own.
     pub fn at(&self, frame: u32) -> SceneOptions {
-        let file = numbered(&self.path, frame).filter(|_| !self.path.exists());
+        let file = path_of_frame(&self.path, frame).filter(|_| !self.path.exists());
         let of_sequence = self.of_sequence || file.is_some();
         let path = file.unwrap_or_else(|| self.path.clone());
         SceneOptions { path, frames: Some(Frames::one(frame)), of_sequence, ..self.clone() }

@@ -82,7 +82,7 @@ fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
 
 fn build(mut description: Description, request: &SceneRequest, threads: usize) -> Result<Loaded> {
     set_environment(&mut description, request)?;
-    let removed = switch::off(&mut description, request.off);
+    let removed = switch::remove_effects(&mut description, request.off);
     Ok(Loaded { scene: Scene::build(description, threads)?, removed })
 }
 

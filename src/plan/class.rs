@@ -61,7 +61,7 @@ impl Event {
 
     /// The event if a surface with `lobes` scatters by `lobe`.
     #[inline]
-    pub fn of(lobe: LobeSet, lobes: LobeSet) -> Event {
+    pub fn at_surface(lobe: LobeSet, lobes: LobeSet) -> Event {
         if lobe.intersects(LobeSet::BROAD) {
             Event::Broad
         } else if lobe.intersects(LobeSet::SHARP) {
@@ -75,8 +75,8 @@ impl Event {
 
     /// The event at a surface with `lobes` that scatters by `lobe`, or in a medium, which has no lobes.
     #[inline]
-    pub fn by(lobe: LobeSet, lobes: Option<LobeSet>) -> Event {
-        lobes.map_or(Event::Medium, |lobes| Event::of(lobe, lobes))
+    pub fn at_vertex(lobe: LobeSet, lobes: Option<LobeSet>) -> Event {
+        lobes.map_or(Event::Medium, |lobes| Event::at_surface(lobe, lobes))
     }
 
     #[inline]

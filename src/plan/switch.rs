@@ -23,16 +23,16 @@ impl Removed {
 }
 
 /// Removes the effects that are properties of the scene, not path classes, from its description.
-pub fn off(description: &mut Description, effects: EffectSet) -> Removed {
+pub fn remove_effects(description: &mut Description, effects: EffectSet) -> Removed {
     let properties = effects.iter().filter(|effect| !effect.is_class());
-    Removed(properties.map(|effect| (effect, remove(description, effect))).collect())
+    Removed(properties.map(|effect| (effect, remove_effect(description, effect))).collect())
 }
 
 /// Removes an effect from a description. Returns the names of the materials and so on that called for it.
-fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
+fn remove_effect(description: &mut Description, effect: Effect) -> Vec<String> {
     let instances = description.instances.iter().map(|placed| (placed.material, placed.name.as_str()));
     let mut because = material_reasons(effect, &used_materials(&description.materials, instances));
-    if let Some(left) = strip(effect, &mut description.materials, &description.textures) {
+    if let Some(left) = remove_from_materials(effect, &mut description.materials, &description.textures) {
         description.textures = left;
     }
     match effect {
@@ -51,34 +51,34 @@ fn remove(description: &mut Description, effect: Effect) -> Vec<String> {
     truncate_reasons(because)
 }
 
-/// A copy of the scene without an effect, as [`off`] removes it from the description. Unchanged data are shared. For
-/// depth of field, see [`crate::camera::Camera::without_lens`].
+/// A copy of the scene without an effect, as [`remove_effects`] removes it from the description. Unchanged data are
+/// shared. For depth of field, see [`crate::camera::Camera::without_lens`].
 ///
 /// # Errors
 /// The effect is alpha, so shapes are committed to Embree again, and it is out of memory.
-pub fn without(scene: &Scene, effect: Effect) -> Result<Scene> {
+pub fn without_effect(scene: &Scene, effect: Effect) -> Result<Scene> {
     let mut list = scene.materials.list.clone();
     let shared = &scene.materials.textures;
-    let textures = strip(effect, &mut list, shared).map_or_else(|| Arc::clone(shared), Arc::from);
+    let textures = remove_from_materials(effect, &mut list, shared).map_or_else(|| Arc::clone(shared), Arc::from);
     let medium = scene.medium.filter(|_| effect != Effect::Volume);
     let environment = scene.lights.sky().environment.clone().filter(|_| effect != Effect::Environment);
     scene.with_materials(Materials { list, textures }, medium, environment)
 }
 
 /// Removes an effect from materials. Returns the remaining textures if they change.
-fn strip(effect: Effect, materials: &mut [Material], textures: &[Texture]) -> Option<Vec<Texture>> {
+fn remove_from_materials(effect: Effect, materials: &mut [Material], textures: &[Texture]) -> Option<Vec<Texture>> {
     match effect {
         Effect::Volume => materials.iter_mut().for_each(|material| material.medium = None),
         Effect::Dispersion => materials.iter_mut().for_each(|material| material.dispersion = 0.0),
         Effect::Alpha => materials.iter_mut().for_each(|material| material.alpha = Alpha::Opaque),
-        Effect::Textures => return Some(flatten_all(materials, textures)),
+        Effect::Textures => return Some(flatten_textures(materials, textures)),
         _ => {}
     }
     None
 }
 
 /// Replaces every texture by its mean. Returns the textures that cut-outs need.
-fn flatten_all(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture> {
+fn flatten_textures(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture> {
     let means: Vec<Vec4> = textures.iter().map(Texture::mean).collect();
     // Cut-outs are another effect, so their alpha stays.
     let mut kept = Vec::new();
@@ -89,7 +89,7 @@ fn flatten_all(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture>
             kept.push(mask_of(texture));
             TextureRef { texture: kept.len() as u32 - 1, ..reference }
         });
-        flatten(
+        flatten_material(
             material,
             |reference| means.get(reference.texture as usize).copied().unwrap_or(Vec4::ONE),
             mask.is_some(),
@@ -121,7 +121,7 @@ fn mask_of(texture: &Texture) -> Texture {
 
 /// Multiplies the factors of a material by the means of their textures and removes the textures. `keep_alpha`: the base
 /// colour's alpha does not change, because its texture stays.
-fn flatten(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, keep_alpha: bool) {
+fn flatten_material(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, keep_alpha: bool) {
     let take = |texture: &mut Option<TextureRef>| texture.take().map_or(Vec4::ONE, &mean);
     let mut base = take(&mut material.base_color_texture);
     if keep_alpha {

@@ -106,7 +106,7 @@ impl<R: PathRecorder> LightWalk<'_, '_, R> {
     #[inline(always)]
     fn arrive(&mut self, at: &Receiver, distance: f32, cos: f32, flight: FlightDensity, scattered: Option<Scattered>) {
         if let Some(scattered) = scattered {
-            self.prefix = self.prefix.then(Event::by(scattered.lobe, self.lobes));
+            self.prefix = self.prefix.then(Event::at_vertex(scattered.lobe, self.lobes));
         }
         let first_from_infinity = scattered.is_none() && self.infinite;
         let distance2 = if first_from_infinity { 1.0 } else { distance * distance };

@@ -120,7 +120,7 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
     /// Class of the path as it arrives at the next vertex.
     #[inline]
     fn suffix_on_arrival(&self, scattered: Option<Scattered>) -> CameraSuffix {
-        scattered.map_or(self.suffix, |scattered| self.suffix.then(Event::of(scattered.lobe, self.lobes)))
+        scattered.map_or(self.suffix, |scattered| self.suffix.then(Event::at_surface(scattered.lobe, self.lobes)))
     }
 
     /// `broad` and `onward`, each empty if its class of direct light is switched off.

@@ -24,7 +24,7 @@ impl PathHistory {
     #[inline]
     pub fn scattered(&mut self, lobe: LobeSet) {
         self.delta &= lobe == LobeSet::DELTA;
-        self.suffix = self.suffix.then(Event::by(lobe, self.lobes));
+        self.suffix = self.suffix.then(Event::at_vertex(lobe, self.lobes));
     }
 
     /// Whether all vertices so far were perfect mirrors or clear glass.

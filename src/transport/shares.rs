@@ -93,7 +93,7 @@ pub(super) fn wanted<S: ScatterPoint>(vertex: &S, halves: PathHalves, on: ClassS
 /// Whether continuing by a lobe of `set`, at a surface that has `lobes`, can reach light of a class in `on`.
 pub(super) fn leads(suffix: CameraSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
-    let ahead = |lobe: LobeSet| !(suffix.then(Event::of(lobe, lobes)).reachable_classes() & on).is_empty();
+    let ahead = |lobe: LobeSet| !(suffix.then(Event::at_surface(lobe, lobes)).reachable_classes() & on).is_empty();
     each.filter(|lobe| set.intersects(*lobe)).any(ahead)
 }
 

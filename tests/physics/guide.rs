@@ -461,7 +461,7 @@ fn properties_of_the_scene_are_weighed() {
     };
     let whole = picture(&pinhole);
     for effect in [Effect::Textures, Effect::Environment] {
-        let without = picture(&switch::without(&pinhole, effect).expect("it is built"));
+        let without = picture(&switch::without_effect(&pinhole, effect).expect("it is built"));
         let pixels = whole.iter().zip(&without);
         let floor = floor::relative_to_mean(whole.iter().copied());
         let found = pixels.map(|(a, b)| (a - b).powi(2) / (a * a + floor)).sum::<f64>() / whole.len() as f64;

@@ -4,7 +4,7 @@ use super::preview::Target;
 use crate::cli::output::PictureArgs;
 use crate::cli::progress::Form;
 use caustique::error::{Error, Result};
-use caustique::options::{RenderOptions, RunOptions, numbered, takes};
+use caustique::options::{RenderOptions, RunOptions, path_of_frame, takes};
 use caustique::pipeline::{MethodRequest, PictureRequest, Saving};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
@@ -100,7 +100,7 @@ impl RenderArgs {
 
     /// The options for one frame, with its number in the names of files.
     pub fn at(&self, frame: u32) -> RenderArgs {
-        let named = |path: &PathBuf| numbered(path, frame).unwrap_or_else(|| path.clone());
+        let named = |path: &PathBuf| path_of_frame(path, frame).unwrap_or_else(|| path.clone());
         RenderArgs {
             output: named(&self.output),
             options: RenderOptions { scene: self.options.scene.at(frame), ..self.options.clone() },

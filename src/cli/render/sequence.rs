@@ -6,7 +6,7 @@ use crate::cli::progress::FrameOfRun;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::options::{Frames, is_pattern, numbered};
+use caustique::options::{Frames, is_pattern, path_of_frame};
 
 /// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
@@ -80,7 +80,7 @@ fn check(args: &RenderArgs, frames: Frames) -> Result<()> {
         return Ok(());
     }
     for (option, path) in args.files() {
-        if numbered(path, 0).is_none() {
+        if path_of_frame(path, 0).is_none() {
             let cause = format!("{option} {}: all frames have the same name", path.display());
             let error = Error::usage(cause);
             return Err(error.hint("put '####' where the frame's number belongs, such as out.####.exr"));

@@ -11,7 +11,7 @@ use crate::scene::Scene;
 const RAYS_PER_EDGE: u32 = 32;
 
 /// Warns if the camera sees no surface, no scattering medium and no light at infinity.
-pub(super) fn nothing_seen(scene: &Scene, camera: &Camera) -> Option<String> {
+pub(super) fn empty_view(scene: &Scene, camera: &Camera) -> Option<String> {
     let shows_more = scene.survey.scattering || scene.lights.emitters().iter().any(Emitter::is_infinite);
     (!shows_more && !sees_anything(scene, camera)).then(|| {
         "the camera sees no surface, so the picture will be black; look at its place and direction, or choose another with --camera".into()

@@ -12,7 +12,7 @@ const RAYS_PER_EDGE: u32 = 16;
 const MAX_NAMES: usize = 3;
 
 /// A warning that names the objects whose back faces the camera would see if glTF did not cull them.
-pub(super) fn culled(scene: &Scene, camera: &Camera) -> Option<String> {
+pub(super) fn culled_objects(scene: &Scene, camera: &Camera) -> Option<String> {
     if !scene.survey.culled {
         return None;
     }

@@ -36,7 +36,7 @@ fn is_glass(material: &Material) -> bool {
 
 /// Warns about curved thin walls. Most are meant to be solid, and are thin because the exporter wrote no thickness and
 /// the mesh is open. Flat walls are panes, where a thickness would change little.
-pub(super) fn thin(scene: &Scene) -> Vec<String> {
+pub(super) fn thin_walls(scene: &Scene) -> Vec<String> {
     let (meshes, materials) = (&scene.shapes.meshes, &scene.materials.list);
     let mut flat: BTreeMap<u32, bool> = BTreeMap::new();
     let mut meant_solid = |instance: &&Instance| {
@@ -70,7 +70,7 @@ fn is_flat(mesh: &Mesh) -> bool {
 }
 
 /// Warns about glass too rough to focus light.
-pub(super) fn frosted(scene: &Scene) -> Vec<String> {
+pub(super) fn frosted_glass(scene: &Scene) -> Vec<String> {
     let warning = |material: &Material, label: String| {
         format!(
             "{label}: its roughness of {} spreads light too wide for a caustic to show; {MAX_FOCUSING_ROUGHNESS} and more is frosted",
@@ -136,7 +136,7 @@ struct Shade {
 
 /// Warns about glass without direct light. Mirrors and walls may still light it, but such light makes hardly any
 /// caustic.
-pub(super) fn unlit(scene: &Scene) -> Vec<String> {
+pub(super) fn unlit_glass(scene: &Scene) -> Vec<String> {
     let mut objects: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
         let material = &scene.materials.list[instance.material as usize];
@@ -148,7 +148,7 @@ pub(super) fn unlit(scene: &Scene) -> Vec<String> {
     let reached = OnceCell::new();
     for (object, instances) in objects.iter().take(MAX_OBJECTS) {
         let shade = shade(scene, instances);
-        if shade.lit || reached.get_or_init(|| objects_lit(scene)).contains(object) {
+        if shade.lit || reached.get_or_init(|| lit_objects(scene)).contains(object) {
             continue;
         }
         let mut blockers: Vec<(&String, &usize)> = shade.blockers.iter().collect();
@@ -166,7 +166,7 @@ pub(super) fn unlit(scene: &Scene) -> Vec<String> {
 
 /// Objects that rays from the lights hit, through transmitting surfaces. These rays find narrow beams, which miss the
 /// few sampled points of a large face.
-fn objects_lit(scene: &Scene) -> BTreeSet<u32> {
+fn lit_objects(scene: &Scene) -> BTreeSet<u32> {
     /// Steps of the additive sequence that fills the hypercube evenly \[Roberts 2018\].
     const STEPS: [f64; 4] =
         [0.856_674_883_854_502_9, 0.733_891_856_627_126, 0.628_706_721_037_804_3, 0.538_596_948_320_147_3];

@@ -27,7 +27,7 @@ const DIRECTIONS_PER_TRIANGLE: u32 = 64;
 /// Warns if the guessed units of punctual lights seem wrong: their ratio to other lights is about the ratio of lumens
 /// to watts, so the other units would make them comparable. Points and spots are compared with emissive surfaces, suns
 /// with the environment. Without anything to compare lumens with, the warning states the guess.
-pub(super) fn units(scene: &Scene) -> Option<String> {
+pub(super) fn wrong_units(scene: &Scene) -> Option<String> {
     let guessed = scene.guessed_units.as_ref()?;
     let sky = scene.lights.sky();
     let (mut points, mut surfaces, mut suns) = (0.0, 0.0, 0.0);
@@ -68,7 +68,7 @@ pub(super) fn units(scene: &Scene) -> Option<String> {
 
 /// Warns about a missing environment if the exporter never writes one. For a scene without any light, building the
 /// scene already warns.
-pub(super) fn no_environment(scene: &Scene, request: &PlanRequest) -> Option<String> {
+pub(super) fn missing_environment(scene: &Scene, request: &PlanRequest) -> Option<String> {
     let dark = scene.environment_unknown && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
     (dark && !request.switches.off.has(Effect::Environment)).then(|| {
         "no environment: Blender's own exporter leaves the world out, so what it shines is missing; export with scripts/blender/export.py, or give it with --env (--env 0,0,0 if it is dark)".into()
@@ -124,7 +124,7 @@ fn light_rays(scene: &Scene) -> Vec<LightRays> {
 }
 
 /// Warns about lights in a casing that lets no light out. A closed room with the camera inside is not a casing.
-pub(super) fn encased(scene: &Scene, camera: Vec3) -> Vec<String> {
+pub(super) fn encased_lights(scene: &Scene, camera: Vec3) -> Vec<String> {
     let mut warnings = Vec::new();
     for LightRays { name, object, rays } in light_rays(scene) {
         let Some(mut casing) = enclosure(scene, rays) else { continue };
@@ -142,7 +142,7 @@ pub(super) fn encased(scene: &Scene, camera: Vec3) -> Vec<String> {
 }
 
 /// Warns about an environment that cannot light the surroundings of the camera: a sky dome or a closed room blocks it.
-pub(super) fn shut_out(scene: &Scene, camera: Vec3) -> Option<String> {
+pub(super) fn blocked_environment(scene: &Scene, camera: Vec3) -> Option<String> {
     scene.lights.sky().environment.as_ref()?;
     let rays = rays::directions(DIRECTIONS).map(|d| (camera, d)).collect();
     let mut around = enclosure(scene, rays)?;
@@ -186,7 +186,7 @@ fn is_within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
 }
 
 /// Warns about delta lights behind glass if the method does not find their caustics.
-pub(super) fn behind_glass(scene: &Scene, request: &PlanRequest) -> Vec<String> {
+pub(super) fn delta_lights_behind_glass(scene: &Scene, request: &PlanRequest) -> Vec<String> {
     if request.search.finds(Effect::Caustic, &scene.survey) {
         return vec![];
     }

@@ -17,19 +17,19 @@ use crate::scene::Scene;
 
 /// The warnings of all checks.
 pub(super) fn warnings(scene: &Scene, camera: &Camera, request: &PlanRequest) -> Vec<String> {
-    let mut warnings = glass::thin(scene);
-    warnings.extend(culling::culled(scene, camera));
-    warnings.extend(glass::frosted(scene));
+    let mut warnings = glass::thin_walls(scene);
+    warnings.extend(culling::culled_objects(scene, camera));
+    warnings.extend(glass::frosted_glass(scene));
     warnings.extend(glass::alpha_glass(scene));
-    warnings.extend(overlap::unordered(scene));
-    warnings.extend(lights::units(scene));
-    warnings.extend(lights::no_environment(scene, request));
+    warnings.extend(overlap::overlapping_solids(scene));
+    warnings.extend(lights::wrong_units(scene));
+    warnings.extend(lights::missing_environment(scene, request));
     if !scene.lights.is_empty() {
-        warnings.extend(lights::encased(scene, camera.position()));
-        warnings.extend(lights::shut_out(scene, camera.position()));
-        warnings.extend(lights::behind_glass(scene, request));
-        warnings.extend(glass::unlit(scene));
-        warnings.extend(black::nothing_seen(scene, camera));
+        warnings.extend(lights::encased_lights(scene, camera.position()));
+        warnings.extend(lights::blocked_environment(scene, camera.position()));
+        warnings.extend(lights::delta_lights_behind_glass(scene, request));
+        warnings.extend(glass::unlit_glass(scene));
+        warnings.extend(black::empty_view(scene, camera));
     }
     warnings
 }

@@ -19,7 +19,7 @@ const TOUCH_TOLERANCE: f32 = 1e-3;
 
 /// Warnings about pairs of solids of different materials and equal priority, if an edge of one crosses the surface of
 /// the other.
-pub(super) fn unordered(scene: &Scene) -> Vec<String> {
+pub(super) fn overlapping_solids(scene: &Scene) -> Vec<String> {
     let materials = &scene.materials.list;
     let solid = |instance: &&Instance| materials[instance.material as usize].is_solid_glass();
     let solids: Vec<&Instance> = scene.shapes.instances.iter().filter(solid).take(MAX_SOLIDS).collect();

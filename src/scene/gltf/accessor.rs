@@ -94,7 +94,7 @@ impl Document<'_> {
 
     /// Reads the displacements of a morph target. They may be without data, because the number of vertices was already
     /// checked.
-    pub(super) fn deltas(&self, index: usize, vertices: usize) -> Result<Vec<[f32; 3]>> {
+    pub(super) fn displacements(&self, index: usize, vertices: usize) -> Result<Vec<[f32; 3]>> {
         let count = get(&self.accessors, index, "accessor")?.count.0;
         if count != vertices as u64 {
             return Err(fault(at("accessor", index), format!("{count} displacements are for {vertices} vertices"))

@@ -66,7 +66,7 @@ pub(super) fn apply(document: &mut Document, frame: Option<FrameTime>, warnings:
     };
     for Track { pointer, place, curve } in &tracks {
         let rotation = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
-        match pointer::put(&mut document.raw, pointer, &curve.at(time, rotation), container::is_supported) {
+        match pointer::put(&mut document.raw, pointer, &curve.value_at(time, rotation), container::is_supported) {
             Ok(()) => {}
             Err(PointerError::Missing) => {
                 let cause = format!("it moves {pointer}, which does not exist");

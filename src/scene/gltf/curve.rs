@@ -73,7 +73,7 @@ impl Curve {
     }
 
     /// The value at a time (seconds), clamped to the first and last key. `rotation`: values are unit quaternions.
-    pub(super) fn at(&self, time: f64, rotation: bool) -> Vec<f64> {
+    pub(super) fn value_at(&self, time: f64, rotation: bool) -> Vec<f64> {
         // Files have times in f32, so a time that equals a key's time up to rounding counts as the key's.
         let after = self.times.partition_point(|key| f64::from(*key) <= time + 1e-6 * time.max(1.0));
         let Some(k) = after.checked_sub(1) else { return self.value(0) };

@@ -119,7 +119,7 @@ fn add_target(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut
         }
     };
     let vertices = mesh.positions.len();
-    let read = |index: &gltf::json::Index<_>| document.deltas(index.value(), vertices);
+    let read = |index: &gltf::json::Index<_>| document.displacements(index.value(), vertices);
     if let Some(index) = &target.positions {
         moved(&mut mesh.positions, read(index)?);
     }

@@ -6,7 +6,7 @@ use crate::math::{DMat3, Vec3};
 
 /// Applies a transform that cannot be inverted to a mesh. `None` if no triangle with an area remains. Vertex normals
 /// are removed, because the transformed ones would not be those of the plane.
-pub(super) fn flattened(mesh: &Mesh, transform: &DMat3) -> Option<Mesh> {
+pub(super) fn flatten(mesh: &Mesh, transform: &DMat3) -> Option<Mesh> {
     let mut flat = mesh.clone();
     for p in &mut flat.positions {
         *p = (*transform * p.as_dvec3()).as_vec3();

@@ -4,7 +4,7 @@ use super::clipping::{self, Clip};
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
 use super::extras::{self, ObjectExtras, Rate, SceneExtras};
-use super::flat::flattened;
+use super::flat::flatten;
 use super::materials::{Library, tangent_coordinates};
 use super::mesh::MAX_COORDINATE;
 use super::shells;
@@ -321,7 +321,7 @@ impl Reader<'_> {
                 self.check_reach(mesh, &to_world, place)?;
                 let (mesh, to_world) = if invertible {
                     (mesh, to_world)
-                } else if let Some(mesh) = self.flattened(mesh, &to_world.matrix3, place)? {
+                } else if let Some(mesh) = self.add_flattened(mesh, &to_world.matrix3, place)? {
                     (mesh, DAffine3::from_translation(to_world.translation))
                 } else {
                     flat += 1;
@@ -341,8 +341,8 @@ impl Reader<'_> {
 
     /// Adds a flattened copy of a mesh for a transform that is singular, and returns its index. `None` if the copy has
     /// no area.
-    fn flattened(&mut self, mesh: u32, transform: &DMat3, place: &str) -> Result<Option<u32>> {
-        let Some(flat) = flattened(&self.out.meshes[mesh as usize], transform) else { return Ok(None) };
+    fn add_flattened(&mut self, mesh: u32, transform: &DMat3, place: &str) -> Result<Option<u32>> {
+        let Some(flat) = flatten(&self.out.meshes[mesh as usize], transform) else { return Ok(None) };
         let bytes = flat.positions.len() as u64 * VERTEX_BYTES + flat.triangles.len() as u64 * TRIANGLE_BYTES;
         let what = "meshes on nodes whose scale is zero along an axis";
         self.document.count_bytes(bytes, what).map_err(|e| e.within(place))?;

@@ -51,10 +51,10 @@ fn check(effect: Effect, mut with: Description, without: Description, because: &
     let camera = scene.camera(&square(12)).expect("there is a camera");
     let left = match effect {
         Effect::DepthOfField => picture_of(&scene, &camera.without_lens()),
-        _ => picture_of(&switch::without(&scene, effect).expect("it is built"), &camera),
+        _ => picture_of(&switch::without_effect(&scene, effect).expect("it is built"), &camera),
     };
     assert!(left == plain, "{effect:?} left out of the scene");
-    let removed = switch::off(&mut with, EffectSet::from_iter([effect]));
+    let removed = switch::remove_effects(&mut with, EffectSet::from_iter([effect]));
     assert!(picture(with) == plain, "{effect:?}");
     assert_eq!(removed.because(effect), [because]);
 }
@@ -137,7 +137,7 @@ fn textures() {
 fn classes_of_paths_leave_the_scene_alone() {
     let mut description = scene(glass(1.5));
     let before = format!("{description:?}");
-    let removed = switch::off(&mut description, EffectSet::from_iter([Effect::Caustic, Effect::Direct]));
+    let removed = switch::remove_effects(&mut description, EffectSet::from_iter([Effect::Caustic, Effect::Direct]));
     assert_eq!(format!("{description:?}"), before);
     assert!(removed.because(Effect::Caustic).is_empty());
 }

@@ -41,7 +41,7 @@ struct Scribe<'a> {
 impl Scribe<'_> {
     fn arrive(&mut self, scattered: Option<Scattered>) {
         if let Some(scattered) = scattered {
-            self.sofar.push(letter(self.last.map_or(Event::Medium, |lobes| Event::of(scattered.lobe, lobes))));
+            self.sofar.push(letter(self.last.map_or(Event::Medium, |lobes| Event::at_surface(scattered.lobe, lobes))));
         }
     }
 
