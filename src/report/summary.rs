@@ -143,7 +143,29 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
         targets = target::default_targets(&curves, own);
     }
     let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error)).collect()).collect();
-    let left_out = outcome.points.iter().filter(|p| reference.figure(*metric, &p.errors).is_none()).count();
+    notes.extend(remarks(*metric, reference, outcome, &curves));
+    let (windows, whole, strips) =
+        strips::pictures((*metric, reference), outcome, (&options.windows, options.look), &curves)?;
+    Ok(Summary {
+        slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.source, curve)).collect(),
+        theories: lines.iter().map(|line| theory_of(line.source, entries)).collect(),
+        mean_ratios: (0..subject.peers.len()).map(|peer| mean_ratio(peer, subject, outcome)).collect(),
+        curves,
+        beside,
+        targets,
+        reached,
+        overhead: overhead::table(entries, &outcome.endings),
+        windows,
+        reference: whole,
+        strips,
+        notes,
+    })
+}
+
+/// Remarks about measurements that are left out, fireflies, failures and interruption.
+fn remarks(metric: Metric, reference: &Reference, outcome: &Outcome, curves: &[Curve]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let left_out = outcome.points.iter().filter(|p| reference.figure(metric, &p.errors).is_none()).count();
     if left_out > 0 {
         notes.push(format!(
             "{left_out} of {} measurements are at or below the reference's own error and are not reported.",
@@ -162,22 +184,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
     if outcome.interrupted {
         notes.push("The comparison was stopped before its end; this is what was done.".into());
     }
-    let (windows, whole, strips) =
-        strips::pictures((*metric, reference), outcome, (&options.windows, options.look), &curves)?;
-    Ok(Summary {
-        slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.source, curve)).collect(),
-        theories: lines.iter().map(|line| theory_of(line.source, entries)).collect(),
-        mean_ratios: (0..subject.peers.len()).map(|peer| mean_ratio(peer, subject, outcome)).collect(),
-        curves,
-        beside,
-        targets,
-        reached,
-        overhead: overhead::table(entries, &outcome.endings),
-        windows,
-        reference: whole,
-        strips,
-        notes,
-    })
+    notes
 }
 
 /// The exponents of a curve.
