@@ -57,6 +57,15 @@ pub fn brightest(mean: &Picture, index: usize) -> [f32; 3] {
     })
 }
 
+/// The noise that limits the displacement of a picture or of its parts: an estimate and its [`spread`].
+#[derive(Clone, Copy)]
+pub struct Noise<'a> {
+    /// The estimate of the whole picture.
+    pub estimate: &'a Estimate,
+    /// Its spread.
+    pub spread: &'a Picture,
+}
+
 /// Numbers of pixels that were clamped in any channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clamped {

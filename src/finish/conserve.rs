@@ -7,7 +7,7 @@
 //! light of each pixel.
 
 use super::Estimate;
-use super::bound::{LIMIT, brightest};
+use super::bound::{LIMIT, Noise, brightest};
 use crate::film::Picture;
 use rayon::prelude::*;
 
@@ -38,14 +38,11 @@ struct Balance<'a> {
 }
 
 /// Gives back the significant light that `picture` has lost, or takes away what it has gained, against its estimate `mean`:
-/// that of the whole picture or of a part. `estimate` and `spread` belong to the whole picture. A pixel stays within
+/// that of the whole picture or of a part. `noise` belongs to the whole picture. A pixel stays within
 /// [`LIMIT`] times its spread, or within the light that any pixel may have missed, of its estimate.
-pub fn give_back(
-    picture: &mut Picture,
-    (mean, denoised): (&Picture, &Picture),
-    (estimate, spread): (&Estimate, &Picture),
-) {
-    let balance = Balance::new(picture, (mean, denoised), estimate);
+pub fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, noise: Noise<'_>) {
+    let Noise { estimate, spread } = noise;
+    let balance = Balance::new(picture, mean, denoised, estimate);
     let shortfall = balance.sum(|i, c| balance.shortfall(i, c));
     let light = balance.sum(|i, c| f64::from(picture[i][c]));
     let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
@@ -73,7 +70,7 @@ pub fn give_back(
 const CHUNK: usize = 4096;
 
 impl<'a> Balance<'a> {
-    fn new(picture: &'a Picture, (mean, denoised): (&'a Picture, &'a Picture), estimate: &'a Estimate) -> Balance<'a> {
+    fn new(picture: &'a Picture, mean: &'a Picture, denoised: &'a Picture, estimate: &'a Estimate) -> Balance<'a> {
         let [owed, missed] = [[0.0; 3]; 2];
         let balance = Balance { picture, mean, denoised, estimate, owed, missed };
         let lost = balance.sum(|i, c| f64::from(mean[i][c]) - f64::from(picture[i][c]));
@@ -150,7 +147,7 @@ mod tests {
         let (denoised, spread) = (Picture::filled(SIZE, [constant; 3]), spread(estimate));
         let (within, _) = displace(&estimate.mean, &denoised, &spread);
         let mut whole = within.clone();
-        give_back(&mut whole, (&estimate.mean, &denoised), (estimate, &spread));
+        give_back(&mut whole, &estimate.mean, &denoised, Noise { estimate, spread: &spread });
         [within, whole]
     }
 

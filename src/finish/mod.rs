@@ -30,6 +30,7 @@ use crate::combine::{Combiner, LevelStack};
 use crate::error::Result;
 use crate::film::kind::Use;
 use crate::film::{CAUSTIC, LIGHT_GROUP, Layer, LayerSet, Picture, Size, finished_part, kind_of, part_names};
+use bound::Noise;
 use estimate::{alpha, own_level};
 use finished_error::ErrorEstimator;
 use parts::Part;
@@ -132,7 +133,7 @@ impl Finish {
         let denoised = self.denoiser.run(estimate, self.quality)?;
         let spread = bound::spread(estimate);
         let (mut picture, clamped) = bound::displace(&estimate.mean, &denoised, &spread);
-        conserve::give_back(&mut picture, (&estimate.mean, &denoised), (estimate, &spread));
+        conserve::give_back(&mut picture, &estimate.mean, &denoised, Noise { estimate, spread: &spread });
         Ok(([picture, spread], clamped))
     }
 
@@ -154,7 +155,7 @@ impl Finish {
         let ([picture, spread], clamped) = self.with_spread(&estimate)?;
         let (error, error_map) = self.error_by_quarters(set, &estimate, wanted(ERROR))?.unzip();
         let error_map = error_map.flatten();
-        let parts = self.parts(set, &estimate, (&picture, &spread), wanted)?;
+        let parts = self.parts(set, &picture, Noise { estimate: &estimate, spread: &spread }, wanted)?;
         let alpha = alpha(set);
         set.layers.retain(|layer| layer.name != "Combined");
         set.push(match alpha {
@@ -212,8 +213,8 @@ impl Finish {
     fn parts(
         &mut self,
         set: &LayerSet,
-        estimate: &Estimate,
-        (picture, spread): (&Picture, &Picture),
+        picture: &Picture,
+        noise: Noise<'_>,
         wanted: impl Fn(&str) -> bool,
     ) -> Result<Vec<Named>> {
         let present = |names: &mut dyn Iterator<Item = &str>| -> Vec<Named> {
@@ -225,29 +226,24 @@ impl Finish {
         let (effects, groups, caustics) = (present(&mut part_names()), of_group(LIGHT_GROUP), of_group(CAUSTIC));
         let mut finished = Vec::new();
         if any(&effects) || any(&caustics) {
-            finished.extend(self.split(effects, estimate, (picture, spread))?);
+            finished.extend(self.split(effects, picture, noise)?);
         }
         if any(&groups) {
-            let groups = with_rest(groups, &estimate.mean);
-            finished.extend(self.split(groups, estimate, (picture, spread))?);
+            let groups = with_rest(groups, &noise.estimate.mean);
+            finished.extend(self.split(groups, picture, noise)?);
         }
         let whole = finished_part("Caustic").and_then(|name| finished.iter().find(|(part, _)| *part == name)).cloned();
         if let (true, Some((_, whole)), Some(mean)) = (any(&caustics), whole, set.picture("Caustic")) {
             let caustics = with_rest(caustics, &mean);
-            finished.extend(self.split(caustics, estimate, (&whole, spread))?);
+            finished.extend(self.split(caustics, &whole, noise)?);
         }
         finished.retain(|(name, _)| !name.is_empty() && wanted(name));
         Ok(finished)
     }
 
     /// Finishes parts so that they sum to `whole`, with the guides and standard errors of the whole picture.
-    fn split(
-        &mut self,
-        parts: Vec<Named>,
-        estimate: &Estimate,
-        (whole, spread): (&Picture, &Picture),
-    ) -> Result<Vec<Named>> {
-        let mut of_part = estimate.clone();
+    fn split(&mut self, parts: Vec<Named>, whole: &Picture, noise: Noise<'_>) -> Result<Vec<Named>> {
+        let mut of_part = noise.estimate.clone();
         let (mut names, mut estimates) = (Vec::with_capacity(parts.len()), Vec::with_capacity(parts.len()));
         for (name, mean) in parts {
             of_part.mean = mean;
@@ -261,7 +257,7 @@ impl Finish {
             names.push(name);
             estimates.push(Part { mean: std::mem::take(&mut of_part.mean), denoised });
         }
-        let finished = parts::split(&estimates, whole, (estimate, spread));
+        let finished = parts::split(&estimates, whole, noise);
         Ok(names.into_iter().zip(finished).collect())
     }
 }

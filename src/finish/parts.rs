@@ -4,8 +4,7 @@
 //! per pixel so that they sum to the finished picture. A part is never negative, and converges to the limit of its
 //! estimate.
 
-use super::Estimate;
-use super::bound::displace;
+use super::bound::{Noise, displace};
 use super::conserve::give_back;
 use crate::film::Picture;
 use rayon::prelude::*;
@@ -18,14 +17,14 @@ pub struct Part {
     pub denoised: Picture,
 }
 
-/// Finishes parts so that they sum to the finished picture `whole`. `estimate` and `spread` belong to the whole picture.
+/// Finishes parts so that they sum to the finished picture `whole`. `noise` belongs to the whole picture.
 ///
 /// Light of the whole picture at a pixel where no part has any, which the denoiser has brought from around, goes to the
 /// last part.
-pub fn split(parts: &[Part], whole: &Picture, (estimate, spread): (&Estimate, &Picture)) -> Vec<Picture> {
+pub fn split(parts: &[Part], whole: &Picture, noise: Noise<'_>) -> Vec<Picture> {
     let finish = |part: &Part| {
-        let (mut picture, _) = displace(&part.mean, &part.denoised, spread);
-        give_back(&mut picture, (&part.mean, &part.denoised), (estimate, spread));
+        let (mut picture, _) = displace(&part.mean, &part.denoised, noise.spread);
+        give_back(&mut picture, &part.mean, &part.denoised, noise);
         picture
     };
     let mut finished: Vec<Picture> = parts.iter().map(finish).collect();
@@ -57,6 +56,7 @@ pub fn split(parts: &[Part], whole: &Picture, (estimate, spread): (&Estimate, &P
 mod tests {
     use super::*;
     use crate::film::Size;
+    use crate::finish::Estimate;
     use crate::random::{Domain, Purpose, Stream};
 
     /// An estimate with a constant standard error.
@@ -76,7 +76,8 @@ mod tests {
         let parts = [part(1), part(2), Part { mean: Picture::filled(size, [0.0; 3]), denoised: plane(20) }];
         let (whole, spread) = (plane(3), Picture::filled(size, [0.1; 3]));
         let estimate = estimate(&whole, 0.1);
-        let finished = split(&parts, &whole, (&estimate, &spread));
+        let noise = Noise { estimate: &estimate, spread: &spread };
+        let finished = split(&parts, &whole, noise);
         for index in 0..size.pixels() {
             for c in 0..3 {
                 let sum: f32 = finished.iter().map(|part| part[index][c]).sum();
@@ -84,7 +85,7 @@ mod tests {
                 assert!(finished.iter().all(|part| part[index][c] >= 0.0));
             }
         }
-        assert!(split(&[], &whole, (&estimate, &spread)).is_empty());
+        assert!(split(&[], &whole, noise).is_empty());
     }
 
     /// With standard errors of zero the finished parts are their estimates.
@@ -94,7 +95,7 @@ mod tests {
         let plane = |value: f32| Picture::filled(size, [value; 3]);
         let part = |value: f32| Part { mean: plane(value), denoised: plane(9.0) };
         let whole = plane(0.75);
-        let exact = (&estimate(&whole, 0.0), &plane(0.0));
+        let exact = Noise { estimate: &estimate(&whole, 0.0), spread: &plane(0.0) };
         let finished = split(&[part(0.25), part(0.5)], &whole, exact);
         assert_eq!(finished, [plane(0.25), plane(0.5)]);
     }

@@ -115,7 +115,7 @@ impl fmt::Display for FitFailure {
         match self {
             FitFailure::Few(n) => write!(f, "{n} measurements are too few"),
             FitFailure::Narrow => write!(f, "the measurements span too little"),
-            FitFailure::Fireflies(n) => write!(f, "fireflies rule {n} of the measurements"),
+            FitFailure::Fireflies(n) => write!(f, "fireflies dominate {n} of the measurements"),
             FitFailure::Scattered(error) => write!(f, "the measurements scatter too much (± {error:.1})"),
             FitFailure::Denoised => write!(f, "denoised pictures follow no power"),
         }

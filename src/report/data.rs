@@ -55,8 +55,8 @@ impl<'a> Row<'a> {
 }
 
 /// The method of a curve, or the mode of another renderer.
-fn method(subject: &Subject, of: PictureSource) -> &'static str {
-    match of {
+fn method(subject: &Subject, source: PictureSource) -> &'static str {
+    match source {
         PictureSource::Estimate(entry) | PictureSource::Finished(entry) => {
             subject.entries[entry].settings.method.name()
         }
@@ -86,7 +86,7 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
     let runs = (0..subject.lines.len()).map(|line| run(subject, outcome, summary, line));
     let targets = summary.targets.iter().zip(&summary.reached).map(|(target, reached)| {
         let answers = subject.lines.iter().zip(reached).map(|(line, reached)| answer(&line.name, reached));
-        let of = Some(&target.of).filter(|of| !of.is_empty());
+        let of = Some(&target.origin).filter(|of| !of.is_empty());
         json!({"error": finite(target.error), "of": of, "runs": answers.collect::<Vec<_>>()})
     });
     json!({
@@ -116,13 +116,13 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
 
 /// A curve, with the settings of its entry or the facts about its peer.
 fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> Value {
-    let of = subject.lines[line].source;
-    let mut object = match of {
+    let source = subject.lines[line].source;
+    let mut object = match source {
         PictureSource::Estimate(entry) | PictureSource::Finished(entry) => subject.entries[entry].object(),
         PictureSource::Peer(peer) | PictureSource::Denoised(peer) => peer_object(subject, outcome, summary, peer),
     };
     object["name"] = subject.lines[line].name.as_str().into();
-    object["finish"] = match of {
+    object["finish"] = match source {
         PictureSource::Finished(entry) => json!(subject.entries[entry].finish),
         PictureSource::Denoised(_) => "Open Image Denoise".into(),
         _ => Value::Null,
@@ -135,7 +135,7 @@ fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> 
     object["no_fit"] = summary.slopes[line][0].as_ref().err().map(FitFailure::to_string).into();
     object["curve"] =
         summary.curves[line].mean.iter().filter(|curve_point| curve_point.reported).map(curve_point).collect();
-    if let PictureSource::Estimate(entry) = of {
+    if let PictureSource::Estimate(entry) = source {
         object["overhead"] = json!(summary.overhead[entry]);
     }
     object
@@ -143,19 +143,19 @@ fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> 
 
 /// Facts about another renderer.
 fn peer_object(subject: &Subject, outcome: &Outcome, summary: &Summary, peer: usize) -> Value {
-    let account = &outcome.peers[peer];
-    let startup = Mean::of(&account.startups).map(|mean| mean.value);
+    let facts = &outcome.peers[peer];
+    let startup = Mean::of(&facts.startups).map(|mean| mean.value);
     let ratio = summary.mean_ratios[peer];
     json!({
         "renderer": format!("{:?}", subject.peers[peer].renderer).to_lowercase(),
         "mode": subject.peers[peer].mode,
-        "version": account.version,
+        "version": facts.version,
         "startup_seconds": startup,
-        "approximations": account.approximations,
-        "unfinished": account.unfinished,
-        "out": account.left_out,
-        "mean_ratio": ratio.map(|of| json!({"value": finite(of.ratio), "standard_error": finite(of.error)})),
-        "same_scene": ratio.map(|of| of.is_same()),
+        "approximations": facts.approximations,
+        "unfinished": facts.unfinished,
+        "out": facts.left_out,
+        "mean_ratio": ratio.map(|mean| json!({"value": finite(mean.ratio), "standard_error": finite(mean.error)})),
+        "same_scene": ratio.map(|mean| mean.is_same()),
     })
 }
 

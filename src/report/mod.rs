@@ -23,6 +23,7 @@ pub mod plot;
 pub mod point;
 pub mod reference;
 mod strips;
+mod subject;
 pub mod summary;
 mod tables;
 pub mod target;

@@ -110,13 +110,13 @@ fn marks(subject: &Subject, summary: &Summary) -> Markup {
     let any = |found: &dyn Fn(PictureSource) -> bool| subject.lines.iter().any(|line| found(line.source));
     html! {
         p.note {
-            @if any(&|of| !of.is_raw()) { "Full lines and marks: what a method leaves. Dashes and hollow marks: the \
-                picture finished or denoised from it, the time for that added. " }
+            @if any(&|of| !of.is_raw()) { "Full lines and marks: pictures as rendered. Dashes and hollow marks: \
+                finished or denoised pictures, the time for that included. " }
             @if summary.curves.iter().flat_map(|curve| &curve.mean).any(|curve_point| curve_point.fireflies) {
-                "Crosses: fireflies rule the figure, for the worst 0.5 % of the pixels hold more than half of it. "
+                "Crosses: fireflies dominate the error; the worst 0.5 % of the pixels hold more than half of it. "
             }
-            @if any(&|of| !of.is_ours()) { "Other renderers: each point is a render of its own, started when ours \
-                had got as far; seconds are of rendering, without starting up. " }
+            @if any(&|of| !of.is_ours()) { "Other renderers: each point is a separate render, started when our \
+                runs had taken the same time; seconds do not include startup. " }
             "Grey lines have the exponents of theory."
         }
     }
@@ -146,8 +146,8 @@ fn own_error(subject: &Subject) -> String {
     let metric = subject.metric.name();
     match subject.reference.error.of(subject.metric) {
         Some(own) => format!(
-            "Its own error is {metric} {}. It is taken off every figure, for independent errors add; figures at or \
-                below it are not reported.",
+            "Its own error is {metric} {}. It is subtracted from every figure, because independent errors add; \
+                figures at or below it are not reported.",
             short(own)
         ),
         None => format!("Its own error in {metric} is not known: figures near it say nothing."),

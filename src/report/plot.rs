@@ -154,11 +154,11 @@ fn series(
     line: usize,
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let (r, g, b) = colour(plot.subject, line);
-    let (ink, of, curve) = (RGBColor(r, g, b), plot.subject.lines[line].source, &plot.curves[line]);
+    let (ink, source, curve) = (RGBColor(r, g, b), plot.subject.lines[line].source, &plot.curves[line]);
     let points: Vec<(f64, f64)> =
         curve.iter().map(|curve_point| (plot.axis.of(curve_point), curve_point.figure)).collect();
     let thick = ink.stroke_width(2);
-    match of.is_raw() {
+    match source.is_raw() {
         true => chart.draw_series(LineSeries::new(points.iter().copied(), thick)).map(drop)?,
         false => chart.draw_series(DashedLineSeries::new(points.iter().copied(), 6, 4, thick)).map(drop)?,
     }
@@ -168,7 +168,7 @@ fn series(
         Some(PathElement::new(vec![(x, low), (x, curve_point.figure + spread)], ink.stroke_width(1)))
     };
     chart.draw_series(curve.iter().filter_map(bar))?;
-    let fill = if of.is_raw() { ink.filled() } else { ink.stroke_width(1) };
+    let fill = if source.is_raw() { ink.filled() } else { ink.stroke_width(1) };
     // After seven curves the colours repeat with another marker.
     if number(plot.subject, line) < COLOURS.len() {
         chart.draw_series(points.iter().map(|&point| Circle::new(point, 3, fill)))?;
@@ -224,14 +224,14 @@ fn guides(chart: &mut Chart<'_, '_>, plot: &Plot<'_>) -> std::result::Result<(),
         let at = |x: f64| (x, lowest * x.powf(exponent));
         chart.draw_series(LineSeries::new([at(first), at(last)], GUIDE.stroke_width(2)))?;
         let style = (FONT, 13).into_font().color(&GREY).pos(Pos::new(HPos::Right, VPos::Top));
-        let name = format!("N^{} ", minus(&nice(exponent)));
+        let name = format!("N^{} ", minus(&exponent_text(exponent)));
         chart.draw_series([Text::new(name, at((first * last).sqrt()), style)])?;
     }
     Ok(())
 }
 
-/// `-2/3`, `-1`, `-0.5`.
-fn nice(exponent: f64) -> String {
+/// An exponent as a short text: `-2/3`, `-1`, `-0.5`.
+fn exponent_text(exponent: f64) -> String {
     let thirds = exponent * 3.0;
     if (thirds - thirds.round()).abs() < 1e-6 && thirds.round() as i64 % 3 != 0 {
         return format!("{}/3", thirds.round());
@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn exponents_and_names_are_short() {
-        assert_eq!([-1.0, -2.0 / 3.0, -0.5].map(nice), ["-1", "-2/3", "-0.5"]);
+        assert_eq!([-1.0, -2.0 / 3.0, -0.5].map(exponent_text), ["-1", "-2/3", "-0.5"]);
         assert_eq!(clip("sppm"), "sppm");
         assert_eq!(clip(&"x".repeat(40)).chars().count(), 25);
     }

@@ -1,12 +1,12 @@
 //! Crops of all curves side by side, at equal time and at equal error.
 
-use super::crop::{self, Look, Window};
+use super::crop::{self, Window};
 use super::curve::Curve;
 use super::entry::Metric;
 use super::number::{iterations, short};
 use super::outcome::Outcome;
 use super::point::Point;
-use super::reference::Reference;
+use super::subject::{ReportOptions, Subject};
 use crate::error::Result;
 use crate::film::Picture;
 
@@ -71,24 +71,35 @@ impl Alignment {
     }
 }
 
-/// The windows, the crops of the reference, and the crops of the curves. The windows are `wanted`, or if that is empty
-/// those in which the curves differ most.
+/// All crops of a report.
+pub(super) struct Gallery {
+    /// Windows of the crops.
+    pub(super) windows: Vec<Window>,
+    /// The whole reference and its crops.
+    pub(super) reference: Crops,
+    /// Crops of the curves at equal time and at equal error.
+    pub(super) strips: Vec<Strip>,
+}
+
+/// Cuts the crops of the reference and of the curves, in the windows of `options`, or if there are none in those in which
+/// the curves differ most.
 ///
 /// # Errors
 /// A stored picture cannot be read.
-pub(super) fn pictures(
-    (metric, reference): (Metric, &Reference),
+pub(super) fn gallery(
+    subject: &Subject,
     outcome: &mut Outcome,
-    (wanted, look): (&[Window], Look),
+    options: &ReportOptions,
     curves: &[Curve],
-) -> Result<(Vec<Window>, Crops, Vec<Strip>)> {
+) -> Result<Gallery> {
+    let (metric, reference, look) = (subject.metric, &subject.reference, options.look);
     let lines = outcome.lines.clone();
     let Alignment { time, error, at_time, at_error } = Alignment::of(lines.len(), outcome, metric);
     let mut load = |points: &[Point]| -> Result<Vec<Picture>> {
         points.iter().filter_map(|point| outcome.picture(point).transpose()).collect()
     };
     let (timed, equal) = (load(&at_time)?, load(&at_error)?);
-    let mut windows = wanted.to_vec();
+    let mut windows = options.windows.clone();
     if windows.is_empty() && !timed.is_empty() {
         windows = crop::choose(&timed, &reference.picture, 2);
     }
@@ -128,11 +139,11 @@ pub(super) fn pictures(
     }
     let mut parts = vec![Window::whole(reference.picture.size())];
     parts.extend(&windows);
-    let truth = Crops {
+    let reference = Crops {
         name: "reference".into(),
         caption: String::new(),
         pictures: parts.into_iter().map(|part| crop::picture(&reference.picture, part, look)).collect::<Result<_>>()?,
         heat_maps: Vec::new(),
     };
-    Ok((windows, truth, strips))
+    Ok(Gallery { windows, reference, strips })
 }

@@ -1,46 +1,20 @@
-//! Evaluation of a comparison, which [`data`](super::data), [`plot`](super::plot) and [`page`](super::page)
-//! write down.
+//! Evaluation of a comparison, which [`data`](super::data), [`plot`](super::plot) and [`page`](super::page) write.
 
-use super::crop::{Look, Window};
+use super::crop::Window;
 use super::curve::{Axis, Curve, FitFailure, Slope};
-use super::entry::{Entry, Line, Metric, PictureSource};
-use super::equal_time::Rules;
+use super::entry::{Entry, Metric, PictureSource};
 use super::outcome::Outcome;
 use super::overhead::{self, Overhead};
 use super::point::Point;
 use super::reference::Reference;
-use super::strips;
+use super::strips::{self, Gallery};
 use super::target::{self, Reached, Target};
 use super::theory::{Theory, theory};
 use crate::error;
-use crate::peers::Peer;
 use serde_json::Value;
 
 pub use super::strips::{Crops, Strip};
-
-/// The subject of a report: the compared runs and the conditions.
-pub struct Subject {
-    /// Name of the scene in the report.
-    pub scene: String,
-    /// Width and height of the picture.
-    pub size: (u32, u32),
-    /// Entries of caustique.
-    pub entries: Vec<Entry>,
-    /// Other renderers.
-    pub peers: Vec<Peer>,
-    /// The curves.
-    pub lines: Vec<Line>,
-    /// Seeds, moments and end of the runs.
-    pub rules: Rules,
-    /// Metric of curves, targets and fits.
-    pub metric: Metric,
-    /// The reference.
-    pub reference: Reference,
-    /// Names and values of facts about the machine: processor, threads, versions.
-    pub machine: Vec<(String, String)>,
-    /// Names and values of options that hold for all runs.
-    pub settings: Vec<(String, String)>,
-}
+pub use super::subject::{ReportOptions, Subject};
 
 /// Mean of a peer's picture relative to the reference, which shows whether the scene is the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +48,7 @@ pub struct Summary {
     /// One curve for each line.
     pub curves: Vec<Curve>,
     /// Curves in a second metric: trimmed relMSE, or relMSE if the report's metric is the trimmed one.
-    pub beside: MetricCurves,
+    pub second: MetricCurves,
     /// Fitted exponents of each line, in iterations and in seconds.
     pub slopes: Vec<[Result<Slope, FitFailure>; 2]>,
     /// Exponent by theory of each line.
@@ -97,20 +71,6 @@ pub struct Summary {
     pub notes: Vec<String>,
 }
 
-/// Options of the report.
-pub struct ReportOptions {
-    /// Target errors; if there are none, [`target::default_targets`].
-    pub targets: Vec<f64>,
-    /// Additional targets: the error of an entry's estimate after some iterations, as (index of the entry, iterations).
-    pub targets_of: Vec<(usize, u64)>,
-    /// Windows of the crops; if there are none, those in which the curves differ most.
-    pub windows: Vec<Window>,
-    /// Exposure and tone curve.
-    pub look: Look,
-    /// Additional remarks.
-    pub notes: Vec<String>,
-}
-
 /// Evaluates a comparison.
 ///
 /// # Errors
@@ -123,9 +83,10 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
     };
     let curves = curves_in(*metric);
     let other = if *metric == Metric::RelMseTrimmed { Metric::RelMse } else { Metric::RelMseTrimmed };
-    let beside = MetricCurves { metric: other, curves: curves_in(other) };
+    let second = MetricCurves { metric: other, curves: curves_in(other) };
     let mut notes = options.notes.clone();
-    let mut targets: Vec<Target> = options.targets.iter().map(|&error| Target { error, of: String::new() }).collect();
+    let mut targets: Vec<Target> =
+        options.targets.iter().map(|&error| Target { error, origin: String::new() }).collect();
     for &(run, iterations) in &options.targets_of {
         let name = &entries[run].name;
         let line = lines.iter().position(|line| line.source == PictureSource::Estimate(run)).unwrap_or_default();
@@ -133,7 +94,7 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
             Some(curve_point) => {
                 targets.push(Target {
                     error: curve_point.figure,
-                    of: format!("{name} after {}", super::number::iterations(iterations)),
+                    origin: format!("{name} after {}", super::number::iterations(iterations)),
                 });
             }
             None => notes.push(format!("{name} ended before {iterations} iterations: no target from there.")),
@@ -144,14 +105,13 @@ pub fn summarize(subject: &Subject, outcome: &mut Outcome, options: &ReportOptio
     }
     let reached = targets.iter().map(|t| curves.iter().map(|c| target::reach(c, t.error)).collect()).collect();
     notes.extend(remarks(*metric, reference, outcome, &curves));
-    let (windows, whole, strips) =
-        strips::pictures((*metric, reference), outcome, (&options.windows, options.look), &curves)?;
+    let Gallery { windows, reference: whole, strips } = strips::gallery(subject, outcome, options, &curves)?;
     Ok(Summary {
         slopes: lines.iter().zip(&curves).map(|(line, curve)| slopes(line.source, curve)).collect(),
         theories: lines.iter().map(|line| theory_of(line.source, entries)).collect(),
         mean_ratios: (0..subject.peers.len()).map(|peer| mean_ratio(peer, subject, outcome)).collect(),
         curves,
-        beside,
+        second,
         targets,
         reached,
         overhead: overhead::table(entries, &outcome.endings),
@@ -175,7 +135,7 @@ fn remarks(metric: Metric, reference: &Reference, outcome: &Outcome, curves: &[C
     let ruled = curves.iter().filter(|curve| curve.last().is_some_and(|curve_point| curve_point.fireflies)).count();
     if ruled > 0 {
         notes.push(format!(
-            "Fireflies rule the last measurement of {ruled} of {} curves: the worst 0.5 % of the pixels hold more than \
+            "Fireflies dominate the last measurement of {ruled} of {} curves: the worst 0.5 % of the pixels hold more than \
              half of relMSE. Such figures change from seed to seed; trimmed ones leave these pixels out.",
             curves.len()
         ));
@@ -188,14 +148,14 @@ fn remarks(metric: Metric, reference: &Reference, outcome: &Outcome, curves: &[C
 }
 
 /// The exponents of a curve.
-fn slopes(of: PictureSource, curve: &Curve) -> [Result<Slope, FitFailure>; 2] {
+fn slopes(source: PictureSource, curve: &Curve) -> [Result<Slope, FitFailure>; 2] {
     [Axis::Iterations, Axis::Seconds]
-        .map(|axis| if of.is_raw() { curve.slope(axis) } else { Err(FitFailure::Denoised) })
+        .map(|axis| if source.is_raw() { curve.slope(axis) } else { Err(FitFailure::Denoised) })
 }
 
 /// Exponent by theory of a curve.
-fn theory_of(of: PictureSource, entries: &[Entry]) -> Option<Theory> {
-    match of {
+fn theory_of(source: PictureSource, entries: &[Entry]) -> Option<Theory> {
+    match source {
         PictureSource::Estimate(entry) => theory(&entries[entry].settings),
         _ => None,
     }

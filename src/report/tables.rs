@@ -12,17 +12,17 @@ use maud::{Markup, html};
 
 /// Name and colour of a curve.
 fn name(subject: &Subject, line: usize) -> Markup {
-    let ((r, g, b), of) = (colour(subject, line), &subject.lines[line]);
-    let style = match of.source.is_raw() {
+    let ((r, g, b), curve) = (colour(subject, line), &subject.lines[line]);
+    let style = match curve.source.is_raw() {
         true => format!("background:rgb({r},{g},{b})"),
         false => format!("border:2px solid rgb({r},{g},{b})"),
     };
-    html! { span.dot style=(style) {} (of.name) }
+    html! { span.dot style=(style) {} (curve.name) }
 }
 
 /// Name and colour of the curve with a source.
-fn name_of(subject: &Subject, of: PictureSource) -> Markup {
-    subject.lines.iter().position(|line| line.source == of).map_or_else(|| html! {}, |line| name(subject, line))
+fn name_of(subject: &Subject, source: PictureSource) -> Markup {
+    subject.lines.iter().position(|line| line.source == source).map_or_else(|| html! {}, |line| name(subject, line))
 }
 
 /// Times to target errors.
@@ -37,7 +37,7 @@ pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
                 div.wide { table {
                     thead {
                         tr.group { th colspan="5" { (subject.metric.name()) " ≤ " (plain(target.error))
-                            @if !target.of.is_empty() { small { " as " (target.of) } } } }
+                            @if !target.origin.is_empty() { small { " as " (target.origin) } } } }
                         tr { th { "Run" } th.number { "iterations" } th.number { "seconds" } th.number { "relative" }
                             th.number { "core-seconds" } }
                     }
@@ -52,7 +52,7 @@ pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
             }
             p.note { "The time after which the error stays at or below the target; between two measurements it is \
                 interpolated as a power of iterations and of seconds. "
-                "“Relative” is the time over that of the first run listed that gets there. “≤”: the first \
+                "“Relative” is the time over that of the first listed run that reaches the target. “≤”: the first \
                     measurement was below the target already."
                 @if subject.rules.seeds.len() > 1 { " Standard errors are the jackknife's over seeds." } }
         }
@@ -98,8 +98,8 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
     let how = if subject.rules.seeds.len() > 1 {
         "over seeds"
     } else {
-        "from the scatter about the line; errors of one run at successive moments are not independent, so that it is \
-            rather too small (--seeds gives an honest one)"
+        "from the scatter about the line; successive errors of one run are not independent, so that it is \
+            too small (--seeds gives a correct one)"
     };
     html! {
         section {
@@ -108,7 +108,7 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
                 thead { tr { th { "Run" } th.number { "in iterations" } th.number { "theory" }
                     th.number { "in seconds" }
                     th.number { "points" } th.number { "iterations" } th { "Theory" } } }
-                tbody { @for (line, of) in subject.lines.iter().enumerate().filter(|(_, line)| line.source.is_raw()) {
+                tbody { @for (line, curve) in subject.lines.iter().enumerate().filter(|(_, line)| line.source.is_raw()) {
                     @let [by_iterations, by_seconds] = &summary.slopes[line];
                     @let theory = summary.theories[line];
                     tr {
@@ -127,14 +127,14 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
                                 td.dim colspan="3" { small { (why.to_string()) } }
                             }
                         }
-                        @let unknown = if of.source.is_ours() { "no closed form" } else { "–" };
+                        @let unknown = if curve.source.is_ours() { "no closed form" } else { "–" };
                         td { small { (theory.map_or(unknown, |t| t.because)) } }
                     }
                 } }
             } }
             p.note { "Slopes of the squared error in the log-log plots, by least squares over the last decade of \
                 iterations: of four measurements or more that span a factor of four, lie on a line (± 0.17), are \
-                above the reference's own error, and are not ruled by fireflies. Standard errors are "
+                above the reference's own error, and are not dominated by fireflies. Standard errors are "
                 (how) ". Theory is the limit of many iterations." }
         }
     }
@@ -157,7 +157,7 @@ pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> 
                     td { (name_of(subject, PictureSource::Peer(peer))) }
                     td { (if account.version.is_empty() { "–" } else { &account.version }) }
                     td.number { (summary.mean_ratios[peer].as_ref().map_or("–".into(), ratio)) }
-                    td { (summary.mean_ratios[peer].as_ref().map_or("–".into(), verdict)) }
+                    td { (summary.mean_ratios[peer].as_ref().map_or("–".into(), same_scene)) }
                     td.number { (seconds(&account.startups)) }
                     td { small {
                         @if let Some(why) = &account.left_out { b { "Left out: " } (why) ". " }
@@ -176,13 +176,13 @@ pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> 
     }
 }
 
-fn ratio(of: &MeanRatio) -> String {
-    with_error(&Mean { value: of.ratio, error: Some(of.error) }, 4)
+fn ratio(mean: &MeanRatio) -> String {
+    with_error(&Mean { value: mean.ratio, error: Some(mean.error) }, 4)
 }
 
-fn verdict(of: &MeanRatio) -> String {
-    let off = 100.0 * (of.ratio - 1.0);
-    match of.is_same() {
+fn same_scene(mean: &MeanRatio) -> String {
+    let off = 100.0 * (mean.ratio - 1.0);
+    match mean.is_same() {
         true if off.abs() <= 1.0 => "within 1 %".into(),
         true => "within 1 % and its noise".into(),
         false => minus(&format!("no: {off:+.1} %")),
@@ -222,7 +222,7 @@ pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
             } }
             p.note { "Seconds per iteration are those of pilot, iterations and finish over the number of iterations. \
                 “Over same method” compares with the first run of that method. "
-                "Light, map and eye are processor seconds of one iteration; the methods that weigh strategies path \
+                "Light, map and eye are processor seconds of one iteration; methods that weight techniques path \
                     by path count their light paths under eye." }
         }
     }

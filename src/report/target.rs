@@ -8,7 +8,7 @@ pub struct Target {
     /// The error, in the report's metric.
     pub error: f64,
     /// Origin of the target, such as `sppm after 1000 iterations`; empty for a given number.
-    pub of: String,
+    pub origin: String,
 }
 
 /// Result of a run for a target.
@@ -83,7 +83,7 @@ pub fn default_targets(curves: &[Curve], own: f64) -> Vec<Target> {
     let mut targets: Vec<f64> =
         ladder.filter(|&error| error > own && error < largest && reach(error) >= curves.len().min(2)).take(4).collect();
     targets.reverse();
-    targets.into_iter().map(|error| Target { error, of: String::new() }).collect()
+    targets.into_iter().map(|error| Target { error, origin: String::new() }).collect()
 }
 
 #[cfg(test)]

@@ -53,7 +53,7 @@ pub fn write(
     bytes("points.csv", &data::csv(subject, outcome)?)?;
     bytes("points.json", format!("{:#}\n", data::json(subject, outcome, summary)).as_bytes())?;
     let mut plots = Vec::new();
-    let beside = &summary.beside;
+    let beside = &summary.second;
     let trimmed = if beside.metric == Metric::RelMseTrimmed { "trimmed" } else { "all" };
     for (axis, heading, name) in [
         (Axis::Seconds, "Error against seconds", "seconds"),

@@ -159,7 +159,7 @@ struct Canvas {
     top: i64,
     width: usize,
     height: usize,
-    /// By part, then channel.
+    /// Values of each part and channel, row by row.
     planes: Vec<Vec<Vec<f32>>>,
 }
 
