@@ -62,7 +62,7 @@ impl TechniqueSet {
     }
 }
 
-/// What the bidirectional paths of a render share.
+/// Settings and shared data of the bidirectional paths of a render.
 #[derive(Clone, Copy)]
 pub struct Bidirectional<'a> {
     /// Camera paths.

@@ -66,7 +66,7 @@ pub(super) fn add(sample: &mut PixelSample, levels: &MergeLevels, class: PathCla
 /// Vertices of one light path, for its camera path.
 pub type LightVertices<'s> = bumpalo::collections::Vec<'s, LightVertex<'s>>;
 
-/// What light paths leave besides vertices.
+/// Splats and photons that light paths leave.
 #[derive(Default)]
 pub struct Deposits {
     /// Light for pixels, of all paths so far.
@@ -185,8 +185,8 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
         );
         let lobes = vertex.shading.bsdf.lobes();
         self.lobes = Some(lobes);
-        // Whatever lobes the point has: photons represent the light that arrives around a merging point, across borders
-        // of materials.
+        // All lobes count: photons represent the light that arrives around a merging point, across borders of
+        // materials.
         if lobes != LobeSet::DELTA
             && techniques.light_vertex_merges(vertex.depth)
             && vertex.depth < camera_paths.max_depth

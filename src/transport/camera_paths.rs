@@ -15,7 +15,7 @@ use crate::stop::Stop;
 use crate::trace::Ray;
 use serde::{Deserialize, Serialize};
 
-/// What finds light that was scattered broadly before it arrives at the camera path's first broad bounce.
+/// Technique for light that was scattered broadly before it arrives at the camera path's first broad bounce.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -42,7 +42,7 @@ impl Indirect {
 /// The start of a camera path, and its random numbers.
 pub type CameraPathStart = (PathStart, Stream);
 
-/// What all camera paths of a render share.
+/// Settings and shared data of all camera paths of a render.
 #[derive(Clone, Copy)]
 pub struct CameraPaths<'a> {
     /// The scene.
@@ -53,7 +53,7 @@ pub struct CameraPaths<'a> {
     pub interior: InitialMedium,
     /// Largest number of segments of a path.
     pub max_depth: u32,
-    /// What finds indirect light where photons are gathered.
+    /// Technique for indirect light where photons are gathered.
     pub indirect: Indirect,
     /// Classes of paths that contribute.
     pub classes: ClassSet,

@@ -332,8 +332,8 @@ impl<'a> Visitor<'a> for Deposit<'_> {
         if !self.arrives(scattered) {
             return Next::Stop;
         }
-        // Whatever lobes the point has: photons represent the light that arrives around a gathering point, across
-        // borders of materials and dark texels.
+        // All lobes count: photons represent the light that arrives around a gathering point, across borders of
+        // materials and dark texels.
         let gathers = vertex.shading.bsdf.lobes() != LobeSet::DELTA;
         let kind = if self.caustic { Kind::Caustic } else { Kind::Indirect };
         if scattered.is_some() && gathers && self.kinds[kind as usize] {

@@ -16,7 +16,7 @@ pub struct Features {
     pub depth: f32,
 }
 
-/// What one camera path adds to its pixel. Radiance is linear RGB.
+/// The contribution of one camera path to its pixel. Radiance is linear RGB.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelSample {
     /// Lights seen directly or through perfect mirrors and clear glass.

@@ -1,14 +1,14 @@
-//! One iteration of the methods made of pairs of walks: light tracing, bidirectional path tracing, bidirectional photon
-//! mapping, vertex connection and merging.
+//! The methods that walk pairs of paths: light tracing, bidirectional path tracing, bidirectional photon mapping, and
+//! vertex connection and merging.
 //!
-//! Tiles of constant size are the unit of work. A tile walks the light path and then the camera path of each of its
-//! pixels. Where the film is a window and nothing is merged, the light paths of all other pixels are walked, too: their
-//! light reaches the window as it reaches the whole picture, and so the window's pixels are those of the whole picture
-//! to the bit. What light paths send to the film is a list per tile, added by the tiles that it goes to in the order of those
-//! that have left it, so the sums do not depend on threads; photons are likewise concatenated and wait for the next iteration.
+//! The unit of work is a tile of constant size. For each of its pixels a tile walks a light path and then a camera
+//! path. If the film is a window and nothing is merged, the light paths of all other pixels are walked, too, so that
+//! the window has the bits of the whole picture. Each tile lists the light that its light paths send to other pixels;
+//! the receiving tiles add it in the order of the sending tiles, so sums do not depend on threads. Photons are
+//! concatenated likewise, for the next iteration.
 //!
-//! With bandwidth levels every pixel has two light paths and two camera paths: level 1 is made of the first pair alone,
-//! the other levels of the second. They share nothing but the photons, those of both light paths.
+//! With bandwidth levels every pixel has two pairs of paths. Level 1 comes from the first pair, the other levels from
+//! the second. The pairs share nothing but the photons, which both light paths leave.
 
 use super::guiding::learn_guide;
 use super::integrator::{Integrator, Work};
@@ -38,7 +38,7 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// A light path and a camera path for every pixel, and the levels they make.
+/// A light path and a camera path for every pixel, and the levels that they sample.
 struct Pair {
     light: Domain,
     camera: Domain,
@@ -47,13 +47,13 @@ struct Pair {
 }
 
 impl Pair {
-    /// Which of its levels is the method's own image, if any.
+    /// The index of the picture level among the levels of the pair, if it has it.
     fn own(&self, own: usize) -> Option<usize> {
         own.checked_sub(self.levels.0).filter(|level| *level < self.levels.1)
     }
 }
 
-/// What iterations share.
+/// Integrator of the bidirectional methods.
 pub struct Passes<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
@@ -63,21 +63,20 @@ pub struct Passes<'a> {
     guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
     tiles: Tiles,
-    /// Tiles whose light paths are walked, and what those have left; lists that are kept grow but once.
+    /// Tiles whose light paths are walked, and what these leave. The lists keep their capacity over iterations.
     sources: Vec<WholeTile>,
     left: Vec<Deposits>,
-    /// Measures of the iteration, by pair.
+    /// Samples of the current iteration, by pair.
     samples: Vec<SampleBuffer>,
-    /// Photons and the pass that left them.
+    /// Photons, and the iteration that left them.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     recorder: FilmRecorder,
-    /// Photons expected within the largest bandwidth before it shrinks: as many as light paths of the pixels that it
-    /// covers.
+    /// Expected number of photons within the largest initial bandwidth: the number of pixels that it covers.
     covered: f32,
 }
 
 impl<'a> Passes<'a> {
-    /// Nothing done yet. `settings.levels` must be one level unless the method has levels.
+    /// `settings.levels` must be one level unless the method has levels.
     pub fn new(
         scene: &'a Scene,
         camera: &'a Camera,
@@ -130,8 +129,9 @@ impl<'a> Passes<'a> {
         let Settings { seed, max_depth, .. } = *self.settings;
         let paths = light_paths(self.camera, self.shared.techniques);
         let pass = LightPaths::new(seed, i, pair.light, paths, max_depth).guided(guide);
-        // Others put paths together of one wavelength alone, whichever it is. There each light path is its pixel's own, and
-        // its passes can take the points of a sequence; one whose photons serve all pixels gains nothing by that.
+        // Methods without merging connect paths of one pixel only, so any wavelength will do, and light paths of a
+        // pixel can follow a low-discrepancy sequence over iterations. Photons serve all pixels and gain nothing from
+        // that.
         if self.shared.techniques.merge {
             pass.with(IterationWavelengths::drifting(seed, i))
         } else {
@@ -139,11 +139,11 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// The photons that pass `i` leaves, where it was not rendered here.
+    /// Traces the photons of iteration `i`, if that was not rendered here.
     fn photons_of(&self, i: u64) -> PhotonMap<MergePhoton> {
         let (shared, tiles) = (self.shared, self.tiles);
         let mut parts = Vec::new();
-        // In the order of `iterate`, so that even photons in one place are summed alike.
+        // In the order of an iteration, so that sums over coincident photons have equal bits.
         for pair in &self.pairs {
             let pass = self.light_pass(i, pair, self.guide.as_deref());
             let walk = |tile| {
@@ -163,12 +163,11 @@ impl<'a> Passes<'a> {
         PhotonMap::build(parts.concat())
     }
 
-    /// Adds iteration `i` (from 1) to all pixels. Returns the number of light paths walked and of photons merged; `None`
-    /// where it was given up.
+    /// Adds iteration `i` (from 1) to all pixels; `None` if it was aborted.
     fn pass<W: TileRecorder>(&mut self, i: u64, pixels: &mut [PixelAccumulator], recorders: &mut [W]) -> Option<Work> {
         let shared = self.shared;
         if shared.techniques.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
-            // Before the first pass of all, too: without photons it would lack the light that only they bring.
+            // Also before the first iteration: without photons it would lack the light that only photons find.
             let photons = self.photons_of(i - 1);
             if self.settings.stop.aborted() {
                 return None;
@@ -225,7 +224,7 @@ impl<'a> Passes<'a> {
                         else {
                             continue;
                         };
-                        // One wavelength for both, so that they can be connected.
+                        // Both paths take one wavelength, so that they can be connected.
                         start.0.wavelength_sample = pass.wavelength(index);
                         let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
                         let meets = CameraWalkContext { vertices: &vertices, photons: map, levels: &levels };
@@ -271,7 +270,7 @@ impl<'a> Passes<'a> {
     }
 }
 
-/// Photons by the kind of light that a surface shows of them.
+/// Number of photons by kind, as a surface with broad lobes would classify them.
 fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
     let suffix = CameraSuffix::START.then(Event::Broad);
     let caustics =
@@ -279,25 +278,23 @@ fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
     [map.photons().len() - caustics, caustics].map(|count| count as u64)
 }
 
-/// Light paths of a pass: where nothing is merged, as many as the whole picture has pixels, of which the film may be a
-/// window.
+/// Number of light paths of an iteration: one per pixel of the film, or of the whole picture if nothing is merged.
 fn light_paths(camera: &Camera, techniques: TechniqueSet) -> u32 {
     let (width, height) = if techniques.merge { camera.size() } else { camera.whole()[0] };
     width * height
 }
 
-/// Bytes kept for a tile of the whole picture whose light paths are walked, without what these send.
+/// Bytes per tile of the whole picture whose light paths are walked, without splats and photons.
 pub fn bytes_per_whole_tile() -> u64 {
     (size_of::<WholeTile>() + size_of::<Deposits>()) as u64
 }
 
-/// Splats by the tile that they go to, each tile's in the order of the tiles that have left them: whoever adds them, the
-/// sums are the same.
+/// Splats by receiving tile, in the order of the sending tiles, so that sums do not depend on threads.
 struct SplatsByTile<'l> {
     left: &'l [Deposits],
-    /// The tile that has left a splat, and its place there.
+    /// For each splat, the sending tile and the index in its list.
     order: Vec<(u32, u32)>,
-    /// Where in `order` each tile's end.
+    /// The end of each tile's range in `order`.
     ends: Vec<usize>,
 }
 
@@ -320,7 +317,7 @@ impl<'l> SplatsByTile<'l> {
         SplatsByTile { left, order, ends }
     }
 
-    /// Those of a tile.
+    /// The splats that a tile receives.
     fn of(&self, tile: usize) -> impl Iterator<Item = &'l Splat> {
         let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
         let left = self.left;
@@ -333,7 +330,7 @@ impl Integrator for Passes<'_> {
         if !self.settings.method.has_bandwidths() {
             return self.settings.initial_pixels(self.scene, self.camera);
         }
-        // Merging is one of many strategies, and small kernels suffice \[Georgiev et al. 2012\].
+        // Merging is one of many techniques, and small kernels suffice \[Georgiev et al. 2012\].
         let initial = match self.settings.initial_bandwidth {
             InitialBandwidth::Fixed(radius) => InitialBandwidth::Fixed(radius),
             _ => InitialBandwidth::Footprint,
@@ -341,7 +338,8 @@ impl Integrator for Passes<'_> {
         let Settings { max_initial_bandwidth: [widest, _], seed, .. } = *self.settings;
         let (none, camera_paths) = (PhotonMap::build(Vec::new()), self.camera_paths());
         let all = initial_bandwidths(&camera_paths, initial, widest, seed, [&none; 2]);
-        // A footprint is the same number of pixels everywhere; a fixed radius is compared with the median one.
+        // A footprint covers the same number of pixels everywhere; a fixed radius is compared with the median
+        // footprint.
         let pixels = match initial {
             InitialBandwidth::Fixed(radius) => {
                 let footprints =
@@ -367,7 +365,7 @@ impl Integrator for Passes<'_> {
             None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
         };
         self.recorder = recorder;
-        // Light and camera paths take turns within a pixel.
+        // Light and camera paths alternate within a pixel, so their times are not separated.
         phases.eye += cpu_seconds() - start;
         work
     }

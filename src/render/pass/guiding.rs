@@ -1,11 +1,12 @@
-//! Learning where light paths are to start: rounds of a few light paths and camera paths before the first iteration.
+//! Learning the guide of light paths, in rounds of a few light and camera paths before the first iteration.
 //!
-//! A round draws light paths by what the rounds before it have learnt, gathers their photons where camera paths look, and
-//! adds up by cell of the guide how much squared relative error every photon leaves in the picture: its own share of
-//! the pixel, squared, for it is there or not. The pixel's value is what the round itself finds there.
+//! A round samples light paths with the guide of the previous rounds and gathers their photons along camera paths. For
+//! each cell of the guide it sums the squared relative error that the photons cause in the picture: the square of a
+//! photon's fraction of the pixel, because the photon may or may not be there. The value of the pixel is estimated in
+//! the same round.
 //!
-//! What unguided light paths would leave is known from the same photons, by their weights. Where the guide, once
-//! learnt, does not leave less, there is none.
+//! The weights of the same photons give the error of unguided light paths. If the learnt guide does not reduce the
+//! error, it is dropped.
 
 use super::cost::{Cost, GUIDED_START};
 use super::light_path_ranges::light_path_ranges;
@@ -23,26 +24,25 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 
 pub(super) const ROUNDS: u64 = 5;
-/// Light paths of a round, over those of an iteration, and bounds of their number.
+/// Light paths of a round over those of an iteration, and bounds of their number.
 const LIGHT_PATHS: f64 = 0.25;
 const LEAST: u32 = 1 << 12;
 const MOST: u32 = 1 << 15;
-/// Camera paths of a round, but one in so many pixels at most.
+/// Largest number of camera paths of a round, and the number of pixels per camera path in small pictures.
 const EYE_PATHS: u32 = 1 << 13;
 const PIXELS_PER_EYE_PATH: u64 = 4;
 /// Camera paths per unit of work.
 const CHUNK: u32 = 256;
-/// Photons of either kind that a pixel gathers.
+/// Number of photons of each kind that a pixel gathers.
 const NEIGHBOURS: usize = 16;
-/// Added to a pixel's squared value, as the papers' relMSE has it. Of all errors this one still depends on the unit of
-/// radiance: it decides how well light paths are guided, not what is reported.
+/// Added to a pixel's squared value, as in the papers' relMSE. This error depends on the unit of radiance; it only
+/// affects how well light paths are guided, not the reported error.
 const DARK: f32 = 0.01;
 
-/// A guide that leaves more than this of what unguided light paths leave of squared error, times what an iteration
-/// costs, is no gain.
+/// A guide must reduce squared error times cost of an iteration below this fraction of the unguided one's.
 const WORTH: f64 = 0.9;
 
-/// A photon and the component of the guide that has made it.
+/// A photon, and the cell of the guide that sampled its path.
 #[derive(Clone, Copy)]
 struct Marked {
     photon: Photon,
@@ -63,7 +63,7 @@ impl Located for Marked {
     }
 }
 
-/// The guide of a view, learnt; `None` where there is nothing to choose, or nothing to gain by it.
+/// Learns the guide of a view; `None` if there is nothing to choose, or no gain.
 pub(super) fn learn_guide(
     camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
@@ -86,8 +86,8 @@ pub(super) fn learn_guide(
     Some(guide)
 }
 
-/// What an iteration costs with the guide over what it costs without, counted: guided light paths meet glass at once,
-/// and are longer.
+/// Counted cost of an iteration with the guide over that without: guided light paths meet glass at once, and are
+/// longer.
 fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide: &Guide) -> f64 {
     let (width, height) = camera_paths.camera.size();
     let cost = |guide: Option<&Guide>| {
@@ -101,15 +101,15 @@ fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide
     cost(Some(guide)) / cost(None)
 }
 
-/// Light paths of a cell.
+/// Light paths sampled by a cell.
 #[derive(Clone, Copy, Default)]
 struct Walked {
     paths: f64,
-    /// What they cost, in vertices.
+    /// Their cost, in vertices.
     work: f64,
 }
 
-/// Photons of a round, and the light paths by cell.
+/// Traces the photons of a round. Also returns the light paths by cell.
 fn photons(
     camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
@@ -151,10 +151,10 @@ fn photons(
     (all.map(PhotonMap::build), walked)
 }
 
-/// Sums over a round's camera paths of the squared relative errors that photons leave.
+/// Sums of squared relative errors over the camera paths of a round.
 struct CellErrors {
     of_cells: Vec<f64>,
-    /// What as many unguided light paths would leave with the same bandwidths: a photon of weight w stands for w
+    /// Error of the same number of unguided light paths at the same bandwidths: a photon of weight w represents w
     /// unguided ones, each 1 / w times as bright.
     unguided: f64,
 }
@@ -169,13 +169,13 @@ impl CellErrors {
         self.unguided += other.unguided;
     }
 
-    /// What guiding leaves of the error.
+    /// Guided over unguided squared error.
     fn ratio(&self) -> f64 {
         self.of_cells.iter().sum::<f64>() / self.unguided
     }
 }
 
-/// What the photons of a round leave where its camera paths look.
+/// Estimates the error that the photons of a round cause along its camera paths.
 fn error(
     camera_paths: &CameraPaths<'_>,
     seed: u64,
@@ -186,7 +186,7 @@ fn error(
     let (width, height) = camera_paths.camera.size();
     let pixels = u64::from(width) * u64::from(height);
     let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
-    // Pixels in even steps from a first one drawn anew every round.
+    // Evenly spaced pixels, with a random offset in each round.
     let offset = Stream::new(seed, round, Domain::GuideCamera, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
         let mut error = CellErrors::none(cells);
@@ -209,7 +209,7 @@ fn error(
     sum
 }
 
-/// Adds what the photons around a probe leave in its pixel.
+/// Adds the errors of the photons around a probe.
 fn weigh(
     camera_paths: &CameraPaths<'_>,
     maps: &ByKind<PhotonMap<Marked>>,

@@ -1,19 +1,19 @@
 //! Multiplexed Metropolis light transport: Markov chains over the paths of bidirectional path tracing \[Veach and Guibas
 //! 1997; Kelemen et al. 2002; Hachisuka, Kaplanyan and Dachsbacher 2014, "Multiplexed Metropolis Light Transport"\].
 //!
-//! A state is a point of primary sample space ([`Chain`]), a length, and a [`Division`] of a path of that length among
-//! the two walks; its weight is the light that this one technique brings, by the balance heuristic. Proposals keep the
-//! length and may change all else.
+//! A state is a point of primary sample space ([`Chain`]), a path length, and a [`Division`] of the path among the two
+//! walks. Its target density is the light that this technique finds, weighted by the balance heuristic. Proposals keep
+//! the path length and may change everything else.
 //!
-//! An iteration is a render of its own, so that iterations are independent, tell their variance by their scatter, and
-//! can be divided among machines:
+//! An iteration is a complete render. So iterations are independent, their scatter gives the variance, and several
+//! machines can share them:
 //!
-//! 1. One pair of walks for every pixel, all techniques, as bidirectional path tracing does. They measure what is seen
-//!    directly and direct light, and G-buffers; and the mean of all other light, `b`.
-//! 2. Chains start at paths found there, drawn in proportion to their light by one stratified sequence. So started they
-//!    are in equilibrium in the mean, whatever their length, and `b` makes the sum unbiased \[Veach 1997, 11.3.1\].
-//! 3. They walk as many steps as there are pixels. Both the state and the proposal are counted, each with the
-//!    probability that it is the next state \[the expected values of Veach 1997, 11.5\].
+//! 1. A pair of walks for every pixel with all techniques, as in bidirectional path tracing. They sample directly
+//! visible light, direct light and G-buffers, and estimate the mean of all other light, `b`.
+//! 2. Chains start at paths found in step 1, sampled in proportion to their light by a stratified sequence. Such chains
+//! are in equilibrium on average, and `b` makes the sum unbiased \[Veach 1997, 11.3.1\].
+//! 3. Chains take one step per pixel in total. State and proposal both contribute, each with the probability that it is
+//! the next state \[expected values, Veach 1997, 11.5\].
 
 use super::integrator::{Integrator, Work};
 use super::tiles::{TILE_PIXELS, Tiles};
@@ -36,16 +36,16 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// Steps of a chain, where there are pixels enough for many. Each iteration finds new starts in proportion to their
-/// light, so short ones, which are many, are spread better: 512 had 1.1 to 1.2 times the error.
+/// Steps per chain in large pictures. Each iteration starts new chains in proportion to light, so many short chains are
+/// better stratified: 512 steps gave 1.1 to 1.2 times the error.
 const STEPS: usize = 64;
-/// Vertex of a camera path whose draws are the chain's own: its place on the film and how paths are divided.
+/// Vertex of a camera path whose random numbers select the pixel and the division.
 const OWN: u32 = u32::MAX;
 
-/// Chains of an iteration at least.
+/// Smallest number of chains in an iteration.
 const CHAINS: usize = 16;
 
-/// Light that a path brings to a pixel.
+/// Light that a path adds to a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Deposit {
     pixel: u32,
@@ -53,29 +53,29 @@ struct Deposit {
     value: Rgb,
 }
 
-/// What the chains are to look for: all that is not seen directly, nor direct light.
+/// Whether chains sample the class: all light except directly visible lights and direct light.
 fn chained(class: PathClass) -> bool {
     !matches!(class.part(), Part::Emission | Part::Direct)
 }
 
-/// A path that one of the ordinary walks has found.
+/// A path found in step 1 at which a chain may start.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    /// Index of the pixel that walked it.
+    /// Index of its pixel.
     path: u32,
     division: Division,
     importance: f32,
 }
 
-/// What one path brings that chains look for.
+/// The light of one path that chains sample.
 #[derive(Default)]
 struct Found {
-    /// The pixel that its camera path starts in.
+    /// The pixel in which its camera path starts.
     pixel: u32,
     deposits: SmallVec<[(Technique, Deposit); 4]>,
 }
 
-/// What a chain's target density is: the sum of the channels.
+/// Target density of chains: the sum of the channels.
 fn importance(value: Rgb) -> f32 {
     let sum = value.element_sum();
     if sum.is_finite() { sum } else { 0.0 }
@@ -109,7 +109,7 @@ struct State {
     importance: f32,
 }
 
-/// What the iterations share.
+/// Integrator of Metropolis light transport.
 pub(super) struct Metropolis<'a> {
     camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
@@ -119,7 +119,7 @@ pub(super) struct Metropolis<'a> {
     levels: MergeLevels,
 }
 
-/// The walks of one iteration.
+/// The paths of one iteration.
 struct Walks<'i, 'a> {
     shared: &'i Bidirectional<'a>,
     pass: LightPaths<'i>,
@@ -129,16 +129,16 @@ struct Walks<'i, 'a> {
     size: UVec2,
 }
 
-/// Where a camera path starts: its pixel, and the point of that, uniform on the unit square.
+/// Start of a camera path: its pixel, and a point in it, uniform on the unit square.
 type Film = (UVec2, Vec2);
 
 impl Walks<'_, '_> {
-    /// The draws of both walks of a path.
+    /// Random numbers of both walks of a path.
     fn streams(&self, path: u32) -> (Stream, Stream) {
         (self.cameras.path(u64::from(path)), self.lights.path(u64::from(path)))
     }
 
-    /// Both walks of a path; what they find goes to `left`, `found` and `measure`.
+    /// Walks both subpaths of a path. Their light goes to `left`, `found` and `sample`.
     fn walk<'s>(
         &self,
         shared: &Bidirectional<'s>,
@@ -161,7 +161,7 @@ impl Walks<'_, '_> {
         }
     }
 
-    /// The path that starts in a pixel, by all techniques; what chains can start from goes to `candidates`.
+    /// Walks the path of a pixel with all techniques, and appends the starts that it offers to `candidates`.
     fn ordinary(
         &self,
         arena: &mut Bump,
@@ -184,7 +184,7 @@ impl Walks<'_, '_> {
         sample
     }
 
-    /// The path at the chain's place.
+    /// Evaluates the state of a chain.
     fn state(&self, arena: &mut Bump, chain: &mut Chain, segments: u32, streams: (Stream, Stream)) -> State {
         arena.reset();
         let own = streams.0.vertex(OWN);
@@ -205,8 +205,8 @@ impl Walks<'_, '_> {
         State { deposits, importance }
     }
 
-    /// A chain that starts at `candidate` and takes so many steps. What it finds, with weights that sum to one for a
-    /// step, each divided by its importance.
+    /// Runs a chain from `candidate`. Returns its contributions, divided by their importance, with weights that sum to
+    /// one for each step.
     fn chain(&self, arena: &mut Bump, number: u64, candidate: &Candidate, steps: usize) -> Vec<Deposit> {
         let Candidate { path, division: Division { segments, camera }, .. } = *candidate;
         let (cameras, lights) = self.streams(path);
@@ -231,7 +231,7 @@ impl Walks<'_, '_> {
             }
             chain.propose();
             let proposal = self.state(arena, &mut chain, segments, streams);
-            // Rounding may have put out the path that the chain began with; then any that shines is better.
+            // Rounding may have extinguished the chain's first path. Then any other is accepted.
             let acceptance = match current.importance {
                 0.0 => 1.0,
                 importance => (proposal.importance / importance).min(1.0),
@@ -249,8 +249,8 @@ impl Walks<'_, '_> {
     }
 }
 
-/// Where chains start: `count` of the candidates, in proportion to their importance, by one stratified sequence whose
-/// first number is `u`; and the sum of all importance.
+/// Starts of chains: `count` of the candidates, sampled in proportion to importance by a stratified sequence with the
+/// random number `u`. Also returns the sum of all importances.
 fn starts(candidates: &[Candidate], count: usize, u: f64) -> (Vec<Candidate>, f64) {
     let total: f64 = candidates.iter().map(|candidate| f64::from(candidate.importance)).sum();
     let step = total / count as f64;
@@ -261,7 +261,7 @@ fn starts(candidates: &[Candidate], count: usize, u: f64) -> (Vec<Candidate>, f6
             found.push(*candidate);
         }
     }
-    // What rounding leaves out.
+    // Rounding may leave the sequence one short.
     if let Some(last) = candidates.last() {
         found.resize(count, *last);
     }
@@ -269,7 +269,6 @@ fn starts(candidates: &[Candidate], count: usize, u: f64) -> (Vec<Candidate>, f6
 }
 
 impl<'a> Metropolis<'a> {
-    /// Nothing done yet.
     pub fn new(
         scene: &'a Scene,
         camera: &'a Camera,
@@ -294,8 +293,8 @@ impl<'a> Metropolis<'a> {
         Metropolis { camera_paths, settings, shared, tiles, samples, levels }
     }
 
-    /// One pair of walks for every pixel: all that is seen directly, direct light, and what chains can start from. Last,
-    /// light paths that ended because they were not finite.
+    /// Step 1 for all pixels. Returns the candidates, and the number of light paths that ended because they were not
+    /// finite.
     fn walk_all(&mut self, walks: &Walks<'_, '_>) -> (Vec<Candidate>, u64) {
         let (tiles, width) = (self.tiles, walks.size.x);
         let left: Vec<(Deposits, Vec<Candidate>)> = self
@@ -362,7 +361,7 @@ impl Integrator for Metropolis<'_> {
         if self.settings.stop.aborted() {
             return None;
         }
-        // A step stands for as many paths as there are pixels over steps, and light divided by its importance for `b`.
+        // The steps represent all pixels, and light over importance is scaled to the mean `b`.
         let scale = (total / (count * steps) as f64) as f32;
         for Deposit { pixel, part, value } in left.into_iter().flatten() {
             let sample = &mut self.samples[self.tiles.slot(pixel)];

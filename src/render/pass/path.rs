@@ -1,4 +1,4 @@
-//! One iteration of path tracing.
+//! Path tracing.
 
 use super::integrator::{Integrator, Work};
 use super::sample_buffer::{self, SampleBuffer};
@@ -13,7 +13,7 @@ use crate::transport::{CameraPaths, PixelSample, path_sample};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
-/// The passes of a render.
+/// Integrator of path tracing.
 pub(super) struct Paths<'a> {
     camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
@@ -23,7 +23,6 @@ pub(super) struct Paths<'a> {
 }
 
 impl<'a> Paths<'a> {
-    /// Nothing done yet.
     pub fn new(camera_paths: CameraPaths<'a>, settings: &'a Settings) -> Paths<'a> {
         let tiles = Tiles::new(camera_paths.camera);
         let samples = [SampleBuffer::new(tiles.count() * TILE_PIXELS, 1)];
@@ -36,7 +35,7 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// Adds iteration `i` (from 1) to all pixels; false where it was given up.
+    /// Adds iteration `i` (from 1) to all pixels; false if it was aborted.
     fn pass<W: TileRecorder>(&mut self, i: u64, pixels: &mut [PixelAccumulator], recorders: &mut [W]) -> bool {
         let (camera_paths, tiles) = (self.camera_paths, self.tiles);
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);

@@ -1,16 +1,15 @@
-//! Classical photon mapping \[Jensen 1996\]: photons traced once, and the nearest of caustics and of all others around
-//! every point that a camera path sees.
+//! Classical photon mapping \[Jensen 1996\]: photons are traced once, and the nearest photons of each kind are gathered
+//! around every point that a camera path sees.
 //!
-//! As comparisons of progressive methods show it \[Hachisuka 2013\], without final gathering: direct light by
-//! next-event estimation, caustics and all other indirect light from the maps. Camera paths accumulate over iterations,
-//! the maps stay. So the picture tends to their own blurred and blotched one, never to the truth: only more photons
-//! help, and memory bounds their number. The estimated error, which is told from differences between iterations, does
-//! not know of it.
+//! As in comparisons of progressive methods \[Hachisuka 2013\], there is no final gathering: next-event estimation
+//! finds direct light, the maps give all indirect light. Iterations trace new camera paths with the same maps. So the
+//! picture converges to the blurred estimate of the maps; only more photons, limited by memory, reduce that bias. The
+//! estimated error comes from differences between iterations and does not contain it.
 //!
-//! Of light in media it has single scattering alone, no photons: not for scenes whose media scatter.
+//! In media it finds single scattering only, without photons, so it is not meant for scattering scenes.
 //!
-//! Where the memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the
-//! number of paths that were traced.
+//! When memory is full, tracing ends with the last light path whose photons all fit, and fluxes are divided by the
+//! number of traced paths.
 
 use super::integrator::{Integrator, Work};
 use super::photon_tracer::trace_range;
@@ -30,14 +29,13 @@ use crate::transport::{
 };
 use bumpalo::Bump;
 
-/// Light paths traced between two looks at the memory.
+/// Light paths between two checks of the memory.
 const BATCH: u32 = 1 << 16;
-/// Bytes per photon while the map is built: the photon as traced and as sorted, its place on the curve, its share of
-/// the tree.
+/// Bytes per photon while the map is built: the photon in the order of tracing and sorted, its Morton code, and its
+/// share of the tree.
 pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 
-/// The photons of a pass that fit into `most`, and the number of light paths that left them. Their flux is divided by
-/// it. Last, light paths that ended because they were not finite.
+/// Traces photons up to the number `most`.
 fn trace(
     scene: &Scene,
     initial_media: &InitialMedia,
@@ -56,7 +54,7 @@ fn trace(
         lost += batch.lost;
         traced = end;
     }
-    // The memory ends within a batch: path by path.
+    // The limit lies within this batch, so its paths are added one by one.
     let mut arena = Bump::new();
     let mut path = Photons::default();
     while traced < pass.count() {
@@ -75,8 +73,8 @@ fn trace(
     (photons, traced, lost)
 }
 
-/// The distance to the k-th nearest photon is the bandwidth; it is not inside, so `k - 1` are, which is as many as this
-/// area holds on average.
+/// Bandwidths by the distance to the k-th nearest photon. That photon is outside, so `k - 1` are inside, which is the
+/// expected number in this area.
 struct Neighbours<'a> {
     count: usize,
     nearest: &'a mut ByKind<Nearest>,
@@ -104,20 +102,19 @@ impl GatherBandwidths for Neighbours<'_> {
     fn counter(&mut self, _: Kind, (): &()) {}
 }
 
-/// The passes of a render.
+/// Integrator of classical photon mapping.
 pub(super) struct Pm<'a> {
     camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
     initial_media: &'a InitialMedia,
-    /// Built by the first iteration.
+    /// Built in the first iteration.
     maps: Option<PhotonMaps>,
-    /// The light paths of the maps are counted.
+    /// Whether the light paths of the maps have been reported.
     counted: bool,
     samples: [SampleBuffer; 1],
 }
 
 impl<'a> Pm<'a> {
-    /// Nothing done yet.
     pub fn new(
         scene: &'a Scene,
         camera: &'a Camera,
@@ -129,7 +126,7 @@ impl<'a> Pm<'a> {
         Pm { camera_paths, settings, initial_media, maps: None, counted: false, samples }
     }
 
-    /// The maps, how many light paths they are of, and what was left out.
+    /// Traces photons and builds the maps.
     fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32, u64) {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();
@@ -194,7 +191,7 @@ impl Integrator for Pm<'_> {
         if self.settings.stop.aborted() {
             return None;
         }
-        // After a pause the maps are made again, of the same paths.
+        // A resumed render traces the same maps again without counting them twice.
         let (light_paths, rejected) =
             if std::mem::replace(&mut self.counted, true) { (0, 0) } else { (u64::from(traced), rejected) };
         Some(Work { light_paths, photons, rejected, ..Work::default() })

@@ -1,4 +1,4 @@
-//! The photons of a pass, and what media add to them: photons of their own, and bandwidths of their own.
+//! Photon maps of an iteration, and what media add to them: a map of photons in media, with its own bandwidths.
 
 use super::photon_counts::PhotonCounts;
 use crate::camera::GROUP_SIZE;
@@ -9,15 +9,15 @@ use crate::render::settings::Settings;
 use crate::spectrum::IterationWavelengths;
 use crate::transport::{PathStart, Volume};
 
-/// Photons of an iteration.
+/// Photon maps of an iteration.
 pub(super) struct Maps {
-    /// On surfaces.
+    /// Photons on surfaces.
     pub surface: PhotonMaps,
-    /// In media, if any scatter.
+    /// Photons in media, if the scene has scattering media.
     pub volume: Option<VolumeMap>,
-    /// The wavelengths they have taken.
+    /// Wavelengths of the light paths.
     pub wavelengths: IterationWavelengths,
-    /// Light paths that ended because they were not finite.
+    /// Number of light paths that ended because they were not finite.
     pub lost: u64,
 }
 
@@ -28,19 +28,19 @@ impl Maps {
         surface + self.volume.as_ref().map_or(0, |volume| volume.map.photons().len())
     }
 
-    /// Photons on surfaces, of which none has been gathered yet.
+    /// Number of photons on surfaces by kind; none has been gathered yet.
     pub fn counts(&self) -> PhotonCounts {
         let stored = self.surface.each_ref().map(|map| map.photons().len() as u64);
         PhotonCounts { stored, ..PhotonCounts::default() }
     }
 
-    /// Photons and light paths that were not finite.
+    /// Number of photons and light paths that were not finite.
     pub fn rejected(&self) -> u64 {
         let surface: u64 = self.surface.iter().map(PhotonMap::rejected).sum();
         self.lost + surface + self.volume.as_ref().map_or(0, |volume| volume.map.rejected())
     }
 
-    /// The starts of camera paths that take no other wavelengths.
+    /// Sets the wavelengths of camera paths to those of the light paths.
     #[inline]
     pub fn tune(
         &self,
@@ -52,7 +52,7 @@ impl Maps {
         starts
     }
 
-    /// The photons in media for some of the levels of `pixel`.
+    /// The photons in media, with the radii of some levels of `pixel`.
     #[inline]
     pub fn volume(&self, pixel: &PixelAccumulator, levels: impl Iterator<Item = usize>) -> Option<Volume<'_>> {
         let VolumeMap { map, schedule } = self.volume.as_ref()?;
@@ -60,14 +60,14 @@ impl Maps {
     }
 }
 
-/// Photons in media, and how far bandwidths have shrunk.
+/// Photons in media, and the schedule of their bandwidths.
 pub(super) struct VolumeMap {
     map: PhotonMap<VolumePhoton>,
     schedule: Schedule,
 }
 
 impl VolumeMap {
-    /// Those of iteration `i`.
+    /// Builds the map of iteration `i`.
     pub fn new(photons: Vec<VolumePhoton>, i: u64, settings: &Settings) -> VolumeMap {
         VolumeMap { map: PhotonMap::build(photons), schedule: settings.schedule(i) }
     }
