@@ -236,16 +236,12 @@ fn the_circle_test_finds_planted_faults() {
         let place = |(name, text): (&str, &str)| (name.into(), from_parent(text, "outer::room", 1));
         circle(&["a", "b", "c"].into_iter().zip(texts).map(place).collect::<Vec<(String, String)>>())
     };
-    let right =
-        ["pub struct A;", "use super::a::A;\npub(super) fn b() {}", "use crate::outer::boundary_kernel::{A, b};"];
+    let right = ["pub struct A;", "use super::a::A;\npub(super) fn b() {}", "use crate::outer::room::{A, b};"];
     assert_eq!(circle(right), [] as [&str; 0]);
     assert_eq!(circle(["use super::c;\npub struct A;", right[1], right[2]]), ["a", "b", "c"]);
     assert_eq!(circle(["use super::b;\npub struct A;", right[1], ""]), ["a", "b"]);
     // Modules with the same names in other folders are other modules.
-    assert_eq!(
-        circle(["use crate::boundary_kernel::b;\nuse super::super::b;\npub struct A;", right[1], ""]),
-        [] as [&str; 0]
-    );
+    assert_eq!(circle(["use crate::room::b;\nuse super::super::b;\npub struct A;", right[1], ""]), [] as [&str; 0]);
 }
 
 #[test]

@@ -49,9 +49,9 @@ impl PilotResult {
 /// Counted core-seconds that pilots and render may take.
 #[derive(Clone, Copy)]
 pub(super) struct Budget {
-    /// All pilots together.
+    /// Core-seconds of all pilots together.
     pub pilots: f64,
-    /// The render.
+    /// Core-seconds of the render.
     pub render: f64,
 }
 
@@ -170,7 +170,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 }
 
 impl ExpectedErrors {
-    /// Extrapolates errors from the half of the pilot's iterations to `factor` times as many, by the power law through
+    /// Extrapolates errors from the half of the pilot's iterations to `factor` times that number, by the power law through
     /// the mean errors of `half` and `quarters`. The result is linear in both, so that its noise includes the noise of
     /// the exponent, which grows with the logarithm of `factor`.
     fn extrapolate(half: &[PixelError], quarters: [&[PixelError]; 2], factor: f64) -> ExpectedErrors {

@@ -1,4 +1,4 @@
-//! What a render hands on: pixels, layers, counts, and the error as estimated without a reference.
+//! The result of a render: pixels, layers, statistics, and the error estimated without a reference.
 
 mod accuracy;
 mod error_coverage;

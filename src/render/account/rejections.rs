@@ -65,7 +65,8 @@ impl Rejections {
         })
     }
 
-    /// Whether so many samples and light paths are missing that the picture may be wrong. Features do not count.
+    /// Whether the share of rejected samples and light paths is so large that the picture may be wrong. Features do not
+    /// count.
     pub fn are_too_many(&self) -> bool {
         (self.rejected() + self.light) as f64 > MAX_REJECTED_SHARE * self.samples as f64
     }

@@ -1,4 +1,4 @@
-//! What a render counts and measures: iterations, light paths, photons, time, and the history of its error.
+//! Statistics of a render: iterations, light paths, photons, time, and the history of the error.
 
 use super::error_estimate::{ErrorEstimate, ErrorReport};
 use super::history::HistoryEntry;

@@ -73,7 +73,7 @@ impl<'a> Session<'a> {
         Ok(State { pixels: &self.pixels, counters: self.counters.clone(), passes: self.integrator.state()? })
     }
 
-    /// Whether all iterations are done: those of the settings, or as many as pixels can sum exactly.
+    /// Whether the render has done all iterations of its settings, or the most that pixels can sum exactly.
     pub fn is_finished(&self) -> bool {
         self.counters.next >= self.settings().iterations.unwrap_or(u64::MAX).min(MAX_TERMS)
     }

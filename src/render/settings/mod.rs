@@ -34,18 +34,18 @@ pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum KernelChoice {
-    /// Alike within the bandwidth
+    /// Constant within the bandwidth
     ///
-    /// [`kernel::Box`].
+    /// See [`kernel::Box`].
     #[default]
     Box,
-    /// Falling with the squared distance
+    /// Falls with the squared distance
     ///
-    /// [`kernel::Epanechnikov`].
+    /// See [`kernel::Epanechnikov`].
     Epanechnikov,
     /// A normal distribution cut off at three standard deviations
     ///
-    /// [`kernel::Gaussian`].
+    /// See [`kernel::Gaussian`].
     Gaussian,
 }
 
@@ -54,14 +54,14 @@ pub enum KernelChoice {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum RadiusRule {
-    /// The iteration's number alone
+    /// By the number of the iteration alone
     ///
-    /// [`memoryless`].
+    /// See [`memoryless`].
     #[default]
     Memoryless,
-    /// The photons found
+    /// By the number of photons found
     ///
-    /// [`local`](crate::estimator::rule::local).
+    /// See [`local`](crate::estimator::rule::local).
     Local,
 }
 
@@ -177,8 +177,8 @@ impl Settings {
     }
 
     /// Default number of light paths per iteration for a picture of this size. If photons carry caustics alone, most of
-    /// the error comes from camera paths. Guided light paths are several times as long as unguided ones, because most of
-    /// them hit glass; then there are at most as many as pixels.
+    /// the error comes from camera paths. Guided light paths cost several times as much as unguided ones, because most of
+    /// them hit glass, so their default is at most one per pixel.
     pub fn default_photons(&self, (width, height): (u32, u32)) -> u32 {
         let photons = self.method.default_photons();
         if self.guided && self.indirect == Indirect::Paths {
