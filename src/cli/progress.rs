@@ -3,7 +3,7 @@
 use super::{printable, say};
 use caustique::pipeline::FINISHED_PICTURE;
 pub use caustique::pipeline::plan::percent;
-use caustique::render::{Progress, Settings};
+use caustique::render::{ExpectedError, Progress, Settings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::io::IsTerminal;
@@ -181,14 +181,7 @@ struct Line {
     error_of: &'static str,
     /// A smaller error, and the seconds until the render reaches it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    expected: Option<Expected>,
-}
-
-/// A smaller error, and the seconds until the render reaches it.
-#[derive(Serialize)]
-struct Expected {
-    error: f64,
-    seconds: f64,
+    expected: Option<ExpectedError>,
 }
 
 impl Reporter {
@@ -216,10 +209,11 @@ impl Reporter {
                 }
             }
             Form::Json => {
-                let Progress { iteration, iterations, seconds, remaining, light_paths, error_coverage, .. } = *progress;
+                let Progress {
+                    iteration, iterations, seconds, remaining, light_paths, error_coverage, expected, ..
+                } = *progress;
                 let error = progress.finished.or(progress.error);
                 let error_of = if progress.finished.is_some() { FINISHED_PICTURE } else { error_coverage.name() };
-                let expected = progress.expected.map(|(error, seconds)| Expected { error, seconds });
                 let frame = self.turn.map(|turn| turn.frame);
                 let line =
                     Line { frame, iteration, iterations, seconds, remaining, light_paths, error, error_of, expected };
@@ -270,7 +264,7 @@ fn sentence(progress: &Progress) -> String {
         text += &format!(", {} photons/s", count(progress.light_paths as f64 / progress.seconds.max(1e-9)));
     }
     match (progress.finished, progress.expected) {
-        (Some(error), Some((wanted, seconds))) => {
+        (Some(error), Some(ExpectedError { error: wanted, seconds })) => {
             text += &format!(", error {} now, {} in about {}", percent(error), percent(wanted), duration(seconds));
         }
         (Some(error), None) => text += &format!(", error {}", percent(error)),
@@ -325,7 +319,8 @@ mod tests {
         assert_eq!(sentence(&progress), "iteration 12 of 64, 3.1 s, 4 min 10 s left, 387 k photons/s, error 3.1 %");
         let noise = Progress { error_coverage: ErrorCoverage::Noise, remaining: None, iterations: None, ..progress };
         assert_eq!(sentence(&noise), "iteration 12, 3.1 s, 387 k photons/s, error 3.1 % (noise only)");
-        let known = Progress { finished: Some(0.021), expected: Some((0.01, 40.0)), ..noise };
+        let known =
+            Progress { finished: Some(0.021), expected: Some(ExpectedError { error: 0.01, seconds: 40.0 }), ..noise };
         assert_eq!(sentence(&known), "iteration 12, 3.1 s, 387 k photons/s, error 2.1 % now, 1.0 % in about 40.0 s");
         assert_eq!(duration(7500.0), "2 h 5 min");
         assert_eq!(duration(99.7), "1 min 40 s");

@@ -6,7 +6,7 @@
 use super::finish::OpenFinish;
 use crate::error::Result;
 use crate::finish::reads_for_error;
-use crate::render::{Accuracy, MIN_ITERATIONS_FOR_ERROR, Progress, Session, TimeSpent};
+use crate::render::{Accuracy, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, Session, TimeSpent};
 
 /// Without a target error, the factor by which the iterations grow between two estimates.
 const GROWTH: u64 = 4;
@@ -59,7 +59,7 @@ pub(super) fn add_to_progress(
     let error = accuracy.error(session.iterations());
     let next = target.unwrap_or(0.5 * error);
     let seconds = accuracy.iterations_to(next).map(|iterations| session.seconds_until(iterations));
-    let expected = seconds.filter(|seconds| *seconds > 0.0).map(|seconds| (next, seconds));
+    let expected = seconds.filter(|seconds| *seconds > 0.0).map(|seconds| ExpectedError { error: next, seconds });
     Progress { finished: Some(error), expected, ..*progress }
 }
 

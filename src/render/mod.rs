@@ -17,7 +17,9 @@ pub use pass::{
     MAX_TECHNIQUES, PHOTON_BYTES, PhotonCounts, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile, photons_per_path,
     sample_bytes,
 };
-pub use session::{Control, MIN_ITERATIONS_FOR_ERROR, Progress, RenderInput, Session, State, render, run_session};
+pub use session::{
+    Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, RenderInput, Session, State, render, run_session,
+};
 pub use settings::{
     BandwidthRule, Candidate, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY,
     DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, KernelChoice, Levels, MAX_SHARDS, Method, RadiusRule, Settings, Shard,

@@ -1,6 +1,7 @@
 //! Progress of a render, and the observer's answer to it.
 
 use crate::render::account::ErrorCoverage;
+use serde::Serialize;
 
 /// Answer of an observer after an iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,6 +12,15 @@ pub enum Control {
     Stop,
     /// Stop because the target error is reached.
     Reached,
+}
+
+/// A smaller relative error, and the seconds until the render reaches it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ExpectedError {
+    /// The relative error.
+    pub error: f64,
+    /// Seconds from now.
+    pub seconds: f64,
 }
 
 /// State of a render after an iteration.
@@ -35,6 +45,6 @@ pub struct Progress {
     pub error_coverage: ErrorCoverage,
     /// Estimated relative error of the finished picture, if it has been measured. Shown instead of `error`.
     pub finished: Option<f64>,
-    /// The next error to reach (relative), and the seconds until then.
-    pub expected: Option<(f64, f64)>,
+    /// The next smaller error, if it is known when the render reaches it.
+    pub expected: Option<ExpectedError>,
 }

@@ -5,7 +5,7 @@ mod input;
 mod run;
 mod state;
 
-pub use control::{Control, Progress};
+pub use control::{Control, ExpectedError, Progress};
 pub use input::RenderInput;
 pub use run::{MIN_ITERATIONS_FOR_ERROR, render, run_session};
 pub use state::State;
