@@ -117,7 +117,7 @@ fn row(stack: &LevelStack, normalisation: &Normalisation, channel: Channel, star
         Channel::Deviation(j) => {
             let level = &stack.levels[j][n.clone()];
             for ((out, rgb), variance) in out.iter_mut().zip(level).zip(&stack.variances[j][n]) {
-                // The deviation of log(1 + x) is that of x over 1 + x; on a logarithmic scale.
+                // The deviation of log(1 + x) is that of x divided by 1 + x. The channel is its logarithm.
                 let bright = mean(rgb.map(|v| finite(v).max(0.0) * scale));
                 let deviation = mean(variance.map(|v| finite(v).max(0.0))).sqrt() * scale / (1.0 + bright);
                 let floor = DEVIATION_FLOOR.ln();

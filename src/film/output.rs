@@ -361,7 +361,7 @@ mod tests {
         }
         let set = layers((1, 1), std::slice::from_ref(&pixel), &bandwidths(), &shape(), |_| true).expect("one pixel");
         assert_eq!(value(&set, "Variance2", "R"), f32::MAX);
-        // The root of (1e20)^2 four times, over 4 and 3.
+        // Four squared deviations of (1e20)^2, over 3 for the variance and over 4 for that of the mean.
         assert!((value(&set, "Error", "R") / (1e20 / 3f32.sqrt()) - 1.0).abs() < 1e-3);
     }
 

@@ -106,7 +106,7 @@ mod tests {
         image.push(Layer::interleaved(ERROR, "RGB", [[0.2; 3]; 256])).expect("sizes agree");
         let page = html(&image, &reference, ["a.exr", "b.exr"], &compared).expect("both are pictures");
         assert_eq!(page.matches("<figure>").count(), 5);
-        // 0.2 over the root of 1 and the floor of 0.01 of it.
+        // 0.2 / sqrt(1 + 0.01), with the floor of 0.01.
         assert!(page.contains("19.9 %") || page.contains("20 %"));
     }
 }

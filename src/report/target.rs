@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn the_error_is_interpolated_as_a_power_of_time() {
-        // N^-1/2 and a tenth of a second an iteration.
+        // N^-1/2, and 0.1 s per iteration.
         let curve = one(&[(1, 0.1, 1.0), (4, 0.4, 0.5), (16, 1.6, 0.25)]);
         let ([n, s, c], at_once) = crossing(&curve, 1.0 / 3.0).expect("it is reached");
         assert!((n - 9.0).abs() < 1e-9 && (s - 0.9).abs() < 1e-9 && (c - 1.8).abs() < 1e-9 && !at_once, "{n} {s} {c}");

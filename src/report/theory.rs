@@ -26,7 +26,7 @@ pub fn theory(settings: &Settings) -> Option<Theory> {
         (_, [BandwidthRule::Memoryless, ..]) => (kernel, "the slower of variance N^−α and squared bias N^(2α − 2)"),
         _ => return None,
     };
-    // Not -0.
+    // Adding zero turns -0 into 0.
     Some(Theory { exponent: exponent + 0.0, because })
 }
 

@@ -99,7 +99,7 @@ fn equal_levels_give_that_image_whatever_the_weights() {
     let mut random = Random(2);
     for (width, height) in [(1, 1), (2, 5), (31, 18)] {
         let mut stack = random.stack(width, height, 5);
-        // A range of radiance as renders have it.
+        // The range of radiance in renders.
         stack.levels[0].iter_mut().for_each(|rgb| *rgb = rgb.map(|v| 10f32.powf(6.0 * v - 8.0)));
         stack.levels = vec![stack.levels[0].clone(); 5];
         for weights in random_weights(&mut random, width, height, 5) {

@@ -108,9 +108,9 @@ fn values_that_are_not_finite_stay_where_they_are() {
     let image = combiner.run(&stack).unwrap();
     assert!(image.iter().flatten().all(|v| v.is_finite()));
     assert_eq!(image[at(5, 30)], [7.0, 8.0, 9.0]);
-    // No finite level: the neighbours' mean, which is of their size.
+    // No level is finite: the pixel gets the mean of its neighbours.
     assert!(image[lost].iter().all(|v| (0.5..4.0).contains(v)), "{:?}", image[lost]);
-    // Nothing finite at all.
+    // No pixel is finite.
     stack.levels.iter_mut().flatten().for_each(|rgb| *rgb = [f32::NAN; 3]);
     assert!(combiner.run(&stack).unwrap().iter().all(|rgb| *rgb == [0.0; 3]));
 }
