@@ -112,7 +112,6 @@ pub(super) fn gallery(
             let figure = curve_point.map_or("below the reference's error".into(), |curve_point| {
                 format!("{} {}", metric.name(), short(curve_point.figure))
             });
-            let seconds = short(point.seconds);
             let line = &lines[point.line];
             let count = match line.source.is_ours() {
                 true => iterations(point.iterations),
@@ -120,7 +119,7 @@ pub(super) fn gallery(
             };
             Ok(Crops {
                 name: line.name.clone(),
-                caption: format!("{count}, {seconds} s, {figure}"),
+                caption: format!("{count}, {} s, {figure}", short(point.seconds)),
                 pictures: windows.iter().map(|w| crop::picture(picture, *w, look)).collect::<Result<_>>()?,
                 heat_maps: windows
                     .iter()
