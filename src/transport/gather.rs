@@ -2,8 +2,9 @@
 
 use super::bandwidths::{FoundPhotons, GatherBandwidths, PhotonCounter};
 use super::cause::Cause;
-use super::gathering_walk::{GatheringWalk, Onward};
+use super::gathering_walk::GatheringWalk;
 use super::glint::GlintGather;
+use super::glint::Onward;
 use super::photon_batch::Batch;
 use super::vertex::Vertex;
 use crate::bsdf::LobeSet;

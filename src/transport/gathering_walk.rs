@@ -22,7 +22,7 @@ use super::bandwidths::GatherBandwidths;
 use super::camera_paths::{CameraPathStart, CameraPaths, Indirect};
 use super::cause::Cause;
 use super::direct::{BSDF_SAMPLE_PROBABILITY, balance, direct_light, next_event};
-use super::glint::Glints;
+use super::glint::{Glints, Onward};
 use super::pass_through::PassThroughHit;
 use super::photon_batch::{Scratch, Waiting};
 use super::pixel_sample::{Features, PixelSample};
@@ -43,13 +43,6 @@ use crate::scene::Scene;
 
 /// Smallest probability of continuing by broad lobes, and by the others, at a vertex that has both.
 const MIN_CHANCE: f32 = 0.1;
-
-/// The lobes by which a path may continue, and the probability that it does.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Onward {
-    pub lobes: LobeSet,
-    pub probability: f32,
-}
 
 /// Visitor of a camera path that gathers. `PATHS`: the path continues by broad lobes ([`Indirect::Paths`]).
 pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {

@@ -15,12 +15,18 @@
 //! ([`PhotonFlags::density`]).
 
 use super::bandwidths::{LevelRadii, MAX_LEVELS};
-use super::gathering_walk::Onward;
 use crate::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use crate::light::EmissionDensity;
 use crate::math::{Rgb, Vec3};
 use crate::photon::{Kernel, Photon, PhotonFlags, PhotonMap};
 use std::f32::consts::PI;
+
+/// The lobes by which a path may continue, and the probability that it does.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Onward {
+    pub lobes: LobeSet,
+    pub probability: f32,
+}
 
 /// Kernel area for glints over the kernel area of other photons. It is smaller because photons are only one of two
 /// techniques here.
