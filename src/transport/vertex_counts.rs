@@ -1,6 +1,6 @@
 //! Mean numbers of vertices of paths. The cost model of methods uses them instead of a clock.
 
-use super::camera_paths::CameraPaths;
+use super::camera_paths::{CameraPathStart, CameraPaths};
 use super::initial_media::InitialMedia;
 use super::light::LightPaths;
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
@@ -148,53 +148,18 @@ impl VertexCounts {
         let pixels = u64::from(width) * u64::from(height);
         let lights = LightPaths::new(seed, 0, Domain::GuideLight, PATHS, camera_paths.max_depth).guided(guide);
         let from_light = |index: u32| {
-            let mut count = Count::new(camera_paths.scene);
-            if let Some(emitted) = lights.emit(camera_paths.scene, initial_media, index) {
-                let (start, stream) = (&emitted.start, emitted.stream);
-                walk(
-                    camera_paths.scene,
-                    &Bump::new(),
-                    start,
-                    stream,
-                    Transport::Importance,
-                    camera_paths.max_depth,
-                    &mut count,
-                );
-            }
-            count
+            let emitted = lights.emit(camera_paths.scene, initial_media, index);
+            let start = emitted.map(|emitted| (emitted.start, emitted.stream));
+            count_path::<false>(camera_paths, start, Transport::Importance)
         };
         let start = |index: u32| {
             let pixel = u64::from(index) * pixels / u64::from(PATHS);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
             let stream = Stream::new(seed, u64::MAX, Domain::GuideCamera, u64::from(index));
-            (camera_paths.start(at, stream), stream)
+            Some((camera_paths.start(at, stream), stream))
         };
-        let from_camera = |index: u32| {
-            let (mut count, (start, stream)) = (Count::<false>::new(camera_paths.scene), start(index));
-            walk(
-                camera_paths.scene,
-                &Bump::new(),
-                &start,
-                stream,
-                Transport::Radiance,
-                camera_paths.max_depth,
-                &mut count,
-            );
-            count
-        };
-        let through = |index: u32| {
-            let (mut count, (start, stream)) = (Count::<true>::new(camera_paths.scene), start(index));
-            walk(
-                camera_paths.scene,
-                &Bump::new(),
-                &start,
-                stream,
-                Transport::Radiance,
-                camera_paths.max_depth,
-                &mut count,
-            );
-            count.counts()
-        };
+        let from_camera = |index: u32| count_path::<false>(camera_paths, start(index), Transport::Radiance);
+        let through = |index: u32| count_path::<true>(camera_paths, start(index), Transport::Radiance).counts();
         let paths = || (0..PATHS).into_par_iter().with_min_len(CHUNK);
         let light: Vec<Count<'_, false>> = paths().map(from_light).collect();
         let through: Vec<[f64; 6]> =
@@ -211,18 +176,17 @@ impl VertexCounts {
             merged
         };
         let merged: Vec<u64> = camera.par_iter().with_min_len(CHUNK).map(merged).collect();
-        // Integers, so sums do not depend on their order.
-        let mean = |counts: &mut dyn Iterator<Item = [f64; 6]>| {
-            let sum = counts.fold([0.0; 6], |sum, counts| std::array::from_fn(|k| sum[k] + counts[k]));
-            sum.map(|sum| sum / f64::from(PATHS))
-        };
-        let [whole, light] = [&camera, &light].map(|counts| mean(&mut counts.iter().map(Count::counts)));
-        let straight = if through.is_empty() { whole } else { mean(&mut through.into_iter()) };
-        let [camera, _, camera_connectable, camera_media, _, camera_textured] = whole;
-        let [light, light_to_broad, light_connectable, light_media, _, light_textured] = light;
-        let [_, camera_to_broad, _, _, media_samples, _] = straight;
-        let textured = (camera_textured + light_textured) / (camera + light).max(1.0);
         let merged = merged.iter().sum::<u64>() as f64 / f64::from(PATHS);
+        let [full, light] = [&camera, &light].map(|counts| mean(counts.iter().map(Count::counts)));
+        let short = if through.is_empty() { full } else { mean(through.into_iter()) };
+        VertexCounts::from_means(full, short, light, merged)
+    }
+
+    /// From means of [`Count::counts`] of full and short camera paths and of full light paths.
+    fn from_means(full: [f64; 6], short: [f64; 6], light: [f64; 6], merged: f64) -> VertexCounts {
+        let [camera, _, camera_connectable, camera_media, _, camera_textured] = full;
+        let [light, light_to_broad, light_connectable, light_media, _, light_textured] = light;
+        let [_, camera_to_broad, _, _, media_samples, _] = short;
         VertexCounts {
             camera,
             camera_to_broad,
@@ -233,8 +197,28 @@ impl VertexCounts {
             camera_media,
             light_media,
             media_samples,
-            textured,
+            textured: (camera_textured + light_textured) / (camera + light).max(1.0),
             merged,
         }
     }
+}
+
+/// Mean counts of [`PATHS`] paths. Counts are integers, so sums do not depend on their order.
+fn mean(counts: impl Iterator<Item = [f64; 6]>) -> [f64; 6] {
+    let sum = counts.fold([0.0; 6], |sum, counts| std::array::from_fn(|k| sum[k] + counts[k]));
+    sum.map(|sum| sum / f64::from(PATHS))
+}
+
+/// Counts the vertices of one path; none without a start.
+fn count_path<'a, const THROUGH: bool>(
+    camera_paths: &CameraPaths<'a>,
+    start: Option<CameraPathStart>,
+    transport: Transport,
+) -> Count<'a, THROUGH> {
+    let (scene, max_depth) = (camera_paths.scene, camera_paths.max_depth);
+    let mut count = Count::<THROUGH>::new(scene);
+    if let Some((start, stream)) = start {
+        walk(scene, &Bump::new(), &start, stream, transport, max_depth, &mut count);
+    }
+    count
 }

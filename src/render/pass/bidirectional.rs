@@ -13,12 +13,12 @@
 use super::guiding::learn_guide;
 use super::integrator::{Integrator, Work};
 use super::photon_counts::PhotonCounts;
-use super::sample_buffer::{self, SampleBuffer};
+use super::sample_buffer::{self, SampleBuffer, SampleBufferPart};
 use super::techniques::{FilmRecorder, TechniquePicture, TileRecorder};
 use super::tiles::{PixelBlock, TILE_PIXELS, Tiles, WholeTile};
 use crate::camera::{Camera, GROUP_SIZE};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
-use crate::estimator::{InitialBandwidth, PixelAccumulator, level_factor2};
+use crate::estimator::{InitialBandwidth, PixelAccumulator, Schedule, level_factor2};
 use crate::light::Guide;
 use crate::photon::{ByKind, PhotonMap};
 use crate::plan::{CameraSuffix, Event, Part};
@@ -174,99 +174,152 @@ impl<'a> Passes<'a> {
             }
             self.photons = Some((i - 1, photons));
         }
-        let schedule = self.settings.schedule(i);
-        let merged = self.photons.is_some();
-        let expected = self.covered * self.pairs.len() as f32;
-        let levels = |bandwidth: f32, pair: &Pair| {
-            MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
-                let radius2 = schedule.radius2(bandwidth, level);
-                let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
-                let eta = match (merged, shared.techniques.connect) {
-                    (false, _) => Eta::NONE,
-                    (true, true) => Eta::new(radius2, shared.merged_paths).sharing_camera_path(expected * shrunk),
-                    (true, false) => Eta::MERGE_ONLY,
-                };
-                (radius2, eta)
-            }))
-        };
-        let (seed, tiles) = (self.settings.seed, self.tiles);
         let map = self.photons.as_ref().map(|(_, map)| map);
         let merges = map.map_or(0, |map| map.photons().len());
         let mut rejected = map.map_or(0, PhotonMap::rejected);
         let stored = map.map_or([0; 2], count_by_kind);
-        let bandwidths: &[PixelAccumulator] = pixels;
         let mut photons: Vec<MergePhoton> = Vec::new();
         let guide = self.guide.clone();
-        let passes: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
-        for ((pair, pass), samples) in self.pairs.iter().zip(&passes).zip(&mut self.samples) {
+        let light: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
+        let iteration = Iteration {
+            shared,
+            tiles: self.tiles,
+            map,
+            schedule: self.settings.schedule(i),
+            expected: self.covered * self.pairs.len() as f32,
+            pixels,
+        };
+        for ((pair, light_paths), samples) in self.pairs.iter().zip(&light).zip(&mut self.samples) {
             let own = pair.own(self.settings.levels.picture_level());
-            let streams = Streams::in_sequence(seed, i, pair.camera);
+            let streams = Streams::in_sequence(self.settings.seed, i, pair.camera);
+            let walks = PairWalks { pair, light_paths, own, streams };
             let mut on_film = samples.par_tiles().zip(recorders.par_iter_mut()).collect::<Vec<_>>().into_iter();
             let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
-            self.sources.par_iter().zip(film).zip(&mut self.left).for_each(|((tile, mut film), left)| {
-                left.clear();
-                let (mut arena, mut sample) = (Bump::new(), PixelSample::default());
-                for PixelBlock { keys, places } in tiles.blocks(*tile) {
-                    if shared.camera_paths.is_given_up() {
-                        return;
-                    }
-                    let mut starts =
-                        film.as_ref().map(|_| shared.camera_paths.starts(&places, streams)).unwrap_or_default();
-                    for k in 0..GROUP_SIZE {
-                        let of_film = places[k].map(|place| place.index);
-                        let Some(index) = (if shared.techniques.merge { of_film } else { keys[k] }) else { continue };
-                        let index = index as u32;
-                        arena.reset();
-                        let mut vertices = LightVertices::new_in(&arena);
-                        shared.light_path(pass, index, false, &mut vertices, left, &mut ());
-                        let (Some((samples, tile_recorder)), Some(place), Some(start)) =
-                            (&mut film, &places[k], &mut starts[k])
-                        else {
-                            continue;
-                        };
-                        // Both paths take one wavelength, so that they can be connected.
-                        start.0.wavelength_sample = pass.wavelength(index);
-                        let levels = levels(bandwidths[place.index as usize].bandwidths[0], pair);
-                        let meets = CameraWalkContext { vertices: &vertices, photons: map, levels: &levels };
-                        tile_recorder.select_pixel(place.at, own);
-                        shared.camera_path(&arena, start, &meets, *tile_recorder, &mut sample);
-                        samples.set(place.at, &sample);
-                    }
-                }
-            });
+            self.sources
+                .par_iter()
+                .zip(film)
+                .zip(&mut self.left)
+                .for_each(|((tile, film), left)| iteration.walk_tile(&walks, *tile, film, left));
             if self.settings.stop.aborted() {
                 return None;
             }
-            let splats = SplatsByTile::new(&self.left, &tiles);
-            samples.par_tiles().zip(recorders.par_iter_mut()).enumerate().for_each(
-                |(tile, (mut samples, tile_recorder))| {
-                    for splat in splats.of(tile) {
-                        let levels = levels(bandwidths[splat.pixel as usize].bandwidths[0], pair);
-                        let (_, slot) = tiles.place(splat.pixel);
-                        tile_recorder.record_splat(slot, own, splat, &levels);
-                        let mut sample = samples.get(slot);
-                        splat.apply(&levels, &mut sample);
-                        samples.set(slot, &sample);
-                    }
-                },
-            );
+            let splats = SplatsByTile::new(&self.left, &self.tiles);
+            samples
+                .par_tiles()
+                .zip(recorders.par_iter_mut())
+                .enumerate()
+                .for_each(|(tile, film)| iteration.add_splats(&walks, splats.of(tile), film));
             rejected += self.left.iter().map(|left| left.lost).sum::<u64>();
             photons.reserve(self.left.iter().map(|left| left.photons.len()).sum());
             self.left.iter().for_each(|left| photons.extend_from_slice(&left.photons));
         }
-        let walked = self.pairs.len() as u64 * u64::from(passes[0].count());
+        let walked = self.pairs.len() as u64 * u64::from(light[0].count());
+        let (tiles, camera_paths) = (self.tiles, &shared.camera_paths);
         let groups = |slot: usize| recorders[slot / TILE_PIXELS].group_light(slot % TILE_PIXELS);
-        let gathered = sample_buffer::add(
-            &self.samples,
-            (&shared.camera_paths, i),
-            pixels,
-            |index| tiles.slot(index as u32),
-            groups,
-        );
+        let slot = |index: usize| tiles.slot(index as u32);
+        let gathered = sample_buffer::add(&self.samples, (camera_paths, i), pixels, slot, groups);
         if shared.techniques.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons)));
         }
         Some(Work { light_paths: walked, photons: merges, rejected, counts: PhotonCounts { stored, gathered } })
+    }
+}
+
+/// Data that all tiles read in an iteration.
+struct Iteration<'i, 'a> {
+    shared: Bidirectional<'a>,
+    tiles: Tiles,
+    /// Photons of the previous iteration.
+    map: Option<&'i PhotonMap<MergePhoton>>,
+    schedule: Schedule,
+    /// Expected number of photons within the largest initial bandwidth.
+    expected: f32,
+    /// Accumulators of all pixels, with their initial bandwidths.
+    pixels: &'i [PixelAccumulator],
+}
+
+/// The walks of one pair of paths per pixel.
+struct PairWalks<'i> {
+    pair: &'i Pair,
+    light_paths: &'i LightPaths<'i>,
+    /// Index of the picture level among the levels of the pair, if it has it.
+    own: Option<usize>,
+    /// Random numbers of the camera paths.
+    streams: Streams,
+}
+
+impl Iteration<'_, '_> {
+    /// Merging radii of a pixel at the levels of a pair.
+    #[inline]
+    fn levels(&self, pixel: u32, pair: &Pair) -> MergeLevels {
+        let bandwidth = self.pixels[pixel as usize].bandwidths[0];
+        let Iteration { shared, schedule, .. } = self;
+        MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
+            let radius2 = schedule.radius2(bandwidth, level);
+            let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
+            let eta = match (self.map.is_some(), shared.techniques.connect) {
+                (false, _) => Eta::NONE,
+                (true, true) => Eta::new(radius2, shared.merged_paths).sharing_camera_path(self.expected * shrunk),
+                (true, false) => Eta::MERGE_ONLY,
+            };
+            (radius2, eta)
+        }))
+    }
+
+    /// Walks the light paths of a tile, and its camera paths if the tile is on the film.
+    fn walk_tile<W: TileRecorder>(
+        &self,
+        walks: &PairWalks<'_>,
+        tile: WholeTile,
+        mut film: Option<(SampleBufferPart<'_>, &mut W)>,
+        left: &mut Deposits,
+    ) {
+        let shared = self.shared;
+        left.clear();
+        let (mut arena, mut sample) = (Bump::new(), PixelSample::default());
+        for PixelBlock { keys, places } in self.tiles.blocks(tile) {
+            if shared.camera_paths.is_given_up() {
+                return;
+            }
+            let mut starts =
+                film.as_ref().map(|_| shared.camera_paths.starts(&places, walks.streams)).unwrap_or_default();
+            for k in 0..GROUP_SIZE {
+                let of_film = places[k].map(|place| place.index);
+                let Some(index) = (if shared.techniques.merge { of_film } else { keys[k] }) else { continue };
+                let index = index as u32;
+                arena.reset();
+                let mut vertices = LightVertices::new_in(&arena);
+                shared.light_path(walks.light_paths, index, false, &mut vertices, left, &mut ());
+                let (Some((samples, recorder)), Some(place), Some(start)) = (&mut film, &places[k], &mut starts[k])
+                else {
+                    continue;
+                };
+                // Both paths take one wavelength, so that they can be connected.
+                start.0.wavelength_sample = walks.light_paths.wavelength(index);
+                let levels = self.levels(place.index as u32, walks.pair);
+                let context = CameraWalkContext { vertices: &vertices, photons: self.map, levels: &levels };
+                recorder.select_pixel(place.at, walks.own);
+                shared.camera_path(&arena, start, &context, *recorder, &mut sample);
+                samples.set(place.at, &sample);
+            }
+        }
+    }
+
+    /// Adds the splats that a tile of the film receives.
+    fn add_splats<'l, W: TileRecorder>(
+        &self,
+        walks: &PairWalks<'_>,
+        splats: impl Iterator<Item = &'l Splat>,
+        (mut samples, recorder): (SampleBufferPart<'_>, &mut W),
+    ) {
+        for splat in splats {
+            let levels = self.levels(splat.pixel, walks.pair);
+            let (_, slot) = self.tiles.place(splat.pixel);
+            recorder.record_splat(slot, walks.own, splat, &levels);
+            let mut sample = samples.get(slot);
+            splat.apply(&levels, &mut sample);
+            samples.set(slot, &sample);
+        }
     }
 }
 
