@@ -217,7 +217,7 @@ impl<'a> Passes<'a> {
         let (tiles, camera_paths) = (self.tiles, &shared.camera_paths);
         let groups = |slot: usize| recorders[slot / TILE_PIXELS].group_light(slot % TILE_PIXELS);
         let slot = |index: usize| tiles.slot(index as u32);
-        let gathered = sample_buffer::add(&self.samples, (camera_paths, i), pixels, slot, groups);
+        let gathered = sample_buffer::add(&self.samples, camera_paths, i, pixels, slot, groups);
         if shared.techniques.merge && self.settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons)));
         }

@@ -25,31 +25,31 @@ use std::f32::consts::PI;
 
 pub(super) const ROUNDS: u64 = 5;
 /// Light paths of a round over those of an iteration, and bounds of their number.
-const LIGHT_PATHS: f64 = 0.25;
-const LEAST: u32 = 1 << 12;
-const MOST: u32 = 1 << 15;
+const LIGHT_PATHS_RATIO: f64 = 0.25;
+const MIN_LIGHT_PATHS: u32 = 1 << 12;
+const MAX_LIGHT_PATHS: u32 = 1 << 15;
 /// Largest number of camera paths of a round, and the number of pixels per camera path in small pictures.
-const EYE_PATHS: u32 = 1 << 13;
-const PIXELS_PER_EYE_PATH: u64 = 4;
+const MAX_CAMERA_PATHS: u32 = 1 << 13;
+const PIXELS_PER_CAMERA_PATH: u64 = 4;
 /// Camera paths per unit of work.
 const CHUNK: u32 = 256;
 /// Number of photons of each kind that a pixel gathers.
 const NEIGHBOURS: usize = 16;
 /// Added to a pixel's squared value, as in the papers' relMSE. This error depends on the unit of radiance; it only
 /// affects how well light paths are guided, not the reported error.
-const DARK: f32 = 0.01;
+const DARK_OFFSET: f32 = 0.01;
 
 /// A guide must reduce squared error times cost of an iteration below this fraction of the unguided one's.
-const WORTH: f64 = 0.9;
+const MAX_ERROR_COST_RATIO: f64 = 0.9;
 
 /// A photon, and the cell of the guide that sampled its path.
 #[derive(Clone, Copy)]
-struct Marked {
+struct GuidedPhoton {
     photon: Photon,
     cell: u32,
 }
 
-impl Located for Marked {
+impl Located for GuidedPhoton {
     fn position(&self) -> Vec3 {
         self.photon.p
     }
@@ -71,14 +71,18 @@ pub(super) fn learn_guide(
     region: Option<Region>,
 ) -> Option<Guide> {
     let seed = settings.seed;
-    let light_paths = ((f64::from(settings.photons) * LIGHT_PATHS) as u32).clamp(LEAST, MOST);
+    let light_paths =
+        ((f64::from(settings.photons) * LIGHT_PATHS_RATIO) as u32).clamp(MIN_LIGHT_PATHS, MAX_LIGHT_PATHS);
     let mut guide = Guide::new(&camera_paths.scene.lights, camera_paths.indirect == Indirect::Photons)?;
     for round in 0..ROUNDS {
-        let (maps, walked) = photons(camera_paths, initial_media, (light_paths, region), seed, round, &guide);
-        let error = error(camera_paths, seed, round, &maps, guide.cells());
+        let (maps, walked) =
+            trace_photons(camera_paths, initial_media, &Round { seed, index: round, light_paths, region }, &guide);
+        let error = estimate_error(camera_paths, seed, round, &maps, guide.cells());
         let paths: Vec<f64> = walked.iter().map(|of| of.paths).collect();
         let work: Vec<f64> = walked.iter().map(|of| of.work).collect();
-        if round + 1 == ROUNDS && error.ratio() * guiding_cost_ratio(camera_paths, settings, &guide) > WORTH {
+        if round + 1 == ROUNDS
+            && error.ratio() * guiding_cost_ratio(camera_paths, settings, &guide) > MAX_ERROR_COST_RATIO
+        {
             return None;
         }
         guide.learn(&error.of_cells, &paths, &work);
@@ -103,46 +107,56 @@ fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide
 
 /// Light paths sampled by a cell.
 #[derive(Clone, Copy, Default)]
-struct Walked {
+struct CellPaths {
     paths: f64,
     /// Their cost, in vertices.
     work: f64,
 }
 
+/// Light paths of a round.
+struct Round {
+    seed: u64,
+    /// Number of the round, from 0.
+    index: u64,
+    light_paths: u32,
+    /// Region of interest of light from infinity.
+    region: Option<Region>,
+}
+
 /// Traces the photons of a round. Also returns the light paths by cell.
-fn photons(
+fn trace_photons(
     camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
-    (light_paths, region): (u32, Option<Region>),
-    seed: u64,
-    round: u64,
+    round: &Round,
     guide: &Guide,
-) -> (ByKind<PhotonMap<Marked>>, Vec<Walked>) {
-    let pass = LightPaths::new(seed, round, Domain::GuideLight, light_paths, camera_paths.max_depth)
+) -> (ByKind<PhotonMap<GuidedPhoton>>, Vec<CellPaths>) {
+    let Round { seed, index, light_paths, region } = *round;
+    let paths_of_round = LightPaths::new(seed, index, Domain::GuideLight, light_paths, camera_paths.max_depth)
         .guided(Some(guide))
         .lighting(region)
         .wanting(ClassSet::ALL, camera_paths.indirect);
     let trace = |paths: std::ops::Range<u32>| {
-        let (mut photons, mut arena, mut marked) = (Photons::default(), Bump::new(), ByKind::<Vec<Marked>>::default());
-        let mut walked = vec![Walked::default(); guide.cells()];
+        let (mut photons, mut arena, mut guided) =
+            (Photons::default(), Bump::new(), ByKind::<Vec<GuidedPhoton>>::default());
+        let mut walked = vec![CellPaths::default(); guide.cells()];
         for index in paths {
-            let path = light_path(camera_paths.scene, &arena, initial_media, &pass, index, &mut photons);
+            let path = light_path(camera_paths.scene, &arena, initial_media, &paths_of_round, index, &mut photons);
             let Some((cell, vertices)) = path else { continue };
             arena.reset();
             photons.volume.clear();
-            for (marked, photons) in marked.iter_mut().zip(&mut photons.surface) {
-                marked.extend(photons.drain(..).map(|photon| Marked { photon, cell: cell as u32 }));
+            for (guided, photons) in guided.iter_mut().zip(&mut photons.surface) {
+                guided.extend(photons.drain(..).map(|photon| GuidedPhoton { photon, cell: cell as u32 }));
             }
             walked[cell].paths += 1.0;
             walked[cell].work += GUIDED_START + f64::from(vertices);
         }
-        (marked, walked)
+        (guided, walked)
     };
-    let parts: Vec<(ByKind<Vec<Marked>>, Vec<Walked>)> = light_path_ranges(light_paths).map(trace).collect();
-    let mut walked = vec![Walked::default(); guide.cells()];
-    let mut all = ByKind::<Vec<Marked>>::default();
-    for (marked, part) in parts {
-        kind::append(&mut all, marked);
+    let parts: Vec<(ByKind<Vec<GuidedPhoton>>, Vec<CellPaths>)> = light_path_ranges(light_paths).map(trace).collect();
+    let mut walked = vec![CellPaths::default(); guide.cells()];
+    let mut all = ByKind::<Vec<GuidedPhoton>>::default();
+    for (guided, part) in parts {
+        kind::append(&mut all, guided);
         for (sum, part) in walked.iter_mut().zip(part) {
             sum.paths += part.paths;
             sum.work += part.work;
@@ -160,7 +174,7 @@ struct CellErrors {
 }
 
 impl CellErrors {
-    fn none(cells: usize) -> CellErrors {
+    fn zero(cells: usize) -> CellErrors {
         CellErrors { of_cells: vec![0.0; cells], unguided: 0.0 }
     }
 
@@ -176,21 +190,21 @@ impl CellErrors {
 }
 
 /// Estimates the error that the photons of a round cause along its camera paths.
-fn error(
+fn estimate_error(
     camera_paths: &CameraPaths<'_>,
     seed: u64,
     round: u64,
-    maps: &ByKind<PhotonMap<Marked>>,
+    maps: &ByKind<PhotonMap<GuidedPhoton>>,
     cells: usize,
 ) -> CellErrors {
     let (width, height) = camera_paths.camera.size();
     let pixels = u64::from(width) * u64::from(height);
-    let paths = u64::from(EYE_PATHS).min(pixels.div_ceil(PIXELS_PER_EYE_PATH)) as u32;
+    let paths = u64::from(MAX_CAMERA_PATHS).min(pixels.div_ceil(PIXELS_PER_CAMERA_PATH)) as u32;
     // Evenly spaced pixels, with a random offset in each round.
     let offset = Stream::new(seed, round, Domain::GuideCamera, u64::MAX).vertex(0).one(Purpose::Pixel);
     let look = |first: u32| {
-        let mut error = CellErrors::none(cells);
-        let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<Marked>>::default());
+        let mut error = CellErrors::zero(cells);
+        let (mut arena, mut nearest) = (Bump::new(), ByKind::<Nearest<GuidedPhoton>>::default());
         for index in first..paths.min(first + CHUNK) {
             arena.reset();
             let stream = Stream::new(seed, round, Domain::GuideCamera, u64::from(index));
@@ -198,22 +212,22 @@ fn error(
             let pixel = pixel.min(pixels - 1);
             let at = ((pixel % u64::from(width)) as u32, (pixel / u64::from(width)) as u32);
             if let Some(probe) = camera_paths.probe(&arena, &(camera_paths.start(at, stream), stream)) {
-                weigh(camera_paths, maps, &mut nearest, &probe, &mut error);
+                add_errors(camera_paths, maps, &mut nearest, &probe, &mut error);
             }
         }
         error
     };
     let parts: Vec<CellErrors> = (0..paths).into_par_iter().step_by(CHUNK as usize).map(look).collect();
-    let mut sum = CellErrors::none(cells);
+    let mut sum = CellErrors::zero(cells);
     parts.iter().for_each(|part| sum.add(part));
     sum
 }
 
 /// Adds the errors of the photons around a probe.
-fn weigh(
+fn add_errors(
     camera_paths: &CameraPaths<'_>,
-    maps: &ByKind<PhotonMap<Marked>>,
-    nearest: &mut ByKind<Nearest<Marked>>,
+    maps: &ByKind<PhotonMap<GuidedPhoton>>,
+    nearest: &mut ByKind<Nearest<GuidedPhoton>>,
     probe: &Probe,
     error: &mut CellErrors,
 ) {
@@ -224,17 +238,17 @@ fn weigh(
     for (map, nearest) in maps.iter().zip(nearest) {
         let radius2 = nearest.radius2(map, point.p, point.ng, NEIGHBOURS, cap * cap).unwrap_or(cap * cap);
         let scale = probe.weight / (PI * radius2);
-        map.within(point.p, radius2, |marked, _| {
-            let photon = &marked.photon;
+        map.within(point.p, radius2, |guided, _| {
+            let photon = &guided.photon;
             if photon.ng.dot(point.ng) > 0.0 {
                 let found = scale * photon.flux;
                 sum += found;
-                light.push((marked.cell, luminance(found), photon.thinning_key.weight()));
+                light.push((guided.cell, luminance(found), photon.thinning_key.weight()));
             }
         });
     }
     let value = luminance(sum + probe.direct);
-    let inverse = 1.0 / (value * value + DARK);
+    let inverse = 1.0 / (value * value + DARK_OFFSET);
     for (cell, light, weight) in light {
         let share = f64::from(light * light * inverse);
         let unguided = share / f64::from(weight);

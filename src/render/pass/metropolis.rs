@@ -40,10 +40,10 @@ use smallvec::SmallVec;
 /// better stratified: 512 steps gave 1.1 to 1.2 times the error.
 const STEPS: usize = 64;
 /// Vertex of a camera path whose random numbers select the pixel and the division.
-const OWN: u32 = u32::MAX;
+const CHAIN_VERTEX: u32 = u32::MAX;
 
 /// Smallest number of chains in an iteration.
-const CHAINS: usize = 16;
+const MIN_CHAINS: usize = 16;
 
 /// Light that a path adds to a pixel.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +54,7 @@ struct Deposit {
 }
 
 /// Whether chains sample the class: all light except directly visible lights and direct light.
-fn chained(class: PathClass) -> bool {
+fn is_sampled_by_chains(class: PathClass) -> bool {
     !matches!(class.part(), Part::Emission | Part::Direct)
 }
 
@@ -83,7 +83,7 @@ fn importance(value: Rgb) -> f32 {
 
 impl Found {
     fn add(&mut self, technique: Technique, (class, pixel): (PathClass, u32), value: Rgb) {
-        if chained(class) && importance(value) > 0.0 {
+        if is_sampled_by_chains(class) && importance(value) > 0.0 {
             self.deposits.push((technique, Deposit { pixel, part: class.part(), value }));
         }
     }
@@ -122,20 +122,31 @@ pub(super) struct Metropolis<'a> {
 /// The paths of one iteration.
 struct Walks<'i, 'a> {
     shared: &'i Bidirectional<'a>,
-    pass: LightPaths<'i>,
+    light_paths: LightPaths<'i>,
     levels: &'i MergeLevels,
     cameras: Streams,
     lights: Streams,
     size: UVec2,
 }
 
-/// Start of a camera path: its pixel, and a point in it, uniform on the unit square.
-type Film = (UVec2, Vec2);
+/// Random numbers of both subpaths of a path.
+#[derive(Clone, Copy)]
+struct PairStreams {
+    camera: Stream,
+    light: Stream,
+}
+
+/// Start of both subpaths of a path.
+struct PairStart {
+    pixel: UVec2,
+    /// Point in the pixel, uniform on the unit square.
+    within: Vec2,
+    streams: PairStreams,
+}
 
 impl Walks<'_, '_> {
-    /// Random numbers of both walks of a path.
-    fn streams(&self, path: u32) -> (Stream, Stream) {
-        (self.cameras.path(u64::from(path)), self.lights.path(u64::from(path)))
+    fn streams(&self, path: u32) -> PairStreams {
+        PairStreams { camera: self.cameras.path(u64::from(path)), light: self.lights.path(u64::from(path)) }
     }
 
     /// Walks both subpaths of a path. Their light goes to `left`, `found` and `sample`.
@@ -143,21 +154,23 @@ impl Walks<'_, '_> {
         &self,
         shared: &Bidirectional<'s>,
         arena: &'s Bump,
-        ((pixel, within), (camera, light)): (Film, (Stream, Stream)),
-        (left, found): (&mut Deposits, &mut Found),
+        start: &PairStart,
+        left: &mut Deposits,
+        found: &mut Found,
         sample: &mut PixelSample,
     ) {
+        let PairStart { pixel, within, streams: PairStreams { camera, light } } = *start;
         let mut vertices = LightVertices::new_in(arena);
         if shared.only.is_none_or(|only| only.light().is_some_and(|depth| depth > 0))
-            && let Some(emitted) = self.pass.emit_from(shared.camera_paths.scene, shared.initial_media, light)
+            && let Some(emitted) = self.light_paths.emit_from(shared.camera_paths.scene, shared.initial_media, light)
         {
-            shared.light_path_of(&self.pass, &emitted, false, &mut vertices, left, &mut ());
+            shared.light_path_of(&self.light_paths, &emitted, false, &mut vertices, left, &mut ());
         }
         if shared.only.is_none_or(|only| only.camera > 0) {
             let mut start = shared.camera_paths.start_at((pixel.x, pixel.y), within, camera);
-            start.wavelength_sample = self.pass.wavelength_sample_of(light);
-            let meets = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
-            shared.camera_path(arena, &(start, camera), &meets, found, sample);
+            start.wavelength_sample = self.light_paths.wavelength_sample_of(light);
+            let context = CameraWalkContext { vertices: &vertices, photons: None, levels: self.levels };
+            shared.camera_path(arena, &(start, camera), &context, found, sample);
         }
     }
 
@@ -165,7 +178,8 @@ impl Walks<'_, '_> {
     fn ordinary(
         &self,
         arena: &mut Bump,
-        (path, pixel): (u32, UVec2),
+        path: u32,
+        pixel: UVec2,
         left: &mut Deposits,
         candidates: &mut Vec<Candidate>,
     ) -> PixelSample {
@@ -174,8 +188,8 @@ impl Walks<'_, '_> {
         let mut found = Found { pixel: path, ..Found::default() };
         let mut sample = PixelSample::default();
         let first = left.splats.len();
-        let within = streams.0.vertex(0).two(Purpose::Pixel);
-        self.walk(self.shared, arena, ((pixel, within), streams), (left, &mut found), &mut sample);
+        let within = streams.camera.vertex(0).two(Purpose::Pixel);
+        self.walk(self.shared, arena, &PairStart { pixel, within, streams }, left, &mut found, &mut sample);
         found.splats(&left.splats[first..]);
         candidates.extend(found.deposits.iter().filter_map(|(technique, deposit)| {
             let division = Division::of(*technique)?;
@@ -185,9 +199,9 @@ impl Walks<'_, '_> {
     }
 
     /// Evaluates the state of a chain.
-    fn state(&self, arena: &mut Bump, chain: &mut Chain, segments: u32, streams: (Stream, Stream)) -> State {
+    fn state(&self, arena: &mut Bump, chain: &mut Chain, segments: u32, streams: PairStreams) -> State {
         arena.reset();
-        let own = streams.0.vertex(OWN);
+        let own = streams.camera.vertex(CHAIN_VERTEX);
         let (mut left, mut found) = (Deposits::default(), Found::default());
         chain.run(|| {
             let camera = ((own.one(Purpose::Division) * (segments + 1) as f32) as u32).min(segments);
@@ -196,8 +210,8 @@ impl Walks<'_, '_> {
             found.pixel = pixel.y * self.size.x + pixel.x;
             let shared = Bidirectional { only: Some(Division { segments, camera }), ..*self.shared };
             let within = (film - pixel.as_vec2()).clamp(Vec2::ZERO, Vec2::splat(1.0 - f32::EPSILON));
-            let start = ((pixel, within), streams);
-            self.walk(&shared, arena, start, (&mut left, &mut found), &mut PixelSample::default());
+            let start = PairStart { pixel, within, streams };
+            self.walk(&shared, arena, &start, &mut left, &mut found, &mut PixelSample::default());
         });
         found.splats(&left.splats);
         let deposits: SmallVec<[Deposit; 4]> = found.deposits.into_iter().map(|(_, deposit)| deposit).collect();
@@ -209,12 +223,15 @@ impl Walks<'_, '_> {
     /// one for each step.
     fn chain(&self, arena: &mut Bump, number: u64, candidate: &Candidate, steps: usize) -> Vec<Deposit> {
         let Candidate { path, division: Division { segments, camera }, .. } = *candidate;
-        let (cameras, lights) = self.streams(path);
-        let streams = (cameras.chained(), lights.chained());
-        let mut chain = Chain::new(mix(cameras.vertex(OWN).bits(Purpose::Film) ^ mix(number)));
-        let own = streams.0.vertex(OWN);
+        let PairStreams { camera: camera_stream, light: light_stream } = self.streams(path);
+        let streams = PairStreams { camera: camera_stream.chained(), light: light_stream.chained() };
+        let mut chain = Chain::new(mix(camera_stream.vertex(CHAIN_VERTEX).bits(Purpose::Film) ^ mix(number)));
+        let own = streams.camera.vertex(CHAIN_VERTEX);
         let place = UVec2::new(path % self.size.x, path / self.size.x).as_vec2();
-        chain.set_initial(own.id(Purpose::Film), (place + cameras.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2());
+        chain.set_initial(
+            own.id(Purpose::Film),
+            (place + camera_stream.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2(),
+        );
         chain.set_initial(own.id(Purpose::Division), Vec2::splat((camera as f32 + 0.5) / (segments + 1) as f32));
         let mut deposits = Vec::new();
         let mut leave = |state: &State, weight: f32| {
@@ -309,7 +326,7 @@ impl<'a> Metropolis<'a> {
                     }
                     let index = place.index as u32;
                     let pixel = UVec2::new(index % width, index / width);
-                    let sample = walks.ordinary(&mut arena, (index, pixel), &mut left, &mut found);
+                    let sample = walks.ordinary(&mut arena, index, pixel, &mut left, &mut found);
                     let PixelSample { emission, direct, features, first, rejection, .. } = sample;
                     samples[place.at] =
                         PixelSample { emission, direct, features, first, rejection, ..PixelSample::default() };
@@ -320,7 +337,7 @@ impl<'a> Metropolis<'a> {
         let (mut candidates, mut lost) = (Vec::new(), 0);
         for (left, found) in left {
             lost += left.lost;
-            for splat in left.splats.iter().filter(|splat| !chained(splat.class)) {
+            for splat in left.splats.iter().filter(|splat| !is_sampled_by_chains(splat.class)) {
                 splat.apply(&self.levels, &mut self.samples[tiles.slot(splat.pixel)]);
             }
             candidates.extend(found);
@@ -341,16 +358,16 @@ impl Integrator for Metropolis<'_> {
         let (shared, levels) = (self.shared, self.levels);
         let walks = Walks {
             shared: &shared,
-            pass: LightPaths::new(seed, i, Domain::Light, width * height, max_depth),
+            light_paths: LightPaths::new(seed, i, Domain::Light, width * height, max_depth),
             levels: &levels,
             cameras: Streams::new(seed, i, Domain::CameraIndependent),
             lights: Streams::new(seed, i, Domain::Light),
             size: UVec2::new(width, height),
         };
         let (candidates, rejected) = self.walk_all(&walks);
-        let count = (pixels.len() / STEPS).max(CHAINS);
+        let count = (pixels.len() / STEPS).max(MIN_CHAINS);
         let steps = pixels.len().div_ceil(count);
-        let u = walks.cameras.path(u64::MAX).vertex(OWN).one_fine(Purpose::Film);
+        let u = walks.cameras.path(u64::MAX).vertex(CHAIN_VERTEX).one_fine(Purpose::Film);
         let (starts, total) = starts(&candidates, count, u);
         drop(candidates);
         let left: Vec<Vec<Deposit>> = starts

@@ -59,7 +59,7 @@ impl<'a> Paths<'a> {
             return false;
         }
         let groups = |slot: usize| recorders[slot / TILE_PIXELS].group_light(slot % TILE_PIXELS);
-        sample_buffer::add(&self.samples, (&camera_paths, i), pixels, |index| tiles.slot(index as u32), groups);
+        sample_buffer::add(&self.samples, &camera_paths, i, pixels, |index| tiles.slot(index as u32), groups);
         true
     }
 }

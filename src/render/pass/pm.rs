@@ -183,7 +183,7 @@ impl Integrator for Pm<'_> {
             },
         );
         if !self.settings.stop.aborted() {
-            sample_buffer::add(&self.samples, (camera_paths, i), pixels, |index| index, |_| &[]);
+            sample_buffer::add(&self.samples, camera_paths, i, pixels, |index| index, |_| &[]);
         }
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();

@@ -123,7 +123,8 @@ impl SampleBufferPart<'_> {
 /// and its light by `groups`. Returns the number of pixels to whose own image photons of each kind have brought light.
 pub(super) fn add<'g>(
     samples: &[SampleBuffer],
-    (camera_paths, i): (&CameraPaths<'_>, u64),
+    camera_paths: &CameraPaths<'_>,
+    i: u64,
     pixels: &mut [PixelAccumulator],
     slot: impl Fn(usize) -> usize + Sync,
     groups: impl Fn(usize) -> &'g [[Rgb; 2]] + Sync,

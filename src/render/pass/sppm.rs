@@ -128,8 +128,7 @@ impl<B: PixelBandwidths, K: Kernel> Integrator for Sppm<'_, B, K> {
             self.bandwidths = before;
         } else {
             let camera_paths = self.tracer.camera_paths();
-            work.counts.gathered =
-                sample_buffer::add(&self.samples, (&camera_paths, i), pixels, |index| index, |_| &[]);
+            work.counts.gathered = sample_buffer::add(&self.samples, &camera_paths, i, pixels, |index| index, |_| &[]);
         }
         phases.eye += cpu_seconds() - start;
         (!aborted).then_some(work)
