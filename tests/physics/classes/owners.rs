@@ -190,9 +190,9 @@ fn random_paths_have_one_class_and_one_owner() {
         *numbers.entry(class).or_insert(0u32) += 1;
         // Classified from both ends, for every vertex where the two subpaths meet.
         for (at, _) in path.char_indices().filter(|(_, c)| "SBV".contains(*c)) {
-            let sight = path[..=at].chars().map(event).fold(CameraSuffix::START, CameraSuffix::then);
+            let suffix = path[..=at].chars().map(event).fold(CameraSuffix::START, CameraSuffix::then);
             let beam = path[at + 1..].chars().rev().map(event).fold(LightPrefix::start(*sizeless), LightPrefix::then);
-            assert_eq!(sight.class_with(beam), class, "{path} {sizeless} at {at}");
+            assert_eq!(suffix.class_with(beam), class, "{path} {sizeless} at {at}");
         }
     }
     println!("{} different paths: {numbers:?}", paths.len());
