@@ -26,14 +26,18 @@ failed=0
 summary=()
 LOG=
 TIMES=$(mktemp)
+beside=          # process group of the parts that run beside the others
+BESIDE_OUTPUT=$(mktemp)
+BESIDE_RESULT=$(mktemp)
 
 finish() {
     local status=$?
+    [ -z "$beside" ] || kill -- "-$beside" 2>/dev/null || true
     if [ -s "$TIMES" ]; then
         printf '\nslowest tests, in seconds\n'
         sort -rn "$TIMES" | sed -n 1,20p
     fi
-    rm -f "$TIMES" ${LOG:+"$LOG"}
+    rm -f "$TIMES" "$BESIDE_OUTPUT" "$BESIDE_RESULT" ${LOG:+"$LOG"}
     # An exit outside of the parts, during installation for example.
     if [ "$status" -ne 0 ] && [ "$failed" -eq 0 ]; then
         summary+=("FAILED   before all parts had run")
@@ -84,6 +88,31 @@ tests() {
     fi
 }
 
+# run_beside FUNCTION: runs the parts of a function in the background; most of them use one core alone
+run_beside() {
+    # Job control gives them a process group of their own, and does not let them ignore SIGINT, which tests send.
+    set -m
+    (
+        trap 'printf "passed=\$((passed + %d))\nfailed=\$((failed + %d))\n" "$passed" "$failed" >"$BESIDE_RESULT"
+              [ ${#summary[@]} -eq 0 ] || printf "summary+=(%q)\n" "${summary[@]}" >>"$BESIDE_RESULT"' EXIT
+        passed=0 failed=0 summary=()
+        "$1"
+    ) </dev/null >"$BESIDE_OUTPUT" 2>&1 &
+    beside=$!
+    set +m
+}
+
+# join_beside: waits for them, shows their output, and adds their results
+join_beside() {
+    local status=0
+    wait "$beside" || status=$?
+    beside=
+    cat "$BESIDE_OUTPUT"
+    # shellcheck source=/dev/null
+    . "$BESIDE_RESULT"
+    [ "$status" -eq 0 ] || exit 1
+}
+
 without() { summary+=("$(printf '%-8s %-22s %s' 'not run' "$1" "$2")"); }
 
 setup test
@@ -97,25 +126,29 @@ else
     without 'cargo fmt' 'rustfmt is not installed: rustup component add rustfmt'
 fi
 part 'cargo build' cargo build --locked --release --workspace
+program_tests() {
+    tests 'Python' .venv/bin/python tests/python/timed.py discover -s tests/python -p 'test_*.py'
+    tests 'Python with Blender' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'blender_*.py'
+    tests 'Python with USD' .venv-usd/bin/python tests/python/timed.py discover -s tests/python -p 'usd_*.py'
+    tests 'Hard cases' tests/hard-cases.sh ${hard_cases[@]+"${hard_cases[@]}"}
+    part 'Python wheel' scripts/python.sh
+    tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning tests/python/timed.py discover -s tests/python/package
+}
+run_beside program_tests
 if cargo clippy --version >/dev/null 2>&1; then
     CLIPPY_CONF_DIR="$ROOT/scripts" part 'cargo clippy' cargo clippy --locked --release --workspace --all-targets -- -D warnings
 else
     without 'cargo clippy' 'clippy is not installed: rustup component add clippy'
 fi
 RUSTDOCFLAGS='-D warnings' part 'cargo doc' cargo doc --locked --release --workspace --no-deps
-# Test programs of stable Rust print the time of each test only if unstable options are allowed, by a variable. The
-# runner `env` sets it for the test programs alone, so the build is unchanged.
+# Stable Rust's test programs print the time of each test only if told that they may use unstable options. As the runner of
+# the programs alone, `env` does not change what is built.
 host=$(rustc -vV | sed -n 's/^host: //p' | tr 'a-z-' 'A-Z_')
 export "CARGO_TARGET_${host}_RUNNER=env RUSTC_BOOTSTRAP=1"
 rust=(cargo test --locked --release --workspace --no-fail-fast --lib --bins --tests -- -Z unstable-options --report-time)
 tests 'cargo test' "${rust[@]}"
 part 'cargo test --doc' cargo test --locked --release --workspace --doc
-tests 'Python' .venv/bin/python tests/python/timed.py discover -s tests/python -p 'test_*.py'
-tests 'Hard cases' tests/hard-cases.sh ${hard_cases[@]+"${hard_cases[@]}"}
-part 'Python wheel' scripts/python.sh
-tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning tests/python/timed.py discover -s tests/python/package
-tests 'Python with USD' .venv-usd/bin/python tests/python/timed.py discover -s tests/python -p 'usd_*.py'
-tests 'Python with Blender' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'blender_*.py'
+join_beside
 if [ "$SECONDS" -lt "$long_within" ]; then
     tests 'cargo test, long' "${rust[@]}" --ignored
 else

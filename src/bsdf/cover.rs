@@ -77,10 +77,10 @@ impl Cover {
     pub fn lobes(&self) -> LobeSet {
         let mut set = LobeSet::empty();
         if self.coat > 0.0 {
-            set = set | self.coat_class;
+            set |= self.coat_class;
         }
         if self.has_sheen() {
-            set = set | LobeSet::BROAD;
+            set |= LobeSet::BROAD;
         }
         set
     }

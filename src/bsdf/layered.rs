@@ -180,17 +180,17 @@ impl<'a> Layered<'a> {
         let diffuse = diffuse_albedo * (FRAC_1_PI / interface.through.average.max(1e-9));
         let mut lobes = LobeSet::empty();
         if has_facets {
-            lobes = lobes | class;
+            lobes |= class;
         }
         if diffuse.max_element() > 0.0 {
-            lobes = lobes | LobeSet::BROAD;
+            lobes |= LobeSet::BROAD;
         }
         if straight.max_element() > 0.0 {
-            lobes = lobes | LobeSet::DELTA;
+            lobes |= LobeSet::DELTA;
         }
         let mut facet_average = Rgb::ZERO;
         if let Some(covered) = &interface.cover {
-            lobes = lobes | covered.cover.lobes();
+            lobes |= covered.cover.lobes();
             facet_average = metal_average * metal + average * (1.0 - metal);
         }
         Layered {

@@ -205,7 +205,7 @@ impl RenderOptions {
             None => MethodRequest::Auto(AutoRequest {
                 fallback: settings,
                 settings_of: Box::new(|candidate, size| self.candidate_settings(candidate, size)),
-                finish: self.pilot_finish(),
+                finish: Box::new(self.pilot_finish()),
             }),
         })
     }

@@ -29,7 +29,7 @@ pub struct AutoRequest<'a> {
     /// Settings of each candidate.
     pub settings_of: SettingsOf<'a>,
     /// Finish of the pilots' pictures.
-    pub finish: Finish,
+    pub finish: Box<Finish>,
 }
 
 impl<'a> MethodRequest<'a> {

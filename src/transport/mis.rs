@@ -9,9 +9,10 @@
 //! the only technique.
 //!
 //! All photons merged at a vertex share the camera path, but the balance heuristic assumes independent samples. Given
-//! the camera path they are independent: if `X` is the contribution of one of `n` light paths, `E[(sum X)^2] = n E[X^2]
-//! + n (n - 1) E[E[X | camera path]^2]`. `X` is nonzero only if the light path ends in the disc, with probability `N /
-//! n`. So the second term is about `N` times the first, and such merges are worth `1 / (1 + N)` of independent ones:
+//! the camera path they are independent: if `X` is the contribution of one of `n` light paths, `E[(sum X)^2]` is
+//! `n E[X^2] + n (n - 1) E[E[X | camera path]^2]`. `X` is nonzero only if the light path ends in the disc, with
+//! probability `N / n`. So the second term is about `N` times the first, and such merges are worth `1 / (1 + N)` of
+//! independent ones:
 //! correlation-aware MIS \[Grittmann et al. 2021\]. If all earlier vertices of the camera path are delta, all camera
 //! paths of the pixel reach the same disc, and a merge counts in full. So there are two coefficients of merges,
 //! [`Merges`]. Light paths need one only: for all their vertices except the last merged one, the camera path has a

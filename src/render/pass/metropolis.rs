@@ -9,11 +9,11 @@
 //! machines can share them:
 //!
 //! 1. A pair of walks for every pixel with all techniques, as in bidirectional path tracing. They sample directly
-//! visible light, direct light and G-buffers, and estimate the mean of all other light, `b`.
+//!    visible light, direct light and G-buffers, and estimate the mean of all other light, `b`.
 //! 2. Chains start at paths found in step 1, sampled in proportion to their light by a stratified sequence. Such chains
-//! are in equilibrium on average, and `b` makes the sum unbiased \[Veach 1997, 11.3.1\].
+//!    are in equilibrium on average, and `b` makes the sum unbiased \[Veach 1997, 11.3.1\].
 //! 3. Chains take one step per pixel in total. State and proposal both contribute, each with the probability that it is
-//! the next state \[expected values, Veach 1997, 11.5\].
+//!    the next state \[expected values, Veach 1997, 11.5\].
 
 use super::integrator::{Integrator, Work};
 use super::tiles::{TILE_PIXELS, Tiles};
