@@ -33,7 +33,7 @@ pub enum Emitter {
         plane: Vec4,
         /// One corner, and the edges from it to the other two (m).
         corners: [Vec3; 3],
-        /// Whether every point of the triangle emits `radiance`; textures and cut-outs make it false.
+        /// Whether every point of the triangle emits `radiance`; false if a texture, for example, varies it.
         uniform: bool,
     },
     /// A point light, of no size, that shines equally in all directions.

@@ -21,7 +21,8 @@ use crate::math::{DVec2, Frame, Vec2, Vec3, one_minus_cos, warp};
 use std::f32::consts::PI;
 use std::ops::Range;
 
-/// Minimum share of the light paths that start unguided (by power alone), which find light that the guide has not seen.
+/// Minimum share of the light paths that start unguided (from a light selected by its power), which find light that the
+/// guide has not seen.
 const MIN_UNGUIDED_SHARE: f64 = 0.2;
 /// Maximum share of the light paths that start towards caustic targets (objects that can make caustics) if light paths
 /// carry all light. If neighbouring photons set the bandwidths, more paths to targets would widen the bandwidths of all
@@ -33,7 +34,7 @@ const PRIOR_SHARE: f64 = 0.1;
 /// Maximum number of guided lights; weaker lights emit only unguided paths.
 const MAX_LIGHTS: usize = 256;
 
-/// Index of the cell that stands for unguided light paths, which start by power alone.
+/// Index of the cell that stands for unguided light paths, whose light is selected by its power.
 pub const UNGUIDED: usize = 0;
 
 /// Emitters that are guided together as one light: the triangles of an object, or one other light.
@@ -121,7 +122,7 @@ impl Guide {
         self.cells.len()
     }
 
-    /// Probability that a light path starts unguided, by power alone.
+    /// Probability that a light path starts unguided, from a light selected by its power.
     pub fn unguided(&self) -> f32 {
         self.choice.pdf(UNGUIDED)
     }

@@ -10,7 +10,7 @@ use std::f32::consts::PI;
 /// Share of the probability of selecting a light that is proportional to power at every receiver. It limits how much
 /// probability a near light behind a wall can take from the other lights.
 const POWER_SHARE: f64 = 0.1;
-/// Minimum probability, once selection by power is left out, of the lights at infinity together and of the finite
+/// Minimum probability, in the selection by expected irradiance, of the lights at infinity together and of the finite
 /// lights together, if a scene has both.
 const MIN_SHARE: f32 = 0.0625;
 

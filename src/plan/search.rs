@@ -19,7 +19,7 @@ pub enum Search {
     Photons,
     /// Camera paths, connected to lights, that gather only the photons of caustics.
     PathsAndPhotons,
-    /// Camera and light paths, merged at nearby points of surfaces (photon gathering with MIS).
+    /// Camera and light paths, merged where their vertices are near each other on surfaces.
     Merging,
     /// Camera and light paths, connected to each other, and merged at nearby points.
     ConnectionsAndMerging,

@@ -30,7 +30,7 @@ use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
 
-/// Whether rays may continue behind the surface: it transmits light, or is cut out.
+/// Whether rays may continue behind the surface, because its material may transmit light.
 #[inline(always)]
 fn passes(scene: &Scene, surface: &Surface) -> bool {
     scene.materials.list[surface.material as usize].transmits()

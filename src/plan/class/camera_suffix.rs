@@ -29,8 +29,8 @@ pub struct CameraSuffix {
     narrowed: bool,
     /// Whether any event precedes the first broad lobe or, without a broad lobe so far, the last sharp lobe.
     preceded: bool,
-    /// Whether the path so far is a sharp lobe followed by delta lobes. If it then ends on a delta light, it is a
-    /// caustic.
+    /// Whether all events so far are narrow lobes (sharp or delta), and delta lobes follow the last sharp one. A path
+    /// that then ends on a delta light is a caustic.
     glint: bool,
 }
 

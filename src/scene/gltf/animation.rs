@@ -166,8 +166,8 @@ fn tracks(document: &Document, faults: FaultPolicy, warnings: &mut Vec<String>) 
     Ok(tracks)
 }
 
-/// Reads the curve of an animation channel, sampler `index`, and checks the width of its values against the value at
-/// `pointer`.
+/// Reads the curve of an animation channel, sampler `index`, and checks that its values have the number of components
+/// that the value at `pointer` needs.
 fn curve(document: &Document, samplers: &[Sampler], index: usize, pointer: &str) -> Result<Curve> {
     let curve =
         Curve::read(document, get(samplers, index, "sampler")?).map_err(|e| e.within(format!("sampler {index}")))?;

@@ -157,7 +157,7 @@ fn sample_vertices(meshes: &[Mesh], instances: &[PlacedMesh]) -> Vec<DVec3> {
     points
 }
 
-/// Reads the light of a node, which is given by its name and raw JSON; `None` without a light.
+/// Reads the light with index `index` in the file, for a node that is given by its name and raw JSON.
 pub(super) fn light(
     document: &Document,
     index: usize,
