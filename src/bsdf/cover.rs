@@ -77,10 +77,10 @@ impl Cover {
     pub fn lobes(&self) -> LobeSet {
         let mut set = LobeSet::empty();
         if self.coat > 0.0 {
-            set |= self.coat_class;
+            set = set | self.coat_class;
         }
         if self.has_sheen() {
-            set |= LobeSet::BROAD;
+            set = set | LobeSet::BROAD;
         }
         set
     }

@@ -181,17 +181,17 @@ impl<'a> Layered<'a> {
         let diffuse = diffuse_albedo * (FRAC_1_PI / interface.through.average.max(1e-9));
         let mut lobes = LobeSet::empty();
         if has_facets {
-            lobes |= class;
+            lobes = lobes | class;
         }
         if diffuse.max_element() > 0.0 {
-            lobes |= LobeSet::BROAD;
+            lobes = lobes | LobeSet::BROAD;
         }
         if straight.max_element() > 0.0 {
-            lobes |= LobeSet::DELTA;
+            lobes = lobes | LobeSet::DELTA;
         }
         let mut facet_average = Rgb::ZERO;
         if let Some(covered) = &interface.cover {
-            lobes |= covered.cover.lobes();
+            lobes = lobes | covered.cover.lobes();
             facet_average = metal_average * metal + average * (1.0 - metal);
         }
         Layered {

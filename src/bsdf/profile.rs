@@ -159,7 +159,7 @@ pub struct Profile {
     nodes: [f32; NODES],
     /// Cosine-weighted average over the hemisphere.
     pub average: f32,
-    /// Normalization of the density of [`Profile::sample`]: the density is the value over it.
+    /// Integral of the profile that normalizes the density of [`Profile::sample`].
     mass: f32,
 }
 
@@ -212,7 +212,7 @@ impl Profile {
         &self.nodes
     }
 
-    /// Normalization of the density of [`Profile::sample`].
+    /// Integral of the profile that normalizes the density of [`Profile::sample`].
     #[inline]
     pub(super) fn mass(&self) -> f32 {
         self.mass

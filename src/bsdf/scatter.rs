@@ -336,7 +336,7 @@ impl Layered<'_> {
     }
 
     /// Samples a direction from the coat, whose lobe has been chosen with the probability `share`; `None` if it is
-    /// below the surface.
+    /// below the surface, or if there is no coat.
     #[inline]
     fn sample_coat(&self, view: &ViewTerms, share: f32, u: Vec2) -> Option<SampledDirection> {
         // Rounding errors can lead here without a cover.

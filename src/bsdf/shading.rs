@@ -269,8 +269,8 @@ impl<'a> Shading<'a> {
         self.sample_view(&self.bsdf.view_terms(second), 0.5, transport, set, 2.0 * u_lobe - 1.0, u)
     }
 
-    /// [`Shading::sample`] for the viewing direction of `view`, which has been chosen with the probability `chance` (1
-    /// unless a normal map mirrors light).
+    /// [`Shading::sample`] for the viewing direction of `view`, which has been chosen with the probability `chance`:
+    /// 1/2 if a normal map mirrors light, otherwise 1.
     #[inline(always)]
     fn sample_view(
         &self,

@@ -79,7 +79,8 @@ pub struct CollisionDistribution<'m> {
 }
 
 impl CollisionDistribution<'_> {
-    /// Samples a scattering point of the ray; `u` is uniform on the unit square. `None` if the sample has no weight.
+    /// Samples a scattering point of the ray; `u` is uniform on the unit square. `None` if its distance or weight is
+    /// not finite.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<Collision> {
         let sigma_t = sample_channel(self.medium.sigma_t(), self.share, u.x);

@@ -24,7 +24,7 @@ use crate::scene::Scene;
 use serde::Serialize;
 use switch::Removed;
 
-/// What a plan says of one effect: whether it is in the scene, whether the render simulates it, and what it costs.
+/// An effect in a plan: whether it is in the scene, whether the render simulates it, and its share of light and cost.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectPlan {
     /// The effect of light transport, such as *caustic*.
@@ -59,7 +59,7 @@ pub struct Plan {
     pub method: String,
     /// Why the method was chosen, in words.
     pub because: String,
-    /// What the render does with each effect, in the order of [`Effect::ALL`].
+    /// One entry for each effect, in the order of [`Effect::ALL`].
     pub effects: Vec<EffectPlan>,
     /// Upper bound on the relative error (the root of relMSE) of the picture that is due to effects left out: 0 if all
     /// effects are simulated. `None` if some are left out, whose light has no bound ([`EffectPlan::error_if_off`] is a
@@ -140,7 +140,7 @@ impl Plan {
         }
     }
 
-    /// What the plan says of one effect.
+    /// The plan's entry for an effect.
     pub fn effect(&self, effect: Effect) -> &EffectPlan {
         &self.effects[effect as usize]
     }

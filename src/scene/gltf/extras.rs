@@ -46,7 +46,7 @@ impl Rate {
     }
 }
 
-/// What sees an object; for now only whether cameras do. Other rays hit the object in any case.
+/// Whether cameras see an object. Other rays hit the object in any case.
 #[derive(Deserialize)]
 #[serde(default)]
 pub(super) struct Visible {
