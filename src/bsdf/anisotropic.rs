@@ -10,16 +10,18 @@ use std::sync::OnceLock;
 /// Number of nodes of the azimuth in a quarter of the circle. The other quarters are mirror images.
 const AZIMUTHS: usize = 13;
 
-/// Two groups of four functions of the direction, at a pair of alphas.
+/// Table of two sets of four functions of the direction, at one pair of alphas: by node of the azimuth and node of the
+/// cosine.
 pub(super) type Row = [[[Vec4; 2]; NODES]; AZIMUTHS];
 
-/// Rows at all pairs of nodes of alpha, computed at first use.
+/// Tables of functions of the direction for every pair of nodes of alpha (along x and along y), computed at first use.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AnisotropicTables(OnceLock<Box<[OnceLock<Box<Row>>]>>);
 
 impl AnisotropicTables {
-    /// The profile `max(constant + factors . functions, 0)`, with the four functions of group `n`, at the alphas along
-    /// x and y. `make` computes all functions from the alpha along x, a smaller one along y, and a direction.
+    /// The function of direction `max(constant + factors . functions, 0)`, with the four tabulated functions of set
+    /// `n`, at the alphas along x and y. `make` computes both sets from the alpha along x, a smaller one along y, and a
+    /// direction.
     pub fn profile(
         &self,
         [along_x, along_y]: [Position; 2],
@@ -56,16 +58,17 @@ impl AnisotropicTables {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AnisotropicProfile {
     azimuths: [Profile; AZIMUTHS],
-    /// Whether the larger alpha is along y.
+    /// Whether the larger alpha is along y, so that x and y of directions are exchanged.
     swapped: bool,
 }
 
-/// The functions of both sides of an interface. They are large, so they are stored outside of the interface.
+/// Functions of the direction for both sides of an interface. They are large, so they are stored outside of the
+/// interface.
 #[derive(Debug)]
 pub(super) enum SideProfiles<'a> {
-    /// Functions of an interface that all surfaces of a material share.
+    /// Functions of an interface that is shared by all surfaces of a material.
     Owned(Box<[AnisotropicProfile; 2]>),
-    /// Functions of the interface of one path vertex, in the arena of the path.
+    /// Functions of the interface at one path vertex, in the arena of the path.
     InArena(&'a [AnisotropicProfile; 2]),
 }
 
@@ -80,16 +83,17 @@ impl std::ops::Deref for SideProfiles<'_> {
     }
 }
 
-/// Share of the circle that belongs to node `k` of the azimuth.
+/// Share of a quarter circle that belongs to node `k` of the azimuth, 0 to 1.
 fn share(k: usize) -> f32 {
     if k == 0 || k == AZIMUTHS - 1 { 0.5 / LAST } else { 1.0 / LAST }
 }
 
-/// Index of the last node, at a quarter of the circle.
+/// Index of the last node of the azimuth, at a quarter of the circle.
 const LAST: f32 = (AZIMUTHS - 1) as f32;
 
 impl AnisotropicProfile {
-    /// Position of `w` on the axis of azimuths: the index of the node below, and the fraction to the next.
+    /// Position of the azimuth of `w` among the nodes: the index of the node below, and the fraction of the distance to
+    /// the next.
     #[inline]
     fn azimuth_position(&self, w: Vec3) -> (usize, f32) {
         let (x, y) = (w.x.abs(), w.y.abs());
@@ -98,7 +102,7 @@ impl AnisotropicProfile {
         (k, azimuth - k as f32)
     }
 
-    /// The value at the direction `w`; `mu` is the position of its cosine.
+    /// Value of the function at the direction `w`; `mu` is the table position of its cosine with the normal.
     #[inline]
     pub fn at(&self, mu: Position, w: Vec3) -> f32 {
         let (k, t) = self.azimuth_position(w);
@@ -140,7 +144,7 @@ impl AnisotropicProfile {
         Some(Vec3::new(x * sign(1), y * sign(2), mu))
     }
 
-    /// Mean over the azimuth.
+    /// The mean of the function over the azimuth, as a function of the cosine.
     pub fn mean(&self) -> Profile {
         Profile::from_nodes(from_fn(|j| (0..AZIMUTHS).map(|k| share(k) * self.azimuths[k].nodes()[j]).sum()))
     }

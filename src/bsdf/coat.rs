@@ -7,7 +7,7 @@ use super::layered::MIN_COSINE;
 use super::{BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 
-/// A coat seen along one direction.
+/// A clear coat over a normal map, seen along one direction. It reflects in a frame of its own, without the map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coat<'a> {
     cover: &'a Cover,
@@ -25,7 +25,8 @@ impl<'a> Coat<'a> {
         Coat { cover, facing, o: Vec3::new(o.x, o.y, o.z.abs()), side: o.z.signum() }
     }
 
-    /// Value and density of the coat, like [`super::Shading::evaluate_cos`].
+    /// Value of the coat's lobe times the cosine, and the density of sampling `wi`, like
+    /// [`super::Shading::evaluate_cos`].
     #[inline]
     pub(super) fn evaluate_cos(&self, wi: Vec3, transport: Transport) -> (f32, f32) {
         let Some((i, cos_ig)) = self.facing.local(wi, transport) else { return (0.0, 0.0) };
@@ -38,21 +39,23 @@ impl<'a> Coat<'a> {
         (f * cosine, pdf)
     }
 
-    /// `i` with z > 0, if it is on the viewer's side and the coat is not a delta lobe.
+    /// The direction `i` with z > 0, if it is on the viewer's side of the coat and the coat is not a delta lobe;
+    /// otherwise `None`.
     #[inline]
     fn on_viewer_side(&self, i: Vec3) -> Option<Vec3> {
         let i = Vec3::new(i.x, i.y, i.z * self.side);
         (self.cover.coat_class != LobeSet::DELTA && i.z.min(self.o.z) >= MIN_COSINE).then_some(i)
     }
 
-    /// Density with which a path from `wi` samples the viewing direction.
+    /// Density per solid angle with which a path that arrives from `wi` samples the viewing direction from the coat.
     #[inline]
     pub(super) fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32 {
         let i = self.facing.local(wi, transport.reversed()).and_then(|(i, _)| self.on_viewer_side(i));
         i.map_or(0.0, |i| self.cover.coat(i, self.o).1)
     }
 
-    /// Samples a reflected direction. The weight is valid only for a delta coat.
+    /// Samples a direction that the coat reflects to; `None` if it is below the surface. The weight is valid only for a
+    /// delta coat.
     #[inline]
     pub(super) fn sample(&self, transport: Transport, u: Vec2) -> Option<BsdfSample> {
         let importance = transport == Transport::Importance;

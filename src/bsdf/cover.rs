@@ -11,7 +11,7 @@ use super::profile::{Position, Profile};
 use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
 use crate::math::{Rgb, Vec2, Vec3};
 
-/// Reflectance of a smooth clear coat.
+/// Reflectance of a smooth clear coat at this cosine with the normal, 0 to 1.
 #[inline]
 pub fn coat_reflectance(cos: f32) -> f32 {
     dielectric(cos, COAT_ETA).0
@@ -27,19 +27,19 @@ pub struct Angles {
 }
 
 impl From<Position> for Angles {
-    /// The angles if both normals are equal.
+    /// The positions if the coat and the base have one normal.
     #[inline]
     fn from(mu: Position) -> Angles {
         Angles { coat: mu, base: mu }
     }
 }
 
-/// Sheen and clear coat.
+/// The cover of a surface's base: a layer of sheen, and a clear coat on top of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Cover {
     coat: f32,
     coat_ggx: Ggx,
-    /// Lobe class of the coat.
+    /// Lobe class (delta, sharp or broad) of the coat.
     pub coat_class: LobeSet,
     coat_albedo: Profile,
     sheen: Rgb,
@@ -48,7 +48,7 @@ pub struct Cover {
 }
 
 impl Cover {
-    /// The cover that the parameters describe; `None` without coat and sheen.
+    /// The cover that the BSDF's parameters describe; `None` without coat and sheen.
     #[inline]
     pub fn new(p: &Parameters, tables: &EnergyTables) -> Option<Cover> {
         if !p.is_covered() {
@@ -72,7 +72,7 @@ impl Cover {
         })
     }
 
-    /// Lobe classes of the layers.
+    /// Lobe classes of the layers, coat and sheen, that the cover has.
     #[inline]
     pub fn lobes(&self) -> LobeSet {
         let mut set = LobeSet::empty();
@@ -85,38 +85,40 @@ impl Cover {
         set
     }
 
-    /// Whether there is a clear coat.
+    /// Whether the cover has a clear coat.
     #[inline]
     pub fn has_coat(&self) -> bool {
         self.coat > 0.0
     }
 
-    /// Whether there is sheen.
+    /// Whether the cover has sheen.
     #[inline]
     pub fn has_sheen(&self) -> bool {
         self.sheen.max_element() > 0.0
     }
 
-    /// Factors of the albedos of coat and sheen in the attenuation of the base.
+    /// Factors of the albedos of coat and sheen by which the layers attenuate the base.
     #[inline]
     pub fn strengths(&self) -> [f32; 2] {
         [self.coat, self.sheen.max_element()]
     }
 
-    /// Albedo of white sheen, at most 1. The lobe of narrow sheen exceeds 1 at grazing angles, see [`Cover::sheen`].
+    /// Albedo of white sheen at a cosine, at most 1. The lobe of narrow sheen exceeds 1 at grazing angles, see
+    /// [`Cover::sheen`].
     #[inline]
     fn sheen_albedo(&self, mu: Position) -> f32 {
         self.sheen_albedo.at(mu).min(1.0)
     }
 
-    /// Transmittance of the layers in one direction, for separable lobes.
+    /// Transmittance of coat and sheen in one direction (0 to 1), for separable lobes of the base, such as the diffuse
+    /// one.
     #[inline]
     pub fn transmittance(&self, w: Angles) -> f32 {
         let [coat, sheen] = self.strengths();
         (1.0 - coat * self.coat_albedo.at(w.coat)) * (1.0 - sheen * self.sheen_albedo(w.base))
     }
 
-    /// Attenuation of a microfacet lobe below the layers, for a pair of directions.
+    /// Factor (0 to 1) by which coat and sheen attenuate a microfacet lobe of the base, for a pair of directions.
     #[inline]
     pub fn facet_transmittance(&self, o: Angles, i: Angles) -> f32 {
         let [coat, sheen] = self.strengths();
@@ -124,7 +126,7 @@ impl Cover {
             * (1.0 - sheen * self.sheen_albedo(o.base).max(self.sheen_albedo(i.base)))
     }
 
-    /// Albedos of coat and sheen. `cos` is the cosine with the normal of the coat.
+    /// Albedos of coat and sheen in a direction. `cos` is its cosine with the normal of the coat.
     #[inline]
     pub fn albedos(&self, cos: f32, w: Angles) -> [Rgb; 2] {
         let mut albedos = [Rgb::ZERO; 2];
@@ -139,7 +141,7 @@ impl Cover {
         albedos
     }
 
-    /// Reflectance of the coat as a smooth interface.
+    /// Reflectance of the coat as a smooth interface, at this cosine with its normal.
     #[inline]
     pub fn coat_reflectance(&self, cos: f32) -> f32 {
         self.coat * coat_reflectance(cos)
@@ -156,7 +158,7 @@ impl Cover {
         (f * d * g2_reflection(lambda_o, lambda_i) / i.z, d * g1(lambda_o))
     }
 
-    /// Samples a direction that the coat reflects to. It may be below the surface.
+    /// Samples a direction to which the coat reflects light, seen along `o`. It may be below the surface.
     #[inline]
     pub fn sample_coat(&self, o: Vec3, u: Vec2) -> Vec3 {
         let smooth = self.coat_class == LobeSet::DELTA;

@@ -16,11 +16,11 @@ const LATTICE: (usize, usize) = (987, 610);
 /// Index of refraction of clear coats (KHR_materials_clearcoat).
 pub(super) const COAT_ETA: f32 = 1.5;
 
-/// Row group of [`SideTables`] for reflection. The four functions are the albedos of a perfect reflector, of total
-/// internal reflection, and of other reflection per F0 and per F90.
+/// Index of the set of functions in [`SideTables`] for reflection. The four functions are the albedos of a perfect
+/// reflector, of total internal reflection, and of other reflection per F0 and per F90.
 const REFLECTED: usize = 0;
-/// Row group of [`SideTables`] for reflection plus transmission. The functions are the constant part of the albedo, the
-/// part per F0, and the part per F90; the fourth is unused.
+/// Index of the set of functions in [`SideTables`] for reflection plus transmission. The functions are the constant
+/// part of the albedo, the part per F0, and the part per F90; the fourth is unused.
 const SCATTERED: usize = 1;
 
 /// Single-scattering albedos on one side of a rough dielectric. They are linear in the reflectances F0 at normal and
@@ -29,17 +29,18 @@ const SCATTERED: usize = 1;
 pub(super) struct SideTables {
     /// Index of refraction of the other side over the index of this side.
     eta: f32,
-    /// The row groups [`REFLECTED`] and [`SCATTERED`].
+    /// Tabulated functions of isotropic roughness: the sets [`REFLECTED`] and [`SCATTERED`].
     albedos: Grid<2>,
-    /// Both row groups for anisotropic roughness.
+    /// Tabulated functions of anisotropic roughness: the sets [`REFLECTED`] and [`SCATTERED`].
     anisotropic: AnisotropicTables,
-    /// Cosine-weighted share of directions with total internal reflection at the smooth interface.
+    /// Cosine-weighted share (0 to 1) of directions with total internal reflection at the smooth interface.
     pub average_total: f32,
-    /// Cosine-weighted average of [`Smooth::grazing_weight`].
+    /// Cosine-weighted average of [`Smooth::grazing_weight`] over the hemisphere.
     pub average_grazing: f32,
 }
 
-/// Tables of one pair of media, from the thinner and from the denser side. Created at first use.
+/// Albedo tables of an interface between two media, seen from the thinner and from the denser side. Created at first
+/// use.
 #[derive(Clone, Debug)]
 struct InterfaceTables {
     /// Index of refraction of the denser medium over that of the thinner one.
@@ -47,7 +48,7 @@ struct InterfaceTables {
     sides: OnceLock<Box<[SideTables; 2]>>,
 }
 
-/// Tables of [`EnergyTables::covered_loss`] for one kind of layer.
+/// Tables of [`EnergyTables::covered_loss`], the energy that facets lose below a layer, for one kind of layer.
 #[derive(Clone, Debug)]
 struct CoverTables {
     /// Albedos of the layer at the nodes of its roughness.
@@ -55,10 +56,11 @@ struct CoverTables {
     losses: Grid<3>,
 }
 
-/// Number of nodes of a layer's roughness. Each of the three row groups has four nodes, of which neighbours share one.
+/// Number of nodes of a layer's roughness in the tables. Each of the three sets of functions has four nodes, of which
+/// neighbours share one.
 const COVER_NODES: usize = 10;
 
-/// The kind of a layer over the base.
+/// The kind of a layer that covers the base of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CoverLayer {
     /// A clear coat.
@@ -67,8 +69,8 @@ pub(super) enum CoverLayer {
     Sheen,
 }
 
-/// All tables of a scene. Rows are computed at first use, on any thread. The result does not depend on when or where,
-/// because the set of interfaces, and so the nearest one to an index, is fixed from the start.
+/// All albedo tables of a scene. Rows are computed at first use, on any thread. The result does not depend on when or
+/// where, because the set of interfaces, and so the nearest one to an index, is fixed from the start.
 #[derive(Clone, Debug)]
 pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
@@ -104,7 +106,8 @@ fn tabulate<T: Copy>(i: usize, zero: T, f: impl Fn(&mut T, &Ggx, Vec3, f32, Vec3
     })
 }
 
-/// The direction reflected by a facet, and G2 / G1, which is zero below the horizon.
+/// The direction into which a facet of normal `h` reflects `wo`, and the share of the light that is not shadowed, G2 /
+/// G1, which is zero below the horizon.
 fn reflected_share(ggx: &Ggx, wo: Vec3, lambda_o: f32, h: Vec3) -> (Vec3, f32) {
     let wi = reflect(wo, h);
     (wi, if wi.z > 0.0 { g2_reflection(lambda_o, ggx.lambda(wi)) / g1(lambda_o) } else { 0.0 })
@@ -126,12 +129,13 @@ fn add_albedos(sums: &mut [f32; 5], smooth: &Smooth, ggx: &Ggx, wo: Vec3, lambda
     }
 }
 
-/// The functions [`REFLECTED`] from the sums of [`add_albedos`].
+/// The functions [`REFLECTED`] at one table entry, from the sums of [`add_albedos`].
 fn reflected([total, r, rg, ..]: [f32; 5]) -> Vec4 {
     Vec4::new(total + r, total, r - rg, rg)
 }
 
-/// The functions [`SCATTERED`] from the sums of [`add_albedos`]. The transmitted part is t (1 - F0) - tg (F90 - F0).
+/// The functions [`SCATTERED`] at one table entry, from the sums of [`add_albedos`]. The transmitted part is t (1 - F0)
+/// - tg (F90 - F0).
 fn scattered([total, r, rg, t, tg]: [f32; 5]) -> Vec4 {
     Vec4::new(total + t, (r - rg) - (t - tg), rg - tg, 0.0)
 }
@@ -158,7 +162,7 @@ impl SideTables {
         }
     }
 
-    /// The rows adjacent to an alpha.
+    /// The table rows at the nodes on either side of an alpha.
     #[inline]
     fn albedos(&self, alpha: Position) -> AdjacentRows<'_, 2> {
         self.albedos.adjacent_rows(alpha, |i| {
@@ -170,42 +174,45 @@ impl SideTables {
         })
     }
 
-    /// Energy that single scattering loses at a perfect reflector: one minus its albedo.
+    /// Energy share that single scattering loses at a perfect reflector, as a function of the cosine: one minus its
+    /// albedo.
     #[inline]
     pub fn white_loss(&self, alpha: Position) -> Profile {
         Profile::new(self.albedos(alpha), REFLECTED, 1.0, -Vec4::X)
     }
 
-    /// Albedo of reflection.
+    /// Albedo of reflection at the interface, as a function of the cosine, for reflectances `f0` (normal) and `f90`
+    /// (grazing).
     #[inline]
     pub fn reflection(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
         Profile::new(self.albedos(alpha), REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90))
     }
 
-    /// Transmittance of the interface to the base: one minus the albedo of reflection and minus `multiple` times the
-    /// white loss, which is the albedo of the compensation.
+    /// Transmittance of the interface to the base, as a function of the cosine: one minus the albedo of reflection and
+    /// minus `multiple` times the white loss, which is the albedo of the compensation.
     #[inline]
     pub fn base_transmittance(&self, alpha: Position, f0: f32, f90: f32, multiple: f32) -> Profile {
         Profile::new(self.albedos(alpha), REFLECTED, 1.0 - multiple, Vec4::new(multiple, -1.0, -f0, -f90))
     }
 
-    /// Energy that single scattering loses at glass: one minus the albedo of reflection and transmission.
+    /// Energy share that single scattering loses at glass, as a function of the cosine: one minus the albedo of
+    /// reflection and transmission.
     #[inline]
     pub fn glass_loss(&self, alpha: Position, f0: f32, f90: f32) -> Profile {
         Profile::new(self.albedos(alpha), SCATTERED, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
     }
 
-    /// [`SideTables::glass_loss`] for anisotropic roughness.
+    /// The loss [`SideTables::glass_loss`] for anisotropic roughness.
     pub fn anisotropic_glass_loss(&self, alphas: [Position; 2], f0: f32, f90: f32) -> AnisotropicProfile {
         self.anisotropic(alphas, (SCATTERED, 1.0, -Vec4::new(1.0, f0, f90, 0.0)))
     }
 
-    /// [`SideTables::reflection`] for anisotropic roughness.
+    /// The albedo [`SideTables::reflection`] for anisotropic roughness.
     pub fn anisotropic_reflection(&self, alphas: [Position; 2], f0: f32, f90: f32) -> AnisotropicProfile {
         self.anisotropic(alphas, (REFLECTED, 0.0, Vec4::new(0.0, 1.0, f0, f90)))
     }
 
-    /// See [`AnisotropicTables::profile`] for `functions`.
+    /// The function of direction that [`AnisotropicTables::profile`] makes from `functions`, for these alphas.
     fn anisotropic(&self, alphas: [Position; 2], functions: (usize, f32, Vec4)) -> AnisotropicProfile {
         let smooth = Smooth::new(self.eta);
         self.anisotropic.profile(alphas, functions, |alpha_x, alpha_y, wo| {
@@ -218,7 +225,7 @@ impl SideTables {
         })
     }
 
-    /// Average reflectance of the smooth interface.
+    /// Average reflectance of the smooth interface over the hemisphere, weighted by the cosine.
     #[inline]
     pub fn average_reflectance(&self, f0: f32, f90: f32) -> f32 {
         f0 * (1.0 - self.average_total - self.average_grazing) + f90 * self.average_grazing + self.average_total
@@ -230,7 +237,7 @@ impl InterfaceTables {
         InterfaceTables { eta, sides: OnceLock::new() }
     }
 
-    /// The tables of the thinner side and of the denser side.
+    /// The tables for directions on the thinner side and on the denser side of the interface.
     #[inline]
     fn sides(&self) -> &[SideTables; 2] {
         self.sides.get_or_init(|| Box::new([self.eta, 1.0 / self.eta].map(SideTables::new)))
@@ -242,8 +249,8 @@ impl CoverTables {
         CoverTables { covers: OnceLock::new(), losses: Grid::new() }
     }
 
-    /// The loss at facets of roughness `alpha` below a layer of roughness `cover_alpha`. `cover` returns the albedo of
-    /// the layer at a roughness.
+    /// The energy that facets of roughness `alpha` lose below a layer of roughness `cover_alpha`, as a function of the
+    /// cosine. `cover` returns the albedo of the layer at a roughness.
     fn profile(&self, alpha: Position, cover_alpha: f32, cover: impl Fn(Position) -> Profile) -> Profile {
         let losses = self.losses.adjacent_rows(alpha, |i| {
             let covers = self.covers.get_or_init(|| {
@@ -269,8 +276,8 @@ impl CoverTables {
 }
 
 impl EnergyTables {
-    /// Tables for interfaces of the relative indices `etas` and for 1.5. An index and its inverse share tables.
-    /// Interfaces of other indices use the nearest tables.
+    /// Tables for interfaces of the relative indices of refraction `etas` and for 1.5. An index and its inverse share
+    /// tables. Interfaces of other indices use the nearest tables.
     pub fn new(etas: impl IntoIterator<Item = f32>) -> EnergyTables {
         let etas = etas.into_iter().chain([COAT_ETA]).filter(|e| *e > 0.0);
         let mut etas: Vec<f32> = etas.map(|e| if e < 1.0 { 1.0 / e } else { e }).collect();
@@ -286,13 +293,13 @@ impl EnergyTables {
         }
     }
 
-    /// Number of rows computed so far, for all pairs of media.
+    /// Number of table rows computed so far, for all pairs of media.
     pub fn row_count(&self) -> usize {
         let sides = self.interfaces.iter().filter_map(|pair| pair.sides.get()).flat_map(|sides| sides.iter());
         sides.map(|side| side.albedos.row_count()).sum()
     }
 
-    /// The tables nearest to the relative index `eta`; `None` for matched indices.
+    /// The tables of the index nearest to the relative index `eta`; `None` for matched indices, which do not reflect.
     #[inline]
     fn nearest(&self, eta: f32) -> Option<&InterfaceTables> {
         if is_matched(eta) {
@@ -316,20 +323,21 @@ impl EnergyTables {
         Some(if eta < 1.0 { [dense, thin] } else { [thin, dense] })
     }
 
-    /// Energy that single scattering loses at a perfect reflector. From the thinner medium it is equal for all pairs.
+    /// Energy share that single scattering loses at a perfect reflector, as a function of the cosine. From the thinner
+    /// medium it is equal for all pairs.
     #[inline]
     pub(super) fn white_loss(&self, alpha: Position) -> Profile {
         self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.white_loss(alpha))
     }
 
-    /// Albedo of a clear coat.
+    /// Albedo of a clear coat of roughness `alpha`, as a function of the cosine.
     #[inline]
     pub(super) fn coat_albedo(&self, alpha: Position) -> Profile {
         let f0 = super::fresnel::normal_incidence(COAT_ETA);
         self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.reflection(alpha, f0, 1.0))
     }
 
-    /// Albedo of white sheen.
+    /// Albedo of white sheen of roughness `alpha`, as a function of the cosine.
     #[inline]
     pub(super) fn sheen_albedo(&self, alpha: Position) -> Profile {
         let made = |i: usize| [row(&std::array::from_fn(|j| Vec4::X * sheen::albedo(node(i), node(j))))];

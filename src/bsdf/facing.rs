@@ -15,7 +15,8 @@ pub(super) struct Facing {
 }
 
 impl Facing {
-    /// Also returns the viewing direction, or its opposite if that replaces it, in the shading frame.
+    /// Builds the sides for a viewing direction `wo`. Also returns `wo`, or its opposite if that replaces it, in the
+    /// shading frame.
     #[inline(always)]
     pub(super) fn new(frame: Frame, ng: Vec3, wo: Vec3) -> (Facing, Vec3) {
         let local = frame.to_local(wo);

@@ -11,7 +11,7 @@ pub const MATCHED: f32 = 2e-3;
 /// here.
 const MIRROR_ETA: f32 = 1e3;
 
-/// Whether an interface of relative index `eta` has no effect.
+/// Whether an interface of relative index `eta` has no effect, because the index is (nearly) 1.
 #[inline]
 pub fn is_matched(eta: f32) -> bool {
     (eta - 1.0).abs() < MATCHED
@@ -38,7 +38,7 @@ pub fn dielectric(cos_o: f32, eta: f32) -> (f32, f32) {
     (0.5 * (sqr(parallel) + sqr(perpendicular)), cos_t)
 }
 
-/// Reflectance of a dielectric at normal incidence, which is equal from both sides.
+/// Reflectance of a dielectric of relative index `eta` at normal incidence, which is equal from both sides.
 #[inline]
 pub fn normal_incidence(eta: f32) -> f32 {
     if is_matched(eta) {
@@ -65,12 +65,12 @@ pub struct Smooth {
     inverse_eta2: f32,
     /// Reflectance at normal incidence.
     normal: f32,
-    /// 1 / (1 - `normal`).
+    /// Precomputed 1 / (1 - `normal`).
     inverse_rest: f32,
 }
 
 impl Smooth {
-    /// The interface of relative index `eta`.
+    /// The interface whose relative index, far side over near side, is `eta`.
     pub fn new(eta: f32) -> Smooth {
         let normal = normal_incidence(eta);
         Smooth { eta, inverse_eta2: 1.0 / (eta * eta), normal, inverse_rest: 1.0 / (1.0 - normal) }
@@ -103,7 +103,7 @@ impl Smooth {
 }
 
 impl Smooth {
-    /// [`Smooth::grazing_weight`] of eight cosines, for an interface to a denser medium or of matched indices.
+    /// [`Smooth::grazing_weight`] for eight cosines, if the far side is denser or its index matched.
     #[inline]
     pub fn grazing_weight_from_thin(&self, cos_o: f32x8) -> f32x8 {
         if is_matched(self.eta) {
@@ -118,7 +118,7 @@ impl Smooth {
         ((f - self.normal) * self.inverse_rest).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
     }
 
-    /// Whether [`Smooth::grazing_weight_from_thin`] applies.
+    /// Whether [`Smooth::grazing_weight_from_thin`] applies: the far side is denser or its index matched.
     pub fn is_from_thin(&self) -> bool {
         self.eta >= 1.0 - MATCHED && self.eta <= MIRROR_ETA
     }

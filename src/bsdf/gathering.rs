@@ -7,22 +7,22 @@ use crate::math::{Rgb, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use wide::{CmpGe, CmpGt, f32x8};
 
-/// [`Shading::gather`], prepared for many photons.
+/// A BSDF prepared for [`Shading::gather`], the radiance that photons cause, with many photons.
 pub struct Gathering<'a> {
     shading: &'a Shading<'a>,
     set: LobeSet,
     kind: GatherCase<'a>,
 }
 
-/// Special cases that are cheap per photon. Most photons fall on the first two.
+/// Cases of a BSDF that differ in the cost per photon. Most photons fall on the first two.
 enum GatherCase<'a> {
-    /// Nothing is scattered.
+    /// The BSDF scatters nothing in the requested lobes.
     Nothing,
     /// Diffuse reflection: `factor`, times the transmittance `through` of a rough interface.
     Diffuse { factor: Rgb, through: Option<&'a Profile> },
     /// Reflecting facets without a cover, and whether the diffuse base below them counts.
     Facets(&'a Layered<'a>, bool),
-    /// The general case.
+    /// Any other BSDF, evaluated in general.
     Any,
 }
 
@@ -46,7 +46,7 @@ impl<'a> Shading<'a> {
     }
 }
 
-/// Dot product of eight vectors with one.
+/// Dot products of eight vectors, given by their coordinates, with one.
 #[inline]
 fn dot(v: &[f32x8; 3], w: Vec3) -> f32x8 {
     v[0] * w.x + v[1] * w.y + v[2] * w.z
@@ -59,8 +59,8 @@ impl Gathering<'_> {
         if self.shading.view.side == 1 { -1.0 } else { 1.0 }
     }
 
-    /// [`Shading::gather`] for a photon from `wi`. `cosine` is its cosine with the geometric normal where it was
-    /// stored.
+    /// Radiance towards the viewer per flux over kernel area of a photon from `wi`, as [`Shading::gather`] returns it.
+    /// `cosine` is the cosine of `wi` with the geometric normal of the surface where the photon was stored.
     #[inline]
     pub fn photon(&self, wi: Vec3, cosine: f32) -> Rgb {
         match &self.kind {
@@ -78,7 +78,8 @@ impl Gathering<'_> {
         }
     }
 
-    /// [`Gathering::photon`] for eight photons. `wi` has the x, y and z coordinates, the result red, green and blue.
+    /// [`Gathering::photon`] for eight photons. `wi` is the x, y and z coordinates of their directions, the result is
+    /// red, green and blue.
     #[inline]
     pub fn photons8(&self, wi: [f32x8; 3], cosine: f32x8) -> [f32x8; 3] {
         if matches!(self.kind, GatherCase::Nothing | GatherCase::Any) {
@@ -136,7 +137,7 @@ impl Gathering<'_> {
     }
 }
 
-/// The table positions of eight cosines.
+/// Positions in the tables of the cosines of eight directions.
 struct Positions {
     index: [i32; 8],
     t: f32x8,
@@ -150,7 +151,7 @@ impl Positions {
         Positions { index: floor.to_array(), t: x - f32x8::from_i32x8(floor) }
     }
 
-    /// [`Profile::at`] for eight positions.
+    /// Values of a profile at the eight positions, like [`Profile::at`].
     #[inline]
     fn of(&self, profile: &Profile) -> f32x8 {
         let nodes = profile.nodes();
@@ -170,7 +171,7 @@ mod tests {
     use crate::math::Frame;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// The special cases agree with the general one, on both sides and with a tilted shading normal.
+    /// The special cases return the values of the general one, on both sides and with a tilted shading normal.
     #[test]
     fn special_cases_agree_with_gather() {
         let tables = EnergyTables::new([1.5]);

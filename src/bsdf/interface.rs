@@ -19,11 +19,11 @@ pub(super) fn multiple_scattering(f: Rgb, kept: f32) -> Rgb {
     f * f * kept / (Rgb::ONE - f * (1.0 - kept))
 }
 
-/// A rough or smooth interface with its cover.
+/// A rough or smooth interface of a surface, with its cover (coat and sheen).
 #[derive(Debug)]
 pub struct Interface<'a> {
     pub(super) ggx: Ggx,
-    /// Lobe class of the facets.
+    /// Lobe class (delta, sharp or broad) of the interface's facets.
     pub(super) class: LobeSet,
     /// [`Interface::effective_cosine`] of 0, which grows with roughness.
     lift: f32,
@@ -34,19 +34,19 @@ pub struct Interface<'a> {
     pub(super) matched: bool,
     /// Whether the interface is invisible over a diffuse base: it does not reflect and has no cover.
     pub(super) invisible: bool,
-    /// The smooth dielectric from above and from below.
+    /// Fresnel's equations of the smooth dielectric, from above and from below.
     pub(super) smooth: [Smooth; 2],
-    /// Reflectance of the dielectric at normal incidence.
+    /// Reflectance of the dielectric at normal incidence, per channel.
     pub(super) f0: Rgb,
     /// Reflectance of the dielectric at grazing incidence.
     pub(super) f90: f32,
-    /// Average reflectance of the dielectric from above.
+    /// Average reflectance of the dielectric from above, over the hemisphere.
     pub(super) average: Rgb,
     /// Albedo of multiple scattering between the facets, relative to a perfect reflector.
     pub(super) multiple_scattering: Rgb,
-    /// Energy that single scattering loses at a perfect reflector.
+    /// Energy share that single scattering loses at a perfect reflector, as a function of the cosine.
     pub(super) loss: Profile,
-    /// Transmittance to the diffuse base.
+    /// Transmittance of the interface to the diffuse base, as a function of the cosine.
     pub(super) through: Profile,
     pub(super) glass: Option<RoughGlass<'a>>,
     pub(super) cover: Option<CoverEffect>,
@@ -55,29 +55,29 @@ pub struct Interface<'a> {
 /// Energy compensation of solid rough glass. Arrays are by side: 0 above, 1 below.
 #[derive(Debug)]
 pub(super) struct RoughGlass<'a> {
-    /// Energy that single scattering loses, as a mean over azimuths.
+    /// Energy share that single scattering loses on each side, as a mean over azimuths.
     pub loss: [Profile; 2],
-    /// For anisotropic roughness: the loss and the albedo of reflection, as functions of the direction.
+    /// For anisotropic roughness: the loss and the albedo of reflection on each side, as functions of the direction.
     anisotropic: Option<[SideProfiles<'a>; 2]>,
-    /// Albedo of reflection for isotropic roughness.
+    /// Albedo of reflection on each side for isotropic roughness, as a function of the cosine.
     reflected: [Profile; 2],
-    /// Factor of the reflected compensation `reflected_compensation[side] * loss(o) * loss(i)`.
+    /// Factor of the compensating reflected lobe `reflected_compensation[side] * loss(o) * loss(i)`.
     pub reflected_compensation: [f32; 2],
-    /// Factor of the transmitted compensation, over the squared index of the side transmitted to (1 above). Equal from
-    /// both sides.
+    /// Factor of the compensating transmitted lobe, over the squared index of the side transmitted to (1 above). Equal
+    /// from both sides.
     pub transmitted_compensation: f32,
 }
 
-/// A cover and its effect on the lobes below. `loss_scale` and `loss_profiles` are for coat and sheen.
+/// A cover (coat and sheen) and its effect on the lobes below. `loss_scale` and `loss_profiles` are for coat and sheen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CoverEffect {
     pub cover: Cover,
-    /// Normalization of the diffuse lobe below the cover: the average of the profile `through` over the average of the
-    /// profile times the transmittance.
+    /// Normalization factor of the diffuse lobe below the cover: the average of the profile `through` over the average
+    /// of the profile times the transmittance.
     pub through: f32,
-    /// Normalization of the compensation, with the profile `loss`.
+    /// Normalization factor of the energy compensation below the cover, with the profile `loss`.
     pub loss: f32,
-    /// Normalization of the compensation of glass, by side.
+    /// Normalization factors of the energy compensation of glass below the cover, by side.
     pub glass_loss: [f32; 2],
     /// Factors of the energy that facets of average reflectance r lose below each layer. The lobe that returns it is
     /// `r * loss_scale * profile(o) * profile(i)`; its albedo is `pi * average * r * loss_scale * profile(o)`.
@@ -86,12 +86,12 @@ pub(super) struct CoverEffect {
 }
 
 impl<'a> Interface<'a> {
-    /// The interface that the parameters describe. Their base colour does not matter.
+    /// The interface that the parameters of a BSDF describe. Their base colour does not matter.
     pub fn new(p: &Parameters, tables: &EnergyTables) -> Interface<'a> {
         Interface::with(p, tables, |sides| SideProfiles::Owned(Box::new(sides)))
     }
 
-    /// The interface that the parameters describe, allocated in `arena`, which runs no destructors.
+    /// The interface that the parameters of a BSDF describe, allocated in `arena`, which runs no destructors.
     #[inline]
     pub fn new_in(p: &Parameters, tables: &EnergyTables, arena: &'a Bump) -> &'a Interface<'a> {
         arena.alloc_with(|| Interface::with(p, tables, |sides| SideProfiles::InArena(arena.alloc(sides))))
@@ -161,7 +161,7 @@ impl<'a> Interface<'a> {
         interface
     }
 
-    /// Squared index of refraction of a side (0 above, 1 below), relative to the index above.
+    /// Squared index of refraction of a side of the interface (0 above, 1 below), relative to the index above.
     #[inline]
     pub(super) fn index2(&self, side: usize) -> f32 {
         if side == 0 { 1.0 } else { sqr(self.eta) }
@@ -173,7 +173,8 @@ impl<'a> Interface<'a> {
         mu + (1.0 - mu) * self.lift
     }
 
-    /// Reflectance and transmittance of the dielectric at a facet, and the cosine of the refracted ray.
+    /// Reflectance and transmittance of the dielectric at a facet where light arrives at cosine `cos` on `side` (0
+    /// above, 1 below), and the cosine of the refracted ray.
     #[inline]
     pub(super) fn dielectric(&self, cos: f32, side: usize) -> (Rgb, f32, f32) {
         match self.smooth[side].grazing_weight(cos) {
@@ -187,7 +188,8 @@ impl<'a> Interface<'a> {
 }
 
 impl<'a> RoughGlass<'a> {
-    /// `alpha` is the isotropic equivalent of `ggx`. `keep` stores the anisotropic profiles of both sides.
+    /// Builds the energy compensation of glass. `alpha` is the isotropic equivalent of `ggx`. `keep` stores the
+    /// anisotropic functions of both sides.
     fn new(
         ggx: &Ggx,
         alpha: Position,
@@ -219,7 +221,7 @@ impl<'a> RoughGlass<'a> {
         RoughGlass { loss, anisotropic, reflected, reflected_compensation, transmitted_compensation: k * FRAC_1_PI }
     }
 
-    /// Loss at the direction `w` on a side; `at` is the position of its cosine.
+    /// Energy share lost by single scattering at the direction `w` on a side; `at` is the table position of its cosine.
     #[inline]
     pub fn loss_along(&self, side: usize, at: Position, w: Vec3) -> f32 {
         match &self.anisotropic {
@@ -228,7 +230,7 @@ impl<'a> RoughGlass<'a> {
         }
     }
 
-    /// Albedo of reflection at the direction `w` on a side.
+    /// Albedo of reflection at the direction `w` on a side; `at` is the table position of its cosine.
     #[inline]
     pub fn reflected_along(&self, side: usize, at: Position, w: Vec3) -> f32 {
         match &self.anisotropic {
@@ -237,7 +239,8 @@ impl<'a> RoughGlass<'a> {
         }
     }
 
-    /// Loss at the direction `w`, and the density per solid angle with which [`RoughGlass::sample`] draws it.
+    /// Energy share lost by single scattering at the direction `w`, and the density per solid angle with which
+    /// [`RoughGlass::sample`] draws it.
     #[inline]
     pub fn loss_with_pdf_w(&self, side: usize, at: Position, w: Vec3) -> (f32, f32) {
         match &self.anisotropic {
@@ -246,7 +249,8 @@ impl<'a> RoughGlass<'a> {
         }
     }
 
-    /// Samples a direction of the upper hemisphere in proportion to the loss on a side.
+    /// Samples a direction of the upper hemisphere in proportion to the energy that single scattering loses on a side;
+    /// `None` if it loses none.
     #[inline]
     pub fn sample(&self, side: usize, u: Vec2) -> Option<Vec3> {
         match &self.anisotropic {

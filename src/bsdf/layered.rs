@@ -21,28 +21,28 @@ use super::profile::Position;
 use crate::math::{Rgb, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// Directions whose absolute cosine is below this scatter no light, because products of smaller cosines underflow.
+/// Smallest absolute cosine of a direction that scatters light, because products of smaller cosines underflow.
 pub(super) const MIN_COSINE: f32 = 1e-6;
 
-/// Mean of the channels. Lobes are sampled in proportion to it.
+/// Mean of the three channels. Lobes are sampled in proportion to it.
 #[inline]
 pub(super) fn mean(c: Rgb) -> f32 {
     c.element_sum() * (1.0 / 3.0)
 }
 
-/// The layered BSDF, see the module's documentation.
+/// The layered BSDF: a mixture of metal, matte surface and glass, below a cover of coat and sheen.
 #[derive(Clone, Copy, Debug)]
 pub struct Layered<'a> {
     pub(super) interface: &'a Interface<'a>,
-    /// Classes of the lobes that scatter light.
+    /// Classes (delta, sharp, broad) of the lobes that scatter light.
     pub(super) lobes: LobeSet,
     pub(super) has_facets: bool,
     pub(super) base: Rgb,
-    /// Weight of the metal in the mixture.
+    /// Weight of the metal in the mixture of three surfaces, 0 to 1.
     pub(super) metal: f32,
-    /// Weight of the matte surface in the mixture.
+    /// Weight of the matte surface (a dielectric over a diffuse base) in the mixture, 0 to 1.
     pub(super) matte: f32,
-    /// Weight of the glass in the mixture; zero if its indices are matched.
+    /// Weight of the glass in the mixture, 0 to 1; zero if its indices are matched.
     pub(super) glass: f32,
     /// Weight of the delta lobe straight through glass of matched indices.
     pub(super) straight: Rgb,
@@ -50,35 +50,36 @@ pub struct Layered<'a> {
     pub(super) diffuse: Rgb,
     /// Factor of the albedo `diffuse_albedo * through(o)` of the diffuse lobe.
     pub(super) diffuse_albedo: Rgb,
-    /// Factor of the reflected compensation `reflected_compensation * loss(o) * loss(i)` of metal, matte and thin
-    /// walls. Its albedo is `pi * average of loss * reflected_compensation * loss(o)`.
+    /// Factor of the energy-compensating reflected lobe `reflected_compensation * loss(o) * loss(i)` of metal, matte
+    /// and thin walls. Its albedo is `pi * average of loss * reflected_compensation * loss(o)`.
     pub(super) reflected_compensation: Rgb,
-    /// Factor of the transmitted compensation of thin walls, likewise.
+    /// Factor of the energy-compensating transmitted lobe of thin walls; its formula is that of
+    /// `reflected_compensation`.
     pub(super) transmitted_compensation: Rgb,
-    /// Average reflectance of the facets, if there is a cover.
+    /// Average reflectance of the facets; used only if there is a cover.
     pub(super) facet_average: Rgb,
-    /// Normal of a clear coat over a normal map, which [`super::coat::Coat`] evaluates.
+    /// Normal of a clear coat over a normal map, which [`super::coat::Coat`] evaluates; otherwise `None`.
     pub(super) coat_normal: Option<Vec3>,
 }
 
 /// One weight per lobe, for one `wo`: estimated albedos, or, normalized to sum to 1, sampling probabilities.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LobeWeights {
-    /// Facets. Fresnel's equations then choose reflection or transmission.
+    /// Weight of the facets' single scattering. Fresnel's equations then choose reflection or transmission.
     pub facets: f32,
-    /// Reflected compensation.
+    /// Weight of the reflected lobe that compensates the energy lost by single scattering.
     pub reflected_compensation: f32,
-    /// Transmitted compensation.
+    /// Weight of the transmitted lobe that compensates the energy lost by single scattering.
     pub transmitted_compensation: f32,
-    /// Diffuse reflection.
+    /// Weight of diffuse reflection.
     pub diffuse: f32,
-    /// Delta lobe straight through glass of matched indices.
+    /// Weight of the delta lobe straight through glass of matched indices.
     pub straight: f32,
-    /// Compensation of the energy that facets lose below a cover.
+    /// Weight of the lobe that compensates the energy that facets lose below a cover.
     pub covered_loss: f32,
-    /// Clear coat.
+    /// Weight of the clear coat.
     pub coat: f32,
-    /// Sheen.
+    /// Weight of sheen.
     pub sheen: f32,
 }
 
@@ -110,26 +111,26 @@ impl LobeWeights {
 /// The terms of a BSDF that depend only on the viewing direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ViewTerms {
-    /// The viewing direction, with z >= 0.
+    /// Unit viewing direction in the shading frame, mirrored to z >= 0 if it is below the surface.
     pub o: Vec3,
     /// Side of the viewing direction: 0 above, 1 below.
     pub side: usize,
-    /// Table position of its cosine.
+    /// Table position of the cosine of the viewing direction.
     pub at: Position,
     /// [`super::microfacet::Ggx::root`] of `o`.
     pub root: f32,
-    /// The profile `loss` of the interface at `o`.
+    /// Value of the interface's `loss` at `o`: the energy share that single scattering loses.
     pub loss: f32,
-    /// The profile `through` of the interface at `o`.
+    /// Value of the interface's `through` at `o`: the transmittance to the diffuse base.
     pub through: f32,
-    /// Estimated albedos of all lobes, as means over the channels.
+    /// Estimated albedo of each lobe, as a mean over the channels.
     means: LobeWeights,
-    /// Estimated albedos of five groups of lobes: facets with their compensation, diffuse, straight, coat, sheen.
+    /// Estimated albedos of five sets of lobes: facets with their compensation, diffuse, straight, coat, sheen.
     albedos: [Rgb; 5],
 }
 
 impl ViewTerms {
-    /// The terms of a BSDF that needs only the direction.
+    /// The terms of a BSDF that depends on nothing but the viewing direction itself, such as a Lambertian one.
     #[inline]
     pub(super) fn plain(wo: Vec3) -> ViewTerms {
         ViewTerms {
@@ -144,7 +145,7 @@ impl ViewTerms {
         }
     }
 
-    /// The viewing direction in the shading frame.
+    /// The viewing direction in the shading frame, with its original sign of z.
     #[inline]
     pub(super) fn wo(&self) -> Vec3 {
         if self.side == 1 { Vec3::new(self.o.x, self.o.y, -self.o.z) } else { self.o }
@@ -152,7 +153,7 @@ impl ViewTerms {
 }
 
 impl<'a> Layered<'a> {
-    /// The BSDF of a surface with this base colour, metalness, transmission and interface.
+    /// The BSDF of a surface with this base colour, metalness (0 to 1), transmission (0 to 1) and interface.
     #[inline(always)]
     pub(super) fn new(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Layered<'a> {
         let Interface { matched, class, thin, average, .. } = *interface;
@@ -211,8 +212,8 @@ impl<'a> Layered<'a> {
         }
     }
 
-    /// Cosine of `w` with the normal of the coat, and the table positions of both cosines. `side` is the side of the
-    /// viewer, `base` the position of the cosine with the normal of the base.
+    /// Cosine of `w` with the normal of the coat, and the table positions of its cosines with the normals of coat and
+    /// base. `side` is the side of the viewer, `base` the position of the cosine with the normal of the base.
     #[inline]
     pub(super) fn angles(&self, side: usize, w: Vec3, base: Position) -> (f32, Angles) {
         let Some(n) = self.coat_normal else { return (w.z.abs(), base.into()) };
@@ -221,19 +222,19 @@ impl<'a> Layered<'a> {
         (cos, Angles { coat: Position::new(cos), base })
     }
 
-    /// Probability of sampling the coat, for a coat over a normal map.
+    /// Probability of sampling the coat, among the lobes of `set`, for a coat over a normal map.
     #[inline]
     pub(super) fn coat_probability(&self, view: &ViewTerms, set: LobeSet) -> f32 {
         self.lobe_weights(view, set).normalized().map_or(0.0, |probabilities| probabilities.coat)
     }
 
-    /// Energy compensation of solid rough glass, if the surface is glass.
+    /// Energy compensation of solid rough glass; `None` if the surface is not such glass.
     #[inline]
     pub(super) fn rough_glass(&self) -> Option<&'a RoughGlass<'a>> {
         if self.glass > 0.0 { self.interface.glass.as_ref() } else { None }
     }
 
-    /// Reflectance of metal and of the matte surface's interface at a facet.
+    /// Reflectance at a facet of the opaque parts of the mixture: metal, and the interface of the matte surface.
     #[inline]
     fn opaque(&self, cos: f32) -> Rgb {
         let mut reflected = if self.metal > 0.0 { schlick(self.base, cos) * self.metal } else { Rgb::ZERO };
@@ -243,7 +244,8 @@ impl<'a> Layered<'a> {
         reflected
     }
 
-    /// Reflectance and transmittance of a facet at the angle of cosine `cos`, and the cosine of the refracted ray.
+    /// Reflectance and transmittance of a facet where light arrives at cosine `cos` on `side`, and the cosine of the
+    /// refracted ray.
     #[inline]
     pub(super) fn fresnel(&self, cos: f32, side: usize) -> (Rgb, Rgb, f32) {
         let opaque = self.opaque(cos);
@@ -254,7 +256,7 @@ impl<'a> Layered<'a> {
         (opaque + f * self.glass, self.base * (self.glass * t), cos_t)
     }
 
-    /// The terms that depend only on the viewing direction `wo`.
+    /// The terms of the BSDF that depend only on the viewing direction `wo`.
     #[inline(always)]
     pub(super) fn view_terms(&self, wo: Vec3) -> ViewTerms {
         let n = self.interface;
@@ -289,7 +291,7 @@ impl<'a> Layered<'a> {
         view
     }
 
-    /// Estimated albedos of the facets, of their reflected compensation, and of their transmitted compensation.
+    /// Estimated albedos of three lobes: the facets, their reflected compensation, and their transmitted compensation.
     #[inline(always)]
     fn facet_albedos(&self, view: &ViewTerms) -> [Rgb; 3] {
         let n = self.interface;
@@ -319,7 +321,7 @@ impl<'a> Layered<'a> {
         }
     }
 
-    /// Attenuates the albedo estimates by the cover, and adds those of the cover itself.
+    /// Attenuates the estimated albedos in `view` by the cover, and adds those of the coat and the sheen.
     #[inline]
     fn cover_albedos(&self, view: &mut ViewTerms) {
         let Some(c) = &self.interface.cover else { return };
@@ -350,7 +352,7 @@ impl<'a> Layered<'a> {
         (view.means.coat, view.means.sheen) = (mean(coat), mean(sheen));
     }
 
-    /// Whether each of the five groups of `ViewTerms::albedos` is in the set.
+    /// For each of the five sets of lobes in `ViewTerms::albedos`, whether it is in the set of lobe classes.
     #[inline]
     fn groups(&self, set: LobeSet) -> [bool; 5] {
         let coat = self.interface.cover.as_ref().is_some_and(|c| set.intersects(c.cover.coat_class));
@@ -358,7 +360,7 @@ impl<'a> Layered<'a> {
         [set.intersects(self.interface.class), broad, set.intersects(LobeSet::DELTA), coat, broad]
     }
 
-    /// Estimated albedo of the lobes of `set`.
+    /// Estimated albedo of the lobes whose class is in `set`.
     #[inline]
     pub(super) fn albedo(&self, view: &ViewTerms, set: LobeSet) -> Rgb {
         let mut sum = Rgb::ZERO;
@@ -370,7 +372,8 @@ impl<'a> Layered<'a> {
         sum.min(Rgb::ONE)
     }
 
-    /// Sampling probabilities of the lobes of `set`, except a coat over a normal map.
+    /// Sampling probabilities of the lobes whose class is in `set`, except a coat over a normal map; `None` if these
+    /// lobes scatter nothing.
     #[inline]
     pub(super) fn lobe_probabilities(&self, view: &ViewTerms, set: LobeSet) -> Option<LobeWeights> {
         let all = self.lobe_weights(view, set);
@@ -378,7 +381,7 @@ impl<'a> Layered<'a> {
         LobeWeights { coat, ..all }.normalized()
     }
 
-    /// Albedo estimates of the lobes of `set`.
+    /// Estimated albedos of the lobes whose class is in `set`; zero for other lobes.
     #[inline]
     fn lobe_weights(&self, view: &ViewTerms, set: LobeSet) -> LobeWeights {
         let [facets, diffuse, straight, coat, sheen] = self.groups(set).map(|counts| f32::from(u8::from(counts)));

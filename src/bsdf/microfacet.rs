@@ -8,7 +8,7 @@ use super::{DELTA_ALPHA, LobeSet, SHARP_ALPHA};
 use crate::math::{Vec2, Vec3, sqr};
 use std::f32::consts::{FRAC_1_PI, TAU};
 
-/// Lobe class of a GGX lobe.
+/// Lobe class (delta, sharp or broad) of a GGX lobe with these alphas.
 #[inline]
 pub(super) fn lobe_class(alpha_x: f32, alpha_y: f32) -> LobeSet {
     let widest = alpha_x.max(alpha_y);
@@ -38,21 +38,21 @@ pub struct Ggx {
 }
 
 impl Ggx {
-    /// Distribution of facet normals, whose product with the cosine integrates to 1 \[Heitz 2014 (85)\].
+    /// Density of facet normals per solid angle, whose product with the cosine integrates to 1 \[Heitz 2014 (85)\].
     #[inline]
     pub fn d(&self, h: Vec3) -> f32 {
         let stretched = sqr(h.x / self.alpha_x) + sqr(h.y / self.alpha_y) + sqr(h.z);
         FRAC_1_PI / (self.alpha_x * self.alpha_y * sqr(stretched))
     }
 
-    /// Smith's Lambda \[Heitz 2014 (72), (80)\].
+    /// Smith's function Lambda of masking and shadowing for the direction `w` \[Heitz 2014 (72), (80)\].
     #[inline]
     pub fn lambda(&self, w: Vec3) -> f32 {
         let slope2 = (sqr(w.x * self.alpha_x) + sqr(w.y * self.alpha_y)) / sqr(w.z).max(f32::MIN_POSITIVE);
         0.5 * ((1.0 + slope2).sqrt() - 1.0)
     }
 
-    /// `w.z (1 + 2 Lambda(w))`. In terms of it, masking-shadowing needs no division.
+    /// The term `w.z (1 + 2 Lambda(w))`. In terms of it, masking-shadowing needs no division.
     #[inline]
     pub fn root(&self, w: Vec3) -> f32 {
         (sqr(w.z) + sqr(w.x * self.alpha_x) + sqr(w.y * self.alpha_y)).sqrt()

@@ -33,7 +33,8 @@ use profile::Profile;
 use std::f32::consts::FRAC_1_PI;
 
 bitflags! {
-    /// A set of lobe classes. The class of a lobe decides which technique carries the light that it scatters.
+    /// A set of lobe classes: delta, sharp, broad. The class of a lobe decides which technique carries the light that
+    /// it scatters.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
     pub struct LobeSet: u8 {
         /// Perfect mirrors and clear interfaces. A path can only continue there.
@@ -43,9 +44,9 @@ bitflags! {
         const SHARP = 2;
         /// Diffuse lobes, sheen and wide glossy lobes. Photons are gathered there.
         const BROAD = 4;
-        /// All classes except delta lobes: those that can be evaluated for a given direction.
+        /// All classes except delta lobes: lobes that can be evaluated for a given direction.
         const SMOOTH = 6;
-        /// All classes.
+        /// All lobe classes.
         const ALL = 7;
     }
 }
@@ -67,7 +68,7 @@ pub enum Transport {
 }
 
 impl Transport {
-    /// The mode of the reversed path.
+    /// The mode of a path in the opposite direction: radiance becomes importance, and the reverse.
     #[inline]
     fn reversed(self) -> Transport {
         match self {
@@ -82,13 +83,13 @@ impl Transport {
 pub struct BsdfSample {
     /// Unit direction in the shading frame.
     pub wi: Vec3,
-    /// f |cos wi| / pdf over the requested set of lobes. For a delta lobe, its weight over the probability of choosing
-    /// it.
+    /// The BSDF times |cos wi| over the density, for the requested set of lobes. For a delta lobe, its weight over the
+    /// probability of choosing it.
     pub weight: Rgb,
     /// Density per solid angle of `wi` over the non-delta lobes of the set. For a delta lobe, the probability of
     /// choosing it.
     pub pdf_w: f32,
-    /// Class of the sampled lobe (exactly one).
+    /// Class of the lobe that was sampled (exactly one).
     pub lobe: LobeSet,
     /// Whether `wi` is on the other side of the surface than `wo`.
     pub transmitted: bool,
@@ -100,12 +101,12 @@ pub struct BsdfSample {
 pub enum Bsdf<'a> {
     /// Lambertian reflection of this colour on both sides.
     Matte(Rgb),
-    /// The layered model.
+    /// The layered model: metal, matte surface and glass below coat and sheen.
     Layered(Layered<'a>),
 }
 
-/// Value and density over `set` of Lambertian reflection, from the cosines of both directions with the normal on the
-/// side of the viewer.
+/// Value and density over `set` of Lambertian reflection of colour `color`, from the cosines of both directions, `view`
+/// and `lit`, with the normal on the side of the viewer.
 #[inline(always)]
 fn lambert(color: Rgb, view: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
     if view > 0.0 && lit > 0.0 && set.intersects(LobeSet::BROAD) && color.max_element() > 0.0 {
@@ -116,12 +117,12 @@ fn lambert(color: Rgb, view: f32, lit: f32, set: LobeSet) -> (Rgb, f32) {
 }
 
 impl<'a> Bsdf<'a> {
-    /// The BSDF of `parameters`, with the interface made from them.
+    /// The BSDF that `parameters` describe, with the interface made from them.
     pub fn new(parameters: &Parameters, interface: &'a Interface<'a>) -> Bsdf<'a> {
         Bsdf::from_shares(parameters.base_color, parameters.metallic, parameters.transmission, interface)
     }
 
-    /// The BSDF of a surface with this base colour, metalness, transmission and interface.
+    /// The BSDF of a surface with this base colour, metalness (0 to 1), transmission (0 to 1) and interface.
     #[inline(always)]
     pub fn from_shares(base: Rgb, metallic: f32, transmission: f32, interface: &'a Interface<'a>) -> Bsdf<'a> {
         if metallic == 0.0 && transmission == 0.0 && interface.invisible {
@@ -137,7 +138,7 @@ impl<'a> Bsdf<'a> {
         matches!(self, Bsdf::Layered(layered) if layered.glass > 0.0)
     }
 
-    /// Classes of the lobes that scatter light.
+    /// Classes (delta, sharp, broad) of the lobes that scatter light.
     #[inline]
     pub fn lobes(&self) -> LobeSet {
         match self {
@@ -147,7 +148,7 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The terms that depend only on the viewing direction `wo`.
+    /// The terms of the BSDF that depend only on the viewing direction `wo`.
     #[inline(always)]
     fn view_terms(&self, wo: Vec3) -> ViewTerms {
         match self {
@@ -178,7 +179,7 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// [`Bsdf::evaluate_view`] with the diffuse reflection multiplied by `share`. The density is unchanged.
+    /// [`Bsdf::evaluate_view`] with the diffuse reflection multiplied by `share` (0 to 1). The density does not change.
     #[inline]
     fn evaluate_dimmed(
         &self,
@@ -201,7 +202,7 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The value of [`Bsdf::evaluate`].
+    /// The value of [`Bsdf::evaluate`] (1/sr, without cosine), without its density.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
         self.eval_view(&self.view_terms(wo), wi, transport, set)
@@ -215,8 +216,8 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// If `set` contains only diffuse reflection: its constant factor, and the profile that is its dependence on the
-    /// cosine of `wi`, if it depends on it.
+    /// If the BSDF has only diffuse reflection in `set`: its constant factor, and, if it depends on the cosine of `wi`,
+    /// the profile of this dependence. Otherwise `None`.
     #[inline]
     fn diffuse_only(&self, view: &ViewTerms, set: LobeSet) -> Option<(Rgb, Option<&'a Profile>)> {
         match self {
@@ -228,7 +229,8 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The layered model, if it has reflecting facets in `set` that neither transmit nor have a cover.
+    /// The layered model, if it has reflecting facets in `set` that neither transmit nor have a cover; otherwise
+    /// `None`.
     #[inline]
     fn reflecting_facets_only(&self, view: &ViewTerms, set: LobeSet) -> Option<&Layered<'a>> {
         match self {
@@ -237,7 +239,7 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// The density of [`Bsdf::evaluate`]. The density of the reverse direction is `pdf(wi, wo, ..)`.
+    /// The density per solid angle of [`Bsdf::evaluate`]. The density of the reverse direction is `pdf(wi, wo, ..)`.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         self.evaluate(wo, wi, transport, set).1

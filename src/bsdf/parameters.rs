@@ -8,7 +8,7 @@ use crate::math::Rgb;
 pub struct Parameters {
     /// Colour of metal, of diffuse reflection and of transmission.
     pub base_color: Rgb,
-    /// Metalness: weight of the metal in the mixture.
+    /// Metalness, 0 to 1: weight of the metal in the mixture of metal and dielectric.
     pub metallic: f32,
     /// GGX alpha along the x axis of the frame: the square of the perceptual roughness, increased by anisotropy.
     pub alpha_x: f32,
@@ -16,17 +16,17 @@ pub struct Parameters {
     pub alpha_y: f32,
     /// Index of refraction below the surface (z < 0, the back) over the index above.
     pub eta: f32,
-    /// Share of the dielectric whose base transmits instead of reflecting diffusely.
+    /// Share (0 to 1) of the dielectric whose base transmits light instead of reflecting it diffusely.
     pub transmission: f32,
     /// Whether the surface is a thin wall, which transmits without refraction.
     pub thin: bool,
-    /// KHR_materials_specular strength.
+    /// Strength of the specular reflection of the dielectric (KHR_materials_specular).
     pub specular: f32,
-    /// KHR_materials_specular colour of reflection at normal incidence; may exceed 1.
+    /// Colour of the dielectric's reflection at normal incidence (KHR_materials_specular); may exceed 1.
     pub specular_color: Rgb,
     /// Strength of the clear coat.
     pub clearcoat: f32,
-    /// GGX alpha of the clear coat.
+    /// GGX alpha of the clear coat: the square of its perceptual roughness.
     pub clearcoat_alpha: f32,
     /// Sheen colour.
     pub sheen_color: Rgb,
@@ -35,7 +35,7 @@ pub struct Parameters {
 }
 
 impl Default for Parameters {
-    /// White diffuse reflection without a specular interface.
+    /// Parameters of white diffuse reflection without a specular interface.
     fn default() -> Self {
         Parameters {
             base_color: Rgb::ONE,
@@ -56,13 +56,14 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Whether there is a clear coat or sheen.
+    /// Whether there is a cover over the base: a clear coat or sheen.
     #[inline]
     pub(super) fn is_covered(&self) -> bool {
         self.clearcoat > 0.0 || self.sheen_color.max_element() > 0.0
     }
 
-    /// Whether the surface only transmits light straight, tinted by the base colour, if its indices are matched.
+    /// Whether a surface whose indices of refraction are matched does nothing but transmit light straight, tinted by
+    /// the base colour.
     #[inline]
     pub fn is_clear_if_matched(&self) -> bool {
         self.metallic == 0.0 && self.transmission == 1.0 && !self.is_covered()

@@ -8,11 +8,11 @@ use crate::math::{Vec2, Vec3, Vec4};
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::sync::OnceLock;
 
-/// Number of nodes along each axis.
+/// Number of nodes of a table along each axis: the cosine, and alpha.
 pub const NODES: usize = 32;
 
-/// Weights of the nodes in `2 integral f(mu) mu dmu`, for an `f` that is linear in t, the fourth root of mu, between
-/// nodes. `2 mu dmu = 8 t^7 dt`.
+/// Weights of the nodes in `2 integral f(mu) mu dmu`, the cosine-weighted average, for an `f` that is linear in t, the
+/// fourth root of mu, between nodes. `2 mu dmu = 8 t^7 dt`.
 const AVERAGE: [f32; NODES] = {
     let mut weights = [0.0f64; NODES];
     let h = 1.0 / (NODES - 1) as f64;
@@ -65,7 +65,7 @@ const fn eighth(x: f64) -> f64 {
     x2 * x2 * x2 * x2
 }
 
-/// Cosine or alpha of node `i`. The first node is at 1e-6 instead of zero, where functions may be undefined.
+/// Cosine or alpha of node `i` of a table. The first node is at 1e-6 instead of zero, where functions may be undefined.
 pub fn node(i: usize) -> f32 {
     let t = i as f32 / (NODES - 1) as f32;
     (t * t * t * t).max(1e-6)
@@ -74,17 +74,17 @@ pub fn node(i: usize) -> f32 {
 /// The position of a cosine or an alpha in a table.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Position {
-    /// Index of the node below.
+    /// Index of the table node below.
     i: usize,
-    /// Fraction of the distance to the next node.
+    /// Fraction of the distance to the next node, 0 to 1.
     t: f32,
 }
 
 impl Position {
-    /// Position of the value 1, in units of nodes.
+    /// Position of a cosine or alpha of 1, in units of nodes.
     pub const SCALE: f32 = (NODES - 1) as f32;
 
-    /// The position of a cosine or an alpha.
+    /// The table position of a cosine or an alpha in `[0, 1]`.
     #[inline]
     pub fn new(x: f32) -> Position {
         let x = x.clamp(0.0, 1.0).sqrt().sqrt() * (NODES - 1) as f32;
@@ -102,7 +102,7 @@ impl Position {
         [(self.i, 1.0 - self.t), (self.i + 1, self.t)]
     }
 
-    /// Interpolates between values at the nodes.
+    /// Interpolates linearly between values at the nodes.
     #[inline]
     pub fn interpolate(self, nodes: &[f32; NODES]) -> f32 {
         let (a, b) = (nodes[self.i], nodes[self.i + 1]);
@@ -110,26 +110,26 @@ impl Position {
     }
 }
 
-/// Four functions of the cosine at one alpha.
+/// Table row: values of four functions of the cosine, at its nodes, for one alpha.
 type Row = [[f32; NODES]; 4];
 
-/// The row whose functions have these values at the nodes of the cosine.
+/// The table row whose four functions have these values at the nodes of the cosine.
 pub fn row(values: &[Vec4; NODES]) -> Row {
     std::array::from_fn(|k| values.map(|v| v[k]))
 }
 
-/// N rows, so 4 N functions of the cosine, at each node of alpha. They are computed at first use, because most
-/// materials have one roughness and need only two nodes.
+/// A table of functions of the cosine and alpha: at each node of alpha, N rows of four functions. They are computed at
+/// first use, because most materials have one roughness and need only two nodes.
 #[derive(Clone, Debug)]
 pub struct Grid<const N: usize>([OnceLock<Box<[Row; N]>>; NODES]);
 
 impl<const N: usize> Grid<N> {
-    /// A grid without computed rows.
+    /// A table without computed rows.
     pub const fn new() -> Grid<N> {
         Grid([const { OnceLock::new() }; NODES])
     }
 
-    /// Number of nodes of alpha that have been computed.
+    /// Number of nodes of alpha whose rows have been computed.
     pub fn row_count(&self) -> usize {
         self.0.iter().filter(|row| row.get().is_some()).count()
     }
@@ -144,7 +144,7 @@ impl<const N: usize> Grid<N> {
     }
 }
 
-/// The rows at two adjacent nodes of alpha, and the fraction of an alpha between them.
+/// The table rows at two adjacent nodes of alpha, and the position of an alpha between them.
 #[derive(Clone, Copy)]
 pub struct AdjacentRows<'g, const N: usize> {
     low: &'g [Row; N],
@@ -159,7 +159,7 @@ pub struct Profile {
     nodes: [f32; NODES],
     /// Cosine-weighted average over the hemisphere.
     pub average: f32,
-    /// Normalization of the density of [`Profile::sample`].
+    /// Integral of the profile that normalizes the density of [`Profile::sample`].
     mass: f32,
 }
 
@@ -176,12 +176,12 @@ fn dot(a: &[f32; NODES], b: &[f32; NODES]) -> f32 {
 }
 
 impl Profile {
-    /// A constant profile.
+    /// The profile with one value at all cosines.
     pub const fn constant(constant: f32) -> Profile {
         Profile { nodes: [constant; NODES], average: constant, mass: 2.0 * constant }
     }
 
-    /// The profile `max(constant + factors . functions, 0)`, with the four functions of row number `n`.
+    /// The profile `max(constant + factors . functions, 0)`, with the four tabulated functions of row number `n`.
     #[inline]
     pub fn new<const N: usize>(grid: AdjacentRows<'_, N>, n: usize, constant: f32, factors: Vec4) -> Profile {
         let AdjacentRows { low, high, t } = grid;
@@ -200,25 +200,25 @@ impl Profile {
         Profile::from_nodes(nodes)
     }
 
-    /// The profile with these values at the nodes.
+    /// The profile with these values at the nodes of the cosine.
     #[inline]
     pub fn from_nodes(nodes: [f32; NODES]) -> Profile {
         Profile { nodes, average: dot(&nodes, &AVERAGE), mass: dot(&nodes, &MASS) }
     }
 
-    /// Values at the nodes.
+    /// Values of the profile at the nodes of the cosine.
     #[inline]
     pub(super) fn nodes(&self) -> &[f32; NODES] {
         &self.nodes
     }
 
-    /// Normalization of the density of [`Profile::sample`].
+    /// Integral of the profile that normalizes the density of [`Profile::sample`].
     #[inline]
     pub(super) fn mass(&self) -> f32 {
         self.mass
     }
 
-    /// The value at a cosine.
+    /// The value of the profile at a cosine, given by its table position.
     #[inline]
     pub fn at(&self, mu: Position) -> f32 {
         mu.interpolate(&self.nodes)

@@ -13,18 +13,18 @@
 
 use crate::math::Vec3;
 
-/// Light from one direction at a facet of a normal map.
+/// Light from one direction that reaches a facet of a normal map: how it is shadowed and mirrored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Relief {
-    /// Share of the light that is not shadowed for diffuse reflection.
+    /// Share (0 to 1) of the light that is not shadowed, for diffuse reflection.
     pub diffuse: f32,
     /// Direction of the light, mirrored at the geometric plane (world space).
     pub mirrored: Vec3,
 }
 
 impl Relief {
-    /// Light from `l` at a facet of normal `n`, on a surface of geometric normal `ng` and interpolated normal
-    /// `interpolated`. All vectors are unit vectors.
+    /// The effect of the map on light from `l` at a facet of normal `n`, on a surface of geometric normal `ng` and
+    /// interpolated normal `interpolated`. All vectors are unit vectors.
     #[inline]
     pub(super) fn new(l: Vec3, n: Vec3, interpolated: Vec3, ng: Vec3) -> Relief {
         Relief {
@@ -34,16 +34,16 @@ impl Relief {
     }
 }
 
-/// `w` mirrored at the plane of unit normal `ng`.
+/// The direction `w` mirrored at the plane of unit normal `ng`.
 #[inline]
 pub(super) fn mirrored(w: Vec3, ng: Vec3) -> Vec3 {
     w - ng * (2.0 * w.dot(ng))
 }
 
-/// Share of light that is not shadowed: Smith shadowing by GGX facets (see [`super::microfacet`]) of alpha = tan(tilt)
-/// / sqrt(8), at most 1, where tilt is the angle between facet and surface \[Conty Estevez 2019\]. `light` is the
-/// cosine of light and surface, positive on the side from which light reaches the facet; `facet` is the cosine of facet
-/// and surface.
+/// Share (0 to 1) of light at a facet that is not shadowed: Smith shadowing by GGX facets (see [`super::microfacet`])
+/// of alpha = tan(tilt) / sqrt(8), at most 1, where tilt is the angle between facet and surface \[Conty Estevez 2019\].
+/// `light` is the cosine of light and surface, positive on the side from which light reaches the facet; `facet` is the
+/// cosine of facet and surface.
 #[inline]
 fn bump_shadowing(light: f32, facet: f32) -> f32 {
     if light <= 0.0 || facet <= 0.0 {

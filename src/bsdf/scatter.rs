@@ -10,14 +10,15 @@ use crate::math::{Rgb, Vec2, Vec3, sqr, warp};
 use std::f32::consts::FRAC_1_PI;
 
 impl Layered<'_> {
-    /// Probability of sampling reflection at a facet.
+    /// Probability of sampling reflection, not transmission, at a facet with these two amounts of light.
     #[inline]
     fn reflect_probability(reflected: Rgb, transmitted: Rgb) -> f32 {
         let (r, t) = (mean(reflected), mean(transmitted));
         if t > 0.0 { r / (r + t) } else { 1.0 }
     }
 
-    /// Factor of transmission relative to flux: radiance is scaled by the squared ratio of the indices.
+    /// Factor of transmission from the viewer's side relative to that of flux: radiance is scaled by the squared ratio
+    /// of the indices.
     #[inline]
     fn radiance_scale(&self, side: usize, transport: Transport) -> f32 {
         match transport {
@@ -28,7 +29,7 @@ impl Layered<'_> {
         }
     }
 
-    /// Value without cosine, and density per solid angle of `wi`, of the non-delta lobes of `set`.
+    /// Value (1/sr, without cosine) and density per solid angle of `wi`, of the non-delta lobes of `set`.
     #[inline]
     pub(super) fn evaluate(&self, view: &ViewTerms, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         if view.o.z.min(wi.z.abs()) < MIN_COSINE || !(set & LobeSet::SMOOTH).intersects(self.lobes) {
@@ -39,7 +40,7 @@ impl Layered<'_> {
         self.evaluate_with::<true>(view, wi, transport, set, &probabilities)
     }
 
-    /// If `set` contains only diffuse reflection: its factor without the profile `through` at `wi`.
+    /// If `set` contains only diffuse reflection: its factor without the profile `through` at `wi`. Otherwise `None`.
     #[inline]
     pub(super) fn diffuse_only(&self, view: &ViewTerms, set: LobeSet) -> Option<Rgb> {
         let facets = self.has_facets && set.intersects(self.interface.class);
@@ -57,7 +58,7 @@ impl Layered<'_> {
         facets && self.glass == 0.0 && n.cover.is_none() && n.smooth[0].is_from_thin() && view.o.z >= MIN_COSINE
     }
 
-    /// The value of [`Layered::evaluate`], without computing the density.
+    /// The value that [`Layered::evaluate`] returns, without computing the density.
     #[inline]
     pub(super) fn eval(&self, view: &ViewTerms, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
         if view.o.z.min(wi.z.abs()) < MIN_COSINE {
@@ -150,7 +151,8 @@ impl Layered<'_> {
         (f, pdf)
     }
 
-    /// Value for flux transmitted from `o` (above) to `i` (below), and the density of `i`.
+    /// Value of the BSDF (1/sr) for flux transmitted from `o` (above) to `i` (below), and the density per solid angle
+    /// of sampling `i`.
     #[inline]
     fn evaluate_transmitted(&self, view: &ViewTerms, i: Vec3, probabilities: &LobeWeights) -> (Rgb, f32) {
         let n = self.interface;
@@ -194,7 +196,8 @@ impl Layered<'_> {
         (f, pdf)
     }
 
-    /// Rough refraction \[Walter 2007 (17), (21)\] of flux from `o` (above) to `i` (below), and the density of `i`.
+    /// Value of rough refraction \[Walter 2007 (17), (21)\] of flux from `o` (above) to `i` (below), and the density of
+    /// sampling `i`.
     #[inline]
     fn transmitting_facets(&self, view: &ViewTerms, i: Vec3) -> (Rgb, f32) {
         let (o, ggx) = (view.o, &self.interface.ggx);
@@ -213,7 +216,7 @@ impl Layered<'_> {
         (value, (1.0 - Self::reflect_probability(r, t)) * visible * g1(lambda_o))
     }
 
-    /// Samples a direction from the lobes of `set`.
+    /// Samples a direction from the lobes whose class is in `set`.
     #[inline]
     pub(super) fn sample(
         &self,
@@ -280,7 +283,7 @@ impl Layered<'_> {
         (pdf_w > 0.0).then_some(sample)
     }
 
-    /// Attenuation of a delta lobe towards `wi` by the cover.
+    /// Factor (0 to 1) by which the cover attenuates a delta lobe towards `wi`.
     #[inline]
     fn cover_transmittance(&self, view: &ViewTerms, wi: Vec3) -> f32 {
         let transmittance = |c: &CoverEffect| {
@@ -290,8 +293,8 @@ impl Layered<'_> {
         self.interface.cover.as_ref().map_or(1.0, transmittance)
     }
 
-    /// Samples the facets, which have been chosen with the probability `share`; `u_facet` chooses reflection or
-    /// transmission.
+    /// Samples a direction from the facets, whose lobe has been chosen with the probability `share`; `u_facet` chooses
+    /// reflection or transmission.
     #[inline]
     fn sample_facets(
         &self,
@@ -332,7 +335,8 @@ impl Layered<'_> {
         (i.z < 0.0).then_some(SampledDirection::Lobe(i, n.class))
     }
 
-    /// Samples the coat, which has been chosen with the probability `share`.
+    /// Samples a direction from the coat, whose lobe has been chosen with the probability `share`; `None` if it is
+    /// below the surface, or if there is no coat.
     #[inline]
     fn sample_coat(&self, view: &ViewTerms, share: f32, u: Vec2) -> Option<SampledDirection> {
         // Rounding errors can lead here without a cover.

@@ -14,12 +14,12 @@ use super::relief::{Relief, mirrored};
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
 
-/// A BSDF in world space, seen along one direction.
+/// The BSDF of a surface point in world space, seen along one direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Shading<'a> {
-    /// Shading frame.
+    /// Frame whose z axis is the shading normal.
     pub frame: Frame,
-    /// Unit geometric normal.
+    /// Unit geometric normal on the front of the surface.
     pub ng: Vec3,
     /// The BSDF in the shading frame.
     pub bsdf: Bsdf<'a>,
@@ -28,14 +28,15 @@ pub struct Shading<'a> {
     pub(super) cos_og: f32,
     /// Whether the opposite of the viewing direction replaces it, see [`Facing`].
     flipped: bool,
-    /// The interpolated normal, if the frame is that of a normal map.
+    /// The interpolated normal, if the shading frame is that of a normal map; otherwise `None`.
     pub(super) interpolated_normal: Option<Vec3>,
-    /// The clear coat, if the surface has one over a normal map.
+    /// The clear coat, if the surface has one over a normal map; otherwise `None`.
     coat: Option<Coat<'a>>,
 }
 
 impl<'a> Shading<'a> {
-    /// `bsdf` in `frame` on a surface with geometric normal `ng`, seen along the unit direction `wo`.
+    /// The BSDF `bsdf` in the shading frame `frame`, on a surface with geometric normal `ng`, seen along the unit
+    /// direction `wo`.
     #[inline(always)]
     pub fn new(frame: Frame, ng: Vec3, bsdf: Bsdf<'a>, wo: Vec3) -> Shading<'a> {
         let (Facing { cos_og, flipped, .. }, o) = Facing::new(frame, ng, wo);
@@ -67,7 +68,7 @@ impl<'a> Shading<'a> {
         Facing { frame: self.frame, ng: self.ng, cos_og: self.cos_og, flipped: self.flipped }
     }
 
-    /// Corrections of a normal map for light from `l` (world space), and the second direction, in the shading frame,
+    /// Corrections by the normal map for light from `l` (world space), and the second direction, in the shading frame,
     /// from which specular light reaches the facet, if any. `None` without a normal map.
     #[inline]
     fn relief(&self, l: Vec3) -> Option<(Relief, Option<Vec3>)> {
@@ -76,7 +77,7 @@ impl<'a> Shading<'a> {
         Some((relief, (self.may_be_specular() && second.z * l.dot(self.ng) > 0.0).then_some(second)))
     }
 
-    /// Whether the BSDF may have a specular lobe.
+    /// Whether the BSDF may have a specular lobe, not only diffuse reflection.
     #[inline]
     fn may_be_specular(&self) -> bool {
         matches!(self.bsdf, Bsdf::Layered(_))
@@ -93,7 +94,8 @@ impl<'a> Shading<'a> {
         self.facing().local(w, transport)
     }
 
-    /// The coat over a normal map, and the probability of sampling it.
+    /// The coat over a normal map, and the probability of sampling it among the lobes of `set`; `None` without such a
+    /// coat.
     #[inline]
     fn coat(&self, view: &ViewTerms, set: LobeSet) -> Option<(&Coat<'a>, f32)> {
         match (&self.coat, &self.bsdf) {
@@ -117,7 +119,7 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// [`Shading::evaluate_cos`] without a coat over a normal map.
+    /// [`Shading::evaluate_cos`] for a surface without a coat over a normal map.
     #[inline]
     fn evaluate_base(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
@@ -153,19 +155,19 @@ impl<'a> Shading<'a> {
         (first + f * second.z.abs(), if radiance { pdf + more } else { 0.5 * (pdf + more) })
     }
 
-    /// The value of [`Shading::evaluate_cos`].
+    /// The value of [`Shading::evaluate_cos`], the BSDF times the cosine, without its density.
     #[inline]
     pub fn eval_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {
         self.evaluate_cos(wi, transport, set).0
     }
 
-    /// The density of [`Shading::evaluate_cos`].
+    /// The density per solid angle of [`Shading::evaluate_cos`].
     #[inline]
     pub fn pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         self.evaluate_cos(wi, transport, set).1
     }
 
-    /// Density per solid angle with which a path from `wi` samples the viewing direction.
+    /// Density per solid angle with which a path that arrives from `wi` samples the viewing direction.
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         let pdf = self.reverse_base_pdf(wi, transport, set);
@@ -179,7 +181,7 @@ impl<'a> Shading<'a> {
         }
     }
 
-    /// [`Shading::reverse_pdf`] without a coat over a normal map.
+    /// [`Shading::reverse_pdf`] for a surface without a coat over a normal map.
     #[inline]
     fn reverse_base_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         // The path from `wi` transports the other quantity.
@@ -209,13 +211,14 @@ impl<'a> Shading<'a> {
         self.bsdf.eval_view(&self.view, i, Transport::Radiance, set) * (i.z.abs() / cosine)
     }
 
-    /// Estimated albedo of the lobes of `set`, see [`Bsdf::albedo`].
+    /// Estimated albedo of the lobes whose class is in `set`, see [`Bsdf::albedo`].
     #[inline]
     pub fn albedo(&self, set: LobeSet) -> Rgb {
         self.bsdf.albedo_view(&self.view, set)
     }
 
-    /// Samples a direction, see [`Bsdf::sample`]. `wi` is in world space, and the weight includes the adjoint.
+    /// Samples a direction, see [`Bsdf::sample`]. `wi` of the sample is in world space, and its weight includes the
+    /// adjoint correction of shading normals.
     #[inline]
     pub fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         match self.coat(&self.view, set) {
@@ -250,7 +253,7 @@ impl<'a> Shading<'a> {
         (pdf_w > 0.0).then_some(sample)
     }
 
-    /// [`Shading::sample`] without a coat over a normal map.
+    /// [`Shading::sample`] for a surface without a coat over a normal map.
     #[inline]
     fn sample_base(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let importance = transport == Transport::Importance;
@@ -266,7 +269,8 @@ impl<'a> Shading<'a> {
         self.sample_view(&self.bsdf.view_terms(second), 0.5, transport, set, 2.0 * u_lobe - 1.0, u)
     }
 
-    /// [`Shading::sample`] for the viewing direction of `view`, which has been chosen with the probability `chance`.
+    /// [`Shading::sample`] for the viewing direction of `view`, which has been chosen with the probability `chance`:
+    /// 1/2 if a normal map mirrors light, otherwise 1.
     #[inline(always)]
     fn sample_view(
         &self,

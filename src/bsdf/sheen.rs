@@ -7,7 +7,7 @@ use std::f32::consts::FRAC_1_PI;
 /// Smallest alpha of sheen. Below it the distribution overflows at the horizon, and the sheen is invisible.
 pub const MIN_ALPHA: f32 = 0.01;
 
-/// Fit of Lambda \[Estevez and Kulla 2017, section 3\].
+/// Fit of Smith's Lambda for sheen at a cosine with the normal \[Estevez and Kulla 2017, section 3\].
 #[inline]
 fn lambda(cos: f32, alpha: f32) -> f32 {
     let l = |x: f32| {
@@ -25,8 +25,8 @@ fn lambda(cos: f32, alpha: f32) -> f32 {
     if cos < 0.5 { l(cos).exp() } else { (2.0 * l(0.5) - l(1.0 - cos)).exp() }
 }
 
-/// Value of the lobe of white sheen, without cosine, from the cosines of both directions and of the half vector with
-/// the normal.
+/// Value of the lobe of white sheen (1/sr, without cosine), from the cosines of both directions and of the half vector
+/// with the normal.
 #[inline]
 pub fn eval(cos_o: f32, cos_i: f32, cos_h: f32, alpha: f32) -> f32 {
     let alpha = alpha.max(MIN_ALPHA);
@@ -36,7 +36,7 @@ pub fn eval(cos_o: f32, cos_i: f32, cos_h: f32, alpha: f32) -> f32 {
     d * g / (4.0 * cos_o * cos_i).max(1e-9)
 }
 
-/// Albedo of white sheen.
+/// Albedo of white sheen of this alpha, at the cosine `cos_o` with the normal.
 pub fn albedo(alpha: f32, cos_o: f32) -> f32 {
     let (rows, columns) = (48, 24);
     let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();

@@ -25,14 +25,14 @@ pub const MAX_FILTER_WIDTH: f32 = 8.0;
 const BLACKMAN_HARRIS: [f64; 4] = [0.35875, 0.48829, 0.14128, 0.01168];
 
 impl Default for Filter {
-    /// A box of one pixel: filters of neighbouring pixels do not overlap.
+    /// The default filter, a box of one pixel: filters of neighbouring pixels do not overlap.
     fn default() -> Filter {
         Filter::Box(1.0)
     }
 }
 
 impl Filter {
-    /// Distance from the centre (pixels) beyond which the filter is zero.
+    /// Distance from the pixel's centre along an axis (pixels) beyond which the filter is zero.
     pub fn radius(self) -> f32 {
         match self {
             Filter::Box(width) => 0.5 * width,
@@ -41,7 +41,7 @@ impl Filter {
         }
     }
 
-    /// The filter `f(d)` along one axis (1/pixel).
+    /// Value of the filter along one axis (1/pixel), at a distance `d` in pixels from the pixel's centre.
     pub fn density(self, d: f32) -> f32 {
         let radius = self.radius();
         if d.abs() >= radius {
@@ -64,7 +64,8 @@ impl Filter {
         }
     }
 
-    /// Inverse of the cumulative distribution of `f`, for `u` in \[0, 1).
+    /// Distance from the pixel's centre (pixels) below which the share `u`, in \[0, 1), of the filter along an axis
+    /// lies.
     pub fn inverse(self, u: f32) -> f32 {
         let radius = self.radius();
         match self {
@@ -79,8 +80,8 @@ impl Filter {
     }
 }
 
-/// Inverse of the cumulative distribution of the Blackman-Harris window on \[0, 1\], by Newton's method safeguarded by
-/// bisection.
+/// Inverse of the cumulative distribution of the Blackman-Harris window on \[0, 1\], found by Newton's method, with
+/// bisection as a fallback.
 fn inverse_window(u: f64) -> f64 {
     let [a, b, c, e] = BLACKMAN_HARRIS;
     let below = |t: f64| {
@@ -108,7 +109,8 @@ fn inverse_window(u: f64) -> f64 {
 }
 
 /// Draws one of the pixels along an axis whose filters cover the point `x`, in proportion to their filters there. Pixel
-/// `k` has its centre at `k + 1/2`; `u` is in \[0, 1). Also returns the sum of the filters at `x`.
+/// `k` has its centre at `k + 1/2`; `u` is in \[0, 1). Returns the index of the pixel, and the sum of the filters at
+/// `x`.
 pub fn sample_pixel(filter: Filter, x: f32, u: f32) -> (i64, f32) {
     let radius = filter.radius();
     let (first, last) = ((x - 0.5 - radius).ceil() as i64, (x - 0.5 + radius).floor() as i64);

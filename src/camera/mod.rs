@@ -9,37 +9,38 @@ pub use tiles::{GROUP_SIZE, TilePixel, par_pixels, pixels_per_band};
 use crate::math::{DMat3, DMat4, DVec3, DVec4, Mat3, Vec2, Vec3, warp};
 use std::f32::consts::PI;
 
-/// The projection, with the size of the film.
+/// Perspective or orthographic projection, with the size of the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// Half width and half height of the film in a plane at distance 1.
+    /// Perspective projection: half width and half height of the film in a plane at distance 1 from the camera.
     Perspective(Vec2),
-    /// Half width and half height of the film (m).
+    /// Orthographic projection: half width and half height of the film (m).
     Orthographic(Vec2),
 }
 
 /// The whole picture, of which the film may be a crop window.
 #[derive(Clone, Copy, Debug)]
 struct Whole {
-    /// Size of the whole picture, in pixels of the film.
+    /// Size of the whole picture, in pixels of the film (a fraction if the film has fewer pixels).
     film: Vec2,
     /// Top left corner of the film in the whole picture, in pixels of the film.
     corner: Vec2,
-    /// `film`, rounded to whole pixels.
+    /// The size `film`, rounded to whole pixels.
     size: (u32, u32),
-    /// `corner`, rounded to whole pixels.
+    /// The corner `corner`, rounded to whole pixels.
     at: (u32, u32),
 }
 
 impl Whole {
-    /// A whole picture that equals the film.
+    /// The whole picture of a camera whose film is not a window, in pixels.
     fn from_size(width: u32, height: u32) -> Whole {
         let film = Vec2::new(width as f32, height as f32);
         Whole { film, corner: Vec2::ZERO, size: (width, height), at: (0, 0) }
     }
 }
 
-/// A camera with a film of `width x height` pixels. It looks along its local -Z, +Y up.
+/// A camera with a film of `width x height` pixels, which may be a crop window of a larger picture. It looks along its
+/// local -Z, +Y up.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     position: Vec3,
@@ -52,13 +53,13 @@ pub struct Camera {
     offset: Vec2,
     width: u32,
     height: u32,
-    /// Share of a pixel's side that its rays cover. Below 1 for [`Camera::subsample`].
+    /// Share (0 to 1) of a pixel's side that its rays cover; below 1 for [`Camera::subsample`].
     covered: f32,
     filter: Filter,
     whole: Whole,
 }
 
-/// A ray from the film.
+/// A ray that starts on the lens, for a point of the film.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraRay {
     /// Origin on the lens.
@@ -67,10 +68,10 @@ pub struct CameraRay {
     pub direction: Vec3,
 }
 
-/// A connection from a point of the scene to the lens.
+/// A connection from a point of the scene to the lens, for a light path's contribution.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraSample {
-    /// Film point in the whole picture (pixels).
+    /// Point of the whole picture that sees the scene's point (pixels).
     pub film: Vec2,
     /// Unit direction from the point towards the lens.
     pub wi: Vec3,
@@ -83,8 +84,8 @@ pub struct CameraSample {
 }
 
 impl Camera {
-    /// A camera at `position` whose axes are the columns of `rotation`. `lens` is its radius and focus distance (m),
-    /// `size` the width and height of the film in pixels.
+    /// A camera at `position` whose axes (right, up, backward) are the columns of `rotation`. `lens` is its radius and
+    /// focus distance (m), `size` the width and height of the film in pixels.
     pub fn new(position: DVec3, rotation: Mat3, projection: Projection, lens: (f32, f32), size: (u32, u32)) -> Camera {
         let position = position.as_vec3();
         Camera {
@@ -102,28 +103,29 @@ impl Camera {
         }
     }
 
-    /// This camera with the film moved by `shift`, in widths to the right and heights upwards.
+    /// A copy of this camera with the film moved by `shift`, in widths to the right and heights upwards.
     pub fn with_shift(&self, shift: Vec2) -> Camera {
         let (Projection::Perspective(half) | Projection::Orthographic(half)) = self.projection;
         Camera { offset: 2.0 * shift * half, ..*self }
     }
 
-    /// This camera with another pixel filter.
+    /// A copy of this camera with another pixel filter.
     pub fn with_filter(&self, filter: Filter) -> Camera {
         Camera { filter, ..*self }
     }
 
-    /// This camera with a crop window of the film: left edge, top edge, width and height in pixels. Rays and random
-    /// numbers of its pixels are those of the whole picture, to the bit.
+    /// A copy of this camera whose film is a crop window of the present film: left edge, top edge, width and height in
+    /// pixels. Rays and random numbers of its pixels are those of the whole picture, to the bit.
     pub fn crop(&self, [x, y, width, height]: [u32; 4]) -> Camera {
         let Whole { corner, at, .. } = self.whole;
         let (corner, at) = (corner + Vec2::new(x as f32, y as f32), (at.0 + x, at.1 + y));
         Camera { width, height, whole: Whole { corner, at, ..self.whole }, ..*self }
     }
 
-    /// This camera with `factor` times the pixels per side, at least one, spread evenly over the film. Each covers the
-    /// area of one pixel of this camera, so camera paths have the noise of single pixels. Light paths contribute from
-    /// all of the film, so with proportionally fewer light paths their noise is that of the full picture.
+    /// A copy of this camera with `factor` times the pixels per side (at least one pixel), spread evenly over the film.
+    /// Each covers the area of one pixel of this camera, so camera paths have the noise of single pixels. Light paths
+    /// contribute from all of the film, so with proportionally fewer light paths their noise is that of the full
+    /// picture.
     pub fn subsample(&self, factor: f64) -> Camera {
         let scaled = |side: u32| ((f64::from(side) * factor).round() as u32).max(1);
         let (width, height, covered) = (scaled(self.width), scaled(self.height), self.covered * factor.min(1.0) as f32);
@@ -137,12 +139,13 @@ impl Camera {
         Camera { width, height, covered, whole, ..*self }
     }
 
-    /// This camera with `factor` times the pixels per side, at least one, that together cover the same view.
+    /// A copy of this camera with `factor` times the pixels per side (at least one pixel), which together cover the
+    /// view of this camera.
     pub fn downscale(&self, factor: f64) -> Camera {
         Camera { covered: self.covered, ..self.subsample(factor) }
     }
 
-    /// This camera as a pinhole camera: everything is in focus.
+    /// A copy of this camera as a pinhole camera: everything is in focus.
     pub fn without_lens(&self) -> Camera {
         Camera { lens_radius: 0.0, focus_distance: 1.0, ..*self }
     }
@@ -158,8 +161,8 @@ impl Camera {
         self.whole.corner + Vec2::new(x as f32, y as f32) + 0.5 + from_centre * self.covered
     }
 
-    /// Draws one of the pixels whose filters cover a film point of the whole picture, in proportion to their filters
-    /// there. Also returns the sum of the filters. `None` if the drawn pixel is outside of the film.
+    /// Draws one of the pixels whose filters cover a point `film` of the whole picture, in proportion to their filters
+    /// there. Returns its column and row, and the sum of the filters. `None` if the drawn pixel is outside of the film.
     #[inline]
     pub fn sample_pixel(&self, film: Vec2, u: impl FnOnce() -> Vec2) -> Option<((u32, u32), f32)> {
         let corner = self.whole.corner;
@@ -178,7 +181,7 @@ impl Camera {
         (x < self.width && y < self.height).then_some(((x, y), along * across))
     }
 
-    /// Width and height of the whole picture, and the top left corner of this film in it (pixels).
+    /// Width and height of the whole picture, and column and row of this film's top left corner in it (pixels).
     pub fn whole(&self) -> [(u32, u32); 2] {
         [self.whole.size, self.whole.at]
     }
@@ -188,12 +191,12 @@ impl Camera {
         [self.size(), self.whole.size]
     }
 
-    /// Area of the whole picture in pixels of this film.
+    /// Area of the whole picture, in numbers of pixels of this film.
     pub fn whole_pixels(&self) -> f32 {
         self.whole.film.x * self.whole.film.y
     }
 
-    /// Row-major index of a pixel of the film in the whole picture, the key of its random numbers.
+    /// Row-major index, in the whole picture, of a pixel of the film; it is the key of the pixel's random numbers.
     #[inline]
     pub fn pixel_key(&self, (x, y): (u32, u32)) -> u64 {
         let Whole { size, at, .. } = self.whole;
@@ -205,7 +208,7 @@ impl Camera {
         (self.width, self.height)
     }
 
-    /// Centre of the lens.
+    /// Centre of the lens in world space (m).
     pub fn position(&self) -> Vec3 {
         self.position
     }
@@ -308,7 +311,7 @@ impl Camera {
         self.whole.film.x
     }
 
-    /// Depth of `p` along the viewing direction.
+    /// Depth (m) of the point `p` along the viewing direction, from the camera.
     pub fn depth(&self, p: Vec3) -> f32 {
         (p - self.position).dot(self.forward())
     }

@@ -2,24 +2,25 @@
 
 use rayon::prelude::*;
 
-/// Side of a tile in pixels. A band, the unit of work, is a row of tiles.
+/// Side of a square tile in pixels. A row of tiles is a band, the unit of work of a thread.
 const TILE: usize = 16;
 
-/// Number of pixels that are visited together.
+/// Number of pixels in a group, which a thread visits together.
 pub const GROUP_SIZE: usize = 8;
 
-/// A pixel of a group.
+/// A pixel of a group, the pixels that a thread visits together.
 #[derive(Clone, Copy, Debug)]
 pub struct TilePixel {
-    /// Column and row in the picture.
+    /// Column and row of the pixel in the picture.
     pub pixel: (u32, u32),
-    /// Row-major index in the picture.
+    /// Row-major index of the pixel in the picture.
     pub index: u64,
-    /// Row-major index in the band.
+    /// Row-major index of the pixel in its band, a row of tiles.
     pub at: usize,
 }
 
-/// Number of pixels in a band, the unit of work of [`par_pixels`], of a picture of this width.
+/// Number of pixels in a band, the row of tiles that is the unit of work of [`par_pixels`], of a picture of this width
+/// in pixels.
 pub fn pixels_per_band(width: u32) -> usize {
     width as usize * TILE
 }

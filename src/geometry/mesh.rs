@@ -7,7 +7,7 @@ use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
 /// has none.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// Name for messages.
+    /// Name of the mesh for messages.
     pub name: String,
     /// Vertex positions: in world space if the mesh has one instance, in local space if several instances share it.
     pub positions: Vec<Vec3>,
@@ -38,7 +38,7 @@ pub(super) struct Corner {
 }
 
 impl Corner {
-    /// Packs the vertices of a mesh. Moves normals and texture coordinate set 0 out of `mesh`.
+    /// Packs the vertices of a mesh for surface lookups. Moves normals and texture coordinate set 0 out of `mesh`.
     pub fn pack(mesh: &mut Mesh) -> Vec<Corner> {
         let (normals, uvs) = (std::mem::take(&mut mesh.normals), std::mem::take(&mut mesh.uvs[0]));
         let corner = |(i, &p): (usize, &Vec3)| Corner {
@@ -55,13 +55,13 @@ impl Corner {
 pub struct Instance {
     /// Name of the object (the glTF node), for messages and cryptomatte.
     pub name: String,
-    /// Index into the scene's meshes.
+    /// Index of the mesh in the scene's meshes.
     pub mesh: u32,
-    /// Index into the scene's materials.
+    /// Index of the material in the scene's materials.
     pub material: u32,
-    /// Index of the object, which all primitives of one glTF node share.
+    /// Index of the object in the scene; all primitives of one glTF node share it.
     pub object: u32,
-    /// Whether camera rays pass through it. All other rays hit it.
+    /// Whether camera rays pass through the instance. All other rays hit it.
     pub hidden_from_camera: bool,
     /// Transform from local to world space; `None` if the mesh is in world space.
     pub to_world: Option<Placement>,
@@ -82,7 +82,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The placement by an invertible affine transform.
+    /// The placement of a mesh by an invertible affine transform from local to world space.
     pub fn new(points: Affine3A) -> Placement {
         let normals = points.matrix3.inverse().transpose();
         let absolute = Affine3A { matrix3: points.matrix3.abs(), translation: points.translation.abs() };
@@ -101,8 +101,8 @@ impl Instance {
         }
     }
 
-    /// Bound on the distance of the computed world position `p` from the plane of its triangle. `local` is the extent
-    /// of the triangle in the space of the mesh.
+    /// Bound (m) on the distance of the computed world position `p` from the plane of its triangle. `local` is the
+    /// extent of the triangle in the space of the mesh.
     #[inline]
     pub(super) fn position_error(&self, local: Extent, p: Vec3) -> f32 {
         let extent = match &self.to_world {

@@ -2,19 +2,19 @@
 
 use crate::math::Vec3;
 
-/// Relative error of a coordinate computed from barycentric coordinates and a transform: eight roundings, of which four
-/// are in the transform, two in the barycentric interpolation, and two in the corners that Embree computes.
+/// Relative rounding error of a coordinate computed from barycentric coordinates and a transform: eight roundings, of
+/// which four are in the transform, two in the barycentric interpolation, and two in the corners that Embree computes.
 const POSITION_ERROR: f32 = 8.0 * f32::EPSILON;
 
-/// Error of a component of the triangle normal that Embree computes, relative to the products that it is a difference
-/// of: two roundings for the products and the difference, two for the edges.
+/// Rounding error of a component of the triangle normal that Embree computes, relative to the products that it is a
+/// difference of: two roundings for the products and the difference, two for the edges.
 const NORMAL_ERROR: f32 = 4.0 * f32::EPSILON;
 
-/// Error of the distance between a plane and the end of a ray, relative to the length of the ray: four roundings in the
-/// direction and four in Embree's distance to the triangle.
+/// Rounding error of the distance between a plane and the end of a ray, relative to the length of the ray: four
+/// roundings in the direction and four in Embree's distance to the triangle.
 const RAY_ERROR: f32 = 8.0 * f32::EPSILON;
 
-/// Smallest error bound, so that ray origins are off the surface even at the origin of the scene.
+/// Smallest bound on rounding errors (m), so that ray origins are off the surface even at the origin of the scene.
 const MIN_ERROR: f32 = 1e-30;
 
 /// The size and position of a triangle, which determine the rounding errors of points on it.
@@ -34,8 +34,8 @@ impl Extent {
         Extent { largest: a.max(b).max(c), edges: [corners[1] - corners[0], corners[2] - corners[0]] }
     }
 
-    /// Bound on the distance of a computed position from the triangle's plane as Embree's arithmetic sees it. Errors
-    /// within the plane do not matter, so a wide flat floor has the small error of its height.
+    /// Bound (m) on the distance of a computed position from the triangle's plane as Embree's arithmetic sees it.
+    /// Errors within the plane do not matter, so a wide flat floor has the small error of its height.
     ///
     /// The distance to a plane is the sum over axes of normal times coordinate, so each term contributes the error of
     /// its normal and of its coordinate.
@@ -53,21 +53,21 @@ impl Extent {
     }
 }
 
-/// Bound on the distance between coinciding objects at `p` that is due to the rounding of their coordinates.
+/// Bound (m) on the distance between coinciding objects at `p` that is due to the rounding of their coordinates.
 #[inline]
 pub fn coordinate_error(p: Vec3) -> f32 {
     f32::EPSILON * p.abs().max_element() + MIN_ERROR
 }
 
-/// Bound (scene units) on the distance of a computed position from the plane of a triangle with these corners.
+/// Bound (m) on the distance of a computed position from the plane of a triangle with these corners.
 #[inline]
 pub fn triangle_error(corners: [Vec3; 3]) -> f32 {
     let extent = Extent::from_corners(corners);
     extent.plane_error() + coordinate_error(extent.largest)
 }
 
-/// Origin of a ray along `direction` from a point `p` of a triangle with unit normal `ng`: moved by `error` to the side
-/// that the direction points to.
+/// Origin of a ray along `direction` from a point `p` of a triangle with unit normal `ng`: moved off the triangle by
+/// `error` (m) to the side that the direction points to.
 #[inline]
 pub fn offset_origin(p: Vec3, ng: Vec3, direction: Vec3, error: f32) -> Vec3 {
     p + ng * error.copysign(direction.dot(ng))

@@ -4,14 +4,14 @@ use super::mesh::Corner;
 use super::{Instance, Mesh, Surface};
 use crate::processor::prefetch;
 
-/// The scene's geometry.
+/// The scene's geometry: meshes and their instances.
 #[derive(Clone, Debug, Default)]
 pub struct Shapes {
-    /// Meshes.
+    /// Meshes, in local space if they are shared, otherwise in world space.
     pub meshes: Vec<Mesh>,
-    /// Instances of the meshes. Their indices are valid.
+    /// Instances of the meshes. All their indices are valid.
     pub instances: Vec<Instance>,
-    /// Packed vertices of each mesh.
+    /// Packed vertices of each mesh, by the index of the mesh.
     corners: Vec<Vec<Corner>>,
 }
 

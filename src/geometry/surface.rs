@@ -5,7 +5,7 @@ use super::precision::{Extent, offset_origin, shadow_end};
 use super::{Instance, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
-/// A point on a triangle.
+/// A point on a triangle, with the attributes that shading needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// World position, interpolated by barycentric coordinates, which is more precise than the point along the ray.
@@ -21,13 +21,13 @@ pub struct Surface {
     pub uv: [Vec2; 2],
     /// Linear RGBA vertex colour; white if the mesh has none.
     pub color: Vec4,
-    /// Index of the instance.
+    /// Index of the instance in the scene.
     pub instance: u32,
-    /// Index of the triangle in its mesh.
+    /// Index of the triangle in the instance's mesh.
     pub primitive: u32,
-    /// Index of the material.
+    /// Index of the material in the scene.
     pub material: u32,
-    /// Bound (scene units) on the distance of `p` from the triangle as Embree's arithmetic sees it.
+    /// Bound (m) on the distance of `p` from the triangle's plane as Embree's arithmetic sees it.
     pub error: f32,
     /// Whether other surfaces coincide with this one here and their order is known (`scene/contact.rs`).
     pub touching: bool,
@@ -95,7 +95,8 @@ impl Surface {
         offset_origin(self.p, self.ng, direction, self.error)
     }
 
-    /// End of a shadow ray of length `distance` that arrives here; `direction` points back along the ray.
+    /// End of a shadow ray of length `distance` that arrives at this surface point; `direction` points back along the
+    /// ray. It is moved off the surface, so that the surface does not block the ray.
     #[inline]
     pub fn shadow_end(&self, direction: Vec3, distance: f32) -> Vec3 {
         shadow_end(self.p, self.ng, direction, self.error, distance)

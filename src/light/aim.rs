@@ -10,15 +10,19 @@ use crate::material::Materials;
 use crate::math::{Frame, Vec2, Vec3, warp};
 use std::f32::consts::PI;
 
-/// Share of the paths that start on the disc of a target.
+/// Share of the light paths from infinity that start on the disc of a caustic target, an object that can make caustics.
 const AIMED_SHARE: f32 = 0.5;
-/// Maximum number of targets; [`merged_spheres`] merges nearby ones.
+/// Maximum number of caustic targets, the spheres around objects that can make caustics; [`merged_spheres`] merges
+/// nearby ones.
 const MAX_TARGETS: usize = 32;
-/// Maximum number of spheres for [`merged_spheres`], whose cost is quadratic; [`spatially_merged`] merges others first.
+/// Maximum number of spheres given to [`merged_spheres`], whose cost is quadratic; beforehand, [`spatially_merged`]
+/// reduces more spheres to this number.
 const MAX_SPHERES: usize = 512;
-/// Share of the paths that start on a disc of the region of interest, in a scene without targets.
+/// Share of the light paths from infinity that start on a disc of the region of interest (the sphere around most
+/// visible surfaces), in a scene without caustic targets.
 const REGION_SHARE: f32 = 0.5;
-/// Share of the paths that start on a disc of the region of interest, in a scene with targets.
+/// Share of the light paths from infinity that start on a disc of the region of interest (the sphere around most
+/// visible surfaces), in a scene with caustic targets.
 const REGION_SHARE_WITH_TARGETS: f32 = 1.0 / 3.0;
 
 /// Squared distance of `center` from the line through `p` along the unit `d`.
@@ -28,17 +32,17 @@ fn distance_to_line2(center: Vec3, p: Vec3, d: Vec3) -> f32 {
     (v - d * v.dot(d)).length_squared()
 }
 
-/// Bounding spheres of the objects that can make caustics.
+/// Caustic targets: the bounding spheres of the objects that can make caustics, towards which light paths start.
 pub struct CausticTargets {
-    /// Centres and radii (m).
+    /// Centre and radius (m) of the bounding sphere of each target.
     spheres: Vec<(Vec3, f32)>,
-    /// Selects a target in proportion to the area of its disc.
+    /// Selects a target in proportion to the area of its disc, the cross-section of its sphere; `None` without targets.
     choice: Option<Cdf>,
-    /// Sum of the areas of the discs (m2).
+    /// Sum of the areas of the targets' discs, the cross-sections of their spheres (m2).
     area: f32,
 }
 
-/// Bounding sphere of points, around the centre of their bounding box.
+/// Centre and radius of a sphere around points, centred in their bounding box; `None` without points.
 fn bounding_sphere(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, f32)> {
     let (low, high) =
         points.clone().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
@@ -47,7 +51,7 @@ fn bounding_sphere(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, 
     (center.is_finite() && radius2 > 0.0).then(|| (center, radius2.sqrt()))
 }
 
-/// The sphere around two spheres.
+/// Centre and radius of the smallest sphere around two spheres.
 fn join(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     let distance = a.0.distance(b.0);
     if distance + b.1 <= a.1 {
@@ -60,8 +64,8 @@ fn join(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     (a.0 + (b.0 - a.0) * ((radius - a.1) / distance), radius)
 }
 
-/// Merges spheres until at most `most` remain: repeatedly halves the largest group along its widest axis, then merges
-/// each group.
+/// Merges spheres (centre, radius) until at most `most` remain: repeatedly halves the largest set along its widest
+/// axis, then joins the spheres of each set into one.
 fn spatially_merged(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
     if spheres.len() <= most {
         return spheres;
@@ -85,8 +89,8 @@ fn spatially_merged(spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> 
     groups.into_iter().filter_map(|group| group.into_iter().reduce(join)).collect()
 }
 
-/// Merges spheres until at most `most` remain: repeatedly merges the pair with the smallest enclosing sphere, so that
-/// small isolated spheres stay small.
+/// Merges spheres (centre, radius) until at most `most` remain: repeatedly joins the pair with the smallest enclosing
+/// sphere, so that small isolated spheres stay small.
 fn merged_spheres(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)> {
     // For each sphere, the best partner among the later ones. It is searched again only if that partner was merged.
     let partner = |spheres: &[(Vec3, f32)], i: usize| {
@@ -118,7 +122,7 @@ fn merged_spheres(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)
 }
 
 impl CausticTargets {
-    /// Finds the targets of a scene.
+    /// Finds the caustic targets of a scene from its objects and their materials.
     pub fn new(shapes: &Shapes, materials: &Materials) -> CausticTargets {
         let spheres: Vec<(Vec3, f32)> = shapes
             .instances
@@ -135,8 +139,9 @@ impl CausticTargets {
         CausticTargets { choice: Cdf::new(areas.map(f64::from)), spheres, area }
     }
 
-    /// Turns the start of a light path from infinity, sampled uniformly on the scene's disc, into a start sampled from
-    /// the mixture. `u` selects the scene's disc or a target, `point` a point of the target's disc.
+    /// Turns the start of a light path from infinity, sampled uniformly on the disc of the whole scene, into a start
+    /// sampled from the mixture of this disc and the targets' discs. `u` selects the disc, `point` a point on a
+    /// target's disc.
     pub fn aim(&self, sky: &Sky, emission: &mut EmissionSample, u: f32, point: Vec2) {
         let Some(choice) = &self.choice else { return };
         if u < AIMED_SHARE {
@@ -147,8 +152,9 @@ impl CausticTargets {
         }
     }
 
-    /// [`CausticTargets::aim`], with part of the starts on a disc of the region. Flux and density do not account for
-    /// the region: [`CausticTargets::density_with_region`] returns the density of the whole mixture.
+    /// Does the work of [`CausticTargets::aim`], and moves part of the starts to a disc of the region of interest. Flux
+    /// and density do not account for the region: [`CausticTargets::density_with_region`] returns the density of the
+    /// whole mixture.
     pub fn aim_with_region(&self, sky: &Sky, emission: &mut EmissionSample, region: Region, u: f32, point: Vec2) {
         let share = self.region_share();
         if u < share {
@@ -165,8 +171,8 @@ impl CausticTargets {
         if self.choice.is_none() { REGION_SHARE } else { REGION_SHARE_WITH_TARGETS }
     }
 
-    /// Density per area of an aimed start in the mixture with the region, and the part of this density without the
-    /// discs of the targets.
+    /// Density per area (1/m2) of the start of a light path from infinity in the mixture of the discs of scene, targets
+    /// and region of interest, and the part of this density that is not due to the targets.
     pub fn density_with_region(&self, sky: &Sky, emission: &EmissionSample, region: Region) -> (f32, f32) {
         let share = self.region_share();
         let (p, d, aimed) = (emission.origin, emission.direction, emission.density.onward);
@@ -175,16 +181,16 @@ impl CausticTargets {
         ((1.0 - share) * aimed + through, (1.0 - share) * aimed * self.unaimed_share(sky, emission) + through)
     }
 
-    /// Moves the start of a light path from infinity to a point of the disc of `target`, with the flux and density of
-    /// the mixture.
+    /// Moves the start of a light path from infinity to a point of the disc of `target`, and sets the flux and density
+    /// that it has in the mixture of the discs of scene and targets.
     pub fn aim_at(&self, sky: &Sky, emission: &mut EmissionSample, target: usize, point: Vec2) {
         emission.entry = EntryDisc::Target(target);
         emission.origin = Self::sample_origin(sky, emission.direction, self.spheres[target], point);
         self.apply_mixture(sky, emission);
     }
 
-    /// Samples a line along `d` through the disc of a sphere, and returns the origin on it outside the scene's bounding
-    /// sphere.
+    /// Samples a line along the unit `d` through the disc of a sphere, and returns a point on it outside the scene's
+    /// bounding sphere, where a light path can start.
     fn sample_origin(sky: &Sky, d: Vec3, (center, radius): (Vec3, f32), point: Vec2) -> Vec3 {
         let frame = Frame::from_normal(d);
         let q = warp::disc_concentric(point) * radius;
@@ -192,24 +198,27 @@ impl CausticTargets {
         p - d * ((p - sky.center).dot(d) + sky.radius)
     }
 
-    /// Replaces flux and density of a start on the scene's disc by those of the mixture.
+    /// Replaces flux and density of a start, which assume the scene's disc alone, by those in the mixture of the discs
+    /// of scene and targets.
     fn apply_mixture(&self, sky: &Sky, emission: &mut EmissionSample) {
         emission.density.onward = self.mixture_density(sky, emission.origin, emission.direction, Some(emission.entry));
         emission.flux *= 1.0 / (PI * sky.radius * sky.radius * emission.density.onward);
     }
 
-    /// Centres and radii of the bounding spheres.
+    /// Centres and radii (m) of the targets' bounding spheres.
     pub fn spheres(&self) -> &[(Vec3, f32)] {
         &self.spheres
     }
 
-    /// Density per area, in the mixture, of the line through `p` along the unit `d`.
+    /// Density per area (1/m2) with which a light path from infinity starts along the line through `p` with unit
+    /// direction `d`, in the mixture of the discs of scene and targets.
     #[inline]
     pub fn density(&self, sky: &Sky, p: Vec3, d: Vec3) -> f32 {
         self.mixture_density(sky, p, d, None)
     }
 
-    /// [`CausticTargets::density`] of a line that was sampled on the disc `drawn`, so it counts as a line through it.
+    /// [`CausticTargets::density`] of a line that was sampled on the disc `drawn`: the line counts as passing through
+    /// this disc, even if rounding puts it outside. `None` if the line was not sampled.
     fn mixture_density(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
         if self.choice.is_none() {
             return 1.0 / (PI * sky.radius * sky.radius);
@@ -221,14 +230,16 @@ impl CausticTargets {
         self.scene_disc_density(sky, p, d, drawn) + AIMED_SHARE * discs as f32 / self.area
     }
 
-    /// Density per area, in the mixture, of the scene's disc alone.
+    /// Density per area (1/m2) with which a start on the disc of the whole scene, not of a target, takes the line
+    /// through `p` along `d`, including the share of such starts in the mixture.
     fn scene_disc_density(&self, sky: &Sky, p: Vec3, d: Vec3, drawn: Option<EntryDisc>) -> f32 {
         // A target's disc may extend beyond the scene's.
         let inside = drawn == Some(EntryDisc::Whole) || distance_to_line2(sky.center, p, d) <= sky.radius * sky.radius;
         if inside { (1.0 - AIMED_SHARE) / (PI * sky.radius * sky.radius) } else { 0.0 }
     }
 
-    /// Share of the scene's disc in the density of an aimed start.
+    /// Part, 0 to 1, of the density of a start from infinity that is due to the disc of the whole scene, not to caustic
+    /// targets.
     pub fn unaimed_share(&self, sky: &Sky, emission: &EmissionSample) -> f32 {
         match self.choice {
             None => 1.0,
@@ -247,7 +258,7 @@ mod tests {
     use crate::math::Rgb;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// An unaimed start of light from infinity, sampled on the scene's disc of area `whole`.
+    /// Test start of a light path from infinity, sampled on the scene's disc of area `whole` (m2) without aiming.
     fn start(origin: Vec3, direction: Vec3, whole: f32) -> EmissionSample {
         let onward = 1.0 / whole;
         EmissionSample {
@@ -262,8 +273,8 @@ mod tests {
         }
     }
 
-    /// The flux through small discs does not depend on aiming or on a region of interest, also after Russian roulette
-    /// down to the share of unaimed paths. Targets and regions partly overlap the discs.
+    /// The mean flux through small discs does not depend on aiming or on a region of interest, even after Russian
+    /// roulette that keeps paths with their unaimed share. Targets and regions partly overlap the discs.
     #[test]
     fn aiming_keeps_the_flux() {
         let spheres = vec![(Vec3::new(0.3, 0.0, 0.1), 0.2), (Vec3::new(0.2, 0.1, -0.4), 0.25), (Vec3::X, 0.1)];

@@ -1,15 +1,15 @@
 //! Sampling an index with given probabilities.
 
-/// Number of steps of the unit interval; probabilities are multiples of one step. Uniform numbers of 32 bits resolve
-/// 2^32 steps. Cumulative sums in f32 would resolve 2^24, too few for the weaker of a million lights.
+/// Number of steps of the unit interval; every probability of a [`Cdf`] is a multiple of one step. Uniform numbers of
+/// 32 bits resolve 2^32 steps. Cumulative sums in f32 would resolve 2^24, too few for the weaker of a million lights.
 const STEPS: u64 = 1 << 32;
 
 /// A discrete distribution, inverted with a guide table \[Chen and Asau 1974\]. Unlike an alias table, the inversion is
 /// monotonic, so it keeps the stratification of its input.
 #[derive(Clone, Debug)]
 pub struct Cdf {
-    /// For each index, the first step after its interval. An index with a positive weight has at least one step.
-    /// Entries from `last` on are not used: their end is [`STEPS`], which does not fit.
+    /// For each index, the step at which its interval of the unit interval ends (exclusive). An index with a positive
+    /// weight has at least one step. Entries from `last` on are not used: their end is [`STEPS`], which does not fit.
     ends: Vec<u32>,
     /// The last index with a positive weight.
     last: usize,
@@ -49,7 +49,7 @@ impl Cdf {
         Some(Cdf { ends, last, guide, total })
     }
 
-    /// Sum of the weights.
+    /// Sum of the weights that the distribution was built from.
     pub fn total(&self) -> f64 {
         self.total
     }
@@ -64,7 +64,7 @@ impl Cdf {
         if index == 0 { 0 } else { self.end(index - 1) }
     }
 
-    /// Probability of all indices before `index` together.
+    /// Sum of the probabilities of all indices before `index`.
     #[inline]
     pub fn below(&self, index: usize) -> f64 {
         self.start(index) as f64 / STEPS as f64
@@ -76,8 +76,8 @@ impl Cdf {
         (self.end(index) - self.start(index)) as f32 / STEPS as f32
     }
 
-    /// Samples an index by `u` in `[0, 1)`. Returns the index, its probability (above zero), and the position of `u` in
-    /// the interval of the index, which is a uniform number again.
+    /// Samples an index by the uniform number `u` in `[0, 1)`. Returns the index, its probability (above zero), and the
+    /// position of `u` in the interval of the index, which is again uniform in `[0, 1)`.
     #[inline]
     pub fn sample(&self, u: f64) -> (usize, f32, f32) {
         let steps = u * STEPS as f64;

@@ -2,11 +2,12 @@
 
 use crate::math::Vec3;
 
-/// A cone with a half angle of at most 90 degrees. It is convex, so at most one part of a ray is in it.
+/// A cone of directions from a point, with a half angle of at most 90 degrees. It is convex, so at most one part of a
+/// ray is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     apex: Vec3,
-    /// Unit vector from the apex.
+    /// Unit vector of the axis, from the apex into the cone.
     axis: Vec3,
     /// Squared sine of the half angle.
     sin2: f32,
@@ -15,7 +16,7 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// A cone whose half angle is given as 1 - cos; `None` for half angles above 90 degrees.
+    /// A cone whose half angle is given as 1 minus its cosine; `None` for half angles above 90 degrees.
     #[inline]
     pub fn new(apex: Vec3, axis: Vec3, one_minus_cos: f32) -> Option<Cone> {
         let (sin2, cos2) = (one_minus_cos * (2.0 - one_minus_cos), (1.0 - one_minus_cos) * (1.0 - one_minus_cos));

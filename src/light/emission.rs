@@ -2,46 +2,48 @@
 
 use crate::math::{Rgb, Vec3};
 
-/// A sample of a light from a receiver, for next-event estimation.
+/// A sampled point or direction of a light, as seen from a receiver (a point that receives light), for next-event
+/// estimation.
 #[derive(Clone, Copy, Debug)]
 pub struct DirectSample {
-    /// Unit direction towards the light.
+    /// Unit direction from the receiver towards the light.
     pub wi: Vec3,
     /// End of the shadow ray, offset from the light's surface; `None` for light from infinity.
     pub target: Option<Vec3>,
-    /// Radiance that arrives; for a delta light, irradiance on a surface that faces the light.
+    /// Radiance that arrives at the receiver (W/m2/sr); for a delta light, irradiance on a surface that faces the light
+    /// (W/m2).
     pub radiance: Rgb,
-    /// Density per solid angle, which includes the selection of the light; for a delta light, the probability of
-    /// selecting it.
+    /// Density per solid angle at the receiver with which this direction is sampled, including the selection of the
+    /// light; for a delta light, the probability of selecting it.
     pub pdf_w: f32,
-    /// Whether no ray can hit the light.
+    /// Whether the light is a delta light: no ray can hit it.
     pub delta: bool,
-    /// Density per area, on a surface that faces `wi`, with which light paths from this point of the light (from this
-    /// direction, for a light at infinity) arrive, times the probability of selecting the light for emission over the
+    /// Density per area (1/m2) with which light paths from this point or direction of the light arrive on a surface at
+    /// the receiver that faces `wi`. It is multiplied by the probability of selecting the light for emission over the
     /// probability of selecting it here.
     pub arrival_pdf_a: f32,
-    /// Index of the light.
+    /// Index of the sampled light in [`Lights::emitters`](super::Lights::emitters).
     pub light: u32,
 }
 
-/// Densities with which a light path starts, as the MIS weights need them.
+/// Densities with which a light path starts at a point of a light in a direction, as the MIS weights need them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionDensity {
     /// Density of the light's point (per area; per solid angle of the direction, for light from infinity) in
     /// [`Lights::sample_direct`](super::Lights::sample_direct). For a delta light, the probability of selecting it.
     /// `direct` and `start` differ by the selection of the light, which depends on the receiver.
     pub direct: f32,
-    /// Density of the light's point in [`Lights::sample_emission`](super::Lights::sample_emission), in the units of
-    /// `direct`.
+    /// Density of the light's point when [`Lights::sample_emission`](super::Lights::sample_emission) starts a light
+    /// path there, in the units of `direct`.
     pub start: f32,
-    /// Density of the rest of the emission: of the direction per solid angle, or of the entry point per area for light
-    /// from infinity.
+    /// Density of the second part of the start: of the emitted direction per solid angle, or of the point of entry into
+    /// the scene per area for light from infinity.
     pub onward: f32,
-    /// Cosine at the light; 1 at infinity and for points.
+    /// Cosine of the emitted direction to the normal at the light; 1 at infinity and for points.
     pub cos: f32,
     /// Whether the light is at infinity.
     pub infinite: bool,
-    /// Whether no ray can hit the light.
+    /// Whether the light is a delta light: no ray can hit it.
     pub delta: bool,
 }
 
@@ -54,43 +56,43 @@ impl EmissionDensity {
     }
 }
 
-/// The disc that the start of a light path from infinity was sampled on. Its density always counts this disc. A test of
-/// the position would be wrong at the rim of a small disc, because of rounding, and would select the density of the
+/// The disc on which the start of a light path from infinity was sampled. Its density always counts this disc. A test
+/// of the position would be wrong at the rim of a small disc, because of rounding, and would select the density of the
 /// scene's larger disc, which gives the path too much flux.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EntryDisc {
-    /// The disc of the whole scene.
+    /// The disc of the whole scene, with the radius of its bounding sphere.
     Whole,
-    /// The disc of a caustic target, by its index.
+    /// The disc of a caustic target (the bounding sphere of an object that can make caustics), by the target's index.
     Target(usize),
-    /// A disc of this radius around the region of interest.
+    /// A disc of this radius (m) around the region of interest, the sphere around most visible surfaces.
     Region(f32),
 }
 
-/// The start of a light path.
+/// The sampled start of a light path: a ray that leaves a light, its flux and its densities.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSample {
     /// Origin of the ray, offset from the light's surface.
     pub origin: Vec3,
-    /// Unit direction.
+    /// Unit direction in which the light leaves.
     pub direction: Vec3,
-    /// Emitted flux over density (W): the flux of the path if it is the only one.
+    /// Emitted flux over the density of the start (W): the flux that the path carries if it is the only one.
     pub flux: Rgb,
-    /// Index of the light.
+    /// Index of the light in [`Lights::emitters`](super::Lights::emitters).
     pub light: u32,
-    /// Whether no ray can hit the light.
+    /// Whether the light is a delta light: no ray can hit it.
     pub delta: bool,
     /// Whether the light is at infinity.
     pub infinite: bool,
-    /// The disc on which light from infinity enters the scene.
+    /// The disc on which a path from infinity enters the scene; not used for other lights.
     pub entry: EntryDisc,
-    /// Densities of the start.
+    /// Densities with which this start is sampled, for MIS.
     pub density: EmissionDensity,
 }
 
 impl EmissionSample {
-    /// Replaces the density `onward` by `mixed`, the density of the mixture that the start was sampled from. Returns
-    /// the start, and its flux over the flux before; `None` if the flux is zero.
+    /// Replaces the density `onward` by `mixed`, the density in the mixture of discs that the start was sampled from.
+    /// Returns the start with its new flux, and this flux over the flux before; `None` if the flux is zero.
     #[inline]
     pub fn reweighted(self, mixed: f32) -> Option<(EmissionSample, f32)> {
         let ratio = self.density.onward / mixed;

@@ -5,7 +5,7 @@ use crate::geometry::{Shapes, triangle_error};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
 use std::f32::consts::{PI, TAU};
 
-/// Bound on the rounding error of points on a triangle (scene units), given by a corner and the edges to the others.
+/// Bound on the rounding error of points on a triangle (m), given by a corner and the edges to the other corners.
 #[inline]
 pub(super) fn position_error(&[corner, a, b]: &[Vec3; 3]) -> f32 {
     triangle_error([corner, corner + a, corner + b])
@@ -16,7 +16,7 @@ pub(super) fn position_error(&[corner, a, b]: &[Vec3; 3]) -> f32 {
 pub enum Emitter {
     /// A triangle of an emissive material.
     Triangle {
-        /// Index of the instance.
+        /// Index of the instance (the object) that the triangle belongs to.
         instance: u32,
         /// Index of the triangle in the instance's mesh.
         primitive: u32,
@@ -24,21 +24,21 @@ pub enum Emitter {
         area: f32,
         /// Whether both sides emit.
         two_sided: bool,
-        /// Mean emitted radiance.
+        /// Emitted radiance (W/m2/sr), averaged over the triangle and over directions.
         radiance: Rgb,
-        /// Angular distribution.
+        /// How the radiance depends on the direction.
         spread: Spread,
-        /// Unit normal of the front, and distance of the plane from the origin along it. `plane` and `corners` are
-        /// copies, so that light sampling finds all data in one place.
+        /// Unit normal of the front side (xyz), and distance of the triangle's plane from the origin along it (w).
+        /// `plane` and `corners` are copies, so that light sampling finds all data in one place.
         plane: Vec4,
-        /// A corner, and the edges to the others (m).
+        /// One corner, and the edges from it to the other two (m).
         corners: [Vec3; 3],
-        /// Whether every point emits `radiance`.
+        /// Whether every point of the triangle emits `radiance`; false if a texture, for example, varies it.
         uniform: bool,
     },
-    /// A mathematical point.
+    /// A point light, of no size, that shines equally in all directions.
     Point {
-        /// Position.
+        /// Position (m).
         p: Vec3,
         /// Radiant intensity (W/sr).
         intensity: Rgb,
@@ -46,47 +46,47 @@ pub enum Emitter {
     /// A light that shines into a cone with a soft edge, from a point, or uniformly from a disc across the axis of the
     /// cone. No ray can hit the disc.
     Spot {
-        /// Position; the centre of the disc.
+        /// Position of the point, or of the disc's centre (m).
         p: Vec3,
-        /// Radius of the disc (m); 0 is a mathematical point.
+        /// Radius of the disc that emits (m); 0 makes the spot a mathematical point.
         radius: f32,
-        /// Frame whose normal is the axis, in the direction of the light.
+        /// Frame whose normal is the spot's axis, pointing in the direction of the emitted light.
         frame: Frame,
         /// Radiant intensity on the axis (W/sr).
         intensity: Rgb,
-        /// 1 - cos of the half angle of the cone of full intensity. For narrow cones, the cosine itself would lose its
-        /// digits.
+        /// 1 minus the cosine of the half angle of the cone of full intensity. For narrow cones, the cosine itself
+        /// would lose its digits.
         inner: f32,
-        /// 1 - cos of the half angle from which on the intensity is zero; greater than `inner`.
+        /// 1 minus the cosine of the half angle beyond which the intensity is zero; greater than `inner`.
         outer: f32,
-        /// Falloff between `inner` and `outer`.
+        /// Falloff of the intensity between `inner` and `outer`.
         edge: SpotEdge,
     },
     /// Light from a small cone of directions at infinity.
     Sun {
-        /// Frame whose normal points towards the sun.
+        /// Frame whose normal points from the scene towards the sun.
         frame: Frame,
         /// Irradiance on a surface that faces the sun (W/m2).
         irradiance: Rgb,
-        /// 1 - cos of the half angle of the sun's disc; 0 is exactly parallel light.
+        /// 1 minus the cosine of the half angle of the sun's disc; 0 is exactly parallel light.
         one_minus_cos: f32,
-        /// Whether cameras do not see the disc.
+        /// Whether camera rays do not see the sun's disc, although it lights the scene.
         hidden_from_camera: bool,
     },
-    /// The environment.
+    /// The environment (image or uniform colour) at infinity, stored in [`Sky`].
     Environment,
 }
 
 /// The bounding sphere of the scene, and the environment around it.
 #[derive(Clone, Debug)]
 pub struct Sky {
-    /// Centre of the scene's bounding sphere.
+    /// Centre of the scene's bounding sphere (m).
     pub center: Vec3,
     /// Radius of the scene's bounding sphere (m).
     pub radius: f32,
-    /// The environment, if any.
+    /// The light from all directions around the scene; `None` if the scene has no environment.
     pub environment: Option<Environment>,
-    /// Whether cameras do not see the environment.
+    /// Whether camera rays do not see the environment, although it lights the scene.
     pub hidden_from_camera: bool,
 }
 
@@ -109,7 +109,7 @@ impl SpotEdge {
         }
     }
 
-    /// Mean of the falloff over the ramp.
+    /// Mean of the falloff over the edge, as the ramp goes from 0 to 1.
     #[inline]
     pub(super) fn mean(self) -> f32 {
         match self {
@@ -118,7 +118,8 @@ impl SpotEdge {
         }
     }
 
-    /// Inverse of the falloff's integral: the ramp below which `share` of the light in the edge lies.
+    /// Inverse of the falloff's normalised integral: the ramp, 0 to 1, below which `share` (0 to 1) of the light in the
+    /// edge lies.
     #[inline]
     pub(super) fn ramp(self, share: f32) -> f32 {
         match self {
@@ -139,7 +140,8 @@ impl SpotEdge {
     }
 }
 
-/// Intensity of a spot relative to its axis. The angle to the axis and both edges are given as 1 - cos.
+/// Intensity of a spot relative to the intensity on its axis, 0 to 1. The angle to the axis and both edges are given as
+/// 1 minus the cosine.
 #[inline]
 pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32, edge: SpotEdge) -> f32 {
     if one_minus_cos <= inner {
@@ -151,13 +153,13 @@ pub fn spot_falloff(one_minus_cos: f32, inner: f32, outer: f32, edge: SpotEdge) 
     }
 }
 
-/// Integral of [`spot_falloff`] over all directions (sr).
+/// Integral of [`spot_falloff`] over all directions (sr): the spot's flux over its intensity on the axis.
 #[inline]
 pub fn spot_solid_angle(inner: f32, outer: f32, edge: SpotEdge) -> f32 {
     TAU * (inner + (outer - inner) * edge.mean())
 }
 
-/// Samples a point on the disc of a spot at `p`.
+/// Samples a point uniformly on the disc of a spot with centre `p` and the axis of `frame`.
 #[inline]
 pub fn spot_point(p: Vec3, radius: f32, frame: &Frame, u: Vec2) -> Vec3 {
     if radius == 0.0 {
@@ -168,8 +170,8 @@ pub fn spot_point(p: Vec3, radius: f32, frame: &Frame, u: Vec2) -> Vec3 {
 }
 
 impl Emitter {
-    /// Luminance of the emitted flux (W), for the selection of lights. For light from infinity, the flux through the
-    /// scene's bounding sphere.
+    /// Luminance of the flux that the light emits (W), by which lights are selected. For light from infinity, the flux
+    /// through the scene's bounding sphere.
     pub fn power(&self, sky: &Sky) -> f64 {
         // In f64, which does not overflow: a light of infinite power could not be selected.
         const PI: f64 = std::f64::consts::PI;
@@ -189,7 +191,8 @@ impl Emitter {
         }
     }
 
-    /// A point of the light, offset from its front; `None` for light from infinity.
+    /// Some fixed point of the light, offset from its front so that a ray can start there; `None` for light from
+    /// infinity.
     pub fn any_point(&self, shapes: &Shapes) -> Option<Vec3> {
         match self {
             Emitter::Triangle { instance, primitive, .. } => {
@@ -200,7 +203,7 @@ impl Emitter {
         }
     }
 
-    /// Whether no ray can hit the light.
+    /// Whether the light is a delta light: no ray can hit it.
     pub fn is_delta(&self) -> bool {
         match self {
             Emitter::Point { .. } | Emitter::Spot { .. } => true,
@@ -214,7 +217,8 @@ impl Emitter {
         matches!(self, Emitter::Sun { .. } | Emitter::Environment)
     }
 
-    /// Radiance of a sun of finite size.
+    /// Radiance (W/m2/sr) of a sun of finite size that gives `irradiance`; its half angle is given as 1 minus the
+    /// cosine.
     #[inline]
     pub fn sun_radiance(irradiance: Rgb, one_minus_cos: f32) -> Rgb {
         // E = integral of L cos over the cone = L pi sin^2, and sin^2 = h (2 - h) with h = 1 - cos.

@@ -5,12 +5,12 @@ use crate::math::{Rgb, Vec2, Vec3, luminance, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::Arc;
 
-/// An environment light.
+/// Light that arrives from all directions at infinity.
 #[derive(Clone, Debug)]
 pub enum Environment {
     /// Equal radiance from all directions.
     Uniform(Rgb),
-    /// An image.
+    /// A latitude-longitude image of the radiance.
     Image(Arc<ImageEnvironment>),
 }
 
@@ -27,8 +27,8 @@ pub struct ImageEnvironment {
 }
 
 impl ImageEnvironment {
-    /// Builds the sampling distribution of `width * height` finite, non-negative texels, already scaled by the
-    /// strength. `rotation` is in radians. `None` if all texels are black.
+    /// Builds the sampling distribution of an image of `width * height` finite, non-negative texels, already scaled by
+    /// the environment's strength. `rotation` about +Y is in radians. `None` if all texels are black.
     pub fn new(width: usize, height: usize, radiance: Vec<[f32; 3]>, rotation: f32) -> Option<ImageEnvironment> {
         // Bilinear interpolation spreads a texel over the neighbouring cells. So the weight of a cell is the
         // tent-weighted mean over its 3x3 neighbourhood, which is positive wherever the radiance is.
@@ -86,7 +86,8 @@ impl ImageEnvironment {
         top.lerp(bottom, y - fy)
     }
 
-    /// Density per solid angle of a cell: at theta, the cell has the solid angle 2 pi^2 sin(theta) / (width height).
+    /// Density per solid angle with which directions in a texel (the cell) are sampled, if the texel has this
+    /// probability: at polar angle theta, it has the solid angle 2 pi^2 sin(theta) / (width height).
     fn density(&self, cell: (usize, usize), probability: f32, sin_theta: f32) -> f32 {
         debug_assert!(cell.0 < self.width);
         probability * (self.width * self.height) as f32 / (TAU * PI * sin_theta.max(1e-6))
@@ -113,7 +114,7 @@ impl ImageEnvironment {
         (self.to_world(d), self.density((x, y), pdf_y * pdf_x, sin_theta))
     }
 
-    /// Mean radiance over the sphere.
+    /// Radiance averaged over all directions.
     fn mean(&self) -> Rgb {
         let mut sum = glam::DVec3::ZERO;
         let mut weight = 0.0;
@@ -129,7 +130,7 @@ impl ImageEnvironment {
 }
 
 impl Environment {
-    /// Radiance that arrives from direction `d` (unit, pointing away from the scene).
+    /// Radiance (W/m2/sr) that arrives from direction `d` (unit, pointing away from the scene).
     #[inline]
     pub fn radiance(&self, d: Vec3) -> Rgb {
         match self {
@@ -138,7 +139,8 @@ impl Environment {
         }
     }
 
-    /// Samples a direction towards the environment. Returns the direction and its density per solid angle.
+    /// Samples a direction towards the environment, by luminance if it is an image. Returns the direction and its
+    /// density per solid angle.
     #[inline]
     pub fn sample(&self, u: Vec2) -> (Vec3, f32) {
         match self {
@@ -156,7 +158,7 @@ impl Environment {
         }
     }
 
-    /// Mean radiance over the sphere.
+    /// Radiance averaged over all directions (W/m2/sr).
     pub fn mean(&self) -> Rgb {
         match self {
             Environment::Uniform(radiance) => *radiance,

@@ -1,49 +1,50 @@
 //! Light groups: the picture has a separate layer for the light of each group.
 
-/// Maximum number of groups in a scene; each group takes memory in every pixel.
+/// Maximum number of light groups in a scene. A light group is a named set of lights whose light gets a layer of its
+/// own, which takes memory in every pixel.
 pub const MAX_GROUPS: usize = 64;
-/// Maximum length of a group's name in letters. `ViewLayer.CombinedLightGroup_NAME.R` then has 63 letters, Blender's
-/// limit for a channel name.
+/// Maximum length of a light group's name in letters. `ViewLayer.CombinedLightGroup_NAME.R` then has 63 letters,
+/// Blender's limit for a channel name.
 pub const MAX_GROUP_NAME: usize = 32;
 
-/// Index of a light group in its scene, or no group.
+/// Index of a light group (a named set of lights with a layer of its own) in its scene, or no group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Group(u8);
 
 impl Group {
-    /// No group.
+    /// The value of lights that are in no light group.
     pub const NONE: Group = Group(0);
 
-    /// The group with an index below [`MAX_GROUPS`].
+    /// The value of the light group with this index, which is below [`MAX_GROUPS`].
     pub fn new(index: usize) -> Group {
         Group(u8::try_from(index + 1).unwrap_or(0))
     }
 
-    /// The index of the group; `None` for [`Group::NONE`].
+    /// Index of the light group in [`Groups::names`]; `None` for [`Group::NONE`].
     #[inline]
     pub fn index(self) -> Option<usize> {
         self.0.checked_sub(1).map(usize::from)
     }
 }
 
-/// The light groups of a scene, and the group of each light.
+/// The light groups of a scene (named sets of lights, each with a layer), and the group of each light.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Groups {
-    /// Names of the groups in the names of layers: unique, of ASCII letters, digits and `_`.
+    /// Name of each light group in the names of its layers: unique, of ASCII letters, digits and `_`.
     pub names: Vec<String>,
-    /// Names of the groups in the scene file.
+    /// Name of each light group in the scene file, by the index of the group.
     labels: Vec<String>,
-    /// Group of each emissive instance, by the index of the instance.
+    /// Light group of each emissive instance (object), by the index of the instance.
     pub instances: Vec<Group>,
-    /// Groups of points, spots and suns, in the order of the emitters.
+    /// Light group of each point, spot and sun, in the order of the emitters.
     pub others: Vec<Group>,
-    /// Group of the environment.
+    /// Light group of the environment.
     pub environment: Group,
 }
 
 impl Groups {
-    /// The group with the name `label` in the scene file, added if it is new. `None` if there are [`MAX_GROUPS`]
-    /// others.
+    /// The light group with the name `label` in the scene file; a new name adds a group. `None` if the name is new and
+    /// there are already [`MAX_GROUPS`] groups.
     pub fn get_or_add(&mut self, label: &str) -> Option<Group> {
         let index = match self.labels.iter().position(|known| known == label) {
             Some(index) => index,
@@ -57,14 +58,15 @@ impl Groups {
         Some(Group::new(index))
     }
 
-    /// Groups whose names were truncated or numbered: the name in the scene file, and the name in layers.
+    /// The light groups whose names were truncated or numbered to make layer names: the name in the scene file, and the
+    /// name in layers.
     pub fn renamed(&self) -> impl Iterator<Item = (&str, &str)> {
         let pairs = self.labels.iter().zip(&self.names);
         pairs.filter(|(label, name)| legal(label) != **name).map(|(label, name)| (&**label, &**name))
     }
 
-    /// A unique layer name for a label: illegal letters become `_`, long names are truncated, and names that are taken
-    /// get a number.
+    /// A unique layer name for the light group `label`: illegal letters become `_`, long names are truncated, and names
+    /// that are taken get a number.
     fn free_name(&self, label: &str) -> String {
         let letters = legal(label);
         let mut name = letters[..letters.len().min(MAX_GROUP_NAME)].to_owned();
@@ -79,7 +81,7 @@ impl Groups {
     }
 }
 
-/// Replaces every letter that a layer's name cannot have by `_`.
+/// Replaces every letter of a light group's name that a layer's name cannot have by `_`.
 fn legal(label: &str) -> String {
     label.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }

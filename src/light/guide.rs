@@ -21,64 +21,72 @@ use crate::math::{DVec2, Frame, Vec2, Vec3, one_minus_cos, warp};
 use std::f32::consts::PI;
 use std::ops::Range;
 
-/// Minimum share of unguided light paths, which find light that the guide has not seen.
+/// Minimum share of the light paths that start unguided (from a light selected by its power), which find light that the
+/// guide has not seen.
 const MIN_UNGUIDED_SHARE: f64 = 0.2;
-/// Maximum share of the paths that go to targets if light paths carry all light. If neighbouring photons set the
-/// bandwidths, more paths to targets would widen the bandwidths of all light except caustics.
+/// Maximum share of the light paths that start towards caustic targets (objects that can make caustics) if light paths
+/// carry all light. If neighbouring photons set the bandwidths, more paths to targets would widen the bandwidths of all
+/// light except caustics.
 const MAX_TARGETED_SHARE: f64 = 0.2;
-/// Share of the guided paths that is distributed over all cells by the power of their lights.
+/// Share of the guided light paths that is distributed over all cells (pairs of a light and a target) by the power of
+/// the lights, whatever the guide has learned.
 const PRIOR_SHARE: f64 = 0.1;
-/// Maximum number of guided lights; the weakest others are unguided.
+/// Maximum number of guided lights; weaker lights emit only unguided paths.
 const MAX_LIGHTS: usize = 256;
 
-/// The cell of unguided paths.
+/// Index of the cell that stands for unguided light paths, whose light is selected by its power.
 pub const UNGUIDED: usize = 0;
 
-/// Emitters that are guided together: the triangles of an object, or one other light.
+/// Emitters that are guided together as one light: the triangles of an object, or one other light.
 struct GuidedLight {
     emitters: Range<usize>,
-    /// Probability of selecting one of the emitters by power.
+    /// Probability that selection by power gives one of these emitters.
     probability: f64,
-    /// Probability of all emitters before.
+    /// Sum of the probabilities, by power, of all emitters before these.
     below: f64,
-    /// Probability of the light's cell without a target, over `probability`.
+    /// Probability of the cell that pairs this light with no target, over `probability`.
     own: f32,
-    /// Index of each target, and the probability of its cell over `probability`.
+    /// For each caustic target that this light is paired with, its index and the probability of the pair (a cell) over
+    /// `probability`.
     targets: Vec<(usize, f32)>,
 }
 
-/// Probabilities of the cells of guided emission.
+/// Guided emission: the probability of each cell (a light, or a pair of a light and a caustic target) from which light
+/// paths start.
 pub struct Guide {
     lights: Vec<GuidedLight>,
-    /// Index in `lights` of each emitter; `u32::MAX` for unguided emitters.
+    /// For each emitter, the index in `lights` of its guided light; `u32::MAX` for unguided emitters.
     light_of: Vec<u32>,
-    /// Index in `lights` of each cell, and its target if it has one. The entry of [`UNGUIDED`] is not used.
+    /// For each cell, the index of its light in `lights`, and its caustic target if it has one. The entry of
+    /// [`UNGUIDED`] is not used.
     cells: Vec<(usize, Option<usize>)>,
-    /// Probability of each cell by power alone.
+    /// Probability that each cell has by the power of its light alone, before [`Guide::learn`].
     prior: Vec<f64>,
-    /// Maximum share of the paths that go to targets.
+    /// Maximum share, 0 to 1, of the light paths that start towards caustic targets.
     max_targeted: f64,
     choice: Cdf,
 }
 
-/// A start sampled by [`Guide::emit`].
+/// The start of a light path, sampled by [`Guide::emit`].
 pub struct GuidedEmission {
-    /// The start. Its densities are those of unguided emission, which the MIS weights use.
+    /// The sampled start. Its densities are those of unguided emission, which the MIS weights use.
     pub emission: EmissionSample,
-    /// The cell that the start was sampled from.
+    /// Index of the cell (a light, or a pair of a light and a target) that the start was sampled from; may be
+    /// [`UNGUIDED`].
     pub cell: usize,
-    /// Unguided density over the density of the mixture: the factor that was applied to the flux.
+    /// Density of the start in unguided emission over its density in guided emission: the factor that was applied to
+    /// the flux.
     pub ratio: f32,
-    /// Density of emission without aiming or guiding, over the density of the mixture.
+    /// Density of the start without aiming at targets and without guiding, over its density in guided emission.
     pub weight: f32,
-    /// Share of the mixture's density without the cells and discs of caustic targets.
+    /// Part, 0 to 1, of the start's density that remains without aiming at caustic targets (their cells and discs).
     pub unaimed: f32,
 }
 
 impl Guide {
-    /// Builds a cell for every pair of a light and a target, with probabilities by power. `all`: light paths carry all
-    /// light, not only caustics, so each of several lights also has a cell without a target. `None` if there is no
-    /// guided cell.
+    /// Builds a cell for every pair of a guided light and a caustic target, with probabilities by power. `all`: light
+    /// paths carry all light, not only caustics, so each of several lights also has a cell without a target. `None` if
+    /// there is no guided cell.
     pub fn new(lights: &Lights, all: bool) -> Option<Guide> {
         let targets = lights.targets().spheres().len();
         let guided = guided_lights(lights)?;
@@ -109,20 +117,21 @@ impl Guide {
         Some(guide)
     }
 
-    /// Number of cells.
+    /// Number of cells (lights, and pairs of a light and a caustic target), with the cell of unguided paths.
     pub fn cells(&self) -> usize {
         self.cells.len()
     }
 
-    /// Probability of an unguided start.
+    /// Probability that a light path starts unguided, from a light selected by its power.
     pub fn unguided(&self) -> f32 {
         self.choice.pdf(UNGUIDED)
     }
 
-    /// Sets the probabilities of the cells that minimise the error for equal work. For each cell c, `error[c]` is the
-    /// sum of the squared relative errors that its photons left in the picture, `paths[c]` the number of its light
-    /// paths, `work[c]` their total cost. With n paths in each cell, the error is the sum of `error * paths / n` and
-    /// the work the sum of `n * work / paths`. The optimal n is proportional to `sqrt(error * paths / (work / paths))`.
+    /// Sets the probabilities of the cells (pairs of a light and a target) that minimise the picture's error for equal
+    /// work. For each cell c, `error[c]` is the sum of the squared relative errors that its photons left in the
+    /// picture, `paths[c]` the number of its light paths, `work[c]` their total cost. With n paths in each cell, the
+    /// error is the sum of `error * paths / n` and the work the sum of `n * work / paths`. The optimal n is
+    /// proportional to `sqrt(error * paths / (work / paths))`.
     pub fn learn(&mut self, error: &[f64], paths: &[f64], work: &[f64]) {
         let best = |(&error, (&paths, &work)): (&f64, (&f64, &f64))| {
             if work > 0.0 { (error * paths * paths / work).sqrt() } else { 0.0 }
@@ -154,7 +163,7 @@ impl Guide {
         }
     }
 
-    /// Copies the probabilities of the cells to the lights.
+    /// Copies the probability of each cell to the guided light that it belongs to.
     fn update_lights(&mut self) {
         for light in &mut self.lights {
             light.targets.clear();
@@ -173,8 +182,9 @@ impl Guide {
         }
     }
 
-    /// Samples a start. Part of the starts from infinity without a target go through the region of interest, if there
-    /// is one. `choice`, `point` and `direction` are uniform on the unit square.
+    /// Samples the start of a light path. Part of the starts from infinity without a target go through the region of
+    /// interest (the sphere around most visible surfaces), if there is one. `choice`, `point` and `direction` are
+    /// uniform on the unit square.
     #[inline]
     pub fn emit(
         &self,
@@ -212,8 +222,8 @@ impl Guide {
         Some(GuidedEmission { emission, cell, ratio, weight: plain / mixed, unaimed: untargeted * unaimed / mixed })
     }
 
-    /// Turns an unguided start towards a target, with the flux and densities that unguided emission has in the new
-    /// direction.
+    /// Turns an unguided start of a light path towards a caustic target, with the flux and densities that unguided
+    /// emission has in the new direction.
     fn aim_at(
         lights: &Lights,
         mut emission: EmissionSample,
@@ -238,8 +248,9 @@ impl Guide {
         Some(emission)
     }
 
-    /// Density with which the cell of a target samples the direction of a start (the line, for light from infinity).
-    /// `sampled`: the start was sampled towards this target, so rounding at the rim does not matter.
+    /// Density with which the cell of a caustic target samples the direction of a start per solid angle (the line per
+    /// area, for light from infinity). `sampled`: the start was sampled towards this target, so rounding at the rim
+    /// does not matter.
     #[inline]
     fn target_density(lights: &Lights, emission: &EmissionSample, target: usize, sampled: bool) -> f32 {
         let (center, radius) = lights.targets().spheres()[target];
@@ -260,7 +271,7 @@ impl Guide {
     }
 }
 
-/// The strongest lights, by power. `None` if no light has any power.
+/// The strongest lights by power, at most [`MAX_LIGHTS`], without cells so far. `None` if no light has any power.
 fn guided_lights(lights: &Lights) -> Option<Vec<GuidedLight>> {
     let choice = lights.choice()?;
     let mut guided: Vec<GuidedLight> = lights
@@ -276,7 +287,8 @@ fn guided_lights(lights: &Lights) -> Option<Vec<GuidedLight>> {
     Some(guided)
 }
 
-/// Axis of the cone that a sphere subtends from `p`, and 1 - cos of its half angle; `None` from inside the sphere.
+/// Axis of the cone of directions in which a sphere is seen from `p`, and 1 minus the cosine of its half angle; `None`
+/// if `p` is inside the sphere.
 #[inline]
 fn cone(p: Vec3, center: Vec3, radius: f32) -> Option<(Vec3, f32)> {
     let to = center - p;

@@ -16,7 +16,7 @@ use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Share of the selection probability that all lights share equally; the rest is proportional to power.
+/// Share of the probability of selecting a light that all lights get equally; the rest is proportional to power.
 const EQUAL_SHARE: f64 = 0.05;
 
 /// Smallest cosine at which light paths leave a surface. At smaller ones, densities over the cosine overflow.
@@ -28,10 +28,10 @@ pub struct Lights {
     choice: Option<LightSampler>,
     /// For each instance, the index of its first emitter; `u32::MAX` if the instance does not emit.
     first: Vec<u32>,
-    /// For each instance and triangle, the index of the emitter relative to `first`; `u32::MAX` for triangles without
-    /// area.
+    /// For each instance and triangle, the index of its emitter minus the instance's entry in `first`; `u32::MAX` for
+    /// triangles without area.
     relative: Vec<Vec<u32>>,
-    /// Indices of the suns of finite size.
+    /// Indices of the suns of finite size, which rays can hit.
     suns: Vec<u32>,
     environment: Option<u32>,
     sky: Sky,
@@ -39,8 +39,8 @@ pub struct Lights {
     groups: Groups,
 }
 
-/// Radiance that a textured or cut-out triangle emits at the barycentric coordinates `b`. Not inlined, so that the
-/// common case, uniform emission, stays small.
+/// Radiance that a triangle with a texture or cut-out emits at the barycentric coordinates `b`. Not inlined, so that
+/// the common case, uniform emission, stays small.
 #[cold]
 #[inline(never)]
 fn textured_radiance(
@@ -55,7 +55,7 @@ fn textured_radiance(
     Some(material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures))
 }
 
-/// The emitter of a triangle of an emissive material; `None` for a triangle without area or emission.
+/// The emitter of a triangle of an emissive material; `None` if the triangle has no area or does not emit.
 fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primitive: u32) -> Option<Emitter> {
     let placed = &shapes.instances[instance as usize];
     let material = &materials.list[placed.material as usize];
@@ -100,17 +100,19 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
     })
 }
 
-/// A ray that leaves a light, sampled without the selection of the light.
+/// A sampled ray that leaves a given light; its densities do not include the selection of the light.
 struct LightRay {
     origin: Vec3,
     direction: Vec3,
-    /// Emitted flux over density (W).
+    /// Emitted flux over the density of the ray (W).
     flux: Rgb,
-    /// Density of the point per area, or of the direction per solid angle for light from infinity; 1 for points.
+    /// Density of the ray's point on the light per area, or of its direction per solid angle for light from infinity; 1
+    /// for points.
     start: f32,
-    /// Density of the direction per solid angle, or of the entry point per area for light from infinity.
+    /// Density of the ray's direction per solid angle, or of its point of entry into the scene per area for light from
+    /// infinity.
     onward: f32,
-    /// Cosine at the light; 1 at infinity and for points.
+    /// Cosine of the ray to the normal at the light; 1 at infinity and for points.
     cos: f32,
 }
 
@@ -150,18 +152,18 @@ impl Lights {
         Lights { emitters, choice, first, relative, suns, environment, sky, targets, groups }
     }
 
-    /// Assigns the lights to groups.
+    /// Assigns the lights to light groups, whose light gets layers of its own.
     #[must_use]
     pub fn with_groups(self, groups: Groups) -> Lights {
         Lights { groups, ..self }
     }
 
-    /// The light groups of the scene.
+    /// The light groups of the scene: named sets of lights, each with layers of its own.
     pub fn groups(&self) -> &Groups {
         &self.groups
     }
 
-    /// The group of a light.
+    /// The light group of the light with index `light`; [`Group::NONE`] if it has none.
     #[inline]
     pub fn group(&self, light: u32) -> Group {
         let Groups { names, instances, others, environment, .. } = &self.groups;
@@ -183,18 +185,18 @@ impl Lights {
         }
     }
 
-    /// The light group of an emissive surface.
+    /// The light group of the object that a surface belongs to.
     #[inline]
     pub fn surface_group(&self, surface: &Surface) -> Group {
         self.groups.instances.get(surface.instance as usize).copied().unwrap_or_default()
     }
 
-    /// Whether no light has any power.
+    /// Whether no light of the scene has any power.
     pub fn is_empty(&self) -> bool {
         self.choice.is_none()
     }
 
-    /// Binary exponent of the total power of all lights; 0 without lights.
+    /// Exponent to base 2 of the total power of all lights (W); 0 without lights.
     pub fn power_exponent(&self) -> i32 {
         let power: f64 = self.emitters.iter().map(|emitter| emitter.power(&self.sky)).sum();
         if power.is_normal() { ((power.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
@@ -205,12 +207,12 @@ impl Lights {
         &self.emitters
     }
 
-    /// The bounding sphere and the environment.
+    /// The scene's bounding sphere, and the environment around it.
     pub fn sky(&self) -> &Sky {
         &self.sky
     }
 
-    /// Bounding spheres of the objects that can make caustics.
+    /// Caustic targets: the bounding spheres of the objects that can make caustics.
     pub fn targets(&self) -> &CausticTargets {
         &self.targets
     }
@@ -220,15 +222,16 @@ impl Lights {
         self.choice.as_ref().map(LightSampler::power)
     }
 
-    /// Probability of selecting a light for a receiver, over the probability of selecting it for emission.
+    /// Probability of selecting a light for next-event estimation at a receiver, over the probability of selecting it
+    /// for the start of a light path.
     #[inline]
     pub fn choice_ratio(&self, receiver: &Receiver, light: u32) -> f32 {
         let Some(choice) = &self.choice else { return 1.0 };
         choice.pdf(receiver, light as usize) / choice.power().pdf(light as usize)
     }
 
-    /// Ranges of emitters that belong to one object (the triangles of an instance, or a single other light), each with
-    /// the probability of selecting an emitter in it.
+    /// Ranges of emitter indices that belong to one object (the triangles of an instance, or a single other light),
+    /// each with the probability that selection by power gives an emitter in the range.
     pub(super) fn emitters_by_object(&self) -> impl Iterator<Item = (Range<usize>, f64)> {
         let same = |a: &Emitter, b: &Emitter| match (a, b) {
             (Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }) => a == b,
@@ -245,8 +248,8 @@ impl Lights {
         })
     }
 
-    /// Density per solid angle of emission along `d` from any point of a light that is not at infinity, and the cosine
-    /// at the light; `None` if the light emits nothing along `d`.
+    /// Density per solid angle with which light `index`, not at infinity, emits along the unit `d` from any of its
+    /// points, and the cosine at the light; `None` if it emits nothing along `d`.
     #[inline]
     pub(super) fn direction_density(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
         match &self.emitters[index] {
@@ -282,7 +285,8 @@ impl Lights {
         Some(sample)
     }
 
-    /// Samples a point of the light `index`, which was selected with `probability`, as seen from `p`.
+    /// Samples a point of the light `index`, which was selected with `probability`, as seen from `p`. `None` if the
+    /// light does not shine on `p`.
     #[inline]
     fn sample_light(
         &self,
@@ -340,7 +344,7 @@ impl Lights {
         }
     }
 
-    /// [`Lights::sample_light`] for a triangle.
+    /// Does the work of [`Lights::sample_light`] for a triangle.
     #[inline(always)]
     fn sample_triangle(
         triangle: &Emitter,
@@ -382,8 +386,8 @@ impl Lights {
         Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a, light })
     }
 
-    /// The point that [`Lights::sample_direct`] samples for any receiver in a medium with these random numbers, and the
-    /// cone of a spot's light. `None` for light from infinity.
+    /// The point on a light that [`Lights::sample_direct`] samples for any receiver in a medium with these random
+    /// numbers, and the cone of its light if it is a spot. `None` for light from infinity.
     #[inline]
     pub fn sample_point(&self, choice: f64, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
         let (index, ..) = self.choice()?.sample(choice);
@@ -402,8 +406,8 @@ impl Lights {
     }
 
     /// Radiance that a surface hit by a ray emits along `wo`, back to the ray's origin `from`, and the density per
-    /// solid angle with which [`Lights::sample_direct`] samples that point from there. The density is 0 for a light
-    /// that touches the surface at the origin.
+    /// solid angle with which next-event estimation at `from` ([`Lights::sample_direct`]) samples that point. The
+    /// density is 0 for a light that touches the surface at the origin.
     #[inline]
     pub fn hit_radiance(
         &self,
@@ -416,21 +420,21 @@ impl Lights {
         Some((radiance, density.direct * surface.p.distance_squared(from.p) / density.cos))
     }
 
-    /// Density per solid angle with which a triangle emits light paths at cosine `cos`.
+    /// Density per solid angle with which light paths leave a triangle in a direction of cosine `cos` to its normal.
     #[inline]
     fn cosine_density(cos: f32, two_sided: bool, spread: &Spread) -> f32 {
         spread.pdf_w(cos) * if two_sided { 0.5 } else { 1.0 }
     }
 
-    /// Density per area with which light paths from infinity, aimed at targets, enter the scene along the line through
-    /// `p` with direction `wi` towards the light.
+    /// Density per area (1/m2) with which light paths from infinity, aimed at caustic targets, start along the line
+    /// through `p` with unit direction `wi` towards the light.
     #[inline]
     pub fn entry_pdf_a(&self, p: Vec3, wi: Vec3) -> f32 {
         self.targets.density(&self.sky, p, wi)
     }
 
-    /// Radiance that a surface emits along `wo` towards `from`, and the densities of starting a light path at that
-    /// point along `wo`.
+    /// Radiance that a surface emits along `wo` towards the point `from`, and the densities with which a light path
+    /// starts at that point of the surface along `wo`.
     #[inline]
     pub fn emitted(
         &self,
@@ -463,8 +467,8 @@ impl Lights {
     }
 
     /// Calls `each(radiance, direct, start, group)` for every light at infinity that a ray from `from` along `d`
-    /// reaches when it leaves the scene, with the densities of [`EmissionDensity`]. Camera rays skip lights that are
-    /// hidden from cameras.
+    /// reaches when it leaves the scene, with the densities of [`EmissionDensity`] and the light group. Camera rays
+    /// skip lights that are hidden from cameras.
     #[inline]
     pub fn for_each_infinite(
         &self,
@@ -496,7 +500,7 @@ impl Lights {
         }
     }
 
-    /// Samples the start of a light path. Lights are selected by power.
+    /// Samples the start of a light path: selects a light by power, then a point and a direction of it.
     #[inline]
     pub fn sample_emission(
         &self,
@@ -557,7 +561,7 @@ impl Lights {
         })
     }
 
-    /// Samples a ray that leaves a triangle, on its `back` if it emits from both sides.
+    /// Samples a ray that leaves a triangle; `back` selects its back side, if it emits from both sides.
     #[inline(always)]
     fn emit_from_triangle(
         triangle: &Emitter,
@@ -606,8 +610,8 @@ impl Lights {
         Some(LightRay { origin, direction, flux, start: 1.0, onward: falloff / filled, cos: 1.0 })
     }
 
-    /// Aims the start of a light path from infinity at caustic targets (see [`CausticTargets::aim`]). Other starts do
-    /// not change.
+    /// Aims the start of a light path from infinity at caustic targets (see [`CausticTargets::aim`]). Starts at other
+    /// lights do not change.
     #[inline]
     pub fn aim(&self, emission: &mut EmissionSample, u: f32, point: Vec2) {
         if emission.infinite {
@@ -628,14 +632,14 @@ impl Lights {
         }
     }
 
-    /// Density of a start in emission without aiming.
+    /// Density of a light path's start as it would be without aiming at caustic targets.
     #[inline]
     pub fn unaimed_density(&self, emission: &EmissionSample) -> f32 {
         if emission.infinite { 1.0 / (PI * self.sky.radius * self.sky.radius) } else { emission.density.onward }
     }
 
-    /// Density of an aimed start in the mixture with the region, and the part of this density without the caustic
-    /// targets: paths through the disc of the whole scene or of the region.
+    /// Density of an aimed start in the mixture of the discs of scene, caustic targets and region of interest, and the
+    /// part of this density without the targets (paths through the disc of the whole scene or of the region).
     #[inline]
     pub fn density_with_region(&self, emission: &EmissionSample, region: Option<Region>) -> (f32, f32) {
         let onward = emission.density.onward;
@@ -646,14 +650,15 @@ impl Lights {
         }
     }
 
-    /// Samples a point of the disc through which light of direction `d` enters the scene's bounding sphere.
+    /// Samples a point of the disc perpendicular to `d`, as wide as the scene's bounding sphere, through which light of
+    /// direction `d` enters the scene.
     fn sample_scene_disc(&self, u: Vec2, d: Vec3) -> Vec3 {
         let frame = Frame::from_normal(d);
         let q = warp::disc_concentric(u) * self.sky.radius;
         self.sky.center + frame.t * q.x + frame.b * q.y - d * self.sky.radius
     }
 
-    /// Whether any triangle of the instance is a light.
+    /// Whether any triangle of the instance (object) is a light.
     pub fn emits(&self, instance: u32) -> bool {
         self.relative[instance as usize].iter().any(|&i| i != u32::MAX)
     }

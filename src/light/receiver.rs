@@ -2,15 +2,15 @@
 
 use crate::math::Vec3;
 
-/// A point that receives light.
+/// A point that receives light, for which a light is selected.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
-    /// Position.
+    /// Position of the point (m).
     pub p: Vec3,
     /// Unit normal on the side that receives light; zero if light may come from any direction.
     pub n: Vec3,
-    /// Whether the point is in a medium. Lights are then selected by power alone: points along a ray in a medium are
-    /// sampled for a given light, so the light has to be selected before the point.
+    /// Whether the point is in a participating medium. Lights are then selected by power alone: points along a ray in a
+    /// medium are sampled for a given light, so the light has to be selected before the point.
     pub in_medium: bool,
 }
 

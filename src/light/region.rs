@@ -8,22 +8,24 @@
 use crate::math::Vec3;
 use std::f32::consts::PI;
 
-/// Share of the paths that go through the disc of the region itself, if there are wider discs.
+/// Share of the light paths to the region of interest that go through its own disc, if there are wider discs around it.
 const INNER_SHARE: f32 = 0.5;
 
-/// A region of interest, with the distribution of the discs around it.
+/// The region of interest (a sphere around most visible surfaces), with the number of discs around it through which
+/// light paths from infinity enter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// Centre of the sphere.
+    /// Centre of the region's sphere (m).
     pub center: Vec3,
-    /// Radius of the sphere (m).
+    /// Radius of the region's sphere (m).
     pub radius: f32,
-    /// Number of discs of doubling radius around the region's own disc.
+    /// Number of discs around the region's own disc, each twice as wide as the one before.
     pub(super) wider: u32,
 }
 
 impl Region {
-    /// A region in a scene that light from infinity enters through a disc of radius `whole`.
+    /// The region of interest with this sphere, in a scene that light from infinity enters through a disc of radius
+    /// `whole` (m).
     pub fn new(center: Vec3, radius: f32, whole: f32) -> Region {
         let doublings = (whole / radius).log2();
         // The widest disc has at most half the radius of the scene's disc, which has paths of its own.
@@ -31,12 +33,12 @@ impl Region {
         Region { center, radius, wider }
     }
 
-    /// Probability of the region's own disc.
+    /// Probability that a light path to the region goes through its own disc, not a wider one.
     fn inner_share(&self) -> f32 {
         if self.wider == 0 { 1.0 } else { INNER_SHARE }
     }
 
-    /// Samples the radius of a disc by a uniform number.
+    /// Samples the radius (m) of the disc that a light path goes through, by a uniform number in `[0, 1)`.
     #[inline]
     pub(super) fn sample(&self, u: f32) -> f32 {
         let inner = self.inner_share();
@@ -48,9 +50,9 @@ impl Region {
         self.radius * (disc + 1.0).exp2()
     }
 
-    /// Density per area, in the mixture of discs, of a line at a squared distance from the centre. `drawn` is the
-    /// radius of the disc that the line was sampled through, so that rounding at its rim does not matter; 0 for other
-    /// lines.
+    /// Density per area (1/m2), in the mixture of the region's discs, of a line at this squared distance from the
+    /// region's centre. `drawn` is the radius of the disc on which the line was sampled, so that rounding at its rim
+    /// does not matter; 0 for lines that were not sampled.
     #[inline]
     pub(super) fn density(&self, distance2: f32, drawn: f32) -> f32 {
         let drawn2 = drawn * drawn;

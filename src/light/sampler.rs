@@ -7,34 +7,40 @@ use super::tree::LightTree;
 use crate::math::luminance;
 use std::f32::consts::PI;
 
-/// Share of the selection probability that is proportional to power for every receiver. It limits how much probability
-/// a near light behind a wall can take from the other lights.
+/// Share of the probability of selecting a light that is proportional to power at every receiver. It limits how much
+/// probability a near light behind a wall can take from the other lights.
 const POWER_SHARE: f64 = 0.1;
-/// Smallest share of the remaining probability for lights at infinity and for finite lights, if a scene has both.
+/// Minimum probability, in the selection by expected irradiance, of the lights at infinity together and of the finite
+/// lights together, if a scene has both.
 const MIN_SHARE: f32 = 0.0625;
 
-/// Probability of a light in the mixture of both distributions: by power, and by expected irradiance.
+/// Probability of selecting a light in the mixture of two distributions: its probability by power, and `near`, its
+/// probability by the irradiance expected at the receiver.
 #[inline]
 fn mixed(by_power: f32, near: f32) -> f32 {
     POWER_SHARE as f32 * by_power + (1.0 - POWER_SHARE as f32) * near
 }
 
-/// Selects lights by power and by the irradiance expected at the receiver.
+/// Selects a light for next-event estimation, by power and by the irradiance expected at the receiver (the point that
+/// receives light).
 pub(super) struct LightSampler {
     power: Cdf,
-    /// `None` if a scene has one light only, or two triangles of one object.
+    /// Selection by expected irradiance; `None` if it would not help: the scene has one light only, or the two
+    /// triangles of one object.
     near: Option<IrradianceSampler>,
 }
 
 /// Selects lights by the irradiance expected at the receiver.
 struct IrradianceSampler {
     tree: LightTree,
-    /// Lights at infinity, by the irradiance on a surface that faces them.
+    /// Selects among the lights at infinity, by the irradiance on a surface that faces them; `None` without such
+    /// lights.
     infinite: Option<Cdf>,
 }
 
 impl LightSampler {
-    /// Builds the distributions; `powers` are the selection weights of the emitters. `None` if all are zero.
+    /// Builds the distributions over the emitters; `powers` are their weights in the selection by power. `None` if all
+    /// are zero.
     pub fn new(emitters: &[Emitter], sky: &Sky, powers: impl Iterator<Item = f64>) -> Option<LightSampler> {
         let power = Cdf::new(powers)?;
         let near = has_several_lights(emitters).then(|| LightTree::new(emitters)).flatten().map(|tree| {
@@ -51,13 +57,14 @@ impl LightSampler {
         Some(LightSampler { power, near })
     }
 
-    /// The distribution by power alone, which selects lights for emission.
+    /// The distribution over the emitters by power alone, which selects lights for the starts of light paths.
     #[inline]
     pub fn power(&self) -> &Cdf {
         &self.power
     }
 
-    /// Selects a light by the uniform number `u`, and returns its index and its probability.
+    /// Selects a light for a receiver by the uniform number `u`. Returns its index and its probability; `None` if no
+    /// light can reach the receiver.
     #[inline]
     pub fn sample(&self, at: &Receiver, u: f64) -> Option<(usize, f32)> {
         let Some(near) = self.near.as_ref().filter(|_| !at.in_medium) else {
@@ -73,7 +80,7 @@ impl LightSampler {
         Some((index, mixed(self.power.pdf(index), pdf)))
     }
 
-    /// Probability with which [`LightSampler::sample`] selects a light.
+    /// Probability with which [`LightSampler::sample`] selects the light `index` at a receiver.
     #[inline]
     pub fn pdf(&self, at: &Receiver, index: usize) -> f32 {
         let power = self.power.pdf(index);
@@ -84,7 +91,8 @@ impl LightSampler {
     }
 }
 
-/// Whether selection depends on the receiver: not for one emitter, or the two triangles of a rectangle.
+/// Whether a scene has more lights than one emitter or the two triangles of a rectangle, so that selection depends on
+/// the receiver.
 fn has_several_lights(emitters: &[Emitter]) -> bool {
     match emitters {
         [Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }] => a != b,
@@ -93,7 +101,7 @@ fn has_several_lights(emitters: &[Emitter]) -> bool {
 }
 
 impl IrradianceSampler {
-    /// Probability of selecting a light at infinity.
+    /// Probability of selecting one of the lights at infinity, in the selection by expected irradiance.
     #[inline]
     fn infinite_share(&self, at: &Receiver) -> f32 {
         let Some(infinite) = &self.infinite else { return 0.0 };

@@ -12,11 +12,11 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 pub struct Spread {
     /// Tangent of the half angle h.
     tan: f32,
-    /// 1 / (tan h - h).
+    /// Factor 1 / (tan h - h) of the relative radiance.
     scale: f32,
     /// Squared sine of the half angle; 1 for a Lambertian emitter.
     sin2: f32,
-    /// Strength of the clear coat above the emitter.
+    /// Strength of the clear coat above the emitter, 0 to 1.
     coat: f32,
 }
 
@@ -26,7 +26,7 @@ impl Spread {
     /// Smallest half angle (rad), as in Cycles. Cosines of smaller angles have too few digits in f32.
     const MIN_HALF_ANGLE: f32 = 0.5 * std::f32::consts::PI / 180.0;
 
-    /// Emission into a cone of half angle `half` (rad); Lambertian from a right angle on.
+    /// Emission into a cone of half angle `half` (rad); Lambertian if it is a right angle or more.
     pub fn new(half: f32) -> Spread {
         if half >= FRAC_PI_2 * 0.999 {
             return Spread::LAMBERTIAN;
@@ -41,7 +41,7 @@ impl Spread {
         Spread { coat, ..self }
     }
 
-    /// Radiance over the mean radiance, at a cosine above zero.
+    /// Radiance over the mean radiance, in a direction with this cosine (above zero) to the normal.
     #[inline]
     pub(super) fn relative_radiance(&self, cos: f32) -> f32 {
         let passes = if self.coat > 0.0 { 1.0 - self.coat * coat_reflectance(cos) } else { 1.0 };
@@ -52,7 +52,7 @@ impl Spread {
         ((self.tan - tan) * self.scale).max(0.0) * passes
     }
 
-    /// Density per solid angle of [`Spread::sample`].
+    /// Density per solid angle of [`Spread::sample`], at a cosine to the normal.
     #[inline]
     pub(super) fn pdf_w(&self, cos: f32) -> f32 {
         if self.sin2 == 1.0 {
@@ -64,8 +64,8 @@ impl Spread {
         }
     }
 
-    /// Samples a direction in the cone about +Z, proportionally to the cosine. Returns the direction and its flux over
-    /// the mean flux.
+    /// Samples an emitted direction in the cone about +Z, proportionally to the cosine. Returns the direction and the
+    /// weight of the sample: its flux over the mean flux.
     #[inline]
     pub(super) fn sample(&self, u: Vec2) -> (Vec3, f32) {
         if self.sin2 == 1.0 {
@@ -82,7 +82,7 @@ impl Spread {
 mod tests {
     use super::*;
 
-    /// The mean weight of the samples is 1 for every half angle: a cone emits the flux of a Lambertian emitter.
+    /// The mean weight of sampled directions is 1 for every half angle: a cone emits the flux of a Lambertian emitter.
     #[test]
     fn every_half_angle_emits_the_same_flux() {
         for degrees in [0.1f32, 0.5, 1.0, 10.0, 60.0, 89.0, 90.0] {

@@ -18,19 +18,20 @@ use std::ops::Range;
 
 /// Minimum squared distance (m2) in the estimated irradiance, which keeps sums finite.
 const MIN_DISTANCE2: f32 = 1e-12;
-/// Weight of light at grazing incidence, relative to normal incidence: glossy surfaces reflect it.
+/// Weight of light that arrives at grazing incidence, relative to normal incidence, in the estimated irradiance: glossy
+/// surfaces reflect it.
 const GRAZING: f32 = 0.1;
-/// Weight of light from behind the surface, where shading normals may still receive it.
+/// Weight of light from behind the surface, in the estimated irradiance; shading normals may still receive it.
 const BEHIND: f32 = 0.01;
-/// A cluster is compact if its squared radius is less than this share of its squared distance, and its axes are within
-/// `COMPACT_COSINE`.
+/// Threshold of a compact cluster of lights: its squared radius is below this share of its squared distance to the
+/// receiver, and its axes are within `COMPACT_COSINE`.
 const COMPACT_RADIUS2: f32 = 1.0 / 64.0;
-/// Cosine of the largest half angle of the axes of a compact cluster.
+/// Cosine of the largest half angle of the cone around the lights' axes in a compact cluster.
 const COMPACT_COSINE: f32 = 0.7;
 /// Index of a parent or a leaf that does not exist.
 const NONE: u32 = u32::MAX;
 
-/// The data of a cluster that selection needs, in one cache line.
+/// A cluster of lights in the tree, with the data that selection needs, in one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Node {
@@ -43,11 +44,11 @@ struct Node {
     cos_reach: f32,
     two_sided: bool,
     cosine: bool,
-    /// Index in [`LightTree::order`] of the first light of the cluster.
+    /// Index in [`LightTree::order`] of the first light of the cluster; the others follow.
     first: u32,
     /// Number of lights in the cluster.
     count: u32,
-    /// Index of the first child; the second one follows. 0 for a leaf.
+    /// Index of the node of the first child; the second child follows it. 0 for a leaf.
     children: u32,
     parent: u32,
 }
@@ -72,7 +73,8 @@ impl Node {
         }
     }
 
-    /// Whether a receiver sees all lights of the cluster at about the same distance and angle.
+    /// Whether a receiver (a point that receives light) sees all lights of the cluster at about the same distance and
+    /// angle.
     #[inline]
     fn is_compact(&self, at: &Receiver) -> bool {
         self.cos_spread > COMPACT_COSINE && self.radius2 < COMPACT_RADIUS2 * at.p.distance_squared(self.center)
@@ -117,12 +119,13 @@ fn subtract_angle(cos: f32, sin: f32, cos_by: f32, sin_by: f32) -> (f32, f32) {
     if cos >= cos_by { (1.0, 0.0) } else { (cos * cos_by + sin * sin_by, sin * cos_by - cos * sin_by) }
 }
 
-/// The tree over all lights at finite positions.
+/// A tree of clusters over all lights at finite positions.
 pub(super) struct LightTree {
     nodes: Vec<Node>,
     /// Indices of emitters, in the order of the leaves.
     order: Vec<u32>,
-    /// Cumulative intensity: for each index in `order`, the sum over the lights before; then the total.
+    /// Cumulative intensity of the lights (W/sr): for each index in `order`, the sum over the lights before; the last
+    /// entry is the total.
     below: Vec<f64>,
     /// Index of the leaf of each emitter; [`NONE`] for emitters outside the tree.
     leaves: Vec<u32>,
@@ -164,7 +167,7 @@ impl LightTree {
         Some(tree)
     }
 
-    /// Share of the light at index `k` of `order` in the intensity of the node that contains it.
+    /// Intensity of the light at index `k` of `order` over the intensity of the cluster that contains it, 0 to 1.
     #[inline]
     fn intensity_share(&self, k: usize, node: &Node) -> f32 {
         let sum = |first: usize, count: usize| self.below[first + count] - self.below[first];
@@ -173,7 +176,8 @@ impl LightTree {
         if all > 0.0 { (sum(k, 1) / all) as f32 } else { 0.0 }
     }
 
-    /// Selects a light of a node by intensity. Returns its emitter and its probability.
+    /// Selects a light of a cluster in proportion to intensity, by the uniform number `u`. Returns the index of its
+    /// emitter and its probability.
     #[inline]
     fn sample_by_intensity(&self, node: &Node, u: f64) -> (u32, f32) {
         let (start, end) = (node.first as usize, (node.first + node.count) as usize);
@@ -182,14 +186,14 @@ impl LightTree {
         (self.order[k], self.intensity_share(k, node))
     }
 
-    /// Approximate upper bound on the irradiance of all lights at a receiver (W/m2, luminance).
+    /// Approximate upper bound on the irradiance of all lights of the tree at a receiver (W/m2, luminance).
     #[inline]
     pub fn importance(&self, at: &Receiver) -> f32 {
         self.nodes[0].importance(at)
     }
 
-    /// Selects an emitter for a receiver. Returns its index and its probability; `None` if no light can reach the
-    /// receiver.
+    /// Selects an emitter for a receiver by the uniform number `u`. Returns its index and its probability; `None` if no
+    /// light of the tree can reach the receiver.
     #[inline]
     pub fn sample(&self, at: &Receiver, mut u: f64) -> Option<(usize, f32)> {
         let (mut node, mut pdf) = (&self.nodes[0], 1.0);
@@ -219,7 +223,7 @@ impl LightTree {
         (pdf > 0.0).then_some((emitter as usize, pdf))
     }
 
-    /// Probability with which [`LightTree::sample`] selects an emitter.
+    /// Probability with which [`LightTree::sample`] selects the emitter of this index at a receiver.
     #[inline]
     pub fn pdf(&self, at: &Receiver, emitter: usize) -> f32 {
         let mut node = self.leaves[emitter];
@@ -259,7 +263,7 @@ mod tests {
     use crate::math::{Rgb, Vec2, Vec4, warp};
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Triangles, points and spots of random orientation, in a box of 10 m.
+    /// Test lights: triangles, points and spots of random orientation, in a box of 10 m.
     fn lights(n: u64) -> Vec<Emitter> {
         let light = |i: u64| {
             let draws = |k: u64| Stream::new(4, k, Domain::Test, i).vertex(0);

@@ -16,13 +16,13 @@ fn look_up(texture: &Option<TextureRef>, surface: &Surface, textures: &[Texture]
     }
 }
 
-/// Clamps to `[0, 1]`; NaN becomes 0.
+/// Clamps a number to `[0, 1]`; NaN becomes 0.
 #[inline]
 fn unit(x: f32) -> f32 {
     if x > 0.0 { x.min(1.0) } else { 0.0 }
 }
 
-/// Clamps every channel to `[0, 1]`; NaN becomes 0.
+/// Clamps every channel of a colour to `[0, 1]`; NaN becomes 0.
 #[inline]
 pub(super) fn unit_color(c: Rgb) -> Rgb {
     Rgb::new(unit(c.x), unit(c.y), unit(c.z))
@@ -161,13 +161,13 @@ impl Material {
         frame
     }
 
-    /// Alpha: the product of the alphas of base colour, texture and vertex colour.
+    /// Alpha (opacity) at a surface point: the product of the alphas of base colour, texture and vertex colour.
     #[inline]
     pub fn alpha(&self, surface: &Surface, textures: &[Texture]) -> f32 {
         self.base_color[3] * surface.color.w * look_up(&self.base_color_texture, surface, textures).w
     }
 
-    /// Strength of the clear coat.
+    /// Strength of the clear coat at a surface point, 0 to 1.
     #[inline]
     pub fn coat(&self, surface: &Surface, textures: &[Texture]) -> f32 {
         unit(self.clearcoat) * unit(look_up(&self.clearcoat_texture, surface, textures).x)

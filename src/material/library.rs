@@ -7,19 +7,19 @@ use crate::math::Rgb;
 use crate::texture::{Texture, TextureRef};
 use std::sync::Arc;
 
-/// Perceptual roughness from which a lobe is too wide to focus light into caustics or to show reflections.
+/// Perceptual roughness from which on a lobe is too wide to focus light into caustics or to show reflections.
 pub const MAX_FOCUSING_ROUGHNESS: f32 = 0.45;
 
 /// The materials of a scene, and their textures.
 #[derive(Clone, Debug, Default)]
 pub struct Materials {
-    /// Materials. Their texture indices are valid.
+    /// The materials, by their index. Their texture indices are valid.
     pub list: Vec<Material>,
     /// Textures, which scenes may share.
     pub textures: Arc<[Texture]>,
 }
 
-/// Whether a lobe of this perceptual roughness is a delta lobe.
+/// Whether a lobe of this perceptual roughness is a delta lobe: a perfect mirror or clear interface.
 fn is_perfect(roughness: f32) -> bool {
     roughness * roughness < DELTA_ALPHA
 }
@@ -30,7 +30,7 @@ impl Material {
         self.unlit || self.emission.max_element() > 0.0
     }
 
-    /// Upper bound on the emitted radiance over all texels, without vertex colours.
+    /// Upper bound on the radiance that surfaces emit, over all texels, without vertex colours (W/sr/m2).
     pub fn brightest_emission(&self) -> Rgb {
         if self.unlit { Rgb::from_slice(&self.base_color[..3]) } else { self.emission }
     }
@@ -57,7 +57,7 @@ impl Material {
         }
     }
 
-    /// Whether light may be transmitted.
+    /// Whether surfaces of this material may transmit light.
     #[inline]
     pub fn transmits(&self) -> bool {
         self.transmission > 0.0
@@ -68,13 +68,13 @@ impl Material {
         self.transmits() && !self.thin
     }
 
-    /// Whether the base, without coats, may have a narrow lobe.
+    /// Whether the base, without coats, may have a narrow lobe (delta or sharp).
     fn has_narrow_base(&self) -> bool {
         let width = if self.is_solid_glass() { refraction_width(self.ior) } else { 1.0 };
         self.roughness * width.sqrt() < MAX_FOCUSING_ROUGHNESS || self.metallic_roughness_texture.is_some()
     }
 
-    /// Whether the material shows reflections: the base or the clear coat may have a narrow lobe.
+    /// Whether the material shows reflections: its base or its clear coat may have a narrow lobe (delta or sharp).
     pub fn is_glossy(&self) -> bool {
         self.has_narrow_base() || self.clearcoat > 0.0
     }
@@ -105,7 +105,7 @@ impl Material {
         self.has_narrow_base() && (self.transmission > 0.0 || self.metallic >= 0.5)
     }
 
-    /// The textures of the material.
+    /// References to the textures that the material uses.
     pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
         [
             self.base_color_texture,

@@ -27,19 +27,19 @@ pub enum Alpha {
 /// A glTF material. Factors multiply their textures.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// Name for messages.
+    /// Name of the material for messages.
     pub name: String,
-    /// Base colour and alpha.
+    /// Base colour (linear RGB) and alpha, 0 to 1.
     pub base_color: [f32; 4],
     /// Base colour texture (sRGB), alpha in its fourth channel.
     pub base_color_texture: Option<TextureRef>,
-    /// Metalness.
+    /// Metalness, 0 (dielectric) to 1 (metal).
     pub metallic: f32,
-    /// Perceptual roughness; the GGX alpha is its square.
+    /// Perceptual roughness, 0 to 1; the GGX alpha is its square.
     pub roughness: f32,
-    /// Roughness in G, metalness in B.
+    /// Texture with roughness in G and metalness in B.
     pub metallic_roughness_texture: Option<TextureRef>,
-    /// Tangent-space normals and their scale.
+    /// Texture of tangent-space normals, and the scale of their slopes.
     pub normal_texture: Option<(TextureRef, f32)>,
     /// Emitted radiance (W/sr/m2): factor times strength.
     pub emission: Rgb,
@@ -48,7 +48,7 @@ pub struct Material {
     pub spread: f32,
     /// Emission texture (sRGB).
     pub emission_texture: Option<TextureRef>,
-    /// Alpha mode.
+    /// How alpha decides whether rays hit the surface.
     pub alpha: Alpha,
     /// Whether back faces emit. Scattering always has two sides.
     pub double_sided: bool,
@@ -60,11 +60,11 @@ pub struct Material {
     pub unlit: bool,
     /// Index of refraction (KHR_materials_ior), at least 1; infinity for the extension's legacy 0.
     pub ior: f32,
-    /// Transmission (KHR_materials_transmission).
+    /// Share of light that the dielectric's base transmits, 0 to 1 (KHR_materials_transmission).
     pub transmission: f32,
-    /// Transmission texture, R.
+    /// Texture of the transmission, in R.
     pub transmission_texture: Option<TextureRef>,
-    /// Whether the mesh is a thin wall without refraction. Else it is the boundary of a solid.
+    /// Whether the mesh is a thin wall without refraction. Otherwise it is the boundary of a solid.
     pub thin: bool,
     /// Medium that fills the solid: absorption from KHR_materials_volume, or `extras.caustique.medium`.
     pub medium: Option<MediumParameters>,
@@ -72,37 +72,37 @@ pub struct Material {
     pub priority: i32,
     /// Whether the surface touches opaque surfaces without a film of air: paint, a label, a liquid.
     pub optical_contact: bool,
-    /// KHR_materials_specular strength.
+    /// Strength of the dielectric's specular reflection, 0 to 1 (KHR_materials_specular).
     pub specular: f32,
-    /// Texture of the specular strength, A.
+    /// Texture of the specular strength, in A.
     pub specular_texture: Option<TextureRef>,
-    /// KHR_materials_specular colour.
+    /// Colour of the dielectric's specular reflection at normal incidence (KHR_materials_specular).
     pub specular_color: Rgb,
     /// Texture of the specular colour (sRGB).
     pub specular_color_texture: Option<TextureRef>,
-    /// Strength of the clear coat (KHR_materials_clearcoat).
+    /// Strength of the clear coat, 0 to 1 (KHR_materials_clearcoat).
     pub clearcoat: f32,
-    /// Texture of the clear coat's strength, R.
+    /// Texture of the clear coat's strength, in R.
     pub clearcoat_texture: Option<TextureRef>,
-    /// Perceptual roughness of the clear coat.
+    /// Perceptual roughness of the clear coat, 0 to 1.
     pub clearcoat_roughness: f32,
-    /// Texture of the clear coat's roughness, G.
+    /// Texture of the clear coat's roughness, in G.
     pub clearcoat_roughness_texture: Option<TextureRef>,
     /// Sheen colour (KHR_materials_sheen).
     pub sheen_color: Rgb,
     /// Texture of the sheen colour (sRGB).
     pub sheen_color_texture: Option<TextureRef>,
-    /// Perceptual roughness of the sheen.
+    /// Perceptual roughness of the sheen, 0 to 1.
     pub sheen_roughness: f32,
-    /// Texture of the sheen's roughness, A.
+    /// Texture of the sheen's roughness, in A.
     pub sheen_roughness_texture: Option<TextureRef>,
-    /// Strength of the anisotropy (KHR_materials_anisotropy).
+    /// Strength of the anisotropy, 0 to 1 (KHR_materials_anisotropy).
     pub anisotropy: f32,
     /// Rotation of the direction of anisotropy against the tangent (rad, counter-clockwise).
     pub anisotropy_rotation: f32,
-    /// Texture of the anisotropy: direction in RG, strength in B.
+    /// Texture of the anisotropy: its direction in RG, its strength in B.
     pub anisotropy_texture: Option<TextureRef>,
-    /// KHR_materials_dispersion: 20 / Abbe number; 0 is none.
+    /// Dispersion, as 20 / Abbe number; 0 is none (KHR_materials_dispersion).
     pub dispersion: f32,
 }
 

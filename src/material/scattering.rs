@@ -8,7 +8,8 @@ use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4};
 use bumpalo::Bump;
 use std::sync::{Arc, OnceLock};
 
-/// Energy compensation tables, and the parts of all materials that do not depend on textures.
+/// The scattering of a scene's materials: energy compensation tables, and the parts of the materials that do not depend
+/// on textures.
 pub struct Scattering {
     tables: Arc<EnergyTables>,
     materials: Vec<PreparedMaterial>,
@@ -18,14 +19,15 @@ pub struct Scattering {
 /// large.
 struct PreparedMaterial {
     unlit: bool,
-    /// Whether there is neither a normal map nor anisotropy.
+    /// Whether the material has neither a normal map nor anisotropy.
     plain_frame: bool,
-    /// Base colour before the vertex colour, metalness and transmission; `None` if they have textures.
+    /// Base colour before the vertex colour, metalness and transmission of the material; `None` if they have textures.
     shares: Option<(Vec4, f32, f32)>,
-    /// Interface with empty space, and its relative index of refraction; `None` if textures affect the interface.
+    /// Relative index of refraction and interface of the material in empty space; `None` if textures affect the
+    /// interface.
     open: Option<(f32, Interface<'static>)>,
-    /// Interfaces with the solids of the scene, by decreasing relative index. Each is created when a path first needs
-    /// it, because few pairs of materials ever touch.
+    /// Relative index of refraction and interface of the material inside each of the scene's solids, by decreasing
+    /// index. Each is created when a path first needs it, because few pairs of materials ever touch.
     nested: Vec<(f32, OnceLock<Box<Interface<'static>>>)>,
 }
 
@@ -62,7 +64,7 @@ fn plain_interface(material: &Material, eta: f32, tables: &EnergyTables) -> Inte
     Interface::new(&material.parameters(&ANYWHERE, &[], eta), tables)
 }
 
-/// Sorts indices of refraction and removes duplicates.
+/// Sorts indices of refraction, and removes duplicates.
 fn distinct(indices: impl Iterator<Item = f32>) -> Vec<f32> {
     let mut indices: Vec<f32> = indices.collect();
     indices.sort_by(f32::total_cmp);
@@ -76,7 +78,8 @@ fn solids(materials: &[Material]) -> Vec<f32> {
 }
 
 impl EnergyTables {
-    /// Tables for all interfaces of these materials with empty space and with the solids among them.
+    /// Energy compensation tables for all interfaces of these materials with empty space and with the solids among
+    /// them.
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
         let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
         let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));
@@ -85,12 +88,12 @@ impl EnergyTables {
 }
 
 impl Scattering {
-    /// The scattering of a scene with these materials.
+    /// The scattering of a scene that has these materials.
     pub fn new(materials: &[Material]) -> Scattering {
         Scattering::with(Arc::new(EnergyTables::for_materials(materials)), materials)
     }
 
-    /// The scattering of the scene with other materials, with the same tables. All indices of refraction of the new
+    /// The scattering of this scene with other materials, with the present tables. All indices of refraction of the new
     /// materials must occur among the old ones.
     pub fn for_materials(&self, materials: &[Material]) -> Scattering {
         Scattering::with(Arc::clone(&self.tables), materials)
@@ -160,7 +163,7 @@ impl Scattering {
     }
 }
 
-/// Evaluation of textured materials. Not inlined, so that the code for untextured ones stays small.
+/// Evaluation of materials whose textures matter. Not inlined, so that the code for untextured ones stays small.
 impl Materials {
     #[inline(never)]
     fn shading_frame(&self, surface: &Surface) -> Frame {

@@ -12,14 +12,14 @@ pub fn orthonormal_basis(n: Vec3) -> (Vec3, Vec3) {
     (Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y))
 }
 
-/// A right-handed orthonormal frame; `n` is the local z axis.
+/// A right-handed orthonormal frame in world space; `n` is its z axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
-    /// Local x axis in world space.
+    /// The frame's x axis in world space, a unit vector.
     pub t: Vec3,
-    /// Local y axis in world space.
+    /// The frame's y axis in world space, a unit vector.
     pub b: Vec3,
-    /// Local z axis in world space.
+    /// The frame's z axis in world space, a unit vector.
     pub n: Vec3,
 }
 

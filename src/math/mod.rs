@@ -8,14 +8,14 @@ pub use frame::{Frame, orthonormal_basis};
 pub use glam::{Affine3A, DAffine3, DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, Mat3A, UVec2, Vec2, Vec3, Vec3A, Vec4};
 pub use rgb::{Rgb, is_lit, luminance};
 
-/// `x * x`.
+/// Square of a number.
 #[inline]
 pub fn sqr(x: f32) -> f32 {
     x * x
 }
 
-/// 1 - cos of the angle between two unit vectors. It is computed from the chord, because 1 minus a dot product loses
-/// all digits at small angles.
+/// 1 minus the cosine of the angle between two unit vectors. It is computed from the chord, because 1 minus a dot
+/// product loses all digits at small angles.
 #[inline]
 pub fn one_minus_cos(a: Vec3, b: Vec3) -> f32 {
     0.5 * (a - b).length_squared()

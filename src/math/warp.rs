@@ -4,8 +4,8 @@
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-/// Uniform point of the unit disc, area-preserving and continuous
-/// \[Shirley and Chiu 1997, "A Low Distortion Map Between Disk and Square"\]. Density 1/pi.
+/// Maps a point of the unit square to a uniform point of the unit disc (density 1/pi), area-preserving and continuous
+/// \[Shirley and Chiu 1997, "A Low Distortion Map Between Disk and Square"\].
 #[inline]
 pub fn disc_concentric(u: Vec2) -> Vec2 {
     let a = 2.0 * u.x - 1.0;
@@ -17,14 +17,14 @@ pub fn disc_concentric(u: Vec2) -> Vec2 {
     Vec2::new(r * phi.cos(), r * phi.sin())
 }
 
-/// Direction of the upper hemisphere (local z up) with density cos / pi.
+/// Maps a point of the unit square to a unit direction of the upper hemisphere (local z up), with density cos / pi.
 #[inline]
 pub fn hemisphere_cosine(u: Vec2) -> Vec3 {
     let d = disc_concentric(u);
     Vec3::new(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
 }
 
-/// Uniform direction of the sphere; density 1 / (4 pi).
+/// Maps a point of the unit square to a uniform unit direction of the sphere, with density 1 / (4 pi).
 #[inline]
 pub fn sphere_uniform(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
@@ -33,8 +33,8 @@ pub fn sphere_uniform(u: Vec2) -> Vec3 {
     Vec3::new(r * phi.cos(), r * phi.sin(), z)
 }
 
-/// Uniform direction of the cone of half angle `acos(1 - one_minus_cos)` around local z. Narrow cones (the sun) stay
-/// exact in f32 because the argument is `1 - cos`.
+/// Maps a point of the unit square to a uniform direction of the cone of half angle `acos(1 - one_minus_cos)` around
+/// local z. Narrow cones (the sun) stay exact in f32 because the argument is 1 minus the cosine.
 #[inline]
 pub fn cone_uniform(u: Vec2, one_minus_cos: f32) -> Vec3 {
     let h = u.x * one_minus_cos;
@@ -43,14 +43,14 @@ pub fn cone_uniform(u: Vec2, one_minus_cos: f32) -> Vec3 {
     Vec3::new(r * phi.cos(), r * phi.sin(), 1.0 - h)
 }
 
-/// Density of [`cone_uniform`] inside the cone.
+/// Density per solid angle of [`cone_uniform`] for directions inside the cone.
 #[inline]
 pub fn cone_uniform_pdf_w(one_minus_cos: f32) -> f32 {
     1.0 / (TAU * one_minus_cos)
 }
 
-/// Barycentric coordinates `(b1, b2)` of a uniform point of a triangle
-/// \[Heitz 2019, "A Low-Distortion Map Between Triangle and Square"\].
+/// Maps a point of the unit square to the barycentric coordinates `(b1, b2)` of a uniform point of a triangle \[Heitz
+/// 2019, "A Low-Distortion Map Between Triangle and Square"\].
 #[inline]
 pub fn triangle_uniform(u: Vec2) -> Vec2 {
     let (mut b0, mut b1);

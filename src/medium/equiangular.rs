@@ -4,7 +4,7 @@
 
 use crate::math::Vec3;
 
-/// Lower bound on the distance of the light from the ray, relative to its distance from the start of the segment. Below
+/// Lower bound on the distance of a light from the ray, relative to its distance from the start of the segment. Below
 /// it rounding errors dominate. The bound does not bias: sampling stays consistent, with a slightly worse density.
 const MIN_RELATIVE_OFFSET: f32 = 1e-4;
 
@@ -18,19 +18,19 @@ const SHORT_RATIO: f32 = 0.5;
 /// Equiangular sampling of a segment of a ray with respect to a point of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equiangular {
-    /// Distances from the ray's origin to the start and the end of the segment.
+    /// Distances (m) from the ray's origin to the start and the end of the segment.
     segment: [f32; 2],
-    /// Signed distance from the start of the segment to the point of the ray that is nearest to the light.
+    /// Signed distance (m) along the ray from the start of the segment to the ray's point that is nearest to the light.
     along: f32,
-    /// Distance of the light from the ray.
+    /// Distance of the light from the line of the ray (m).
     offset: f32,
-    /// Angle that the segment subtends at the light.
+    /// Angle that the segment subtends at the light (rad).
     angle: f32,
 }
 
 impl Equiangular {
-    /// Sampling of the ray from `origin` along the unit `direction` between the two distances in `segment`, of which
-    /// the second may be infinite. `None` if the segment subtends no angle at `light`.
+    /// Sampling of the segment of a ray from `origin` along the unit `direction` between the two distances in
+    /// `segment`, of which the second may be infinite. `None` if the segment subtends no angle at `light`.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3, segment: [f32; 2], light: Vec3) -> Option<Equiangular> {
         let to = light - (origin + direction * segment[0]);
@@ -43,20 +43,20 @@ impl Equiangular {
         (offset > 0.0 && angle > 0.0).then_some(Equiangular { segment, along, offset, angle })
     }
 
-    /// Whether the light is so near that its inverse squared distance varies far more than the light scattered over the
-    /// distance `length`.
+    /// Whether the light is so near to the segment that its inverse squared distance varies far more than the light
+    /// scattered over the distance `length` (m).
     #[inline]
     pub fn is_near(&self, length: f32) -> bool {
         self.offset < NEAR_RATIO * length
     }
 
-    /// Whether the segment is so short that samples of the whole distance `length` would rarely be on it.
+    /// Whether the segment is so short that samples of the whole distance `length` (m) would rarely be on it.
     #[inline]
     pub fn is_short(&self, length: f32) -> bool {
         self.segment[1] - self.segment[0] < SHORT_RATIO * length
     }
 
-    /// Samples a distance from the ray's origin.
+    /// Samples a distance (m) from the ray's origin to a point of the segment, by the uniform number `u`.
     #[inline]
     pub fn sample(&self, u: f32) -> f32 {
         let (sin, cos) = (u * self.angle).sin_cos();
@@ -64,7 +64,7 @@ impl Equiangular {
         (self.segment[0] + from).min(self.segment[1])
     }
 
-    /// Density per length with which [`Equiangular::sample`] draws `distance` \[equation (6)\].
+    /// Density per length (1/m) with which [`Equiangular::sample`] draws `distance` \[equation (6)\].
     #[inline]
     pub fn pdf(&self, distance: f32) -> f32 {
         let [start, end] = self.segment;

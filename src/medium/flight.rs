@@ -11,30 +11,31 @@
 use super::{Equiangular, MediumParameters};
 use crate::math::{Rgb, Vec2, is_lit};
 
-/// A sampled collision of a ray with a medium.
+/// A sampled collision of a ray with a medium: the point where the ray scatters or is absorbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision {
-    /// Distance from the origin of the ray.
+    /// Distance from the origin of the ray (m).
     pub distance: f32,
     /// Transmittance up to the collision, over its density per length.
     pub weight: Rgb,
 }
 
-/// The outcome of free-flight sampling.
+/// The outcome of free-flight sampling: whether the ray collides with the medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FlightOutcome {
-    /// The ray reaches its end. The weight is the transmittance over the probability of this outcome.
+    /// The ray reaches its end without a collision. The weight is the transmittance over the probability of this
+    /// outcome.
     Passed(Rgb),
     /// The ray collides with the medium.
     Collided(Collision),
 }
 
-/// Added to uniform numbers, which are multiples of 2^-24, so that no distance is zero.
+/// Offset that is added to uniform numbers, which are multiples of 2^-24, so that no sampled distance is zero.
 const HALF_STEP: f32 = 0.5 / 16_777_216.0;
 
 impl MediumParameters {
-    /// Samples the free flight of a ray with `throughput` over at most `distance`, which may be infinite. `u` is
-    /// uniform on the unit square.
+    /// Samples the free flight in the medium of a ray with `throughput` over at most `distance` (m), which may be
+    /// infinite. `u` is uniform on the unit square.
     #[inline]
     pub fn sample_flight(&self, throughput: Rgb, distance: f32, u: Vec2) -> FlightOutcome {
         let sigma = self.sigma_t();
@@ -64,20 +65,22 @@ impl MediumParameters {
     }
 }
 
-/// The distribution of scattering points on a ray, with channels in proportion to the light that they scatter.
+/// The distribution of scattering points on a ray in a medium, with colour channels drawn in proportion to the light
+/// that they scatter.
 #[derive(Clone, Copy, Debug)]
 pub struct CollisionDistribution<'m> {
     medium: &'m MediumParameters,
-    /// Length of the ray.
+    /// Length of the ray (m); may be infinite.
     distance: f32,
     /// Probability of a collision on the whole ray, per channel: one minus the transmittance.
     collided: Rgb,
-    /// Probabilities of the channels.
+    /// Probability with which each channel is drawn; they sum to 1.
     share: Rgb,
 }
 
 impl CollisionDistribution<'_> {
-    /// Samples a scattering point; `u` is uniform on the unit square.
+    /// Samples a scattering point of the ray; `u` is uniform on the unit square. `None` if its distance or weight is
+    /// not finite.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<Collision> {
         let sigma_t = sample_channel(self.medium.sigma_t(), self.share, u.x);
@@ -87,7 +90,7 @@ impl CollisionDistribution<'_> {
         self.at(t, self.pdf(t))
     }
 
-    /// Samples a scattering point equiangularly with respect to a light.
+    /// Samples a scattering point of the ray equiangularly with respect to a light.
     #[inline]
     pub fn sample_equiangular(&self, light: &Equiangular, u: f32) -> Option<Collision> {
         let t = light.sample(u + HALF_STEP).min(self.distance);
@@ -100,7 +103,7 @@ impl CollisionDistribution<'_> {
         (distance.is_finite() && weight.is_finite()).then_some(Collision { distance, weight })
     }
 
-    /// Density per length with which [`CollisionDistribution::sample`] draws `distance`.
+    /// Density per length (1/m) with which [`CollisionDistribution::sample`] draws `distance`.
     #[inline]
     pub fn pdf(&self, distance: f32) -> f32 {
         // Exponential densities of the channels, normalized on the length of the ray.
@@ -115,7 +118,7 @@ fn exp_m1(x: f32) -> f32 {
     x.exp_m1()
 }
 
-/// Probabilities of the channels in proportion to `of`; equal if `of` is zero or not finite.
+/// Probabilities of the three colour channels in proportion to `of`; equal if `of` is zero or not finite.
 #[inline]
 fn shares(of: Rgb) -> Rgb {
     let sum = of.element_sum();
@@ -135,14 +138,14 @@ fn sample_channel(of: Rgb, share: Rgb, u: f32) -> f32 {
     }
 }
 
-/// Free-flight densities of a path segment in both directions, with equal probabilities of the channels. A density is
-/// per length if the segment ends at a vertex of a scattering medium in that direction. Else it is the probability of
-/// passing.
+/// Densities of the free flight along a path segment in both directions, with equal probabilities of the colour
+/// channels. A density is per length if the segment ends at a vertex of a scattering medium in that direction.
+/// Otherwise it is the probability of passing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlightDensity {
-    /// Density from the start to the end.
+    /// Density (or probability of passing) from the start of the segment to its end.
     pub forward: f32,
-    /// Density from the end to the start.
+    /// Density (or probability of passing) from the end of the segment to its start.
     pub reverse: f32,
 }
 
@@ -150,8 +153,8 @@ impl FlightDensity {
     /// The densities of a segment without scattering media.
     pub const ONE: FlightDensity = FlightDensity { forward: 1.0, reverse: 1.0 };
 
-    /// The densities of the segment extended by `distance` in `medium`. `starts` and `ends`: the start or end of the
-    /// segment is a vertex of this medium.
+    /// The densities of the segment extended by `distance` (m) in `medium`. `starts` and `ends`: the start or end of
+    /// the segment is a vertex in this medium.
     #[must_use]
     #[inline]
     pub fn through(self, medium: &MediumParameters, distance: f32, starts: bool, ends: bool) -> FlightDensity {

@@ -10,14 +10,14 @@ pub use phase::HenyeyGreenstein;
 
 use crate::math::Rgb;
 
-/// The parameters of a homogeneous medium.
+/// The parameters of a homogeneous participating medium.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct MediumParameters {
     /// Absorption coefficient (1/m).
     pub sigma_a: Rgb,
     /// Scattering coefficient (1/m).
     pub sigma_s: Rgb,
-    /// Henyey-Greenstein asymmetry, in (-1, 1).
+    /// Asymmetry of the Henyey-Greenstein phase function, in (-1, 1); positive values scatter forward.
     pub g: f32,
 }
 
@@ -34,13 +34,13 @@ impl MediumParameters {
         self.sigma_s.max_element() > 0.0
     }
 
-    /// The phase function.
+    /// The phase function of the medium.
     #[inline]
     pub fn phase(&self) -> HenyeyGreenstein {
         HenyeyGreenstein { g: self.g }
     }
 
-    /// Transmittance over `distance` \[Beer-Lambert\], which may be infinite.
+    /// Transmittance per channel (0 to 1) over `distance` (m), which may be infinite \[Beer-Lambert\].
     #[inline]
     pub fn transmittance(&self, distance: f32) -> Rgb {
         let through = |sigma: f32| if sigma > 0.0 { (-sigma * distance).exp() } else { 1.0 };

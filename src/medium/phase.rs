@@ -38,7 +38,8 @@ impl HenyeyGreenstein {
         Frame::from_normal(ahead).to_world(Vec3::new(sin * c, sin * s, 1.0 - h)).normalize()
     }
 
-    /// The function as a forward-scattering one: the absolute asymmetry, and the direction that is forward.
+    /// The phase function rewritten with an asymmetry that is not negative: the absolute asymmetry, and the direction
+    /// that is then forward.
     #[inline]
     fn forward(&self, wo: Vec3) -> (f32, Vec3) {
         (self.g.abs(), if self.g < 0.0 { wo } else { -wo })

@@ -40,26 +40,26 @@ use crate::bsdf::LobeSet;
 use serde::{Deserialize, Serialize};
 use std::ops::BitAnd;
 
-/// The kind of scattering at a vertex of a path.
+/// How light is scattered at one vertex of a path: the letter of the vertex in Heckbert's notation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A perfect mirror or clear glass and nothing else.
+    /// Scattering at a surface that is only a perfect mirror or only clear glass.
     Clear,
-    /// The perfect mirror or clear interface of a surface that has other lobes.
+    /// Scattering by the perfect mirror or clear interface of a surface that also has other lobes, such as a coat.
     Mirror,
-    /// A sharp lobe.
+    /// Scattering by a sharp lobe: glossy, and too narrow to gather photons.
     Sharp,
-    /// A broad lobe.
+    /// Scattering by a broad lobe, such as diffuse reflection, where photons can be gathered.
     Broad,
-    /// A medium.
+    /// Scattering in a participating medium.
     Medium,
 }
 
 impl Event {
-    /// All kinds.
+    /// All kinds of scattering at a vertex.
     pub const ALL: [Event; 5] = [Event::Clear, Event::Mirror, Event::Sharp, Event::Broad, Event::Medium];
 
-    /// The event if a surface with `lobes` scatters by `lobe`.
+    /// The kind of scattering at a vertex on a surface that has `lobes` and scatters by `lobe`.
     #[inline]
     pub fn at_surface(lobe: LobeSet, lobes: LobeSet) -> Event {
         if lobe.intersects(LobeSet::BROAD) {
@@ -73,7 +73,8 @@ impl Event {
         }
     }
 
-    /// The event at a surface with `lobes` that scatters by `lobe`, or in a medium, which has no lobes.
+    /// The kind of scattering at a vertex: on a surface that has `lobes` and scatters by `lobe`, or in a medium if
+    /// `lobes` is `None`.
     #[inline]
     pub fn at_vertex(lobe: LobeSet, lobes: Option<LobeSet>) -> Event {
         lobes.map_or(Event::Medium, |lobes| Event::at_surface(lobe, lobes))
@@ -85,7 +86,8 @@ impl Event {
     }
 }
 
-/// A class of light paths; see the table in `plan/class.rs`.
+/// A class of light paths by the events at their vertices; every path is in exactly one class of the table in
+/// `plan/class.rs`.
 #[allow(missing_docs, reason = "the table says it")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum PathClass {
@@ -105,23 +107,25 @@ pub enum PathClass {
     Volume,
 }
 
-/// An additive part of the picture; each has a layer.
+/// A part of the picture that comes from some of the path classes and has a layer of its own. The parts add up to the
+/// picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Lights seen directly or through perfect mirrors and clear glass.
     Emission,
     /// Direct light at the first surface that is neither a perfect mirror nor clear glass.
     Direct,
-    /// Light focused by mirrors and glass.
+    /// Light focused by mirrors and glass (caustics).
     Caustic,
-    /// All other light from surfaces.
+    /// All other light from surfaces: indirect light and reflections.
     Indirect,
-    /// Light whose first vertex from the camera, apart from perfect mirrors and clear glass, is in a medium.
+    /// Light whose first scattering event seen from the camera, apart from perfect mirrors and clear glass, is in a
+    /// participating medium.
     Volume,
 }
 
 impl PathClass {
-    /// All classes.
+    /// All path classes, in the order of the table.
     pub const ALL: [PathClass; 14] = [
         PathClass::Emission,
         PathClass::Direct,
@@ -139,12 +143,13 @@ impl PathClass {
         PathClass::Volume,
     ];
 
-    /// The class of a whole path, given by its events from the camera to a light. `sizeless`: it is a delta light.
+    /// The class of a whole light path, given by its scattering events in the order from the camera to the light.
+    /// `sizeless`: the light is a delta light.
     pub fn of(events: impl IntoIterator<Item = Event>, sizeless: bool) -> PathClass {
         events.into_iter().fold(CameraSuffix::START, CameraSuffix::then).class_at_light(sizeless)
     }
 
-    /// The part of the picture that the class belongs to.
+    /// The part (layer) of the picture to which paths of the class contribute.
     #[inline]
     pub fn part(self) -> Part {
         use PathClass as C;
@@ -158,7 +163,7 @@ impl PathClass {
         }
     }
 
-    /// The effect that the class belongs to.
+    /// The effect of light transport, such as *caustic*, that paths of the class show.
     pub fn effect(self) -> Effect {
         use PathClass as C;
         match self {
@@ -174,55 +179,55 @@ impl PathClass {
     }
 }
 
-/// A set of path classes.
+/// A set of path classes, one bit per class.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClassSet(u16);
 
 impl ClassSet {
-    /// Every class.
+    /// The set of all path classes.
     pub const ALL: ClassSet = ClassSet((1 << PathClass::ALL.len()) - 1);
-    /// No class.
+    /// The empty set.
     pub const NONE: ClassSet = ClassSet(0);
 
-    /// The classes of an effect.
+    /// The path classes that show an effect.
     pub fn of(effect: Effect) -> ClassSet {
         PathClass::ALL.into_iter().filter(|class| class.effect() == effect).collect()
     }
 
-    /// The classes that belong to none of the effects.
+    /// The path classes that show none of the effects.
     pub fn without(effects: EffectSet) -> ClassSet {
         PathClass::ALL.into_iter().filter(|class| !effects.has(class.effect())).collect()
     }
 
-    /// The set of one class.
+    /// The set that contains one path class alone.
     #[inline]
     pub const fn one(class: PathClass) -> ClassSet {
         ClassSet(1 << class as u16)
     }
 
-    /// The classes that are not in the set.
+    /// The path classes that are not in the set.
     pub const fn complement(self) -> ClassSet {
         ClassSet(ClassSet::ALL.0 & !self.0)
     }
 
-    /// The classes in either set.
+    /// The path classes that are in one of the two sets or in both.
     #[inline]
     pub const fn and(self, other: ClassSet) -> ClassSet {
         ClassSet(self.0 | other.0)
     }
 
-    /// Whether the set contains a class.
+    /// Whether the set contains a path class.
     #[inline]
     pub const fn has(self, class: PathClass) -> bool {
         self.0 & 1 << class as u16 != 0
     }
 
-    /// Whether the set contains a class of a part.
+    /// Whether the set contains any path class of a part (layer) of the picture.
     pub fn has_part(self, part: Part) -> bool {
         PathClass::ALL.into_iter().any(|class| self.has(class) && class.part() == part)
     }
 
-    /// Whether the set contains every class.
+    /// Whether the set contains every path class.
     #[inline]
     pub const fn is_all(self) -> bool {
         self.0 == ClassSet::ALL.0
@@ -249,13 +254,14 @@ impl FromIterator<PathClass> for ClassSet {
     }
 }
 
-/// The classes of the effect *glossy*.
+/// The path classes of the effect *glossy*: reflections in narrow lobes, apart from caustics.
 fn glossy() -> ClassSet {
     ClassSet::of(Effect::Glossy)
 }
 
 impl Switches {
-    /// The path classes that are not switched off. Other effects are switched off by removing them from the scene.
+    /// The path classes whose effects the user has not switched off. Effects that are not path classes are switched off
+    /// by removing them from the scene.
     pub fn classes(self) -> ClassSet {
         ClassSet::without(self.off.classes())
     }

@@ -3,14 +3,14 @@
 use serde::{Serialize, Serializer};
 use std::str::FromStr;
 
-/// An effect that a scene may call for and a render may simulate.
+/// An effect of light transport that a scene may call for and a render may simulate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effect {
-    /// Visible lights.
+    /// Lights that the camera sees, directly or through perfect mirrors and clear glass.
     Emission,
-    /// Light that one surface scatters between the light and the camera.
+    /// Light that exactly one surface scatters between the light and the camera.
     Direct,
-    /// Light that several surfaces scatter.
+    /// Light that several surfaces scatter between the light and the camera.
     Indirect,
     /// Reflections in narrow lobes, except perfect mirrors, clear glass and caustics.
     Glossy,
@@ -18,22 +18,22 @@ pub enum Effect {
     Caustic,
     /// Caustics seen through glass or in a mirror: specular, diffuse, specular.
     Sds,
-    /// Absorption and scattering in media.
+    /// Absorption and scattering in participating media.
     Volume,
     /// Refraction that depends on the wavelength.
     Dispersion,
-    /// Blur outside the camera's focus.
+    /// Depth of field: blur outside the camera's focus.
     DepthOfField,
-    /// Light from an environment.
+    /// Light from an environment (sky) at infinity.
     Environment,
-    /// Cut-outs and blending.
+    /// Surfaces that are cut out or blended by alpha.
     Alpha,
-    /// Textures.
+    /// Textures of materials.
     Textures,
 }
 
 impl Effect {
-    /// All effects, in the order of lists.
+    /// All effects, in the order in which lists print them.
     pub const ALL: [Effect; 12] = [
         Effect::Emission,
         Effect::Direct,
@@ -67,8 +67,8 @@ impl Effect {
         }
     }
 
-    /// Whether the effect is a set of path classes. The other effects are properties of the scene: to remove one
-    /// changes the scene.
+    /// Whether the effect is made of path classes, which a render can leave out. Other effects are properties of the
+    /// scene: to remove one changes the scene.
     pub fn is_class(self) -> bool {
         self <= Effect::Sds
     }
@@ -92,7 +92,7 @@ impl FromStr for Effect {
     }
 }
 
-/// A set of effects.
+/// A set of effects, one bit per effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EffectSet(u16);
 
@@ -115,7 +115,7 @@ impl EffectSet {
         Effect::ALL.into_iter().filter(move |effect| self.has(*effect))
     }
 
-    /// The effects of the set that are path classes.
+    /// The effects of the set that are made of path classes ([`Effect::is_class`]).
     pub fn classes(self) -> EffectSet {
         self.iter().filter(|effect| effect.is_class()).collect()
     }
@@ -127,13 +127,13 @@ impl FromIterator<Effect> for EffectSet {
     }
 }
 
-/// The value of `--effects`, such as `-dispersion,+volume`.
+/// The value of the option `--effects`, such as `-dispersion,+volume`: effects that the user switches off or expects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Switches {
-    /// Effects to leave out.
+    /// Effects that the render leaves out, given with a minus sign.
     pub off: EffectSet,
-    /// Effects that the user expects. The plan simulates every effect of the scene anyway, and warns if one of these is
-    /// not in the scene.
+    /// Effects that the user expects in the scene, given with a plus sign. The plan simulates every effect of the scene
+    /// anyway, and warns if one of these is not in the scene.
     pub on: EffectSet,
 }
 

@@ -24,66 +24,69 @@ use crate::scene::Scene;
 use serde::Serialize;
 use switch::Removed;
 
-/// One effect of a plan.
+/// An effect in a plan: whether it is in the scene, whether the render simulates it, and its share of light and cost.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectPlan {
-    /// The effect.
+    /// The effect of light transport, such as *caustic*.
     #[serde(rename = "name")]
     pub effect: Effect,
-    /// Whether the scene calls for the effect.
+    /// Whether the scene calls for the effect: some material, light or the like needs it.
     pub present: bool,
     /// Whether the render simulates the effect.
     pub simulated: bool,
-    /// Names of the materials, lights and so on that call for the effect.
+    /// Names of the materials, lights and so on that call for the effect; empty if none does.
     pub because: Vec<String>,
-    /// The techniques that carry the effect, if it is simulated.
+    /// The techniques that carry the light of the effect, in words; `None` if it is not simulated.
     pub by: Option<&'static str>,
-    /// Share of the effect in the picture's light, 0 to 1; `None` if no pilot has measured it.
+    /// Share of the picture's light that the effect brings, 0 to 1; `None` if no pilot (a small test render) has
+    /// measured it.
     pub energy: Option<f64>,
-    /// Core-seconds that an iteration without the effect would save; `None` if no pilot has counted them.
+    /// Core-seconds per iteration that a render would save without the effect; `None` if no pilot (a small test render)
+    /// has counted them.
     pub seconds_per_iteration: Option<f64>,
-    /// `seconds_per_iteration` over the core-seconds of an iteration, 0 to 1.
+    /// `seconds_per_iteration` over the core-seconds of a whole iteration, 0 to 1; `None` if no pilot has counted them.
     pub time: Option<f64>,
-    /// Relative error (the root of relMSE) of a picture without the effect; `None` if no pilot has measured it.
+    /// Relative error (the root of relMSE) that a picture has without the effect; `None` if no pilot has measured it.
     pub error_if_off: Option<f64>,
 }
 
-/// The effects that a render simulates or leaves out, and why.
+/// The plan of a render: the effects that it simulates or leaves out, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
-    /// The scene's file.
+    /// Path of the scene file, as text.
     pub scene: String,
-    /// Name of the method.
+    /// Name of the rendering method.
     pub method: String,
-    /// Why the method was chosen.
+    /// Why the method was chosen, in words.
     pub because: String,
-    /// All effects, in the order of [`Effect::ALL`].
+    /// One entry for each effect, in the order of [`Effect::ALL`].
     pub effects: Vec<EffectPlan>,
-    /// Upper bound on the relative error (the root of relMSE) from missing light: 0 if all effects are simulated.
-    /// `None` if some are left out, whose light has no bound ([`EffectPlan::error_if_off`] is a measurement).
+    /// Upper bound on the relative error (the root of relMSE) of the picture that is due to effects left out: 0 if all
+    /// effects are simulated. `None` if some are left out, whose light has no bound ([`EffectPlan::error_if_off`] is a
+    /// measurement).
     pub left_out_at_most: Option<f64>,
     /// Missing effects and likely mistakes in the scene, each with a remedy. Warnings from reading and building the
     /// scene are in [`Scene::warnings`].
     pub warnings: Vec<String>,
-    /// Explanation in case the whole picture is black; empty if a warning of the scene already explains it.
+    /// Explanation to print if the whole picture turns out black; empty if a warning of the scene already explains it.
     #[serde(skip)]
     pub reason_if_black: String,
 }
 
-/// The render that a plan is made for.
+/// The render for which a plan is made, except its scene and camera.
 #[derive(Clone, Copy, Debug)]
 pub struct PlanRequest<'a> {
-    /// The method's name.
+    /// Name of the rendering method.
     pub method: &'a str,
-    /// Why the method was chosen.
+    /// Why the method was chosen, in words.
     pub because: &'a str,
-    /// Techniques of the method.
+    /// Combination of techniques by which the method finds light.
     pub search: Search,
-    /// Maximum length of a light path in segments.
+    /// Maximum length of a light path in segments; `None` is no limit.
     pub max_depth: Option<u32>,
-    /// Effects that the user switches off or asks for.
+    /// Effects that the user switches off or expects.
     pub switches: Switches,
-    /// Effects that were removed from the scene because of `switches`.
+    /// Effects that were removed from the scene because of `switches`, with what called for them.
     pub removed: &'a Removed,
 }
 
@@ -137,7 +140,7 @@ impl Plan {
         }
     }
 
-    /// The plan of one effect.
+    /// The plan's entry for an effect.
     pub fn effect(&self, effect: Effect) -> &EffectPlan {
         &self.effects[effect as usize]
     }
@@ -156,7 +159,7 @@ fn depth_warning(most: u32, effects: &[EffectPlan], scene: &Scene) -> String {
     }
 }
 
-/// Number of segments of the shortest path that shows an effect.
+/// Number of segments of the shortest path, from the light to the camera, that shows an effect.
 fn min_depth(effect: Effect, scene: &Scene) -> u32 {
     match effect {
         Effect::Direct | Effect::Glossy => 2,

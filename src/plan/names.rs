@@ -5,9 +5,9 @@ use crate::material::Material;
 use crate::scene::Scene;
 use std::collections::HashSet;
 
-/// Maximum number of names on a line; the others are counted.
+/// Maximum number of names on a line of a message; the others are counted.
 const MAX_NAMES: usize = 3;
-/// Maximum number of reasons in a list; the others are counted.
+/// Maximum number of reasons in a list of a message; the others are counted.
 const MAX_REASONS: usize = 4;
 
 /// Lists names, at most [`MAX_NAMES`] of them: `a, b, c and 12 more`.
@@ -16,7 +16,7 @@ pub(super) fn truncate_names(names: &[String]) -> String {
     if names.len() > MAX_NAMES { format!("{shown} and {} more", names.len() - MAX_NAMES) } else { shown }
 }
 
-/// Keeps at most [`MAX_REASONS`] reasons, and appends the number of the others.
+/// Keeps at most [`MAX_REASONS`] reasons for an effect, and appends the number of the others.
 pub(super) fn truncate_reasons(mut reasons: Vec<String>) -> Vec<String> {
     let more = reasons.len().saturating_sub(MAX_REASONS);
     if more > 0 {
@@ -26,10 +26,10 @@ pub(super) fn truncate_reasons(mut reasons: Vec<String>) -> Vec<String> {
     reasons
 }
 
-/// A material and the objects that use it.
+/// A material and the objects of the scene that use it, for messages.
 pub(super) struct UsedMaterial<'a> {
     pub(super) material: &'a Material,
-    /// Quoted names, each once, in the scene's order.
+    /// Quoted names of the objects, each once, in the scene's order.
     pub(super) objects: Vec<String>,
 }
 
@@ -40,7 +40,7 @@ impl UsedMaterial<'_> {
     }
 }
 
-/// The materials that `instances` use, each given by the index of its material and the name of its object.
+/// The materials that `instances` use; each item is the index of a material and the name of an object with it.
 pub(super) fn used_materials<'a>(
     materials: &'a [Material],
     instances: impl Iterator<Item = (u32, &'a str)>,
@@ -62,7 +62,7 @@ pub(super) fn used_in_scene(scene: &Scene) -> Vec<UsedMaterial<'_>> {
     used_materials(&scene.materials.list, scene.shapes.instances.iter().map(|i| (i.material, i.name.as_str())))
 }
 
-/// Names of the lights with power that satisfy `which`; each emissive object is listed once.
+/// Names of the lights that have power and satisfy `which`; each emissive object is listed once.
 pub(super) fn lights(scene: &Scene, which: impl Fn(&Emitter) -> bool) -> Vec<String> {
     let sky = scene.lights.sky();
     let mut known = HashSet::new();

@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::material::{Alpha, Material};
 use crate::scene::Scene;
 
-/// For each effect, the names of the materials, lights and so on that call for it.
+/// The effects that a scene calls for: for each effect, the names of the materials, lights and so on that need it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Presence {
     because: [Vec<String>; Effect::ALL.len()],
@@ -63,12 +63,12 @@ impl Presence {
     }
 }
 
-/// The medium outside all solids, as a reason.
+/// Name of the medium outside all solids, as a reason why a scene calls for an effect.
 pub(super) const SPACE: &str = "the scene's medium";
-/// The environment, as a reason.
+/// Name of the environment, as a reason why a scene calls for an effect.
 pub(super) const ENVIRONMENT: &str = "the environment";
 
-/// The materials that call for an effect, if the effect is a property of materials.
+/// Names of the materials in `used` that call for an effect; empty if the effect is not a property of materials.
 pub(super) fn material_reasons(effect: Effect, used: &[UsedMaterial]) -> Vec<String> {
     let calls: fn(&Material) -> bool = match effect {
         Effect::Volume => |material| material.is_solid_glass() && material.medium.is_some(),

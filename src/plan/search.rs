@@ -13,27 +13,27 @@ pub enum Search {
     LightPaths,
     /// Camera and light paths, connected to each other.
     Connections,
-    /// Camera paths that gather photons of a single map, on surfaces.
+    /// Camera paths that gather photons of a single map, on surfaces alone.
     Map,
     /// Camera paths that gather photons, on surfaces and in media.
     Photons,
-    /// Camera paths, connected to lights, that gather photons of caustics.
+    /// Camera paths, connected to lights, that gather only the photons of caustics.
     PathsAndPhotons,
-    /// Camera and light paths, merged on surfaces.
+    /// Camera and light paths, merged where their vertices are near each other on surfaces.
     Merging,
-    /// Camera and light paths, connected to each other and merged.
+    /// Camera and light paths, connected to each other, and merged at nearby points.
     ConnectionsAndMerging,
 }
 
-/// The techniques that carry the light of a path class: one, or several whose MIS weights sum to one.
+/// The techniques that carry the light of a path class: one technique, or several whose MIS weights sum to one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Owner {
-    /// Camera paths that hit lights.
+    /// Camera paths that hit lights by chance.
     Hits,
-    /// Next-event estimation, and camera paths that hit lights. For hits by way of a sharp lobe and then mirrors or
-    /// clear glass, also photons of caustics.
+    /// Next-event estimation, and camera paths that hit lights. If a path reaches the light by way of a sharp lobe and
+    /// then mirrors or clear glass, also photons of caustics.
     Lit,
-    /// Photons, gathered or merged.
+    /// Photons, gathered by or merged with camera paths.
     Photons,
     /// Light paths, connected to the camera.
     LightPaths,
@@ -42,7 +42,7 @@ pub enum Owner {
 }
 
 impl Search {
-    /// The techniques that carry the light of a class; `None` if the method misses it.
+    /// The techniques that carry the light of a path class; `None` if the method does not find this light.
     pub fn owner(self, class: PathClass) -> Option<Owner> {
         use PathClass as C;
         Some(match (self, class) {
@@ -60,7 +60,7 @@ impl Search {
         })
     }
 
-    /// The classes whose light `owner` carries.
+    /// The path classes whose light the techniques `owner` carry.
     pub fn owned_by(self, owner: Owner) -> ClassSet {
         PathClass::ALL.into_iter().filter(|class| self.owner(*class) == Some(owner)).collect()
     }
@@ -82,7 +82,7 @@ impl Search {
         }
     }
 
-    /// The techniques that carry an effect, in words.
+    /// The techniques that carry the light of an effect, in words for the user.
     pub(super) fn carrier(self, effect: Effect, scene: &Scene) -> &'static str {
         let media_scatter = scene.survey.scattering;
         // Reflections of lights in sharp lobes are shared with the photons of caustics, if there are any.

@@ -11,24 +11,25 @@ use crate::scene::{Description, Scene};
 use crate::texture::{Integers, Texels, Texture, TextureRef};
 use std::sync::Arc;
 
-/// The removed effects, each with the names of the materials and so on that called for it.
+/// The effects that were removed from a scene, each with the names of the materials and so on that called for it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Removed(Vec<(Effect, Vec<String>)>);
 
 impl Removed {
-    /// Names of the materials and so on that called for a removed effect.
+    /// Names of the materials and so on that called for the effect before its removal; empty if it was not removed.
     pub fn because(&self, effect: Effect) -> &[String] {
         self.0.iter().find(|(removed, _)| *removed == effect).map_or(&[], |(_, because)| because)
     }
 }
 
-/// Removes the effects that are properties of the scene, not path classes, from its description.
+/// Removes from a scene's description the effects that are properties of the scene; effects made of path classes stay.
 pub fn remove_effects(description: &mut Description, effects: EffectSet) -> Removed {
     let properties = effects.iter().filter(|effect| !effect.is_class());
     Removed(properties.map(|effect| (effect, remove_effect(description, effect))).collect())
 }
 
-/// Removes an effect from a description. Returns the names of the materials and so on that called for it.
+/// Removes one effect from a description. Returns the names of the materials and so on that called for it; empty if
+/// none did.
 fn remove_effect(description: &mut Description, effect: Effect) -> Vec<String> {
     let instances = description.instances.iter().map(|placed| (placed.material, placed.name.as_str()));
     let mut because = material_reasons(effect, &used_materials(&description.materials, instances));
@@ -51,7 +52,7 @@ fn remove_effect(description: &mut Description, effect: Effect) -> Vec<String> {
     truncate_reasons(because)
 }
 
-/// A copy of the scene without an effect, as [`remove_effects`] removes it from the description. Unchanged data are
+/// A copy of the scene without one effect, as [`remove_effects`] removes it from the description. Unchanged data are
 /// shared. For depth of field, see [`crate::camera::Camera::without_lens`].
 ///
 /// # Errors
@@ -65,7 +66,7 @@ pub fn without_effect(scene: &Scene, effect: Effect) -> Result<Scene> {
     scene.with_materials(Materials { list, textures }, medium, environment)
 }
 
-/// Removes an effect from materials. Returns the remaining textures if they change.
+/// Removes an effect from materials. Returns the scene's new list of textures if it changes, otherwise `None`.
 fn remove_from_materials(effect: Effect, materials: &mut [Material], textures: &[Texture]) -> Option<Vec<Texture>> {
     match effect {
         Effect::Volume => materials.iter_mut().for_each(|material| material.medium = None),
@@ -77,7 +78,8 @@ fn remove_from_materials(effect: Effect, materials: &mut [Material], textures: &
     None
 }
 
-/// Replaces every texture by its mean. Returns the textures that cut-outs need.
+/// Replaces every texture of the materials by its mean. Returns the textures that remain, because cut-outs need their
+/// alpha.
 fn flatten_textures(materials: &mut [Material], textures: &[Texture]) -> Vec<Texture> {
     let means: Vec<Vec4> = textures.iter().map(Texture::mean).collect();
     // Cut-outs are another effect, so their alpha stays.

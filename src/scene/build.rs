@@ -12,11 +12,11 @@ use crate::texture::Texture;
 use crate::trace::{CAMERA_RAY_BIT, HitFilter, Tracer};
 use std::sync::Arc;
 
-/// Distance of the scene's centre from the origin, in scene radii, from which on the scene is moved to the origin,
-/// because f32 coordinates would lose digits.
+/// Distance of the scene's centre from the origin, in scene radii. A scene farther out is moved to the origin, because
+/// f32 coordinates would lose digits.
 const FAR_FROM_ORIGIN: f64 = 8.0;
 
-/// Builds the scene.
+/// Builds the scene from its description; Embree builds with `threads` threads (0: all).
 ///
 /// # Errors
 /// Embree is missing, or out of memory.
@@ -81,7 +81,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     })
 }
 
-/// Adds a warning for each material whose dispersion has no effect.
+/// Adds a warning for each material with dispersion that has no effect, because it does not refract.
 fn warn_of_dispersion(description: &Description, warnings: &mut Vec<String>) {
     for placed in &description.instances {
         let material = &description.materials[placed.material as usize];
@@ -103,7 +103,8 @@ fn warn_of_thin_walls(shapes: &Shapes, contacts: &Contacts, warnings: &mut Vec<S
     }
 }
 
-/// The light groups of the scene, in order of appearance, and the group of each light.
+/// The light groups of the scene (named sets of lights, each with a layer), in order of appearance, and the group of
+/// each light.
 fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups {
     let mut groups = Groups::default();
     let mut of = |name: &Option<String>| {
@@ -134,9 +135,9 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
     groups
 }
 
-/// Adds a warning for each glass solid whose alpha is only approximated. If alpha varies over the solid, the alpha
-/// where a ray enters also decides at its exit, so reversed paths may differ. If an emissive solid has alpha, each face
-/// decides by itself, so that light samples and hits agree, and a ray may pass one wall of the solid alone.
+/// Adds a warning for each glass solid with alpha, which is only approximated. If alpha varies over the solid, the
+/// alpha where a ray enters also decides at its exit, so reversed paths may differ. If an emissive solid has alpha,
+/// each face decides by itself, so that light samples and hits agree, and a ray may pass one wall of the solid alone.
 fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec<String>) {
     let mut named = vec![false; materials.list.len()];
     for instance in &shapes.instances {
@@ -159,7 +160,8 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
     }
 }
 
-/// Adds warnings about lights without effect; `punctual` is the number of punctual lights in the file.
+/// Adds warnings about lights without effect; `punctual` is the number of point, spot and directional lights in the
+/// file.
 fn warn_of_lights(
     (shapes, materials): (&Shapes, &Materials),
     lights: &Lights,
@@ -193,7 +195,7 @@ fn warn_of_lights(
     }
 }
 
-/// [`Scene::with_materials`].
+/// Does the work of [`Scene::with_materials`].
 ///
 /// # Errors
 /// Embree is out of memory.
@@ -262,7 +264,8 @@ fn bounding_sphere(description: &Description) -> (DVec3, f64) {
     }
 }
 
-/// Places the instances. A mesh with one instance is transformed to world space; other meshes are shared.
+/// Moves the meshes and instances of the description into shapes, with `origin` subtracted from positions. A mesh with
+/// one instance is transformed to world space; other meshes are shared.
 fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
     let mut uses = vec![0u32; description.meshes.len()];
     for placed in &description.instances {
@@ -310,13 +313,14 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
     }
 }
 
-/// The properties of a material that Embree's filters use: alpha, and whether rays pass through the light.
+/// The properties of a material that Embree's hit filters use: how alpha acts at each hit, and whether all rays pass
+/// through the surface.
 fn hit_behaviour(material: &Material) -> (Alpha, bool) {
     (material.alpha_per_hit(), material.null_bsdf)
 }
 
-/// Commits the shapes to Embree. Returns a scene of all shapes except pass-through lights, and one of the pass-through
-/// lights, if there are any.
+/// Commits the shapes to Embree. Returns an Embree scene of all shapes except lights that all rays pass through, and
+/// one of these pass-through lights, if there are any.
 fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<(Tracer, Option<Tracer>)> {
     let material = |instance: &Instance| &materials.list[instance.material as usize];
     // For each instance that belongs to the scene, whether its hits are filtered.
@@ -335,13 +339,14 @@ fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> 
     Ok((tracer, pass_through))
 }
 
-/// A random number in (0, 1] that depends on ray, instance and `key` alone.
+/// A random number in (0, 1] that depends on the ray's token, the instance and `key` alone.
 pub(super) fn random_cutoff(token: u32, instance: u32, key: u32) -> f32 {
     let key = u64::from(token) << 32 ^ u64::from(instance).wrapping_mul(0x9e37_79b9) << 20 ^ u64::from(key);
     (crate::random::mix(key) >> 40) as f32 * (1.0 / 16_777_216.0) + f32::MIN_POSITIVE
 }
 
-/// Filter of hits: rejects hits of camera rays on instances hidden from cameras, and hits that pass by alpha.
+/// The filter of Embree's hits: rejects hits of camera rays on instances hidden from cameras, and hits on surfaces that
+/// the ray passes because of alpha.
 fn hit_filter(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
     Arc::new(move |instance, primitive, barycentric, token| {
@@ -382,7 +387,7 @@ fn axis(light: &PunctualLight) -> Vec3 {
     (light.to_world.matrix3 * DVec3::NEG_Z).normalize_or(DVec3::NEG_Y).as_vec3()
 }
 
-/// 1 - cos of an angle (radians), exact for small angles.
+/// 1 minus the cosine of an angle (radians), exact for small angles.
 fn one_minus_cos(angle: f64) -> f64 {
     2.0 * (0.5 * angle).sin().powi(2)
 }
@@ -454,7 +459,7 @@ fn add_light_spheres(description: &mut Description) {
     }
 }
 
-/// A subdivided icosahedron of `20 * 4^subdivisions` triangles around the origin.
+/// A sphere around the origin as a subdivided icosahedron of `20 * 4^subdivisions` triangles; `radius` is in metres.
 fn icosphere(radius: f32, subdivisions: u32) -> Mesh {
     let t = (1.0 + 5f32.sqrt()) / 2.0;
     let mut positions: Vec<Vec3> = [

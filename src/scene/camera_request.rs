@@ -9,7 +9,7 @@ use std::borrow::Cow;
 
 /// Width of a picture in pixels, if neither the scene nor the user sets a size.
 const DEFAULT_WIDTH: u32 = 1280;
-/// Aspect ratio of a picture when neither the camera nor the user gives one.
+/// Width over height of a picture when neither the camera nor the user gives it.
 const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
 /// Maximum width and height of a picture in pixels.
 pub const MAX_SIZE: u32 = 32_768;
@@ -19,22 +19,22 @@ pub const MAX_SIZE: u32 = 32_768;
 pub struct CameraRequest {
     /// Name of the camera; `None`: the scene's first camera.
     pub camera: Option<String>,
-    /// Width in pixels.
+    /// Width of the whole picture in pixels; `None`: from the scene, or from the height.
     pub width: Option<u32>,
-    /// Height in pixels.
+    /// Height of the whole picture in pixels; `None`: from the scene, or from the width.
     pub height: Option<u32>,
-    /// The window to render; `None`: the window in the scene file, or the whole picture.
+    /// The window of the picture to render; `None`: the window in the scene file, or the whole picture.
     pub crop: Option<Crop>,
-    /// Pixel filter.
+    /// Filter that reconstructs pixels.
     pub filter: Filter,
 }
 
-/// A window of a picture: left edge, top edge, width and height.
+/// A window of a picture, which is rendered alone: left edge, top edge, width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Crop {
-    /// In pixels.
+    /// The four numbers in pixels.
     Pixels([u32; 4]),
-    /// In shares of the picture's width and height.
+    /// The four numbers in shares of the picture's width and height, 0 to 1.
     Shares([f64; 4]),
 }
 
@@ -62,8 +62,8 @@ impl Crop {
 }
 
 impl Scene {
-    /// The camera for `request`, of its window of the picture. If only one of width and height is given, the camera's
-    /// aspect ratio gives the other.
+    /// The camera that `request` asks for, with the window of the picture as its film. If only one of width and height
+    /// is given, the camera's aspect ratio gives the other.
     ///
     /// # Errors
     /// No camera has the name, the size is zero or too large, or the window is not within the picture.
@@ -88,7 +88,7 @@ impl Scene {
         Ok(Some(window).filter(|window| *window != [0, 0, size.0, size.1]))
     }
 
-    /// The camera for `request`, of the whole picture.
+    /// The camera that `request` asks for, with the whole picture as its film.
     ///
     /// # Errors
     /// No camera has the name, or the size is zero or too large.
@@ -117,7 +117,7 @@ impl Scene {
         Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
     }
 
-    /// The camera called `name`; without a name the first camera, or a default one.
+    /// The camera called `name`; without a name the scene's first camera, or a default one if it has none.
     fn described_camera(&self, name: Option<&str>) -> Result<Cow<'_, CameraDescription>> {
         let Some(name) = name else {
             return Ok(self.cameras.first().map_or_else(|| Cow::Owned(self.default_camera()), Cow::Borrowed));
@@ -181,8 +181,8 @@ impl Scene {
     }
 }
 
-/// Orthonormal axes of a node's transform. They are left-handed if the transform mirrors, so that +X stays to the
-/// right.
+/// Orthonormal axes of a camera node's transform, as columns. They are left-handed if the transform mirrors, so that +X
+/// stays to the right.
 fn rotation(to_world: &DAffine3) -> Mat3 {
     let back = to_world.matrix3.z_axis.normalize_or(DVec3::Z);
     let up = to_world.matrix3.y_axis;

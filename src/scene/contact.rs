@@ -30,7 +30,7 @@ use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
 
-/// Whether rays may continue behind the surface.
+/// Whether rays may continue behind the surface, because its material may transmit light.
 #[inline(always)]
 fn passes(scene: &Scene, surface: &Surface) -> bool {
     scene.materials.list[surface.material as usize].transmits()
@@ -48,7 +48,7 @@ pub struct ContactPoint {
 }
 
 impl ContactPoint {
-    /// The point of `surface`, if other surfaces touch it there.
+    /// The point of `surface`, if other surfaces touch it there; otherwise `None`.
     #[inline(always)]
     pub fn touching(surface: &Surface) -> Option<ContactPoint> {
         surface.touching.then(|| ContactPoint::of(surface))
@@ -60,7 +60,8 @@ impl ContactPoint {
         ContactPoint { p, ng, instance, primitive, material, error }
     }
 
-    /// The point on the triangle of light `index` that is nearest to `near`, if other surfaces may touch the triangle.
+    /// The point nearest to `near` on the triangle of the light with index `index`, if other surfaces may touch the
+    /// triangle; otherwise `None`.
     #[inline]
     pub fn on_light(scene: &Scene, index: u32, near: Vec3) -> Option<ContactPoint> {
         if scene.contacts.is_empty() { None } else { ContactPoint::on_touched_light(scene, index, near) }
@@ -81,8 +82,8 @@ impl ContactPoint {
     }
 }
 
-/// Sort key of a surface among touching ones, in the order in which a ray along `direction` crosses them. `film`: an
-/// opaque surface is among them.
+/// Sort key of a surface among those that touch at `point`: sorted by it, they are in the order in which a ray along
+/// `direction` crosses them. `film`: an opaque surface is among them, with a film of air before it.
 fn rank(scene: &Scene, point: &ContactPoint, direction: Vec3, film: bool) -> (u8, i64, i64) {
     let front = direction.dot(point.ng) < 0.0;
     let material = &scene.materials.list[point.material as usize];
@@ -101,10 +102,10 @@ fn rank(scene: &Scene, point: &ContactPoint, direction: Vec3, film: bool) -> (u8
     (rank, reversed(point.instance), reversed(point.primitive))
 }
 
-/// Touching surfaces at one point.
+/// Surfaces that touch at one point, each with its hit by a ray.
 type Stack = SmallVec<[(ContactPoint, Hit); 4]>;
 
-/// The other surfaces that touch the surface at `at`, unordered.
+/// The other surfaces that touch the surface at `at`, in no order. `token` holds the random bits of the ray for alpha.
 fn others(scene: &Scene, at: &ContactPoint, token: u32) -> Stack {
     let reach = at.error;
     let (origin, direction) = (at.p - at.ng * reach, at.ng);
@@ -124,8 +125,8 @@ fn others(scene: &Scene, at: &ContactPoint, token: u32) -> Stack {
     others
 }
 
-/// Removes transmitting surfaces that are in optical contact with an opaque surface. Returns whether an opaque surface
-/// is in the stack, so that a film of air separates the others from it.
+/// Removes the transmitting surfaces that are in optical contact with an opaque surface. Returns whether an opaque
+/// surface is in the stack, so that a film of air separates the remaining surfaces from it.
 fn remove_optical_contacts(scene: &Scene, stack: &mut Stack) -> bool {
     let material = |point: &ContactPoint| &scene.materials.list[point.material as usize];
     let opaque = |point: &ContactPoint| !material(point).transmits();
@@ -137,8 +138,8 @@ fn remove_optical_contacts(scene: &Scene, stack: &mut Stack) -> bool {
     film
 }
 
-/// All surfaces at the point `hit_point`, in the order in which a ray along `direction` crosses them; empty if no other
-/// surface touches the one that was hit.
+/// All surfaces that touch at `hit_point`, in the order in which a ray along `direction` crosses them; empty if no
+/// other surface touches the one that was hit.
 fn stack(scene: &Scene, hit_point: ContactPoint, hit: Hit, direction: Vec3, token: u32) -> Stack {
     let mut stack = others(scene, &hit_point, token);
     if !stack.is_empty() {
@@ -149,7 +150,7 @@ fn stack(scene: &Scene, hit_point: ContactPoint, hit: Hit, direction: Vec3, toke
     stack
 }
 
-/// The touching surfaces that a ray along `direction` crosses after the one at `point`, in order.
+/// The touching surfaces, with their hits, that a ray along `direction` crosses after the one at `point`, in order.
 fn following(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> Stack {
     let mut others = others(scene, point, token);
     let passes = |point: &ContactPoint| scene.materials.list[point.material as usize].transmits();
@@ -164,7 +165,7 @@ fn following(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -
     others
 }
 
-/// The surfaces of a stack, in its order.
+/// The surface at each hit of a stack of touching surfaces, in the order of the stack.
 fn surfaces<'a>(scene: &'a Scene, stack: &'a Stack) -> impl Iterator<Item = Surface> + 'a {
     stack.iter().filter_map(|(_, hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric))
 }
@@ -175,14 +176,14 @@ fn next(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> Opt
     following(scene, point, direction, token).first().map(|(_, hit)| *hit)
 }
 
-/// The touching surfaces that a ray along `direction` crosses after the one at `point`, in order.
+/// The surfaces touching the one at `point` that a ray along `direction` crosses after it, in order.
 #[cold]
 #[inline(never)]
 pub fn surfaces_after(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
     surfaces(scene, &following(scene, point, direction, token)).collect()
 }
 
-/// The touching surfaces that a ray along `direction` crosses before the one at `point`, in order.
+/// The surfaces touching the one at `point` that a ray along `direction` crosses before it, in order.
 pub fn surfaces_before(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> SmallVec<[Surface; 2]> {
     // The reversed ray crosses them after the one at `point`.
     let mut back = surfaces_after(scene, point, -direction, token);
@@ -190,7 +191,8 @@ pub fn surfaces_before(scene: &Scene, point: &ContactPoint, direction: Vec3, tok
     back
 }
 
-/// A surface that touches the culled surface `culled`, and that a camera ray along `direction` does not cull.
+/// A surface that touches `culled`, a back face through which camera rays pass, and that a camera ray along `direction`
+/// does not pass; `None` if there is none.
 #[cold]
 #[inline(never)]
 pub fn visible_on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token: u32) -> Option<Surface> {
@@ -202,19 +204,19 @@ pub fn visible_on_culled(scene: &Scene, culled: &Surface, direction: Vec3, token
 #[derive(Clone, Copy)]
 pub struct RaySurfaces {
     ray: Ray,
-    /// Current point of the ray, if more surfaces may touch there.
+    /// Current point of the ray, if more surfaces may touch there; otherwise `None`.
     here: Option<ContactPoint>,
 }
 
 impl RaySurfaces {
-    /// Starts at the ray's origin. `leaving` is the point of the surface that the ray leaves, if other surfaces touch
-    /// it.
+    /// Starts at the origin of `ray`. `leaving` is the point of the surface that the ray leaves, if other surfaces
+    /// touch it there.
     #[inline(always)]
     pub fn new(ray: Ray, leaving: Option<ContactPoint>) -> RaySurfaces {
         RaySurfaces { ray, here: leaving }
     }
 
-    /// The rest of the ray.
+    /// The part of the ray that is still to be traced.
     #[inline(always)]
     pub fn ray(&self) -> &Ray {
         &self.ray
@@ -234,7 +236,7 @@ impl RaySurfaces {
         self.surface_at(scene, &hit, inside)
     }
 
-    /// [`RaySurfaces::next`] for a ray whose hit is known.
+    /// Does the work of [`RaySurfaces::next`] for a ray whose nearest hit is known.
     #[inline(always)]
     pub fn surface_at(&self, scene: &Scene, hit: &Hit, inside: bool) -> Option<(Surface, f32)> {
         let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
@@ -245,7 +247,7 @@ impl RaySurfaces {
         Some((first.unwrap_or(surface), hit.t))
     }
 
-    /// Continues behind `surface`.
+    /// Continues the ray behind `surface`, which it has just crossed.
     #[inline(always)]
     pub fn pass(&mut self, surface: &Surface) {
         let next = surface.ray_origin(self.ray.direction);
@@ -255,7 +257,7 @@ impl RaySurfaces {
     }
 }
 
-/// The surface that a ray crosses first among those that touch the surface that was hit; `None` if no other touches it.
+/// The surface that a ray crosses first among those that touch the surface that it hit; `None` if no other touches it.
 #[inline(never)]
 fn first(scene: &Scene, surface: &Surface, hit: Hit, ray: &Ray) -> Option<Surface> {
     let stack = stack(scene, ContactPoint::of(surface), hit, ray.direction, ray.token);

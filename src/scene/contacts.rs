@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use rstar::{AABB, RTree, RTreeObject};
 use std::collections::BTreeMap;
 
-/// Minimum cosine of the angle between touching surfaces. Surfaces that cross at larger angles share a line, which rays
-/// hit with probability zero.
+/// Minimum cosine of the angle between surfaces that count as touching. Surfaces that cross at larger angles share a
+/// line, which rays hit with probability zero.
 const MIN_PARALLEL_COSINE: f32 = 0.99;
 
 /// Maximum number of triangles of a scene, instances included, that are searched for contacts. In a larger scene, every
@@ -31,9 +31,9 @@ pub(super) fn face_each_other(a: Vec3, b: Vec3) -> bool {
 struct Triangle {
     corners: [Vec3; 3],
     normal: Vec3,
-    /// Bound on the distance of rounded positions from the plane.
+    /// Bound on the distance of rounded positions on the triangle from its plane (m).
     error: f32,
-    /// Largest absolute coordinate of the corners.
+    /// Largest absolute coordinate of the corners (m).
     largest: f32,
     instance: u32,
     primitive: u32,
@@ -48,7 +48,7 @@ impl Triangle {
         Some(Triangle { corners, normal, error, largest, instance, primitive })
     }
 
-    /// Maximum distance between two triangles that touch, at points in both.
+    /// Maximum distance (m) between two triangles that count as touching, at points in both.
     fn reach(&self, other: &Triangle) -> f32 {
         let nearest = self.largest.min(other.largest);
         self.error + other.error + 2.0 * coordinate_error(Vec3::splat(nearest))
@@ -85,28 +85,28 @@ impl RTreeObject for Triangle {
     }
 }
 
-/// Triangles that may touch others, if at least one of the two transmits light.
+/// The triangles of a scene that other triangles may touch, if at least one of the two transmits light.
 #[derive(Clone, Debug, Default)]
 pub struct Contacts {
     /// For each instance and triangle, the maximum distance of touching surfaces (metres), or 0 without contact. Empty
     /// for an instance without contacts.
     reach: Vec<Box<[f32]>>,
-    /// Contacts were not searched, so every hit queries them.
+    /// Whether contacts were not searched, because the scene is large, so that every hit queries touching surfaces.
     unknown: bool,
-    /// Whether a sheet of thin glass may touch an opaque surface.
+    /// Whether any sheet of thin glass may touch an opaque surface.
     pub sheets: bool,
-    /// Instances with walls thinner than the rounding error of positions, and this error (metres).
+    /// Index of each instance with walls thinner than the rounding error of positions, and this error (metres).
     pub thin: Vec<(u32, f32)>,
 }
 
-/// A triangle that another triangle may touch.
+/// A triangle that another triangle may touch, and how near the other one is.
 #[derive(Clone, Copy, Default)]
 struct Contact {
     instance: u32,
     primitive: u32,
-    /// Maximum distance of the touching surfaces (metres).
+    /// Maximum distance of the surfaces that touch the triangle (metres).
     reach: f32,
-    /// If the other triangle is the opposite wall of the same mesh, `reach`; otherwise 0.
+    /// Equal to `reach` if the other triangle is the opposite wall of the same mesh; otherwise 0.
     thin: f32,
     /// Whether one of the two triangles is thin glass and the other opaque.
     sheet: bool,
@@ -185,7 +185,7 @@ impl Contacts {
         Contacts { reach: all, unknown: false, sheets, thin: walls.into_iter().collect() }
     }
 
-    /// Whether no contact is known.
+    /// Whether the search has found no contact, so that no hit needs to query touching surfaces.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.reach.is_empty()

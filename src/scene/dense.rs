@@ -9,12 +9,12 @@ use crate::geometry::{Shapes, triangle_error};
 use crate::material::{Materials, MediumParameters};
 use crate::math::Rgb;
 
-/// Maximum share of the mean free path that ray offsets may skip. A half-space of albedo 1/2 gets darker by about twice
-/// this share.
+/// Maximum share of a medium's mean free path that the offset of ray origins from surfaces may skip. A half-space of
+/// albedo 1/2 gets darker by about twice this share.
 const MAX_SKIPPED_SHARE: f32 = 0.005;
 
-/// Reduces the density of media that positions do not resolve, with a warning for each object that contains one, and
-/// for the medium outside all solids.
+/// Reduces the density of media whose mean free path is too short for rounded positions, with a warning for each object
+/// that contains one, and for the medium outside all solids.
 pub(super) fn limit_densities(
     shapes: &Shapes,
     materials: &mut Materials,
@@ -60,7 +60,7 @@ fn warning(owner: &str, medium: MediumParameters, skipped: f32) -> String {
     )
 }
 
-/// The medium with the highest extinction that ray offsets of `skipped` metres allow; `None` if the medium is not
+/// The medium reduced to the highest extinction at which rays may skip `skipped` metres; `None` if the medium is not
 /// denser.
 fn limit_density(medium: MediumParameters, skipped: f32) -> Option<MediumParameters> {
     let (most, sigma_t) = (MAX_SKIPPED_SHARE / skipped, medium.sigma_t());
@@ -76,8 +76,8 @@ fn limit_density(medium: MediumParameters, skipped: f32) -> Option<MediumParamet
 mod tests {
     use super::*;
 
-    /// Each channel has the smaller of its own and the highest extinction, and keeps its albedo. A medium that does not
-    /// scatter does not change.
+    /// Each channel gets the smaller of its own and the highest extinction, and keeps its albedo. A medium that does
+    /// not scatter does not change.
     #[test]
     fn limited_densities_keep_the_albedo_of_each_channel() {
         let medium = MediumParameters { sigma_a: Rgb::new(1e20, 1.0, 0.0), sigma_s: Rgb::new(3e20, 1.0, 1e4), g: 0.5 };

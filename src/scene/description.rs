@@ -11,58 +11,58 @@ use std::path::PathBuf;
 /// The content of a scene file. All indices are valid, all numbers finite, all transforms invertible.
 #[derive(Clone, Debug, Default)]
 pub struct Description {
-    /// The scene file.
+    /// Path of the scene file.
     pub source: PathBuf,
     /// Hash of the .glb that a converter has made of the scene file and of all files that the scene file names; `None`
     /// for a file that is read without a converter.
     pub converted: Option<String>,
     /// Meshes in local space; each is listed once, even with several instances.
     pub meshes: Vec<Mesh>,
-    /// Instances of the meshes.
+    /// Instances of the meshes: which mesh is placed where, with which material.
     pub instances: Vec<PlacedMesh>,
     /// Names of objects (nodes that carry a mesh).
     pub objects: Vec<String>,
-    /// Materials.
+    /// Materials, indexed by [`PlacedMesh::material`].
     pub materials: Vec<Material>,
     /// Textures, decoded.
     pub textures: Vec<Texture>,
-    /// Cameras, in the file's order.
+    /// Cameras, in the order of the file.
     pub cameras: Vec<CameraDescription>,
-    /// Point, spot and directional lights.
+    /// Point, spot and directional lights of the file.
     pub lights: Vec<PunctualLight>,
-    /// Units of `lights`, if they were guessed.
+    /// Units of the intensities of `lights`, if they were guessed; otherwise `None`.
     pub guessed_units: Option<GuessedUnits>,
-    /// The environment.
+    /// The light from all directions at infinity; `None` if the file has none.
     pub environment: Option<EnvironmentDescription>,
-    /// Whether cameras do not see the environment; it lights the scene anyway.
+    /// Whether camera rays do not see the environment; it lights the scene anyway.
     pub environment_hidden_from_camera: bool,
-    /// Light group of the environment.
+    /// Name of the environment's light group (a named set of lights with a layer of its own), if it has one.
     pub environment_light_group: Option<String>,
     /// Whether the original scene may have an environment that the file lacks: the exporter that wrote the file never
     /// writes one.
     pub environment_unknown: bool,
-    /// The medium outside all solids.
+    /// The medium that fills the space outside all solids; `None` if it is empty.
     pub medium: Option<MediumParameters>,
-    /// Settings of the picture.
+    /// Settings of the picture, which options of the user override.
     pub picture: PictureDefaults,
-    /// Warnings about ignored or approximated features, one sentence each: `material "glass": ...`.
+    /// Warnings about ignored or approximated features of the file, one sentence each: `material "glass": ...`.
     pub warnings: Vec<String>,
 }
 
-/// An instance of a mesh.
+/// An instance of a mesh: its place, material and object.
 #[derive(Clone, Debug)]
 pub struct PlacedMesh {
-    /// Name of the node.
+    /// Name of the node in the file, for messages.
     pub name: String,
-    /// Index into [`Description::meshes`].
+    /// Index of the mesh in [`Description::meshes`].
     pub mesh: u32,
-    /// Index into [`Description::materials`].
+    /// Index of the material in [`Description::materials`].
     pub material: u32,
-    /// Index into [`Description::objects`].
+    /// Index of the object's name in [`Description::objects`].
     pub object: u32,
     /// Whether camera rays pass through the instance; other rays hit it.
     pub hidden_from_camera: bool,
-    /// Light group of the instance, if it is emissive.
+    /// Name of the light group (a named set of lights with a layer of its own) of the instance, if it is emissive.
     pub light_group: Option<String>,
     /// Transform from local to world space.
     pub to_world: DAffine3,
@@ -71,36 +71,40 @@ pub struct PlacedMesh {
 /// A camera; it looks along -Z of its node, +Y up.
 #[derive(Clone, Debug)]
 pub struct CameraDescription {
-    /// Name of the node.
+    /// Name of the camera's node in the file.
     pub name: String,
     /// Transform from camera to world space; its scale is ignored.
     pub to_world: DAffine3,
-    /// Projection.
+    /// Perspective or orthographic projection, with the size of the view.
     pub projection: Projection,
-    /// Radius of the lens (m); 0 is a pinhole.
+    /// Radius of the camera's lens (m); 0 is a pinhole.
     pub aperture_radius: f32,
-    /// Distance of the plane in focus (m).
+    /// Distance from the camera to the plane in focus (m).
     pub focus_distance: f32,
-    /// Offset of the picture's centre from the camera's axis: to the right in picture widths, up in picture heights.
+    /// Offset of the picture's centre from the camera's axis: to the right in widths of the picture, up in heights of
+    /// the picture.
     pub shift: [f32; 2],
 }
 
 /// Settings of the picture in a scene file; options of the user override them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PictureDefaults {
-    /// Width and height in pixels.
+    /// Width and height of the whole picture in pixels; `None` if the file does not set them.
     pub resolution: Option<[u32; 2]>,
-    /// Exposure for display, in stops.
+    /// Exposure for display, in stops; `None` if the file does not set it.
     pub exposure: Option<f32>,
-    /// Tone curve for display.
+    /// Tone curve for display; `None` if the file does not set it.
     pub tonemap: Option<ToneMap>,
-    /// Whether the background is transparent: cameras do not see the environment, and alpha is the coverage of a pixel.
+    /// Whether the background is transparent: camera rays do not see the environment, and alpha is the coverage of a
+    /// pixel.
     pub film_transparent: bool,
-    /// The window to render: left edge, top edge, width and height, in shares of the whole picture.
+    /// The window to render: left edge, top edge, width and height, in shares (0 to 1) of the whole picture; `None` is
+    /// the whole picture.
     pub crop: Option<[f64; 4]>,
-    /// Frame number of the picture.
+    /// Frame number of the picture in an animation; `None` if the file does not set it.
     pub frame: Option<i32>,
-    /// Frames per second, as a fraction of two positive numbers.
+    /// Frames per second of animations, as numerator and denominator, both positive; `None` if the file does not set
+    /// them.
     pub frame_rate: Option<[u32; 2]>,
 }
 
@@ -121,14 +125,14 @@ pub enum ToneMap {
 /// Projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// Perspective projection.
+    /// Perspective projection: nearer things look larger.
     Perspective {
         /// Vertical field of view (radians).
         yfov: f32,
-        /// Width over height, if the file gives it.
+        /// Width over height of the view; `None` if the file does not give it.
         aspect: Option<f32>,
     },
-    /// Orthographic projection.
+    /// Orthographic projection: all rays are parallel.
     Orthographic {
         /// Half the width of the view (m).
         xmag: f32,
@@ -140,80 +144,80 @@ pub enum Projection {
 /// A light of KHR_lights_punctual in radiometric units; it shines along -Z of its node.
 #[derive(Clone, Debug)]
 pub struct PunctualLight {
-    /// Name of the node.
+    /// Name of the light's node in the file.
     pub name: String,
     /// Transform from the light's space to world space.
     pub to_world: DAffine3,
     /// Radiant intensity (W/sr) of points and spots, irradiance (W/m2) of suns, per channel.
     pub intensity: Rgb,
-    /// Kind of the light.
+    /// Point, spot or sun.
     pub kind: PunctualKind,
     /// Radius (m) of a point light's sphere or of a spot's disc; 0 for a mathematical point.
     pub radius: f32,
-    /// Whether cameras do not see the light.
+    /// Whether camera rays do not see the light; it lights the scene anyway.
     pub hidden_from_camera: bool,
-    /// Light group of the light.
+    /// Name of the light's group (a named set of lights with a layer of its own), if it has one.
     pub light_group: Option<String>,
 }
 
 impl PunctualLight {
-    /// Whether the scene has an emissive sphere in place of the light.
+    /// Whether the scene has an emissive sphere in place of the light: it is a point light with a radius.
     pub fn is_sphere(&self) -> bool {
         self.kind == PunctualKind::Point && self.radius > 0.0
     }
 }
 
-/// Units of punctual lights that were guessed, because neither the file nor the user states them.
+/// Units of the intensities of punctual lights, if they were guessed because neither the file nor the user states them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GuessedUnits {
-    /// Whether the numbers were taken for lumens, at 683 lumens per watt, or for watts.
+    /// Whether the intensities were taken for lumens, at 683 lumens per watt; otherwise they were taken for watts.
     pub photometric: bool,
-    /// The reason for the guess, as part of a message.
+    /// The reason for the guess, as a part of a message.
     pub from: String,
 }
 
 /// Kind of a punctual light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PunctualKind {
-    /// Equal intensity in all directions.
+    /// A point light of equal intensity in all directions.
     Point,
-    /// Emission into a cone with a soft edge.
+    /// A spot, which emits into a cone with a soft edge.
     Spot {
         /// Half angle of the cone of full intensity (radians).
         inner: f32,
-        /// Half angle from which on the intensity is zero (radians).
+        /// Half angle of the cone outside which the intensity is zero (radians).
         outer: f32,
-        /// Falloff between `inner` and `outer`.
+        /// Falloff of the intensity between `inner` and `outer`.
         edge: SpotEdge,
     },
-    /// Light from infinity, from a cone of directions.
+    /// A sun: light from infinity, from a cone of directions.
     Sun {
-        /// Angular diameter (radians); 0 is exactly parallel light.
+        /// Angular diameter of the sun (radians); 0 is exactly parallel light.
         angle: f32,
     },
 }
 
-/// An environment light.
+/// Light from all directions at infinity, as the scene file describes it.
 #[derive(Clone, Debug)]
 pub struct EnvironmentDescription {
-    /// Radiance, before `strength`.
+    /// Radiance per direction, before it is multiplied by `strength`.
     pub source: EnvironmentSource,
     /// Counter-clockwise rotation about +Y seen from above (degrees).
     pub rotation_deg: f32,
-    /// Factor on the radiance.
+    /// Factor on the radiance of `source`.
     pub strength: f32,
 }
 
-/// Radiance of an environment.
+/// Radiance of an environment light for each direction.
 #[derive(Clone, Debug)]
 pub enum EnvironmentSource {
     /// Equal radiance from all directions.
     Color(Rgb),
     /// A latitude-longitude image: u = 1/2 + atan2(z, x) / 2 pi, v = acos(y) / pi from the top.
     Image {
-        /// Width in texels.
+        /// Width of the image in texels.
         width: u32,
-        /// Height in texels.
+        /// Height of the image in texels.
         height: u32,
         /// Radiance, top row first; finite and not negative.
         texels: Vec<[f32; 3]>,

@@ -10,14 +10,14 @@ use std::io::BufReader;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Maximum number of texels of an environment: 16384 x 8192, 1.5 GiB.
+/// Maximum number of texels of an environment image: 16384 x 8192, 1.5 GiB.
 const MAX_TEXELS: u64 = 1 << 27;
-/// Memory per texel in bytes, including its sampling distribution.
+/// Memory per texel of an environment image in bytes, with its sampling distribution.
 const TEXEL_BYTES: u64 = 32;
-/// Value of an infinite texel: the largest half float, where images overflow to infinity.
+/// Value that replaces an infinite texel: the largest half float, beyond which images overflow to infinity.
 const MAX_HALF: f32 = 65_504.0;
 
-/// Width, height and texels, top row first.
+/// A decoded image: width, height, and RGB texels with the top row first.
 type Pixels = (u32, u32, Vec<[f32; 3]>);
 
 /// Reads the radiance of an environment from an OpenEXR or Radiance HDR file, recognised by its first bytes. Texels
@@ -52,7 +52,7 @@ pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<EnvironmentSource
     Ok(EnvironmentSource::Image { width, height, texels })
 }
 
-/// Makes texels finite and non-negative. Returns the number of texels that changed.
+/// Replaces texels that are negative or not finite. Returns the number of texels that changed.
 fn clamp(texels: &mut [[f32; 3]]) -> usize {
     let mut count = 0;
     for texel in texels {

@@ -6,7 +6,7 @@
 use crate::error::{Error, ErrorKind, Result};
 use std::path::{Component, Path, PathBuf};
 
-/// The folder of a scene file.
+/// The folder of a scene file, from which the scene may name files.
 #[derive(Clone, Copy, Debug)]
 pub struct Folder<'a> {
     path: &'a Path,
@@ -45,8 +45,8 @@ fn is_windows_path(name: &Path) -> bool {
         || bytes.split(|byte| matches!(byte, b'\\' | b'/')).any(|part| part == b".." && bytes.contains(&b'\\'))
 }
 
-/// The path with symbolic links resolved. A path that does not exist is resolved as far as it exists, then by its text,
-/// so that the result does not reveal whether a file outside the folder exists.
+/// The path with symbolic links resolved. Of a path that does not exist, the part that exists is resolved, and the rest
+/// is normalised as text, so that the result does not reveal whether a file outside the folder exists.
 fn resolve(path: &Path) -> PathBuf {
     let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     path.canonicalize().unwrap_or_else(|_| {

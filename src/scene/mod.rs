@@ -33,56 +33,59 @@ use std::sync::Arc;
 
 /// A validated, immutable scene with all data that rendering reads.
 pub struct Scene {
-    /// The scene file.
+    /// Path of the scene file.
     pub source: PathBuf,
-    /// Hash of the converted file, see [`Description::converted`].
+    /// Hash of the .glb into which a converter has turned the scene file, see [`Description::converted`]; `None`
+    /// without a converter.
     pub converted: Option<String>,
-    /// Offset that was subtracted from all world positions; zero except for scenes far from the origin.
+    /// Offset (m) that was subtracted from all world positions; zero except for scenes far from the origin.
     pub origin: DVec3,
-    /// Meshes and instances.
+    /// Meshes and their instances.
     pub shapes: Arc<Shapes>,
-    /// Materials and textures.
+    /// Materials and their textures.
     pub materials: Arc<Materials>,
-    /// Names of objects.
+    /// Names of objects, by the index of the object.
     pub objects: Vec<String>,
     /// Index of the first object that is a sphere made for a point light with a radius. All later objects are, too.
     pub first_light_sphere: u32,
-    /// Embree scene of all shapes except pass-through lights.
+    /// Embree scene of all shapes except lights that rays pass through.
     pub tracer: Tracer,
-    /// Embree scene of the pass-through lights ([`crate::material::Material::null_bsdf`]), if there are any.
+    /// Embree scene of the lights that rays pass through ([`crate::material::Material::null_bsdf`]), if there are any.
     pub pass_through_lights: Option<Tracer>,
-    /// Lights.
+    /// All lights, with the distributions that sample them.
     pub lights: Lights,
     /// Names of the lights that are not triangles: points, spots and suns, in the order of [`Lights::emitters`].
     pub light_names: Vec<String>,
-    /// Units of punctual lights, if they were guessed.
+    /// Units of the intensities of punctual lights, if they were guessed; otherwise `None`.
     pub guessed_units: Option<GuessedUnits>,
-    /// Whether an environment may be missing: see [`Description::environment_unknown`].
+    /// Whether the original scene may have an environment that the file lacks: see
+    /// [`Description::environment_unknown`].
     pub environment_unknown: bool,
-    /// Cameras, in the file's order.
+    /// Cameras, in the order of the file.
     pub cameras: Vec<CameraDescription>,
-    /// Settings of the picture in the scene file.
+    /// Settings of the picture in the scene file, which options override.
     pub picture: PictureDefaults,
-    /// The medium outside all solids.
+    /// The medium that fills the space outside all solids; `None` if it is empty.
     pub medium: Option<MediumParameters>,
-    /// Precomputed scattering data of the materials.
+    /// Scattering data of the materials that were computed in advance.
     pub scattering: Scattering,
-    /// Kinds of things that the scene contains.
+    /// Kinds of things that the scene contains, such as media and delta lights.
     pub survey: Survey,
-    /// Triangles that other triangles may touch.
+    /// Triangles that other triangles may touch, where rays need to find all touching surfaces.
     pub contacts: Arc<Contacts>,
-    /// Rank of the solid of each instance. Where solids of equal priority overlap, the highest rank fills the space.
+    /// Rank of the solid that each instance belongs to. Where solids of equal priority overlap, the highest rank fills
+    /// the space.
     pub ranks: Arc<[u32]>,
-    /// Deep stacks of solids that paths have entered.
+    /// Stacks of solids, too deep for a path to carry, that paths have entered.
     pub solid_stacks: SolidStacks,
     /// Warnings about ignored or approximated features, from the reader and from [`Scene::build`].
     pub warnings: Vec<String>,
 }
 
 impl Scene {
-    /// Distance from the scene's centre beyond which paths from `origin` in an unbounded medium only move away: outside
-    /// the scene's bounding sphere plus one mean free path, and farther out than `origin`. Infinite if no medium
-    /// scatters outside solids.
+    /// Distance (m) from the scene's centre beyond which paths from `origin` in an unbounded medium only move away:
+    /// outside the scene's bounding sphere plus one mean free path, and farther out than `origin`. Infinite if no
+    /// medium scatters outside solids.
     pub fn reach(&self, origin: Vec3) -> f32 {
         let Some(medium) = self.medium.filter(MediumParameters::scatters) else { return f32::INFINITY };
         let sky = self.lights.sky();
@@ -111,7 +114,8 @@ impl Scene {
         build::rebuild_with_materials(self, materials, medium, environment)
     }
 
-    /// Whether the solid exists for a ray that enters it, if the solid's alpha decides once per entry.
+    /// Whether a ray that enters the solid at `surface` finds it present, not passed over by alpha, if the solid's
+    /// alpha decides once per entry. `token` holds the random bits of the ray.
     pub fn solid_is_present(&self, surface: &Surface, token: u32) -> bool {
         let material = &self.materials.list[surface.material as usize];
         let chance = material.coverage(surface, &self.materials.textures);

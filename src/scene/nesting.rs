@@ -9,26 +9,28 @@ use crate::material::Materials;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{PoisonError, RwLock};
 
-/// The empty stack.
+/// Index of the empty stack of solids.
 pub const EMPTY_STACK: u32 = u32::MAX;
 
-/// Maximum number of stacks. More of them come from open meshes, which paths enter and never leave.
+/// Maximum number of stacks of solids that a scene stores. More of them come from open meshes, which paths enter and
+/// never leave.
 const MAX_STACKS: usize = 1 << 20;
 
-/// A stack of solids. Each solid is identified by the instance whose surface was crossed to enter it.
+/// A stack of the nested solids that a path is in. Each solid is identified by the instance whose surface was crossed
+/// to enter it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SolidStack {
     /// Index of the stack of solids entered before the last one, or [`EMPTY_STACK`].
     pub outer: u32,
-    /// Instance of the solid entered last.
+    /// Index of the instance of the solid that was entered last.
     pub last: u32,
-    /// Instance of the solid in the stack that fills the space.
+    /// Index of the instance of the solid that fills the space, among the solids of the stack.
     pub host: u32,
 }
 
-/// Rank of the solid of each instance. Where two solids of equal priority overlap, the one of higher rank fills the
-/// space, in any order of entry. Smaller solids have higher ranks, because a small solid may be inside a large one. All
-/// instances of an object are one solid.
+/// Rank of the solid that each instance belongs to. Where two solids of equal priority overlap, the one of higher rank
+/// fills the space, in any order of entry. Smaller solids have higher ranks, because a small solid may be inside a
+/// large one. All instances of an object are one solid.
 pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
     let mut of_mesh = HashMap::new();
     let mut volumes = BTreeMap::<u32, f64>::new();
@@ -43,7 +45,7 @@ pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
     shapes.instances.iter().map(|instance| rank.get(&instance.object).copied().unwrap_or(0)).collect()
 }
 
-/// Volume of a closed mesh, in local space.
+/// Volume of a closed mesh in its local space (m3).
 fn volume(mesh: &Mesh) -> f64 {
     let Some(&[first, ..]) = mesh.triangles.first() else { return 0.0 };
     let origin = mesh.positions[first as usize];
@@ -54,7 +56,7 @@ fn volume(mesh: &Mesh) -> f64 {
     mesh.triangles.iter().map(of).sum()
 }
 
-/// The deep stacks that paths in a scene have entered so far.
+/// The deep stacks of nested solids that paths in a scene have entered so far.
 #[derive(Default)]
 pub struct SolidStacks {
     stacks: RwLock<Stacks>,
@@ -67,14 +69,14 @@ struct Stacks {
 }
 
 impl SolidStacks {
-    /// The stack at an index, which must not be [`EMPTY_STACK`].
+    /// The stack of solids at an index, which must not be [`EMPTY_STACK`].
     #[cold]
     #[inline(never)]
     pub fn get(&self, stack: u32) -> SolidStack {
         self.stacks.read().unwrap_or_else(PoisonError::into_inner).list[stack as usize]
     }
 
-    /// The index of `stack`, added if it is new. `None` if there are too many stacks.
+    /// The index of the stack of solids `stack`, which is added if it is new. `None` if there are too many stacks.
     #[cold]
     #[inline(never)]
     pub fn push(&self, stack: SolidStack) -> Option<u32> {

@@ -4,41 +4,42 @@ use crate::geometry::Shapes;
 use crate::light::{Emitter, Lights};
 use crate::material::{Alpha, Materials, MediumParameters};
 
-/// Kinds of things that a scene contains.
+/// Which kinds of things a scene contains; each field is true if there is at least one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Survey {
-    /// Some material has alpha cut-outs or blending.
+    /// Whether some material has alpha cut-outs or blending.
     pub alpha: bool,
-    /// Some instance is hidden from cameras.
+    /// Whether some instance is hidden from cameras.
     pub hidden_from_camera: bool,
-    /// Cameras look through the back faces of some surface.
+    /// Whether camera rays pass through the back faces of some surface.
     pub culled: bool,
-    /// Some mesh bounds a solid that light enters.
+    /// Whether some mesh bounds a solid that light enters.
     pub solids: bool,
-    /// Rays may cross boundaries that do not scatter: index-matched solids, solids inside others, solids with alpha.
+    /// Whether rays may cross boundaries that do not scatter: index-matched solids, solids inside others, solids with
+    /// alpha.
     pub null_boundaries: bool,
-    /// Some medium absorbs or scatters.
+    /// Whether some medium absorbs or scatters.
     pub media: bool,
-    /// Some medium scatters.
+    /// Whether some medium scatters.
     pub scattering: bool,
-    /// Some solid of clear glass contains a medium that scatters.
+    /// Whether some solid of clear glass contains a medium that scatters.
     pub cloudy_glass: bool,
-    /// Some solid refracts with dispersion.
+    /// Whether some solid refracts with dispersion.
     pub dispersion: bool,
-    /// Some surface may have narrow lobes: mirrors, glass, glossy materials.
+    /// Whether some surface may have narrow lobes: mirrors, glass, glossy materials.
     pub narrow_lobes: bool,
-    /// Sharp lobes may reflect lights of finite size by way of perfect mirrors or clear glass.
+    /// Whether sharp lobes may reflect lights of finite size by way of perfect mirrors or clear glass.
     pub glints: bool,
-    /// No ray can hit some light.
+    /// Whether some light is a delta light, which no ray can hit.
     pub delta_lights: bool,
-    /// Some light is at infinity.
+    /// Whether some light is at infinity.
     pub infinite_lights: bool,
-    /// The scene has an environment that cameras see.
+    /// Whether the scene has an environment that cameras see.
     pub environment: bool,
 }
 
 impl Survey {
-    /// Inspects the scene.
+    /// Finds out which kinds of things a scene contains.
     pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());
         let mut survey = Survey {

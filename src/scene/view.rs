@@ -6,7 +6,7 @@ use crate::camera::Camera;
 /// A scene and the camera that a render, a plan or a pilot looks through.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
-    /// The scene.
+    /// The scene to look at.
     pub scene: &'a Scene,
     /// The camera, sized for the picture.
     pub camera: &'a Camera,

@@ -3,39 +3,39 @@
 use super::WavelengthSample;
 use crate::random::mix;
 
-/// The wavelengths that the paths of one iteration may take: one per band, at the same offset in every band. So two
-/// paths of one band have the same wavelength when they are connected. Over all seeds the offset is uniform in every
-/// iteration.
+/// The wavelengths that the paths of one iteration of a render may take: one in each of the bands of the spectrum, at
+/// an equal offset. So two paths of one band have one wavelength when they are connected. Over all seeds the offset is
+/// uniform in every iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct IterationWavelengths {
-    /// Position within each band, in `[0, 1)`.
+    /// Position of the wavelengths within their bands, in `[0, 1)`.
     offset: f32,
 }
 
 impl IterationWavelengths {
-    /// The wavelengths of an iteration of a render with `seed`. Offsets advance by the golden ratio per iteration, so
-    /// they fill the bands evenly.
+    /// The wavelengths of an iteration of a render with `seed`. Offsets within the bands advance by the golden ratio
+    /// per iteration, so they fill the bands evenly.
     pub fn new(seed: u64, iteration: u64) -> IterationWavelengths {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         IterationWavelengths { offset: ((iteration as f64 * GOLDEN + first_offset(seed)) % 1.0) as f32 }
     }
 
-    /// The wavelengths of an iteration whose camera paths merge photons of the iteration before. The offset moves back
-    /// and forth with the square root of the iteration number, so consecutive iterations have similar wavelengths. It
-    /// covers the whole band in the long run, and its steps shrink as bandwidths do.
+    /// The wavelengths of an iteration whose camera paths merge photons of the iteration before. The offset within the
+    /// bands moves back and forth with the square root of the iteration number, so consecutive iterations have similar
+    /// wavelengths. It covers the whole band in the long run, and its steps shrink as bandwidths do.
     pub fn drifting(seed: u64, iteration: u64) -> IterationWavelengths {
         let at = ((iteration as f64).sqrt() + 2.0 * first_offset(seed)) % 2.0;
         IterationWavelengths { offset: (if at < 1.0 { at } else { 2.0 - at }) as f32 }
     }
 
-    /// This iteration's wavelength in the band of `wavelength`.
+    /// The iteration's only wavelength in the band that contains `wavelength`.
     #[inline]
     pub fn nearest(self, wavelength: WavelengthSample) -> WavelengthSample {
         WavelengthSample::within(wavelength.band().0, self.offset)
     }
 }
 
-/// Offset of iteration 0 of a render with `seed`, uniform in `[0, 1)` over seeds.
+/// Offset within the bands in iteration 0 of a render with `seed`, uniform in `[0, 1)` over seeds.
 fn first_offset(seed: u64) -> f64 {
     (mix(seed ^ 0x51ed_270b_8f7c_2a35) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }

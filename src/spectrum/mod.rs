@@ -17,8 +17,9 @@ pub use iteration_wavelengths::IterationWavelengths;
 
 use crate::math::Rgb;
 
-/// Number of bands. With more bands, more photons are wasted where dispersed light is seen through dispersive glass.
-/// With fewer, the colours of a single iteration show.
+/// Number of bands of equal probability into which the spectrum is divided; only paths of one band are connected. With
+/// more bands, more photons are wasted where dispersed light is seen through dispersive glass. With fewer, the colours
+/// of a single iteration show.
 pub const BANDS: u8 = 8;
 
 /// Channels of weights below this are treated as zero: [`Wavelength::inverse_weight`] is then zero, too.
@@ -29,13 +30,13 @@ const MIN_WEIGHT: f32 = 1e-6;
 pub struct WavelengthSample(f32);
 
 impl WavelengthSample {
-    /// From a uniform number in `[0, 1)`.
+    /// The sample that the uniform number `u` in `[0, 1)` determines.
     #[inline]
     pub fn new(u: f32) -> WavelengthSample {
         WavelengthSample(u)
     }
 
-    /// The index of the band, and the position within it in `[0, 1]`.
+    /// The index of the sample's band of the spectrum, and the position within the band in `[0, 1]`.
     #[inline]
     fn band(self) -> (u8, f32) {
         let x = self.0 * f32::from(BANDS);
@@ -43,7 +44,7 @@ impl WavelengthSample {
         (band, x - f32::from(band))
     }
 
-    /// The sample at `offset`, in `[0, 1]`, within a band.
+    /// The sample at the position `offset`, in `[0, 1]`, within a band of the spectrum.
     #[inline]
     fn within(band: u8, offset: f32) -> WavelengthSample {
         WavelengthSample((f32::from(band) + offset) * (1.0 / f32::from(BANDS)))
@@ -56,9 +57,9 @@ impl WavelengthSample {
         Wavelength { nm, weight, band: Band(self.band().0 + 1) }
     }
 
-    /// A wavelength for a path that carries only one RGB channel (0 to 2). The number `u` draws the band in proportion
-    /// to its weight in that channel, so all such paths have the same weight. All three channels of `weight` are set to
-    /// it; its mean over offsets is 1.
+    /// A wavelength for a path that carries only one RGB channel (0 to 2). The number `u`, in `[0, 1)`, draws the band
+    /// in proportion to its weight in that channel, so all such paths have equal weights. All three channels of
+    /// `weight` are set to it; its mean over offsets is 1.
     #[inline]
     pub fn sample_in_channel(self, channel: usize, u: f32) -> Wavelength {
         let offset = self.band().1;
@@ -76,26 +77,27 @@ impl WavelengthSample {
     }
 }
 
-/// The wavelength that a path has taken.
+/// The wavelength that a path has taken at dispersive glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wavelength {
     /// Wavelength (nm).
     pub nm: f32,
-    /// Factor of the path's throughput. At most 3 per channel; the mean over wavelengths is white.
+    /// Factor of the path's throughput: the RGB colour of the wavelength. At most 3 per channel; the mean over
+    /// wavelengths is white.
     pub weight: Rgb,
-    /// The band that contains the wavelength.
+    /// The band of the spectrum that contains the wavelength.
     pub band: Band,
 }
 
-/// The band of a path's wavelength (1 to [`BANDS`]), or 0 for a path without one.
+/// The band of the spectrum that contains a path's wavelength (1 to [`BANDS`]), or 0 for a path without a wavelength.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Band(u8);
 
 impl Band {
-    /// The band of paths that have not met dispersive glass.
+    /// The value of paths that have not met dispersive glass, and so have no wavelength.
     pub const WHITE: Band = Band(0);
 
-    /// The band of a path's wavelength; [`Band::WHITE`] for `None`.
+    /// The band that contains a path's wavelength; [`Band::WHITE`] for `None`.
     #[inline]
     pub fn of_wavelength(wavelength: Option<&Wavelength>) -> Band {
         wavelength.map_or(Band::WHITE, |wavelength| wavelength.band)
@@ -109,8 +111,8 @@ impl Wavelength {
         Rgb::select(self.weight.cmpgt(Rgb::splat(MIN_WEIGHT)), self.weight.recip(), Rgb::ZERO)
     }
 
-    /// Factor of the contribution of an independent subpath of `band` that is connected to or merged with this one.
-    /// `None` if the bands differ, so that the subpaths are not connected.
+    /// Factor of the contribution when an independent subpath of `band` is connected to or merged with the subpath of
+    /// this wavelength. `None` if the bands differ, so that the subpaths are not connected.
     #[inline]
     pub fn connection_factor(&self, band: Band) -> Option<Rgb> {
         if band == Band::WHITE {

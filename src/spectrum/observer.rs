@@ -10,21 +10,22 @@
 use crate::math::Rgb;
 use std::sync::LazyLock;
 
-/// Shortest and longest wavelength (nm). Outside, the fits are below 0.2 % of their peaks.
+/// Shortest and longest wavelength (nm) that paths take. Outside, the fits of the observer's curves are below 0.2 % of
+/// their peaks.
 pub const RANGE: (f64, f64) = (390.0, 720.0);
 
-/// Number of steps of the table over uniform numbers.
+/// Number of steps of the table of wavelengths over uniform numbers.
 const STEPS: usize = 256;
-/// Number of steps of the integrals over wavelengths.
+/// Number of steps of the numerical integrals over wavelengths.
 const INTEGRATION_STEPS: usize = 3300;
 
-/// A Gaussian with different widths below and above its peak (nm).
+/// A Gaussian of a wavelength, of this height, with different widths below and above its peak (nm).
 fn lobe(nm: f64, height: f64, peak: f64, below: f64, above: f64) -> f64 {
     let t = (nm - peak) / if nm < peak { below } else { above };
     height * (-0.5 * t * t).exp()
 }
 
-/// The observer's X, Y, Z at a wavelength \[(4), table 1\].
+/// The standard observer's X, Y, Z at a wavelength (nm) \[(4), table 1\].
 fn xyz(nm: f64) -> [f64; 3] {
     [
         lobe(nm, 1.056, 599.8, 37.9, 31.0) + lobe(nm, 0.362, 442.0, 16.0, 26.7) + lobe(nm, -0.065, 501.1, 20.4, 26.2),
@@ -33,7 +34,7 @@ fn xyz(nm: f64) -> [f64; 3] {
     ]
 }
 
-/// Linear Rec. 709 colour of a wavelength with negative channels set to zero, in arbitrary units.
+/// Linear Rec. 709 colour of a wavelength (nm) with negative channels set to zero, in arbitrary units.
 fn rgb(nm: f64) -> [f64; 3] {
     let [x, y, z] = xyz(nm);
     [

@@ -3,7 +3,7 @@
 use crate::math::{DVec4, Vec2, Vec4};
 use std::sync::{Arc, LazyLock};
 
-/// Treatment of texture coordinates outside `[0, 1)`.
+/// How texture coordinates outside `[0, 1)` are treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Wrap {
     /// Repeats the image.
@@ -18,20 +18,20 @@ pub enum Wrap {
 /// Texels of an image, top row first.
 #[derive(Clone, Debug)]
 pub enum Texels {
-    /// The integers of the image file. Textures of one image share them.
+    /// Texels as the integers of the image file. Textures of one image share them.
     Integers {
         /// `width * height * channels` integers.
         data: Arc<Integers>,
-        /// 1: grey, 2: grey and alpha, 3: RGB, 4: RGBA.
+        /// Number of channels: 1 is grey, 2 grey and alpha, 3 RGB, 4 RGBA.
         channels: u8,
-        /// Meaning of the integers.
+        /// How the integers are converted to linear values.
         encoding: Encoding,
     },
-    /// Linear RGBA floats.
+    /// Texels as linear RGBA floats.
     Floats(Vec<[f32; 4]>),
 }
 
-/// Integer channels of texels.
+/// Channels of texels as integers, one after the other.
 #[derive(Clone, Debug)]
 pub enum Integers {
     /// 8 bits per channel.
@@ -40,7 +40,7 @@ pub enum Integers {
     Words(Vec<u16>),
 }
 
-/// Meaning of the integers of a texel.
+/// How the integers of a texel are converted to linear values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Encoding {
     /// The largest integer means 1, and values are linear.
@@ -55,13 +55,13 @@ pub enum Encoding {
 /// An image with its wrap and filter modes.
 #[derive(Clone, Debug)]
 pub struct Texture {
-    /// Name for messages.
+    /// Name of the texture for messages.
     pub name: String,
     /// Width in texels, at least 1.
     pub width: u32,
     /// Height in texels, at least 1.
     pub height: u32,
-    /// The texels.
+    /// The texels of the image, top row first.
     pub texels: Texels,
     /// Wrap modes along u and v.
     pub wrap: [Wrap; 2],
@@ -69,19 +69,19 @@ pub struct Texture {
     pub linear: bool,
 }
 
-/// A reference to a texture, with its UV set and KHR_texture_transform.
+/// A reference to a texture, with its set of texture coordinates and their transform (KHR_texture_transform).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
-    /// Index into the scene's textures.
+    /// Index of the texture in the scene's textures.
     pub texture: u32,
-    /// UV set, 0 or 1.
+    /// Index of the set of texture coordinates, 0 or 1.
     pub set: u8,
     /// Row-major 2x3 affine transform of (u, v).
     pub transform: [[f32; 3]; 2],
 }
 
 impl TextureRef {
-    /// The transformed texture coordinates; `uv` has the coordinates of both sets.
+    /// The transformed texture coordinates for a lookup; `uv` has the coordinates of both sets.
     #[inline]
     pub fn coordinates(&self, uv: [Vec2; 2]) -> Vec2 {
         let p = uv[usize::from(self.set & 1)];
@@ -90,7 +90,7 @@ impl TextureRef {
     }
 }
 
-/// Linear values of 8-bit sRGB values (IEC 61966-2-1).
+/// Linear value of each 8-bit sRGB value (IEC 61966-2-1).
 static SRGB_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|i| {
         let c = i as f64 / 255.0;
@@ -98,7 +98,7 @@ static SRGB_BYTES: LazyLock<[f32; 256]> = LazyLock::new(|| {
     })
 });
 
-/// Linear values of 16-bit sRGB values, in colour images and in grey images.
+/// Linear value of each 16-bit sRGB value: in colour images, and in grey images.
 static SRGB_WORDS: LazyLock<[Box<[f32]>; 2]> = LazyLock::new(|| {
     let linear = |i: u16, grey: bool| {
         let c = unit_word(i, grey);
@@ -113,7 +113,7 @@ fn unit_word(word: u16, grey: bool) -> f32 {
     if grey { f32::from(word) * (1.0 / 65535.0) } else { f32::from(word) / 65535.0 }
 }
 
-/// RGBA of a texel of 1 to 4 channels. `opaque` is the alpha of texels without one.
+/// Red, green, blue and alpha of a texel of 1 to 4 channels. `opaque` is the alpha of texels without one.
 #[inline]
 fn rgba<T: Copy>(texel: &[T], opaque: T) -> [T; 4] {
     match *texel {
@@ -153,7 +153,7 @@ impl Integers {
     }
 }
 
-/// The texel of [`Encoding::Glossiness`].
+/// Linear RGBA of a texel with [`Encoding::Glossiness`] from its glossiness `gloss` (8 bits).
 fn roughness(gloss: u8, factor: f32) -> Vec4 {
     Vec4::new(0.0, (255.0 - factor * f32::from(gloss)) / 255.0, 1.0, 1.0)
 }

@@ -14,7 +14,7 @@ pub struct Ray {
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
-    /// Largest t; may be infinite.
+    /// Largest t of the segment (m); may be infinite.
     pub tmax: f32,
     /// Random bits for the alpha cut-outs along this ray. In scenes with objects that are hidden from cameras,
     /// [`CAMERA_RAY_BIT`] is set in camera rays and cleared in others.
@@ -27,11 +27,11 @@ pub const CAMERA_RAY_BIT: u32 = 1;
 /// The nearest triangle along a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
-    /// Distance along the ray.
+    /// Distance along the ray (m).
     pub t: f32,
     /// Barycentric weights of the second and third corner.
     pub barycentric: [f32; 2],
-    /// Index of the instance.
+    /// Index of the instance that was hit.
     pub instance: u32,
     /// Index of the triangle in the instance's mesh.
     pub primitive: u32,
@@ -57,7 +57,7 @@ pub type HitFilter = Arc<dyn Fn(u32, u32, [f32; 2], u32) -> bool + Send + Sync>;
 /// scene. Rays are faster there than through an instance's own BVH, whose box overlaps those of its neighbours.
 const MAX_COPIED_TRIANGLES: usize = 1 << 17;
 
-/// Geometry committed to Embree; clones share it.
+/// The scene's triangles committed to Embree; clones share them.
 #[derive(Clone)]
 pub struct Tracer {
     scene: embree::Scene,
@@ -148,14 +148,14 @@ impl Tracer {
         }
     }
 
-    /// The nearest hit, if any.
+    /// The nearest hit on the segment; `None` if there is none.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.scene.intersect(&Self::ray(ray)).map(Hit::from)
     }
 
-    /// Traces up to eight rays of similar directions and calls `each` with the number and nearest hit of every ray that
-    /// hits. For a hit on a shared edge, the choice of the triangle may depend on the other rays.
+    /// Traces up to eight rays of similar directions and calls `each` with the number (0 to 7) and nearest hit of every
+    /// ray that hits. For a hit on a shared edge, the choice of the triangle may depend on the other rays.
     #[inline]
     pub fn intersect8(&self, ray: impl Fn(usize) -> Option<Ray>, mut each: impl FnMut(usize, Hit)) {
         self.scene.intersect8(|k| ray(k).as_ref().map(Self::ray), |k, hit| each(k, hit.into()));
@@ -166,7 +166,7 @@ impl Tracer {
         self.scene.each_hit(&Self::ray(ray), &mut |hit| each(hit.into()));
     }
 
-    /// Whether any hit is on the segment.
+    /// Whether any triangle is hit on the segment, for shadow rays.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         self.scene.occluded(&Self::ray(ray))

@@ -4,9 +4,10 @@ use crate::light::emitter::Emitter;
 use crate::math::{Vec3, luminance};
 use std::f32::consts::PI;
 
-/// Number of buckets along an axis; candidate splits are at their borders.
+/// Number of buckets along an axis of a cluster of lights; the borders between them are tried as splits.
 const BUCKETS: usize = 12;
-/// Depth from which on clusters are split into halves of equal size, which limits the depth of the tree.
+/// Depth in the light tree from which on clusters are split into halves of equal size, which limits the depth of the
+/// tree.
 const BALANCED_FROM: u32 = 40;
 
 /// Bounds on the positions and directions of the lights of a cluster.
@@ -15,14 +16,14 @@ pub struct Bounds {
     pub low: Vec3,
     pub high: Vec3,
     pub axis: Vec3,
-    /// Maximum angle between `axis` and the axis of a light (rad).
+    /// Maximum angle between `axis`, the axis of the cluster, and the axis of any of its lights (rad).
     pub spread: f32,
-    /// Maximum angle between the axis of a light and its emission (rad).
+    /// Maximum angle between the axis of a light and the directions in which it emits (rad).
     pub reach: f32,
     pub two_sided: bool,
     /// Whether the intensity of all lights falls off with the cosine, instead of being constant up to `reach`.
     pub cosine: bool,
-    /// Sum of the maximum radiant intensities of the lights (W/sr, luminance).
+    /// Sum of the maximum radiant intensities of the cluster's lights (W/sr, luminance).
     pub intensity: f32,
 }
 
@@ -76,7 +77,8 @@ impl Bounds {
         }
     }
 
-    /// Cost of a cluster of these lights: intensity times the extent in space and in directions.
+    /// Cost of a cluster with these bounds, which the best split minimises: intensity times the extent in space and in
+    /// directions.
     pub fn cost(&self) -> f32 {
         let (spread, edge) = (self.spread, (self.spread + self.reach).min(PI));
         let (sin, cos) = spread.sin_cos();
@@ -87,7 +89,7 @@ impl Bounds {
     }
 }
 
-/// The cone around two cones, each given by an axis and a half angle (rad).
+/// The smallest cone around two cones of directions, each given by an axis and a half angle (rad).
 fn joint_cone(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
     let apart = wide.0.dot(narrow.0).clamp(-1.0, 1.0).acos();
@@ -105,12 +107,13 @@ fn joint_cone(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
     }
 }
 
-/// Bounds of several lights; `None` if there are none.
+/// Bounds of a cluster of lights, given as emitter index and bounds; `None` if there are none.
 pub fn union(lights: &[(u32, Bounds)]) -> Option<Bounds> {
     lights.iter().map(|light| light.1).reduce(|a, b| a.union(&b))
 }
 
-/// Reorders lights into two parts with the least total cost, and returns the length of the first part.
+/// Reorders the lights of a cluster into two parts with the least total cost, and returns the number of lights in the
+/// first part. `depth` is the depth of the cluster in the tree.
 pub fn split(lights: &mut [(u32, Bounds)], depth: u32) -> usize {
     let centers = || lights.iter().map(|light| light.1.center());
     let low = centers().fold(Vec3::INFINITY, Vec3::min);

@@ -2,7 +2,7 @@
 
 use super::{ClassSet, Event, PathClass, glossy};
 
-/// The first event of a path that is not [`Event::Clear`].
+/// The first scattering event of a camera path that is not a perfect mirror or clear glass ([`Event::Clear`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum First {
     Nothing,
@@ -11,30 +11,31 @@ enum First {
     Medium,
 }
 
-/// Events of a path from the camera so far, as far as they determine its class.
+/// Summary of the scattering events on a camera path so far: all that the class of the whole light path depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraSuffix {
     first: First,
-    /// There was an event.
+    /// Whether the path has any event so far.
     begun: bool,
-    /// The last event is the only one that is not clear.
+    /// Whether the last event is the only one that is not a perfect mirror or clear glass.
     alone: bool,
-    /// All events are delta lobes.
+    /// Whether all events so far are delta lobes.
     delta: bool,
-    /// Number of broad lobes and media, at most 2.
+    /// Number of broad lobes and media on the path so far; 2 also stands for more.
     broad_count: u8,
-    /// There was a medium.
+    /// Whether any event so far is in a medium.
     medium: bool,
-    /// There was a narrow lobe since the last broad lobe or medium.
+    /// Whether there was a narrow lobe (delta or sharp) since the last broad lobe or medium.
     narrowed: bool,
-    /// There was an event before the first broad lobe; without a broad lobe so far, before the last sharp lobe.
+    /// Whether any event precedes the first broad lobe or, without a broad lobe so far, the last sharp lobe.
     preceded: bool,
-    /// All events are narrow lobes: a sharp one, and then delta lobes.
+    /// Whether all events so far are narrow lobes (sharp or delta), and delta lobes follow the last sharp one. A path
+    /// that then ends on a delta light is a caustic.
     glint: bool,
 }
 
 impl CameraSuffix {
-    /// A path without events.
+    /// The state of a camera path without events.
     pub const START: CameraSuffix = CameraSuffix {
         first: First::Nothing,
         begun: false,
@@ -47,7 +48,7 @@ impl CameraSuffix {
         glint: false,
     };
 
-    /// Appends an event.
+    /// The state after one more scattering event, farther from the camera.
     #[must_use]
     #[inline]
     pub fn then(self, event: Event) -> CameraSuffix {
@@ -75,7 +76,7 @@ impl CameraSuffix {
         }
     }
 
-    /// The class of the path if it ends on a light here. `sizeless`: it is a delta light.
+    /// The class of the light path if the camera path ends on a light here. `sizeless`: the light is a delta light.
     #[inline]
     pub fn class_at_light(self, sizeless: bool) -> PathClass {
         use PathClass as C;
@@ -100,7 +101,7 @@ impl CameraSuffix {
         }
     }
 
-    /// The class of the path that joins this path with a path from a light.
+    /// The class of the whole light path that joins this camera path with a path from a light.
     #[inline]
     pub fn class_with(self, light: LightPrefix) -> PathClass {
         let mut path = self;
@@ -115,13 +116,13 @@ impl CameraSuffix {
         }
     }
 
-    /// Whether all events so far are perfect mirrors or clear glass.
+    /// Whether all events on the camera path so far are perfect mirrors or clear glass.
     #[inline]
     pub fn is_clear(self) -> bool {
         self.first == First::Nothing
     }
 
-    /// A superset of the classes that the path has now or can have after more events.
+    /// Path classes that include all those that the camera path can still have if it ends now or after more events.
     pub fn reachable_classes(self) -> ClassSet {
         use PathClass as C;
         let caustic = if self.broad_count == 1 && self.medium || self.broad_count > 1 {
@@ -140,21 +141,21 @@ impl CameraSuffix {
     }
 }
 
-/// The narrow lobes of a light path between the light and its first broad lobe or medium.
+/// Narrow lobes (delta or sharp) on a light path, between the light and its first broad lobe or medium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum NarrowPart {
     None,
-    /// Narrow lobes, other than those below.
+    /// Any narrow lobes that none of the other values describes.
     Any,
-    /// Delta lobes after a delta light.
+    /// Only delta lobes, on a path from a delta light.
     Delta,
-    /// Delta lobes after a delta light, then a sharp lobe, then any narrow lobes.
+    /// Delta lobes after a delta light, then a sharp lobe, which shows a caustic, then any narrow lobes.
     Glint,
 }
 
-/// Events of a light path so far, as far as they determine the class of a whole path. Photons store it in one byte: two
-/// bits for the `NarrowPart`, two bits for the number of broad lobes and media (at most 2), one bit if the first of
-/// these is a medium, one bit for a delta light.
+/// Summary of the scattering events on a light path so far: all that the class of the whole path depends on. Photons
+/// store it in one byte: two bits for the `NarrowPart`, two bits for the number of broad lobes and media (at most 2),
+/// one bit if the first of these is a medium, one bit for a delta light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightPrefix(u8);
 
@@ -162,21 +163,22 @@ impl LightPrefix {
     const MEDIUM: u8 = 1 << 4;
     const SIZELESS: u8 = 1 << 5;
 
-    /// Number of possible values.
+    /// Number of possible values of [`LightPrefix::index`].
     pub const COUNT: usize = 1 << 6;
 
-    /// The value as an index below [`LightPrefix::COUNT`].
+    /// The summary as an array index below [`LightPrefix::COUNT`].
     #[inline]
     pub fn index(self) -> usize {
         usize::from(self.0) % LightPrefix::COUNT
     }
 
-    /// A path of narrow lobes alone, from a light of finite size.
+    /// The summary of a path from a light of finite size that has met narrow lobes (delta or sharp) alone.
     pub const FOCUSED: LightPrefix = LightPrefix(NarrowPart::Any as u8);
-    /// A path of narrow lobes and then a broad lobe, from a light of finite size.
+    /// The summary of a path from a light of finite size that has met narrow lobes (delta or sharp) and then a broad
+    /// lobe.
     pub const SCATTERED: LightPrefix = LightPrefix(NarrowPart::Any as u8 | 1 << 2);
 
-    /// A path without events. `sizeless`: it starts at a delta light.
+    /// The summary of a light path without events. `sizeless`: it starts at a delta light.
     #[inline]
     pub fn start(sizeless: bool) -> LightPrefix {
         LightPrefix(if sizeless { LightPrefix::SIZELESS } else { 0 })
@@ -192,13 +194,13 @@ impl LightPrefix {
         }
     }
 
-    /// Number of broad lobes and media, at most 2.
+    /// Number of broad lobes and media on the light path so far; 2 also stands for more.
     #[inline]
     fn broad_count(self) -> u8 {
         self.0 >> 2 & 3
     }
 
-    /// Appends an event.
+    /// The summary after one more scattering event, farther from the light.
     #[must_use]
     #[inline]
     pub fn then(self, event: Event) -> LightPrefix {

@@ -4,7 +4,7 @@ use super::{ClassSet, PathClass};
 use crate::plan::Effect;
 use crate::scene::Survey;
 
-/// Path classes that are possible in a scene with this survey.
+/// Path classes that are possible in a scene with this survey of its contents.
 pub fn classes_in(survey: &Survey) -> ClassSet {
     let mut absent = ClassSet::NONE;
     if !survey.scattering {

@@ -1,6 +1,6 @@
 use super::*;
 
-/// All paths of at most `most` events.
+/// All paths of at most `most` scattering events.
 fn paths(most: usize) -> Vec<Vec<Event>> {
     let mut all = vec![vec![]];
     let mut last = all.clone();
@@ -25,7 +25,8 @@ fn letters(path: &[Event]) -> String {
     path.iter().map(letter).collect()
 }
 
-/// The classes of the table that a path matches, by string operations alone.
+/// The classes of the table in `plan/class.rs` that a path, written in Heckbert's notation, matches, by string
+/// operations alone. `sizeless`: it ends on a delta light.
 fn rows(path: &str, sizeless: bool) -> Vec<PathClass> {
     use PathClass as C;
     let rest = path.trim_start_matches('C');

@@ -7,10 +7,10 @@ use crate::light::Emitter;
 use crate::math::Vec2;
 use crate::scene::Scene;
 
-/// Number of camera rays along each edge of the picture.
+/// Number of test rays along each edge of the picture.
 const RAYS_PER_EDGE: u32 = 32;
 
-/// Warns if the camera sees no surface, no scattering medium and no light at infinity.
+/// A warning if the camera sees no surface, no scattering medium and no light at infinity; otherwise `None`.
 pub(super) fn empty_view(scene: &Scene, camera: &Camera) -> Option<String> {
     let shows_more = scene.survey.scattering || scene.lights.emitters().iter().any(Emitter::is_infinite);
     (!shows_more && !sees_anything(scene, camera)).then(|| {
@@ -18,7 +18,7 @@ pub(super) fn empty_view(scene: &Scene, camera: &Camera) -> Option<String> {
     })
 }
 
-/// The most likely reason for a black picture, with a remedy. Empty for a scene without light, because building it
+/// The most likely reason why a picture is black, with a remedy. Empty for a scene without light, because building it
 /// already warns. `warned`: the plan has other warnings.
 pub(in super::super) fn reason(
     scene: &Scene,

@@ -6,12 +6,13 @@ use crate::math::Vec2;
 use crate::scene::Scene;
 use std::collections::BTreeSet;
 
-/// Number of camera rays along each edge of the picture.
+/// Number of test rays along each edge of the picture.
 const RAYS_PER_EDGE: u32 = 16;
-/// Maximum number of objects that the warning names.
+/// Maximum number of objects that the warning names; the others are counted.
 const MAX_NAMES: usize = 3;
 
-/// A warning that names the objects whose back faces the camera would see if glTF did not cull them.
+/// A warning that names the objects whose back faces the camera would see if glTF did not cull them; `None` if there
+/// are none.
 pub(super) fn culled_objects(scene: &Scene, camera: &Camera) -> Option<String> {
     if !scene.survey.culled {
         return None;

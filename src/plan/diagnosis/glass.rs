@@ -11,31 +11,31 @@ use crate::stat::median;
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Maximum distance of the points of a flat mesh from a plane, relative to the size of the mesh.
+/// A mesh is flat if its points are nearer to a plane than this, relative to the size of the mesh.
 const FLAT_TOLERANCE: f32 = 1e-3;
 /// Maximum number of glass objects that are checked for light.
 const MAX_OBJECTS: usize = 64;
 /// Maximum number of instances of an object that are checked for light.
 const MAX_INSTANCES: usize = 16;
-/// Maximum number of points on an instance.
+/// Maximum number of sample points on an instance of a glass object, from which shadow rays go to the lights.
 const MAX_POINTS: usize = 16;
-/// Number of light samples from each point.
+/// Number of light samples (shadow rays) from each sample point.
 const LIGHT_SAMPLES: u32 = 64;
-/// Number of rays from all lights together.
+/// Number of test rays that leave all lights together, in search of glass.
 const LIGHT_RAYS: u32 = 1 << 14;
-/// Maximum alpha of a transparent body; higher alpha may be intended.
+/// A transparent body with a higher mean alpha gets no warning, because its alpha may be intended.
 const MAX_ALPHA: f32 = 0.75;
-/// Minimum share of a body's faces that are transparent.
+/// Minimum share of a body's faces that are transparent; otherwise it gets no warning.
 const MIN_TRANSPARENT_SHARE: f32 = 0.9;
-/// Maximum number of faces whose alpha is looked up.
+/// Maximum number of faces of a body whose alpha is looked up.
 const MAX_FACES: usize = 256;
 
 fn is_glass(material: &Material) -> bool {
     material.transmission >= 0.5 && material.ior != 1.0
 }
 
-/// Warns about curved thin walls. Most are meant to be solid, and are thin because the exporter wrote no thickness and
-/// the mesh is open. Flat walls are panes, where a thickness would change little.
+/// Warnings about curved glass objects that are thin walls. Most are meant to be solid, and are thin because the
+/// exporter wrote no thickness and the mesh is open. Flat walls are panes, where a thickness would change little.
 pub(super) fn thin_walls(scene: &Scene) -> Vec<String> {
     let (meshes, materials) = (&scene.shapes.meshes, &scene.materials.list);
     let mut flat: BTreeMap<u32, bool> = BTreeMap::new();
@@ -69,7 +69,7 @@ fn is_flat(mesh: &Mesh) -> bool {
     off <= FLAT_TOLERANCE * size
 }
 
-/// Warns about glass too rough to focus light.
+/// Warnings about glass that is too rough to focus light into caustics.
 pub(super) fn frosted_glass(scene: &Scene) -> Vec<String> {
     let warning = |material: &Material, label: String| {
         format!(
@@ -82,7 +82,7 @@ pub(super) fn frosted_glass(scene: &Scene) -> Vec<String> {
     frosted.map(|used| warning(used.material, used.label())).collect()
 }
 
-/// Warns about smooth closed bodies with partial alpha, which old models use for glass. Alpha does not refract.
+/// Warnings about smooth closed bodies with partial alpha, which old models use for glass. Alpha does not refract.
 pub(super) fn alpha_glass(scene: &Scene) -> Vec<String> {
     let materials = &scene.materials.list;
     let mut alphas: BTreeMap<u32, f32> = BTreeMap::new();
@@ -126,16 +126,16 @@ fn alpha_of_body(scene: &Scene, index: u32) -> Option<f32> {
     (transparent as f32 >= MIN_TRANSPARENT_SHARE * alphas.len() as f32).then_some(middle)
 }
 
-/// Result of shadow rays from a glass object to the lights.
+/// Which lights reach a glass object, found by shadow rays from the object.
 struct Shade {
-    /// A light shines on some point of the object.
+    /// Whether a light shines on any tested point of the object.
     lit: bool,
-    /// Quoted name of each blocking object, and the number of shadow rays that it blocks.
+    /// For each object between the glass and the lights, its quoted name and the number of shadow rays that it blocks.
     blockers: BTreeMap<String, usize>,
 }
 
-/// Warns about glass without direct light. Mirrors and walls may still light it, but such light makes hardly any
-/// caustic.
+/// Warnings about glass objects without direct light. Mirrors and walls may still light them, but such light makes
+/// hardly any caustic.
 pub(super) fn unlit_glass(scene: &Scene) -> Vec<String> {
     let mut objects: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (index, instance) in scene.shapes.instances.iter().enumerate() {
@@ -164,8 +164,8 @@ pub(super) fn unlit_glass(scene: &Scene) -> Vec<String> {
     warnings
 }
 
-/// Objects that rays from the lights hit, through transmitting surfaces. These rays find narrow beams, which miss the
-/// few sampled points of a large face.
+/// Indices of the objects that test rays from the lights hit, through transmitting surfaces. These rays find narrow
+/// beams, which miss the few sampled points of a large face.
 fn lit_objects(scene: &Scene) -> BTreeSet<u32> {
     /// Steps of the additive sequence that fills the hypercube evenly \[Roberts 2018\].
     const STEPS: [f64; 4] =
@@ -208,7 +208,8 @@ fn shade(scene: &Scene, instances: &[u32]) -> Shade {
     shade
 }
 
-/// Direction and distance of a light that shines on `p` if nothing is between; `k` selects the light and a point of it.
+/// Unit direction and distance (m) from `p` of a light that shines on `p` if nothing is between; the number `k` selects
+/// the light and a point of it.
 fn towards_light(scene: &Scene, p: Vec3, k: u32) -> Option<(Vec3, f32)> {
     /// Steps of the additive sequence that fills the square evenly \[Roberts 2018\].
     const STEPS: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);

@@ -9,24 +9,24 @@ use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::PI;
 
-/// Lumens per watt, as exporters count.
+/// Lumens per watt with which exporters convert the power of lights.
 const EFFICACY: f32 = 683.0;
-/// Powers of two lights are suspicious if their ratio is `EFFICACY` within this factor.
+/// The powers of two lights are suspicious if their ratio is `EFFICACY`, up to this factor in either direction.
 const RATIO_TOLERANCE: f32 = 5.0;
 /// Maximum number of lights that are checked.
 const MAX_LIGHTS: usize = 64;
-/// Number of directions from a point light.
+/// Number of test rays from a point light, in directions all around it.
 const DIRECTIONS: u32 = 256;
-/// Number of surfaces that enclosed light hits one after the other.
+/// Number of surfaces that a test ray may hit one after the other before the light counts as enclosed.
 const BOUNCES: usize = 4;
 /// Maximum number of triangles of an emissive object that are sampled.
 const MAX_EMITTING_TRIANGLES: usize = 8;
-/// Number of directions from each of these triangles.
+/// Number of test rays from each sampled triangle of an emissive object.
 const DIRECTIONS_PER_TRIANGLE: u32 = 64;
 
-/// Warns if the guessed units of punctual lights seem wrong: their ratio to other lights is about the ratio of lumens
-/// to watts, so the other units would make them comparable. Points and spots are compared with emissive surfaces, suns
-/// with the environment. Without anything to compare lumens with, the warning states the guess.
+/// A warning if the guessed units of punctual lights seem wrong: their ratio to other lights is about the ratio of
+/// lumens to watts, so the other units would make them comparable. Points and spots are compared with emissive
+/// surfaces, suns with the environment. Without anything to compare lumens with, the warning states the guess.
 pub(super) fn wrong_units(scene: &Scene) -> Option<String> {
     let guessed = scene.guessed_units.as_ref()?;
     let sky = scene.lights.sky();
@@ -66,8 +66,8 @@ pub(super) fn wrong_units(scene: &Scene) -> Option<String> {
     ))
 }
 
-/// Warns about a missing environment if the exporter never writes one. For a scene without any light, building the
-/// scene already warns.
+/// A warning that the scene has no environment, if the exporter that wrote the file never writes one. A scene without
+/// any light gets none, because building it already warns.
 pub(super) fn missing_environment(scene: &Scene, request: &PlanRequest) -> Option<String> {
     let dark = scene.environment_unknown && scene.lights.sky().environment.is_none() && !scene.lights.is_empty();
     (dark && !request.switches.off.has(Effect::Environment)).then(|| {
@@ -75,16 +75,16 @@ pub(super) fn missing_environment(scene: &Scene, request: &PlanRequest) -> Optio
     })
 }
 
-/// A light and sampled rays that leave it.
+/// A light and sampled rays that leave it, to test whether its light gets out of its casing.
 struct LightRays {
     name: String,
-    /// The object, for an emissive surface.
+    /// Index of the light's object, for an emissive surface; `None` for other lights.
     object: Option<u32>,
-    /// Origins and directions.
+    /// Origin and unit direction of each ray.
     rays: Vec<(Vec3, Vec3)>,
 }
 
-/// Rays of all lights with power that are not at infinity.
+/// Sampled rays of each light that has power and is not at infinity.
 fn light_rays(scene: &Scene) -> Vec<LightRays> {
     let mut sources = Vec::new();
     let mut glowing: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
@@ -123,7 +123,7 @@ fn light_rays(scene: &Scene) -> Vec<LightRays> {
     sources
 }
 
-/// Warns about lights in a casing that lets no light out. A closed room with the camera inside is not a casing.
+/// Warnings about lights in a casing that lets no light out. A closed room with the camera inside is not a casing.
 pub(super) fn encased_lights(scene: &Scene, camera: Vec3) -> Vec<String> {
     let mut warnings = Vec::new();
     for LightRays { name, object, rays } in light_rays(scene) {
@@ -141,7 +141,8 @@ pub(super) fn encased_lights(scene: &Scene, camera: Vec3) -> Vec<String> {
     warnings
 }
 
-/// Warns about an environment that cannot light the surroundings of the camera: a sky dome or a closed room blocks it.
+/// A warning if the environment cannot light the surroundings of the camera, because a sky dome or a closed room blocks
+/// it.
 pub(super) fn blocked_environment(scene: &Scene, camera: Vec3) -> Option<String> {
     scene.lights.sky().environment.as_ref()?;
     let rays = rays::directions(DIRECTIONS).map(|d| (camera, d)).collect();
@@ -154,7 +155,8 @@ pub(super) fn blocked_environment(scene: &Scene, camera: Vec3) -> Option<String>
     ))
 }
 
-/// The opaque objects that rays hit while they bounce from surface to surface; `None` if a ray leaves the scene.
+/// Indices of the opaque objects that rays (origin and direction) hit while they bounce from surface to surface; `None`
+/// if a ray leaves the scene.
 fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>> {
     let onward: Vec<Vec3> = rays::directions(DIRECTIONS).collect();
     let mut met = BTreeSet::new();
@@ -173,7 +175,7 @@ fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>
     (!rays.is_empty()).then_some(met)
 }
 
-/// Whether a point is in the bounding box of objects.
+/// Whether the point `p` is in the common bounding box of objects, given by their indices.
 fn is_within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for instance in scene.shapes.instances.iter().filter(|instance| objects.contains(&instance.object)) {
@@ -185,7 +187,7 @@ fn is_within(scene: &Scene, objects: &BTreeSet<u32>, p: Vec3) -> bool {
     p.cmpge(low).all() && p.cmple(high).all()
 }
 
-/// Warns about delta lights behind glass if the method does not find their caustics.
+/// Warnings about delta lights behind glass if the method of the planned render does not find their caustics.
 pub(super) fn delta_lights_behind_glass(scene: &Scene, request: &PlanRequest) -> Vec<String> {
     if request.search.finds(Effect::Caustic, &scene.survey) {
         return vec![];

@@ -15,7 +15,7 @@ use super::PlanRequest;
 use crate::camera::Camera;
 use crate::scene::Scene;
 
-/// The warnings of all checks.
+/// Warnings of all checks about likely mistakes in the scene, in sentences for the user.
 pub(super) fn warnings(scene: &Scene, camera: &Camera, request: &PlanRequest) -> Vec<String> {
     let mut warnings = glass::thin_walls(scene);
     warnings.extend(culling::culled_objects(scene, camera));

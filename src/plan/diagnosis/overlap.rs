@@ -11,7 +11,7 @@ use crate::trace::Ray;
 const MAX_SOLIDS: usize = 64;
 /// Maximum number of triangles of a solid whose edges are traced.
 const MAX_TRIANGLES: usize = 256;
-/// Maximum number of surfaces along an edge.
+/// Maximum number of surfaces that a test ray along an edge crosses.
 const MAX_SURFACES: usize = 16;
 /// An edge touches a surface, instead of crossing it, at a smaller cosine, or within this share of its length from an
 /// end.
@@ -45,7 +45,7 @@ pub(super) fn overlapping_solids(scene: &Scene) -> Vec<String> {
     pairs.into_iter().map(warning).collect()
 }
 
-/// Instances of solids whose surface an edge of `instance` crosses.
+/// Indices of the instances of solids whose surface an edge of `instance` crosses.
 fn crossed_solids(scene: &Scene, instance: &Instance) -> Vec<u32> {
     let mesh: &Mesh = &scene.shapes.meshes[instance.mesh as usize];
     let mut crossed = Vec::new();
@@ -58,7 +58,7 @@ fn crossed_solids(scene: &Scene, instance: &Instance) -> Vec<u32> {
     crossed
 }
 
-/// Traces an edge of an object, and adds the solids whose surface it crosses to `crossed`.
+/// Traces a ray along an edge of an object, and adds the instances of the solids whose surface it crosses to `crossed`.
 fn trace_edge(scene: &Scene, object: u32, from: Vec3, to: Vec3, crossed: &mut Vec<u32>) {
     let length = from.distance(to);
     let Some(direction) = (to - from).try_normalize() else { return };

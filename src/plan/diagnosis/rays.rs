@@ -6,10 +6,10 @@ use crate::scene::Scene;
 use crate::scene::contact::RaySurfaces;
 use crate::trace::Ray;
 
-/// Maximum number of transmitting surfaces along a ray.
+/// Maximum number of transmitting surfaces that a test ray passes before it gives up.
 const MAX_SURFACES: usize = 64;
 
-/// `n` directions, spread evenly over the sphere on a spiral with the golden angle between neighbours.
+/// `n` unit directions, spread evenly over the sphere on a spiral with the golden angle between neighbours.
 pub(super) fn directions(n: u32) -> impl Iterator<Item = Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     (0..n).map(move |i| {
@@ -20,18 +20,19 @@ pub(super) fn directions(n: u32) -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// The first surface along a ray; `token` is the random number for alpha.
+/// The first surface along a ray of length `tmax`, opaque or not; `token` is the random number for alpha.
 pub(super) fn first(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
     let hit = scene.tracer.intersect(&Ray { origin, direction, tmax, token })?;
     scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)
 }
 
-/// The first opaque surface along a ray, which is not refracted on the way.
+/// The first opaque surface along a ray of length `tmax`, which passes other surfaces without refraction; `token` is
+/// the random number for alpha.
 pub(super) fn first_opaque(scene: &Scene, origin: Vec3, direction: Vec3, tmax: f32, token: u32) -> Option<Surface> {
     first_opaque_after(scene, origin, direction, tmax, token, |_| {})
 }
 
-/// [`first_opaque`], which calls `passed` with each transmitting surface on the way.
+/// Does the work of [`first_opaque`], and calls `passed` with each transmitting surface on the way.
 pub(super) fn first_opaque_after(
     scene: &Scene,
     origin: Vec3,

@@ -11,7 +11,7 @@ use gltf::json::validation::Checked;
 
 const DAMAGED: &str = "the file is damaged: export it again";
 
-/// Elements of `size` bytes, `stride` bytes apart.
+/// Elements of a buffer view: `size` bytes each, `stride` bytes apart.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -20,7 +20,8 @@ struct Elements<'a> {
 }
 
 impl<'a> Elements<'a> {
-    /// `count` elements of `size` bytes from byte `offset` of a view.
+    /// Finds `count` elements of `size` bytes, `stride` bytes apart, from byte `offset` of a buffer view. An error if
+    /// they are not within the view.
     fn new(view: &'a [u8], offset: u64, count: u64, size: usize, stride: Option<usize>) -> Result<Elements<'a>> {
         let stride = stride.unwrap_or(size);
         if stride < size {
@@ -69,7 +70,7 @@ fn float(component: ComponentType, normalized: bool, bytes: &[u8]) -> f32 {
 }
 
 impl Document<'_> {
-    /// Number of components of an element of an accessor.
+    /// Number of components (1 to 16) in each element of the accessor with this index.
     pub(super) fn width(&self, index: usize) -> Result<usize> {
         match get(&self.accessors, index, "accessor")?.type_ {
             Checked::Valid(kind) => Ok(kind.multiplicity()),
@@ -77,7 +78,7 @@ impl Document<'_> {
         }
     }
 
-    /// Reads vectors of `N` floats, which may be non-finite.
+    /// Reads an accessor of vectors of `N` floats, which may be non-finite.
     pub(super) fn floats<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>> {
         let normalized = get(&self.accessors, index, "accessor")?.normalized;
         self.elements(
@@ -92,8 +93,8 @@ impl Document<'_> {
         )
     }
 
-    /// Reads the displacements of a morph target. They may be without data, because the number of vertices was already
-    /// checked.
+    /// Reads the displacements of a morph target, one per vertex of a mesh of `vertices` vertices. The file may leave
+    /// out their data, because the number of vertices was already checked.
     pub(super) fn displacements(&self, index: usize, vertices: usize) -> Result<Vec<[f32; 3]>> {
         let count = get(&self.accessors, index, "accessor")?.count.0;
         if count != vertices as u64 {
@@ -106,7 +107,7 @@ impl Document<'_> {
         deltas
     }
 
-    /// Reads vertex indices.
+    /// Reads an accessor of vertex indices.
     pub(super) fn indices(&self, index: usize) -> Result<Vec<u32>> {
         self.elements(index, 1, 0, &unsigned, true)
     }

@@ -34,17 +34,17 @@ struct Channel {
     target: Value,
 }
 
-/// An animated value.
+/// A value of the document that an animation changes, and its curve over time.
 struct Track {
-    /// JSON pointer to the value.
+    /// JSON pointer to the value in the document.
     pointer: String,
-    /// Animation and channel, for messages.
+    /// Name of the animation and index of the channel, for messages.
     place: String,
     curve: Curve,
 }
 
-/// Applies a frame to a document, or without a frame the time of the first key. Without a frame, invalid animations are
-/// skipped with a warning.
+/// Writes the animated values at a frame into the document; without a frame, those at the time of the first key.
+/// Without a frame, invalid animations are skipped with a warning.
 ///
 /// # Errors
 /// A frame is given, and an animation is invalid.
@@ -80,15 +80,15 @@ pub(super) fn apply(document: &mut Document, frame: Option<FrameTime>, warnings:
     document.reparse_animated()
 }
 
-/// Treatment of invalid animations.
+/// Treatment of invalid animations: as errors or as warnings.
 #[derive(Clone, Copy)]
 struct FaultPolicy {
-    /// Whether they are errors, instead of warnings.
+    /// Whether invalid animations are errors, not warnings.
     fatal: bool,
 }
 
 impl FaultPolicy {
-    /// Returns the error, or turns it into a warning.
+    /// Returns the error about an invalid animation, or turns it into a warning.
     fn handle(self, error: Error, warnings: &mut Vec<String>) -> Result<()> {
         if self.fatal {
             return Err(error);
@@ -98,7 +98,7 @@ impl FaultPolicy {
     }
 }
 
-/// Frames per second: of the scene, else of `frame`, else the default.
+/// Frames per second: the scene's rate, else that of `frame`, else the default.
 fn rate(document: &Document, frame: FrameTime, warnings: &mut Vec<String>) -> Result<f64> {
     let index = document.default_scene()?;
     let extras: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
@@ -116,7 +116,7 @@ fn rate(document: &Document, frame: FrameTime, warnings: &mut Vec<String>) -> Re
     }))
 }
 
-/// The animated values of all animations. If several animations move a value, the first one does.
+/// The animated values of all animations. If several animations change one value, the first one does.
 fn tracks(document: &Document, faults: FaultPolicy, warnings: &mut Vec<String>) -> Result<Vec<Track>> {
     let list = document.raw["animations"].as_array().map_or(&[][..], Vec::as_slice);
     // The name of the animation that moves each pointer.
@@ -166,7 +166,8 @@ fn tracks(document: &Document, faults: FaultPolicy, warnings: &mut Vec<String>) 
     Ok(tracks)
 }
 
-/// Reads the curve of a channel, and checks the width of its values.
+/// Reads the curve of an animation channel, sampler `index`, and checks that its values have the number of components
+/// that the value at `pointer` needs.
 fn curve(document: &Document, samplers: &[Sampler], index: usize, pointer: &str) -> Result<Curve> {
     let curve =
         Curve::read(document, get(samplers, index, "sampler")?).map_err(|e| e.within(format!("sampler {index}")))?;
@@ -182,7 +183,7 @@ fn curve(document: &Document, samplers: &[Sampler], index: usize, pointer: &str)
     Ok(curve)
 }
 
-/// JSON pointer to the value that a channel moves; `None` if the target is missing or unknown.
+/// JSON pointer to the value that an animation channel changes; `None` if the channel's target is missing or unknown.
 fn target(document: &Document, target: &Value) -> Result<Option<String>> {
     let path = target["path"].as_str().unwrap_or_default();
     if path == "pointer" {

@@ -6,7 +6,7 @@ use crate::scene::Description;
 use crate::scene::description::{CameraDescription, PictureDefaults, PlacedMesh, Projection};
 use smallvec::SmallVec;
 
-/// Aspect ratio of a picture if neither the scene nor the camera sets it.
+/// Width over height of a picture if neither the scene nor the camera sets it.
 const DEFAULT_ASPECT: f64 = 16.0 / 9.0;
 
 /// Geometry nearer to a camera than this share of the near plane's distance passes through the camera, and is not
@@ -16,11 +16,11 @@ const MIN_DEPTH_SHARE: f64 = 0.01;
 /// Maximum number of triangles that are tested for one plane, a tenth of a second. Larger scenes may get no warning.
 const MAX_TRIANGLES: usize = 1 << 20;
 
-/// A range of depths from the camera (m).
+/// A range of depths from a camera that a clip plane would cut away (m).
 struct DepthRange {
     low: f64,
     high: f64,
-    /// Geometry with a smaller depth is not reported.
+    /// Depth (m) below which geometry is not reported, because it may pass through the camera.
     min_reported: f64,
 }
 
@@ -82,8 +82,8 @@ impl Frustum {
         Frustum { to_camera, sides }
     }
 
-    /// Whether part of an instance is in view in a range of depths. `left` is the number of triangles that may still be
-    /// tested.
+    /// Whether part of an instance is in view of the camera within a range of depths. `left` is the number of triangles
+    /// that may still be tested, and decreases.
     fn shows(
         &self,
         out: &Description,

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
-/// Supported extensions.
+/// Names of the glTF extensions that the reader supports.
 const SUPPORTED: [&str; 19] = [
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
@@ -31,12 +31,12 @@ const SUPPORTED: [&str; 19] = [
     "KHR_texture_transform",
 ];
 
-/// Whether an extension is supported.
+/// Whether the reader supports the glTF extension of this name.
 pub(super) fn is_supported(extension: &str) -> bool {
     SUPPORTED.contains(&extension)
 }
 
-/// Splits a `.glb` into its JSON and its binary chunk; a `.gltf` is JSON alone.
+/// Splits the bytes of a `.glb` into its JSON and its binary chunk; a `.gltf` is JSON alone, and the chunk is empty.
 pub(super) fn split(bytes: &[u8]) -> Result<(Value, &[u8])> {
     let (json, binary) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, &[][..]) };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
@@ -65,7 +65,7 @@ fn unify_integers(value: &mut Value) {
     }
 }
 
-/// Reads a little-endian 32-bit word.
+/// Reads a little-endian 32-bit word at byte `at`; `None` past the end.
 fn word(bytes: &[u8], at: usize) -> Option<usize> {
     let word = bytes.get(at..at.checked_add(4)?)?;
     Some(u32::from_le_bytes(word.try_into().ok()?) as usize)
@@ -164,7 +164,7 @@ fn remedy(extension: &str) -> &'static str {
     }
 }
 
-/// Adds the names of all extensions in the document, listed or not. Extras may have keys of any name.
+/// Adds the names of all glTF extensions in the document to `names`, listed or not. Extras may have keys of any name.
 fn collect_extensions(value: &Value, names: &mut BTreeSet<String>) {
     match value {
         Value::Array(list) => list.iter().for_each(|item| collect_extensions(item, names)),
@@ -188,7 +188,7 @@ fn collect_extensions(value: &Value, names: &mut BTreeSet<String>) {
     }
 }
 
-/// The error for a value of the wrong JSON type.
+/// The error for a value of the wrong JSON type at a place in the document.
 pub(super) fn malformed(place: impl std::fmt::Display, cause: &serde_json::Error) -> Error {
     fault(place, cause).hint(DAMAGED)
 }

@@ -25,7 +25,7 @@ enum Interpolation {
     CubicSpline,
 }
 
-/// A curve with keys at increasing times.
+/// An animated value over time: keys at increasing times, and the interpolation between them.
 pub(super) struct Curve {
     /// Times of the keys (seconds).
     times: Vec<f32>,
@@ -67,12 +67,13 @@ impl Curve {
         Ok(Curve { width: values.len() / slots, times, values, interpolation: sampler.interpolation })
     }
 
-    /// Time of the first key (seconds).
+    /// Time of the first key of the curve (seconds).
     pub(super) fn start(&self) -> f64 {
         f64::from(self.times[0])
     }
 
-    /// The value at a time (seconds), clamped to the first and last key. `rotation`: values are unit quaternions.
+    /// The curve's value at a time (seconds), clamped to the first and last key. `rotation`: values are unit
+    /// quaternions.
     pub(super) fn value_at(&self, time: f64, rotation: bool) -> Vec<f64> {
         // Files have times in f32, so a time that equals a key's time up to rounding counts as the key's.
         let after = self.times.partition_point(|key| f64::from(*key) <= time + 1e-6 * time.max(1.0));
@@ -97,7 +98,7 @@ impl Curve {
         }
     }
 
-    /// The value of a key.
+    /// The value of the key with this index, without tangents.
     fn value(&self, key: usize) -> Vec<f64> {
         self.slot(key, self.interpolation.slots() / 2)
     }
@@ -122,7 +123,7 @@ impl Curve {
 }
 
 impl Interpolation {
-    /// Number of values per key.
+    /// Number of values that the file stores per key: 3 for splines (in-tangent, value, out-tangent), otherwise 1.
     fn slots(self) -> usize {
         if self == Interpolation::CubicSpline { 3 } else { 1 }
     }
@@ -133,7 +134,7 @@ fn quaternion(value: &[f64]) -> Option<glam::DQuat> {
     glam::DVec4::from_array(four).try_normalize().map(glam::DQuat::from_vec4)
 }
 
-/// All numbers of an accessor, for elements of any width.
+/// All numbers of the accessor with this index, one after the other, for elements of any width.
 fn flat(document: &Document, index: usize) -> Result<Vec<f32>> {
     get(&document.accessors, index, "accessor")?;
     Ok(match document.width(index)? {

@@ -14,14 +14,14 @@ use serde_json::Value;
 
 const EXPORT: &str = "the file is damaged: export it again";
 
-/// The deformation of a mesh by its node.
+/// The deformation of a mesh by the morph weights and the skin of its node.
 #[derive(Default)]
 pub(super) struct Deformation {
-    /// Weights of the morph targets; empty if all are zero.
+    /// Weights of the mesh's morph targets; empty if all are zero.
     weights: Vec<f64>,
-    /// Joint matrices of the skin: from the bind pose to world space relative to `center`.
+    /// Joint matrices of the skin, from the bind pose to world space relative to `center`; `None` without a skin.
     joints: Option<Vec<DAffine3>>,
-    /// World transform of a skinned mesh: a translation to the first joint.
+    /// World transform of a skinned mesh: a translation to the first joint; `None` without a skin.
     pub(super) center: Option<DAffine3>,
 }
 
@@ -33,13 +33,13 @@ struct Skin {
     inverse_bind_matrices: Option<usize>,
 }
 
-/// Whether a node deforms its mesh, so that the deformed mesh is not shared.
+/// Whether a node, given by its raw JSON, deforms its mesh, so that the deformed mesh is not shared.
 pub(super) fn is_deformed(raw: &Value) -> bool {
     raw.get("skin").is_some() || raw.get("weights").is_some()
 }
 
 impl Deformation {
-    /// The deformation of mesh `mesh` by node `node`.
+    /// The deformation of the mesh with index `mesh` by the node with index `node`.
     ///
     /// # Errors
     /// The weights are not numbers, the skin or a joint does not exist, or a joint has no finite transform.
@@ -59,7 +59,7 @@ impl Deformation {
         Ok(Deformation { weights, joints: Some(joints), center: Some(center) })
     }
 
-    /// Deforms a mesh; `place` names the primitive in messages.
+    /// Deforms a mesh by morph targets and skin; `place` names the primitive in messages.
     ///
     /// # Errors
     /// Morph targets, joints or weights do not fit the mesh.
@@ -111,7 +111,7 @@ impl Deformation {
     }
 }
 
-/// Adds a weighted morph target to a mesh.
+/// Adds the displacements of a morph target, times `weight`, to a mesh.
 fn add_target(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut Mesh) -> Result<()> {
     let moved = |values: &mut [Vec3], deltas: Vec<[f32; 3]>| {
         for (value, delta) in values.iter_mut().zip(deltas) {
@@ -139,7 +139,7 @@ fn add_target(document: &Document, target: &MorphTarget, weight: f64, mesh: &mut
     Ok(())
 }
 
-/// Joint matrices: the inverse bind matrix, followed by the world transform of the joint.
+/// Joint matrices of the skin `raw`: for each joint, its inverse bind matrix, followed by its world transform.
 fn joints(document: &Document, raw: &Value, worlds: &WorldTransforms) -> Result<Vec<DAffine3>> {
     let skin = Skin::deserialize(raw).map_err(|e| fault("", e).hint(EXPORT))?;
     let binds = skin.inverse_bind_matrices.map(|index| document.floats::<16>(index)).transpose()?;
@@ -161,7 +161,8 @@ fn joints(document: &Document, raw: &Value, worlds: &WorldTransforms) -> Result<
     skin.joints.iter().enumerate().map(joint).collect()
 }
 
-/// Reads an attribute of a skin, with four values per vertex; `None` if the primitive lacks it.
+/// Reads a vertex attribute of a skin, joints or weights, with four values per vertex; `None` if the primitive lacks
+/// it.
 fn skin_attribute(
     document: &Document,
     primitive: &Primitive,

@@ -29,9 +29,9 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<json::Image>,
     pub(super) textures: Vec<json::Texture>,
     pub(super) samplers: Vec<json::texture::Sampler>,
-    /// Number of elements without data that the file may still have.
+    /// Number of elements without data (zeros) that the file may still have.
     pub(super) zeros_left: Cell<u64>,
-    /// Bytes that were allocated since the last check of free memory.
+    /// Bytes that were allocated since free memory was last checked.
     unchecked_bytes: Cell<u64>,
     buffers: Vec<Cow<'a, [u8]>>,
 }
@@ -113,7 +113,7 @@ impl<'a> Document<'a> {
         list.iter().enumerate().map(load).collect()
     }
 
-    /// The bytes at a URI.
+    /// The bytes that a URI of the document names: in the URI itself, or in a file.
     pub(super) fn bytes_of(&self, uri: &str) -> Result<Vec<u8>> {
         uri::load(uri, self.folder, |bytes| {
             let error = self.count_bytes(bytes, "files that the scene names");
@@ -121,7 +121,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Index of the default scene.
+    /// Index of the document's default scene.
     pub(super) fn default_scene(&self) -> Result<usize> {
         let Some(value) = self.raw.get("scene") else { return Ok(0) };
         let index = value.as_u64().and_then(|i| usize::try_from(i).ok());
@@ -129,19 +129,19 @@ impl<'a> Document<'a> {
         get(&self.scenes, index, "scene").map(|_| index)
     }
 
-    /// Parses nodes and cameras again, after an animation has changed the raw JSON.
+    /// Parses the nodes and cameras again, after an animation has changed the raw JSON.
     pub(super) fn reparse_animated(&mut self) -> Result<()> {
         self.nodes = parts(&self.raw, "nodes")?;
         self.cameras = parts(&self.raw, "cameras")?;
         Ok(())
     }
 
-    /// The raw JSON of item `index` in a list of the document; `null` if there is none.
+    /// Raw JSON of the item at `index` in the document's list `list`; `null` if there is none.
     pub(super) fn part(&self, list: &str, index: usize) -> &Value {
         &self.raw[list][index]
     }
 
-    /// The bytes of a buffer view.
+    /// The bytes of the buffer view with this index.
     pub(super) fn view(&self, index: usize) -> Result<&[u8]> {
         let view = get(&self.views, index, "buffer view")?;
         let buffer =
@@ -160,12 +160,12 @@ impl<'a> Document<'a> {
     }
 }
 
-/// A place in an error message: `accessor 12`.
+/// A place for error messages, from the kind of an item and its index: `accessor 12`.
 pub(super) fn at(kind: &str, index: usize) -> String {
     format!("{kind} {index}")
 }
 
-/// A place in an error message: `mesh "water"`, or `mesh 3` without a name.
+/// A place for error messages, from the kind of an item and its name: `mesh "water"`, or `mesh 3` without a name.
 pub(super) fn named(kind: &str, name: Option<&str>, index: usize) -> String {
     match name.filter(|name| !name.is_empty()) {
         Some(name) => format!("{kind} \"{name}\""),
@@ -173,7 +173,7 @@ pub(super) fn named(kind: &str, name: Option<&str>, index: usize) -> String {
     }
 }
 
-/// The item at `index`, or an error.
+/// The item at `index` of a list of the document; an error if there is none. `kind` names the item in the error.
 pub(super) fn get<'l, T>(list: &'l [T], index: usize, kind: &str) -> Result<&'l T> {
     list.get(index).ok_or_else(|| {
         let cause = match list.len() {
@@ -192,7 +192,7 @@ pub(super) fn extension<T: DeserializeOwned>(part: &Value, name: &str, place: im
     }
 }
 
-/// Parses the items of a list of the document.
+/// Parses all items of the document's list `list`; an absent list is empty.
 fn parts<T: DeserializeOwned>(raw: &Value, list: &str) -> Result<Vec<T>> {
     let items = match raw.get(list) {
         None => return Ok(Vec::new()),
@@ -207,7 +207,7 @@ fn parts<T: DeserializeOwned>(raw: &Value, list: &str) -> Result<Vec<T>> {
     items.iter().enumerate().map(part).collect()
 }
 
-/// Keys whose values are 64-bit integers or floats.
+/// Names of the keys in glTF whose values are integers of 64 bits or floats.
 const WIDE_KEYS: [&str; 16] = [
     "count",
     "byteLength",
@@ -227,8 +227,8 @@ const WIDE_KEYS: [&str; 16] = [
     "ymag",
 ];
 
-/// A part without extensions and extras, which the crate cannot parse everywhere. Rejects integers that the crate would
-/// truncate to 32 bits.
+/// A part of the document without extensions and extras, which the `gltf` crate cannot parse everywhere. Rejects
+/// integers that the crate would truncate to 32 bits.
 fn core(value: &Value, place: &str) -> Result<Value> {
     let wide = |key: &str| WIDE_KEYS.contains(&key);
     Ok(match value {

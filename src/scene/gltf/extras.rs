@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Extras of a scene.
+/// Content of `extras.caustique` of a scene.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct SceneExtras {
@@ -28,7 +28,7 @@ pub(super) struct SceneExtras {
     pub(super) frame_rate: Option<Rate>,
 }
 
-/// Frames per second: a whole number or a fraction.
+/// Frames per second of a scene: a whole number or a fraction.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "a whole number, or two for a fraction as in [24000, 1001]")]
 pub(super) enum Rate {
@@ -37,7 +37,7 @@ pub(super) enum Rate {
 }
 
 impl Rate {
-    /// Numerator and denominator.
+    /// Numerator and denominator of the rate.
     pub(super) fn fraction(self) -> [u32; 2] {
         match self {
             Rate::Whole(rate) => [rate, 1],
@@ -46,7 +46,7 @@ impl Rate {
     }
 }
 
-/// Visibility to cameras; other rays hit the object in any case.
+/// Whether cameras see an object. Other rays hit the object in any case.
 #[derive(Deserialize)]
 #[serde(default)]
 pub(super) struct Visible {
@@ -59,7 +59,7 @@ impl Default for Visible {
     }
 }
 
-/// Extras of an environment: a colour or a file.
+/// Content of `extras.caustique.environment`: a colour or an image file.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct EnvironmentExtras {
@@ -71,7 +71,7 @@ pub(super) struct EnvironmentExtras {
     pub(super) light_group: Option<String>,
 }
 
-/// Units of punctual lights.
+/// Units of the intensities of punctual lights, as the file states them.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Units {
@@ -79,7 +79,7 @@ pub(super) enum Units {
     Photometric,
 }
 
-/// A homogeneous medium (1/m).
+/// A homogeneous participating medium, with coefficients in 1/m.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Medium {
@@ -106,13 +106,13 @@ impl Medium {
 #[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Contact {
-    /// A film of air is between them.
+    /// A film of air is between the material and the opaque surface.
     Air,
-    /// No air is between them.
+    /// No air is between the material and the opaque surface.
     Optical,
 }
 
-/// Extras of a material.
+/// Content of `extras.caustique` of a material.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct MaterialExtras {
@@ -123,7 +123,7 @@ pub(super) struct MaterialExtras {
     pub(super) spread_deg: Option<f32>,
 }
 
-/// Extras of a node with a mesh.
+/// Content of `extras.caustique` of a node with a mesh.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct ObjectExtras {
@@ -131,7 +131,7 @@ pub(super) struct ObjectExtras {
     pub(super) light_group: Option<String>,
 }
 
-/// Extras of a camera, or of its node.
+/// Content of `extras.caustique` of a camera, or of its node.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct CameraExtras {
@@ -140,7 +140,7 @@ pub(super) struct CameraExtras {
     pub(super) shift: Option<[f32; 2]>,
 }
 
-/// Extras of a light's node, or of the light.
+/// Content of `extras.caustique` of a light's node, or of the light.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct LightExtras {
@@ -151,7 +151,7 @@ pub(super) struct LightExtras {
     pub(super) light_group: Option<String>,
 }
 
-/// Keys of each kind of part; keys of nested objects follow a dot.
+/// Keys of `extras.caustique` that the reader knows in a scene; keys of nested objects follow a dot.
 pub(super) const SCENE: &[&str] = &[
     "environment",
     "environment.color",
@@ -191,7 +191,8 @@ pub(super) const NODE: &[&str] = &[
     "light_group",
 ];
 
-/// Reads `extras.caustique` of a part of the document; the default if there are none.
+/// Reads `extras.caustique` of a part of the document; the default if there are no extras. `place` names the part in
+/// errors.
 pub(super) fn read<T: Default + DeserializeOwned>(part: &Value, place: &str) -> Result<T> {
     match part.get("extras").and_then(|extras| extras.get("caustique")) {
         None | Some(Value::Null) => Ok(T::default()),

@@ -23,8 +23,8 @@ pub fn hash(scene: &Path, allow_outside: bool) -> Result<String> {
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// The files that a scene file with these bytes names, existing or not. Files outside the scene's folder are skipped
-/// unless `allow_outside`. Empty if the bytes are not glTF.
+/// Paths of the files that a scene file with these bytes names, existing or not. Files outside the scene's folder are
+/// skipped unless `allow_outside`. Empty if the bytes are not glTF.
 pub fn files(bytes: &[u8], scene: &Path, allow_outside: bool) -> Vec<PathBuf> {
     let mut found = Vec::new();
     if let Ok((json, _)) = container::split(bytes) {
@@ -33,7 +33,7 @@ pub fn files(bytes: &[u8], scene: &Path, allow_outside: bool) -> Vec<PathBuf> {
     found
 }
 
-/// Adds the values of keys that name files: `uri` of buffers and images, `file` of an environment.
+/// Adds the paths of the files that the JSON names to `found`: `uri` of buffers and images, `file` of an environment.
 fn collect(json: &Value, folder: Folder, found: &mut Vec<PathBuf>) {
     match json {
         Value::Array(values) => values.iter().for_each(|value| collect(value, folder, found)),

@@ -20,14 +20,14 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 const EFFICACY: f32 = 683.0;
 /// First version of Blender's exporter that writes lumens.
 const FIRST_PHOTOMETRIC: [u32; 2] = [3, 6];
-/// Minimum visible irradiance (W/m2). Blender's default scene has about 1.
+/// Smallest irradiance of a scene's lights that is visible (W/m2). Blender's default scene has about 1.
 const MIN_IRRADIANCE: f64 = 0.02;
-/// Maximum number of lights in the estimate of a scene's brightness.
+/// Maximum number of lights from which the brightness of a scene is estimated.
 const MAX_SAMPLED_LIGHTS: usize = 64;
-/// Maximum number of vertices in the estimate of a scene's brightness.
+/// Maximum number of vertices at which the brightness of a scene is estimated.
 const MAX_SAMPLED_POINTS: usize = 4096;
 
-/// A light of KHR_lights_punctual.
+/// A light as KHR_lights_punctual writes it.
 #[derive(Deserialize)]
 struct Light {
     #[serde(rename = "type")]
@@ -68,20 +68,20 @@ fn one() -> f32 {
 /// Divisors that convert intensities in the file to radiometric units.
 #[derive(Clone, Copy)]
 pub(super) struct Divisors {
-    /// For suns, to W/m2.
+    /// Divisor for suns, to W/m2.
     sun: f32,
-    /// For points and spots, to W/sr.
+    /// Divisor for points and spots, to W/sr.
     point: f32,
 }
 
 impl Divisors {
     const RADIOMETRIC: Divisors = Divisors { sun: 1.0, point: 1.0 };
     const PHOTOMETRIC: Divisors = Divisors { sun: EFFICACY, point: EFFICACY };
-    /// For Blender's own units: the power of a point or spot light over the whole sphere.
+    /// Divisors for Blender's own units, where a point or spot light has the power (W) over the whole sphere.
     const WATTS: Divisors = Divisors { sun: 1.0, point: 4.0 * PI };
 }
 
-/// The divisors for the lights of a file, and whether the units are a guess.
+/// The divisors of light intensities for a file, and whether its units are a guess.
 pub(super) fn divisors(
     document: &Document,
     units: LightUnits,
@@ -107,8 +107,8 @@ pub(super) fn divisors(
     }
 }
 
-/// Takes intensities for watts instead of lumens, if as lumens they would be too dark to see. Blender's exporter omits
-/// the factor in its lighting mode "Unitless", and files do not state the mode.
+/// Changes guessed units from lumens to watts, if as lumens the lights would be too dark to see. Blender's exporter
+/// omits the factor in its lighting mode "Unitless", and files do not state the mode.
 pub(super) fn reconsider_units(out: &mut Description) {
     let Some(guessed) = out.guessed_units.as_mut().filter(|guessed| guessed.photometric) else { return };
     let glows = out.materials.iter().any(|material| material.emission.max_element() > 0.0);
@@ -157,7 +157,7 @@ fn sample_vertices(meshes: &[Mesh], instances: &[PlacedMesh]) -> Vec<DVec3> {
     points
 }
 
-/// Reads the light of a node, which is given by its name and raw JSON.
+/// Reads the light with index `index` in the file, for a node that is given by its name and raw JSON.
 pub(super) fn light(
     document: &Document,
     index: usize,
@@ -215,8 +215,8 @@ pub(super) fn light(
     Ok(PunctualLight { name, to_world, intensity, kind, radius, hidden_from_camera, light_group })
 }
 
-/// Checks the cone of a spot. `blend` is the share of the edge in the cone's 1 - cos, as in Blender; the edge then has
-/// Blender's falloff.
+/// Checks the cone of a spot. `blend` is the width of the soft edge over that of the whole cone, both as 1 minus the
+/// cosine, as in Blender; the edge then has Blender's falloff.
 fn cone(spot: &Spot, blend: Option<f32>, place: &str, warnings: &mut Vec<String>) -> Result<PunctualKind> {
     let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
     if !(inner.is_finite() && outer.is_finite()) {

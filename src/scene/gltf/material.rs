@@ -88,17 +88,17 @@ record! { Anisotropy {
 }}
 record! { Dispersion { dispersion: f32 = 0.0, }}
 
-/// A material, and whether the file declares its meshes solid or thin.
+/// A material as read from the file, and whether the file declares its meshes solid or thin.
 pub(super) struct Loaded {
     pub(super) material: Material,
-    /// `Some(true)` for a volume extension with a thickness, or a medium inside; `Some(false)` for a volume extension
-    /// without thickness.
+    /// `Some(true)` if the file declares meshes solid: a volume extension with a thickness, or a medium inside.
+    /// `Some(false)` for a volume extension without thickness (thin walls); `None` if it declares neither.
     pub(super) solid: Option<bool>,
     /// Whether the material has an occlusion texture, which is ignored because occlusion is simulated.
     pub(super) occlusion: bool,
 }
 
-/// Reads material `index`.
+/// Reads the material with this index in the file.
 ///
 /// # Errors
 /// A number is not finite, or a texture cannot be read.
@@ -168,7 +168,7 @@ impl Reader<'_> {
         if x.is_finite() { Ok(x) } else { Err(fault(self.place, format!("{name} is not finite"))) }
     }
 
-    /// Clamps a number to `[0, max]`, with a warning if it changes.
+    /// Clamps a property of the material to `[0, max]`, with a warning that names it if it changes.
     fn range(&mut self, x: f32, max: f32, name: &str) -> Result<f32> {
         let inside = self.finite(x, name)?.clamp(0.0, max);
         if inside != x {
@@ -199,8 +199,8 @@ impl Reader<'_> {
         self.textures.reference(self.document, &info, usage, &place, self.warnings).map(Some)
     }
 
-    /// KHR_materials_pbrSpecularGlossiness: a dielectric with the specular colour as reflectance at normal incidence.
-    /// The legacy index 0 of KHR_materials_ior expresses this, because it makes the Fresnel factor 1.
+    /// Reads KHR_materials_pbrSpecularGlossiness as a dielectric with the specular colour as reflectance at normal
+    /// incidence. The legacy index 0 of KHR_materials_ior expresses this, because it makes the Fresnel factor 1.
     fn specular_glossiness(&mut self, material: &mut Material) -> Result<()> {
         const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
         let Some(old) = self.extension::<SpecularGlossiness>(NAME)? else { return Ok(()) };
@@ -280,7 +280,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads transmission and the medium of a solid. Returns whether the file declares meshes of the material solid.
+    /// Reads transmission and the medium of a solid. Returns whether the file declares meshes of the material solid
+    /// (`Some(true)`) or thin (`Some(false)`), or neither.
     fn transmission(&mut self, material: &mut Material) -> Result<Option<bool>> {
         if let Some(e) = self.extension::<Transmission>("KHR_materials_transmission")? {
             material.transmission = self.unit(e.transmission_factor, "transmissionFactor")?;
@@ -320,9 +321,10 @@ impl Reader<'_> {
         Ok(solid)
     }
 
-    /// The medium with sigma_a = -ln(c) / d, which transmits the colour c over the distance d (KHR_materials_volume).
+    /// The absorbing medium with sigma_a = -ln(c) / d, which transmits the colour c over the distance d in metres
+    /// (KHR_materials_volume).
     fn absorption(&mut self, distance: f32, color: [f32; 3]) -> Result<Option<MediumParameters>> {
-        /// Minimum transmitted share, which keeps sigma_a finite.
+        /// Minimum share of light that a channel transmits, which keeps sigma_a finite.
         const MIN_COLOR: f32 = 1e-6;
         let c = self.color(color, 1.0, "attenuationColor")?;
         if c == Rgb::ONE || distance == f32::INFINITY {

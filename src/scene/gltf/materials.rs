@@ -12,17 +12,17 @@ use crate::material::Material;
 use crate::texture::TextureRef;
 use std::collections::HashMap;
 
-/// Loads materials when meshes need them.
+/// The materials of a file, loaded when meshes need them.
 pub(super) struct Library {
     glass: Glass,
-    /// The materials in use.
+    /// The materials in use, in the order of their first use.
     pub(super) list: Vec<Material>,
     pub(super) textures: Textures,
-    /// Materials that were read, by index in the file.
+    /// Materials that were read, by their index in the file (`None` is the default material).
     loaded: HashMap<Option<usize>, Loaded>,
-    /// Index in `list`, by index in the file and whether the mesh is solid.
+    /// Index in `list`, by the index in the file and by whether the mesh is solid.
     known: HashMap<(Option<usize>, bool), u32>,
-    /// Number of materials with an occlusion texture.
+    /// Number of materials with an occlusion texture, which is ignored.
     pub(super) occluded: usize,
 }
 
@@ -91,7 +91,7 @@ impl Library {
     }
 }
 
-/// Why a mesh is not closed, with the consequence and a remedy, as the end of a warning.
+/// Why a mesh is not closed, with the consequence and a remedy, as the end of a warning. `bounds` is its topology.
 fn reason_not_closed(bounds: Solid) -> String {
     match (bounds.flipped, bounds.rim) {
         (true, _) => "part of its faces is flipped: recalculate its normals".to_string(),

@@ -10,10 +10,11 @@ use gltf::json;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-/// Maximum coordinate (m). Squared areas of larger triangles would overflow f32.
+/// Maximum absolute coordinate of a vertex (m). Squared areas of larger triangles would overflow f32.
 pub(super) const MAX_COORDINATE: f64 = 1e9;
 
-/// Reads primitive `primitive` of mesh `index`, deformed by a node. `None` if it has nothing to render, with a warning.
+/// Reads the primitive `primitive` of the mesh with index `index`, deformed by a node. `None` if it has nothing to
+/// render, with a warning.
 ///
 /// # Errors
 /// Data of the primitive are missing, out of range or not finite.
@@ -76,7 +77,8 @@ fn kind(mode: Mode) -> &'static str {
     if mode == Mode::Points { "points" } else { "lines" }
 }
 
-/// Vertex indices of the triangles (specification, section 3.7.2.1).
+/// Vertex indices of each triangle of a primitive in a drawing mode (specification, section 3.7.2.1); `order` lists its
+/// vertices.
 fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => {
@@ -88,7 +90,7 @@ fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
     }
 }
 
-/// Removes triangles without area, which no ray can hit. Returns their number.
+/// Removes triangles without area, which no ray can hit. Returns the number of removed triangles.
 pub(super) fn drop_degenerate(mesh: &mut Mesh) -> usize {
     let before = mesh.triangles.len();
     let positions = &mesh.positions;
@@ -133,7 +135,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads an attribute with one value per vertex. Non-finite values are replaced by `fallback`, with a warning.
+    /// Reads an attribute of a primitive with one value per vertex. Non-finite values are replaced by `fallback`, with
+    /// a warning.
     fn vertex_values<const N: usize>(
         &self,
         semantic: &Semantic,

@@ -72,23 +72,23 @@ pub enum Glass {
     Thin,
 }
 
-/// A frame of an animation.
+/// The frame of an animation at which a file is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTime {
     /// Frame number; frame N is at N / rate seconds.
     pub number: u32,
-    /// Frames per second, for files without a frame rate of their own; 24 if `None`.
+    /// Frames per second, for files without a frame rate of their own; `None` is 24.
     pub rate: Option<f64>,
     /// Whether the file is one of a sequence with a file per frame, so that a missing animation needs no warning.
     pub of_sequence: bool,
 }
 
-/// Choices for properties that a file may leave open.
+/// Choices of the user for properties that a file may leave open.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ReadOptions {
     /// Units of punctual lights.
     pub light_units: LightUnits,
-    /// Treatment of glass without a volume extension.
+    /// Treatment of glass meshes without a volume extension: solid or thin.
     pub glass: Glass,
     /// Whether the scene may name files outside its own folder.
     pub allow_outside: bool,
@@ -108,7 +108,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
     read_bytes(&bytes, path, options)
 }
 
-/// [`read`] from the bytes of a file; files that the scene names are relative to `path`.
+/// Does the work of [`read`] for the bytes of a file; files that the scene names are relative to `path`.
 ///
 /// # Errors
 /// As for [`read`].
@@ -121,7 +121,7 @@ fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
-/// An error at a place in the scene file.
+/// An error whose message names a place in the scene file and the cause.
 fn fault(place: impl Display, cause: impl Display) -> Error {
     Error::new(ErrorKind::Scene, place, cause)
 }

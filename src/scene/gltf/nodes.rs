@@ -24,11 +24,11 @@ use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Memory per instance of a mesh in bytes, Embree included. Measured: 2^20 instances of a triangle take 957 MiB.
+/// Memory of an instance of a mesh in bytes, Embree included. Measured: 2^20 instances of a triangle take 957 MiB.
 const INSTANCE_BYTES: u64 = 1000;
-/// Maximum memory per vertex in bytes, Embree included.
+/// Maximum memory of a vertex in bytes, Embree included.
 const VERTEX_BYTES: u64 = 128;
-/// Maximum memory per triangle in bytes, Embree included.
+/// Maximum memory of a triangle in bytes, Embree included.
 const TRIANGLE_BYTES: u64 = 128;
 
 /// Reads the bytes of a file into a description.
@@ -65,7 +65,7 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
     Ok(out)
 }
 
-/// The extension KHR_node_visibility.
+/// Content of the extension KHR_node_visibility.
 #[derive(Deserialize)]
 struct Visibility {
     #[serde(default = "visible")]
@@ -76,33 +76,33 @@ fn visible() -> bool {
     true
 }
 
-/// A node's reference to a light of KHR_lights_punctual.
+/// A node's reference to a light of KHR_lights_punctual, by index.
 #[derive(Deserialize)]
 struct LightReference {
     light: u32,
 }
 
-/// The extension EXT_mesh_gpu_instancing.
+/// Content of the extension EXT_mesh_gpu_instancing.
 #[derive(Deserialize)]
 struct Instancing {
     attributes: HashMap<String, u32>,
 }
 
-/// A primitive with its material, by their indices in the description.
+/// A primitive of a mesh with its material, both by their indices in the description.
 #[derive(Clone, Copy)]
 struct Part {
     mesh: u32,
     material: u32,
 }
 
-/// A primitive that was read, with its material.
+/// A primitive of a mesh as it was read, with its material.
 struct MaterialMesh {
     /// Index of the primitive in its mesh.
     primitive: usize,
     mesh: Mesh,
-    /// Index of the material in the file.
+    /// Index of the material in the file; `None` if the primitive has none.
     file_material: Option<usize>,
-    /// Index of the material in the library.
+    /// Index of the material in the list of those in use.
     material: u32,
     /// Topology of the primitive if it is closed alone, otherwise of the whole mesh.
     bounds: Solid,
@@ -111,14 +111,14 @@ struct MaterialMesh {
 struct Reader<'r> {
     document: &'r Document<'r>,
     library: Library,
-    /// Parts of the meshes that were read, by index of the mesh, and of the node if it deforms the mesh.
+    /// Primitives of the meshes that were read, by index of the mesh, and of the node if it deforms the mesh.
     meshes: HashMap<(usize, Option<usize>), Vec<Part>>,
     worlds: WorldTransforms<'r, 'r>,
-    /// Local bounds of each mesh in `out`.
+    /// Bounding box, in local space, of each mesh in `out`.
     bounds: Vec<(DVec3, DVec3)>,
-    /// Clip planes of the cameras.
+    /// Clip planes of the cameras, in their order.
     clips: Vec<Clip>,
-    /// Unit conversion of punctual lights, once it is known.
+    /// Divisors from the file's units of punctual lights to radiometric units; `None` until the first light is read.
     divisors: Option<lights::Divisors>,
     options: ReadOptions,
     scene: SceneExtras,
@@ -146,7 +146,7 @@ impl Reader<'_> {
         self.walk(roots)
     }
 
-    /// Checks and copies the settings of the picture.
+    /// Checks the settings of the picture in the extras of the scene, and copies them to the description.
     fn picture(&mut self, place: &str) -> Result<()> {
         let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, frame, frame_rate, .. } = self.scene;
         if resolution.is_some_and(|size| size.contains(&0)) {
@@ -174,7 +174,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Nodes without a parent: the roots of a file without a scene.
+    /// Indices of the nodes without a parent, which are the roots if the file has no scene.
     fn root_nodes(&self) -> Vec<usize> {
         let nodes = &self.document.nodes;
         let mut child = vec![false; nodes.len()];
@@ -225,7 +225,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Visits each node once, in the file's order, parents first. Nodes must form trees (specification, section 3.5.2).
+    /// Visits each node below `roots` once, in the file's order, parents first. Nodes must form trees (specification,
+    /// section 3.5.2).
     fn walk(&mut self, roots: Vec<usize>) -> Result<()> {
         let document = self.document;
         let mut seen = vec![false; document.nodes.len()];
@@ -297,7 +298,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Adds instances of the parts of a mesh, one for each of `copies`.
+    /// Adds instances of the primitives of a mesh to the description, one of each for each transform in `copies`.
     fn place(
         &mut self,
         parts: &[Part],
@@ -431,8 +432,8 @@ impl Reader<'_> {
         Ok((meshes, whole))
     }
 
-    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), relative to the node. Without the
-    /// extension, the identity alone.
+    /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), relative to the node; only the identity
+    /// without the extension.
     fn copies(&self, raw: &Value, place: &str) -> Result<Vec<DAffine3>> {
         const NAME: &str = "EXT_mesh_gpu_instancing";
         let Some(instancing) = extension::<Instancing>(raw, NAME, place)? else { return Ok(vec![DAffine3::IDENTITY]) };
@@ -461,7 +462,8 @@ impl Reader<'_> {
         Ok(copies)
     }
 
-    /// Checks that there is memory for `copies` instances of a mesh of `parts` parts, besides the present instances.
+    /// Checks that there is memory for `copies` instances of a mesh of `parts` primitives, besides the present
+    /// instances.
     fn check_memory(&self, copies: usize, parts: usize) -> Result<()> {
         let placed = (copies as u64).saturating_mul(parts as u64).saturating_add(self.out.instances.len() as u64);
         let bytes = placed.saturating_mul(INSTANCE_BYTES);
@@ -473,8 +475,8 @@ impl Reader<'_> {
     }
 }
 
-/// Flips inner shells of glass solids that face the wrong way, and adds warnings about flipped and inverted shells.
-/// Primitives of one material are one solid.
+/// Flips inner shells (connected parts) of glass solids that face the wrong way, and adds warnings about flipped and
+/// inverted shells. Primitives of one material are one solid.
 fn orient_shells(mut glass: Vec<&mut MaterialMesh>, whole: Solid, name: &str, warnings: &mut Vec<String>) {
     while let Some(material) = glass.first().map(|part| part.file_material) {
         let (mut same, others) = glass.into_iter().partition::<Vec<_>, _>(|part| part.file_material == material);

@@ -2,21 +2,21 @@
 
 use serde_json::{Map, Value};
 
-/// Why a value cannot be written at a pointer.
+/// Why an animated value cannot be written at a JSON pointer.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum PointerError {
-    /// A list has no item with the index in the pointer.
+    /// A list of the document has no item with the index in the pointer.
     Missing,
     /// The reader does not support animation of this value.
     Unread,
 }
 
-/// Parts of a document that animations may change.
+/// Lists of the document whose values animations may change.
 const ANIMATED_PARTS: [&str; 5] = ["nodes", "cameras", "materials", "meshes", "extensions"];
 
-/// Writes the numbers of an animation at a pointer, with the type of the present value: a boolean, a number, or a list.
-/// Weights are always a list. Adds values that the file leaves at their default. `is_supported` tells supported
-/// extensions.
+/// Writes the numbers of an animation at a JSON pointer, with the type of the present value: a boolean, a number, or a
+/// list. Weights are always a list. Adds values that the file leaves at their default. `is_supported` says whether the
+/// reader supports a glTF extension.
 pub(super) fn put(
     root: &mut Value,
     pointer: &str,

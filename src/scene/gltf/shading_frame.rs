@@ -23,10 +23,10 @@ pub(super) fn repair_normals(mesh: &mut Mesh) -> usize {
     repaired
 }
 
-/// Computes tangents in the direction of increasing u of `coordinates`: the angle-weighted mean over the adjacent
-/// faces, made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF prescribes,
-/// faces that are mirrored in the texture do not contribute to the tangents of others: a vertex between both kinds is
-/// split.
+/// Computes the tangents of a mesh, in the direction of increasing u of `coordinates`: the angle-weighted mean over the
+/// adjacent faces, made perpendicular to the normal. As in MikkTSpace (<http://www.mikktspace.com>), which glTF
+/// prescribes, faces that are mirrored in the texture do not contribute to the tangents of others: a vertex between
+/// both kinds is split.
 pub(super) fn make_tangents(mesh: &mut Mesh, coordinates: &TextureRef) {
     let set = usize::from(coordinates.set);
     if mesh.uvs[set].is_empty() {
@@ -79,7 +79,7 @@ fn area([a, b, c]: [Vec2; 3]) -> f32 {
     (b - a).perp_dot(c - a)
 }
 
-/// Appends a copy of vertex `i`, and returns its index.
+/// Appends a copy of vertex `i` to the mesh, and returns the index of the copy.
 fn split(mesh: &mut Mesh, i: u32) -> u32 {
     fn repeat<T: Copy>(values: &mut Vec<T>, i: usize) {
         if let Some(&value) = values.get(i) {

@@ -7,29 +7,30 @@ use rstar::RTree;
 use rstar::primitives::{GeomWithData, Rectangle};
 use std::collections::HashSet;
 
-/// Numbers of inverted and flipped shells.
+/// Numbers of shells (connected parts of closed glass) that face inwards or were flipped.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct ShellReport {
-    /// Outermost shells whose faces point inwards.
+    /// Number of outermost shells whose faces point inwards.
     pub(super) inverted: usize,
-    /// Inner shells that were flipped.
+    /// Number of inner shells that were flipped.
     pub(super) flipped: usize,
 }
 
-/// A triangle: index of the mesh, and of the triangle in it.
+/// Reference to a triangle: index of its mesh, and of the triangle in the mesh.
 type Face = (u32, u32);
 
-/// A connected part of closed glass.
+/// A connected part of the surface of closed glass.
 struct Shell {
     triangles: Vec<Face>,
-    /// Enclosed volume; negative if the faces point inwards.
+    /// Enclosed volume (m3); negative if the faces point inwards.
     volume: f64,
     low: DVec3,
     high: DVec3,
 }
 
-/// Flips each shell that is inside another and has the same orientation. A second surface of the same glass would have
-/// no effect, so the shell was meant to bound a hollow. Together, `meshes` are closed.
+/// Flips each shell (connected part of closed glass) that is inside another and has the same orientation. A second
+/// surface of the same glass would have no effect, so the shell was meant to bound a hollow. Together, `meshes` are
+/// closed.
 pub(super) fn flip_inner(meshes: &mut [&mut Mesh]) -> ShellReport {
     let mut shells = shells(&meshes.iter().map(|mesh| &**mesh).collect::<Vec<_>>());
     // From the largest to the smallest, so that the orientation of an outer shell is final before its inner shells.
@@ -102,7 +103,7 @@ fn shells(meshes: &[&Mesh]) -> Vec<Shell> {
     shells
 }
 
-/// Root of a position in the union-find, with path halving.
+/// Root of the set that contains `place` in a union-find forest, with path halving.
 fn root(parents: &mut [u32], mut place: u32) -> u32 {
     while parents[place as usize] != place {
         let next = parents[parents[place as usize] as usize];
@@ -111,8 +112,8 @@ fn root(parents: &mut [u32], mut place: u32) -> u32 {
     place
 }
 
-/// Whether a shell contains all of another one, tested at a few corners. Shells that intersect do not contain each
-/// other.
+/// Whether the shell `outer` contains all of `inner`, tested at a few corners. Shells that intersect do not contain
+/// each other.
 fn contains(meshes: &[&Mesh], outer: &Shell, inner: &Shell) -> bool {
     const CORNERS: usize = 3;
     let step = inner.triangles.len().div_ceil(CORNERS);

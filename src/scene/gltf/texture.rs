@@ -14,24 +14,24 @@ use std::collections::HashMap;
 use std::io::Cursor;
 use std::sync::Arc;
 
-/// Maximum width and height of a texture.
+/// Maximum width and height of a texture, in texels.
 const MAX_SIDE: u32 = 32_768;
 /// Maximum memory for decoding an image, in bytes: 16384 x 16384 RGBA.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Interpretation of an image.
+/// How the numbers of an image are interpreted.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Use {
     /// Colours, sRGB-encoded.
     Color,
     /// Linear numbers.
     Data,
-    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness), converted to roughness in G. The field
-    /// has the bits of the f32 factor of glossiness.
+    /// Glossiness in the alpha channel (KHR_materials_pbrSpecularGlossiness), converted to roughness in G. The field is
+    /// the bits of the f32 factor of glossiness.
     Glossiness(u32),
 }
 
-/// `textureInfo` of the specification (section 5.30), with the scale of normal textures.
+/// Content of `textureInfo` of the specification (section 5.30), with the scale of normal textures.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Info {
@@ -48,7 +48,7 @@ fn one() -> f32 {
     1.0
 }
 
-/// The extension KHR_texture_transform.
+/// Content of the extension KHR_texture_transform.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 struct Transform {
@@ -74,18 +74,18 @@ impl Transform {
     }
 }
 
-/// Loads textures when materials need them.
+/// The textures of a file, loaded when materials need them.
 #[derive(Default)]
 pub(super) struct Textures {
-    /// The textures in use.
+    /// The textures in use, in the order of their first use.
     pub(super) list: Vec<Texture>,
-    /// Index in `list`, by image, sampler and use.
+    /// Index in `list`, by the image, the sampler and the use of the texture.
     known: HashMap<(usize, Option<usize>, Use), u32>,
-    /// Decoded images, by index in the file.
+    /// Decoded images, by their index in the file.
     images: HashMap<usize, Decoded>,
 }
 
-/// A decoded image.
+/// A decoded image, before its interpretation.
 #[derive(Clone)]
 struct Decoded {
     width: u32,
@@ -252,7 +252,7 @@ fn check_size(document: &Document, bytes: &[u8], format: ImageFormat) -> Result<
     Ok(jpeg.is_some_and(|jpeg| !jpeg.ends))
 }
 
-/// Properties of a JPEG from its markers (ITU T.81, annex B).
+/// Properties of a JPEG file, read from its markers (ITU T.81, annex B).
 struct JpegMarkers {
     progressive: bool,
     /// Whether the file has its end marker.

@@ -4,7 +4,7 @@ use crate::geometry::Mesh;
 use crate::math::Vec3;
 use std::collections::HashMap;
 
-/// Topology of a set of triangles.
+/// How a set of triangles encloses a volume: whether it is closed, and its holes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Solid {
     /// Whether exactly two triangles share every edge, in opposite directions. Vertices at equal positions count as
@@ -12,7 +12,7 @@ pub(super) struct Solid {
     pub(super) closed: bool,
     /// Whether two triangles share every edge, but some in the same direction, because part of the faces is flipped.
     pub(super) flipped: bool,
-    /// Number of edges with only one triangle: the boundary of holes.
+    /// Number of edges that belong to only one triangle: the boundary of holes.
     pub(super) rim: usize,
     /// Enclosed volume (m3); negative if the front faces point inwards. Meaningless for an open surface.
     pub(super) volume: f64,
@@ -38,7 +38,8 @@ pub(super) fn solid(meshes: &[&Mesh]) -> Solid {
     Solid { closed: edges.opposite, flipped: edges.paired && !edges.opposite, rim: edges.single, volume }
 }
 
-/// Numbers the distinct positions. Returns the number of each vertex's position, and the count of positions.
+/// Numbers the distinct positions of vertices. Returns, for each mesh and vertex, the number of its position, and the
+/// count of positions.
 pub(super) fn weld(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
     // Allocated at full size, because a growing table takes twice the memory for a while.
     let mut known: HashMap<[u32; 3], u32> = HashMap::with_capacity(meshes.iter().map(|m| m.positions.len()).sum());
@@ -52,19 +53,20 @@ pub(super) fn weld(meshes: &[&Mesh]) -> (Vec<Vec<u32>>, usize) {
     (places, known.len())
 }
 
-/// How triangles share edges.
+/// How the triangles of a set share edges.
 struct Edges {
-    /// Two triangles share every edge, and there are edges.
+    /// Whether exactly two triangles share every edge, and there are edges.
     paired: bool,
-    /// Two triangles share every edge in opposite directions, and there are edges.
+    /// Whether two triangles share every edge in opposite directions, and there are edges.
     opposite: bool,
-    /// Number of edges with one triangle.
+    /// Number of edges that belong to one triangle only.
     single: usize,
 }
 
 impl Edges {
-    /// Counts directed edges between numbered positions. A counting sort groups edges by their lower position and their
-    /// direction, so an edge takes four bytes, and only the few edges at a position are sorted.
+    /// Counts how triangles share the directed edges `edges` between `places` numbered positions. A counting sort
+    /// groups edges by their lower position and their direction, so an edge takes four bytes, and only the few edges at
+    /// a position are sorted.
     fn count<E: Iterator<Item = (u32, u32)>>(places: usize, edges: impl Fn() -> E) -> Edges {
         let list = |(i, j): (u32, u32)| 2 * i.min(j) as usize + usize::from(i < j);
         let mut ends = vec![0usize; 2 * places + 1];
@@ -90,7 +92,8 @@ impl Edges {
         counted
     }
 
-    /// Adds the edges between one position and the higher positions `highs`. The first `down` edges lead downwards.
+    /// Counts the edges between one position and the higher positions `highs`. The first `down` edges lead to the lower
+    /// position.
     fn add_edges_at(&mut self, highs: &mut [u32], down: usize) {
         let (down, up) = highs.split_at_mut(down);
         down.sort_unstable();

@@ -26,14 +26,15 @@ pub(super) fn local(raw: &Value, place: &str) -> Result<DAffine3> {
     compose(t, r, s).ok_or_else(|| fault(place, "its rotation is not a quaternion"))
 }
 
-/// The transform of a column-major 4 x 4 matrix. `None` if the last row is not 0, 0, 0, 1.
+/// The transform of a column-major 4 x 4 matrix. `None` if its last row is not 0, 0, 0, 1.
 pub(super) fn affine(m: [f64; 16]) -> Option<DAffine3> {
     let column = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
     let transform = DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) };
     ([m[3], m[7], m[11], m[15]] == [0.0, 0.0, 0.0, 1.0]).then_some(transform)
 }
 
-/// Composes scale, then rotation (a quaternion, normalised), then translation. `None` if the quaternion is zero.
+/// Composes scale `s`, then rotation `r` (a quaternion, normalised), then translation `t`; `None` is the identity.
+/// Returns `None` if the quaternion is zero.
 pub(super) fn compose(t: Option<[f64; 3]>, r: Option<[f64; 4]>, s: Option<[f64; 3]>) -> Option<DAffine3> {
     let rotation = glam::DVec4::from_array(r.unwrap_or([0.0, 0.0, 0.0, 1.0])).try_normalize()?;
     let (t, s) = (DVec3::from_array(t.unwrap_or([0.0; 3])), DVec3::from_array(s.unwrap_or([1.0; 3])));
@@ -52,12 +53,12 @@ pub(super) fn is_invertible(transform: &DAffine3) -> bool {
         && inverse.to_cols_array().iter().all(|x| x.abs() < f64::from(f32::MAX).sqrt())
 }
 
-/// World transforms of nodes in any scene of the document.
+/// World transforms of the nodes of a document, in any of its scenes.
 pub(super) struct WorldTransforms<'d, 'a> {
     document: &'d Document<'a>,
-    /// Parent of each node.
+    /// Index of each node's parent; `None` for a root.
     parents: Vec<Option<usize>>,
-    /// Cache of world transforms by node, because joints share their ancestors.
+    /// Cache of world transforms by index of the node, because joints share their ancestors.
     known: RefCell<HashMap<usize, DAffine3>>,
 }
 
@@ -74,7 +75,7 @@ impl<'d, 'a> WorldTransforms<'d, 'a> {
         WorldTransforms { document, parents, known: RefCell::default() }
     }
 
-    /// The world transform of a node.
+    /// The world transform of the node with this index.
     ///
     /// # Errors
     /// The node does not exist or is its own ancestor, or a transform of an ancestor is invalid.

@@ -5,7 +5,8 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::scene::folder::Folder;
 use std::path::PathBuf;
 
-/// The bytes at `uri`; relative paths start at `folder`. `reserve` is called with the size of a file before it is read.
+/// The bytes that `uri` names, in itself or in a file; relative paths start at `folder`. `reserve` is called with the
+/// size of a file (bytes) before it is read.
 pub(super) fn load(uri: &str, folder: Folder, reserve: impl FnOnce(u64) -> Result<()>) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((head, body)) = data.split_once(',') else {
@@ -85,7 +86,7 @@ fn percent_decode(text: &str) -> Vec<u8> {
     out
 }
 
-/// Decodes base64 with the standard alphabet of RFC 4648, with or without padding.
+/// Decodes base64 with the standard alphabet of RFC 4648, with or without padding; `None` if the text is not base64.
 fn base64(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len() / 4 * 3);
     let (mut bits, mut held) = (0u32, 0);

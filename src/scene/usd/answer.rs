@@ -4,7 +4,7 @@ use crate::error::{Error, ErrorKind, Result};
 use serde::Deserialize;
 use std::path::Path;
 
-/// An error as the converter prints it, in JSON.
+/// An error as the USD converter prints it, in JSON.
 #[derive(Deserialize)]
 struct Fault {
     prim: String,
@@ -12,7 +12,7 @@ struct Fault {
     hint: Option<String>,
 }
 
-/// The options of `caustique render` that the converter printed for a stage.
+/// The options of `caustique render` that the USD converter printed for a stage.
 ///
 /// # Errors
 /// The converter printed something else.

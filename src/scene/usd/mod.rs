@@ -23,7 +23,7 @@ use std::time::Duration;
 /// File extensions of USD stages.
 const EXTENSIONS: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
-/// Names and contents of the converter's files.
+/// Names and contents of the files of the USD converter (in Python), embedded in the program.
 const SOURCES: [(&str, &str); 20] = [
     ("cameras.py", include_str!("../../../scripts/usd/cameras.py")),
     ("convert.py", include_str!("../../../scripts/usd/convert.py")),
@@ -87,15 +87,15 @@ pub fn arguments(path: &Path, allow_outside: bool) -> Result<Vec<String>> {
     answer::options(&output.stdout, path)
 }
 
-/// Environment variable that limits the time of a conversion, in seconds.
+/// Environment variable that limits the time of a conversion from USD, in seconds.
 const SECONDS_VARIABLE: &str = "CAUSTIQUE_USD_SECONDS";
-/// Default time limit of a conversion, in seconds.
+/// Default time limit of a conversion from USD, in seconds.
 const DEFAULT_MAX_SECONDS: u32 = 3600;
 
-/// Time between two checks whether the user has asked to stop.
+/// Time between two checks during a conversion whether the user has asked to stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The time limit of a conversion, in seconds.
+/// The time limit of a conversion from USD, in seconds.
 fn max_seconds() -> Result<u32> {
     let Some(value) = std::env::var_os(SECONDS_VARIABLE) else { return Ok(DEFAULT_MAX_SECONDS) };
     // poll(2) takes milliseconds in 31 bits.
@@ -108,7 +108,7 @@ fn max_seconds() -> Result<u32> {
     })
 }
 
-/// The converter's files in a temporary folder, which is removed on drop.
+/// The USD converter's files in a temporary folder, which is removed on drop.
 struct Converter<'p> {
     stage: &'p Path,
     interpreter: Interpreter,
@@ -128,7 +128,7 @@ impl<'p> Converter<'p> {
         Ok(Converter { stage, interpreter, folder })
     }
 
-    /// Runs the converter on the stage with these command-line arguments.
+    /// Runs the converter on the stage with these command-line arguments, and returns what it printed.
     fn run(&self, arguments: &[OsString], allow_outside: bool, stop: &Stop) -> Result<Output> {
         let mut command = self.interpreter.command();
         command.arg("-B").arg(self.folder.path().join("convert.py")).arg(self.stage).args(arguments);

@@ -11,7 +11,7 @@ pub const VARIABLE: &str = "CAUSTIQUE_USD_PYTHON";
 /// Path of the Python that `scripts/setup.sh usd` installs, in the project's folder.
 const ENVIRONMENT: &str = ".venv-usd/bin/python";
 
-/// Hint of errors about a missing Python or module.
+/// Hint that ends errors about a missing Python or module.
 pub(super) const HINT: &str = "run 'scripts/setup.sh usd', or install what scripts/requirements-usd.txt lists (pip \
                                install usd-core numpy OpenEXR pillow mapbox-earcut) and set CAUSTIQUE_USD_PYTHON to \
                                that Python";
