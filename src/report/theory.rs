@@ -6,7 +6,7 @@ use crate::render::{BandwidthRule, Settings};
 /// Exponent of the squared error as a power of the number of iterations, with its reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Theory {
-    /// Exponent in the limit of many iterations, below 0.
+    /// Exponent in the limit of many iterations, 0 or below.
     pub exponent: f64,
     /// The reason for the exponent, in a clause.
     pub because: &'static str,
