@@ -31,7 +31,7 @@ pub enum ErrorKind {
 /// An error with its category, its place, its cause, and a hint about the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
-    /// The category.
+    /// Category of the error, which determines the exit code.
     pub kind: ErrorKind,
     /// File and place in it, such as `pool.glb: mesh "water", primitive 0`; empty when there is none.
     pub place: String,
@@ -52,7 +52,7 @@ impl Error {
         Error::new(ErrorKind::Usage, "command line", cause)
     }
 
-    /// Sets the hint.
+    /// Sets the hint, the remedy in one clause.
     #[must_use]
     pub fn hint(mut self, hint: impl fmt::Display) -> Self {
         self.hint = Some(hint.to_string());

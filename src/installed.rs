@@ -20,7 +20,7 @@ pub fn candidates(relative: &str) -> Vec<PathBuf> {
     project_folders().iter().map(|home| home.join(relative)).collect()
 }
 
-/// The first of [`candidates`] that exists.
+/// The first of the [`candidates`] that exists; `None` if none does.
 pub fn find(relative: &str) -> Option<PathBuf> {
     candidates(relative).into_iter().find(|path| path.exists())
 }
@@ -46,7 +46,7 @@ fn project_folders() -> Vec<PathBuf> {
     }
 }
 
-/// The folders above a file, except folders where everybody may create files.
+/// The folders above `file`, nearest first, except folders where everybody may create files.
 fn folders_above(file: &Path) -> Vec<PathBuf> {
     let shared = |folder: &&Path| folder.metadata().is_ok_and(|data| data.mode() & STICKY_BIT != 0);
     file.ancestors().skip(1).filter(|folder| !shared(folder)).map(Path::to_path_buf).collect()

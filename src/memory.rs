@@ -11,13 +11,13 @@ use rustix::process::{Resource, getrlimit};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// Allocations below this number of bytes need no check.
+/// Allocations below this number of bytes are not checked against the free memory.
 pub const MIN_CHECKED_BYTES: u64 = 16 << 20;
 
 /// Largest compression ratio of an EXR: that of deflate (1032) over run lengths in blocks of 64 samples.
 pub const MAX_EXR_RATIO: u64 = 1032 * 64;
 
-/// Free memory, and the limit that determines it.
+/// Memory that the process may still allocate, and the limit that determines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Available {
     /// Bytes that the process may still allocate.

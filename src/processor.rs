@@ -35,7 +35,8 @@ pub fn check() -> Result<()> {
         .hint("use a processor made since 2013, or build from source without the flags in .cargo/config.toml"))
 }
 
-/// Required features that the first processor in `cpuinfo` does not list. Empty if it has no list of features.
+/// Required processor features that the first processor in the text `cpuinfo` does not list. Empty if it has no list of
+/// features.
 fn missing_features(cpuinfo: &str) -> Vec<&'static str> {
     let flags = cpuinfo.lines().find_map(|line| line.strip_prefix("flags")?.split_once(':'));
     let Some((_, flags)) = flags else { return Vec::new() };

@@ -24,21 +24,21 @@ struct State {
 }
 
 impl Default for Stop {
-    /// Without a stop request.
+    /// A stop that nobody has requested, without a deadline.
     fn default() -> Stop {
         Stop::from_flag(Arc::default())
     }
 }
 
 impl Stop {
-    /// A stop that is requested by setting `requested`.
+    /// A stop that is requested by setting `requested` to true, also from another thread.
     #[allow(clippy::disallowed_methods, reason = "a deadline decides when a render stops, and nothing else")]
     pub fn from_flag(requested: Arc<AtomicBool>) -> Stop {
         let (deadline, aborted) = (AtomicU64::new(NO_DEADLINE), AtomicBool::new(false));
         Stop { requested, state: Arc::new(State { created: Instant::now(), deadline, aborted }) }
     }
 
-    /// Starts an iteration, with a deadline `seconds` from now, if any.
+    /// Starts an iteration that is not aborted, with a deadline `seconds` from now; without a deadline if `None`.
     pub fn start_iteration(&self, seconds: Option<f64>) {
         let end = |seconds: f64| (self.nanoseconds() as f64 + 1e9 * seconds.max(0.0)) as u64;
         self.state.deadline.store(seconds.map_or(NO_DEADLINE, end), Ordering::Relaxed);
@@ -49,7 +49,7 @@ impl Stop {
         self.state.created.elapsed().as_nanos() as u64
     }
 
-    /// Whether a stop was requested. The deadline does not count.
+    /// Whether the user has requested a stop. The deadline does not count.
     pub fn requested(&self) -> bool {
         self.requested.load(Ordering::Relaxed)
     }
@@ -68,7 +68,7 @@ impl Stop {
         ends
     }
 
-    /// Whether the iteration that was started last is aborted.
+    /// Whether the iteration that was started last is aborted: a unit of its work had to end early.
     pub fn aborted(&self) -> bool {
         self.state.aborted.load(Ordering::Relaxed)
     }

@@ -19,7 +19,7 @@ use super::Sums;
 use super::output::{NetworkOutput, Rect};
 use super::stack::LevelStack;
 
-/// Channels per pair besides the feature space: source, centre, falloff.
+/// Network output channels per pair of bandwidth levels, besides the feature space: source, centre, falloff.
 pub const SCALARS: usize = 3;
 
 /// Largest number of dimensions of the feature space.
@@ -28,9 +28,9 @@ pub const MAX_DIMENSIONS: usize = 8;
 /// Maximum exponent of an affinity in powers of two (exp(-60)), so that every weight stays positive in f32.
 const MAX_DISTANCE: f32 = 60.0 * std::f32::consts::LOG2_E;
 
-/// Range of source and centre, as in training; NaN counts as 0.
+/// Least and greatest value of the network's outputs source and centre, as in training; NaN counts as 0.
 const LOG_WEIGHT: (f32, f32) = (-12.0, 12.0);
-/// Range of falloff, as in training; NaN counts as 0.
+/// Least and greatest value of the network's output falloff, as in training; NaN counts as 0.
 const LOG_FALLOFF: (f32, f32) = (-20.0, 0.0);
 
 /// Pixels per SIMD block.
@@ -38,7 +38,8 @@ const LANES: usize = 8;
 
 type Lanes = [f32; LANES];
 
-/// Adds pair `pair` (levels 1 and `pair` + 2) of equation (6) to `sums`, over the pixels of `core`.
+/// Adds the terms of pair `pair` (bandwidth levels 1 and `pair` + 2) of equation (6) to `sums`, over the pixels of
+/// `core`.
 ///
 /// `features` covers `core` and a window's radius around it within the image; `valid` says for each pixel of the image
 /// whether it can be a neighbour.
@@ -102,11 +103,12 @@ fn add<const D: usize>(
 struct Neighbours<const D: usize> {
     radius: usize,
     pitch: usize,
-    /// phi, scaled so that squared distances are exponents of two.
+    /// The network's features of each pixel, phi, scaled so that squared distances are exponents of two; one plane
+    /// each.
     phi: [Vec<f32>; D],
     /// exp(source), zero outside the image and at invalid pixels.
     weight: Vec<f32>,
-    /// y - z, RGB.
+    /// Difference of the two levels, y - z, in RGB.
     difference: [Vec<f32>; 3],
 }
 
@@ -198,7 +200,7 @@ impl<const D: usize> Neighbours<D> {
     }
 }
 
-/// LANES values from `start`.
+/// The SIMD block of [`LANES`] values of `plane` from index `start` on.
 #[inline(always)]
 fn lanes(plane: &[f32], start: usize) -> Lanes {
     plane[start..start + LANES].try_into().unwrap_or([0.0; LANES])
@@ -242,7 +244,7 @@ fn exp_bounded(x: f32, (least, most): (f32, f32)) -> f32 {
     if x.is_nan() { 1.0 } else { x.clamp(least, most).exp() }
 }
 
-/// Channels of source, centre and falloff.
+/// Indices of the network's channels source, centre and falloff of pair `pair` among `pairs`.
 const fn scalar_channels<const D: usize>(pairs: usize, pair: usize) -> (usize, usize, usize) {
     let first = pairs * D + pair;
     (first, first + pairs, first + 2 * pairs)

@@ -11,10 +11,11 @@ use super::Sums;
 use super::output::{NetworkOutput, Rect};
 use super::stack::LevelStack;
 
-/// Range to which weights are clamped, so that they and their sums stay positive and finite.
+/// Range to which the network's weights are clamped, so that they and their sums stay positive and finite.
 const WEIGHT_RANGE: (f32, f32) = (1e-20, 1e20);
 
-/// Adds pair `pair` of equation (6) to `sums`, over the pixels of `core`, which `weights` covers.
+/// Adds the terms of pair `pair` of levels of equation (6) to `sums`, over the pixels of `core`, which `weights`
+/// covers.
 pub fn add_pair(
     stack: &LevelStack,
     valid: &[bool],

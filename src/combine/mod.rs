@@ -38,7 +38,7 @@ pub use stack::LevelStack;
 use tensor::Normalisation;
 use tile::Tile;
 
-/// A loaded network that combines levels.
+/// A loaded neural network that combines the bandwidth levels of a render into one picture.
 pub struct Combiner {
     network: Network,
 }
@@ -52,12 +52,12 @@ impl Combiner {
         Ok(Combiner { network: Network::load(model, runtime, rayon::current_num_threads())? })
     }
 
-    /// The network's metadata.
+    /// The network's metadata: its numbers of levels and its window, among others.
     pub fn metadata(&self) -> &model::Metadata {
         self.network.metadata()
     }
 
-    /// Combines the levels of a stack, in their units.
+    /// Combines the bandwidth levels of a stack into one picture, in the units of the levels.
     ///
     /// A pixel that is not finite in every level contributes to no neighbour. Its own result is its first finite level, else
     /// the mean of the finite pixels in its window, else black.
@@ -70,7 +70,7 @@ impl Combiner {
         self.run_tiled(stack, pixels)
     }
 
-    /// [`run`](Self::run) with tiles of about `pixels` pixels, on which the result depends by rounding only.
+    /// [`run`](Self::run) in tiles of about `pixels` pixels; their size changes the result by rounding only.
     pub(crate) fn run_tiled(&mut self, stack: &LevelStack, pixels: usize) -> Result<Picture> {
         let metadata = self.network.metadata().clone();
         stack.check(metadata.levels)?;
@@ -91,7 +91,7 @@ impl Combiner {
     }
 }
 
-/// Sums of equation (6) at one pixel, over all pairs of levels.
+/// Sums of equation (6) at one pixel, over all pairs of bandwidth levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     /// sum of w (y_i + z_c - z_i), RGB.
@@ -100,7 +100,8 @@ pub struct Sums {
     pub weight: f32,
 }
 
-/// Equation (6) at the pixels of a tile's core.
+/// The colours that equation (6) gives the pixels of a tile's core, row by row. `valid`: finite in all levels, per
+/// pixel.
 fn combine_tile(stack: &LevelStack, valid: &[bool], tile: &Tile, weights: &Weights) -> Vec<[f32; 3]> {
     let mut sums = vec![Sums::default(); tile.core.width() * tile.core.height()];
     for pair in 0..stack.levels.len() - 1 {

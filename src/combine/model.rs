@@ -6,7 +6,7 @@ use std::path::Path;
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};
 
-/// An ONNX file in memory, and its name for messages.
+/// The bytes of a neural network's ONNX file, and the name of the file for messages.
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(super) name: String,
@@ -14,7 +14,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// The network that ships with the program; `models/compact.txt` describes its training.
+    /// The network `compact`, which ships with the program; `models/compact.txt` describes its training.
     pub fn compact() -> Self {
         Model { name: "compact".into(), bytes: Cow::Borrowed(include_bytes!("models/compact.onnx")) }
     }
@@ -51,39 +51,41 @@ impl Model {
 /// The form in which a network outputs the weights of equation (6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WeightForm {
-    /// Output `features`: pairwise affinities from per-pixel features, see [`affinity`](super::affinity).
+    /// Output tensor `features`: affinities of pairs of pixels follow from per-pixel features, see
+    /// [`affinity`](super::affinity).
     Features {
-        /// Dimensions of the feature space.
+        /// Number of dimensions of the feature space.
         dimensions: usize,
     },
-    /// Output `weights`: a weight for every pair and every pixel of the window, see [`kernel`](super::kernel).
+    /// Output tensor `weights`: a weight for every pair of levels and every pixel of the window, see
+    /// [`kernel`](super::kernel).
     Weights,
 }
 
-/// Metadata of a network file.
+/// Metadata of a network file: the form of its output, and the sizes of its input and window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Metadata {
-    /// Form of the weights.
+    /// Form in which the network outputs the weights.
     pub form: WeightForm,
-    /// Number of levels in the input, m.
+    /// Number of bandwidth levels in the network's input, m.
     pub levels: usize,
-    /// Side of the square window, odd.
+    /// Side in pixels of the square window of equation (6), odd.
     pub window: usize,
     /// Pixels per cell of the network's coarsest grid; input sizes are multiples of it.
     pub stride: usize,
-    /// Receptive radius in pixels.
+    /// Radius in pixels of the input that one pixel of the output depends on.
     pub halo: usize,
-    /// Description of the training.
+    /// Description of the network's training, in words.
     pub training: String,
 }
 
-/// Maximum number of floats in the network output of a tile: 128 MiB.
+/// Maximum number of floats in the network's output for one tile of the picture: 128 MiB.
 const MAX_TILE_FLOATS: usize = 32 << 20;
-/// Maximum number of pixels in a tile. The halo of a tile of this size is already small.
+/// Maximum number of pixels in a tile of the picture. The halo of a tile of this size is already relatively small.
 const MAX_TILE_PIXELS: usize = 512 * 512;
 
 impl Metadata {
-    /// Reads metadata through `get`, which returns the value of a key without its prefix `caustique.`.
+    /// Reads the network's metadata through `get`, which returns the value of a key without its prefix `caustique.`.
     pub(super) fn read(get: impl Fn(&str) -> Option<String>) -> std::result::Result<Self, String> {
         let text = |key: &str| get(key).ok_or_else(|| format!("its metadata lacks caustique.{key}"));
         let number = |key: &str, least: usize, most: usize| {
@@ -114,7 +116,7 @@ impl Metadata {
         })
     }
 
-    /// Name of the output tensor.
+    /// Name of the network's output tensor: `features` or `weights`.
     pub fn output(&self) -> &'static str {
         match self.form {
             WeightForm::Features { .. } => "features",
@@ -122,7 +124,7 @@ impl Metadata {
         }
     }
 
-    /// Number of channels of the output tensor.
+    /// Number of channels of the network's output tensor.
     pub fn output_channels(&self) -> usize {
         let pairs = self.levels - 1;
         match self.form {
@@ -139,7 +141,7 @@ impl Metadata {
         }
     }
 
-    /// Number of pixels of a tile.
+    /// Number of pixels of the tiles in which the network is run.
     pub(super) fn tile_pixels(&self) -> usize {
         (MAX_TILE_FLOATS / self.output_channels()).min(MAX_TILE_PIXELS)
     }

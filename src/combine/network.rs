@@ -10,16 +10,16 @@ use super::runtime::{Runtime, SilencedStderr};
 use super::tensor;
 use crate::error::{Error, ErrorKind, Result};
 
-/// The weights of equation (6), in one of two forms.
+/// The network's weights for equation (6) over one tile, in one of two forms.
 #[derive(Debug)]
 pub enum Weights {
-    /// See [`affinity`](super::affinity).
+    /// Affinities from features, see [`affinity`](super::affinity).
     Features(NetworkOutput),
-    /// See [`kernel`](super::kernel).
+    /// Explicit weights for every pixel of the window, see [`kernel`](super::kernel).
     Kernel(NetworkOutput),
 }
 
-/// A loaded network.
+/// A neural network that is loaded for inference.
 pub struct Network {
     session: Session,
     metadata: Metadata,
@@ -105,7 +105,7 @@ fn check_outlets(session: &Session, metadata: &Metadata) -> std::result::Result<
     Ok(())
 }
 
-/// A message in one line; ONNX Runtime's can have several.
+/// `message` in one line; messages of ONNX Runtime can have several.
 fn one_line(message: &dyn std::fmt::Display) -> String {
     message.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }

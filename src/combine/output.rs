@@ -1,6 +1,6 @@
 //! Rectangles of pixels, and the output of a network over one.
 
-/// Pixels x0 <= x < x1, y0 <= y < y1.
+/// A rectangle of pixels: x0 <= x < x1, y0 <= y < y1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct Rect {
@@ -11,30 +11,30 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// Pixels per row.
+    /// Width in pixels.
     pub fn width(&self) -> usize {
         self.x1 - self.x0
     }
 
-    /// Number of rows.
+    /// Height in pixels.
     pub fn height(&self) -> usize {
         self.y1 - self.y0
     }
 }
 
-/// Output of the network over the rectangle of its input.
+/// Output of the network over the rectangle of pixels of its input.
 #[derive(Debug)]
 pub struct NetworkOutput {
-    /// The rectangle of pixels.
+    /// The rectangle of pixels that the output covers.
     pub rect: Rect,
-    /// Side of the window of equation (6).
+    /// Side in pixels of the window of equation (6).
     pub window: usize,
-    /// Values, `[channel][y][x]`.
+    /// Output values, indexed `[channel][y][x]` within the rectangle.
     pub data: Vec<f32>,
 }
 
 impl NetworkOutput {
-    /// Row `y` of the image in a channel, from the left edge of the rectangle.
+    /// The values of a channel in row `y` of the image, from the left edge of the rectangle.
     pub fn row(&self, channel: usize, y: usize) -> &[f32] {
         let width = self.rect.width();
         let start = (channel * self.rect.height() + y - self.rect.y0) * width;

@@ -14,34 +14,35 @@ use ort::environment::Environment;
 use crate::error::{Error, ErrorKind, Result};
 use crate::installed;
 
-/// Environment variable that names the library's file.
+/// Environment variable that names the file of ONNX Runtime's library.
 pub const VARIABLE: &str = "CAUSTIQUE_ONNXRUNTIME";
 
-/// Prefix of the library's file names.
+/// Prefix of the file names of ONNX Runtime's library.
 const NAME: &str = "libonnxruntime.so";
 
-/// Minor versions whose file names are tried (Debian 13 installs libonnxruntime.so.1.21). The first is the oldest that
-/// `ort` supports here.
+/// Minor versions of ONNX Runtime whose file names are tried (Debian 13 installs libonnxruntime.so.1.21). The first is
+/// the oldest that `ort` supports here.
 const MINOR_VERSIONS: std::ops::RangeInclusive<u32> = 17..=49;
 
-/// Folder within the project into which `scripts/setup.sh` installs the library.
+/// Folder within the project into which `scripts/setup.sh` installs ONNX Runtime.
 const FOLDER: &str = ".deps/onnxruntime";
 
 const HINT: &str = "on Debian 13: apt-get install libonnxruntime1.21; on Debian 12: run scripts/setup.sh; \
                     or set CAUSTIQUE_ONNXRUNTIME to the path of libonnxruntime.so (1.17 or later)";
 
-/// The loaded library.
+/// The loaded library of ONNX Runtime.
 #[derive(Clone, Debug)]
 pub struct Runtime {
     environment: Environment,
     path: PathBuf,
 }
 
-/// The library of the process. `ort` allows no second environment, even after the first is dropped.
+/// The process's ONNX Runtime, `None` before it is loaded. `ort` allows no second environment, even after the first is
+/// dropped.
 static LOADED: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl Runtime {
-    /// Returns the library; the first call loads it.
+    /// Returns the process's ONNX Runtime; the first call loads it.
     ///
     /// # Errors
     /// [`ErrorKind::Library`]: no candidate can be loaded. The hint says what to install.
@@ -54,17 +55,17 @@ impl Runtime {
         Ok(loaded.insert(runtime).clone())
     }
 
-    /// The loaded file.
+    /// Path of the loaded file of the library.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where the library was found, in words.
+    /// Where the library was found, in words: an environment variable, `scripts/setup.sh` or `system`.
     pub fn origin(&self) -> &'static str {
         installed::origin(VARIABLE, FOLDER, &self.path)
     }
 
-    /// Version in the file name, such as `1.21.1`; `None` if the name has none (it is 1.17 or later).
+    /// ONNX Runtime's version by the file name, such as `1.21.1`; `None` if the name has none (it is 1.17 or later).
     pub fn version(&self) -> Option<&str> {
         let name = self.path.file_name()?.to_str()?;
         name.split_once(".so.").map(|(_, version)| version).filter(|version| version.contains('.'))
@@ -75,7 +76,8 @@ impl Runtime {
     }
 }
 
-/// Candidates in the order in which they are tried. The system's loader searches for names without a folder.
+/// Paths of ONNX Runtime in the order in which they are tried; only `named`, if given. The system's loader searches for
+/// names without a folder.
 fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
     if let Some(path) = named {
         // An absolute path, because `ort` searches for relative ones beside the executable first.
@@ -93,7 +95,7 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
     Ok(all)
 }
 
-/// Loads the first candidate that is a supported version of ONNX Runtime.
+/// Loads the first of the candidate paths that is a supported version of ONNX Runtime.
 fn load(candidates: &[PathBuf]) -> Result<Runtime> {
     let mut refusals = Vec::new();
     for candidate in candidates {
@@ -140,7 +142,8 @@ impl Drop for SilencedStderr {
     }
 }
 
-/// The file of a loaded candidate; for a name without a folder, the file that this process has mapped.
+/// The path of the library that was loaded as `candidate`; for a name without a folder, the file that this process has
+/// mapped.
 fn loaded_file(candidate: &Path) -> PathBuf {
     if candidate.is_absolute() {
         return candidate.canonicalize().unwrap_or_else(|_| candidate.to_path_buf());

@@ -8,22 +8,23 @@ use crate::film::{LayerSet, Picture, Role, Size};
 /// The layers of one render that the combiner reads.
 #[derive(Clone, Debug, Default)]
 pub struct LevelStack {
-    /// Width and height.
+    /// Width and height of all layers in pixels.
     pub size: Size,
-    /// `Level1`, `Level2`, ...: scene-linear radiance, smallest bandwidth first.
+    /// Layers `Level1`, `Level2`, ...: scene-linear radiance estimated with each bandwidth, smallest first.
     pub levels: Vec<Picture>,
-    /// `Variance1`, `Variance2`, ...: variance of each level's mean.
+    /// Layers `Variance1`, `Variance2`, ...: variance of the mean radiance of each level.
     pub variances: Vec<Picture>,
-    /// `albedo`: reflectance at the first hit, 0 to 1.
+    /// Layer `albedo`: reflectance at the first hit, 0 to 1.
     pub albedo: Picture,
-    /// `normal`: world-space unit normal at the first hit, zero on the background.
+    /// Layer `normal`: world-space unit normal at the first hit, zero on the background.
     pub normal: Picture,
-    /// `depth`: distance along the path to the first hit; 1e9 and more (or not finite) is background.
+    /// Layer `depth`: distance along the path to the first hit; 1e9 and more (or not finite) is background.
     pub depth: Vec<f32>,
 }
 
 impl LevelStack {
-    /// Collects the layers. A missing layer is left empty; the combiner then returns an error with its name.
+    /// Collects the combiner's layers from a set. A missing layer is left empty; the combiner then returns an error
+    /// with its name.
     ///
     /// # Errors
     /// The set has no levels.
@@ -75,7 +76,7 @@ impl LevelStack {
         plane("depth".into(), self.depth.len())
     }
 
-    /// Whether each pixel is finite in all levels; only such pixels take part in equation (6).
+    /// Whether each pixel is finite in all bandwidth levels; only such pixels take part in equation (6).
     pub(crate) fn valid(&self) -> Vec<bool> {
         let at = |i: usize| self.levels.iter().all(|level| level[i].iter().all(|v| v.is_finite()));
         (0..self.size.pixels()).into_par_iter().map(at).collect()

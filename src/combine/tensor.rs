@@ -10,36 +10,37 @@ use super::stack::LevelStack;
 use crate::film::Picture;
 use crate::stat::median;
 
-/// Version of the channel order and scaling. The metadata of a network states the version of its training.
+/// Version of the order and scaling of the network's input channels. A network's metadata states the version of its
+/// training.
 pub const VERSION: u32 = 1;
 
-/// Deviations below this value, on the scale of log(1 + x), count as no noise.
+/// Standard deviations below this value, on the scale of log(1 + x), count as no noise.
 const DEVIATION_FLOOR: f32 = 1e-3;
 
-/// Depths from this value on are background (the EXR stores 1e10).
+/// Depths from this value on, in scene units, are background (the EXR stores 1e10).
 const BACKGROUND_DEPTH: f32 = 1e9;
 
 /// The exposure leaves out the brightest 1 / `TRIMMED` of the pixels that are not black.
 const TRIMMED: usize = 100;
 
-/// Number of channels for `levels` levels.
+/// Number of the network's input channels for `levels` bandwidth levels.
 pub const fn channels(levels: usize) -> usize {
     4 * levels + 7
 }
 
-/// Content of one channel.
+/// Content of one input channel of the network.
 #[derive(Clone, Copy)]
 enum Channel {
-    /// Colour component of a level: level index, component.
+    /// A colour component of a bandwidth level: index of the level from 0, index of the component.
     Level(usize, usize),
-    /// Standard deviation of a level, by its index.
+    /// Standard deviation of a bandwidth level, by the index of the level from 0.
     Deviation(usize),
     Albedo(usize),
     Normal(usize),
     Depth,
 }
 
-/// Channels in the network's order.
+/// The network's input channels for `levels` bandwidth levels, in order.
 fn order(levels: usize) -> Vec<Channel> {
     let mut all: Vec<Channel> = (0..levels).flat_map(|j| (0..3).map(move |c| Channel::Level(j, c))).collect();
     all.extend((0..levels).map(Channel::Deviation));
@@ -54,19 +55,19 @@ fn order(levels: usize) -> Vec<Channel> {
 pub struct Normalisation {
     /// Factor on radiance: one over a trimmed mean luminance of the level with the largest bandwidth.
     pub exposure: f32,
-    /// Median depth without the background.
+    /// Median depth of the pixels that are not background.
     pub depth: f32,
 }
 
 impl Normalisation {
-    /// The scales of `stack`; 1 for an image without light or depth.
+    /// The scales of the picture in `stack`; 1 for an image without light or depth.
     pub fn of(stack: &LevelStack) -> Self {
         Normalisation { exposure: exposure(stack.levels.last()), depth: median_depth(&stack.depth) }
     }
 }
 
-/// One over the mean luminance without black pixels, so that the amount of background does not matter, and without the
-/// brightest hundredth, so that fireflies do not.
+/// One over the mean luminance of `level` without black pixels, so that the amount of background does not matter, and
+/// without the brightest hundredth, so that fireflies do not.
 fn exposure(level: Option<&Picture>) -> f32 {
     let luminance = |rgb: &[f32; 3]| {
         let [r, g, b] = rgb.map(finite);
@@ -88,7 +89,8 @@ fn median_depth(depth: &[f32]) -> f32 {
     median(&mut seen, f32::total_cmp).unwrap_or(1.0)
 }
 
-/// The network's input for `rect`, `[channel][y][x]`; zero outside the image, like the padding of a convolution.
+/// The network's input for the pixels of `rect`, `[channel][y][x]`; zero outside the image, like the padding of a
+/// convolution.
 pub fn fill(stack: &LevelStack, normalisation: &Normalisation, rect: Rect) -> Vec<f32> {
     let (width, area) = (rect.width(), rect.width() * rect.height());
     let order = order(stack.levels.len());
@@ -106,7 +108,7 @@ pub fn fill(stack: &LevelStack, normalisation: &Normalisation, rect: Rect) -> Ve
     data
 }
 
-/// Fills one row of one channel, from pixel `start`.
+/// Fills `out`, a row of one input channel, with consecutive pixels from index `start` on.
 fn row(stack: &LevelStack, normalisation: &Normalisation, channel: Channel, start: usize, out: &mut [f32]) {
     let scale = normalisation.exposure;
     let n = start..start + out.len();

@@ -9,10 +9,10 @@ use super::model::Metadata;
 use super::output::Rect;
 use crate::film::Size;
 
-/// A part of the image, and the part that the network reads for it.
+/// A rectangle of the image, and the larger rectangle that the network reads for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
-    /// Pixels of the result, inside the image.
+    /// Pixels whose result the tile gives, inside the image.
     pub core: Rect,
     /// Pixels that the network reads. They can exceed the image at the right and bottom by less than a stride.
     pub input: Rect,
@@ -31,10 +31,11 @@ pub fn tiles(Size { width, height }: Size, metadata: &Metadata, pixels: usize) -
     rows.iter().flat_map(|row| columns.iter().map(move |column| tile(row, column))).collect()
 }
 
-/// First pixel and end along one axis.
+/// Index of the first pixel along one axis, and index behind the last.
 type Span = (usize, usize);
 
-/// Cores and inputs along one axis: equal parts of at most `longest` pixels, or of a stride if that is longer.
+/// Cores and inputs of the tiles along one axis: equal parts of at most `longest` pixels, or of the network's stride if
+/// that is longer.
 fn spans(size: usize, longest: usize, metadata: &Metadata) -> Vec<(Span, Span)> {
     let stride = metadata.stride;
     let parts = size.div_ceil(longest.max(stride));

@@ -7,23 +7,23 @@
 use super::layers::{Layer, Plane, Sample};
 use super::naming::Naming;
 
-/// Ranks per pixel; each layer stores two.
+/// Number of ranks, pairs of an object's id and its coverage, per pixel; each layer stores two.
 pub const RANKS: usize = 6;
 
-/// An id: the bits of a float that is neither denormal, infinite nor NaN.
+/// Cryptomatte id of an object or material: the bits of a float that is neither denormal, infinite nor NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Id(pub u32);
 
 impl Id {
-    /// MurmurHash3_32 with seed 0 of the UTF-8 name, then the specification's `uint32_to_float32`: it flips the lowest bit
-    /// of an exponent of all zeros or all ones, because programs flush denormals and change NaN.
+    /// The id of a name: MurmurHash3_32 with seed 0 of the UTF-8 name, then the specification's `uint32_to_float32`: it
+    /// flips the lowest bit of an exponent of all zeros or all ones, because programs flush denormals and change NaN.
     pub fn of(name: &str) -> Self {
         let bits = murmur(name);
         let exponent = (bits >> 23) & 0xff;
         Id(if exponent == 0 || exponent == 0xff { bits ^ (1 << 23) } else { bits })
     }
 
-    /// The float that files store.
+    /// The id as the float that files store.
     pub fn to_f32(self) -> f32 {
         f32::from_bits(self.0)
     }
@@ -34,7 +34,7 @@ fn murmur(name: &str) -> u32 {
     murmur3::murmur3_32(&mut name.as_bytes(), 0).unwrap_or(0)
 }
 
-/// Ids and names of objects or of materials.
+/// Cryptomatte of objects or of materials: their ids and names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cryptomatte {
     kind: String,
@@ -51,7 +51,7 @@ impl Cryptomatte {
         Cryptomatte { kind: kind.into(), names, ids }
     }
 
-    /// Ids in the order of the names.
+    /// Ids of the objects or materials, in the order of the names.
     pub fn ids(&self) -> &[Id] {
         &self.ids
     }
@@ -73,8 +73,8 @@ impl Cryptomatte {
         ]
     }
 
-    /// The layers `CryptoObject00` to `02` from the ranks of every pixel; `samples` is the total weight of a fully covered
-    /// pixel.
+    /// The cryptomatte layers, such as `CryptoObject00` to `02`, from the ranks of every pixel; `samples` is the total
+    /// weight of a fully covered pixel.
     pub fn layers(&self, pixels: &[PixelRanks], samples: f32) -> Vec<Layer> {
         let sorted: Vec<[Rank; RANKS]> = pixels.iter().map(PixelRanks::sorted).collect();
         let layer = |index: usize| {
@@ -97,7 +97,7 @@ struct Rank {
     weight: f32,
 }
 
-/// Running coverage of one pixel by id.
+/// The ids of the objects, or materials, that cover one pixel, with the weight of each, while samples are added.
 ///
 /// The weights always sum to the total added. They are exact for up to six ids; a seventh replaces the id with the least
 /// weight and inherits that weight (Metwally, Agrawal, El Abbadi, "Efficient Computation of Frequent and Top-k Elements
@@ -109,7 +109,7 @@ pub struct PixelRanks {
 }
 
 impl PixelRanks {
-    /// Adds a weight above zero.
+    /// Adds `weight`, above zero, to the coverage of the pixel by `id`.
     pub fn add(&mut self, id: Id, weight: f32) {
         let mut least = 0;
         for i in 0..RANKS {
@@ -128,7 +128,7 @@ impl PixelRanks {
         rank.weight += weight;
     }
 
-    /// Ranks by descending weight, then by id; empty ranks (weight zero) last.
+    /// The pixel's ids and weights by descending weight, then by id; empty ranks (weight zero) last.
     fn sorted(&self) -> [Rank; RANKS] {
         let mut ranks = self.ranks;
         ranks.sort_by(|a, b| b.weight.total_cmp(&a.weight).then(a.id.cmp(&b.id)));
@@ -136,7 +136,8 @@ impl PixelRanks {
     }
 }
 
-/// JSON in ASCII, which EXR headers require: other characters become `\u` escapes (surrogate pairs above U+FFFF).
+/// The JSON text in ASCII, which EXR headers require: other characters become `\u` escapes (surrogate pairs above
+/// U+FFFF).
 pub fn ascii_json(json: &str) -> String {
     let mut ascii = String::with_capacity(json.len());
     for c in json.chars() {

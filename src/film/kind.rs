@@ -1,92 +1,93 @@
 //! The table of layers. Names in files, `--layers`, `info`, merging, the finish, Blender's add-on, the USD converter and
 //! the page for compositors read it; `output.rs` computes the values.
 
-/// Prefix of a layer with the light of one light group.
+/// Prefix of the name of a layer with the light of one light group.
 pub const LIGHT_GROUP: &str = "LightGroup_";
-/// Prefix of a layer with the caustics of one light group.
+/// Prefix of the name of a layer with the caustics of one light group.
 pub const CAUSTIC: &str = "Caustic_";
-/// Prefix of a finished part.
+/// Prefix of the name of a finished part, a denoised additive part of the picture.
 pub const COMBINED: &str = "Combined";
 
-/// Prefixes of the cryptomattes of objects and of materials.
+/// Prefixes of the names of the cryptomatte layers of objects and of materials.
 pub const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
 
-/// The suffix that a layer's name has after the name of its kind.
+/// The suffix of a layer's name, which follows the name of the layer's kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suffix {
-    /// None: the kind has one layer.
+    /// No suffix: the kind has one layer.
     None,
-    /// The number of a bandwidth level, from 1.
+    /// The number of a bandwidth level, from 1, smallest bandwidth first.
     Level,
-    /// The number of a quarter of the iterations, 1 to 4.
+    /// The number of a quarter of the iterations, 1 to 4, whose mean the layer holds.
     Quarter,
-    /// The number of a pair of cryptomatte ranks, `00` and up.
+    /// The number of a pair of cryptomatte ranks, `00` and up, each an id and its coverage.
     Ranks,
     /// The name of a light group.
     Group,
 }
 
-/// How the layers of renders with different seeds are merged.
+/// How a layer is merged over renders with different seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Merge {
-    /// The mean.
+    /// The mean of the renders' values, weighted by their iterations.
     Mean,
-    /// Variances of means of independent renders: a sum weighted by the squares of the shares.
+    /// Variances of means of independent renders: a sum weighted by the squares of each render's share of the
+    /// iterations.
     Variance,
     /// Standard errors: the root of their mean square.
     Error,
-    /// Counts: the sum.
+    /// Counts: the sum over renders.
     Sum,
     /// The first render's values: distances, which have no mean with the background, and bandwidths.
     First,
-    /// Cryptomatte ranks: coverages are added by id.
+    /// Cryptomatte ranks: coverages are added for each id.
     Matte,
 }
 
-/// Purpose for which the finish reads a layer.
+/// Purpose for which the finish, which denoises a render's picture, reads a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// The picture.
+    /// The finished picture.
     Picture,
-    /// The estimate of the picture's error.
+    /// The estimate of the finished picture's error.
     Error,
-    /// A part of the picture, which is finished as well; holds the meaning of the finished layer.
+    /// An additive part of the picture, which is finished as well; holds the meaning of the finished layer, in words.
     Part(&'static str),
 }
 
-/// A row of the table: one layer, or layers that differ by a suffix.
+/// A kind of layers, a row of the table: one layer, or layers that differ by a suffix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LayerKind {
-    /// Name in plain files, without the suffix; empty for the beauty.
+    /// Name of the layer in plain files, without the suffix; empty for the beauty.
     pub name: &'static str,
-    /// Suffix of the name.
+    /// Suffix of the layer's name.
     pub suffix: Suffix,
-    /// Components, one letter each.
+    /// Components of the layer, one letter each, such as `RGB`.
     pub components: &'static str,
-    /// Unit of the values.
+    /// Unit of the layer's values, in words.
     pub unit: &'static str,
-    /// Meaning of the values.
+    /// Meaning of the layer's values, in words.
     pub meaning: &'static str,
-    /// How renders with different seeds are merged.
+    /// How the layer is merged over renders with different seeds.
     pub merge: Merge,
-    /// Purpose for which the finish reads the layer, if it does.
+    /// Purpose for which the finish reads the layer; `None` if it does not.
     pub finish: Option<Use>,
-    /// Whether `--layers comp` includes it; finished parts are always included.
+    /// Whether `--layers comp` includes the layer; finished parts are always included.
     pub compositing: bool,
-    /// Whether half floats suffice unless a value is too large.
+    /// Whether half floats suffice for the layer unless a value is too large.
     pub half: bool,
-    /// Whether it has to be named: `--layers all` leaves it out.
+    /// Whether the layer has to be named to be written: `--layers all` leaves it out.
     pub on_request: bool,
-    /// Blender's name of the pass, if it differs.
+    /// Blender's name of the layer's pass; `None` if it does not differ.
     pub blender: Option<&'static str>,
-    /// Property of Blender's view layer that enables the pass; finished parts share another one.
+    /// Property of Blender's view layer that enables the pass; finished parts share another property.
     pub switch: Option<&'static str>,
 }
 
 const RADIANCE: &str = "W/(sr m^2)";
 
 impl LayerKind {
-    /// Radiance, averaged over renders.
+    /// Defaults for layers of radiance, which are averaged over merged renders.
     const COLOUR: LayerKind = LayerKind {
         name: "",
         suffix: Suffix::None,
@@ -102,29 +103,29 @@ impl LayerKind {
         switch: None,
     };
 
-    /// An additive part of the picture, with the meanings of the part and of the finished part.
+    /// The kind of an additive part of the picture, with the meanings of the part and of the finished part.
     const fn part(name: &'static str, meaning: &'static str, finished: &'static str) -> LayerKind {
         let switch = Some("noisy_parts");
         LayerKind { name, meaning, finish: Some(Use::Part(finished)), switch, ..LayerKind::COLOUR }
     }
 
-    /// An additive part that holds the light of one light group.
+    /// The kind of an additive part of the picture that holds the light of one light group.
     const fn of_group(name: &'static str, meaning: &'static str, finished: &'static str) -> LayerKind {
         LayerKind { suffix: Suffix::Group, ..LayerKind::part(name, meaning, finished) }
     }
 
-    /// Bandwidths, one layer for each level.
+    /// The kind of photon-gathering bandwidths, one layer for each bandwidth level.
     const fn radius(name: &'static str, meaning: &'static str) -> LayerKind {
         let (suffix, merge) = (Suffix::Level, Merge::First);
         LayerKind { name, meaning, suffix, merge, components: "X", unit: "m", ..LayerKind::COLOUR }
     }
 
-    /// A distance or position, taken from the first of merged renders.
+    /// The kind of a distance or position, taken from the first of merged renders.
     const fn first(name: &'static str, components: &'static str, meaning: &'static str) -> LayerKind {
         LayerKind { name, components, unit: "m", meaning, merge: Merge::First, ..LayerKind::COLOUR }
     }
 
-    /// The layers of a cryptomatte.
+    /// The kind of the layers of a cryptomatte.
     const fn matte(name: &'static str, switch: &'static str, meaning: &'static str) -> LayerKind {
         LayerKind {
             name,
@@ -139,12 +140,12 @@ impl LayerKind {
         }
     }
 
-    /// Name of the finished part, without the suffix; `None` if the kind is not a part.
+    /// Name of the layer of the finished part, without the suffix; `None` if the kind is not an additive part.
     pub fn finished(&self) -> Option<String> {
         matches!(self.finish, Some(Use::Part(_))).then(|| format!("{COMBINED}{}", self.name))
     }
 
-    /// Whether a layer of this kind has the name; a numbered name may lack its number.
+    /// Whether a layer of this kind has the name `name`; a numbered name may lack its number.
     fn is(&self, name: &str) -> bool {
         match self.suffix {
             Suffix::None => name == self.name,
@@ -154,7 +155,8 @@ impl LayerKind {
     }
 }
 
-/// The table. Parts are in the order in which they are finished: the last one takes light that no part accounts for.
+/// The table of all kinds of layers. Parts are in the order in which they are finished: the last one takes light that
+/// no part accounts for.
 pub static LAYERS: &[LayerKind] = &[
     LayerKind {
         meaning: "beauty: the finished picture, or the estimator's own",
@@ -299,7 +301,7 @@ pub(super) fn stem(name: &str) -> &str {
     name.trim_end_matches(|c: char| c.is_ascii_digit())
 }
 
-/// The kind of a layer by its plain name, and whether the name is that of the finished part; `None` for an unknown name.
+/// The kind of a layer by its plain name, and whether the name belongs to a finished part; `None` for an unknown name.
 /// A number may be missing: `Level` is the kind of all levels.
 pub fn kind_of(name: &str) -> Option<(&'static LayerKind, bool)> {
     let is = |name: &str| LAYERS.iter().find(|kind| kind.is(name));
@@ -307,13 +309,13 @@ pub fn kind_of(name: &str) -> Option<(&'static LayerKind, bool)> {
     finished.map(|kind| (kind, true)).or_else(|| Some((is(name)?, false)))
 }
 
-/// Names of the additive parts, in the order in which they are finished.
+/// Names of the layers with additive parts of the picture, in the order in which they are finished.
 pub fn part_names() -> impl Iterator<Item = &'static str> {
     let is_part = |kind: &&LayerKind| matches!(kind.finish, Some(Use::Part(_))) && kind.suffix == Suffix::None;
     LAYERS.iter().filter(is_part).map(|kind| kind.name)
 }
 
-/// Name of the finished part of a layer; `None` if the layer is not a part.
+/// Name of the finished part of the layer `name`; `None` if the layer is not an additive part.
 pub fn finished_part(name: &str) -> Option<String> {
     match kind_of(name)? {
         (LayerKind { finish: Some(Use::Part(_)), .. }, false) => Some(format!("{COMBINED}{name}")),
@@ -321,14 +323,14 @@ pub fn finished_part(name: &str) -> Option<String> {
     }
 }
 
-/// Components, unit and meaning of a layer.
+/// Components, unit and meaning of a layer, for users.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LayerDescription {
-    /// Components, one letter each.
+    /// Components of the layer, one letter each, such as `RGB`.
     pub components: &'static str,
-    /// Unit of the values.
+    /// Unit of the layer's values, in words.
     pub unit: &'static str,
-    /// Meaning of the values.
+    /// Meaning of the layer's values, in words.
     pub meaning: &'static str,
 }
 

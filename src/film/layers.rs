@@ -6,7 +6,7 @@
 use super::picture::{Picture, Size};
 use crate::error::{Error, ErrorKind, Result};
 
-/// Number format of a plane in a file.
+/// Number format in which a file stores a plane, one component of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sample {
     /// 16 bits; at most 65504, 11 bits of precision.
@@ -15,12 +15,12 @@ pub enum Sample {
     Float,
 }
 
-/// One component of a layer.
+/// One component of a layer, with a value for every pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
-    /// The component, one letter in our files: `R G B A`, `X Y Z`, `U V`, `r g b a` for cryptomatte.
+    /// Name of the component, one letter in our files: `R G B A`, `X Y Z`, `U V`, `r g b a` for cryptomatte.
     pub component: String,
-    /// Number format in a file.
+    /// Number format of the values in a file.
     pub sample: Sample,
     /// One value per pixel, row by row from the top, `width * height` of them.
     pub values: Vec<f32>,
@@ -46,10 +46,10 @@ pub struct LayerSet {
     pub layers: Vec<Layer>,
 }
 
-/// Meaning of a layer, independent of the name that the writing program gives it.
+/// Meaning of a layer that other programs write too, independent of the name that the writing program gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// The picture.
+    /// The picture itself.
     Beauty,
     /// Reflectance at the first rough hit.
     Albedo,
@@ -80,14 +80,14 @@ impl Layer {
         Layer { name: name.into(), planes: planes.collect() }
     }
 
-    /// The layer with another number format in files.
+    /// The layer with another number format of its planes in files.
     #[must_use]
     pub fn stored_as(mut self, sample: Sample) -> Self {
         self.planes.iter_mut().for_each(|plane| plane.sample = sample);
         self
     }
 
-    /// The plane of a component.
+    /// The layer's plane of a component, by name; `None` if it has none.
     pub fn plane(&self, component: &str) -> Option<&Plane> {
         self.planes.iter().find(|plane| plane.component == component)
     }
@@ -104,7 +104,7 @@ impl Layer {
 }
 
 impl LayerSet {
-    /// A picture without layers.
+    /// A set of no layers, for a picture of this size in pixels.
     pub fn new(width: usize, height: usize) -> Self {
         LayerSet { width, height, layers: Vec::new() }
     }
@@ -114,7 +114,7 @@ impl LayerSet {
         self.width * self.height
     }
 
-    /// Width and height.
+    /// Width and height in pixels.
     pub fn size(&self) -> Size {
         Size { width: self.width, height: self.height }
     }
@@ -135,13 +135,13 @@ impl LayerSet {
         Ok(())
     }
 
-    /// The layer of exactly this name.
+    /// The layer of exactly this name; `None` if there is none.
     pub fn get(&self, name: &str) -> Option<&Layer> {
         self.layers.iter().find(|layer| layer.name == name)
     }
 
-    /// The layer with a role, by the names that caustique, Blender, Mitsuba, pbrt, LuxCore and Arnold use. The name of a
-    /// view layer or file part may precede it (`ViewLayer.Denoising Albedo`).
+    /// The layer with a role, by the names that caustique, Blender, Mitsuba, pbrt, LuxCore and Arnold use; `None` if
+    /// there is none. The name of a view layer or file part may precede it (`ViewLayer.Denoising Albedo`).
     pub fn find(&self, role: Role) -> Option<&Layer> {
         let names: &[&str] = match role {
             Role::Beauty => {
@@ -166,7 +166,7 @@ impl LayerSet {
         exact.or_else(|| names.iter().skip(1).find_map(|name| self.layers.iter().find(|layer| last(layer, name))))
     }
 
-    /// The layer of exactly this name as a picture, see [`Layer::triples`].
+    /// The layer of exactly this name as a picture, see [`Layer::triples`]; `None` if there is none.
     pub fn picture(&self, name: &str) -> Option<Picture> {
         self.get(name).map(|layer| self.picture_of(layer))
     }
@@ -176,7 +176,7 @@ impl LayerSet {
         Picture::new(self.size(), layer.triples())
     }
 
-    /// The beauty.
+    /// The beauty, the layer of the picture itself.
     ///
     /// # Errors
     /// No layer has the role [`Role::Beauty`].

@@ -23,7 +23,7 @@ pub enum Naming {
 }
 
 impl Naming {
-    /// The layer's name in a file, without component.
+    /// Name of the layer in a file, without component; `name` is its plain name.
     pub fn layer(self, name: &str) -> String {
         match self {
             Naming::Plain => name.to_owned(),
@@ -45,7 +45,7 @@ impl Naming {
         }
     }
 
-    /// A matrix for world points, row by row, changed to take points in the file's axes.
+    /// A matrix for points in our world axes, row by row, changed to take points in the file's axes.
     pub fn from_file_axes(self, m: [f32; 16]) -> [f32; 16] {
         match self {
             Naming::Plain => m,
@@ -58,7 +58,7 @@ impl Naming {
         }
     }
 
-    /// The channel's name in a file.
+    /// Name of the channel in a file that stores a component of a layer; `layer` is its plain name.
     pub fn channel(self, layer: &str, component: &str) -> String {
         let prefix = self.layer(layer);
         // A layer whose only plane has its name is one channel at the root: `Z`, not `Z.Z`.
@@ -66,12 +66,13 @@ impl Naming {
     }
 }
 
-/// Whether a layer holds world positions or directions.
+/// Whether the layer `name` holds world positions or directions, which depend on the axes.
 fn has_axes(name: &str) -> bool {
     kind_of(name).is_some_and(|(kind, _)| kind.components == "XYZ")
 }
 
-/// Replaces Blender's names and axes by ours. Removes layers whose names we cannot write, and returns their names.
+/// Replaces Blender's names and axes in `set` by ours. Removes layers whose names we cannot write, and returns their
+/// names.
 pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
     let known: Vec<&str> = LAYERS.iter().filter(|kind| kind.blender.is_some()).map(|kind| kind.name).collect();
     for layer in &mut set.layers {

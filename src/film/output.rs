@@ -20,27 +20,27 @@ use crate::plan::{ClassSet, Part};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Depth of the background.
+/// Depth of pixels that see only the background, in scene units.
 pub const BACKGROUND: f32 = FAR;
-/// Pixels whose layers are all computed in turn while the pixels are in the cache.
+/// Number of pixels whose layers are all computed in turn while the pixels are in the cache.
 const BLOCK: usize = 2048;
 
-/// The properties of a render, beside its pixels, that its layers depend on.
+/// The properties of a render, beside its pixels, that determine which layers it has and how they are computed.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Shape {
-    /// Number of bandwidth levels.
+    /// Number of bandwidth levels, which a render estimates at the same time.
     pub levels: usize,
-    /// Number of levels that the bias of level `own` is estimated from ([`SquaredError::of`]).
+    /// Number of bandwidth levels that the bias of level `own` is estimated from ([`SquaredError::of`]).
     pub compared: usize,
-    /// Index, from 0, of the level that is the method's own image.
+    /// Index, from 0, of the bandwidth level that is the method's own image.
     pub own: usize,
-    /// Kinds of photons that have bandwidths; merged light paths count as the first kind.
+    /// Whether photons of each kind have bandwidths; merged light paths count as the first kind.
     pub kinds: ByKind<bool>,
     /// Whether an environment light is visible.
     pub environment: bool,
-    /// Classes of light paths that are simulated: a part without any has no layer.
+    /// Classes of light paths, such as caustics, that are simulated: a part without any has no layer.
     pub classes: ClassSet,
-    /// Whether media scatter.
+    /// Whether the scene's media scatter light.
     pub volume: bool,
     /// Whether photons are gathered in media.
     pub volume_photons: bool,
@@ -48,23 +48,24 @@ pub struct Shape {
     pub groups: Vec<String>,
 }
 
-/// Input of a layer at one pixel.
+/// The state of one pixel from which a layer's values are computed.
 struct PixelInput<'a> {
     pixel: &'a PixelAccumulator,
     /// Index of the pixel, row by row from the top.
     index: usize,
     bandwidths: &'a BandwidthState,
-    /// Variance by quarters over sample variance, the factor that corrects sample variances.
+    /// Factor that corrects the pixel's sample variances: the variance by quarters of the iterations over the sample
+    /// variance.
     ratio: f64,
 }
 
 /// Computes the values of one layer at one pixel; components that the layer lacks are ignored.
 type Get = Box<dyn Fn(&PixelInput<'_>) -> [f32; 4] + Sync>;
 
-/// Selects one of the additive parts.
+/// Returns one of the additive parts of the picture, such as the caustics, at a pixel.
 type PartGetter = fn(&Parts) -> DVec3;
 
-/// A layer with the function that computes it.
+/// A layer to be written, with the function that computes it.
 struct Column {
     name: String,
     components: &'static str,
@@ -83,7 +84,7 @@ impl Column {
         Column::new(name, move |at| padded(get(at.pixel).as_vec3()))
     }
 
-    /// A variance or standard error.
+    /// A layer of variances or standard errors, as RGB; values are clamped to finite ones.
     fn noise(name: impl Into<String>, get: impl Fn(&PixelInput<'_>) -> DVec3 + Sync + 'static) -> Column {
         // Squares of 1e20 and more overflow f32; a large known variance must not become infinity, which means unknown.
         let most = DVec3::splat(f64::from(f32::MAX));
@@ -103,12 +104,13 @@ fn padded(v: Vec3) -> [f32; 4] {
     v.extend(0.0).to_array()
 }
 
-/// `sum / count`, zero when nothing was counted.
+/// The mean `sum / count`, zero when nothing was counted.
 fn mean(sum: DVec3, count: u32) -> DVec3 {
     if count == 0 { DVec3::ZERO } else { sum / f64::from(count) }
 }
 
-/// Layer names for the kinds of photons that have bandwidths: `Radius` for the first of them, whichever it is.
+/// Names of the layers with bandwidths, for the kinds of photons that have bandwidths: `Radius` for the first of them,
+/// whichever it is.
 // Inlined into its caller's loops it took minutes to compile.
 #[inline(never)]
 pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
@@ -116,7 +118,7 @@ pub fn radius_layers(kinds: ByKind<bool>) -> Vec<(Kind, &'static str)> {
     present.zip(["Radius", "CausticRadius"]).collect()
 }
 
-/// All layers except the cryptomattes.
+/// All layers of a render of this shape, except the cryptomattes.
 fn columns(shape: &Shape) -> Vec<Column> {
     let Shape { levels, compared, own, kinds, environment, volume_photons, .. } = *shape;
     let mut columns = vec![
@@ -161,7 +163,7 @@ fn columns(shape: &Shape) -> Vec<Column> {
     columns
 }
 
-/// The additive parts, and the light of light groups.
+/// The layers of the additive parts of the picture, and of the light of light groups.
 fn part_columns(shape: &Shape) -> Vec<Column> {
     let (classes, volume) = (shape.classes, shape.volume);
     let mut columns = Vec::new();
@@ -187,17 +189,18 @@ fn part_columns(shape: &Shape) -> Vec<Column> {
     columns
 }
 
-/// Variance of the mean of a level; after fewer than two iterations the square of the mean.
+/// Variance of the mean radiance of a bandwidth level at a pixel; after fewer than two iterations the square of the
+/// mean.
 fn variance(pixel: &PixelAccumulator, level: usize) -> DVec3 {
     if pixel.iterations < 2 { pixel.mean(level) * pixel.mean(level) } else { pixel.variance_of_mean(level) }
 }
 
-/// Names of all layers that [`layers`] can compute.
+/// Names of all layers that [`layers`] can compute for a render of this shape.
 pub fn names(shape: &Shape) -> Vec<String> {
     columns(shape).into_iter().map(|column| column.name).collect()
 }
 
-/// Computes the layers whose names are `wanted`, from pixels row by row from the top.
+/// Computes the layers whose names `wanted` accepts, from the sums of pixels row by row from the top.
 ///
 /// # Errors
 /// The number of pixels is not `width * height`.

@@ -26,7 +26,8 @@ impl From<(u32, u32)> for Size {
     }
 }
 
-/// Scene-linear RGB, or a vector such as the normal, at every pixel. Dereferences to the pixels, row by row from the top.
+/// A picture in memory: scene-linear RGB, or a vector such as the normal, at every pixel. Dereferences to the pixels,
+/// row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Picture {
     size: Size,
@@ -50,7 +51,7 @@ impl Picture {
         Picture::new(size, (0..size.pixels()).into_par_iter().map(pixel).collect())
     }
 
-    /// Width and height.
+    /// Width and height in pixels.
     pub fn size(&self) -> Size {
         self.size
     }
@@ -61,30 +62,32 @@ impl Picture {
         Picture::from_fn(self.size, |i| self[i].map(&function))
     }
 
-    /// Pixels of two pictures of equal size, combined channel by channel.
+    /// The picture whose channels are `function` of the channels of two pictures of equal size, pixel by pixel.
     #[must_use]
     pub fn zip(&self, other: &Picture, function: impl Fn(f32, f32) -> f32 + Sync + Send) -> Picture {
         Picture::from_fn(self.size, |i| std::array::from_fn(|c| function(self[i][c], other[i][c])))
     }
 
-    /// Mean of two pictures of equal size.
+    /// The mean of two pictures of equal size, pixel by pixel.
     #[must_use]
     pub fn average(&self, other: &Picture) -> Picture {
         self.zip(other, |a, b| 0.5 * (a + b))
     }
 
-    /// Half the absolute difference of two pictures of equal size: the standard error of their mean, by two samples.
+    /// Half the absolute difference of two pictures of equal size, by channel: the standard error of their mean, by two
+    /// samples.
     #[must_use]
     pub fn half_difference(&self, other: &Picture) -> Picture {
         self.zip(other, |a, b| 0.5 * (a - b).abs())
     }
 
-    /// Whether every value is zero.
+    /// Whether every value of the picture is zero.
     pub fn is_black(&self) -> bool {
         self.iter().flatten().all(|value| *value == 0.0)
     }
 
-    /// The floor that relative errors against this picture have ([`floor::relative_to_mean`]).
+    /// The constant that is added to the squared value of this picture as the reference of relative errors
+    /// ([`floor::relative_to_mean`]).
     pub fn relative_floor(&self) -> f64 {
         floor::relative_to_mean(self.iter().map(|rgb| channel_mean(*rgb)))
     }

@@ -4,7 +4,7 @@ use super::kind::{LAYERS, LayerKind, Suffix, describe, finished_part, kind_of, p
 use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, ErrorKind, Result};
 
-/// The value of `--layers`.
+/// The layers to write, the value of `--layers`.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub enum Selection {
     /// Every layer except `Quarter1` to `Quarter4`.
@@ -20,7 +20,7 @@ pub enum Selection {
 }
 
 impl Selection {
-    /// Parses `all`, `comp`, `beauty` or names separated by commas.
+    /// Parses a value of `--layers`: `all`, `comp`, `beauty` or names separated by commas.
     ///
     /// # Errors
     /// No name, or an unknown name; the hint has the nearest known one.
@@ -86,8 +86,8 @@ impl Selection {
     }
 }
 
-/// Whether half floats show no difference: colours and directions without very bright values. Depth needs more digits,
-/// and the ids of cryptomattes need all bits.
+/// Whether half floats show no difference for the layer: colours and directions without very bright values. Depth needs
+/// more digits, and the ids of cryptomattes need all bits.
 fn fits_half(layer: &Layer) -> bool {
     /// The largest finite half float.
     const MAX_HALF: f32 = 65_504.0;

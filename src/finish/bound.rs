@@ -15,15 +15,16 @@ use super::window::window;
 use crate::film::Picture;
 use rayon::prelude::*;
 
-/// `c`: maximum displacement of a pixel, in standard errors.
+/// Maximum displacement of a pixel from its estimate by the finish, in standard errors: `c` of the finish.
 pub const LIMIT: f32 = 3.0;
-/// Pixels to each side in the window of the percentile.
+/// Pixels to each side of a pixel in the window whose standard errors and brightest estimate limit it.
 pub const REACH: usize = 3;
-/// The percentile, as a share of the window.
+/// Percentile of the standard errors in a window that a pixel's spread is at least, as a share of the window, 0 to 1.
 const PERCENTILE: f32 = 0.8;
 
-/// The spread of every pixel and channel: the larger of its standard error and the percentile `PERCENTILE` of its
-/// neighbours'. Standard errors that are not finite count as infinite. The spread of an exact pixel is zero.
+/// The spread of every pixel and channel, the standard error that limits its displacement: the larger of its own and
+/// the percentile `PERCENTILE` of its neighbours'. Standard errors that are not finite count as infinite. The spread of
+/// an exact pixel is zero.
 ///
 /// A neighbour counts only if its estimate is not above the pixel's by more than [`LIMIT`] of the neighbour's standard
 /// errors: beside a bright light the pixel's own samples show that it does not see the light.
@@ -50,7 +51,7 @@ pub fn spread(estimate: &Estimate) -> Picture {
     Picture::new(mean.size(), (0..mean.len()).into_par_iter().map_init(Vec::new, of_pixel).collect())
 }
 
-/// The largest finite estimate within [`REACH`] of a pixel, by channel; zero if there is none.
+/// The largest finite estimate in RGB within [`REACH`] pixels of pixel `index`, by channel; zero if there is none.
 pub fn brightest(mean: &Picture, index: usize) -> [f32; 3] {
     window(mean.size(), index, REACH).fold([0.0; 3], |most, other| {
         std::array::from_fn(|c| if mean[other][c].is_finite() { most[c].max(mean[other][c]) } else { most[c] })
@@ -62,21 +63,21 @@ pub fn brightest(mean: &Picture, index: usize) -> [f32; 3] {
 pub struct Noise<'a> {
     /// The estimate of the whole picture.
     pub estimate: &'a Estimate,
-    /// Its spread.
+    /// Spread of every pixel and channel of `estimate`, from [`spread`].
     pub spread: &'a Picture,
 }
 
-/// Numbers of pixels that were clamped in any channel.
+/// Numbers of pixels that the finish has clamped in any channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clamped {
-    /// Clamped to zero: equation (6) subtracts levels from each other, and denoisers overshoot.
+    /// Pixels clamped to zero: equation (6) subtracts bandwidth levels from each other, and denoisers overshoot.
     pub below_zero: u64,
-    /// Clamped to the brightest estimate around.
+    /// Pixels clamped to the brightest estimate around them.
     pub too_bright: u64,
 }
 
-/// Moves `mean` towards `denoised` by at most [`LIMIT`] times `spread`, clamped between zero and [`brightest`]. Also
-/// counts the clamped pixels.
+/// Moves every pixel of the estimate `mean` towards `denoised` by at most [`LIMIT`] times `spread`, clamped between
+/// zero and [`brightest`]. Also counts the clamped pixels.
 ///
 /// Values of `denoised` that are not finite are ignored; they replace values of `mean` that are not finite.
 pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture) -> (Picture, Clamped) {

@@ -11,20 +11,21 @@ use super::bound::{LIMIT, Noise, brightest};
 use crate::film::Picture;
 use rayon::prelude::*;
 
-/// A sum of light by channel.
+/// Light of a whole picture: the sum over its pixels, for each channel.
 type Light = [f64; 3];
 
-/// Share of the total light that may be lost: giving back less would add more noise than it is worth.
+/// Share of a picture's total light that the finish may lose: giving back less would add more noise than it is worth.
 const TOLERATED_LOSS: f64 = 0.04;
 
-/// The part of the `lost` light of a `total` that neither its variance explains nor [`TOLERATED_LOSS`] allows. A single
-/// bright sample equals its standard error, so that none of it is significant; of k equal ones `1 - 1 / k^2` is.
+/// The part of the `lost` light of a picture with `total` light that neither the `variance` of that total explains nor
+/// [`TOLERATED_LOSS`] allows. A single bright sample equals its standard error, so that none of it is significant; of k
+/// equal ones `1 - 1 / k^2` is.
 fn significant(lost: f64, variance: f64, total: f64) -> f64 {
     let explained = (variance + (TOLERATED_LOSS * total).powi(2)) / (lost * lost);
     if explained < 1.0 { lost * (1.0 - explained * explained) } else { 0.0 }
 }
 
-/// A picture after the bounded displacement, and the light that it has lost.
+/// A picture after the bounded displacement, and the light that the displacement has lost.
 struct Balance<'a> {
     picture: &'a Picture,
     mean: &'a Picture,
@@ -88,13 +89,14 @@ impl<'a> Balance<'a> {
         f64::from(self.estimate.deviation[i][c])
     }
 
-    /// Whether a pixel takes part: its values are finite, and it is not exact.
+    /// Whether pixel `i` takes part in the balance: its values are finite, and it is not exact.
     fn counts(&self, i: usize) -> bool {
         let finite = |plane: &Picture| plane[i].iter().all(|value| value.is_finite());
         finite(self.mean) && finite(self.denoised) && finite(&self.estimate.deviation) && !self.estimate.is_exact(i)
     }
 
-    /// Sum over the pixels that take part, in chunks that do not depend on the number of threads.
+    /// Sum, by channel, of a function of (pixel, channel) over the pixels that take part, in chunks that do not depend
+    /// on the number of threads.
     fn sum(&self, of: impl Fn(usize, usize) -> f64 + Sync) -> Light {
         let pixels = self.picture.len();
         let chunk = |start: usize| {
@@ -105,8 +107,8 @@ impl<'a> Balance<'a> {
         parts.iter().fold([0.0; 3], |sum, part| std::array::from_fn(|c| sum[c] + part[c]))
     }
 
-    /// Distance that the bound has kept a pixel from the denoised picture, at most [`Self::missed`], times the share of its
-    /// value that its noise explains.
+    /// Distance in channel `c` that the bound has kept pixel `i` from the denoised picture, at most [`Self::missed`],
+    /// times the share of its value that its noise explains.
     fn shortfall(&self, i: usize, c: usize) -> f64 {
         let (value, error) = (f64::from(self.mean[i][c]), f64::from(LIMIT) * self.error(i, c));
         let doubt = if value > error { error / value } else { 1.0 };
@@ -142,7 +144,7 @@ mod tests {
         picture.iter().map(|rgb| rgb[1]).sum::<f32>() / picture.len() as f32
     }
 
-    /// The picture after the bounded displacement towards a constant, and after its light has been given back.
+    /// The picture after the bounded displacement towards `constant`, and after its light has been given back.
     fn finished(estimate: &Estimate, constant: f32) -> [Picture; 2] {
         let (denoised, spread) = (Picture::filled(SIZE, [constant; 3]), spread(estimate));
         let (within, _) = displace(&estimate.mean, &denoised, &spread);

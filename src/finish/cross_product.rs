@@ -10,13 +10,13 @@ use crate::film::{Picture, channel_mean};
 use crate::stat::TRIMMED_SHARE;
 use rayon::prelude::*;
 
-/// Squared error of one pixel, estimated by a cross product.
+/// Squared error of one pixel of a picture, estimated by a cross product with two independent estimates.
 #[derive(Clone, Copy, Debug)]
 pub struct PixelError {
     /// Squared relative error; noise around a small error can make it negative.
     pub squared: f64,
-    /// Noise in `squared` from the two estimates, by channel: the derivative of the product by one of them, times
-    /// their difference.
+    /// Noise in `squared` from the two estimates, by channel: the derivative of the product by one estimate, times the
+    /// difference of the two.
     pub noise: [f64; 3],
 }
 
@@ -53,7 +53,7 @@ mod tests {
     use crate::film::Size;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// Mean of the squared errors.
+    /// Mean over the kept pixels of the squared relative errors of `picture`.
     fn mean_error(picture: &Picture, estimates: [&Picture; 2], values: &Picture) -> f64 {
         let pixels = squared_errors(picture, estimates, values);
         pixels.iter().map(|pixel| pixel.squared).sum::<f64>() / pixels.len().max(1) as f64

@@ -17,7 +17,7 @@ const SCRATCH_PER_PIXEL: u64 = 700;
 /// rounding, so that the limit must not depend on the machine.
 const MAX_MEMORY_MIB: u32 = 1024;
 
-/// Bytes of scratch memory for a picture of `pixels` pixels.
+/// Bytes of scratch memory that Open Image Denoise needs for a picture of `pixels` pixels.
 pub fn scratch(pixels: u64) -> u64 {
     (SCRATCH_PER_PIXEL * pixels).min(u64::from(MAX_MEMORY_MIB) << 20)
 }
@@ -38,18 +38,18 @@ pub enum DenoiserChoice {
     None,
 }
 
-/// A loaded denoiser.
+/// A loaded denoiser of pictures.
 pub enum Denoiser {
-    /// Open Image Denoise. The filter keeps its network between pictures of equal size and inputs.
+    /// Open Image Denoise. Its filter keeps its neural network between pictures of equal size and inputs.
     Oidn {
-        /// The filter.
+        /// The filter of Open Image Denoise.
         filter: oidn::Filter,
-        /// Version of the library.
+        /// Version of Open Image Denoise, such as `2.3.0`.
         version: String,
     },
-    /// [`statistical`].
+    /// The project's own denoiser, see [`statistical`].
     Own,
-    /// None: the denoised picture is the estimate.
+    /// No denoiser: the denoised picture is the estimate.
     None,
 }
 
@@ -70,7 +70,7 @@ impl Denoiser {
         }
     }
 
-    /// Name and version for the header.
+    /// Name of the denoiser, with the version of Open Image Denoise, for the header of files.
     pub fn name(&self) -> String {
         match self {
             Denoiser::Oidn { version, .. } => format!("Open Image Denoise {version}"),
@@ -79,7 +79,7 @@ impl Denoiser {
         }
     }
 
-    /// Denoises an estimate.
+    /// The denoised picture of an estimate; the estimate itself with [`Denoiser::None`].
     ///
     /// # Errors
     /// [`ErrorKind::Library`]: Open Image Denoise fails.
@@ -121,7 +121,7 @@ pub fn library() -> std::result::Result<oidn::Library, oidn::Error> {
     oidn::Library::load(&installed::candidates(FOLDER))
 }
 
-/// Where the library was found, in words.
+/// Where Open Image Denoise was found, in words: an environment variable, `scripts/setup.sh` or `system`.
 pub fn origin(library: &oidn::Library) -> &'static str {
     installed::origin(oidn::LIBRARY_VARIABLE, FOLDER, library.path())
 }

@@ -4,21 +4,21 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::QUARTERS;
 use crate::film::{LayerSet, Picture, Role};
 
-/// Standard error over estimate that rounding of single-precision sums alone can produce.
+/// Largest ratio of standard error to estimate that rounding of single-precision sums alone can produce.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
 
-/// A picture, its noise and the guides of a denoiser, all of one size.
+/// An unfinished picture, its noise, and the guides of a denoiser, all of one size.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// Radiance.
+    /// Estimated radiance.
     pub mean: Picture,
-    /// Standard error of `mean`; infinite where it is unknown.
+    /// Standard error of `mean`, by channel; infinite where it is unknown.
     pub deviation: Picture,
-    /// Reflectance at the first rough hit, 0 to 1.
+    /// Reflectance at the first rough hit, 0 to 1; `None` if unknown.
     pub albedo: Option<Picture>,
-    /// World-space normal at that hit.
+    /// World-space normal at the first rough hit; `None` if unknown.
     pub normal: Option<Picture>,
-    /// Coverage of each pixel, if the picture has it.
+    /// Coverage of each pixel, 0 to 1; `None` if the picture has no alpha.
     pub alpha: Option<Vec<f32>>,
 }
 
@@ -51,8 +51,8 @@ impl Estimate {
         Ok(Estimate { mean, deviation, albedo, normal, alpha })
     }
 
-    /// Whether all samples of a pixel have been equal: a light seen without noise, or nothing at all. A black surface is
-    /// not exact, because rare light may have missed it.
+    /// Whether all samples of pixel `index` have been equal: a light seen without noise, or nothing at all. A black
+    /// surface is not exact, because rare light may have missed it.
     pub(super) fn is_exact(&self, index: usize) -> bool {
         let (mean, error) = (self.mean[index], self.deviation[index]);
         let most = mean.into_iter().fold(0.0, f32::max);
@@ -60,13 +60,14 @@ impl Estimate {
         (most > 0.0 || shows_nothing) && error.into_iter().all(|error| error <= ROUNDING * most)
     }
 
-    /// The estimate by the first two quarters of the iterations.
+    /// The estimate by the first half of the iterations: the mean of the first two of the four quarters.
     #[must_use]
     pub fn first_half(&self, quarters: &[Picture; QUARTERS]) -> Estimate {
         self.from_partial(quarters[0].average(&quarters[1]), 2.0)
     }
 
-    /// The estimate by a part of the iterations, 1 / `divisor` of them, whose mean is given.
+    /// The estimate by a part of the iterations, 1 / `divisor` of them, whose mean is given; standard errors grow
+    /// accordingly.
     #[must_use]
     pub fn from_partial(&self, mean: Picture, divisor: f32) -> Estimate {
         let deviation = self.deviation.map(|error| error * divisor.sqrt());
@@ -75,18 +76,18 @@ impl Estimate {
     }
 }
 
-/// Number, from 1, of the level that is the method's own image: the second largest.
+/// Number, from 1, of the bandwidth level that is the method's own image: the second largest.
 pub(super) fn own_level(set: &LayerSet) -> usize {
     let count = (1..).take_while(|level| set.get(&format!("Variance{level}")).is_some()).count();
     count.saturating_sub(1).max(1)
 }
 
-/// Coverage of each pixel, if the beauty has it.
+/// Coverage of each pixel, 0 to 1; `None` if the beauty has no alpha.
 pub(super) fn alpha(set: &LayerSet) -> Option<Vec<f32>> {
     set.find(Role::Beauty).and_then(|beauty| beauty.plane("A")).map(|plane| plane.values.clone())
 }
 
-/// The pictures of the four quarters of the iterations; `None` if one is missing or black.
+/// The pictures that each of four equal parts of the iterations gives; `None` if one is missing or black.
 pub fn quarters(set: &LayerSet) -> Option<[Picture; QUARTERS]> {
     let pictures: Vec<Picture> = (1..=QUARTERS).filter_map(|k| set.picture(&format!("Quarter{k}"))).collect();
     let quarters = <[Picture; QUARTERS]>::try_from(pictures).ok()?;

@@ -22,20 +22,20 @@ use crate::stat::TRIMMED_SHARE;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Pixels to each side of the windows in which errors of pixels are averaged.
+/// Pixels to each side of a pixel in the windows over which squared errors are averaged.
 const REACH: usize = 7;
-/// Var(q) / Var(p), see the head of this file.
+/// Variance of the control `q` relative to that of `p`, Var(q) / Var(p), see the head of this file.
 const CONTROL_VARIANCE: f64 = 4.0;
-/// Stand-in for an infinite relative variance.
+/// Stand-in for an infinite relative variance of a pixel.
 const INFINITE_VARIANCE: f64 = 1e30;
-/// Least squared error of a pixel, as a share of the error that its variance predicts.
+/// Least estimated squared error of a pixel, as a share of the error that its variance predicts.
 const MIN_PREDICTED_SHARE: f64 = 0.1;
 
 /// Exponent `b` of the error of finished pictures, iterations^-b, before a render has shown its own: the project's
 /// scenes show 0.2 to 0.5 (`docs/lab/measurements.md`, slopes of finished pictures).
 pub const DEFAULT_CONVERGENCE_RATE: f64 = 0.35;
 
-/// The error of a picture finished from half of the iterations.
+/// Estimated error of a picture finished from half of a render's iterations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FinishedError {
     /// Squared relative error without the share [`TRIMMED_SHARE`] of the pixels, those of the largest variance; noise around a
@@ -45,20 +45,20 @@ pub struct FinishedError {
     pub deviation: f64,
     /// Squared relative bias that all quarters share; zero without bandwidth levels.
     pub bias: f64,
-    /// Share of the estimate's variance in the pixels left out, 0 to 1. Near one a few bright samples hold all noise,
-    /// and no sample so far predicts how much light others like them will add.
+    /// Share of the estimate's variance in the pixels left out of `noise`, 0 to 1. Near one a few bright samples hold
+    /// all noise, and no sample so far predicts how much light others like them will add.
     pub rare: f64,
-    /// Squared relative error by light that hardly any photon has carried. Quarters do not show it: the photon counts
-    /// do, and their owner fills it in.
+    /// Squared relative error by light that hardly any photon has carried. The quarters of the iterations do not show
+    /// it; the caller adds it from the counts of photons.
     pub unseen: f64,
 }
 
-/// Squared errors of every pixel.
+/// Squared errors of every pixel of a finished picture.
 #[derive(Clone, Debug)]
 pub struct ErrorMap {
-    /// Noise, at half of the iterations.
+    /// Squared error by noise of every pixel and channel, after half of the iterations.
     noise: Picture,
-    /// Bias.
+    /// Squared bias of every pixel and channel.
     bias: Picture,
     /// Factors that make squared errors relative: one over the pixel's squared value plus the
     /// [floor](Picture::relative_floor).
@@ -66,35 +66,36 @@ pub struct ErrorMap {
 }
 
 impl ErrorMap {
-    /// Squared errors of the picture finished from all iterations. Noise falls at [`DEFAULT_CONVERGENCE_RATE`], not at
-    /// the rate that this render has shown: merged shards must give the same map as one render.
+    /// Squared errors of the pixels of the picture finished from all iterations. Noise falls at
+    /// [`DEFAULT_CONVERGENCE_RATE`], not at the rate that this render has shown: merged shards must give the same map
+    /// as one render.
     pub fn squared(&self) -> Picture {
         let fall = (-2.0 * DEFAULT_CONVERGENCE_RATE).exp2() as f32;
         self.noise.zip(&self.bias, |noise, bias| fall * noise + bias)
     }
 }
 
-/// The pictures that the error is estimated from, all of one size.
+/// The pictures from which the error of a finished picture is estimated, all of one size.
 #[derive(Clone, Copy)]
 pub struct ErrorEstimator<'a> {
-    /// The picture finished from quarters 1 and 2.
+    /// The picture finished from the first half of the iterations: quarters 1 and 2.
     pub half: &'a Picture,
-    /// The quarters.
+    /// The unfinished pictures that each of four equal parts of the iterations gives.
     pub quarters: &'a [Picture; 4],
-    /// Standard error of the estimate by all iterations.
+    /// Standard error of the unfinished estimate by all iterations.
     pub deviation: &'a Picture,
-    /// The level that is the method's own image, and the next larger.
+    /// The bandwidth level that is the method's own image, and the next larger; `None` without levels.
     pub levels: Option<[&'a Picture; 2]>,
 }
 
 impl ErrorEstimator<'_> {
-    /// The error of the whole picture.
+    /// The error of the whole finished picture.
     pub fn error(&self) -> FinishedError {
         let products = Products::of(self);
         self.mean_error(&products, self.bias(&products).as_ref())
     }
 
-    /// The error of the whole picture, and of its pixels.
+    /// The error of the whole finished picture, and the errors of its pixels.
     pub fn error_and_map(&self) -> (FinishedError, ErrorMap) {
         let products = Products::of(self);
         let bias = self.bias(&products);
@@ -106,7 +107,8 @@ impl ErrorEstimator<'_> {
         self.half.size()
     }
 
-    /// Relative variance of a pixel of the estimate, mean over RGB.
+    /// Relative variance of pixel `i` of the estimate, mean over RGB; `weight` is the factor that makes squares
+    /// relative.
     fn variance(&self, i: usize, weight: f64) -> f64 {
         let variance = self.deviation[i].iter().map(|s| (f64::from(*s).powi(2) * weight).min(INFINITE_VARIANCE));
         variance.sum::<f64>() / 3.0
@@ -122,7 +124,8 @@ impl ErrorEstimator<'_> {
         }
     }
 
-    /// Squared relative bias of pixels: the squared difference of the two levels, averaged over windows.
+    /// Squared relative bias of every pixel: the squared difference of the two bandwidth levels, averaged over windows;
+    /// `None` without levels.
     fn bias(&self, products: &Products) -> Option<Picture> {
         let [own, larger] = self.levels?;
         let difference = Picture::from_fn(self.size(), |i| {
@@ -133,9 +136,9 @@ impl ErrorEstimator<'_> {
         Some(Picture::new(self.size(), smooth).map(|d| d * d))
     }
 
-    /// Errors of pixels: a mean of the window's own `p` and of the error predicted from the variance of the estimate,
-    /// which distributes the picture's error over the pixels. The weights are inverse variances; that of the prediction
-    /// is its square.
+    /// Squared errors of every pixel: a mean of the window's own `p` and of the error predicted from the variance of
+    /// the estimate, which distributes the picture's error over the pixels. The weights are inverse variances; the
+    /// variance of the prediction is its square.
     fn map(&self, products: Products, bias: Option<Picture>, error: FinishedError) -> ErrorMap {
         let Products { ref weight, error: ref own, ref control, ref kept, .. } = products;
         let variance = Picture::from_fn(self.size(), |i| {
@@ -164,8 +167,8 @@ impl ErrorEstimator<'_> {
         ErrorMap { noise, bias, weight: products.weight.into_iter().map(|w| w as f32).collect() }
     }
 
-    /// Sum over square blocks of the squared sum of the control in each: its expectation is the variance of the whole
-    /// sum if pixels farther apart than a block are independent.
+    /// Sum over square blocks of pixels of the squared sum of the control `q` in each: its expectation is the variance
+    /// of the whole sum if pixels farther apart than a block are independent.
     fn squared_block_sums(&self, products: &Products) -> f64 {
         const SIDE: usize = 2 * REACH + 1;
         let Size { width, height } = self.size();
@@ -179,19 +182,19 @@ impl ErrorEstimator<'_> {
     }
 }
 
-/// The products of the quarters, pixel by pixel.
+/// The products `p` and `q` of differences of the quarters, pixel by pixel, see the head of this file.
 struct Products {
-    /// Factors that make squares relative.
+    /// Factor of each pixel that makes squares relative.
     weight: Vec<f64>,
-    /// `p`, relative.
+    /// `p` of each pixel, a noisy estimate of its squared error, relative.
     error: Picture,
-    /// `q`, relative.
+    /// `q` of each pixel, the control with mean zero, relative.
     control: Picture,
-    /// Whether a pixel counts: all but the share [`TRIMMED_SHARE`] of the largest variance.
+    /// Whether each pixel counts: all but the share [`TRIMMED_SHARE`], which has the largest variance.
     kept: Vec<bool>,
     /// Number of pixels that count, at least 1.
     count: f64,
-    /// See [`FinishedError::rare`].
+    /// Share of the estimate's variance in the pixels that do not count, see [`FinishedError::rare`].
     rare: f64,
 }
 
@@ -216,14 +219,15 @@ impl Products {
         Products { weight, error, control, kept, count, rare }
     }
 
-    /// Mean over the pixels that count, and over channels.
+    /// Mean of `plane` over the pixels that count, and over channels.
     fn average(&self, plane: &Picture) -> f64 {
         let kept = plane.iter().zip(&self.kept).filter(|(_, kept)| **kept);
         kept.map(|(value, _)| channel_mean(*value)).sum::<f64>() / self.count
     }
 }
 
-/// Which values are not in the largest share [`TRIMMED_SHARE`], and the share of the sum that the largest have.
+/// Which of the `values` are not in the largest share [`TRIMMED_SHARE`], and the part of the sum, 0 to 1, that the
+/// largest have.
 fn without_worst(values: &[f64]) -> (Vec<bool>, f64) {
     let count = values.len() - (values.len() as f64 * TRIMMED_SHARE) as usize;
     if count == 0 {
@@ -243,7 +247,7 @@ mod tests {
 
     const SIZE: Size = Size { width: 160, height: 120 };
 
-    /// A grey picture with uniform noise of this standard deviation at each pixel.
+    /// A grey picture with uniform noise of standard deviation `sigma` at each pixel.
     fn noisy(seed: u64, sigma: impl Fn(usize) -> f32 + Sync + Send) -> Picture {
         let draw = |index: usize| Stream::new(seed, 0, Domain::Test, index as u64).vertex(0).one(Purpose::Pixel);
         Picture::from_fn(SIZE, |i| [1.0 + sigma(i) * 12f32.sqrt() * (draw(i) - 0.5); 3])
@@ -263,8 +267,8 @@ mod tests {
         ErrorEstimator { half, quarters: &quarters, deviation: &deviation, levels: None }.error_and_map()
     }
 
-    /// Pictures that are off by a tenth, with quarters whose noise is three times that: the error is right, and its
-    /// standard error is the spread of twelve estimates.
+    /// Pictures that are off by a tenth, with quarters whose noise is three times that: the estimated error is right,
+    /// and its standard error is the spread of twelve estimates.
     #[test]
     fn the_error_is_right_and_so_is_its_standard_error() {
         let picture = grey(1.1);

@@ -35,30 +35,31 @@ use estimate::{alpha, own_level};
 use finished_error::ErrorEstimator;
 use parts::Part;
 
-/// Bytes per pixel that a finish without parts needs beside its layers: the estimates by all and by half of the
-/// iterations, their pictures, the quarters, and the buffers of the error estimate.
+/// Bytes of memory per pixel that a finish without parts needs beside its layers: the estimates by all and by half of
+/// the iterations, their pictures, the quarters, and the buffers of the error estimate.
 pub const BYTES_PER_PIXEL: u64 = 384;
-/// Bytes per pixel for each part.
+/// Bytes of memory per pixel that the finish needs for each additive part of the picture.
 pub const BYTES_PER_PIXEL_OF_PART: u64 = 36;
-/// Name of the layer with the picture's error.
+/// Name of the layer with the estimated error of every pixel of the finished picture.
 pub const ERROR: &str = "Error";
 
-/// Whether finishing the picture alone, without its error and parts, reads this layer.
+/// Whether finishing the picture alone, without its error and parts, reads the layer `name`.
 pub fn reads_for_picture(name: &str) -> bool {
     kind_of(name).is_some_and(|(kind, _)| kind.finish == Some(Use::Picture))
 }
 
-/// Whether finishing the picture and estimating its error by quarters reads this layer.
+/// Whether finishing the picture and estimating its error by quarters reads the layer `name`.
 pub fn reads_for_error(name: &str) -> bool {
     kind_of(name).is_some_and(|(kind, _)| matches!(kind.finish, Some(Use::Picture | Use::Error)))
 }
 
-/// Whether the finish reads this layer for the picture, its error, or its parts.
+/// Whether the finish reads the layer `name` for the picture, its error, or its parts.
 pub fn reads(name: &str) -> bool {
     reads_for_error(name) || finished_part(name).is_some()
 }
 
-/// Finishes pictures.
+/// The finish of renders: denoises pictures within the limits that their standard errors set, and splits them into
+/// layers.
 pub struct Finish {
     denoiser: Denoiser,
     /// Quality of Open Image Denoise.
@@ -69,33 +70,33 @@ pub struct Finish {
 /// The result of [`Finish::apply`], beside the layers.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// Number of levels that equation (6) has combined, if it has.
+    /// Number of bandwidth levels that the network has combined by equation (6); `None` without the network.
     pub combined: Option<usize>,
-    /// The error of a picture finished from half of the iterations, if the set has quarters.
+    /// Error of a picture finished from half of the iterations; `None` if the set lacks the quarters of the iterations.
     pub error: Option<FinishedError>,
-    /// The errors of its pixels, if the layer [`ERROR`] is wanted.
+    /// Errors of the pixels of the finished picture; `None` unless the layer [`ERROR`] is wanted.
     pub error_map: Option<ErrorMap>,
-    /// Pixels that were kept between zero and the brightest estimate around them.
+    /// Numbers of pixels that were clamped between zero and the brightest estimate around them.
     pub clamped: Clamped,
 }
 
-/// A picture with the name of its layer.
+/// A layer's name and its picture.
 type Named = (String, Picture);
 
 impl Finish {
-    /// A finish by a denoiser, and by the network of equation (6) if there is one.
+    /// A finish by a denoiser, and by the network that combines bandwidth levels with equation (6), if there is one.
     pub fn new(denoiser: Denoiser, network: Option<Combiner>) -> Finish {
         Finish { denoiser, quality: Quality::High, network }
     }
 
-    /// The finish for the pilots that `auto` compares: with our own denoiser if the render has any. A whole render and
-    /// each of its shards then choose alike, with and without the library of another denoiser.
+    /// The finish for pilots, the short test renders that `auto` compares: with our own denoiser if the render has any.
+    /// A whole render and each of its shards then choose alike, with and without the library of another denoiser.
     pub fn for_pilots(choice: DenoiserChoice) -> Finish {
         let none = choice == DenoiserChoice::None;
         Finish::new(if none { Denoiser::None } else { Denoiser::Own }, None)
     }
 
-    /// The denoiser's name.
+    /// Name of the denoiser, with the version of Open Image Denoise.
     pub fn denoiser(&self) -> String {
         self.denoiser.name()
     }
@@ -115,12 +116,12 @@ impl Finish {
         finished.map(|_| ())
     }
 
-    /// Whether the denoiser has qualities.
+    /// Whether the denoiser has levels of quality, as Open Image Denoise has.
     pub fn has_qualities(&self) -> bool {
         matches!(self.denoiser, Denoiser::Oidn { .. })
     }
 
-    /// The finished picture of an estimate.
+    /// The finished picture of an unfinished estimate.
     ///
     /// # Errors
     /// The denoiser fails.
@@ -128,7 +129,8 @@ impl Finish {
         self.with_spread(estimate).map(|([picture, _], _)| picture)
     }
 
-    /// The finished picture, the spread that limits its displacement, and the number of clamped pixels.
+    /// The finished picture and the [spread](bound::spread) that limits its displacement, and the numbers of clamped
+    /// pixels.
     fn with_spread(&mut self, estimate: &Estimate) -> Result<([Picture; 2], Clamped)> {
         let denoised = self.denoiser.run(estimate, self.quality)?;
         let spread = bound::spread(estimate);
@@ -137,9 +139,9 @@ impl Finish {
         Ok(([picture, spread], clamped))
     }
 
-    /// Finishes the picture of `set` and makes the result its beauty; alpha stays. Adds `Error`, `CombinedDirect` and
-    /// the other parts if the set has their sources and `wanted` accepts their names. The result does not depend on the
-    /// number of threads, except as [`caustique_oidn`] says of Open Image Denoise.
+    /// Finishes the picture of the layer set and makes the result its beauty; alpha stays. Adds `Error`,
+    /// `CombinedDirect` and the other parts if the set has their sources and `wanted` accepts their names. The result
+    /// does not depend on the number of threads, except as [`caustique_oidn`] says of Open Image Denoise.
     ///
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
@@ -177,8 +179,8 @@ impl Finish {
         Ok(Finished { combined, error, error_map, clamped })
     }
 
-    /// The error of a picture finished from half of its iterations, by the other half; `None` if a quarter is missing or
-    /// black.
+    /// The error of a picture finished from the first half of the iterations, by the second half; `None` if a quarter
+    /// of the iterations is missing or black.
     ///
     /// # Errors
     /// Layers are missing, or the denoiser fails.
@@ -187,7 +189,7 @@ impl Finish {
         Ok(self.error_by_quarters(set, &estimate, false)?.map(|(error, _)| error))
     }
 
-    /// [`estimate_error`](Self::estimate_error) for a known estimate, with the errors of pixels if they are wanted.
+    /// [`estimate_error`](Self::estimate_error) for a known estimate, with the errors of the pixels if they are wanted.
     fn error_by_quarters(
         &mut self,
         set: &LayerSet,
@@ -208,8 +210,8 @@ impl Finish {
         }))
     }
 
-    /// The finished parts that are wanted, with their layers' names. Parts that together sum to the picture, or to its
-    /// caustics, are all finished if one of them is wanted.
+    /// The finished parts of the picture whose names are wanted, with their layers' names. Parts that together sum to
+    /// the picture, or to its caustics, are all finished if one of them is wanted.
     fn parts(
         &mut self,
         set: &LayerSet,
@@ -241,7 +243,8 @@ impl Finish {
         Ok(finished)
     }
 
-    /// Finishes parts so that they sum to `whole`, with the guides and standard errors of the whole picture.
+    /// Finishes named parts so that they sum to the picture `whole`, with the guides and standard errors of the whole
+    /// picture.
     fn split(&mut self, parts: Vec<Named>, whole: &Picture, noise: Noise<'_>) -> Result<Vec<Named>> {
         let mut of_part = noise.estimate.clone();
         let (mut names, mut estimates) = (Vec::with_capacity(parts.len()), Vec::with_capacity(parts.len()));
@@ -262,10 +265,10 @@ impl Finish {
     }
 }
 
-/// The light of groups. If lights outside all groups have added any, their light comes first, without a name; the last
-/// part takes what rounding leaves.
+/// The light of light groups. If lights outside all groups have added any to `whole`, their light comes first, without
+/// a name; the last part takes the remainder of rounding.
 fn with_rest(mut groups: Vec<Named>, whole: &Picture) -> Vec<Named> {
-    /// Share of the total light that rounding may leave.
+    /// Largest share of the total light that counts as rounding.
     const ROUNDING: f64 = 1e-5;
     let rest = Picture::from_fn(whole.size(), |index| {
         std::array::from_fn(|c| {
@@ -284,7 +287,7 @@ fn with_rest(mut groups: Vec<Named>, whole: &Picture) -> Vec<Named> {
 mod tests {
     use super::*;
 
-    /// Shards know nothing of each other, and have to choose as one render does.
+    /// Shards of one render do not communicate, and have to choose as one render does.
     #[test]
     fn pilots_are_finished_alike_by_every_denoiser() {
         for choice in [DenoiserChoice::Auto, DenoiserChoice::Oidn, DenoiserChoice::Own] {

@@ -9,15 +9,16 @@ use super::conserve::give_back;
 use crate::film::Picture;
 use rayon::prelude::*;
 
-/// A part before the bound: its estimate and its denoised picture.
+/// An additive part of the picture, such as its caustics, before the bound: its estimate and its denoised picture.
 pub struct Part {
-    /// Estimate.
+    /// Estimated light of the part.
     pub mean: Picture,
-    /// Denoised estimate; the estimate itself if it has no noise.
+    /// Denoised estimate of the part; the estimate itself if it has no noise.
     pub denoised: Picture,
 }
 
-/// Finishes parts so that they sum to the finished picture `whole`. `noise` belongs to the whole picture.
+/// Finishes additive parts of a picture so that they sum to the finished picture `whole`. `noise` belongs to the whole
+/// picture.
 ///
 /// Light of the whole picture at a pixel where no part has any, which the denoiser has brought from around, goes to the
 /// last part.
@@ -59,7 +60,7 @@ mod tests {
     use crate::finish::Estimate;
     use crate::random::{Domain, Purpose, Stream};
 
-    /// An estimate with a constant standard error.
+    /// An estimate with `error` as the standard error of every pixel.
     fn estimate(mean: &Picture, error: f32) -> Estimate {
         let deviation = Picture::filled(mean.size(), [error; 3]);
         Estimate { mean: mean.clone(), deviation, albedo: None, normal: None, alpha: None }

@@ -8,37 +8,39 @@
 use super::window::window;
 use crate::film::Picture;
 
-/// Pixels to each side in the averaged window.
+/// Pixels to each side of a pixel in the window that it is averaged over.
 const REACH: usize = 8;
-/// Standard deviation of the weight in distance, in pixels.
+/// Standard deviation, in pixels, of the Gaussian weight of a neighbour by its distance.
 const DISTANCE: f32 = 5.0;
-/// Standard deviation of the weight in albedo.
+/// Standard deviation of the Gaussian weight of a neighbour by its difference in albedo.
 const ALBEDO: f32 = 0.04;
-/// Standard deviation of the weight in the difference of unit normals.
+/// Standard deviation of the Gaussian weight of a neighbour by the difference of unit normals.
 const NORMAL: f32 = 0.2;
-/// Largest difference of two estimates of the same light, in standard errors of the difference: first and second pass.
+/// Largest difference of two pixels that count as estimates of equal light, in standard errors of the difference, in
+/// the first and second pass.
 const MAX_DIFFERENCE: [f32; 2] = [3.0, 1.0];
 
 /// Input of the denoiser: pictures of equal size.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
-    /// Estimates.
+    /// Estimated radiance.
     pub mean: &'a Picture,
-    /// Standard errors ([`super::bound::spread`]).
+    /// Standard error of each pixel, raised towards its neighbours' ([`super::bound::spread`]).
     pub spread: &'a Picture,
-    /// Reflectances, if known.
+    /// Reflectances at the first rough hit; `None` if unknown.
     pub albedo: Option<&'a Picture>,
-    /// Unit normals, if known.
+    /// Unit normals at the first rough hit; `None` if unknown.
     pub normal: Option<&'a Picture>,
 }
 
-/// Denoises a picture in two passes.
+/// Denoises a picture in two passes of weighted means; the result of the first selects the neighbours in the second.
 pub fn denoise(input: &Input<'_>) -> Picture {
     let first = pass(input, input.mean, MAX_DIFFERENCE[0]);
     pass(input, &first, MAX_DIFFERENCE[1])
 }
 
-/// Means of the estimates over neighbours whose `guide` differs by less than `max_difference` standard errors.
+/// Means of the estimates over neighbours whose `guide`, the estimates or the first pass's result, differs by less than
+/// `max_difference` standard errors.
 fn pass(input: &Input<'_>, guide: &Picture, max_difference: f32) -> Picture {
     let Input { mean, spread, albedo, normal } = *input;
     let size = mean.size();
@@ -74,7 +76,8 @@ fn distance2(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|c| (a[c] - b[c]).powi(2)).sum()
 }
 
-/// Variance of the difference of two estimates, summed over channels, times `factor` squared.
+/// Variance of the difference of two estimates with the standard errors `a` and `b`, summed over channels, times
+/// `factor` squared.
 fn variance(a: [f32; 3], b: [f32; 3], factor: f32) -> f32 {
     let sum: f32 = (0..3).map(|c| a[c] * a[c] + b[c] * b[c]).sum();
     (factor * factor * sum).max(f32::MIN_POSITIVE)

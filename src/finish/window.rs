@@ -3,15 +3,15 @@
 use crate::film::Size;
 use rayon::prelude::*;
 
-/// Indices of the pixels within `reach` of pixel `index` in x and y, the pixel included, row by row. The border cuts
-/// windows off.
+/// Indices of the pixels within `reach` of pixel `index` in x and y, the pixel included, row by row. The border of the
+/// picture cuts windows off.
 pub fn window(size: Size, index: usize, reach: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (index % size.width, index / size.width);
     let around = move |at: usize, end: usize| at.saturating_sub(reach)..(at + reach + 1).min(end);
     around(y, size.height).flat_map(move |y| around(x, size.width).map(move |x| y * size.width + x))
 }
 
-/// Means over the pixels that count in square windows. The border cuts windows off.
+/// Means over square windows around every pixel, of only the pixels that count. The border cuts windows off.
 pub struct Windows<'a> {
     size: Size,
     reach: usize,
@@ -21,21 +21,22 @@ pub struct Windows<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// Windows of `reach` pixels to each side. `counts` says which pixels count, row by row.
+    /// Windows that extend `reach` pixels to each side. `counts` says for each pixel whether it counts, row by row.
     pub fn new(size: Size, reach: usize, counts: &'a [bool]) -> Windows<'a> {
         let windows = Windows { size, reach, counts, number: Vec::new() };
         let number = windows.sums(|i| [f32::from(u8::from(counts[i]))]);
         Windows { number, ..windows }
     }
 
-    /// The mean over the window of each pixel; zero if no pixel of it counts.
+    /// The mean of `values` over the window of each pixel; zero if no pixel of it counts.
     pub fn means<const N: usize>(&self, values: &[[f32; N]]) -> Vec<[f32; N]> {
         let mut sums = self.sums(|i| if self.counts[i] { values[i] } else { [0.0; N] });
         sums.par_iter_mut().zip(&self.number).for_each(|(sum, [number])| *sum = sum.map(|sum| sum / number.max(1.0)));
         sums
     }
 
-    /// Sums over windows, by differences of running sums along rows and then columns.
+    /// Sums of `value`, a function of the pixel's index, over windows, by differences of running sums along rows and
+    /// then columns.
     fn sums<const N: usize>(&self, value: impl Fn(usize) -> [f32; N] + Sync) -> Vec<[f32; N]> {
         let (width, height) = (self.size.width, self.size.height);
         let mut rows = vec![[0.0; N]; width * height];

@@ -26,7 +26,7 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut BufWriter<&mut File>) -> Result
     publish(&target, temporary).map_err(|cause| failure(path, &cause))
 }
 
-/// Writes `bytes` as a file, see [`write()`].
+/// Writes `bytes` as a file, atomically, see [`write()`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     write(path, |file| file.write_all(bytes).map_err(|cause| failure(path, &cause)))
 }
@@ -50,11 +50,12 @@ pub fn check_writable(path: &Path) -> Result<()> {
     temporary_beside(&target).map(drop).map_err(|cause| failure(path, &cause))
 }
 
-/// Whether the folder, such as `/tmp`, allows only the owner to replace the file, and the owner is another user.
+/// Whether the folder of the file `target`, such as `/tmp`, allows only the owner to replace the file, and the owner is
+/// another user.
 #[cfg(unix)]
 fn is_protected(target: &Path, file: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
-    /// The sticky bit of a mode.
+    /// The sticky bit of a folder's mode.
     const STICKY: u32 = 0o1000;
     let user = rustix::process::geteuid().as_raw();
     let folder = fs::metadata(folder(target));
@@ -95,7 +96,7 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
     one == other
 }
 
-/// The file behind a path. Links are followed, also to a file that does not exist yet, so that a link stays a link.
+/// The file that `path` names. Links are followed, also to a file that does not exist yet, so that a link stays a link.
 fn resolve(path: &Path) -> Result<PathBuf> {
     let error = |cause: &str| Error::new(ErrorKind::Io, path.display(), cause);
     if path.file_name().is_none() || path.is_dir() {
@@ -121,7 +122,7 @@ fn resolve(path: &Path) -> Result<PathBuf> {
     Ok(fs::canonicalize(&target).unwrap_or(target))
 }
 
-/// Maximum length of a chain of links, as on Linux.
+/// Maximum length of a chain of symbolic links, as on Linux.
 const MAX_LINKS: usize = 40;
 
 fn folder(path: &Path) -> &Path {
@@ -132,7 +133,7 @@ fn is_device(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|data| !data.is_file())
 }
 
-/// A locked temporary file beside the target.
+/// Creates a locked temporary file in the folder of the file `target`.
 fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
     let prefix = prefix(target);
     let mut builder = tempfile::Builder::new();
@@ -155,7 +156,7 @@ fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
     }
 }
 
-/// Prefix of the names of the temporary files of a target.
+/// Prefix of the names of the temporary files for the file `target`.
 fn prefix(target: &Path) -> OsString {
     let mut prefix = OsString::from(".caustique-");
     // File names are limited to 255 bytes.
@@ -168,11 +169,11 @@ fn prefix(target: &Path) -> OsString {
 
 /// Suffix of the names of temporary files.
 const SUFFIX: &str = ".part";
-/// Random characters between prefix and suffix, the default of `tempfile`.
+/// Number of random characters between prefix and suffix, the default of `tempfile`.
 const RANDOM: usize = 6;
 
-/// Removes the temporary files of this target that a killed process has left: those that no process has locked. On file
-/// systems without locks nothing is removed.
+/// Removes the temporary files in `folder` whose names begin with `prefix` that a killed process has left: files that
+/// no process has locked. On file systems without locks nothing is removed.
 fn remove_stale(folder: &Path, prefix: &OsStr) {
     let ours = |name: &OsStr| {
         let (name, prefix) = (name.as_encoded_bytes(), prefix.as_encoded_bytes());

@@ -19,7 +19,7 @@ const PIXELS_PER_DEGREE: f32 = 3840.0 * std::f32::consts::PI / 180.0;
 const COLOUR_EXPONENT: f32 = 0.7;
 /// The share of the largest colour difference that maps to `KNEE_TO`, FLIP 2020 section 4.1.3.
 const KNEE_FROM: f32 = 0.4;
-/// The value that `KNEE_FROM` maps to.
+/// Share of the largest error, 0 to 1, that `KNEE_FROM` maps to.
 const KNEE_TO: f32 = 0.95;
 /// Width of the edge and point detectors in degrees, FLIP 2020 section 4.2.
 const DETECTOR_WIDTH: f32 = 0.082;
@@ -57,7 +57,7 @@ pub fn ldr(reference: &Picture, test: &Picture) -> Vec<f32> {
     Detector::new().ldr(&clamped(reference), &clamped(test))
 }
 
-/// First and last exposure in stops, HDR-FLIP 2021 section 3.1.
+/// First and last exposure in stops at which the pictures are compared, HDR-FLIP 2021 section 3.1.
 fn exposures(reference: &Picture) -> (f32, f32) {
     let mut luminances: Vec<f32> =
         reference.iter().map(|rgb| luminance(Rgb::from_array(*rgb).max(Vec3::ZERO))).collect();
@@ -77,23 +77,23 @@ fn exposures(reference: &Picture) -> (f32, f32) {
     ((bright / brightest).log2(), (bright / median).log2())
 }
 
-/// The filters of the observer.
+/// The filters of FLIP's model of the observer, as lists of taps, odd in number.
 struct Detector {
-    /// Contrast sensitivity of the achromatic channel.
+    /// Taps of the contrast sensitivity of the achromatic channel.
     achromatic: Vec<f32>,
-    /// Contrast sensitivity of the red-green channel.
+    /// Taps of the contrast sensitivity of the red-green channel.
     red_green: Vec<f32>,
-    /// Contrast sensitivity of the blue-yellow channel, a sum of two separable Gaussians.
+    /// Taps of the contrast sensitivity of the blue-yellow channel, a sum of two separable Gaussians.
     blue_yellow: [Vec<f32>; 2],
-    /// Gaussian.
+    /// Taps of the Gaussian, which smooths across edges and points.
     smooth: Vec<f32>,
-    /// First derivative of the Gaussian: edges.
+    /// Taps of the first derivative of the Gaussian, which finds edges.
     edge: Vec<f32>,
-    /// Second derivative of the Gaussian: points.
+    /// Taps of the second derivative of the Gaussian, which finds points.
     point: Vec<f32>,
-    /// Largest colour difference, between green and blue.
+    /// Largest colour difference, between green and blue, which maps to 1.
     largest: f32,
-    /// CIE XYZ to linear Rec. 709.
+    /// Matrix from CIE XYZ to linear Rec. 709.
     from_xyz: Mat3,
 }
 
@@ -182,14 +182,14 @@ impl Detector {
 
 /// A picture as the observer perceives it.
 struct Percept {
-    /// Hunt-adjusted CIELAB.
+    /// Hunt-adjusted CIELAB colour of every pixel.
     colour: Vec<Vec3>,
-    /// Magnitudes of edges and points.
+    /// Magnitude of edges at every pixel.
     edge: Vec<f32>,
     point: Vec<f32>,
 }
 
-/// Correlation of every row with `taps`; border pixels are repeated outwards.
+/// Correlation of every row of `plane` with `taps`; border pixels are repeated outwards.
 fn horizontal(plane: &[f32], taps: &[f32], width: usize) -> Vec<f32> {
     let radius = taps.len() / 2;
     let mut out = vec![0.0; plane.len()];
@@ -204,7 +204,7 @@ fn horizontal(plane: &[f32], taps: &[f32], width: usize) -> Vec<f32> {
     out
 }
 
-/// Correlation of every column with `taps`; border pixels are repeated outwards.
+/// Correlation of every column of `plane` with `taps`; border pixels are repeated outwards.
 fn vertical(plane: &[f32], taps: &[f32], width: usize, height: usize) -> Vec<f32> {
     let radius = taps.len() / 2;
     let mut out = vec![0.0; plane.len()];
@@ -217,10 +217,10 @@ fn vertical(plane: &[f32], taps: &[f32], width: usize, height: usize) -> Vec<f32
     out
 }
 
-/// The white point of the colour spaces, D65.
+/// The white point of the colour spaces, D65, in CIE XYZ.
 const WHITE: Vec3 = Vec3::new(0.950_428_55, 1.0, 1.088_900_4);
 
-/// Linear Rec. 709 to CIE XYZ, from the chromaticities of the primaries.
+/// Matrix from linear Rec. 709 to CIE XYZ, from the chromaticities of the primaries.
 const TO_XYZ: Mat3 = Mat3::from_cols_array(&[
     10_135_552.0 / 24_577_794.0,
     2_613_072.0 / 12_288_897.0,
@@ -233,19 +233,19 @@ const TO_XYZ: Mat3 = Mat3::from_cols_array(&[
     70_074_185.0 / 73_733_382.0,
 ]);
 
-/// Linear Rec. 709 to YCxCz, a linear opponent space (FLIP 2020 section 4.1.1).
+/// Converts linear Rec. 709 to YCxCz, a linear opponent space (FLIP 2020 section 4.1.1).
 fn ycxcz(rgb: Rgb) -> Vec3 {
     let v = TO_XYZ * rgb / WHITE;
     Vec3::new(116.0 * v.y - 16.0, 500.0 * (v.x - v.y), 200.0 * (v.y - v.z))
 }
 
-/// YCxCz to CIE XYZ.
+/// Converts YCxCz to CIE XYZ.
 fn xyz(c: Vec3) -> Vec3 {
     let y = (c.x + 16.0) / 116.0;
     Vec3::new(y + c.y / 500.0, y, y - c.z / 200.0) * WHITE
 }
 
-/// Linear Rec. 709 to CIELAB (CIE 15).
+/// Converts linear Rec. 709 to CIELAB (CIE 15).
 fn lab(rgb: Rgb) -> Vec3 {
     const DELTA: f32 = 6.0 / 29.0;
     let f = |t: f32| if t > DELTA.powi(3) { t.cbrt() } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
@@ -253,12 +253,14 @@ fn lab(rgb: Rgb) -> Vec3 {
     Vec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 }
 
-/// Colours look paler in the dark: Hunt's effect, FLIP 2020 section 4.1.2.
+/// CIELAB with chroma scaled by lightness, because colours look paler in the dark: Hunt's effect, FLIP 2020 section
+/// 4.1.2.
 fn hunt(lab: Vec3) -> Vec3 {
     Vec3::new(lab.x, 0.01 * lab.x * lab.y, 0.01 * lab.x * lab.z)
 }
 
-/// City-block distance in lightness, Euclidean in the other two channels (HyAB, FLIP 2020 section 4.1.2).
+/// Distance of two CIELAB colours: city-block in lightness, Euclidean in the other two channels (HyAB, FLIP 2020
+/// section 4.1.2).
 fn colour_distance(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
     d.x.abs() + (d.y * d.y + d.z * d.z).sqrt()

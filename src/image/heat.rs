@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use crate::math::Rgb;
 
-/// Every sixteenth colour, and the last, of matplotlib's magma (S. van der Walt, N. Smith; CC0), sRGB-encoded.
+/// Colour scale of errors from 0 to 1: every sixteenth colour, and the last, of matplotlib's magma (S. van der Walt, N.
+/// Smith; CC0), sRGB-encoded.
 const MAGMA: [[f32; 3]; 17] = [
     [0.001, 0.000, 0.014],
     [0.040, 0.031, 0.134],
@@ -25,8 +26,8 @@ const MAGMA: [[f32; 3]; 17] = [
     [0.987, 0.991, 0.750],
 ];
 
-/// Colour of an error, sRGB-encoded, from 0 (black) over red to 1 (pale yellow); lightness increases with the error. NaN
-/// has the colour of 1.
+/// Colour of an error on a heat map, sRGB-encoded, from 0 (black) over red to 1 (pale yellow); lightness increases with
+/// the error. NaN has the colour of 1.
 pub fn magma(error: f32) -> Rgb {
     let position = if error.is_nan() { 16.0 } else { error.clamp(0.0, 1.0) * 16.0 };
     let index = (position as usize).min(15);

@@ -23,11 +23,11 @@ pub struct Comparison {
     pub mean_ratio: Option<f64>,
     /// Mean over pixels of HDR-FLIP, see [`flip::hdr`].
     pub flip: f64,
-    /// The part of relMSE that changes from pixel to pixel, see [`grain`].
+    /// The part of relMSE that changes from pixel to pixel: noise and displaced edges, see [`grain`].
     pub grain: f64,
     /// The constant that is added to the squared reference, see [`Floor`].
     pub floor: f64,
-    /// Pixels with a channel that is not finite, in either picture.
+    /// Number of pixels with a channel that is not finite, in either picture.
     pub pixels_not_finite: u64,
     /// HDR-FLIP per pixel, rows from the top; 1 where a pixel is not finite.
     #[serde(skip)]
@@ -54,20 +54,21 @@ impl Floor {
     }
 }
 
-/// The metrics of a [`Comparison`] that treat every pixel alone.
+/// The metrics of a [`Comparison`] that treat every pixel alone, without FLIP and grain.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Errors {
-    /// See [`Comparison::relmse`].
+    /// Mean relative squared error, see [`Comparison::relmse`].
     pub relmse: f64,
-    /// See [`Comparison::relmse_trimmed`].
+    /// Mean relative squared error without the worst 0.5 % of the pixels, see [`Comparison::relmse_trimmed`].
     pub relmse_trimmed: f64,
-    /// See [`Comparison::mse`].
+    /// Mean squared error, see [`Comparison::mse`].
     pub mse: f64,
-    /// See [`Comparison::mean_ratio`].
+    /// Mean of the picture over mean of the reference, see [`Comparison::mean_ratio`].
     pub mean_ratio: Option<f64>,
 }
 
-/// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is none.
+/// The errors of `a` against the reference `b` over all pixels that are finite in both; `None` if there is no such
+/// pixel.
 pub fn errors(a: &Picture, b: &Picture) -> Option<Errors> {
     errors_with_floor(a, b, floor::ABSOLUTE)
 }
@@ -90,17 +91,19 @@ fn errors_with_floor(a: &Picture, b: &Picture, floor: f64) -> Option<Errors> {
     Some(Errors { relmse, relmse_trimmed, mse, mean_ratio: (sum_b != 0.0).then(|| sum_a / sum_b) })
 }
 
-/// Mean over RGB of (x - r)^2, over (mean of r over RGB)^2 + 0.01.
+/// Relative squared error of a pixel `x` against its reference `r`: mean over RGB of (x - r)^2, over (mean of r over
+/// RGB)^2 + 0.01.
 pub fn relative_squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     squared_error(x, r) / weight(r, floor::ABSOLUTE)
 }
 
-/// The denominator of relMSE: (mean of r over RGB)^2 plus the floor.
+/// The denominator of a pixel's relative squared error against its reference `r`: (mean of r over RGB)^2 plus the
+/// floor.
 fn weight(r: [f32; 3], floor: f64) -> f64 {
     channel_mean(r).powi(2) + floor
 }
 
-/// Mean over RGB of (x - r)^2.
+/// Squared error of a pixel `x` against its reference `r`: mean over RGB of (x - r)^2.
 pub fn squared_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     (0..3).map(|c| (f64::from(x[c]) - f64::from(r[c])).powi(2)).sum::<f64>() / 3.0
 }
@@ -155,7 +158,7 @@ pub fn compare(a: &LayerSet, b: &LayerSet) -> Result<Comparison> {
     compare_with_floor(a, b, Floor::Papers)
 }
 
-/// [`compare`] with a chosen floor.
+/// Compares the pictures of two files as [`compare`] does, with a chosen floor of relative errors.
 ///
 /// # Errors
 /// As [`compare`].
@@ -169,8 +172,8 @@ pub fn compare_with_floor(a: &LayerSet, b: &LayerSet, floor: Floor) -> Result<Co
     compare_pictures(&a.beauty()?, &b.beauty()?, floor)
 }
 
-/// Bytes per pixel while two pictures are compared, besides the layers of the files: two pictures, two exposed copies of
-/// them, and the buffers of FLIP.
+/// Bytes of memory per pixel while two pictures are compared, besides the layers of the files: two pictures, two
+/// exposed copies of them, and the buffers of FLIP.
 const COMPARED_PIXEL_BYTES: u64 = 200;
 
 fn check_sizes(a: Size, b: Size) -> Result<()> {

@@ -21,7 +21,7 @@ impl ToneMap {
     }
 }
 
-/// sRGB's transfer function, clipped to 0 to 1 (IEC 61966-2-1).
+/// sRGB's transfer function from linear to encoded values, clipped to 0 to 1 (IEC 61966-2-1).
 pub fn srgb_encode(linear: f32) -> f32 {
     let v = linear.clamp(0.0, 1.0);
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
@@ -33,10 +33,11 @@ pub fn srgb_decode(encoded: f32) -> f32 {
     if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Exposure before Narkowicz's curve, as he advises: its 1 is brighter than the white of a scene.
+/// Factor on colours before Narkowicz's curve, as he advises: its 1 is brighter than the white of a scene.
 const PRE_EXPOSURE: f32 = 0.6;
 
-/// Rational fit to ACES' reference rendering and output transforms (Narkowicz 2015, "ACES Filmic Tone Mapping Curve").
+/// Display value, linear, 0 to 1, of a linear channel by a rational fit to ACES' reference rendering and output
+/// transforms (Narkowicz 2015, "ACES Filmic Tone Mapping Curve").
 pub(super) fn aces(x: f32) -> f32 {
     // Larger squares would overflow; the curve exceeds 1 there.
     let x = x.min(1e6);
@@ -50,7 +51,7 @@ pub(super) fn aces(x: f32) -> f32 {
 /// whose "mix percent" is 40); matrices rounded as Filament has them. Colours outside
 /// Rec. 709 are clipped, not compressed as Blender does.
 fn agx(colour: Rgb) -> Rgb {
-    /// Rows of Rec. 709 to Rec. 2020 (ITU-R BT.2087).
+    /// Matrix, by rows, from Rec. 709 to Rec. 2020 (ITU-R BT.2087).
     const TO_2020: [[f32; 3]; 3] = [[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0113], [0.0164, 0.0880, 0.8956]];
     const INSET: [[f32; 3]; 3] = [
         [0.856_627_15, 0.095_121_24, 0.048_251_61],
@@ -62,7 +63,7 @@ fn agx(colour: Rgb) -> Rgb {
         [-0.141_329_76, 1.157_823_7, -0.016_493_94],
         [-0.141_329_76, -0.110_606_64, 1.251_936_4],
     ];
-    /// Stops below and above middle grey: log2(0.18) - 10 and log2(0.18) + 6.5.
+    /// Least log2 of linear radiance that the curve maps, log2(0.18) - 10; the greatest is log2(0.18) + 6.5.
     const MIN_EV: f32 = -12.473_93;
     const MAX_EV: f32 = 4.026_069;
 

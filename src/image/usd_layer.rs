@@ -10,8 +10,8 @@ use std::path::Path;
 /// Name of the beauty, which has no name in the EXR.
 const BEAUTY: &str = "beauty";
 
-/// Writes the USD layer to `path`. The path of the EXR `product` is relative if it lies in the folder of the layer or
-/// below.
+/// Writes the USD file that describes the layers of an EXR, `product`, to `path`. The path of the EXR is relative if it
+/// lies in the folder of the USD file or below.
 ///
 /// # Errors
 /// Errors of the file system, with the path.
@@ -19,7 +19,7 @@ pub fn write(path: &Path, product: &Path, set: &LayerSet) -> Result<()> {
     atomic::write_bytes(path, text(&relative(path, product), set).as_bytes())
 }
 
-/// The product's path, relative to the layer if it lies in its folder or below.
+/// The path of the EXR `product` as the USD file `layer` names it: relative if it lies in its folder or below.
 fn relative(layer: &Path, product: &Path) -> String {
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let (layer, product) = (whole(layer), whole(product));
@@ -76,7 +76,7 @@ def Scope "Render"
     )
 }
 
-/// The RenderVar of an EXR layer.
+/// The text of the USD prim RenderVar that describes a layer of the EXR.
 fn var(name: &str, layer: &Layer) -> String {
     let components: String = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
     let kind = match components.as_str() {
@@ -93,7 +93,7 @@ fn var(name: &str, layer: &Layer) -> String {
     )
 }
 
-/// A unique USD identifier for an EXR layer.
+/// A unique USD identifier for a layer of the EXR; added to `taken`.
 fn prim_name(layer: &Layer, taken: &mut HashSet<String>) -> String {
     let name = if layer.name.is_empty() { BEAUTY } else { &layer.name };
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
@@ -107,7 +107,7 @@ fn prim_name(layer: &Layer, taken: &mut HashSet<String>) -> String {
     name
 }
 
-/// A USD string literal.
+/// The text as a USD string literal.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {

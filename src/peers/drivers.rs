@@ -10,12 +10,12 @@ use crate::temporary;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// `__main__.py` of the drivers' folder. Running the folder puts it on the search path, which an isolated Python leaves
-/// out; the first argument is the driver's module.
+/// Text of `__main__.py` in the folder of the drivers, the Python scripts that run other renderers. Running the folder
+/// puts it on the search path, which an isolated Python leaves out; the first argument is the driver's module.
 const MAIN: &str = "import runpy, sys
 runpy.run_module(sys.argv.pop(1), run_name='__main__')
 ";
-/// Names and contents of the files in `scripts/compare/peers`, and `__main__.py`.
+/// Names and contents of the drivers' files: the Python scripts in `scripts/compare/peers`, and `__main__.py`.
 const SOURCES: [(&str, &str); 12] = [
     ("__main__.py", MAIN),
     ("cycles_driver.py", include_str!("../../scripts/compare/peers/cycles_driver.py")),
@@ -31,33 +31,34 @@ const SOURCES: [(&str, &str); 12] = [
     ("variant.py", include_str!("../../scripts/compare/peers/variant.py")),
 ];
 
-/// Seconds, besides [`MAX_BUDGETS`], after which a driver is killed: startup and conversion of a large scene take half a
-/// minute.
+/// Seconds, besides [`MAX_BUDGETS`], after which a driver, the script that runs another renderer, is killed: startup
+/// and conversion of a large scene take half a minute.
 const MAX_OVERHEAD_SECONDS: f64 = 300.0;
-/// Time budgets, besides [`MAX_OVERHEAD_SECONDS`], after which a driver is killed: photon maps can exceed the budget.
+/// Number of time budgets of a render, besides [`MAX_OVERHEAD_SECONDS`], after which its driver is killed: photon maps
+/// can exceed the budget.
 const MAX_BUDGETS: f64 = 5.0;
 
-/// A render to be made by a driver.
+/// A render to be made by a driver, the script that runs another renderer.
 #[derive(Clone, Copy, Debug)]
 pub struct Task {
     /// Time budget for rendering in seconds.
     pub budget: f64,
-    /// Seed.
+    /// Seed of the render.
     pub seed: u64,
 }
 
-/// A render made by a driver.
+/// The result of a render by another renderer.
 #[derive(Clone, Debug)]
 pub struct Rendering {
-    /// The picture.
+    /// The rendered picture.
     pub picture: Picture,
-    /// Wall-clock seconds of rendering.
+    /// Wall-clock seconds of rendering, without startup.
     pub seconds: f64,
-    /// Core-seconds of rendering.
+    /// Core-seconds of rendering, without startup.
     pub core_seconds: f64,
     /// Wall-clock seconds of startup, and of reading and converting the scene.
     pub startup_seconds: f64,
-    /// Samples per pixel; below 1 if some pixels have none.
+    /// Samples per pixel of the picture; below 1 if some pixels have none.
     pub passes: f64,
     /// Version of the renderer.
     pub version: String,
@@ -65,10 +66,10 @@ pub struct Rendering {
     pub approximations: Vec<String>,
 }
 
-/// Reply of a driver.
+/// Reply of a driver, the script that runs another renderer.
 #[derive(Clone, Debug)]
 pub enum Reply {
-    /// A render.
+    /// The renderer has made a picture.
     Rendered(Box<Rendering>),
     /// The renderer cannot render the scene; holds the reasons, in words.
     Unsupported(Vec<String>),
@@ -76,7 +77,7 @@ pub enum Reply {
     Stopped,
 }
 
-/// The JSON line that a driver prints.
+/// The JSON line that a driver prints as its reply.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum ReplyLine {
@@ -93,7 +94,7 @@ enum ReplyLine {
     },
 }
 
-/// Drivers of some renderers for a scene, in a temporary folder.
+/// Driver scripts of some renderers for a scene, in a temporary folder.
 pub struct Drivers {
     scene: PathBuf,
     camera: Option<String>,
@@ -128,7 +129,7 @@ impl Drivers {
         Ok(Drivers { scene: scene.into(), camera: camera.map(Into::into), size, threads, interpreters, folder })
     }
 
-    /// Renders the scene with a peer.
+    /// Renders the scene with a peer, a renderer in one of its modes.
     ///
     /// # Errors
     /// The driver fails, exceeds its time limit, or prints no reply.

@@ -10,7 +10,7 @@ mod python;
 pub use drivers::{Drivers, Rendering, Reply, Task};
 pub use process::Stop;
 
-/// A renderer.
+/// Another renderer, to which caustique is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Renderer {
@@ -22,19 +22,19 @@ pub enum Renderer {
     Cycles,
 }
 
-/// A renderer in one of its modes.
+/// Another renderer in one of its modes, to which caustique is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peer {
     /// The renderer.
     pub renderer: Renderer,
-    /// Name of the mode for the driver.
+    /// Name of the renderer's mode, as its driver script expects it.
     pub mode: &'static str,
-    /// Name in reports.
+    /// Name of renderer and mode in reports.
     pub name: &'static str,
 }
 
 impl Renderer {
-    /// The modes that are compared.
+    /// The modes of this renderer that are compared.
     pub fn peers(self) -> Vec<Peer> {
         let names: &[(&str, &str)] = match self {
             Renderer::Mitsuba => &[("path", "Mitsuba")],
@@ -46,7 +46,7 @@ impl Renderer {
         names.iter().map(|&(mode, name)| Peer { renderer: self, mode, name }).collect()
     }
 
-    /// File name of the driver.
+    /// File name of the renderer's driver, the Python script that runs it.
     fn driver(self) -> &'static str {
         match self {
             Renderer::Mitsuba => "mitsuba_driver.py",

@@ -8,17 +8,17 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus};
 use std::time::Duration;
 
-/// Returns true when the program must stop.
+/// A callback that returns true when the program must stop; called repeatedly while the program runs.
 pub type Stop<'a> = &'a dyn Fn() -> bool;
 
-/// Time between two polls of the program.
+/// Time between two polls of the program's state.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// How a program ended.
+/// How a child program has ended.
 pub(super) enum End {
-    /// It has exited; holds the status, standard output and standard error.
+    /// It has exited by itself; holds the status, standard output and standard error.
     Exit(ExitStatus, [String; 2]),
-    /// It was killed after its time limit.
+    /// It was killed after it exceeded its time limit.
     TooLong,
     /// It was killed because [`Stop`] returned true.
     Stopped,
@@ -79,7 +79,7 @@ mod tests {
         command
     }
 
-    /// Whether a process exists and is not a zombie.
+    /// Whether the process with the number `id` exists and is not a zombie.
     fn is_alive(id: &str) -> bool {
         let state = std::fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
         state.rsplit_once(')').is_some_and(|(_, rest)| !rest.trim_start().starts_with('Z'))

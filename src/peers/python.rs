@@ -6,10 +6,10 @@ use crate::installed;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Remedy for a missing interpreter.
+/// Remedy for a missing Python interpreter of another renderer.
 const HINT: &str = "run 'scripts/compare/setup.sh peers'";
 
-/// Environment variable with an additional module folder for the drivers.
+/// Environment variable with an additional folder of Python modules for the renderers' driver scripts.
 const PACKAGES: &str = "CAUSTIQUE_PEERS_PACKAGES";
 
 /// Python code that fails unless all modules in its arguments are found. Importing them would take seconds.
@@ -18,17 +18,17 @@ const PROBE: &str = "import importlib.util, os, sys\n\
                      missing = [name for name in sys.argv[1:] if importlib.util.find_spec(name) is None]\n\
                      sys.exit('no module ' + ', '.join(missing) if missing else 0)";
 
-/// A Python interpreter with a renderer.
+/// A Python interpreter that has the modules of another renderer.
 #[derive(Clone, Debug)]
 pub(super) struct Interpreter {
     path: PathBuf,
-    /// Additional module folder.
+    /// Additional folder of Python modules.
     packages: Option<PathBuf>,
 }
 
 impl Interpreter {
-    /// Finds the interpreter of a renderer: the one that its environment variable names, if set, else the one in the
-    /// virtual environment that `scripts/compare/setup.sh peers` makes (see [`installed`]).
+    /// Finds the Python interpreter of a renderer: the one that its environment variable names, if set, else the one in
+    /// the virtual environment that `scripts/compare/setup.sh peers` makes (see [`installed`]).
     ///
     /// # Errors
     /// [`ErrorKind::Library`]: there is no interpreter, it does not run, or it lacks the renderer.

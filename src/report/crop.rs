@@ -6,12 +6,12 @@ use crate::image::tonemap::ToneMap;
 use crate::image::{heat, png, relative_squared_error};
 use std::ops::Range;
 
-/// A rectangle of pixels.
+/// A rectangle of pixels that the report crops out of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Window {
-    /// Leftmost column.
+    /// Index of the leftmost column, from 0.
     pub x: usize,
-    /// Top row.
+    /// Index of the top row, from 0.
     pub y: usize,
     /// Number of columns.
     pub width: usize,
@@ -44,7 +44,7 @@ impl Window {
         Size { width: self.width, height: self.height }
     }
 
-    /// Indices of its pixels in a picture of this width.
+    /// Indices of the window's pixels in a picture that is `width` pixels wide.
     fn indices(self, width: usize) -> impl Iterator<Item = usize> {
         (self.y..self.y + self.height).flat_map(move |y| (self.x..self.x + self.width).map(move |x| y * width + x))
     }
@@ -53,20 +53,20 @@ impl Window {
 /// Exposure and tone curve of the pictures in the report.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// Exposure in stops.
+    /// Exposure of the pictures in stops.
     pub exposure: f32,
-    /// Tone curve.
+    /// Tone curve of the pictures.
     pub tonemap: ToneMap,
 }
 
-/// The relative error of a pixel, clamped to 1: the root of its term of relMSE.
+/// The relative error of a pixel `x` against its reference `r`, clamped to 1: the root of its term of relMSE.
 fn relative_error(x: [f32; 3], r: [f32; 3]) -> f64 {
     let error = relative_squared_error(x, r).sqrt();
     if error.is_nan() { 1.0 } else { error.min(1.0) }
 }
 
-/// Up to `count` disjoint windows with the largest difference between the mean errors of the worst and the best picture,
-/// or with the largest mean error if there is only one picture.
+/// Chooses up to `count` disjoint windows with the largest difference between the mean errors of the worst and the best
+/// picture, or with the largest mean error if there is only one picture.
 pub fn choose(pictures: &[Picture], reference: &Picture, count: usize) -> Vec<Window> {
     let Size { width, height } = reference.size();
     let least = width.min(height);
@@ -123,7 +123,7 @@ pub fn scale(pictures: &[Picture], reference: &Picture, windows: &[Window]) -> f
     errors.get(errors.len() * 95 / 100).copied().unwrap_or(1.0).max(1e-6)
 }
 
-/// A window of a picture as a PNG.
+/// A window of a picture, exposed and tone-mapped, as the bytes of a PNG.
 ///
 /// # Errors
 /// The window is empty.
@@ -132,7 +132,8 @@ pub fn picture(picture: &Picture, window: Window, look: Look) -> Result<Vec<u8>>
     png::encode(window.size(), pixels.map(|i| look.tonemap.display(picture[i].into(), look.exposure)))
 }
 
-/// Heat map, as a PNG, of the relative error in a window; the error `largest` has the palest colour.
+/// Heat map of a picture's relative error in a window, as the bytes of a PNG; the error `largest` has the palest
+/// colour.
 ///
 /// # Errors
 /// The window is empty.
@@ -141,7 +142,7 @@ pub fn heat_map(picture: &Picture, reference: &Picture, window: Window, largest:
     png::encode(window.size(), window.indices(reference.size().width).map(|i| heat::magma(error(i) as f32)))
 }
 
-/// The colours of heat maps from left to right, as a PNG.
+/// The colour scale of the heat maps, from no error on the left, as the bytes of a PNG.
 ///
 /// # Errors
 /// None beyond lack of memory.

@@ -10,14 +10,14 @@ use std::fmt;
 /// A mean over seeds and its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
-    /// The mean.
+    /// Mean over the seeds.
     pub value: f64,
-    /// Its standard error; `None` for a single value.
+    /// Standard error of the mean; `None` with a single value.
     pub error: Option<f64>,
 }
 
 impl Mean {
-    /// The mean of `values`; `None` if there are none.
+    /// The mean of `values` and its standard error; `None` if there are no values.
     pub fn of(values: &[f64]) -> Option<Mean> {
         let n = values.len() as f64;
         let value = values.iter().sum::<f64>() / n;
@@ -27,18 +27,18 @@ impl Mean {
     }
 }
 
-/// A point of an error curve.
+/// A point of an error curve: time, and the error of the picture at this time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurvePoint {
-    /// Iterations done.
+    /// Iterations done; samples per pixel for other renderers.
     pub iterations: u64,
-    /// Wall-clock seconds.
+    /// Wall-clock seconds of the run so far.
     pub seconds: f64,
-    /// Core-seconds.
+    /// Core-seconds of the run so far.
     pub cpu_seconds: f64,
-    /// The error after subtraction of the reference's own error.
+    /// The picture's error, in the curve's metric, after subtraction of the reference's own error.
     pub figure: f64,
-    /// Standard error of `figure` over seeds.
+    /// Standard error of `figure` over seeds; `None` with a single seed.
     pub spread: Option<f64>,
     /// Whether the figure exceeds the reference's own error; smaller figures are not reported.
     pub reported: bool,
@@ -47,19 +47,19 @@ pub struct CurvePoint {
 }
 
 /// Whether a few bright samples dominate a picture's error: the worst 0.5 % of the pixels hold more than half of its
-/// relMSE. Of uniform Gaussian noise they hold 2 to 5 %.
+/// relMSE. With uniform Gaussian noise they hold 2 to 5 %.
 pub fn fireflies(errors: &Errors) -> bool {
     (1.0 - TRIMMED_SHARE) * errors.relmse_trimmed < 0.5 * errors.relmse
 }
 
-/// A run's error against iterations and seconds.
+/// The error of the pictures of one run against iterations and seconds.
 #[derive(Clone, Debug, Default)]
 pub struct Curve {
-    /// Mean over seeds, in order of iterations.
+    /// Points of the mean over seeds, in order of iterations.
     pub mean: Vec<CurvePoint>,
-    /// The curve of every seed.
+    /// Points of the curve of every seed, in order of iterations.
     pub by_seed: Vec<Vec<CurvePoint>>,
-    /// The reference's own error.
+    /// The reference's own error, in the curve's metric.
     pub own: f64,
 }
 
@@ -68,7 +68,8 @@ pub(super) fn interpolate(a: f64, b: f64, t: f64) -> f64 {
     if a > 0.0 && b > 0.0 { a * (b / a).powf(t) } else { a + t * (b - a) }
 }
 
-/// Seconds, core-seconds and figure after `iterations`, interpolated as a power of iterations; `None` outside the curve.
+/// Seconds, core-seconds and figure of a curve after `iterations`, interpolated as a power of iterations; `None`
+/// outside the curve.
 fn values_at(curve: &[CurvePoint], iterations: u64) -> Option<[f64; 3]> {
     let values = |curve_point: &CurvePoint| [curve_point.seconds, curve_point.cpu_seconds, curve_point.figure];
     let next = curve.iter().position(|curve_point| curve_point.iterations >= iterations)?;
@@ -82,29 +83,29 @@ fn values_at(curve: &[CurvePoint], iterations: u64) -> Option<[f64; 3]> {
     Some(std::array::from_fn(|i| interpolate(before[i], after[i], t)))
 }
 
-/// A fitted exponent of the error.
+/// The exponent of a power law fitted to an error curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
-    /// Exponent with its standard error: over seeds, or from the scatter about the line with a single seed.
+    /// Exponent with its standard error: over seeds, or with a single seed from the scatter about the line.
     pub exponent: Mean,
     /// The power law fitted to the mean curve.
     pub line: PowerLaw,
-    /// First and last value on the axis.
+    /// First and last fitted value on the horizontal axis.
     pub range: (f64, f64),
-    /// Number of points fitted.
+    /// Number of points that the power law is fitted to.
     pub points: usize,
 }
 
-/// The reason why no exponent is reported.
+/// The reason why no exponent is reported for a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FitFailure {
-    /// Fewer than [`MIN_POINTS`] measurements in the last decade exceed the reference's own error.
+    /// Fewer than [`MIN_POINTS`] measurements in the last decade exceed the reference's own error; holds their number.
     Few(usize),
-    /// The measurements span less than [`MIN_SPAN`].
+    /// The measurements span a ratio of less than [`MIN_SPAN`] on the axis.
     Narrow,
-    /// Fireflies dominate this number of the measurements.
+    /// Fireflies dominate the error of some measurements; holds their number.
     Fireflies(usize),
-    /// The exponent's standard error, which is given, exceeds [`MAX_EXPONENT_ERROR`].
+    /// The exponent's standard error exceeds [`MAX_EXPONENT_ERROR`]; holds the standard error.
     Scattered(f64),
     /// The pictures are denoised, and their error follows no power law.
     Denoised,
@@ -122,26 +123,26 @@ impl fmt::Display for FitFailure {
     }
 }
 
-/// Minimum number of points of a fit.
+/// Minimum number of points to fit an exponent to.
 const MIN_POINTS: usize = 4;
-/// Minimum ratio of the last to the first value on the axis.
+/// Minimum ratio of the last to the first fitted value on the axis.
 const MIN_SPAN: f64 = 4.0;
 /// Maximum standard error of a reported exponent: half the difference between the exponents of theory, 2/3 and 1.
 const MAX_EXPONENT_ERROR: f64 = 1.0 / 6.0;
 
-/// The horizontal axis of a curve.
+/// The quantity on the horizontal axis of an error curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// Iterations.
+    /// Iterations of the render.
     Iterations,
-    /// Wall-clock seconds.
+    /// Wall-clock seconds of the render.
     Seconds,
-    /// Core-seconds.
+    /// Core-seconds of the render.
     CoreSeconds,
 }
 
 impl Axis {
-    /// The value of a point on this axis.
+    /// The value of a curve's point on this axis.
     pub fn of(self, curve_point: &CurvePoint) -> f64 {
         match self {
             Axis::Iterations => curve_point.iterations as f64,
@@ -152,7 +153,7 @@ impl Axis {
 }
 
 impl Curve {
-    /// The curve of the line with index `line`.
+    /// The error curve in a metric of the line with index `line`, from the measurements `points` of all lines.
     pub fn of(line: usize, points: &[Point], metric: Metric, reference: &Reference) -> Curve {
         let own = reference.error.of(metric).unwrap_or(0.0);
         let mut by_seed: Vec<(u64, Vec<CurvePoint>)> = Vec::new();
@@ -171,8 +172,9 @@ impl Curve {
         Curve::from_seeds(by_seed.into_iter().map(|(_, curve_points)| curve_points).collect(), own)
     }
 
-    /// The curve of several seeds; its mean ends where the shortest of them ends. Curves that a clock has stopped end at
-    /// different iterations: a curve is interpolated where only others have a point.
+    /// The curve of several seeds, one list of points each; its mean ends where the shortest of them ends. Curves that
+    /// a clock has stopped end at different iterations: a curve is interpolated where only others have a point. `own`
+    /// is the reference's own error.
     pub fn from_seeds(by_seed: Vec<Vec<CurvePoint>>, own: f64) -> Curve {
         let mut moments: Vec<u64> = by_seed.iter().flatten().map(|curve_point| curve_point.iterations).collect();
         moments.sort_unstable();
@@ -195,7 +197,7 @@ impl Curve {
         Curve { mean: moments.iter().filter_map(mean).collect(), by_seed, own }
     }
 
-    /// For each seed the curve without it, for the jackknife; empty with a single seed.
+    /// For each seed the curve of the other seeds, for the jackknife; empty with a single seed.
     pub fn without_each_seed(&self) -> Vec<Curve> {
         let without = |left: usize| {
             let rest = self.by_seed.iter().enumerate().filter(|(seed, _)| *seed != left);
@@ -204,7 +206,7 @@ impl Curve {
         if self.by_seed.len() > 1 { (0..self.by_seed.len()).map(without).collect() } else { Vec::new() }
     }
 
-    /// The last point of the mean curve.
+    /// The last point of the mean curve; `None` for an empty curve.
     pub fn last(&self) -> Option<&CurvePoint> {
         self.mean.last()
     }

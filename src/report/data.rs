@@ -10,7 +10,7 @@ use crate::error::{Error, ErrorKind, Result};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// A measurement: a row of the CSV and an object of the JSON.
+/// A measurement of one picture: a row of the CSV and an object of the JSON.
 #[derive(Serialize)]
 struct Row<'a> {
     run: &'a str,
@@ -54,7 +54,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// The method of a curve, or the mode of another renderer.
+/// The method of the entry behind a curve, or the mode of another renderer.
 fn method(subject: &Subject, source: PictureSource) -> &'static str {
     match source {
         PictureSource::Estimate(entry) | PictureSource::Finished(entry) => {
@@ -64,7 +64,7 @@ fn method(subject: &Subject, source: PictureSource) -> &'static str {
     }
 }
 
-/// `points.csv`: a header line, then a row for each measurement.
+/// The bytes of `points.csv`: a header line, then a row for each measurement.
 ///
 /// # Errors
 /// None beyond lack of memory.
@@ -114,7 +114,7 @@ pub fn json(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Value {
     })
 }
 
-/// A curve, with the settings of its entry or the facts about its peer.
+/// The JSON object of the curve with index `line`, with the settings of its entry or the facts about its peer.
 fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> Value {
     let source = subject.lines[line].source;
     let mut object = match source {
@@ -141,7 +141,7 @@ fn run(subject: &Subject, outcome: &Outcome, summary: &Summary, line: usize) -> 
     object
 }
 
-/// Facts about another renderer.
+/// The JSON object of facts about another renderer, by its index.
 fn peer_object(subject: &Subject, outcome: &Outcome, summary: &Summary, peer: usize) -> Value {
     let facts = &outcome.peers[peer];
     let startup = Mean::of(&facts.startups).map(|mean| mean.value);

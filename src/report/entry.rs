@@ -6,14 +6,14 @@ use crate::render::{Settings, TimeSpent};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// A method with its settings, and a name.
+/// A run that the report compares: a method of caustique with its settings, and a name.
 #[derive(Clone, Debug)]
 pub struct Entry {
     /// Name in the report.
     pub name: String,
     /// Options of `caustique render` that give the same run.
     pub options: String,
-    /// Settings; the seed comes from [`Rules::seeds`](super::equal_time::Rules::seeds).
+    /// Settings of the render; the seed comes from [`Rules::seeds`](super::equal_time::Rules::seeds).
     pub settings: Settings,
     /// Time that `auto` took to choose the settings; it counts as render time.
     pub decided: TimeSpent,
@@ -22,7 +22,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// The settings that its method uses, as JSON.
+    /// The settings that the entry's method uses, as a JSON object.
     pub fn object(&self) -> Value {
         let Settings { method, levels, photons, alpha, initial_bandwidth, max_depth, .. } = self.settings;
         let mut object = json!({
@@ -43,7 +43,7 @@ impl Entry {
     }
 }
 
-/// A curve of the report.
+/// A curve of the report: one run with its pictures either raw or denoised.
 #[derive(Clone, Debug)]
 pub struct Line {
     /// Name in the report.
@@ -52,7 +52,7 @@ pub struct Line {
     pub source: PictureSource,
 }
 
-/// Source of the pictures of a curve: an entry or a peer by its index.
+/// Source of the pictures of a curve: an entry of caustique or a peer, another renderer, by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureSource {
     /// The estimate of an entry, not finished.
@@ -66,7 +66,8 @@ pub enum PictureSource {
 }
 
 impl PictureSource {
-    /// Whether caustique renders it. Such curves count iterations, those of peers count samples per pixel.
+    /// Whether caustique renders the pictures. Their curves count iterations, the curves of other renderers samples per
+    /// pixel.
     pub fn is_ours(self) -> bool {
         matches!(self, PictureSource::Estimate(_) | PictureSource::Finished(_))
     }
@@ -77,7 +78,8 @@ impl PictureSource {
     }
 }
 
-/// The curves of entries and peers: each without a denoiser, then with one, where that is compared.
+/// The curves of entries and of peers, the other renderers: each without a denoiser, then with one, where that is
+/// compared.
 pub fn lines(entries: &[Entry], peers: &[Peer], denoised: bool) -> Vec<Line> {
     let with_second = |name: &str, source: PictureSource, second: Option<(&str, PictureSource)>| {
         let second = second.map(|(suffix, source)| Line { name: format!("{name}{suffix}"), source });
@@ -131,7 +133,7 @@ impl Metric {
     }
 }
 
-/// Iteration counts at which pictures are measured: 1, 2, 3, ... in a geometric series.
+/// Iteration counts at which pictures are measured: 1, 2, 3, ... in a geometric series, rounded.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {
     ratio: f64,
@@ -139,12 +141,12 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// A series with a ratio above 1.
+    /// A series of iteration counts with a ratio above 1.
     pub fn new(ratio: f64) -> Moments {
         Moments { ratio, next: 1 }
     }
 
-    /// Whether `iterations` is in the series; called after every iteration.
+    /// Whether the iteration count is in the series; must be called after every iteration.
     pub fn reached(&mut self, iterations: u64) -> bool {
         if iterations < self.next {
             return false;

@@ -19,23 +19,23 @@ use std::path::Path;
 pub use super::entry_run::Rules;
 pub use super::outcome::{Outcome, Participants};
 
-/// Progress after an iteration of an entry or a render of a peer.
+/// Progress of a comparison after one iteration of an entry or one render of a peer, another renderer.
 pub struct Step<'a> {
-    /// Name of the entry or peer.
+    /// Name of the entry or peer that has just rendered.
     pub name: &'a str,
-    /// Whether it is an entry of caustique.
+    /// Whether it is an entry, which caustique renders, and not a peer.
     pub is_ours: bool,
     /// Iterations done; for peers samples per pixel, 0 if the render gave no picture.
     pub iterations: u64,
-    /// Seconds that the run has taken.
+    /// Wall-clock seconds that the run has taken.
     pub seconds: f64,
     /// Completed share of all runs with all seeds, 0 to 1.
     pub fraction: f64,
-    /// The measurement, if one was made.
+    /// The measurement of the picture's error, if one was made.
     pub point: Option<&'a Point>,
 }
 
-/// The runs of one seed, and the renders of peers that are still to come.
+/// The runs with one seed, and the renders of peers, other renderers, that are still to come.
 struct Queue<'a> {
     runs: Vec<EntryRun<'a>>,
     turns: VecDeque<PeerTurn>,
@@ -44,21 +44,21 @@ struct Queue<'a> {
 }
 
 impl Queue<'_> {
-    /// The next render of a peer, once every open run has rendered for the peer's time: all then meet the same load on the
-    /// machine.
+    /// The next render of a peer, once every open run has rendered for the peer's time: all then meet the same load on
+    /// the machine. `None` if none is due.
     fn due(&mut self) -> Option<PeerTurn> {
         let budget = self.turns.front()?.budget;
         let is_far = |run: &EntryRun<'_>| !run.open || run.session.spent().seconds >= budget;
         if self.runs.iter().all(is_far) { self.turns.pop_front() } else { None }
     }
 
-    /// The open run that has used the least time; the first of equals.
+    /// Index of the open run that has used the least time, the first of equals; `None` if no run is open.
     fn next(&self, rules: &Rules) -> Option<usize> {
         let open = (0..self.runs.len()).filter(|&run| self.runs[run].open);
         open.min_by(|&a, &b| self.runs[a].used(rules).total_cmp(&self.runs[b].used(rules)))
     }
 
-    /// Completed share, 0 to 1.
+    /// Completed share of the runs and renders of peers with this seed, 0 to 1.
     fn fraction(&self, rules: &Rules) -> f64 {
         let runs = self.runs.iter().map(|run| run.fraction(rules)).sum::<f64>();
         let peers = self.peers as f64 * (1.0 - self.turns.len() as f64 / self.all_turns.max(1) as f64);
@@ -66,8 +66,8 @@ impl Queue<'_> {
     }
 }
 
-/// Renders and measures all participants, one seed after the other. Pictures of the first seed are stored in `folder`
-/// until the outcome is dropped. `observe` is called after every step and can stop the comparison.
+/// Renders and measures all participants in turns, one seed after the other. Pictures of the first seed are stored in
+/// `folder` until the outcome is dropped. `observe` is called after every step and can stop the comparison.
 ///
 /// # Errors
 /// The store of pictures cannot be created in `folder`.

@@ -11,10 +11,10 @@ use crate::image::tonemap::ToneMap;
 use crate::image::{Comparison, heat, png};
 use maud::{Markup, html};
 
-/// Percentile of the errors that gets the palest colour, so that fireflies do not make the rest black.
+/// Percentile of the pixels' errors that gets the palest colour, so that fireflies do not make the rest black.
 const PERCENTILE: f64 = 0.95;
 
-/// The page for `image` and its reference, which have the same size.
+/// The HTML page that shows the errors of `image` against its reference, which have the same size.
 ///
 /// # Errors
 /// One of the two sets has no picture.
@@ -62,7 +62,7 @@ pub fn html(image: &LayerSet, reference: &LayerSet, names: [&str; 2], comparison
     Ok(document(&format!("Errors of {}", names[0]), &lead, &body))
 }
 
-/// A picture with a title, and the bar of its colour scale with three labels.
+/// The HTML of a picture with a title, and of the bar of its colour scale with three labels.
 fn figure(title: &str, url: &str, scale: Option<(&str, &[String; 3])>) -> Markup {
     html! {
         figure {
@@ -78,7 +78,7 @@ fn figure(title: &str, url: &str, scale: Option<(&str, &[String; 3])>) -> Markup
     }
 }
 
-/// The error that gets the palest colour.
+/// The error that gets the palest colour of the heat map, from the errors of the pixels.
 fn scale(errors: impl Iterator<Item = f32>) -> f32 {
     let mut errors: Vec<f32> = errors.filter(|error| error.is_finite()).collect();
     errors.sort_unstable_by(f32::total_cmp);

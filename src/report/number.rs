@@ -2,7 +2,7 @@
 
 use super::curve::Mean;
 
-/// Three significant digits: `0.0123`, `12.3`, `4.56e-5`.
+/// A number with three significant digits: `0.0123`, `12.3`, `4.56e-5`.
 pub fn short(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
@@ -24,13 +24,13 @@ pub fn plain(x: f64) -> String {
     shown.split_once('e').map_or_else(|| trimmed(&shown), |(digits, power)| format!("{}e{power}", trimmed(digits)))
 }
 
-/// `-0.672 ± 0.014`; without an error the value alone.
+/// A mean and its standard error with `digits` decimals: `-0.672 ± 0.014`; the mean alone without a standard error.
 pub fn with_error(mean: &Mean, digits: usize) -> String {
     let value = minus(&format!("{:.digits$}", mean.value));
     mean.error.map_or(value.clone(), |error| format!("{value} ± {error:.digits$}"))
 }
 
-/// A value rounded to two digits of its standard error: `0.7283 ± 0.0056`; [`short`] without a standard error.
+/// A mean rounded to two digits of its standard error: `0.7283 ± 0.0056`; [`short`] without a standard error.
 pub fn short_with_error(mean: &Mean) -> String {
     match mean.error.filter(|error| *error > 0.0 && error.is_finite()) {
         Some(error) => with_error(mean, (1.0 - error.log10().floor()).clamp(0.0, 8.0) as usize),
@@ -38,12 +38,12 @@ pub fn short_with_error(mean: &Mean) -> String {
     }
 }
 
-/// `1 iteration`, `12 iterations`.
+/// A number of iterations in words: `1 iteration`, `12 iterations`.
 pub fn iterations(n: u64) -> String {
     if n == 1 { "1 iteration".into() } else { format!("{n} iterations") }
 }
 
-/// Replaces hyphens by minus signs.
+/// The text of a number with hyphens replaced by minus signs.
 pub fn minus(text: &str) -> String {
     text.replace('-', "−")
 }

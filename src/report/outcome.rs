@@ -12,25 +12,25 @@ use crate::finish::Finish;
 use crate::image::errors;
 use crate::render::{Rendered, StopReason, TimeSpent};
 
-/// The entries and other renderers that are compared.
+/// The renderers that are compared: entries, the methods of caustique with their settings, and other renderers.
 pub struct Participants<'a> {
-    /// Entries of caustique.
+    /// Entries of the comparison, which caustique renders.
     pub entries: &'a [Entry],
-    /// The finish of each entry, if its finished pictures are measured.
+    /// The finish of each entry; `None` if its finished pictures are not measured.
     pub finishes: &'a mut [Option<Finish>],
-    /// Other renderers.
+    /// Other renderers; `None` if only entries are compared.
     pub peers: Option<PeerRenders>,
 }
 
-/// Results of a comparison.
+/// Results of a comparison of entries and other renderers: the measured errors and times.
 pub struct Outcome {
-    /// The curves.
+    /// The curves, to which the measurements belong.
     pub lines: Vec<Line>,
-    /// Facts about each peer and its renders.
+    /// Facts about each other renderer and its renders.
     pub peers: Vec<PeerSummary>,
-    /// Measurements, by seed and then in order of time.
+    /// Measurements of pictures, by seed and then in order of time.
     pub points: Vec<Point>,
-    /// Times of every run with every seed.
+    /// Times of the run of every entry with every seed.
     pub endings: Vec<RunEnd>,
     /// Renders of all entries with the first seed, without their pixels.
     pub renders: Vec<Rendered>,
@@ -41,13 +41,13 @@ pub struct Outcome {
     pictures: PictureStore,
 }
 
-/// The comparison with one seed.
+/// The part of a comparison that renders with one seed.
 pub(super) struct Round<'a> {
-    /// The seed.
+    /// Seed of the renders.
     pub(super) seed: u64,
-    /// Whether the pictures are stored.
+    /// Whether the pictures of the measurements are stored.
     pub(super) keep_pictures: bool,
-    /// The reference.
+    /// The reference picture that errors are measured against.
     pub(super) reference: &'a Reference,
 }
 
@@ -75,12 +75,13 @@ impl Outcome {
         point.picture.map(|number| self.pictures.get(number)).transpose()
     }
 
-    /// Iterations and seconds of the last measurement if it is new, else zero.
+    /// Iterations and seconds of the last measurement if it is new, else zeros.
     pub(super) fn last_point(&self, is_new: bool) -> (u64, f64) {
         self.points.last().filter(|_| is_new).map_or((0, 0.0), |point| (point.iterations, point.seconds))
     }
 
-    /// Renders one iteration of an entry, and measures it if its moment has come; returns whether it was measured.
+    /// Renders one iteration of the entry with index `entry`, and measures its picture if the moment has come; returns
+    /// whether it was measured.
     pub(super) fn step(
         &mut self,
         entry: usize,
@@ -98,7 +99,8 @@ impl Outcome {
         measured
     }
 
-    /// Renders and measures a peer; returns whether it was measured, or `None` if the user has stopped it.
+    /// Renders and measures a picture of another renderer; returns whether it was measured, or `None` if the user has
+    /// stopped it.
     pub(super) fn render_peer(
         &mut self,
         turn: PeerTurn,
@@ -148,12 +150,12 @@ impl Outcome {
         }
     }
 
-    /// Index of the curve with a source.
+    /// Index of the curve whose pictures come from `source`.
     fn line(&self, source: PictureSource) -> usize {
         self.lines.iter().position(|line| line.source == source).unwrap_or_default()
     }
 
-    /// Adds the time of one finish to every measurement of finished pictures.
+    /// Adds the time of one finish to every measurement of the entry's finished pictures with this seed.
     fn add_finish_time(&mut self, entry: usize, seed: u64, finish: TimeSpent) {
         let line = self.line(PictureSource::Finished(entry));
         for point in self.points.iter_mut().filter(|point| point.line == line && point.seed == seed) {
@@ -163,8 +165,8 @@ impl Outcome {
         }
     }
 
-    /// Measures the estimate and, if there is a finish, the finished picture; an error ends the run. Returns whether a
-    /// measurement was added.
+    /// Measures the error of an entry's estimate and, if there is a finish, of its finished picture; an error ends the
+    /// run. Returns whether a measurement was added.
     fn measure(
         &mut self,
         entry: usize,
@@ -188,7 +190,7 @@ impl Outcome {
         self.points.len() > before
     }
 
-    /// Adds the measurement of a picture, unless it has no finite pixel.
+    /// Adds the measurement of a picture's error, unless the picture has no finite pixel.
     fn measure_picture(
         &mut self,
         source: PictureSource,
@@ -214,7 +216,7 @@ impl Outcome {
         self.add_point(point, source, picture, round)
     }
 
-    /// Adds a measurement to its curve, and stores its picture if the round stores pictures.
+    /// Adds a measurement to the curve of its source, and stores its picture if the round stores pictures.
     fn add_point(&mut self, point: Point, source: PictureSource, picture: &Picture, round: &Round<'_>) -> Result<()> {
         let number = if round.keep_pictures { Some(self.pictures.push(picture)?) } else { None };
         self.points.push(Point { line: self.line(source), picture: number, ..point });

@@ -6,34 +6,34 @@ use super::point::RunEnd;
 use crate::render::Phases;
 use serde::Serialize;
 
-/// A row of the table: means over seeds.
+/// Cost of an iteration of one entry, a row of the report's table: means over seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Overhead {
-    /// Iterations done.
+    /// Iterations of a run.
     pub iterations: f64,
-    /// Wall-clock seconds of pilot and iterations.
+    /// Wall-clock seconds of the pilot, the preparation by test renders, and of the iterations.
     pub render_seconds: f64,
-    /// Wall-clock seconds of the finish with its layers; it runs once.
+    /// Wall-clock seconds of the finish with its layers, which runs once; `None` without a finish.
     pub finish_seconds: Option<f64>,
     /// Wall-clock seconds of render and finish, divided by iterations.
     pub seconds_per_iteration: f64,
     /// Core-seconds of render and finish, divided by iterations.
     pub cpu_seconds_per_iteration: f64,
-    /// Core-seconds of the pilot; it runs once.
+    /// Core-seconds of the pilot, the preparation by test renders; it runs once.
     pub pilot: f64,
-    /// Core-seconds per iteration for light paths.
+    /// Core-seconds per iteration for tracing light paths.
     pub light: f64,
-    /// Core-seconds per iteration for photon maps.
+    /// Core-seconds per iteration for building photon maps.
     pub map: f64,
-    /// Core-seconds per iteration for camera paths, and for light paths that are traced in turns with them.
+    /// Core-seconds per iteration for tracing camera paths, and light paths that are traced in turns with them.
     pub eye: f64,
-    /// Seconds per iteration relative to the first run.
+    /// Seconds per iteration relative to the first entry's; NaN if either is unknown.
     pub over_first: f64,
-    /// Seconds per iteration relative to the first run with the same method, if that is another run.
+    /// Seconds per iteration relative to the first entry with the same method; `None` if this is the first.
     pub over_plain: Option<f64>,
 }
 
-/// One row for each entry; `None` for a run without iterations.
+/// The cost of iterations, one row for each entry; `None` for a run without iterations.
 pub fn table(entries: &[Entry], endings: &[RunEnd]) -> Vec<Option<Overhead>> {
     let rows: Vec<Option<Overhead>> = (0..entries.len()).map(|run| row(run, endings)).collect();
     let cost = |run: usize| rows[run].as_ref().map(|row| row.seconds_per_iteration).filter(|cost| *cost > 0.0);

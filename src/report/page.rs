@@ -13,15 +13,15 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
 
-/// Plots side by side under a heading.
+/// Plots of error curves, side by side under a heading.
 pub struct Plots {
-    /// The heading.
+    /// Text of the heading.
     pub heading: &'static str,
     /// Metric and SVG document of each plot.
     pub plots: Vec<(Metric, String)>,
 }
 
-/// Builds the page.
+/// The HTML page of the report on a comparison.
 ///
 /// # Errors
 /// None beyond lack of memory.
@@ -47,7 +47,7 @@ pub fn html(subject: &Subject, outcome: &Outcome, summary: &Summary, plots: &[Pl
     Ok(document(&title, &lead(subject), &body))
 }
 
-/// An HTML document with the style of the report: title, a sentence below it, and body.
+/// An HTML document with the style of the report: its title, `lead`, a sentence below the title, and its body.
 pub(super) fn document(title: &str, lead: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -96,7 +96,7 @@ fn lead(subject: &Subject) -> String {
     format!("{runs}, {each}, {width} × {height} pixels{seeds}.")
 }
 
-/// Heading of the plot of a metric.
+/// Heading of a plot of errors in `metric`, in words.
 fn meaning(metric: Metric) -> &'static str {
     match metric {
         Metric::RelMse => "relMSE, all pixels",
@@ -105,7 +105,7 @@ fn meaning(metric: Metric) -> &'static str {
     }
 }
 
-/// Legend of the marks in the plots.
+/// HTML legend of the marks in the plots.
 fn marks(subject: &Subject, summary: &Summary) -> Markup {
     let any = |found: &dyn Fn(PictureSource) -> bool| subject.lines.iter().any(|line| found(line.source));
     html! {

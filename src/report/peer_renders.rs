@@ -12,38 +12,39 @@ use crate::peers::{Drivers, Peer, Rendering, Reply, Task};
 use crate::render::{Method, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::Scene;
 
-/// The smallest time budget, as a share of the time of the runs; the others are its doubles.
+/// The smallest time budget of a peer's renders, as a share of the time of the runs; the other budgets are its doubles.
 const MIN_BUDGET: f64 = 1.0 / 16.0;
-/// Iterations of path tracing for the denoiser's guides.
+/// Iterations of path tracing for albedo and normal, the denoiser's guides.
 const GUIDE_ITERATIONS: u64 = 32;
 
-/// Facts about a peer and its renders.
+/// Facts about a peer, another renderer, and its renders.
 #[derive(Clone, Debug, Default)]
 pub struct PeerSummary {
     /// Version of the renderer.
     pub version: String,
-    /// Seconds of startup, one for each render.
+    /// Wall-clock seconds of startup, one value for each render.
     pub startups: Vec<f64>,
     /// Features of the scene that the renderer approximates, in words.
     pub approximations: Vec<String>,
     /// Number of renders that ended before every pixel had a sample.
     pub unfinished: usize,
-    /// Why the peer is left out, or was left out after an error.
+    /// Why the peer is left out from the start or since an error; `None` if it renders.
     pub left_out: Option<String>,
 }
 
-/// Denoiser of the peers' pictures, with its guides.
+/// Denoiser for the pictures of other renderers, with its guides.
 pub struct PeerDenoiser {
-    /// Open Image Denoise.
+    /// The denoiser: Open Image Denoise.
     pub denoiser: Denoiser,
-    /// Albedo.
+    /// Albedo of the scene, the denoiser's first guide.
     pub albedo: Option<Picture>,
-    /// Normal.
+    /// Normals of the scene, the denoiser's second guide.
     pub normal: Option<Picture>,
 }
 
 impl PeerDenoiser {
-    /// Renders the guides by our own path tracing. They are the same for all peers, and their time does not count.
+    /// Renders the guides, albedo and normal, by our own path tracing. They are the same for all peers, and their time
+    /// does not count.
     ///
     /// # Errors
     /// None beyond lack of memory.
@@ -59,7 +60,7 @@ impl PeerDenoiser {
         Ok(PeerDenoiser { denoiser, albedo, normal })
     }
 
-    /// Denoises a picture; returns it with the time taken.
+    /// Denoises a picture of another renderer; returns it with the time taken.
     fn run(&mut self, picture: &Picture) -> Result<(Picture, TimeSpent)> {
         let estimate = Estimate {
             mean: picture.clone(),
@@ -74,29 +75,29 @@ impl PeerDenoiser {
     }
 }
 
-/// The drivers of the peers, or the reason why none runs.
+/// The programs that run other renderers, or the reason why none runs.
 pub enum Driver {
-    /// Drivers that can render.
+    /// Driver programs that can render.
     Ready(Drivers),
-    /// The reason why no peer can render the comparison.
+    /// The reason, in words, why no peer can render the comparison.
     Refused(String),
 }
 
-/// The peers of a comparison, and how they render.
+/// The peers, other renderers, of a comparison, and how they render.
 pub struct PeerRenders {
-    /// The peers.
+    /// The peers, each a renderer in one of its modes.
     pub peers: Vec<Peer>,
-    /// Their drivers.
+    /// The programs that run the peers.
     pub driver: Driver,
-    /// Denoiser of their pictures, if denoised pictures are compared as well.
+    /// Denoiser of the peers' pictures; `None` unless denoised pictures are compared as well.
     pub denoiser: Option<PeerDenoiser>,
-    /// Time budget of the longest renders in seconds.
+    /// Time budget of the peers' longest renders in seconds.
     pub time: f64,
     /// Returns true to stop; called while a peer renders.
     pub stop: Box<dyn Fn() -> bool>,
 }
 
-/// A render to be made by a peer.
+/// One render to be made by a peer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeerTurn {
     /// Index of the peer.
@@ -105,25 +106,27 @@ pub struct PeerTurn {
     pub budget: f64,
 }
 
-/// Result of a render by a peer.
+/// Result of one render by a peer.
 pub enum PeerResult {
-    /// Measurements of the picture and of the denoised picture; the caller sets their `line` and `picture`.
+    /// Measurements of the picture and of the denoised picture, each with its picture; the caller sets their `line` and
+    /// `picture`.
     Points(Vec<(Point, Picture)>),
-    /// No picture that can be measured.
+    /// The render gave no picture that can be measured.
     Nothing,
-    /// The user has stopped it.
+    /// The user has stopped the render.
     Stopped,
 }
 
 impl PeerRenders {
-    /// The renders of one seed, by budget.
+    /// The renders of the peers with one seed, in order of their time budgets.
     pub fn turns(&self) -> Vec<PeerTurn> {
         let doublings = (1.0 / MIN_BUDGET).log2().round() as i32;
         let budgets = (0..=doublings).map(|i| self.time * MIN_BUDGET * f64::from(i).exp2());
         budgets.flat_map(|budget| (0..self.peers.len()).map(move |peer| PeerTurn { peer, budget })).collect()
     }
 
-    /// Renders and measures. An error leaves the peer out from then on, with the reason in `summary`.
+    /// Renders one picture with a peer and measures its error. A failure leaves the peer out from then on, with the
+    /// reason in `summary`.
     pub fn render(
         &mut self,
         turn: PeerTurn,

@@ -15,7 +15,7 @@ pub struct PictureStore {
 }
 
 impl PictureStore {
-    /// An empty store in a folder, for pictures of this size.
+    /// Creates an empty store in a folder, for pictures of this size.
     ///
     /// # Errors
     /// The file cannot be created.
@@ -24,7 +24,7 @@ impl PictureStore {
         Ok(PictureStore { folder: folder.into(), file, size, count: 0 })
     }
 
-    /// Stores a picture; returns its number.
+    /// Stores a picture; returns its number in the store, for [`get`](Self::get).
     ///
     /// # Errors
     /// The picture cannot be written, for example because the disk is full.
@@ -37,7 +37,7 @@ impl PictureStore {
         Ok(number)
     }
 
-    /// Reads the picture with a number.
+    /// Reads the picture that [`push`](Self::push) has stored under `number`.
     ///
     /// # Errors
     /// The file cannot be read.

@@ -11,11 +11,11 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Width and height of a plot in pixels.
 const SIZE: (u32, u32) = (860, 520);
-/// Margin on the right for the names of the curves.
+/// Margin in pixels on the right for the names of the curves.
 const NAME_MARGIN: i32 = 190;
 /// Maximum number of ticks on an axis.
 const MAX_TICKS: usize = 12;
-/// Minimum vertical distance of two names.
+/// Minimum vertical distance in pixels of two curves' names.
 const NAME_SPACING: i32 = 17;
 const FONT: &str = "Helvetica, Arial, sans-serif";
 const INK: RGBColor = RGBColor(40, 40, 40);
@@ -23,16 +23,16 @@ const GREY: RGBColor = RGBColor(150, 150, 150);
 const GUIDE: RGBColor = RGBColor(190, 190, 190);
 const FAINT: RGBColor = RGBColor(228, 228, 228);
 
-/// Colours for readers with and without colour blindness \[Okabe and Ito 2008\], without the pale yellow.
+/// RGB colours of curves for readers with and without colour blindness \[Okabe and Ito 2008\], without the pale yellow.
 pub const COLOURS: [(u8, u8, u8); 7] =
     [(0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (0, 0, 0)];
 
-/// The colour of a curve. Curves of the same entry or peer share it.
+/// The RGB colour of the curve with index `line`. Curves of the same entry or peer share it.
 pub fn colour(subject: &Subject, line: usize) -> (u8, u8, u8) {
     COLOURS[number(subject, line) % COLOURS.len()]
 }
 
-/// Index of the curve's entry, or of its peer counted after the entries.
+/// Index of the entry of the curve with index `line`, or of its peer, counted after the entries.
 fn number(subject: &Subject, line: usize) -> usize {
     match subject.lines[line].source {
         PictureSource::Estimate(entry) | PictureSource::Finished(entry) => entry,
@@ -45,7 +45,7 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 type Log = WithKeyPoints<LogCoord<f64>>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Log, Log>>;
 
-/// Contents of a plot.
+/// Contents of a plot of error curves.
 struct Plot<'a> {
     subject: &'a Subject,
     summary: &'a Summary,
@@ -55,8 +55,8 @@ struct Plot<'a> {
     curves: Vec<Vec<CurvePoint>>,
 }
 
-/// Plots the error in a metric against an axis; `None` if no curve has a point. Plots against iterations leave other
-/// renderers out, which count samples.
+/// The SVG document of a plot of the error in a metric against an axis; `None` if no curve has a point. Plots against
+/// iterations leave other renderers out, which count samples.
 ///
 /// # Errors
 /// None beyond lack of memory.
@@ -79,7 +79,7 @@ pub fn svg(
     Ok(Some(text))
 }
 
-/// Ranges of both axes.
+/// Ranges (least, greatest) of the horizontal and vertical axis that hold all points; `None` if there are none.
 fn ranges(curves: &[Vec<CurvePoint>], axis: Axis) -> Option<((f64, f64), (f64, f64))> {
     let span = |values: &dyn Fn(&CurvePoint) -> f64, room: f64| {
         let all = || curves.iter().flatten().map(values).filter(|v| *v > 0.0 && v.is_finite());
@@ -89,7 +89,7 @@ fn ranges(curves: &[Vec<CurvePoint>], axis: Axis) -> Option<((f64, f64), (f64, f
     Some((span(&|curve_point| axis.of(curve_point), 1.15)?, span(&|curve_point| curve_point.figure, 1.4)?))
 }
 
-/// A logarithmic axis with ticks at powers of ten, and between them on short axes.
+/// A logarithmic axis from `low` to `high` with ticks at powers of ten, and between them on short axes.
 fn log(low: f64, high: f64) -> Log {
     let decades = (high / low).log10();
     let digits: &[f64] = match decades {
@@ -183,7 +183,7 @@ fn series(
     Ok(())
 }
 
-/// Draws the reference's own error, if it lies within the plot.
+/// Draws the reference's own error as a line, if it lies within the plot.
 fn floor(
     chart: &mut Chart<'_, '_>,
     plot: &Plot<'_>,
@@ -198,7 +198,7 @@ fn floor(
     Ok(())
 }
 
-/// Factor by which a line of theory lies below the data.
+/// Factor by which the line of a theoretical exponent lies below the data.
 const BELOW: f64 = 0.7;
 
 /// Draws lines with the exponents of theory against iterations, each below the last decade of the first curve with that
@@ -239,7 +239,7 @@ fn exponent_text(exponent: f64) -> String {
     format!("{exponent}")
 }
 
-/// Writes the name of every curve beside its end, moved apart if names would overlap.
+/// Writes the name of every curve beside its right end, moved apart if names would overlap.
 fn names(
     root: &Area<'_>,
     chart: &Chart<'_, '_>,
@@ -273,7 +273,7 @@ fn names(
     Ok(())
 }
 
-/// A name shortened to fit beside the plot; the tables of the page have the full name.
+/// The name of a curve, shortened to fit beside the plot; the tables of the page have the full name.
 fn clip(name: &str) -> String {
     const MAX_CHARS: usize = 25;
     if name.chars().count() <= MAX_CHARS {

@@ -15,19 +15,19 @@ use crate::scene::Scene;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A reference's own error, in the metrics of [`Errors`].
+/// A reference picture's own error against the truth, in the metrics of [`Errors`]; `None` where it is unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnError {
-    /// Mean relative squared error.
+    /// Mean relative squared error over the pixels.
     pub relmse: Option<f64>,
     /// Mean relative squared error without the worst 0.5 % of the pixels.
     pub relmse_trimmed: Option<f64>,
-    /// Mean squared error.
+    /// Mean squared error over the pixels and channels.
     pub mse: Option<f64>,
 }
 
 impl OwnError {
-    /// The error in a metric; `None` if it is unknown.
+    /// The reference's own error in a metric; `None` if it is unknown.
     pub fn of(&self, metric: Metric) -> Option<f64> {
         match metric {
             Metric::RelMse => self.relmse,
@@ -36,27 +36,27 @@ impl OwnError {
         }
     }
 
-    /// An error that is known in one metric only.
+    /// An own error of a reference that is known in one metric only.
     pub fn in_metric(metric: Metric, error: f64) -> OwnError {
         let of = |other: Metric| (metric == other).then_some(error);
         let [relmse, relmse_trimmed, mse] = [Metric::RelMse, Metric::RelMseTrimmed, Metric::Mse].map(of);
         OwnError { relmse, relmse_trimmed, mse }
     }
 
-    /// The error as JSON.
+    /// The reference's own error as a JSON object, by metric.
     pub fn object(&self) -> Value {
         json!({"relmse": self.relmse, "relmse_trimmed": self.relmse_trimmed, "mse": self.mse})
     }
 }
 
-/// A reference picture.
+/// A reference picture, against which the errors of other pictures are measured.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// The picture.
+    /// The picture, in scene-linear radiance.
     pub picture: Picture,
-    /// Its own error.
+    /// The picture's own error.
     pub error: OwnError,
-    /// Its origin, in words.
+    /// The picture's origin, in words.
     pub about: String,
 }
 
@@ -71,8 +71,8 @@ impl Reference {
         (figure > own && figure > 0.0).then_some(figure)
     }
 
-    /// Reads a reference, and its own error from the header if caustique has written the file. Also returns the header's
-    /// JSON object.
+    /// Reads a reference picture of this size (width, height), and its own error from the header if caustique has
+    /// written the file. Also returns the header's JSON object.
     ///
     /// # Errors
     /// The file cannot be read, has no picture, or has another size.
@@ -83,7 +83,8 @@ impl Reference {
         Ok((reference, header))
     }
 
-    /// The reference in a layer set, with its own error from the `header`'s JSON object. `about` is its origin, in words.
+    /// The reference in a layer set, of this size (width, height), with its own error from the `header`'s JSON object.
+    /// `about` is its origin, in words.
     ///
     /// # Errors
     /// The set has no picture or another size.
@@ -122,7 +123,8 @@ impl Reference {
     }
 }
 
-/// The error that a header states: that of a reference, or the estimated error of a render that was not finished.
+/// The error that a file's JSON header states: a reference's own error, or the estimated error of a render that was not
+/// finished.
 fn stated_error(header: &Value) -> OwnError {
     let own = &header["reference_error"];
     if own.is_object() {
@@ -133,25 +135,25 @@ fn stated_error(header: &Value) -> OwnError {
     OwnError { relmse: estimate.map(|error| error * error), ..OwnError::default() }
 }
 
-/// Two independent renders with equal numbers of iterations.
+/// Two independent renders with equal numbers of iterations, whose mean is a reference picture.
 pub struct Halves {
-    /// The first render.
+    /// The picture of the first render.
     pub a: Picture,
-    /// The second render.
+    /// The picture of the second render.
     pub b: Picture,
-    /// Method of both.
+    /// Name of the method of both renders.
     pub method: &'static str,
-    /// Seed of each.
+    /// Seed of each render.
     pub seeds: [u64; 2],
-    /// Iterations of each.
+    /// Iterations of each render.
     pub iterations: u64,
-    /// Wall-clock seconds of both.
+    /// Wall-clock seconds of both renders together.
     pub seconds: f64,
 }
 
 impl Halves {
-    /// Renders both in turns for the iterations (of each) or the time (of both together) in `settings`, at least two
-    /// iterations. `observe` receives the iterations of each and the seconds of both, and can stop the render.
+    /// Renders both halves in turns for the iterations (of each) or the time (of both together) in `settings`, at least
+    /// two iterations. `observe` receives the iterations of each and the seconds of both, and can stop the render.
     pub fn render(
         scene: &Scene,
         camera: &Camera,

@@ -10,29 +10,29 @@ use super::subject::{ReportOptions, Subject};
 use crate::error::Result;
 use crate::film::Picture;
 
-/// Crops of one picture, with a caption.
+/// Crops of one picture, the same windows of it as of other pictures, with a caption.
 pub struct Crops {
-    /// Name of the curve, or of the reference.
+    /// Name of the curve to which the picture belongs, or of the reference.
     pub name: String,
-    /// Iterations, seconds, error; empty for the reference.
+    /// Iterations, seconds and error of the picture, in words; empty for the reference.
     pub caption: String,
-    /// One PNG for each window.
+    /// The bytes of one PNG for each window.
     pub pictures: Vec<Vec<u8>>,
-    /// One heat map for each window; empty for the reference.
+    /// The bytes of one PNG for each window, a heat map of the error; empty for the reference.
     pub heat_maps: Vec<Vec<u8>>,
 }
 
-/// Crops of all curves at equal time or at equal error.
+/// A row of the report: crops of all curves at equal time or at equal error.
 pub struct Strip {
-    /// Heading.
+    /// Heading of the row.
     pub title: String,
-    /// Crops of each curve.
+    /// Crops of the picture of each curve.
     pub runs: Vec<Crops>,
-    /// The relative error with the palest colour in the heat maps.
+    /// The relative error that has the palest colour in the heat maps.
     pub largest: f64,
 }
 
-/// The measurements of a curve whose pictures are stored.
+/// The measurements of the curve with index `line` whose pictures are stored.
 fn stored(points: &[Point], line: usize) -> impl Iterator<Item = &Point> {
     points.iter().filter(move |point| point.line == line && point.picture.is_some())
 }
@@ -71,9 +71,9 @@ impl Alignment {
     }
 }
 
-/// All crops of a report.
+/// All crops of pictures in a report.
 pub(super) struct Gallery {
-    /// Windows of the crops.
+    /// Rectangles of pixels that are cropped.
     pub(super) windows: Vec<Window>,
     /// The whole reference and its crops.
     pub(super) reference: Crops,

@@ -10,19 +10,19 @@ use crate::peers::Peer;
 pub struct Subject {
     /// Name of the scene in the report.
     pub scene: String,
-    /// Width and height of the picture.
+    /// Width and height of the picture in pixels.
     pub size: (u32, u32),
-    /// Entries of caustique.
+    /// Entries of the comparison: methods of caustique with their settings.
     pub entries: Vec<Entry>,
-    /// Other renderers.
+    /// Other renderers that are compared.
     pub peers: Vec<Peer>,
-    /// The curves.
+    /// The curves of errors: entries and other renderers, raw and denoised.
     pub lines: Vec<Line>,
-    /// Seeds, moments and end of the runs.
+    /// Seeds, moments of measurement, and limits of the runs.
     pub rules: Rules,
-    /// Metric of curves, targets and fits.
+    /// Error metric of curves, targets and fits.
     pub metric: Metric,
-    /// The reference.
+    /// The reference picture, against which errors are measured.
     pub reference: Reference,
     /// Names and values of facts about the machine: processor, threads, versions.
     pub machine: Vec<(String, String)>,
@@ -32,14 +32,15 @@ pub struct Subject {
 
 /// Options of the report.
 pub struct ReportOptions {
-    /// Target errors; if there are none, [`default_targets`](super::target::default_targets).
+    /// Target errors, to which the report compares times; if there are none,
+    /// [`default_targets`](super::target::default_targets).
     pub targets: Vec<f64>,
     /// Additional targets: the error of an entry's estimate after some iterations, as (index of the entry, iterations).
     pub targets_of: Vec<(usize, u64)>,
-    /// Windows of the crops; if there are none, those in which the curves differ most.
+    /// Windows, rectangles of pixels, of the crops; if there are none, those in which the curves differ most.
     pub windows: Vec<Window>,
-    /// Exposure and tone curve.
+    /// Exposure and tone curve of the pictures.
     pub look: Look,
-    /// Additional remarks.
+    /// Additional remarks for the page.
     pub notes: Vec<String>,
 }

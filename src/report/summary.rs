@@ -16,7 +16,8 @@ use serde_json::Value;
 pub use super::strips::{Crops, Strip};
 pub use super::subject::{ReportOptions, Subject};
 
-/// Mean of a peer's picture relative to the reference, which shows whether the scene is the same.
+/// Mean of the picture of a peer, another renderer, relative to the reference, which shows whether the scene is the
+/// same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanRatio {
     /// Mean of the peer's longest renders over the mean of the reference.
@@ -25,53 +26,54 @@ pub struct MeanRatio {
     pub error: f64,
 }
 
-/// Largest deviation of the ratio from 1, without noise, for the same scene.
+/// Largest deviation of a noise-free ratio of means from 1 with which two renderers count as rendering the same scene.
 const MAX_DEVIATION: f64 = 0.01;
 
 impl MeanRatio {
-    /// Whether the ratio is 1 within [`MAX_DEVIATION`] and two standard errors.
+    /// Whether the ratio is 1 within [`MAX_DEVIATION`] and two standard errors, so that the peer renders the same
+    /// scene.
     pub fn is_same(&self) -> bool {
         (self.ratio - 1.0).abs() <= MAX_DEVIATION + 2.0 * self.error
     }
 }
 
-/// Curves in a metric.
+/// All error curves of a comparison in one metric.
 pub struct MetricCurves {
-    /// The metric.
+    /// The error metric.
     pub metric: Metric,
-    /// One curve for each line.
+    /// One error curve for each line of the report, a run with its pictures either raw or denoised.
     pub curves: Vec<Curve>,
 }
 
-/// Evaluation of a comparison.
+/// Evaluation of a comparison's measurements: curves, exponents, times to targets, and crops.
 pub struct Summary {
-    /// One curve for each line.
+    /// One error curve for each line of the report, in the report's metric.
     pub curves: Vec<Curve>,
-    /// Curves in a second metric: trimmed relMSE, or relMSE if the report's metric is the trimmed one.
+    /// Error curves in a second metric: trimmed relMSE, or relMSE if the report's metric is the trimmed one.
     pub second: MetricCurves,
-    /// Fitted exponents of each line, in iterations and in seconds.
+    /// Fitted exponents of each line's error, in iterations and in seconds.
     pub slopes: Vec<[Result<Slope, FitFailure>; 2]>,
-    /// Exponent by theory of each line.
+    /// Exponent of each line's error by theory; `None` if theory has no closed form.
     pub theories: Vec<Option<Theory>>,
-    /// Errors to reach.
+    /// Target errors, to which times are compared.
     pub targets: Vec<Target>,
-    /// When each target is reached by each line.
+    /// When each target is reached by each line, indexed by target and then by line.
     pub reached: Vec<Vec<Reached>>,
-    /// Mean ratio of each peer that has rendered a picture.
+    /// For each peer, its mean relative to the reference; `None` if it has rendered no picture.
     pub mean_ratios: Vec<Option<MeanRatio>>,
-    /// Overhead of each entry.
+    /// Cost of an iteration of each entry; `None` for a run without iterations.
     pub overhead: Vec<Option<Overhead>>,
-    /// Windows of the crops.
+    /// Windows, rectangles of pixels, of the crops.
     pub windows: Vec<Window>,
-    /// The whole reference and its crops.
+    /// The whole reference picture and its crops.
     pub reference: Crops,
-    /// Crops at equal time and at equal error.
+    /// Crops of the curves' pictures at equal time and at equal error.
     pub strips: Vec<Strip>,
-    /// Remarks.
+    /// Remarks about the comparison, in sentences.
     pub notes: Vec<String>,
 }
 
-/// Evaluates a comparison.
+/// Evaluates the measurements of a comparison.
 ///
 /// # Errors
 /// A stored picture cannot be read.
@@ -147,13 +149,14 @@ fn remarks(metric: Metric, reference: &Reference, outcome: &Outcome, curves: &[C
     notes
 }
 
-/// The exponents of a curve.
+/// The fitted exponents of a curve in iterations and in seconds.
 fn slopes(source: PictureSource, curve: &Curve) -> [Result<Slope, FitFailure>; 2] {
     [Axis::Iterations, Axis::Seconds]
         .map(|axis| if source.is_raw() { curve.slope(axis) } else { Err(FitFailure::Denoised) })
 }
 
-/// Exponent by theory of a curve.
+/// Exponent by theory of the error of pictures from `source`; `None` unless they are estimates of an entry, or if
+/// theory has no closed form.
 fn theory_of(source: PictureSource, entries: &[Entry]) -> Option<Theory> {
     match source {
         PictureSource::Estimate(entry) => theory(&entries[entry].settings),
@@ -161,7 +164,8 @@ fn theory_of(source: PictureSource, entries: &[Entry]) -> Option<Theory> {
     }
 }
 
-/// Mean ratio of a peer, over its longest render with every seed.
+/// Mean of a peer's pictures relative to the reference, over its longest render with every seed; `None` without a
+/// picture.
 fn mean_ratio(peer: usize, subject: &Subject, outcome: &Outcome) -> Option<MeanRatio> {
     let Subject { lines, reference, rules, .. } = subject;
     let line = lines.iter().position(|line| line.source == PictureSource::Peer(peer))?;
@@ -177,7 +181,7 @@ fn mean_ratio(peer: usize, subject: &Subject, outcome: &Outcome) -> Option<MeanR
     Some(MeanRatio { ratio: ratios.iter().sum::<f64>() / n, error })
 }
 
-/// Index of the entry with a name.
+/// Index of the entry with a name; `None` if there is none.
 pub fn find(entries: &[Entry], name: &str) -> Option<usize> {
     entries.iter().position(|entry| entry.name == name)
 }

@@ -10,7 +10,7 @@ use super::summary::{MeanRatio, Subject, Summary};
 use super::target::Reached;
 use maud::{Markup, html};
 
-/// Name and colour of a curve.
+/// HTML of the name of the curve with index `line`, in the curve's colour.
 fn name(subject: &Subject, line: usize) -> Markup {
     let ((r, g, b), curve) = (colour(subject, line), &subject.lines[line]);
     let style = match curve.source.is_raw() {
@@ -20,12 +20,12 @@ fn name(subject: &Subject, line: usize) -> Markup {
     html! { span.dot style=(style) {} (curve.name) }
 }
 
-/// Name and colour of the curve with a source.
+/// HTML of the name of the curve whose pictures come from `source`, in the curve's colour.
 fn name_of(subject: &Subject, source: PictureSource) -> Markup {
     subject.lines.iter().position(|line| line.source == source).map_or_else(|| html! {}, |line| name(subject, line))
 }
 
-/// Times to target errors.
+/// HTML tables of the times that runs take to reach target errors.
 pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
     if summary.targets.is_empty() {
         return html! {};
@@ -59,7 +59,8 @@ pub(super) fn targets(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
-/// Seconds of the first listed run that reaches a target.
+/// Seconds of the first listed run that reaches a target error, to which others are relative; `None` if none reaches
+/// it.
 fn base(reached: &[Reached]) -> Option<f64> {
     reached.iter().find_map(|reached| match reached {
         Reached::After { seconds, at_once: false, .. } => Some(seconds.value),
@@ -88,12 +89,12 @@ fn answer(reached: &Reached, base: Option<f64>) -> Markup {
     }
 }
 
-/// Interpolated iterations: with one decimal below 10, else rounded.
+/// The text of an interpolated number of iterations: with one decimal below 10, else rounded.
 fn whole(n: f64) -> String {
     if n < 10.0 { format!("{n:.1}") } else { format!("{n:.0}") }
 }
 
-/// Exponents beside theory.
+/// HTML table of the curves' fitted exponents beside theory.
 pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
     let how = if subject.rules.seeds.len() > 1 {
         "over seeds"
@@ -140,7 +141,8 @@ pub(super) fn fits(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
-/// Other renderers: whether the scene is the same, startup times, approximations, and why some are left out.
+/// HTML table of other renderers: whether the scene is the same, startup times, approximations, and why some are left
+/// out.
 pub(super) fn peers(subject: &Subject, outcome: &Outcome, summary: &Summary) -> Markup {
     if subject.peers.is_empty() {
         return html! {};
@@ -189,7 +191,7 @@ fn same_scene(mean: &MeanRatio) -> String {
     }
 }
 
-/// Cost of an iteration by phase.
+/// HTML table of the cost of an iteration of each entry by phase.
 pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
     let cell = |row: &Option<Overhead>, get: &dyn Fn(&Overhead) -> Option<f64>| {
         row.as_ref().and_then(get).map_or("–".into(), short)
@@ -228,7 +230,7 @@ pub(super) fn overheads(subject: &Subject, summary: &Summary) -> Markup {
     }
 }
 
-/// Settings of the runs.
+/// HTML table of the settings of the runs.
 pub(super) fn runs(subject: &Subject) -> Markup {
     html! {
         section {

@@ -2,39 +2,39 @@
 
 use super::curve::{Curve, CurvePoint, Mean, interpolate};
 
-/// A target error.
+/// A target error, to which the report compares the times of runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
     /// The error, in the report's metric.
     pub error: f64,
-    /// Origin of the target, such as `sppm after 1000 iterations`; empty for a given number.
+    /// Origin of the target, such as `sppm after 1000 iterations`; empty for a number that the user has given.
     pub origin: String,
 }
 
-/// Result of a run for a target.
+/// When a run reaches a target error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reached {
-    /// The target is reached; means over seeds.
+    /// The run reaches the target after these means over seeds.
     After {
-        /// Iterations, interpolated.
+        /// Iterations until the target, interpolated.
         iterations: Mean,
-        /// Seconds, interpolated.
+        /// Wall-clock seconds until the target, interpolated.
         seconds: Mean,
-        /// Core-seconds, interpolated.
+        /// Core-seconds until the target, interpolated.
         core_seconds: Mean,
         /// Whether the first measurement was already below the target, so that the numbers are upper bounds.
         at_once: bool,
     },
-    /// The run ended before; its iterations and seconds.
+    /// The run ended before it reached the target; holds its iterations and seconds.
     Never(u64, f64),
-    /// The target is not above the reference's own error.
+    /// The target is not above the reference's own error, so that reaching it cannot be measured.
     BelowReference,
-    /// Nothing was measured.
+    /// Nothing was measured for the run.
     Unknown,
 }
 
-/// Iterations, seconds and core-seconds from which on a curve stays at or below `target`, and whether it was always there.
-/// The error is interpolated as a power of each; `None` if the curve ends above the target.
+/// Iterations, seconds and core-seconds from which on a curve stays at or below the error `target`, and whether it was
+/// always there. The error is interpolated as a power of each; `None` if the curve ends above the target.
 pub fn crossing(curve: &Curve, target: f64) -> Option<([f64; 3], bool)> {
     let place =
         |curve_point: &CurvePoint| [curve_point.iterations as f64, curve_point.seconds, curve_point.cpu_seconds];
@@ -50,7 +50,7 @@ pub fn crossing(curve: &Curve, target: f64) -> Option<([f64; 3], bool)> {
     Some((std::array::from_fn(|i| interpolate(before[i], after[i], t)), false))
 }
 
-/// When a run reaches a target, by its mean curve, with the jackknife's standard error over seeds.
+/// When a run reaches a target error, by its mean curve, with the jackknife's standard error over seeds.
 pub fn reach(curve: &Curve, target: f64) -> Reached {
     if target <= curve.own {
         return Reached::BelowReference;
@@ -70,8 +70,8 @@ pub fn reach(curve: &Curve, target: f64) -> Reached {
     Reached::After { iterations, seconds, core_seconds, at_once }
 }
 
-/// Default targets: at most four errors of 1, 2 or 5 times a power of ten, the smallest that two runs reach (or the only
-/// run).
+/// Default target errors: at most four errors of 1, 2 or 5 times a power of ten, the smallest that two runs reach (or
+/// the only run). `own` is the reference's own error.
 pub fn default_targets(curves: &[Curve], own: f64) -> Vec<Target> {
     let reported = |curve: &Curve| {
         curve.mean.iter().filter(|curve_point| curve_point.reported).map(|s| s.figure).collect::<Vec<_>>()

@@ -3,16 +3,16 @@
 use crate::plan::Search;
 use crate::render::{BandwidthRule, Settings};
 
-/// Exponent of the squared error in the number of iterations, with its reason.
+/// Exponent of the squared error as a power of the number of iterations, with its reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Theory {
-    /// Exponent in the limit of many iterations.
+    /// Exponent in the limit of many iterations, 0 or below.
     pub exponent: f64,
-    /// The reason, in a clause.
+    /// The reason for the exponent, in a clause.
     pub because: &'static str,
 }
 
-/// Exponent of a method; `None` if theory has no closed form.
+/// Exponent by theory of the error of a method with its settings; `None` if theory has no closed form.
 ///
 /// With squared bandwidths that shrink as i^(alpha - 1) the variance of the mean falls as N^-alpha and its squared bias
 /// as N^(2 alpha - 2) \[Knaus and Zwicker 2011\]; the slower of the two is the exponent, best at alpha = 2/3

@@ -38,7 +38,8 @@ fn main() {
     }
 }
 
-/// Prints the speed of [`Scene::intersect8`](caustique_embree::Scene::intersect8), like [`best`].
+/// Prints the speed of tracing packets with [`Scene::intersect8`](caustique_embree::Scene::intersect8), as [`best`]
+/// does.
 fn eights(name: &str, threads: usize, rays: &[Ray], scene: &caustique_embree::Scene) {
     let mut seconds = f64::INFINITY;
     for _ in 0..5 {

@@ -12,7 +12,7 @@ pub const INVALID_GEOMETRY_ID: u32 = u32::MAX;
 pub const DEVICE_PROPERTY_VERSION_MAJOR: u32 = 1;
 pub const DEVICE_PROPERTY_VERSION_MINOR: u32 = 2;
 pub const DEVICE_PROPERTY_VERSION_PATCH: u32 = 3;
-/// Whether the device traces packets of eight rays natively.
+/// Device property of Embree: whether the device traces packets of eight rays natively.
 pub const DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED: u32 = 33;
 
 pub const GEOMETRY_TYPE_TRIANGLE: u32 = 0;
@@ -31,7 +31,7 @@ pub const SCENE_FLAG_ROBUST: u32 = 1 << 2;
 /// `RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS` of Embree 4.
 pub const SCENE_FLAG_RAY_FILTER: u32 = 1 << 3;
 
-/// The meaning of an `RTCError`.
+/// The meaning of an `RTCError` code, in words.
 pub fn error_name(code: u32) -> &'static str {
     match code {
         2 => "invalid argument",
@@ -43,7 +43,7 @@ pub fn error_name(code: u32) -> &'static str {
     }
 }
 
-/// `RTCRay`.
+/// Embree's structure `RTCRay`.
 #[repr(C, align(16))]
 #[derive(Clone, Copy)]
 pub struct RawRay {
@@ -57,7 +57,7 @@ pub struct RawRay {
     pub flags: u32,
 }
 
-/// `RTCHit` of Embree 4.3 and later. Earlier versions end before `instance_primitive`.
+/// Embree's structure `RTCHit` of version 4.3 and later. Earlier versions end before `instance_primitive`.
 #[repr(C, align(16))]
 #[derive(Clone, Copy)]
 pub struct RawHit {
@@ -70,7 +70,7 @@ pub struct RawHit {
     pub instance_primitive: u32,
 }
 
-/// `RTCRayHit`.
+/// Embree's structure `RTCRayHit`, a ray and its hit.
 #[repr(C, align(16))]
 #[derive(Clone, Copy)]
 pub struct RawRayHit {
@@ -94,7 +94,8 @@ impl RawHit {
     };
 }
 
-/// `RTCRayHit8`, with one array per field. As in [`RawHit`], `instance_primitive` exists from Embree 4.3 on.
+/// Embree's structure `RTCRayHit8`, with one array per field. As in [`RawHit`], `instance_primitive` exists from Embree
+/// 4.3 on.
 #[repr(C, align(32))]
 #[derive(Clone, Copy)]
 pub struct RawRayHit8 {
@@ -115,7 +116,7 @@ pub struct RawRayHit8 {
     pub instance_primitive: [u32; 8],
 }
 
-/// Mask of the rays to trace in a packet of eight: all bits set, or none.
+/// Mask of the rays to trace in a packet of eight: for each ray all bits set, or none.
 #[repr(C, align(32))]
 pub struct Valid8(pub [i32; 8]);
 
@@ -197,7 +198,7 @@ impl IntersectArguments4 {
     };
 }
 
-/// `RTCFilterFunctionNArguments`. For single rays `count` is 1, and the structures `RTCRayN` and
+/// Embree's structure `RTCFilterFunctionNArguments`. For single rays `count` is 1, and the structures `RTCRayN` and
 /// `RTCHitN` are laid out as `RTCRay` and `RTCHit`.
 #[repr(C)]
 pub struct FilterArguments {
@@ -212,7 +213,7 @@ pub struct FilterArguments {
 pub type FilterFunction = unsafe extern "C" fn(*const FilterArguments);
 pub type ErrorFunction = unsafe extern "C" fn(*mut c_void, u32, *const c_char);
 
-/// `RTCBounds`.
+/// Embree's structure `RTCBounds`, an axis-aligned box.
 #[repr(C, align(16))]
 pub struct RawBounds {
     pub lower: [f32; 4],
@@ -282,7 +283,8 @@ functions! {
     }
 }
 
-/// The functions whose signatures differ. The branch on the version costs little, because it always goes the same way.
+/// Embree's functions whose signatures differ between versions 3 and 4. The branch on the version costs little, because
+/// it always goes the same way.
 #[derive(Clone, Copy)]
 pub enum Trace {
     V3(Trace3),

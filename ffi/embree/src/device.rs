@@ -16,7 +16,8 @@ pub struct Device {
 struct Inner {
     raw: Handle,
     library: Library,
-    /// The first error since the last check. Embree holds its address, which the `Arc` keeps stable.
+    /// The first error that Embree has reported since the last check. Embree holds its address, which the `Arc` keeps
+    /// stable.
     error: Arc<ErrorSlot>,
 }
 
@@ -54,7 +55,7 @@ impl Device {
         Ok(device)
     }
 
-    /// The library of this device.
+    /// The Embree library that this device belongs to.
     pub fn library(&self) -> &Library {
         &self.inner.library
     }
@@ -71,7 +72,8 @@ impl Device {
         Arc::ptr_eq(&self.inner, &other.inner)
     }
 
-    /// Returns the first error that Embree has reported since the last check.
+    /// Returns the first error that Embree has reported since the last check. `during` names the operation for the
+    /// error.
     pub(crate) fn check(&self, during: &'static str) -> Result<(), Error> {
         match self.inner.error.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(message) => Err(Error::Embree { during, message }),
@@ -79,7 +81,8 @@ impl Device {
         }
     }
 
-    /// The handle that Embree returned, or the error that it reported instead.
+    /// The handle that Embree returned, or the error that it reported instead of a null handle. `during` names the
+    /// operation.
     pub(crate) fn check_handle(&self, handle: Handle, during: &'static str) -> Result<Handle, Error> {
         self.check(during)?;
         if handle.is_null() {
@@ -97,7 +100,7 @@ impl Drop for Inner {
     }
 }
 
-/// Embree's error callback, which any of its threads may call.
+/// Embree's error callback, which any of its threads may call; stores the first error in `slot`.
 unsafe extern "C" fn record_error(slot: *mut c_void, code: u32, text: *const c_char) {
     // SAFETY: the pointer is the one given in `Device::new`, alive as long as the device.
     let slot = unsafe { &*(slot as *const ErrorSlot) };

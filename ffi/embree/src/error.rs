@@ -33,7 +33,7 @@ pub enum Error {
     },
     /// A vertex is NaN, infinite, or farther out than Embree can represent (about 1.8e18).
     BadVertex {
-        /// The mesh.
+        /// Id of the mesh with the vertex.
         geometry: GeometryId,
         /// Index of the vertex.
         vertex: usize,
@@ -42,7 +42,7 @@ pub enum Error {
     },
     /// A triangle has an index of a vertex that does not exist.
     BadIndex {
-        /// The mesh.
+        /// Id of the mesh with the triangle.
         geometry: GeometryId,
         /// Index of the triangle.
         triangle: usize,
@@ -54,9 +54,9 @@ pub enum Error {
     /// The matrix of an instance contains NaN or infinity, is not invertible, or is too extreme for single precision:
     /// it scales by less than about 1e-9, or moves the scene beyond 1.8e18.
     BadTransform {
-        /// The instance.
+        /// Id of the instance.
         geometry: GeometryId,
-        /// The matrix.
+        /// The column-major 3x4 matrix of the instance.
         local_to_world: [f32; 12],
     },
     /// A geometry id is used twice in one scene.

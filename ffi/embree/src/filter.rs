@@ -9,12 +9,12 @@ use crate::api::{self, FilterArguments, FilterFunction, INVALID_GEOMETRY_ID, Raw
 use crate::geometry::GeometryId;
 use crate::ray::Hit;
 
-/// A possible hit, which a filter accepts or rejects.
+/// A possible hit of a ray with a triangle, which a filter accepts or rejects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
-    /// The mesh.
+    /// Id of the mesh that is hit.
     pub geometry: GeometryId,
-    /// The instance of the mesh, if the mesh is in an instanced scene.
+    /// Id of the instance of the mesh; `None` if the mesh belongs to the traced scene itself.
     pub instance: Option<GeometryId>,
     /// Index of the triangle in the mesh.
     pub primitive: u32,
@@ -22,18 +22,19 @@ pub struct Candidate {
     pub u: f32,
     /// Barycentric coordinate of the triangle's third corner.
     pub v: f32,
-    /// The ray's [`token`](crate::Ray::token).
+    /// Caller's number for the ray, its [`token`](crate::Ray::token).
     pub token: u32,
 }
 
-/// Accepts a candidate by returning true. If it returns false, the ray continues.
+/// A callback that accepts a candidate, a possible hit, by returning true. If it returns false, the ray continues.
 ///
 /// Must be a pure function of the candidate: Embree may call it several times for one intersection, in any order, and
 /// for intersections behind the nearest one.
 pub type Filter = Arc<dyn Fn(&Candidate) -> bool + Send + Sync>;
 
 thread_local! {
-    /// A panic of a filter, stored until Embree has returned, because it must not unwind through Embree's frames.
+    /// A panic of a filter on this thread, stored until Embree has returned, because it must not unwind through
+    /// Embree's frames.
     static PANIC: Cell<Option<Box<dyn Any + Send>>> = const { Cell::new(None) };
 }
 
@@ -103,7 +104,7 @@ unsafe extern "C" fn report<const MAJOR: u32>(arguments: *const FilterArguments)
     }
 }
 
-/// Resumes the stored panic of a filter, if any, after Embree has returned.
+/// Resumes the stored panic of a filter on this thread, if any, after Embree has returned.
 #[inline]
 pub fn resume_panic() {
     if let Some(panic) = PANIC.take() {

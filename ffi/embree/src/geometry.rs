@@ -9,8 +9,8 @@ pub struct GeometryId(pub u32);
 /// The largest id of a mesh or instance.
 pub const MAX_GEOMETRY_ID: GeometryId = GeometryId((1 << 24) - 1);
 
-/// The largest coordinate (`FLT_LARGE` in Embree's sources). Embree silently drops triangles with larger ones, and must
-/// not be called with such rays.
+/// Largest coordinate that Embree accepts (`FLT_LARGE` in its sources). Embree silently drops triangles with larger
+/// ones, and must not be called with such rays.
 pub(crate) const MAX_COORDINATE: f32 = 1.844e18;
 
 impl fmt::Display for GeometryId {
@@ -19,11 +19,11 @@ impl fmt::Display for GeometryId {
     }
 }
 
-/// An axis-aligned box.
+/// An axis-aligned box around a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Smallest x, y and z.
+    /// Smallest x, y and z in the box.
     pub min: [f32; 3],
-    /// Largest x, y and z.
+    /// Largest x, y and z in the box.
     pub max: [f32; 3],
 }

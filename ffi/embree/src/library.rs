@@ -27,7 +27,8 @@ struct Inner {
 }
 
 impl Library {
-    /// The library with these functions that was loaded from `path` and writes `hit_extent` bytes of `RTCRayHit`.
+    /// The library with these functions that was loaded from `path` and writes `hit_extent` bytes of Embree's structure
+    /// `RTCRayHit`.
     pub(crate) fn new(path: &Path, version: Version, hit_extent: usize, common: Common, trace: Trace) -> Library {
         Library { inner: Arc::new(Inner { path: path.to_owned(), version, hit_extent, common, trace }) }
     }
@@ -37,7 +38,7 @@ impl Library {
         &self.inner.path
     }
 
-    /// The version that a device of the library reports.
+    /// The version of Embree that a device of the library reports.
     pub fn version(&self) -> Version {
         self.inner.version
     }

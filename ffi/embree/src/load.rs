@@ -9,8 +9,8 @@ use crate::error::Error;
 use crate::library::{LIBRARY_VARIABLE, Library};
 use crate::probe;
 
-/// Names to try, best first. Names with a version number belong to runtime packages, the others to development
-/// packages.
+/// File names of Embree's library to try, best first. Names with a version number belong to runtime packages, the
+/// others to development packages.
 #[cfg(not(any(target_os = "macos", windows)))]
 const NAMES: &[&str] = &["libembree4.so.4", "libembree3.so.3", "libembree4.so", "libembree3.so"];
 #[cfg(target_os = "macos")]

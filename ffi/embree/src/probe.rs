@@ -17,7 +17,7 @@ use crate::library::Library;
 use crate::ray::Ray;
 use crate::scene::{Scene, SceneBuilder};
 
-/// The version that a device of the library reports.
+/// The version of Embree that a device of the library reports, or the reason why it cannot be found.
 pub fn version(common: &Common) -> Result<Version, String> {
     // SAFETY: the configuration is a C string, a null device is not used further, and the device is released once.
     unsafe {
@@ -37,8 +37,8 @@ pub fn version(common: &Common) -> Result<Version, String> {
     }
 }
 
-/// Tests the library in a small scene. Returns the number of bytes of `RTCRayHit` that it writes, or the reason why it
-/// cannot be used.
+/// Tests the library in a small scene. Returns the number of bytes of Embree's structure `RTCRayHit` that it writes, or
+/// the reason why it cannot be used.
 pub fn try_out(library: &Library) -> Result<usize, String> {
     let scene = trial_scene(library).map_err(|error| format!("the trial scene failed: {error}"))?;
     let ray = Ray { origin: [5.25, 0.25, 2.0], direction: [0.0, 0.0, -1.0], tmin: 0.0, tmax: 9.0, token: 0 };
@@ -69,7 +69,7 @@ pub fn try_out(library: &Library) -> Result<usize, String> {
     Ok(extent)
 }
 
-/// Triangle 1 of mesh 3 inside instance 7, moved 5 along x, invisible to rays of token 1.
+/// A scene for the test: triangle 1 of mesh 3 inside instance 7, moved 5 along x, invisible to rays of token 1.
 fn trial_scene(library: &Library) -> Result<Scene, Error> {
     let device = Device::new(library, 1)?;
     let mut child = SceneBuilder::new(&device)?;
@@ -85,7 +85,7 @@ fn trial_scene(library: &Library) -> Result<Scene, Error> {
 
 const GUARD: u8 = 0xAB;
 
-/// Memory for the structure and for bytes that a library might write behind it.
+/// Memory for Embree's structure `RTCRayHit` and for bytes that a library might write behind it.
 #[repr(C, align(64))]
 struct Guarded([u8; 512]);
 

@@ -7,7 +7,7 @@ use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 
 impl Scene {
-    /// The nearest hit, if any.
+    /// The nearest hit on the ray's segment; `None` if nothing is hit.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
@@ -23,7 +23,7 @@ impl Scene {
         (raw.hit.geometry != INVALID_GEOMETRY_ID).then(|| Hit::new(raw.ray.tfar, &raw.hit))
     }
 
-    /// Calls `each` with every hit on the segment, in arbitrary order. Slow, because each hit is a callback from
+    /// Calls `each` with every hit on the ray's segment, in arbitrary order. Slow, because each hit is a callback from
     /// Embree: meant for few and short rays.
     pub fn each_hit(&self, ray: &Ray, each: &mut dyn FnMut(Hit)) {
         let mut raw = RawRayHit { ray: RawRay::new(ray), hit: RawHit::MISS };
@@ -37,8 +37,8 @@ impl Scene {
     }
 
     /// Traces up to eight rays of similar directions, such as those of neighbouring pixels, and calls `each` with the
-    /// number and nearest hit of every ray that hits. Faster than [`Scene::intersect`] for each ray. `ray(k)` is ray k
-    /// of 8, if there is one.
+    /// number, 0 to 7, and nearest hit of every ray that hits. Faster than [`Scene::intersect`] for each ray. `ray(k)`
+    /// is ray k of 8, if there is one.
     ///
     /// For ties and rays through edges, the hit may differ from that of [`Scene::intersect`]. It depends only on the
     /// rays of the packet.
@@ -104,7 +104,7 @@ impl Scene {
         }
     }
 
-    /// Whether any hit is on the segment.
+    /// Whether anything is hit on the ray's segment.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut raw = RawRay::new(ray);

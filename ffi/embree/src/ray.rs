@@ -9,15 +9,16 @@ use crate::geometry::GeometryId;
 /// without instances, and at least 1e9 in others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Point at t = 0.
+    /// Origin of the ray, the point at t = 0.
     pub origin: [f32; 3],
-    /// Direction, of any length. The length is the unit of t.
+    /// Direction of the ray, of any length. The length is the unit of t.
     pub direction: [f32; 3],
     /// Smallest t of a hit. Negative values count as 0.
     pub tmin: f32,
     /// Largest t of a hit; may be infinite. A ray with `tmax < tmin` hits nothing.
     pub tmax: f32,
-    /// Passed to filters as [`Candidate::token`](crate::Candidate::token). It has no other effect.
+    /// Caller's number for the ray, passed to filters as [`Candidate::token`](crate::Candidate::token). It has no other
+    /// effect.
     pub token: u32,
 }
 
@@ -74,7 +75,7 @@ impl RawRay {
         }
     }
 
-    /// Whether the segment is not empty and its coordinates are at most `max_coordinate`.
+    /// Whether the ray's segment is not empty and its coordinates are at most `max_coordinate`.
     ///
     /// Embree must not trace any other ray: a library built with assertions, such as Debian's 3.13.5, aborts the
     /// program, and `occluded` needs a `tfar` that is not negative.

@@ -10,7 +10,7 @@ use crate::filter::{self, Filter};
 use crate::geometry::{Bounds, GeometryId, MAX_COORDINATE, MAX_GEOMETRY_ID};
 use crate::transform;
 
-/// Builds a scene.
+/// Builds a scene from triangle meshes and instances of other scenes.
 ///
 /// Scenes are built in Embree's robust mode: rays do not pass between triangles that share an edge. At corners a gap of
 /// about the rounding error remains: one or two in a hundred rays aimed exactly at the corners of a tessellated sphere
@@ -24,13 +24,13 @@ pub struct SceneBuilder {
     geometries: HashMap<GeometryId, BuilderGeometry>,
     has_instances: bool,
     has_filters: bool,
-    /// Largest valid coordinate of a ray.
+    /// Largest absolute coordinate of a ray that the scene accepts.
     max_ray_coordinate: f32,
 }
 
-/// A geometry of a scene builder.
+/// A geometry that was added to a scene builder.
 enum BuilderGeometry {
-    /// A mesh.
+    /// A triangle mesh.
     Mesh(Geometry),
     /// A mesh without triangles, which is not passed to Embree.
     Empty,
@@ -283,7 +283,7 @@ pub struct Scene {
     pub(crate) filtered: bool,
     /// Whether rays may be traced in packets of eight. Not with filters, which expect single rays.
     pub(crate) packets: bool,
-    /// Largest valid coordinate of a ray.
+    /// Largest absolute coordinate of a ray that the scene accepts.
     pub(crate) max_ray_coordinate: f32,
     shared: Arc<Shared>,
 }
@@ -309,7 +309,7 @@ impl Scene {
         (x <= a && y <= b && z <= c).then_some(Bounds { min: [x, y, z], max: [a, b, c] })
     }
 
-    /// The device the scene was built with.
+    /// The Embree device that the scene was built with.
     pub fn device(&self) -> &Device {
         &self.shared.owned.raw.device
     }

@@ -5,15 +5,15 @@
 
 use crate::geometry::{Bounds, MAX_COORDINATE};
 
-/// Every scene accepts rays with coordinates up to at least this value.
+/// Least limit on a ray's coordinates: every scene accepts rays with coordinates up to at least this value.
 const MIN_RAY_LIMIT: f32 = 1e9;
 
-/// Smallest volume of the parallelepiped spanned by the images of the axes, scaled to unit length. Below it, rounding
-/// errors make the inverse useless.
+/// Smallest volume of the parallelepiped that an instance's matrix makes of the axes, scaled to unit length. Below it,
+/// rounding errors make the inverse useless.
 const MIN_VOLUME: f64 = 1e-4;
 
-/// The largest coordinate of a ray that stays valid in the space of the instance. `None` if the matrix (column-major
-/// 3x4) is not finite, not invertible, or too extreme for single precision.
+/// The largest coordinate of a ray that stays valid in the space of an instance with the matrix `local_to_world`
+/// (column-major 3x4). `None` if the matrix is not finite, not invertible, or too extreme for single precision.
 pub fn max_ray_coordinate(local_to_world: &[f32; 12], child: Option<Bounds>) -> Option<f32> {
     if !local_to_world.iter().all(|x| x.is_finite()) {
         return None;

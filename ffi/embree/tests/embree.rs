@@ -21,7 +21,7 @@ fn down(x: f32, y: f32) -> Ray {
     ray([x, y, 5.0], [0.0, 0.0, -1.0])
 }
 
-/// The hits of a packet of rays.
+/// The nearest hit of each ray, all traced as one packet; `None` for a missing ray or without a hit.
 fn together(scene: &Scene, rays: &[Option<Ray>; 8]) -> [Option<Hit>; 8] {
     let mut hits = [None; 8];
     scene.intersect8(|k| rays[k], |k, hit| hits[k] = Some(hit));
@@ -422,7 +422,7 @@ fn extreme_instances_are_refused_or_do_not_crash() {
     assert!(taken > 200 && refused > 200, "{taken} taken, {refused} refused");
 }
 
-/// Three sheets, the middle one with a filter.
+/// A scene of three parallel sheets, the middle one with a filter.
 fn sheets(filter: impl Fn(&Candidate) -> bool + Send + Sync + 'static) -> Scene {
     let mut builder = builder();
     for sheet in 0..3u32 {

@@ -13,11 +13,11 @@ const MAX_DEPTH: usize = 3;
 /// The version number of a library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
-    /// The first number.
+    /// First of the three version numbers.
     pub major: u32,
-    /// The second number.
+    /// Second of the three version numbers.
     pub minor: u32,
-    /// The third number.
+    /// Third of the three version numbers.
     pub patch: u32,
 }
 
@@ -37,12 +37,12 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    /// The refusal of the file at `path`.
+    /// A refusal of the library file at `path`, for `reason`.
     pub fn new(path: &Path, reason: impl Into<String>) -> Refusal {
         Refusal { path: path.to_owned(), reason: reason.into() }
     }
 
-    /// The refusal of the file at `path` by the system's loader, whose message repeats the path.
+    /// A refusal of the library file at `path` because of the system's loader, whose message repeats the path.
     pub fn by_loader(path: &Path, error: &libloading::Error) -> Refusal {
         let text = error.to_string();
         let prefix = format!("{}: ", path.display());
@@ -67,7 +67,7 @@ pub unsafe fn open(path: &Path) -> Result<Library, Refusal> {
     unsafe { Library::new(OsStr::new(path)) }.map_err(|error| Refusal::by_loader(path, &error))
 }
 
-/// Loads the first of `candidates` that `load` accepts.
+/// Loads the first of the `candidates`, library files, that `load` accepts.
 ///
 /// # Errors
 /// `load` accepts none. The error lists all candidates with the reasons, in order.
@@ -110,12 +110,13 @@ fn add_files_below(folder: &Path, stem: &str, depth: usize, found: &mut Vec<Path
     }
 }
 
-/// The file name of a path; empty if it is not UTF-8.
+/// The file name at the end of a path; empty if it is not UTF-8.
 pub fn file_name(path: &Path) -> &str {
     path.file_name().and_then(OsStr::to_str).unwrap_or_default()
 }
 
-/// The file that contains the code or data at `address`, under the name by which it was loaded.
+/// The file that contains the code or data at `address`, under the name by which it was loaded; `None` if there is
+/// none.
 #[cfg(unix)]
 pub fn file_containing(address: usize) -> Option<PathBuf> {
     use std::ffi::{CStr, c_char, c_int, c_void};

@@ -34,7 +34,7 @@ fn peak_memory() -> u64 {
     line.trim().trim_end_matches(" kB").parse().unwrap_or(0) / 1024
 }
 
-/// Hash of the bytes by FNV-1a.
+/// FNV-1a hash of the bytes of a picture's pixels.
 fn fingerprint(pixels: &[[f32; 3]]) -> u64 {
     let bytes = pixels.iter().flatten().flat_map(|value| value.to_bits().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))

@@ -2,24 +2,24 @@
 
 use std::ffi::{c_char, c_int, c_void};
 
-/// A device or a filter: an opaque pointer, null on failure.
+/// A device or a filter of Open Image Denoise: an opaque pointer, null on failure.
 pub type Handle = *mut c_void;
 
-/// Device type of the CPU.
+/// Open Image Denoise's device type of the CPU.
 pub const DEVICE_TYPE_CPU: c_int = 1;
 
-/// Pixels of three floats.
+/// Pixel format of three floats per pixel.
 pub const FORMAT_FLOAT3: c_int = 3;
 
-/// Exists from version 2.3 on.
+/// Quality for previews, which exists from version 2.3 of Open Image Denoise on.
 pub const QUALITY_FAST: c_int = 4;
 pub const QUALITY_BALANCED: c_int = 5;
 pub const QUALITY_HIGH: c_int = 6;
 
-/// Result of [`Functions::device_error`] if there is no error.
+/// Code that [`Functions::device_error`] returns if there is no error.
 pub const NO_ERROR: c_int = 0;
 
-/// The meaning of an error code.
+/// The meaning of an error code of Open Image Denoise, in words.
 pub fn error_name(code: c_int) -> &'static str {
     match code {
         2 => "invalid argument",
@@ -50,7 +50,7 @@ macro_rules! functions {
 }
 
 functions! {
-    /// The functions of the library. Versions before 2.0 lack the typed setters and are therefore refused.
+    /// The functions of Open Image Denoise. Versions before 2.0 lack the typed setters and are therefore refused.
     Functions {
         new_device = b"oidnNewDevice\0" (c_int) -> Handle;
         release_device = b"oidnReleaseDevice\0" (Handle);

@@ -22,7 +22,7 @@ struct Inner {
     library: Library,
 }
 
-/// A device of the library, released when it is dropped.
+/// A raw device of the library, released when it is dropped.
 struct Raw {
     handle: Handle,
     release: unsafe extern "C" fn(Handle),
@@ -51,7 +51,7 @@ impl Device {
         Ok(Device { inner: Arc::new(Inner { raw, library: library.clone() }) })
     }
 
-    /// The library of this device.
+    /// The Open Image Denoise library that this device belongs to.
     pub fn library(&self) -> &Library {
         &self.inner.library
     }
@@ -64,7 +64,8 @@ impl Device {
         self.inner.library.functions()
     }
 
-    /// Returns the first error that the library has reported on this thread since the last check.
+    /// Returns the first error that the library has reported on this thread since the last check. `during` names the
+    /// operation.
     pub(crate) fn check(&self, during: &'static str) -> Result<(), Error> {
         match take_error(self.functions(), self.raw()) {
             Some(message) => Err(Error::Oidn { during, message }),
@@ -74,7 +75,7 @@ impl Device {
 }
 
 impl Raw {
-    /// Creates and commits a device. The error is the library's message.
+    /// Creates and commits a device with this number of threads. The error is the library's message.
     fn open(functions: &Functions, threads: c_int) -> Result<Raw, String> {
         // SAFETY: the argument is a device type of the library.
         let handle = unsafe { (functions.new_device)(api::DEVICE_TYPE_CPU) };
@@ -105,7 +106,7 @@ impl Drop for Raw {
     }
 }
 
-/// Creates a device and reads its version. This fails if the library does not find its modules.
+/// Creates a device and reads the library's version. This fails if the library does not find its modules.
 pub(crate) fn probe(functions: &Functions) -> Result<Version, String> {
     let device = Raw::open(functions, 1).map_err(|reason| format!("makes no device for this processor: {reason}"))?;
     let number = |name: &CStr| {
@@ -120,7 +121,7 @@ pub(crate) fn probe(functions: &Functions) -> Result<Version, String> {
     Ok(Version { major, minor, patch })
 }
 
-/// Takes the first error that the library has recorded on this thread since the last call.
+/// Takes the first error that the library has recorded on this thread since the last call; `None` if there is none.
 fn take_error(functions: &Functions, device: Handle) -> Option<String> {
     let mut text: *const c_char = std::ptr::null();
     // SAFETY: `device` is a device or null. The library sets the pointer or leaves it null.

@@ -33,7 +33,7 @@ pub enum Error {
         /// The library's message.
         message: String,
     },
-    /// More threads than [`MAX_THREADS`].
+    /// More threads were asked for than [`MAX_THREADS`]; holds their number.
     TooManyThreads(usize),
     /// A picture has no pixels, or a side longer than [`MAX_SIDE`].
     BadSize {
@@ -44,16 +44,16 @@ pub enum Error {
     },
     /// The number of pixels of a picture is not width times height.
     BadLength {
-        /// `color`, `albedo` or `normal`.
+        /// Name of the picture: `color`, `albedo` or `normal`.
         picture: &'static str,
-        /// Number of pixels passed.
+        /// Number of pixels that were passed.
         pixels: usize,
-        /// Expected width.
+        /// Expected width in pixels.
         width: usize,
-        /// Expected height.
+        /// Expected height in pixels.
         height: usize,
     },
-    /// Normals without albedo, for which the library has no network.
+    /// Normals were passed without albedo, for which the library has no network.
     NormalWithoutAlbedo,
 }
 

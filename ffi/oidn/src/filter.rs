@@ -19,7 +19,7 @@ pub enum Quality {
     High,
 }
 
-/// A picture to denoise. Pictures are row-major with three channels per pixel.
+/// A picture to denoise, its guides and settings. Pictures are row-major with three channels per pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
     /// Width in pixels.
@@ -29,15 +29,15 @@ pub struct Input<'a> {
     /// The noisy picture. NaN and negative values count as 0. Infinite and huge values are allowed, but spoil the
     /// result: see the crate's documentation.
     pub color: &'a [[f32; 3]],
-    /// Albedo of the surfaces, from 0 to 1, as a guide.
+    /// Albedo of the surfaces, from 0 to 1, as a guide; `None` without.
     pub albedo: Option<&'a [[f32; 3]]>,
-    /// Normals of the surfaces, each coordinate from -1 to 1, as a guide. Only together with `albedo`.
+    /// Normals of the surfaces, each coordinate from -1 to 1, as a guide; `None` without. Only together with `albedo`.
     pub normal: Option<&'a [[f32; 3]]>,
     /// Trade-off between quality and speed.
     pub quality: Quality,
     /// Whether `color` may exceed 1, like radiance. If false, larger values are clamped.
     pub hdr: bool,
-    /// Whether the guides are free of noise. If true, their noise remains in the result.
+    /// Whether the guides, albedo and normals, are free of noise. If true, their noise remains in the result.
     pub clean_aux: bool,
     /// Approximate limit on memory (MiB); `None` means no limit. The picture is cut into overlapping tiles that fit,
     /// but tiles have a minimum size.
@@ -45,7 +45,7 @@ pub struct Input<'a> {
 }
 
 impl<'a> Input<'a> {
-    /// A picture of radiance without guides, at high quality.
+    /// A picture of radiance to denoise without guides, at high quality.
     pub fn new(width: usize, height: usize, color: &'a [[f32; 3]]) -> Input<'a> {
         let quality = Quality::High;
         Input {
@@ -61,7 +61,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Checks sizes and guides, which the library does not check.
+    /// Checks the sizes of picture and guides, which the library does not check.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let (width, height) = (self.width, self.height);
         let sides = 1..=MAX_SIDE;
@@ -144,7 +144,7 @@ impl Filter {
         Ok(output)
     }
 
-    /// Sets or removes a picture that the filter reads.
+    /// Sets a picture that the filter reads under the name `name`, or removes it if `None`.
     fn set_image(&mut self, name: &CStr, pixels: Option<&[[f32; 3]]>, size: (usize, usize)) -> Result<(), Error> {
         match pixels {
             Some(pixels) => self.set_pixels(name, pixels.as_ptr().cast_mut().cast(), size),

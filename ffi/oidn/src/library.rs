@@ -8,7 +8,8 @@ use caustique_library::Version;
 
 use crate::api::Functions;
 
-/// Environment variable with the path of the library to use. If it is set and not empty, no other library is tried.
+/// Environment variable with the path of the Open Image Denoise library to use. If it is set and not empty, no other
+/// library is tried.
 pub const LIBRARY_VARIABLE: &str = "CAUSTIQUE_OIDN";
 
 /// A loaded Open Image Denoise library that has created a device in a test. Clones share it.
@@ -24,7 +25,7 @@ struct Inner {
 }
 
 impl Library {
-    /// The library with these functions that was loaded from `path`.
+    /// The Open Image Denoise library with these functions that was loaded from `path`.
     pub(crate) fn new(path: PathBuf, version: Version, functions: Functions) -> Library {
         Library { inner: Arc::new(Inner { path, version, functions }) }
     }
@@ -35,7 +36,7 @@ impl Library {
         &self.inner.path
     }
 
-    /// The version that a device of the library reports.
+    /// The version of Open Image Denoise that a device of the library reports.
     pub fn version(&self) -> Version {
         self.inner.version
     }

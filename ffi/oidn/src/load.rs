@@ -10,17 +10,18 @@ use crate::device;
 use crate::error::Error;
 use crate::library::{LIBRARY_VARIABLE, Library};
 
-/// Names for the system's loader, best first: of runtime packages, then of development packages.
+/// File names of Open Image Denoise for the system's loader, best first: of runtime packages, then of development
+/// packages.
 const NAMES: &[&str] = &["libOpenImageDenoise.so.2", "libOpenImageDenoise.so"];
 
-/// Common start of all names of the library file. Names of its modules start differently.
+/// Common start of all file names of Open Image Denoise. Names of its modules start differently.
 const STEM: &str = "libOpenImageDenoise.so";
 
-/// The library that [`Library::load`] found.
+/// The library that [`Library::load`] found; `None` before.
 static LOADED: Mutex<Option<Library>> = Mutex::new(None);
 
 impl Library {
-    /// Finds and loads the library. After the first success, all later calls return the same library.
+    /// Finds and loads Open Image Denoise. After the first success, all later calls return the same library.
     ///
     /// If [`LIBRARY_VARIABLE`] is set, only the file that it names is tried. Otherwise the candidates are the library's
     /// usual names for the system's loader, then any `libOpenImageDenoise.so*` below `folders`.
@@ -43,8 +44,8 @@ impl Library {
         Ok(loaded.insert(library).clone())
     }
 
-    /// Loads a library file. The system's loader looks up a bare file name in its own folders. The library finds its
-    /// modules in its own folder, as in the official packages and after `scripts/setup.sh`.
+    /// Loads a file of Open Image Denoise. The system's loader looks up a bare file name in its own folders. The
+    /// library finds its modules in its own folder, as in the official packages and after `scripts/setup.sh`.
     ///
     /// Loading runs the file's initialisers, so the file must be trusted.
     ///
@@ -57,8 +58,8 @@ impl Library {
     }
 }
 
-/// Loads the file that the environment variable names. The name is a path even without a folder, so the system's loader
-/// does not search for it.
+/// Loads the library file that the environment variable names. The name is a path even without a folder, so the
+/// system's loader does not search for it.
 fn load_named(path: &Path) -> Result<Library, Error> {
     match std::path::absolute(path) {
         Ok(absolute) if absolute.is_file() => Library::load_from(absolute),
@@ -70,7 +71,7 @@ fn load_first(candidates: &[PathBuf]) -> Result<Library, Error> {
     load_first_of(candidates, load).map_err(|tried| Error::NotFound { tried })
 }
 
-/// The names and files to try if the environment variable is not set, in order.
+/// The file names and paths of the library to try if the environment variable is not set, in order.
 fn candidates(folders: &[PathBuf]) -> Vec<PathBuf> {
     NAMES.iter().map(PathBuf::from).chain(find_below(folders, STEM)).collect()
 }

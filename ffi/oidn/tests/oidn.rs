@@ -36,7 +36,7 @@ fn noise(pixels: usize, seed: u64) -> Vec<[f32; 3]> {
     (0..pixels).map(|_| std::array::from_fn(|_| next())).collect()
 }
 
-/// Root mean square of the difference from 1.
+/// Root mean square of the pixels' difference from 1.
 fn deviation(pixels: &[[f32; 3]]) -> f64 {
     let squares: f64 = pixels.iter().flatten().map(|&value| (f64::from(value) - 1.0).powi(2)).sum();
     (squares / (3 * pixels.len()) as f64).sqrt()
@@ -46,7 +46,7 @@ fn bits(pixels: &[[f32; 3]]) -> Vec<u32> {
     pixels.iter().flatten().map(|value| value.to_bits()).collect()
 }
 
-/// An input with both guides.
+/// An input of the denoiser with both guides, albedo and normals.
 fn guided<'a>(
     (width, height): (usize, usize),
     color: &'a [[f32; 3]],

@@ -24,7 +24,7 @@ def pack(
     medium: Medium | None = None,
     extras: dict | None = None,
 ) -> bytes:
-    """The bytes of a .glb for `caustique render`; `medium` fills the space.
+    """Packs a scene into the bytes of a .glb for `caustique render`; `medium` fills the space.
 
     `extras` are further keys of the scene's `extras.caustique`, such as {"environment": {"file": "sky.exr"}}.
 
@@ -41,7 +41,7 @@ def pack(
 
 
 def png(name: str, texture) -> bytes:
-    """An image (H, W, 3) of bytes, encoded as PNG."""
+    """Encodes a texture (H, W, 3) of uint8 as the bytes of a PNG. `name` is for errors."""
     pixels = np.asarray(texture)
     if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or 0 in pixels.shape:
         raise ValueError(f"{name}: a texture is (H, W, 3) uint8, not {pixels.shape} {pixels.dtype}")
@@ -90,7 +90,7 @@ class Writer:
         return self.add("bufferViews", {"buffer": 0, "byteOffset": start, "byteLength": len(data)})
 
     def accessor(self, place: str, values, width: int, kind: int = FLOAT) -> int:
-        """Adds an array (N, width)."""
+        """Adds an array (N, width) to the buffer and returns the index of its accessor. `place` is for errors."""
         array = np.asarray(values)
         if array.ndim != 2 or array.shape[1] != width:
             raise ValueError(f"{place}: an array of shape (N, {width}) is needed, not {array.shape}")
@@ -135,7 +135,7 @@ class Writer:
         self.add("nodes", node)
 
     def material(self, material: Material) -> int:
-        """The index of a material. A material of several meshes is written once."""
+        """Adds a material and returns its index. A material of several meshes is written once."""
         if id(material) in self.written:
             return self.written[id(material)][1]
         emission = np.asarray(material.emission, float)
@@ -240,7 +240,7 @@ class Writer:
 
 
 def matrix(place: str, values) -> list[float]:
-    """A matrix (4, 4) in the column-major order of glTF."""
+    """The 16 numbers of a matrix (4, 4) in the column-major order of glTF. `place` is for errors."""
     array = np.asarray(values, float)
     if array.shape != (4, 4):
         raise ValueError(f"{place}: a transform is (4, 4), not {array.shape}")

@@ -14,7 +14,7 @@ Triple = Sequence[float]
 
 @dataclass(kw_only=True)
 class Medium:
-    """A homogeneous medium."""
+    """A homogeneous medium, such as water or fog, that absorbs and scatters light."""
 
     #: Absorption coefficient, 1/m, per channel.
     sigma_a: Triple = (0.0, 0.0, 0.0)
@@ -57,7 +57,7 @@ class Material:
 
 @dataclass(kw_only=True, eq=False)
 class Mesh:
-    """Triangles of one material."""
+    """A triangle mesh of one material."""
 
     #: Positions (V, 3), m.
     vertices: ArrayLike

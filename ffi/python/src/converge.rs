@@ -33,19 +33,19 @@ use std::sync::Arc;
 
 /// Seconds of each run if no argument limits it, as on the command line.
 const DEFAULT_TIME: f64 = 60.0;
-/// Options of a render that all runs share.
+/// Names of the options of a render that all runs of a comparison share.
 const SHARED_OPTIONS: [&str; 10] =
     ["seed", "max_depth", "iterations", "time", "target_error", "width", "height", "camera", "crop", "filter"];
-/// Methods if no runs are named, as on the command line.
+/// Names of the methods that are compared if the caller names no runs, as on the command line.
 const DEFAULT_METHODS: [&str; 4] = ["path", "sppm", "cppm", "vcm"];
 
-/// A run: its name and the options of its render.
+/// A run of a comparison: its name and the options of its render.
 struct Run {
     name: String,
     options: RenderOptions,
 }
 
-/// The arguments of a comparison.
+/// The arguments of a comparison of methods, from Python.
 struct Comparison {
     runs: Vec<Run>,
     /// Options that all runs share: seed, longest path and limits.
@@ -53,22 +53,22 @@ struct Comparison {
     moments: f64,
     seeds: u64,
     metric: Metric,
-    /// How to render a reference, if the caller gives none.
+    /// Method and limits for rendering a reference, if the caller gives none.
     reference: ReferenceOptions,
 }
 
-/// Options for rendering a reference.
+/// Method and limits for rendering a reference picture.
 struct ReferenceOptions {
     method: Option<Method>,
     iterations: Option<u64>,
     time: Option<f64>,
 }
 
-/// The scene of a comparison.
+/// The scene in which methods are compared.
 pub struct Compared<'a> {
     pub path: &'a Path,
     pub loaded: &'a Loaded,
-    /// The options of the scene.
+    /// The options that the scene was read with.
     pub options: &'a SceneOptions,
 }
 
@@ -109,7 +109,7 @@ pub fn converge<'py>(
     to_python(py, &done.whole()?)
 }
 
-/// The runs of the arguments `methods` and `runs`.
+/// The runs that the arguments `methods` and `runs` name.
 fn runs(py: Python<'_>, keywords: &mut Keywords<'_>, common: &RenderOptions) -> PyResult<Vec<Run>> {
     let methods: Option<Vec<String>> = keywords.take("methods")?;
     let named: Option<Bound<'_, PyDict>> = keywords.take("runs")?;
@@ -139,27 +139,27 @@ fn single(method: MethodChoice) -> PyResult<RenderOptions> {
     options::single(method.name(), method.0.is_none_or(Method::has_levels))
 }
 
-/// The options of a run, completed by the options that all runs share.
+/// The options of a run, completed by the options that all runs share, `common`.
 fn with_shared(run: RenderOptions, common: &RenderOptions) -> RenderOptions {
     let RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, .. } = *common;
     RenderOptions { seed, frame_seed, max_depth, iterations, time, target_error, scene: common.scene.clone(), ..run }
 }
 
-/// Reads a reference from an image, a file, or an array (H, W, 3).
+/// Reads a reference picture of this size from an image, a file, or an array (H, W, 3).
 fn reference(given: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<Reference> {
     let header = given.cast::<Image>().ok().and_then(|image| image.get().attributes.object()).unwrap_or(Value::Null);
     let set = picture("reference", given, None)?;
     Reference::of(&set, &header, size, "reference".into()).map_err(raised)
 }
 
-/// Calls the user's callback after each step.
+/// Calls the user's Python function after each step of a comparison.
 struct Callback<'a> {
     caller: &'a Caller,
     progress: Option<Arc<Py<PyAny>>>,
 }
 
 impl Callback<'_> {
-    /// Calls the callback with a state. Returns whether to continue.
+    /// Calls the user's function with the comparison's state as a dict. Returns whether to continue.
     fn call(&self, state: Value) -> Control {
         if let Some(callback) = self.progress.clone() {
             self.caller.run(move |py| {
@@ -172,7 +172,7 @@ impl Callback<'_> {
 }
 
 impl Comparison {
-    /// Settings of all runs and of a reference, before the size of the picture and the choices of `auto`.
+    /// Settings of all runs, and of the reference, before the size of the picture and the choices of `auto`.
     fn settings(&self) -> PyResult<(Vec<Settings>, Settings)> {
         let of = |options: &RenderOptions| options.settings().map_err(raised);
         let settings = self.runs.iter().map(|run| of(&run.options)).collect::<PyResult<_>>()?;
@@ -183,7 +183,7 @@ impl Comparison {
         Ok((settings, of(&with_shared(single(MethodChoice(Some(method)))?, &self.common))?))
     }
 
-    /// Seconds of each run; `None`: only the iterations are limited.
+    /// Time limit of each run in seconds; `None`: only the iterations are limited.
     fn time(&self) -> Option<f64> {
         self.common.time.or(self.common.iterations.is_none().then_some(DEFAULT_TIME))
     }
@@ -278,7 +278,7 @@ impl Comparison {
         Ok((entries, finishes))
     }
 
-    /// Renders a reference in two halves.
+    /// Renders a reference picture in two independent halves, which give its own error.
     fn render_reference(
         &self,
         settings: Settings,

@@ -19,7 +19,7 @@ create_exception!(
     "Something in the scene is ignored or approximated, or looks like a mistake."
 );
 
-/// The exception for an error of the library.
+/// The Python exception for an error of the library.
 pub fn raised(fault: Fault) -> PyErr {
     Python::attach(|py| {
         let (hint, cause) = (fault.hint.as_deref().map(in_python), in_python(&fault.cause));
@@ -37,7 +37,7 @@ pub fn raised(fault: Fault) -> PyErr {
     })
 }
 
-/// Options of the command line, and the Python arguments that have other names.
+/// Options of the command line, and the Python arguments that have other names for them.
 const RENAMED: [(&str, &str); 7] = [
     ("no-combine", "finish=False"),
     ("no-finish", "finish=False"),
@@ -48,10 +48,10 @@ const RENAMED: [(&str, &str); 7] = [
     ("png", "save"),
 ];
 
-/// Options that messages name together with a value.
+/// Options that error messages name together with a value.
 const WITH_VALUE: [&str; 2] = ["method", "indirect"];
 
-/// Splits a text after its leading letters and digits.
+/// Splits a text behind its leading letters and digits.
 fn split_word(text: &str) -> (&str, &str) {
     text.split_at(text.find(|c: char| !c.is_alphanumeric()).unwrap_or(text.len()))
 }
@@ -85,7 +85,7 @@ pub fn in_python(text: &str) -> String {
     out + rest
 }
 
-/// An exception for the arguments of a call.
+/// The Python exception for wrong arguments of a call, with the cause and a hint.
 pub fn usage(cause: impl std::fmt::Display, hint: impl std::fmt::Display) -> PyErr {
     raised(Fault::new(ErrorKind::Usage, "", cause).hint(hint))
 }

@@ -28,11 +28,11 @@ use std::path::PathBuf;
 /// Rec. 709 in W/(sr m2); "Variance1" and other variances are squares of radiance; "Z", "depth" and "P" are metres.
 #[pyclass(frozen, module = "caustique")]
 pub struct Image {
-    /// The layers.
+    /// The layers of the picture.
     pub set: LayerSet,
-    /// The header's attributes.
+    /// The attributes of the EXR header.
     pub attributes: Attributes,
-    /// The pixel sums of a shard, by which it is merged with the others.
+    /// The pixel sums of a shard, a part of a render, by which it is merged with the others; `None` for other images.
     pub sums: Option<ShardSums>,
 }
 
@@ -44,9 +44,9 @@ impl Image {
     }
 }
 
-/// Component names of a layer with one to four planes.
+/// Component names of a layer by its number of planes, one to four.
 const COMPONENTS: [&str; 4] = ["X", "XY", "RGB", "RGBA"];
-/// Layers of vectors.
+/// Names of the layers that hold vectors, X, Y and Z.
 const VECTORS: [&str; 2] = ["normal", "P"];
 
 #[pymethods]
@@ -220,7 +220,7 @@ fn check_memory(count: usize) -> PyResult<()> {
 /// pixel.
 const ARRAY_COPIES: usize = 4;
 
-/// Converts a numpy array to a layer. Returns also its height and width.
+/// Converts a numpy array to a layer with this name. Returns also its height and width.
 fn layer(name: &str, given: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Layer)> {
     let array = given.py().import("numpy")?.call_method1("asarray", (given,))?;
     check_memory(array.getattr("size")?.extract::<usize>()?.saturating_mul(ARRAY_COPIES))?;
@@ -271,7 +271,7 @@ pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyR
     Ok(LayerSet { width, height, layers: vec![layer] })
 }
 
-/// The array, or an exception for its shape.
+/// The array, or a Python exception for its wrong shape.
 fn shaped<T, E: std::fmt::Display>(array: Result<T, E>) -> PyResult<T> {
     array.map_err(|cause| raised(Error::new(ErrorKind::Image, "", cause)))
 }

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use std::fmt::Display;
 use std::ops::RangeBounds;
 
-/// Keyword arguments of a call.
+/// The keyword arguments of a Python call, and the names that have been taken.
 pub struct Keywords<'py> {
     call: &'static str,
     given: Bound<'py, PyDict>,
@@ -17,12 +17,12 @@ pub struct Keywords<'py> {
 }
 
 impl<'py> Keywords<'py> {
-    /// The keyword arguments of a call.
+    /// Keyword arguments `given` to the Python function `call`.
     pub fn of(py: Python<'py>, call: &'static str, given: Option<&Bound<'py, PyDict>>) -> Self {
         Keywords { call, given: given.cloned().unwrap_or_else(|| PyDict::new(py)), known: Vec::new() }
     }
 
-    /// Takes an argument; `None` if it is None or missing.
+    /// Takes the argument `name`; `None` if it is None or missing.
     ///
     /// # Errors
     /// The argument has the wrong type, or is a number that does not fit the type.
@@ -39,7 +39,8 @@ impl<'py> Keywords<'py> {
         })
     }
 
-    /// Takes a number within a range. `say` describes the range.
+    /// Takes the argument `name`, a number within a range; `None` if it is missing. `say` describes the range for
+    /// errors.
     ///
     /// # Errors
     /// The number is out of range.
@@ -55,7 +56,7 @@ impl<'py> Keywords<'py> {
         }
     }
 
-    /// Takes one of several names.
+    /// Takes the argument `name`, one of the names of an enum; `None` if it is missing.
     ///
     /// # Errors
     /// The name does not exist.
@@ -64,23 +65,23 @@ impl<'py> Keywords<'py> {
         choice(&format!("{}: {name}", self.call), &given).map(Some)
     }
 
-    /// Whether an argument has been taken.
+    /// Whether the argument `name` has been taken.
     pub fn has_taken(&self, name: &str) -> bool {
         self.known.iter().any(|known| known == name)
     }
 
-    /// Name of the call.
+    /// Name of the Python function that is called.
     pub fn call(&self) -> &'static str {
         self.call
     }
 
-    /// The value of an argument in Python's notation.
+    /// The value of the argument `name` in Python's notation, or `?`.
     pub fn shown(&self, name: &str) -> String {
         let value = self.given.get_item(name).ok().flatten();
         value.and_then(|value| value.repr().ok()).map_or_else(|| "?".into(), |shown| shown.to_string())
     }
 
-    /// Errors: an argument that nothing has taken.
+    /// Fails if an argument was given that nothing has taken.
     pub fn check_all_taken(self) -> PyResult<()> {
         for (key, _) in self.given.iter() {
             let key: String = key.extract()?;
@@ -95,7 +96,7 @@ impl<'py> Keywords<'py> {
     }
 }
 
-/// The value with a name. `place` names the argument in errors.
+/// The enum's value that the name `given` stands for. `place` names the argument in errors.
 ///
 /// # Errors
 /// The name does not exist.
@@ -103,7 +104,7 @@ pub fn choice<T: ValueEnum>(place: &str, given: &str) -> PyResult<T> {
     one_of(given).map_err(|names| usage(format!("{place}='{given}' does not exist"), names))
 }
 
-/// The known name that is most similar to an unknown one, by Python's difflib.
+/// The known argument name that is most similar to the unknown `key`, by Python's difflib; `None` if none is similar.
 fn nearest(given: &Bound<'_, PyDict>, key: &str, known: &[String]) -> PyResult<Option<String>> {
     let matches = given.py().import("difflib")?.call_method1("get_close_matches", (key, known.to_vec(), 1))?;
     Ok(matches.extract::<Vec<String>>()?.into_iter().next())

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
 
-/// Version, file and origin of a library, or why it was not found and how to install it.
+/// Version, file and origin of a library that was found; or why it was not found, and how to install it.
 type Finding = Result<(String, String, &'static str), (String, Option<String>)>;
 
 /// find_libraries() -> dict: where Embree, Open Image Denoise and ONNX Runtime were found.

@@ -11,27 +11,27 @@ use pyo3::prelude::*;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// Headings of options that may differ between the runs of a comparison.
+/// Headings of the options that may differ between the runs of a comparison.
 const HEADINGS_OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
-/// Options under these headings that all runs of a comparison share.
+/// Names of options under these headings that all runs of a comparison share nevertheless.
 const SHARED: [&str; 2] = ["seed", "max_depth"];
 
-/// Options of `render`.
+/// Descriptions of the options of `render`.
 pub fn of_render() -> Vec<OptionDescription> {
     of_python()
 }
 
-/// Options of `plan`: picture, method and finish, but neither output nor running.
+/// Descriptions of the options of `plan`: picture, method and finish, but neither output nor running.
 pub fn of_plan() -> Vec<OptionDescription> {
     chosen(|entry| !["Output", "Running"].contains(&entry.heading.as_str()))
 }
 
-/// Options of one run of a comparison.
+/// Descriptions of the options of one run of a comparison.
 pub fn of_run() -> Vec<OptionDescription> {
     chosen(|entry| HEADINGS_OF_RUN.contains(&entry.heading.as_str()) && !SHARED.contains(&entry.name.as_str()))
 }
 
-/// The options with these names.
+/// Descriptions of the options with these names.
 pub fn named(names: &[&str]) -> Vec<OptionDescription> {
     chosen(|entry| names.contains(&entry.name.as_str()))
 }
@@ -40,12 +40,12 @@ fn chosen(wanted: impl Fn(&OptionDescription) -> bool) -> Vec<OptionDescription>
     of_python().into_iter().filter(wanted).collect()
 }
 
-/// The finish that arguments of `call` ask for.
+/// The finish of a render, by the arguments `denoise` and `model` of `call`.
 pub fn finish_request(call: &str, denoise: &str, model: Option<String>) -> PyResult<FinishRequest> {
     Ok(FinishRequest { denoiser: choice(&format!("{call}: denoise"), denoise)?, model })
 }
 
-/// The warning that the built-in denoiser replaces a missing one.
+/// Text of the warning that the built-in denoiser replaces a missing one.
 pub fn missing_denoiser(error: &Error) -> String {
     let hint = error.hint.as_ref().map(|hint| format!("; {hint}")).unwrap_or_default();
     format!("{error}: our own denoiser takes its place, whose pictures are grainier{hint}")
@@ -76,7 +76,7 @@ pub fn take_scene(keywords: &mut Keywords<'_>, more: Vec<OsString>) -> PyResult<
     Ok(parsed(keywords, &of_scene(), more)?.0.scene)
 }
 
-/// The options of a method with one level and no finish, for a comparison.
+/// The options of a render by a method without a finish, for a comparison; with one bandwidth level if it has levels.
 pub fn single(method: &str, has_levels: bool) -> PyResult<RenderOptions> {
     let mut words = vec![format!("--method={method}"), "--no-finish".into()];
     words.extend(has_levels.then(|| "--levels=1".to_string()));
@@ -98,7 +98,7 @@ fn parsed(
     parse(words).map_err(|invalid| invalid_argument(keywords, options, &invalid))
 }
 
-/// The exception for an argument that the library rejects.
+/// The Python exception for an argument that the library rejects.
 fn invalid_argument(
     keywords: &Keywords<'_>,
     options: &[OptionDescription],
@@ -110,7 +110,7 @@ fn invalid_argument(
     usage(format!("{}: {name}={} {fault}", keywords.call(), keywords.shown(name)), reason)
 }
 
-/// The arguments of the command line for a keyword argument.
+/// The arguments of the command line for the keyword argument of an option; empty if it is missing.
 fn words(keywords: &mut Keywords<'_>, entry: &OptionDescription) -> PyResult<Vec<OsString>> {
     let name = entry.python.as_deref().unwrap_or(&entry.name);
     let option = &entry.option;
@@ -147,7 +147,7 @@ fn words(keywords: &mut Keywords<'_>, entry: &OptionDescription) -> PyResult<Vec
     Ok(given.unwrap_or_default())
 }
 
-/// The texts of a value: one, or one for each item of a sequence.
+/// The value as texts for the command line: one, or one for each item of a sequence.
 fn texts(value: &Bound<'_, PyAny>) -> PyResult<Vec<OsString>> {
     if let Ok(text) = value.extract::<PathBuf>() {
         return Ok(vec![text.into()]);

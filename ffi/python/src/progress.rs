@@ -18,7 +18,7 @@ pub struct Progress {
     pub light_paths: u64,
     /// Estimated relative error (the root of relMSE), if known.
     pub error: Option<f64>,
-    /// What the error belongs to: 'finished picture', or the parts of the estimate's error that it includes.
+    /// Subject of `error`: 'finished picture', or the parts of the estimate's error that it includes.
     pub error_of: &'static str,
 }
 

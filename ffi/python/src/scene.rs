@@ -35,7 +35,7 @@ pub struct Scene {
     identity: Identity,
 }
 
-/// The identity of a scene for headers, checkpoints and shards: its options, as JSON, and the file of its environment.
+/// Identity of a scene for headers, checkpoints and shards: its options, as JSON, and the file of its environment.
 struct Identity {
     options: Value,
     environment: Option<PathBuf>,
@@ -204,7 +204,7 @@ impl Scene {
 }
 
 impl Scene {
-    /// Origin of the scene, for messages and for the identity of checkpoints and shards.
+    /// Where the scene was read from, for messages and for the identity of checkpoints and shards.
     fn request(&self) -> SceneRequest {
         SceneRequest {
             path: self.path.clone(),
@@ -216,7 +216,7 @@ impl Scene {
         }
     }
 
-    /// The arguments for the header, under the names of the command line.
+    /// The arguments of a render for the header, as JSON, under the names of the command line.
     fn arguments(&self, py: Python<'_>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Value> {
         let own = ["progress", "threads", "checkpoint", "checkpoint_every", "overwrite", "resume"];
         let mut arguments = arguments_as_json(py, options, &own)?;
@@ -260,7 +260,7 @@ fn arguments_as_json(py: Python<'_>, options: Option<&Bound<'_, PyDict>>, but: &
     })
 }
 
-/// The image of a render. If its finish failed, an exception with the image as its attribute.
+/// The image that a render gives. If its finish failed, an exception with the image as its attribute.
 pub fn delivered(py: Python<'_>, delivery: Delivery) -> PyResult<Image> {
     let (image, finish_error) = Image::of(delivery);
     let Some(error) = finish_error.map(raised) else { return Ok(image) };
@@ -278,7 +278,7 @@ fn environment_word(given: &Bound<'_, PyAny>) -> PyResult<OsString> {
     Ok(word)
 }
 
-/// The environment, if it is an array (H, W, 3).
+/// The environment as a picture; `None` unless it is given as an array (H, W, 3).
 fn environment_array(given: &Bound<'_, PyAny>) -> PyResult<Option<Environment>> {
     if given.extract::<PathBuf>().is_ok() || given.extract::<[f32; 3]>().is_ok() {
         return Ok(None);
@@ -315,7 +315,7 @@ impl Observer for CallerReports<'_> {
 }
 
 impl CallerReports<'_> {
-    /// Calls the user's function, which stops the render by returning False.
+    /// Calls the user's function with the progress of a render; the function stops the render by returning False.
     fn call_back(&self, progress: &caustique::render::Progress) {
         let Some(callback) = self.progress.clone() else { return };
         let progress = Progress::from(progress);

@@ -4,12 +4,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
 
-/// A JSON value as Python objects.
+/// Converts a JSON value to Python objects.
 pub fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
     py.import("json")?.call_method1("loads", (value.to_string(),))
 }
 
-/// Keyword arguments as JSON. Objects that JSON does not have become their `str`.
+/// Converts keyword arguments to a JSON object. Objects that JSON does not have become their `str`.
 pub fn to_json(arguments: &Bound<'_, PyDict>) -> PyResult<Value> {
     let py = arguments.py();
     let options = PyDict::new(py);

@@ -17,20 +17,20 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-/// Time between two checks for signals.
+/// Time between two checks for signals, such as Ctrl-C, while work runs.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A task for the calling thread. Returns whether the work continues.
+/// A task that work on other threads leaves to the calling Python thread. Returns whether the work continues.
 type Task = Box<dyn FnOnce(Python<'_>) -> PyResult<bool> + Send>;
 
-/// The connection of the work to the calling thread.
+/// The connection of the work on other threads to the Python thread that has called it.
 pub struct Caller {
     tasks: Sender<(Task, Sender<()>)>,
     stopped: Arc<AtomicBool>,
 }
 
 impl Caller {
-    /// Runs a task in the calling thread and waits for its end.
+    /// Runs a task in the calling Python thread and waits for its end.
     pub fn run(&self, task: impl FnOnce(Python<'_>) -> PyResult<bool> + Send + 'static) {
         let (done, answered) = channel();
         if self.tasks.send((Box::new(task), done)).is_ok() {
@@ -39,7 +39,7 @@ impl Caller {
         }
     }
 
-    /// The stop flag for the work.
+    /// The flag that stops the work.
     pub fn stop(&self) -> Stop {
         Stop::from_flag(Arc::clone(&self.stopped))
     }
@@ -49,7 +49,8 @@ impl Caller {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    /// Issues Python warnings. If the user turns warnings into errors, they stop the work.
+    /// Issues texts as Python warnings, in the calling thread. If the user turns warnings into errors, they stop the
+    /// work.
     pub fn warn(&self, texts: &[String]) {
         let texts = texts.to_vec();
         if !texts.is_empty() {
@@ -58,7 +59,7 @@ impl Caller {
     }
 }
 
-/// Issues Python warnings.
+/// Issues texts as Python warnings.
 pub fn warn(py: Python<'_>, texts: &[String]) -> PyResult<()> {
     let category = py.get_type::<SceneWarning>();
     texts.iter().try_for_each(|text| {
@@ -67,16 +68,16 @@ pub fn warn(py: Python<'_>, texts: &[String]) -> PyResult<()> {
     })
 }
 
-/// The result of work, and the exception that was raised in Python meanwhile.
+/// The result of work, and the Python exception that was raised meanwhile.
 pub struct Done<T> {
-    /// The result.
+    /// Result of the work.
     pub result: Result<T>,
-    /// The exception of a signal or a callback.
+    /// The Python exception of a signal or a callback; `None` if there was none.
     pub raised: Option<PyErr>,
 }
 
 impl<T> Done<T> {
-    /// The result, for work that has no partial result when it is stopped.
+    /// The result, for work that has no partial result when it is stopped; the exception if there was one.
     pub fn whole(self) -> PyResult<T> {
         match self.raised {
             Some(error) => Err(error),
@@ -85,12 +86,12 @@ impl<T> Done<T> {
     }
 }
 
-/// Most threads on small machines.
+/// Largest number of threads on machines with few cores.
 const MAX_THREADS: usize = 64;
-/// Most threads per core on large machines.
+/// Largest number of threads per core on machines with many cores.
 const MAX_THREADS_PER_CORE: usize = 4;
 
-/// Runs a job with `threads` threads; 0 takes all cores.
+/// Runs a job with `threads` threads, while the calling Python thread checks for signals; 0 takes all cores.
 ///
 /// # Errors
 /// There are far fewer cores, or the system starts no threads.

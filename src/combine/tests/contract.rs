@@ -5,7 +5,7 @@ use super::output::{NetworkOutput, Rect};
 use super::*;
 use std::collections::HashMap;
 
-/// Reads the fixture part by part.
+/// The unread bytes of the fixture, the file with inputs and outputs of a network.
 struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {

@@ -7,7 +7,7 @@ const REACH: usize = 7;
 /// Rounding error of a mean of some hundreds of terms, relative to the largest number that is summed.
 const ROUNDING: f32 = 1e-5;
 
-/// Least and largest term of a pixel's channel, and the rounding error.
+/// Least and largest term of equation (6) in channel `c` of a pixel, and the rounding error of their mean.
 fn hull(stack: &LevelStack, valid: &[bool], pixel: usize, c: usize) -> (f32, f32, f32) {
     let (x, y) = (pixel % stack.size.width, pixel / stack.size.width);
     let (mut least, mut most, mut largest) = (f32::INFINITY, f32::NEG_INFINITY, 0f32);
@@ -38,7 +38,7 @@ fn outside(stack: &LevelStack, image: &Picture) -> usize {
     (0..image.len()).filter(|&pixel| valid[pixel] && (0..3).any(|c| beyond(pixel, c))).count()
 }
 
-/// A stack whose levels are a function `of` the pixel's index, times noise with mean 1.
+/// A stack of bandwidth levels that are a function `of` the pixel's index, times noise with mean 1.
 fn picture(width: usize, height: usize, noise: f32, of: impl Fn(usize) -> f32) -> LevelStack {
     let mut stack = Random(12).stack(width, height, 5);
     let mut random = Random(13);

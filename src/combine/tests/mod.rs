@@ -30,7 +30,7 @@ impl Random {
         Picture::new(size, pixels)
     }
 
-    /// Levels that share a picture and differ by noise.
+    /// A stack of random bandwidth levels that share a picture and differ by noise.
     fn stack(&mut self, width: usize, height: usize, levels: usize) -> LevelStack {
         let size = Size { width, height };
         let n = size.pixels();
@@ -56,7 +56,7 @@ fn combiner() -> Combiner {
     Combiner::new(&Model::compact(), &Runtime::find().unwrap()).unwrap()
 }
 
-/// Largest difference of two images, relative to `scale`.
+/// Largest absolute difference of two images' channels, divided by `scale`.
 fn distance(a: &[[f32; 3]], b: &[[f32; 3]], scale: f32) -> f32 {
     assert_eq!(a.len(), b.len());
     let worst = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);

@@ -5,10 +5,10 @@
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
-/// Bytes of the magic number and the version before the first attribute.
+/// Bytes of the magic number and the version of an EXR, which precede the first attribute.
 const PREAMBLE: u64 = 8;
 
-/// Sorts the attributes of a single-part file by name, as the OpenEXR library writes them.
+/// Sorts the attributes in the header of a single-part EXR by name, as the OpenEXR library writes them.
 ///
 /// # Errors
 /// Errors of `file`, and `InvalidData` if the bytes are not a header.
@@ -27,8 +27,8 @@ pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F) -> io::Resul
     file.write_all(&attributes.concat())
 }
 
-/// The bytes of one attribute: name, zero, type, zero, size of the value (four bytes, little endian),
-/// value. `None` at the end.
+/// The bytes of one attribute of the header: name, zero, type, zero, size of the value (four bytes, little endian),
+/// value. `None` at the end of the header.
 fn read_attribute(reader: &mut impl Read) -> io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
     if read_text(reader, &mut bytes)? == 0 {

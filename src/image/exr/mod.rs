@@ -14,24 +14,24 @@ use std::collections::BTreeMap;
 pub use read::read;
 pub use write::{Compression, Options, write, write_followed};
 
-/// Name and version of the program, for headers.
+/// Name and version of the program, for the headers of EXR files.
 const SOFTWARE: &str = concat!("caustique ", env!("CARGO_PKG_VERSION"));
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::ascii_json;
 use serde::{Deserialize, Serialize};
 
-/// Name of the attribute that holds our JSON object.
+/// Name of the header attribute that holds our JSON object about the render.
 pub const ATTRIBUTE: &str = "caustique";
 
-/// The contents of a header besides its channels.
+/// The attributes in the header of an EXR, besides its channels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Attributes {
     /// String attributes by name, ASCII only: Python's OpenEXR refuses a whole file for one byte above 127.
     pub texts: BTreeMap<String, String>,
-    /// Window within a larger picture, and the camera. The reader leaves it empty.
+    /// Position of the picture in a larger one, and the camera. The reader leaves it empty.
     pub frame: Option<Frame>,
-    /// Frame number and rate. The reader leaves it empty.
+    /// Frame number and frame rate. The reader leaves it empty.
     pub moment: Moment,
 }
 
@@ -89,7 +89,7 @@ impl Attributes {
         Ok(())
     }
 
-    /// The object in the attribute `caustique`; `None` if the file is not ours.
+    /// The JSON object about the render in the attribute `caustique`; `None` if caustique has not written the file.
     pub fn object(&self) -> Option<serde_json::Value> {
         serde_json::from_str(self.texts.get(ATTRIBUTE)?).ok()
     }

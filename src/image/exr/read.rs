@@ -18,7 +18,7 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Plane, Sample};
 use crate::memory;
 
-/// Reads every channel of every part, and the string attributes of all parts.
+/// Reads every channel of every part of an EXR as layers, and the string attributes of all parts.
 ///
 /// The picture is the display window: pixels outside a part's data window are zero, pixels outside the display window are
 /// dropped. Samples of type half and uint become `f32` (uint above 2^24 is rounded). The full resolution of tiled files
@@ -112,10 +112,10 @@ fn check_size(headers: &[Header], length: u64) -> Outcome<()> {
 
 /// Maximum compression ratio of Deflate: 258 bytes from two bits, one for the length and one for the distance.
 const DEFLATE_RATIO: u128 = 1032;
-/// Bytes of a display window that are always accepted, because the file may hold a small window of it.
+/// Bytes of pixels in a display window that are always accepted, because the file may hold a small window of it.
 const MAX_WINDOWED_BYTES: u64 = 1 << 30;
 
-/// Upper bound on the compression ratio: bytes of samples per byte of the file.
+/// Upper bound on the compression ratio of a part: bytes of samples per byte of the file.
 fn max_ratio(header: &Header) -> u128 {
     match header.compression {
         Compression::Uncompressed => 1,
@@ -132,7 +132,8 @@ fn max_ratio(header: &Header) -> u128 {
     }
 }
 
-/// Checks the sizes of the sections of a DWA chunk, eleven 64-bit numbers at its start: the decoder allocates as they say.
+/// Checks the sizes of the sections of a DWA chunk, eleven 64-bit numbers at its start, because the decoder allocates
+/// memory as they say.
 fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
     let Some(header) = headers.get(chunk.layer_index) else { return Err(invalid("part index")) };
     let bytes = match &chunk.compressed_block {
@@ -153,13 +154,13 @@ fn check_sections(chunk: &Chunk, headers: &[Header]) -> Outcome<()> {
     Ok(())
 }
 
-/// The display window, one plane per channel of every part.
+/// The pixels of the display window that is read, one plane per channel of every part.
 struct Canvas {
     left: i64,
     top: i64,
     width: usize,
     height: usize,
-    /// Values of each part and channel, row by row.
+    /// Values of each pixel, indexed by part, by channel, and by pixel row by row.
     planes: Vec<Vec<Vec<f32>>>,
 }
 
@@ -173,7 +174,7 @@ impl Canvas {
         Ok(Canvas { left: display.position.0.into(), top: display.position.1.into(), width, height, planes })
     }
 
-    /// Copies the pixels within the display window.
+    /// Copies the pixels of a block that lie within the display window.
     fn paint(&mut self, block: &UncompressedBlock, headers: &[Header]) -> Outcome<()> {
         let part = block.index.layer;
         let header = headers.get(part).ok_or_else(|| invalid("part index"))?;
@@ -216,7 +217,7 @@ impl Canvas {
     }
 }
 
-/// Converts the samples of one line to f32, without the first `skip`.
+/// Converts the samples of one line to f32, without the first `skip` samples.
 fn convert(bytes: &[u8], skip: usize, out: &mut [f32], sample: SampleType) {
     let four = |bytes: &[u8]| [bytes[0], bytes[1], bytes[2], bytes[3]];
     match sample {

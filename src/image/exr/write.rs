@@ -39,12 +39,12 @@ pub enum Compression {
     None,
 }
 
-/// Options of [`write()`].
+/// Options for writing an EXR with [`write()`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Options {
     /// Compression of the pixels.
     pub compression: Compression,
-    /// Names of the channels.
+    /// Naming scheme of the channels.
     pub naming: Naming,
 }
 
@@ -92,11 +92,11 @@ pub fn write_followed(
     })
 }
 
-/// Source of a channel's values.
+/// Source of the values of one channel of the EXR.
 #[derive(Clone, Copy)]
 struct Source<'a> {
     plane: &'a Plane,
-    /// Whether the sign is flipped.
+    /// Whether the values are negated in the file.
     negated: bool,
 }
 
@@ -172,11 +172,11 @@ fn header(
     Ok(header.with_attributes(own))
 }
 
-/// Primaries and white point of Rec. 709.
+/// Chromaticities of the primaries and the white point of Rec. 709.
 const REC_709: Chromaticities =
     Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.3, 0.6), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.329) };
 
-/// Compresses batches of blocks in parallel and writes them in order.
+/// Compresses batches of blocks, groups of scan lines, in parallel and writes them in order.
 fn write_chunks(
     file: &mut BufWriter<&mut File>,
     width: usize,
@@ -209,7 +209,7 @@ fn write_chunks(
     })
 }
 
-/// Compresses a block.
+/// Compresses a block, a group of scan lines.
 fn pack(block: UncompressedBlock, headers: &[Header]) -> exr::error::Result<Chunk> {
     let zipped = matches!(headers[0].compression, Packing::ZIP1 | Packing::ZIP16);
     // The samples of a block are in the machine's byte order, our ZIP needs little-endian.

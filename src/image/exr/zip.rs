@@ -9,7 +9,7 @@ use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::meta::header::Header;
 use libdeflater::{CompressionLvl, Compressor};
 
-/// Compresses a block of scan lines whose samples are little-endian.
+/// Compresses a block of scan lines, whose samples are little-endian, with zlib.
 pub(super) fn chunk(block: UncompressedBlock, header: &Header) -> Chunk {
     let top = block.index.pixel_position.y() as i32 + header.own_attributes.layer_position.y();
     let packed = compress(&block.data);
@@ -22,10 +22,10 @@ pub(super) fn chunk(block: UncompressedBlock, header: &Header) -> Chunk {
     }
 }
 
-/// Compression level: higher ones take up to a third more time for half a percent fewer bytes.
+/// Compression level of zlib: higher ones take up to a third more time for half a percent fewer bytes.
 const LEVEL: i32 = 1;
 
-/// The compressed bytes; `None` if they are not fewer, in which case OpenEXR stores the block uncompressed.
+/// The bytes compressed by zlib; `None` if they are not fewer, in which case OpenEXR stores the block uncompressed.
 fn compress(bytes: &[u8]) -> Option<Vec<u8>> {
     let differences = differences(bytes);
     let mut packed = vec![0; bytes.len()];
@@ -35,7 +35,8 @@ fn compress(bytes: &[u8]) -> Option<Vec<u8>> {
     (length < bytes.len()).then_some(packed)
 }
 
-/// Even bytes, then odd ones; from each except the first its predecessor is subtracted and 128 added.
+/// OpenEXR's prediction before compression: even bytes, then odd ones; from each except the first its predecessor is
+/// subtracted and 128 added.
 fn differences(bytes: &[u8]) -> Vec<u8> {
     let mut apart = vec![0; bytes.len()];
     let (even, odd) = apart.split_at_mut(bytes.len().div_ceil(2));

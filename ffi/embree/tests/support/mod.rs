@@ -28,7 +28,7 @@ pub fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
 pub struct Random(pub u64);
 
 impl Random {
-    /// Uniform in [0, 1).
+    /// The next random number, uniform in [0, 1).
     pub fn unit(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
@@ -37,12 +37,12 @@ impl Random {
         ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
     }
 
-    /// A uniform point of a box around the height field.
+    /// A random point, uniform in a box around the height field.
     pub fn point(&mut self) -> [f32; 3] {
         [self.unit(), self.unit(), self.unit() - 0.5]
     }
 
-    /// A direction that is not of unit length.
+    /// A random direction that is not of unit length.
     pub fn direction(&mut self) -> [f32; 3] {
         [self.unit() - 0.5, self.unit() - 0.5, self.unit() - 0.5]
     }
@@ -99,7 +99,7 @@ pub fn sphere(rings: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (positions, indices)
 }
 
-/// Linear interpolation from `a` to `b`.
+/// Linear interpolation from `a` (weight 0) to `b` (weight 1).
 pub fn between(a: [f32; 3], b: [f32; 3], weight: f32) -> [f32; 3] {
     std::array::from_fn(|k| a[k] + weight * (b[k] - a[k]))
 }
