@@ -99,13 +99,13 @@ pub struct Slope {
 /// The reason why no exponent is reported for a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FitFailure {
-    /// Fewer than [`MIN_POINTS`] measurements in the last decade exceed the reference's own error; holds their number.
+    /// Fewer than `MIN_POINTS` measurements in the last decade exceed the reference's own error; holds their number.
     Few(usize),
-    /// The measurements span a ratio of less than [`MIN_SPAN`] on the axis.
+    /// The measurements span a ratio of less than `MIN_SPAN` on the axis.
     Narrow,
     /// Fireflies dominate the error of some measurements; holds their number.
     Fireflies(usize),
-    /// The exponent's standard error exceeds [`MAX_EXPONENT_ERROR`]; holds the standard error.
+    /// The exponent's standard error exceeds `MAX_EXPONENT_ERROR`; holds the standard error.
     Scattered(f64),
     /// The pictures are denoised, and their error follows no power law.
     Denoised,

@@ -30,7 +30,7 @@ pub struct MeanRatio {
 const MAX_DEVIATION: f64 = 0.01;
 
 impl MeanRatio {
-    /// Whether the ratio is 1 within [`MAX_DEVIATION`] and two standard errors, so that the peer renders the same
+    /// Whether the ratio is 1 within `MAX_DEVIATION` and two standard errors, so that the peer renders the same
     /// scene.
     pub fn is_same(&self) -> bool {
         (self.ratio - 1.0).abs() <= MAX_DEVIATION + 2.0 * self.error
