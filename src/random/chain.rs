@@ -15,7 +15,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// Standard deviation of a small step.
+/// Standard deviation of a small step, in the unit square of a coordinate pair.
 const STEP: f32 = 0.01;
 /// Probability of a large step, which redraws all coordinates \[Kelemen et al. 2002, 3\]. Low, because chains are short
 /// and restart in every iteration.
