@@ -4,7 +4,7 @@ use super::shares::leads;
 use crate::bsdf::LobeSet;
 use crate::plan::{CameraSuffix, ClassSet, Event};
 
-/// What a camera path has met up to its last vertex.
+/// Class, lobes and length of a camera path up to its last vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PathHistory {
     /// Class of the path up to the last vertex: the kinds of its bounces.

@@ -19,8 +19,8 @@ const PATHS: u32 = 4096;
 /// Number of paths that a thread traces as one unit of work.
 const CHUNK: usize = 256;
 
-/// Mean numbers of vertices of a path in a scene, from which render times are estimated. "Full" paths continue by all
-/// lobes and collide in media; "short" paths end at broad lobes and cross media straight.
+/// Mean numbers of vertices of a path in a scene, from which the costs of methods are estimated. "Full" paths continue
+/// by all lobes and collide in media; "short" paths end at broad lobes and cross media straight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VertexCounts {
     /// Mean number of surface vertices of a full camera path.

@@ -68,7 +68,7 @@ pub fn walk<'a, V: Visitor<'a>>(
     }
 }
 
-/// What a scene has besides surfaces, as constants 0 to 3. Each value includes the smaller ones: nothing, absorbing
+/// Contents of a scene besides surfaces, as constants 0 to 3. Each value includes the smaller ones: nothing, absorbing
 /// media, scattering media, dispersive solids.
 const NOTHING: u8 = 0;
 const ABSORPTION: u8 = 1;
