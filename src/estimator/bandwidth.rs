@@ -17,45 +17,48 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Largest bandwidth over the picture's width at the gathering point. A kernel wider than a tenth of the picture has no
-/// local information.
+/// Largest initial gathering radius over the width that the picture covers at the gathering point. A kernel wider than
+/// a tenth of the picture has no local information.
 pub const SCREEN_CAP: f32 = 0.05;
-/// Radius over the width of a pixel at the gathering point, for `--initial-bandwidth footprint`.
+/// Initial gathering radius over the width of a pixel at the gathering point, for `--initial-bandwidth footprint`.
 pub const FOOTPRINT_PIXELS: f32 = 3.0;
-/// Smallest bandwidth over the scene's radius. At a perfect focus the distance between photons is zero.
+/// Smallest gathering radius over the radius of the scene's bounding sphere. At a perfect focus the distance between
+/// photons is zero.
 pub const MIN_RADIUS_RATIO: f32 = 1e-7;
 
-/// Smallest bandwidth over the scene's radius that a user may set. It is a hundred steps (2^-24) of single precision
-/// positions; the smallest of five levels is a quarter of it. Below that, distances of photons are rounding errors.
+/// Smallest gathering radius that a user may set, over the radius of the scene's bounding sphere. It is a hundred steps
+/// (2^-24) of single precision positions; the smallest of five levels is a quarter of it. Below that, distances of
+/// photons are rounding errors.
 pub const MIN_USER_RADIUS_RATIO: f32 = 1e-5;
 
-/// Half width, in pixels, of the neighbourhood of [`initial_volume_bandwidths`].
+/// Half width, in pixels, of the square of pixels whose median [`initial_volume_bandwidths`] takes.
 const NEIGHBOURHOOD: usize = 3;
 
-/// Rule of the largest initial bandwidth.
+/// Rule that sets the initial gathering radius of the largest bandwidth level of each pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum InitialBandwidth {
-    /// Distance to the k-th nearest photon of the pilot.
+    /// Distance to the k-th nearest photon of the pilot iteration, which runs before the first one.
     Nearest(usize),
-    /// [`FOOTPRINT_PIXELS`] pixels.
+    /// [`FOOTPRINT_PIXELS`] times the width of a pixel at the gathering point.
     Footprint,
     /// One radius for all pixels (scene units).
     Fixed(f32),
 }
 
-/// Width of the picture at the end of a path of this length (scene units).
+/// Width that the picture covers at the end of a camera path of this length (scene units).
 pub fn picture_width_at(camera: &Camera, length: f32) -> f32 {
     let (slope, at_zero) = camera.span();
     slope * length + at_zero
 }
 
-/// [`InitialBandwidth::Footprint`] at the end of a path of this length.
+/// Radius (scene units) of [`InitialBandwidth::Footprint`] at the end of a camera path of this length.
 pub fn footprint(camera: &Camera, length: f32) -> f32 {
     FOOTPRINT_PIXELS * picture_width_at(camera, length) / camera.whole_width()
 }
 
-/// Largest initial bandwidth of every pixel for the photons of each pilot map, row by row. It is at most `widest` times
-/// the picture's width, or the radius in which one photon is expected if that is larger.
+/// Initial gathering radius of the largest bandwidth level of every pixel, for the photons of each pilot map (photons
+/// of the iteration that runs before the first), row by row (scene units). It is at most `widest` times the picture's
+/// width, or the radius in which one photon is expected if that is larger.
 pub fn initial_bandwidths<const MAPS: usize>(
     camera_paths: &CameraPaths<'_>,
     rule: InitialBandwidth,
@@ -88,7 +91,8 @@ pub fn initial_volume_bandwidths(
     medians(found.as_flattened(), camera_paths.camera.size().0 as usize)
 }
 
-/// The median of every pixel's neighbourhood, a square of `2 NEIGHBOURHOOD + 1` pixels within the picture.
+/// Median around every pixel: over the square of `2 NEIGHBOURHOOD + 1` pixels on a side, as far as it is in the
+/// picture.
 fn medians(values: &[f32], width: usize) -> Vec<f32> {
     let height = values.len() / width.max(1);
     let around = |at: usize, end: usize| at.saturating_sub(NEIGHBOURHOOD)..(at + NEIGHBOURHOOD + 1).min(end);
@@ -101,31 +105,33 @@ fn medians(values: &[f32], width: usize) -> Vec<f32> {
     (0..values.len()).into_par_iter().map(around_pixel).collect()
 }
 
-/// Radius in which one photon is expected where photon density is typical: the distance to the k-th nearest photon over
-/// `root(k)`; 0 if it is unknown.
+/// Radius (scene units) in which one photon is expected where photon density is typical: the distance to the k-th
+/// nearest photon of the pilot iteration over `root(k)`; 0 if it is unknown.
 fn radius_of_one<P: Located>(rule: InitialBandwidth, pilot: &PhotonMap<P>, root: impl Fn(f32) -> f32) -> f32 {
     let InitialBandwidth::Nearest(k) = rule else { return 0.0 };
     let one = median_radius2(pilot, k).sqrt() / root(k as f32);
     if one.is_finite() { one } else { 0.0 }
 }
 
-/// Upper bounds of bandwidths.
+/// Upper bounds of initial gathering radii.
 #[derive(Clone, Copy)]
 struct Bounds<const MAPS: usize> {
-    /// Relative to the picture's width.
+    /// Bound as a fraction of the picture's width at the gathering point.
     widest: f32,
-    /// Radius that is always allowed, by map.
+    /// Radius (scene units) that is always allowed, by photon map.
     allowed: [f32; MAPS],
 }
 
 impl<const MAPS: usize> Bounds<MAPS> {
-    /// The bound for a map, where the picture is `span` wide.
+    /// Upper bound of the radius for photon map `map`, at a gathering point where the picture is `span` wide (scene
+    /// units).
     fn at(self, map: usize, span: f32) -> f32 {
         (self.widest * span).max(self.allowed[map])
     }
 }
 
-/// Median over photons of the squared distance to the k-th nearest photon; infinite if there are too few.
+/// Median over all photons of the squared distance to the k-th nearest photon (square scene units); infinite if there
+/// are too few.
 pub fn median_radius2<P: Located>(map: &PhotonMap<P>, k: usize) -> f32 {
     const SAMPLES: usize = 256;
     let mut nearest = Nearest::default();

@@ -3,20 +3,20 @@
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-/// Number of instances that a pixel stores without an allocation.
+/// Number of instances for which a pixel stores hit counts without a heap allocation.
 const INLINE_INSTANCES: usize = 4;
 
-/// Counts of first hits by instance. They do not depend on the order of paths.
+/// For one pixel, counts of camera paths by the instance that they hit first. They do not depend on the order of paths.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Coverage {
-    /// Instances and the number of paths that hit them first, in order of appearance.
+    /// Index of each instance and the number of camera paths that hit it first, in order of appearance.
     counts: SmallVec<[(u32, u32); INLINE_INSTANCES]>,
-    /// Number of all paths.
+    /// Number of all camera paths, with or without a hit.
     paths: u32,
 }
 
 impl Coverage {
-    /// Counts one camera path, with the instance that it hit first, if any.
+    /// Counts one camera path; `instance` is the index of the instance that it hits first, `None` if it hits nothing.
     #[inline]
     pub fn add(&mut self, instance: Option<u32>) {
         self.paths += 1;
@@ -33,23 +33,24 @@ impl Coverage {
         }
     }
 
-    /// Adds the counts of other paths.
+    /// Adds the counts of other camera paths of the pixel.
     pub fn join(&mut self, other: &Coverage) {
         self.paths += other.paths;
         other.counts.iter().for_each(|&(instance, count)| self.count(instance, count));
     }
 
-    /// Number of all paths.
+    /// Number of all camera paths counted, with or without a hit.
     pub fn paths(&self) -> u32 {
         self.paths
     }
 
-    /// Fraction of paths that hit anything, 0 to 1; 0 before the first path.
+    /// Fraction of camera paths that hit anything, 0 to 1; 0 before the first path.
     pub fn hit_fraction(&self) -> f32 {
         self.fraction(self.counts.iter().map(|(_, count)| count).sum())
     }
 
-    /// Instances and the fractions of paths that hit them first, in descending order of fractions.
+    /// Index of each instance and the fraction (0 to 1) of camera paths that hit it first, in descending order of
+    /// fractions.
     pub fn fractions(&self) -> impl Iterator<Item = (u32, f32)> {
         let mut counts = self.counts.clone();
         counts.sort_unstable_by_key(|&(instance, count)| (!count, instance));

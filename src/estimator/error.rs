@@ -15,17 +15,19 @@
 use super::PixelAccumulator;
 use crate::math::DVec3;
 
-/// Estimated squared error of one pixel, per channel.
+/// Estimated squared error of the radiance of one pixel, per channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SquaredError {
-    /// Variance of the mean.
+    /// Variance of the mean over iterations.
     pub variance: DVec3,
-    /// Squared bias. Negative values are noise around zero. Zero if there is no larger level for comparison.
+    /// Squared bias of the gathering kernel. Negative values are noise around zero. Zero if there is no larger
+    /// bandwidth level for comparison.
     pub squared_bias: DVec3,
 }
 
 impl SquaredError {
-    /// The error of level `own` (from 0) of `count` levels; `None` before two iterations.
+    /// Estimates the error of bandwidth level `own` (from 0, the smallest) of `count` levels; `None` before two
+    /// iterations.
     pub fn of(pixel: &PixelAccumulator, own: usize, count: usize) -> Option<SquaredError> {
         if pixel.iterations < 2 {
             return None;
@@ -37,8 +39,8 @@ impl SquaredError {
         Some(SquaredError { variance: pixel.variance_of_mean(own), squared_bias })
     }
 
-    /// Estimated standard error including bias: the root of variance plus squared bias, with the latter clamped to
-    /// zero.
+    /// Estimated standard error including bias, per channel: the root of variance plus squared bias, with the latter
+    /// clamped to zero.
     pub fn root(&self) -> DVec3 {
         let total = self.variance + self.squared_bias.max(DVec3::ZERO);
         total.map(f64::sqrt)

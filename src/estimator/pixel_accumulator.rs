@@ -10,22 +10,22 @@ use crate::transport::{Cause, MAX_LEVELS, PixelSample};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// Camera depth where nothing is hit.
+/// Depth along the camera axis (scene units) that is stored for a camera path that hits nothing.
 pub const FAR: f32 = 1e10;
 
-/// Relative correction of level differences for light gathered in media. Bias grows with the squared radius, which
-/// grows by 2^(2/3) per level in media, and by 2 on surfaces. With the correction `1 / (2^(2/3) - 1) - 1` a difference
-/// is the bias of the smaller level for both.
+/// Correction of the difference between two bandwidth levels, as a fraction of it, for light gathered in media. Bias
+/// grows with the squared radius, which grows by 2^(2/3) from level to level in media, and by 2 on surfaces. With the
+/// correction `1 / (2^(2/3) - 1) - 1` a difference is the bias of the smaller level for both.
 const VOLUME_DIFFERENCE: f32 = 0.702_414_4;
 
-/// Sums over iterations of the additive parts of the picture level.
+/// Sums over iterations of the additive parts of a pixel, at the bandwidth level that the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Parts {
     /// Lights seen directly or through perfect mirrors and clear glass.
     pub emission: DVec3,
-    /// Direct light.
+    /// Direct light (one bounce at a surface).
     pub direct: DVec3,
-    /// Caustics.
+    /// Light that mirrors and glass focus on a surface (caustics).
     pub caustic: DVec3,
     /// All other light from surfaces.
     pub indirect: DVec3,
@@ -33,12 +33,12 @@ pub struct Parts {
     pub volume: DVec3,
 }
 
-/// Number of independent groups of iterations ([`random::QUARTERS`]).
+/// Number of independent groups, called quarters, into which iterations are divided in turn ([`random::QUARTERS`]).
 pub const QUARTERS: usize = random::QUARTERS as usize;
-/// Number of additive parts.
+/// Number of additive parts of a pixel: emission, direct, caustic, indirect and volume.
 const PARTS: usize = 5;
 
-/// Sum of the picture level over one quarter of the iterations.
+/// Sum of a pixel over one quarter of the iterations, at the bandwidth level that the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Quarter {
     sum: Sum<DVec3>,
@@ -49,52 +49,56 @@ struct Quarter {
 /// Accumulators of disjoint iterations join to that of all ([`PixelAccumulator::join`]).
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct PixelAccumulator {
-    /// Rounding grids of all sums of light.
+    /// Rounding grids of all sums of light, which make the sums independent of the order of iterations.
     grids: Grids,
-    /// Sum of squares of the picture level. Its plain sum is that of the quarters.
+    /// Sum over iterations of the squared value of the picture level, the bandwidth level that the picture shows. The
+    /// plain sum of this level is that of `quarters`.
     own_squares: Sum<DVec3>,
-    /// Sums of the picture level by quarters, whose random points are scrambled independently. Variance and error are
-    /// estimated from them.
+    /// Sums of the picture level over each quarter of the iterations. Random points of the quarters are scrambled
+    /// independently, so variance and error are estimated from them.
     quarters: [Quarter; QUARTERS],
-    /// Moments of the other levels, smallest bandwidth first, and of the difference between the next larger level and
-    /// the picture level. Levels are correlated, so the variance of the difference does not follow from theirs. In
-    /// media the difference is scaled to equal the bias ([`super::SquaredError`]). Empty with one level.
+    /// Moments of the bandwidth levels except the picture level, smallest bandwidth first, and, as the last entry, of
+    /// the difference between the next larger level and the picture level. Levels are correlated, so the variance of
+    /// the difference does not follow from theirs. In media the difference is scaled to equal the bias
+    /// ([`super::SquaredError`]). Empty if the pixel has one level.
     others: Box<[Moments]>,
-    /// Emission, direct, caustic and indirect light, and light from media.
+    /// Sums over iterations of emission, direct, caustic and indirect light, and light from media.
     parts: [Sum<DVec3>; PARTS],
-    /// Light of each light group, and its caustics.
+    /// For each light group (lights that the user has put on a layer of their own), the sums of its light and of its
+    /// caustics.
     groups: Box<[[Sum<DVec3>; 2]]>,
-    /// Sums of G-buffers over all camera paths.
+    /// Sum over camera paths of the albedo in the G-buffer.
     albedo: DVec3,
     normal: DVec3,
-    /// Sum of path lengths up to the first rough hit.
+    /// Sum over camera paths of the length up to the first hit that is not on a perfect mirror or clear glass (scene
+    /// units).
     depth: Total,
-    /// Number of camera paths whose features are finite.
+    /// Number of camera paths whose albedo, normal and depth are all finite.
     features: u32,
-    /// Number of camera paths with a rough hit: one that is not on a perfect mirror or clear glass.
+    /// Number of camera paths with a hit that is not on a perfect mirror or clear glass.
     depths: u32,
-    /// First hits of all camera paths.
+    /// Counts of camera paths by the instance that they hit first.
     pub coverage: Coverage,
-    /// Number of iterations accumulated.
+    /// Number of iterations accumulated, without rejected ones.
     pub iterations: u32,
-    /// Rejected iterations, by cause.
+    /// Counts of the iterations that were left out because a value was not finite, by cause.
     pub rejected: Rejected,
-    /// Largest initial bandwidth by kind of photons (scene units).
+    /// Initial gathering radius of the largest bandwidth level, by kind of photons (scene units).
     pub bandwidths: ByKind<f32>,
-    /// Largest initial bandwidth of photons in media (scene units); 0 without media.
+    /// Initial gathering radius of the largest bandwidth level for photons in media (scene units); 0 without media.
     pub volume_bandwidth: f32,
-    /// First visible hit of the first accumulated iteration.
+    /// First hit of the camera path of the first accumulated iteration.
     first: FirstVisible,
 }
 
-/// First visible hit of an iteration.
+/// First hit of the camera path of one iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct FirstVisible {
-    /// The iteration, from 1.
+    /// Number of the iteration, from 1; `u64::MAX` before a hit is recorded.
     iteration: u64,
-    /// Camera depth; [`FAR`] where there is none.
+    /// Depth along the camera axis (scene units); [`FAR`] if the path hits nothing.
     z: f32,
-    /// Position.
+    /// Position of the hit; zero if the path hits nothing.
     p: Vec3,
 }
 
@@ -105,54 +109,56 @@ impl Default for FirstVisible {
 }
 
 impl PixelAccumulator {
-    /// The accumulator of a pixel with `levels` levels before its first iteration. If the light of the scene is scaled
-    /// by a power of two, and `exponent` with it, all sums of light scale exactly ([`Grids::new`]).
+    /// The empty accumulator of a pixel with `levels` bandwidth levels and these initial radii (scene units). Sums of
+    /// light are exact on grids in units of 2^`exponent`: if all light of the scene is scaled by a power of two, and
+    /// `exponent` with it, the sums scale exactly ([`Grids::new`]).
     pub fn new(levels: usize, exponent: i32, bandwidths: ByKind<f32>) -> PixelAccumulator {
         let others = vec![Moments::default(); PixelAccumulator::others(levels)].into_boxed_slice();
         PixelAccumulator { grids: Grids::new(exponent), others, bandwidths, ..PixelAccumulator::default() }
     }
 
-    /// Adds sums for `groups` light groups.
+    /// Replaces the sums of light groups by empty sums for `groups` light groups.
     #[must_use]
     pub fn with_groups(self, groups: usize) -> PixelAccumulator {
         PixelAccumulator { groups: vec![[Sum::default(); 2]; groups].into_boxed_slice(), ..self }
     }
 
-    /// Bytes of an accumulator with `levels` levels and `groups` light groups.
+    /// Memory in bytes of an accumulator with `levels` bandwidth levels and `groups` light groups.
     pub fn bytes(levels: usize, groups: usize) -> usize {
         size_of::<PixelAccumulator>()
             + PixelAccumulator::others(levels) * size_of::<Moments>()
             + groups * size_of::<[Sum<DVec3>; 2]>()
     }
 
-    /// Bytes of this accumulator.
+    /// Memory of this accumulator in bytes.
     pub fn size(&self) -> usize {
         PixelAccumulator::bytes(self.levels(), self.groups.len())
     }
 
-    /// Whether the accumulator has sums for `levels` levels and `groups` light groups.
+    /// Whether the accumulator has sums for exactly `levels` bandwidth levels and `groups` light groups.
     pub fn holds(&self, levels: usize, groups: usize) -> bool {
         self.others.len() == PixelAccumulator::others(levels) && self.groups.len() == groups
     }
 
-    /// Length of `others`: moments of the other levels, and of a difference.
+    /// Length of the field `others` for a number of bandwidth levels: all levels but one, plus one difference; 0 for
+    /// one level.
     fn others(levels: usize) -> usize {
         if levels > 1 { levels } else { 0 }
     }
 
-    /// Number of levels.
+    /// Number of bandwidth levels of the pixel, at least 1.
     #[inline]
     pub fn levels(&self) -> usize {
         self.others.len().max(1)
     }
 
-    /// The level (from 0) of the picture: the second largest.
+    /// Index of the bandwidth level that the picture shows: the second largest, or 0 if there is only one level.
     #[inline]
     fn picture_level(&self) -> usize {
         self.levels().saturating_sub(2)
     }
 
-    /// Mean of a level (from 0, the smallest bandwidth); zero before the first iteration.
+    /// Mean radiance over iterations of a bandwidth level (from 0, the smallest); zero before the first iteration.
     pub fn mean(&self, level: usize) -> DVec3 {
         let count = f64::from(self.iterations);
         match level.cmp(&self.picture_level()) {
@@ -163,7 +169,8 @@ impl PixelAccumulator {
         }
     }
 
-    /// Variance of the mean of a level; infinite before two iterations.
+    /// Variance of the mean radiance of a bandwidth level (from 0, the smallest), per channel; infinite before two
+    /// iterations.
     pub fn variance_of_mean(&self, level: usize) -> DVec3 {
         let count = f64::from(self.iterations);
         match level.cmp(&self.picture_level()) {
@@ -173,38 +180,40 @@ impl PixelAccumulator {
         }
     }
 
-    /// Mean of the next larger level minus the picture level, and the variance of that mean; `None` with one level.
+    /// Mean over iterations of the radiance of the next larger bandwidth level minus that of the picture level, and the
+    /// variance of this mean; `None` with one level.
     pub fn difference(&self) -> Option<[DVec3; 2]> {
         let count = f64::from(self.iterations);
         self.others.last().map(|difference| [difference.mean(count), difference.variance_of_mean(count)])
     }
 
-    /// Sum of the picture level.
+    /// Sum over all iterations of the radiance of the picture level, the bandwidth level that the picture shows.
     fn sum(&self) -> DVec3 {
         let mut sum = self.quarters[0].sum;
         self.quarters[1..].iter().for_each(|quarter| sum.join(&quarter.sum));
         sum.value()
     }
 
-    /// Mean of the picture level over a quarter of the iterations; zero without any.
+    /// Mean radiance of the picture level over one quarter (0 to 3) of the iterations; zero if the quarter is empty.
     pub fn quarter(&self, quarter: usize) -> DVec3 {
         let Quarter { sum, count } = self.quarters[quarter];
         if count == 0 { DVec3::ZERO } else { sum.value() / f64::from(count) }
     }
 
-    /// Sums of the additive parts of the picture level.
+    /// Sums over iterations of emission, direct, caustic and indirect light and of light from media, at the picture
+    /// level.
     pub fn parts(&self) -> Parts {
         let [emission, direct, caustic, indirect, volume] = self.parts.map(|part| part.value());
         Parts { emission, direct, caustic, indirect, volume }
     }
 
-    /// Mean light of a light group, and of its caustics.
+    /// Mean over iterations of the light of one light group (by index), and of the caustics in it.
     pub fn group(&self, group: usize) -> [DVec3; 2] {
         let count = f64::from(self.iterations.max(1));
         self.groups[group].map(|sum| sum.value() / count)
     }
 
-    /// Mean albedo of all camera paths.
+    /// Mean albedo over the camera paths with finite features; zero if there are none.
     pub fn albedo(&self) -> DVec3 {
         if self.features == 0 { DVec3::ZERO } else { self.albedo / f64::from(self.features) }
     }
@@ -214,23 +223,25 @@ impl PixelAccumulator {
         self.coverage.paths() - self.features
     }
 
-    /// Direction of the mean normal; zero without any.
+    /// Unit direction of the mean normal over camera paths; zero if there is no normal.
     pub fn normal(&self) -> DVec3 {
         self.normal.normalize_or_zero()
     }
 
-    /// Mean length of camera paths up to their first rough hit, over those that have one.
+    /// Mean length (scene units) of camera paths up to the first hit that is not on a perfect mirror or clear glass;
+    /// `None` if no path has such a hit.
     pub fn depth(&self) -> Option<f64> {
         (self.depths > 0).then(|| self.depth.value() / f64::from(self.depths))
     }
 
-    /// Camera depth of the first visible hit of the first iteration ([`FAR`] without a hit), and its position.
+    /// First hit of the camera path of the first iteration: its depth along the camera axis ([`FAR`] without a hit) and
+    /// its position.
     pub fn first(&self) -> (f32, Vec3) {
         (self.first.z, self.first.p)
     }
 
-    /// Variance of the mean of the picture level from the scatter of the quarters' means. It is correct even if
-    /// iterations within a quarter are not independent. `None` if a quarter is empty.
+    /// Variance of the mean radiance of the picture level, estimated from the scatter of the means of the four
+    /// quarters. It is correct even if iterations within a quarter are not independent. `None` if a quarter is empty.
     #[inline]
     pub fn variance_by_quarters(&self) -> Option<DVec3> {
         if self.quarters.iter().any(|quarter| quarter.count == 0) {
@@ -245,8 +256,8 @@ impl PixelAccumulator {
         Some(scatter.sum::<DVec3>() / ((QUARTERS - 1) as f64 * total))
     }
 
-    /// Records the first visible hit of iteration `i` (from 1), its camera depth and position, unless an iteration has
-    /// been accumulated. Call it before [`PixelAccumulator::add`].
+    /// Records the first hit of the camera path of iteration `i` (from 1), its depth along the camera axis and
+    /// position, unless an iteration has been accumulated. Call it before [`PixelAccumulator::add`].
     #[inline]
     pub fn record_first_hit(&mut self, i: u64, first: impl FnOnce() -> Option<(f32, Vec3)>) {
         if self.iterations == 0 {
@@ -255,14 +266,16 @@ impl PixelAccumulator {
         }
     }
 
-    /// Adds iteration `i` (from 1). With `correlated`, level 1 comes from `independent` and the other levels from
-    /// `correlated`, which has one level less; without, all levels come from `independent`.
+    /// Adds the samples of iteration `i` (from 1), or counts a rejection if a value is not finite. With `correlated`,
+    /// level 0 comes from `independent` and the larger levels from `correlated`, which has one level less; without, all
+    /// levels come from `independent`.
     #[inline]
     pub fn add(&mut self, i: u64, independent: &PixelSample, correlated: Option<&PixelSample>) {
         self.add_with_groups(i, independent, correlated, &[]);
     }
 
-    /// [`PixelAccumulator::add`] with the light of each light group, and its caustics, at the picture level.
+    /// Adds an iteration as [`PixelAccumulator::add`] does, and for each light group its light and the caustics in it,
+    /// at the picture level.
     pub fn add_with_groups(
         &mut self,
         i: u64,
@@ -317,7 +330,7 @@ impl PixelAccumulator {
         std::iter::once(independent).chain(correlated).for_each(|sample| self.add_features(sample));
     }
 
-    /// Adds the first hit and the G-buffer of a camera path.
+    /// Adds the first hit and the G-buffer of one camera path, unless the G-buffer is not finite.
     #[inline]
     fn add_features(&mut self, sample: &PixelSample) {
         self.coverage.add(sample.first.map(|first| first.instance));
@@ -331,7 +344,8 @@ impl PixelAccumulator {
         }
     }
 
-    /// The sample that contains the picture level, and the index of the level in it.
+    /// Chooses between the two camera paths of an iteration: returns the sample that contains the picture level, and
+    /// the index of this level in the sample.
     #[inline]
     pub fn picture_sample<'m>(
         &self,
@@ -344,7 +358,8 @@ impl PixelAccumulator {
         }
     }
 
-    /// The next larger level minus the picture level.
+    /// Radiance of the next larger bandwidth level minus that of the picture level in one iteration, with light in
+    /// media corrected by [`VOLUME_DIFFERENCE`].
     #[inline]
     fn difference_of(
         &self,
@@ -364,7 +379,7 @@ impl PixelAccumulator {
         difference
     }
 
-    /// Rounds all sums of light to grids that are at least as coarse.
+    /// Rounds all sums of light to the grids `to`, each equal to or coarser than the current one.
     #[inline]
     fn coarsen_grids(&mut self, to: Grids) {
         let from = std::mem::replace(&mut self.grids, to);
@@ -380,8 +395,8 @@ impl PixelAccumulator {
         self.others.iter_mut().for_each(|moments| moments.coarsen(from, to));
     }
 
-    /// Adds other iterations of the same pixel. The result has the bits of one accumulator of all iterations, in any
-    /// order.
+    /// Adds an accumulator of other iterations of the pixel. The result is bit for bit that of one accumulator of all
+    /// iterations, in any order.
     pub fn join(&mut self, mut other: PixelAccumulator) {
         let grids = self.grids.max(other.grids);
         self.coarsen_grids(grids);
@@ -494,7 +509,7 @@ mod tests {
         pixel
     }
 
-    /// All results of a pixel, as bits.
+    /// All results of a pixel, as bits for exact comparison.
     fn all_bits(pixel: &PixelAccumulator, levels: usize) -> Vec<u64> {
         let mut all = vec![pixel.albedo(), pixel.normal(), DVec3::splat(pixel.depth().unwrap_or(-1.0))];
         for level in 0..levels {
@@ -537,7 +552,7 @@ mod tests {
         }
     }
 
-    /// Compared with plain sums in f64. No value is so large that others lose digits.
+    /// The accumulator is compared with plain sums in f64. No value is so large that others lose digits.
     #[test]
     fn means_and_variances_agree_with_two_pass_formulas() {
         let mut values = Vec::new();

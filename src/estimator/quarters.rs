@@ -8,12 +8,13 @@
 use super::{PixelAccumulator, SquaredError};
 use rayon::prelude::*;
 
-/// Half width, in pixels, of the windows: 81 pixels have 243 degrees of freedom.
+/// Half width, in pixels, of the square windows over which variances are averaged: 9 x 9 pixels with 3 degrees of
+/// freedom each.
 const REACH: usize = 4;
 
-/// Ratio of the variance by quarters to the sample variance of the picture level, over a window around every pixel; 1
-/// if one of them is unknown or there is no variance. `own` is the picture level (from 0). Pixels are in rows of
-/// `width`.
+/// For every pixel, the variance estimated from the four quarters of the iterations over the sample variance, averaged
+/// over a window around the pixel; 1 if one of them is unknown or there is no variance. `own` is the bandwidth level
+/// that the picture shows (from 0). Pixels are in rows of `width`.
 pub fn variance_ratio(pixels: &[PixelAccumulator], width: usize, own: usize) -> Vec<f32> {
     let of_pixel = |pixel: &PixelAccumulator| {
         let sample = SquaredError::of(pixel, own, own + 1).map(|error| error.variance);
@@ -29,8 +30,8 @@ pub fn variance_ratio(pixels: &[PixelAccumulator], width: usize, own: usize) -> 
     sums.par_iter().map(ratio).collect()
 }
 
-/// Sums over windows along lines of values that are `step` apart. `place` maps an index to its position in its line and
-/// the length of the line.
+/// Sums over windows of `2 REACH + 1` values along lines (rows or columns) of a picture, whose values are `step` apart.
+/// `place` maps an index to its position in its line and the length of the line.
 fn window_sums(values: &[[f64; 2]], place: impl Fn(usize) -> (usize, usize) + Sync, step: usize) -> Vec<[f64; 2]> {
     let sum = |index: usize| {
         let (at, length) = place(index);
@@ -50,8 +51,8 @@ mod tests {
     use crate::random::{Domain, Purpose, QUARTERS, Stream, quarter};
     use crate::transport::PixelSample;
 
-    /// A picture with uniform noise. With `antithetic`, the iterations of a quarter form pairs that cancel, similar to
-    /// low-discrepancy points.
+    /// Pixels of a picture with uniform noise. With `antithetic`, the iterations of a quarter form pairs that cancel,
+    /// similar to low-discrepancy points.
     fn picture(antithetic: bool) -> Vec<PixelAccumulator> {
         let pixel = |index: u64| {
             let mut pixel = PixelAccumulator::new(1, 0, [0.0; 2]);

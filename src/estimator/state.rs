@@ -7,76 +7,82 @@ use super::PixelAccumulator;
 use super::rule::{memoryless, volume};
 use crate::photon::{ByKind, Kind};
 
-/// The memoryless rules at one iteration. Bandwidths follow from the initial ones and the iteration's number.
+/// Bandwidths of one iteration under the memoryless rules, where they depend only on the initial bandwidth and the
+/// number of the iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
     levels: usize,
-    /// Squared radius on surfaces over the initial one.
+    /// Squared radius of the iteration over the initial squared radius, on surfaces.
     surface2: f32,
-    /// Radius in media over the initial one.
+    /// Radius of the iteration over the initial radius, in media.
     volume: f32,
 }
 
 impl Schedule {
-    /// The rules at iteration `i` (from 1) for `levels` levels, with the reduction rates `alpha` on surfaces and
-    /// `volume_alpha` in media.
+    /// The schedule of iteration `i` (from 1) for `levels` bandwidth levels, with the reduction rates `alpha` on
+    /// surfaces and `volume_alpha` in media, both in (0, 1].
     pub fn new(i: u64, levels: usize, alpha: f64, volume_alpha: f64) -> Schedule {
         let surface2 = memoryless::radius2_factor(i, alpha) as f32;
         Schedule { levels, surface2, volume: volume::radius_factor(i, volume_alpha) as f32 }
     }
 
-    /// Number of levels.
+    /// Number of bandwidth levels of a pixel.
     pub fn levels(&self) -> usize {
         self.levels
     }
 
-    /// Squared radius of the largest level over the initial one.
+    /// Squared radius on surfaces in this iteration over the initial squared radius, for the largest level (and any
+    /// other).
     #[inline]
     pub fn factor2(&self) -> f32 {
         self.surface2
     }
 
-    /// Squared radius of a level (from 0, the smallest) on surfaces, where `initial` is the initial radius of the
-    /// largest (scene units).
+    /// Squared gathering radius on surfaces at bandwidth level `level` (from 0, the smallest) in this iteration;
+    /// `initial` is the initial radius of the largest level (scene units).
     #[inline]
     pub fn radius2(&self, initial: f32, level: usize) -> f32 {
         initial * initial * self.surface2 * level_factor2(level, self.levels)
     }
 
-    /// Radius of a level in media, where `initial` is the initial radius of the largest (scene units).
+    /// Gathering radius in media at bandwidth level `level` (from 0, the smallest) in this iteration; `initial` is the
+    /// initial radius of the largest level (scene units).
     #[inline]
     pub fn volume_radius(&self, initial: f32, level: usize) -> f32 {
         initial * self.volume * volume::level_factor(level, self.levels)
     }
 }
 
-/// Squared radius on surfaces of level `level` (from 0, the smallest) of `levels` over that of the largest.
+/// Squared radius on surfaces of bandwidth level `level` (from 0, the smallest) of `levels`, over that of the largest
+/// level.
 #[inline]
 pub fn level_factor2(level: usize, levels: usize) -> f32 {
     0.5f32.powi((levels - 1 - level) as i32)
 }
 
-/// The bandwidths of all pixels after an iteration.
+/// Gathering radii of all pixels after an iteration.
 #[derive(Clone, Debug)]
 pub struct BandwidthState {
     schedule: Schedule,
-    /// Squared radii on surfaces by kind of every pixel and level (square scene units), under a rule that counts
-    /// photons.
+    /// Squared radii on surfaces (square scene units) of every pixel and level, by kind of photons; `None` unless the
+    /// bandwidth rule counts photons.
     counted: Option<ByKind<Vec<f32>>>,
 }
 
 impl BandwidthState {
-    /// Bandwidths that follow `schedule`.
+    /// Bandwidths that follow `schedule` everywhere: the rule counts no photons.
     pub fn memoryless(schedule: Schedule) -> BandwidthState {
         BandwidthState { schedule, counted: None }
     }
 
-    /// Bandwidths of a rule that counts photons, if there is one; in media, and without one, they follow `schedule`.
+    /// Bandwidths on surfaces from `counted`, the squared radii of a rule that counts photons; without it, and in
+    /// media, they follow `schedule`.
     pub fn new(schedule: Schedule, counted: Option<ByKind<Vec<f32>>>) -> BandwidthState {
         BandwidthState { schedule, counted }
     }
 
-    /// Squared radius of a level (from 0, the smallest) of the pixel with this index (square scene units).
+    /// Squared gathering radius on surfaces for photons of `kind`, at bandwidth level `level` (from 0, the smallest) of
+    /// the pixel with this index (square scene units).
     #[inline]
     pub fn radius2(&self, index: usize, pixel: &PixelAccumulator, kind: Kind, level: usize) -> f32 {
         match &self.counted {
@@ -85,7 +91,7 @@ impl BandwidthState {
         }
     }
 
-    /// Radius in media of a level of a pixel (scene units).
+    /// Gathering radius in media at bandwidth level `level` (from 0, the smallest) of a pixel (scene units).
     #[inline]
     pub fn volume_radius(&self, pixel: &PixelAccumulator, level: usize) -> f32 {
         self.schedule.volume_radius(pixel.volume_bandwidth, level)

@@ -7,21 +7,24 @@
 use std::f32::consts::PI;
 use wide::f32x8;
 
-/// A kernel of density estimation.
+/// A radially symmetric kernel of density estimation. `s` is the squared distance over the squared bandwidth, 0 to 1.
 pub trait Kernel: Copy + Send + Sync + 'static {
-    /// Whether the kernel is constant, so that a photon has equal weight at all bandwidths that contain it.
+    /// Whether the kernel is constant within the bandwidth, so that a photon has equal weight at all bandwidths that
+    /// contain it.
     const BOX: bool;
-    /// Second moment along an axis over the squared bandwidth; bias is proportional to it.
+    /// Second moment of the kernel along an axis over the squared bandwidth; bias is proportional to it.
     const SECOND_MOMENT: f32;
-    /// Integral of the squared kernel times pi r^2; variance is proportional to it.
+    /// Integral of the squared kernel times pi r^2, where r is the bandwidth; variance is proportional to it.
     const ROUGHNESS: f32;
-    /// The kernel relative to the box kernel, on surfaces.
+    /// Value of the kernel on surfaces over that of the box kernel; `s` is the squared distance over the squared
+    /// bandwidth.
     fn weight(s: f32) -> f32;
-    /// The kernel relative to the box kernel, in media: of equal shape, normalised over the ball.
+    /// Value of the kernel in media over that of the box kernel; `s` is the squared distance over the squared
+    /// bandwidth. The shape is that on surfaces, normalised over the ball.
     fn ball_weight(s: f32) -> f32;
 }
 
-/// The box kernel: one within the bandwidth \[post-reconstruction 2021, (3)\].
+/// The box kernel: constant within the bandwidth, zero outside \[post-reconstruction 2021, (3)\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Box;
 
@@ -29,7 +32,7 @@ pub struct Box;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Epanechnikov;
 
-/// A normal distribution, cut off at three standard deviations and normalised.
+/// A normal distribution, cut off at three standard deviations (the bandwidth) and normalised.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Gaussian;
 
@@ -61,11 +64,13 @@ impl Kernel for Epanechnikov {
     }
 }
 
-/// Half the squared bandwidth over the variance, which is the exponent at the rim.
+/// Half the squared bandwidth over the variance of the Gaussian kernel: the exponent at its rim, three standard
+/// deviations from the centre.
 const RIM: f32 = 4.5;
 /// Fraction of the normal distribution within three standard deviations, in two dimensions: `1 - exp(-RIM)`.
 const KEPT: f32 = 0.988_891;
-/// Value at the centre relative to the box kernel, in media: `1 / int_0^1 3 x^2 exp(-RIM x^2) dx`.
+/// Value of the Gaussian kernel at its centre over that of the box kernel, in media: `1 / int_0^1 3 x^2 exp(-RIM x^2)
+/// dx`.
 const BALL_PEAK: f32 = 7.397_645;
 
 impl Kernel for Gaussian {
@@ -82,8 +87,9 @@ impl Kernel for Gaussian {
     }
 }
 
-/// Laplacian of a smooth kernel, the triweight `4 / pi (1 - s)^3`. Summed over photons, with the fourth power of the
-/// bandwidth as divisor, it estimates the Laplacian of the photon density. `s` must be below 1.
+/// Laplacian of a smooth kernel, the triweight `4 / pi (1 - s)^3`; `s` is the squared distance over the squared
+/// bandwidth and must be below 1. Summed over photons, with the fourth power of the bandwidth as divisor, it estimates
+/// the Laplacian of the photon density.
 #[inline]
 pub fn laplacian(s: f32x8) -> f32x8 {
     (f32x8::ONE - s) * (s * 3.0 - 1.0) * (48.0 / PI)
@@ -93,7 +99,7 @@ pub fn laplacian(s: f32x8) -> f32x8 {
 mod tests {
     use super::*;
 
-    /// Midpoint sum over s of `f(s)`; ds is the area element over pi r^2.
+    /// Integral of `f(s)` over s from 0 to 1 by the midpoint rule; ds is the area element over pi r^2.
     fn integral(f: impl Fn(f64) -> f64) -> f64 {
         let n = 200_000;
         (0..n).map(|i| f((f64::from(i) + 0.5) / f64::from(n))).sum::<f64>() / f64::from(n)

@@ -14,24 +14,24 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Both kinds, in the order of [`ByKind`].
+    /// All kinds of photons, in the order of [`ByKind`].
     pub const ALL: [Kind; 2] = [Kind::Indirect, Kind::Caustic];
 }
 
-/// A value for each kind, at `kind as usize`.
+/// A value for each kind of photons, at index `kind as usize`.
 pub type ByKind<T> = [T; 2];
 
-/// Appends items of each kind.
+/// Appends the items of each kind of photons in `more` to those in `all`.
 pub fn append<T>(all: &mut ByKind<Vec<T>>, more: ByKind<Vec<T>>) {
     for (all, more) in all.iter_mut().zip(more) {
         all.extend(more);
     }
 }
 
-/// Number of items of both kinds.
+/// Number of items of both kinds of photons together.
 pub fn count<T>(all: &ByKind<Vec<T>>) -> usize {
     all.iter().map(Vec::len).sum()
 }
 
-/// Photon maps of an iteration on surfaces.
+/// Maps of the photons on surfaces of one iteration, one map for each kind.
 pub type PhotonMaps = ByKind<PhotonMap>;

@@ -10,15 +10,15 @@ use crate::spectrum::Band;
 use rayon::prelude::*;
 use wide::{CmpLt, f32x8};
 
-/// Number of photons per leaf, and of children per node.
+/// Number of photons per leaf of the tree, and of children per node.
 const WIDTH: usize = 8;
-/// Levels of a map of 2^32 photons: log8(2^32 / 8), rounded up.
+/// Number of node levels of the tree over 2^32 photons: log8(2^32 / 8), rounded up.
 const MAX_LEVELS: usize = 10;
-/// Bits per axis of the Morton code.
+/// Bits per axis of the Morton code by which photons are sorted.
 const MORTON_BITS: u32 = 21;
 
-/// Whether, and how likely, camera paths find the light of a photon, if all bounces so far were delta. Unknown (0) for
-/// other photons.
+/// Whether, and how likely, camera paths find the light of a photon on their own. Known only if all bounces of its
+/// light path were delta; unknown (0) for other photons.
 ///
 /// One byte: 1 for a delta light, otherwise twice the biased exponent of the density of emission. So the density is
 /// known up to a factor of two, and no density is stored as 1.
@@ -26,13 +26,14 @@ const MORTON_BITS: u32 = 21;
 pub struct PhotonFlags(u8);
 
 impl PhotonFlags {
-    /// The photon comes from a delta light: no continued camera path can find it.
+    /// Flags of a photon from a delta light: no continued camera path can find it.
     pub const UNREACHABLE: PhotonFlags = PhotonFlags(1);
-    /// Bias of exponents, and the range of exponents.
+    /// Bias of the stored exponents, and the range of exponents.
     const BIAS: i32 = 64;
     const EXPONENTS: (i32, i32) = (-63, 63);
 
-    /// For a light with a size that emits with this density ([`crate::light::EmissionDensity::ray_density`]).
+    /// Flags of a photon from a light with a size that emits with this density per area and solid angle
+    /// ([`crate::light::EmissionDensity::ray_density`]).
     #[inline]
     pub fn from_area_light(density: f32) -> PhotonFlags {
         let exponent = (density.to_bits() >> 23 & 0xff) as i32 - 127;
@@ -40,44 +41,46 @@ impl PhotonFlags {
         PhotonFlags(((exponent.clamp(least, largest) + Self::BIAS) << 1) as u8)
     }
 
-    /// The density of emission, rounded down to a power of two; 0 if there is none.
+    /// Density of emission per area and solid angle, rounded down to a power of two; 0 if it is unknown or the light is
+    /// a delta light.
     #[inline]
     pub fn density(self) -> f32 {
         if self.0 < 2 { 0.0 } else { f32::from_bits(((i32::from(self.0 >> 1) - Self::BIAS + 127) as u32) << 23) }
     }
 }
 
-/// A light vertex, reduced to the data that gathering needs, in the order in which gathering loads it.
+/// A photon on a surface: a vertex of a light path, reduced to the data that gathering needs, in the order in which
+/// gathering loads it.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 pub struct Photon {
     /// World position.
     pub p: Vec3,
-    /// Unit direction towards the previous vertex.
+    /// Unit direction towards the previous vertex of the light path.
     pub wi: Vec3,
     /// Unit geometric normal of the surface.
     pub ng: Vec3,
     /// Flux (W), already divided by the number of light paths of the iteration.
     pub flux: Rgb,
-    /// Number of segments of the light path.
+    /// Number of segments of the light path up to the photon.
     pub depth: u16,
-    /// Whether camera paths find its light.
+    /// Whether, and how likely, camera paths find the light of the photon on their own.
     pub flags: PhotonFlags,
-    /// Band of the light path's wavelength.
+    /// Band of wavelengths that the light path carries.
     pub band: Band,
-    /// Weight and rank, for rules that count photons; zero if light paths are not guided.
+    /// Weight and rank, for bandwidth rules that count photons; zero if light paths are not guided.
     pub thinning_key: ThinningKey,
 }
 
 impl Photon {
-    /// Cosine between direction and normal.
+    /// Cosine between the direction of the photon and its normal.
     #[inline]
     pub fn cosine(&self) -> f32 {
         self.wi.dot(self.ng).abs()
     }
 }
 
-/// Positions of eight photons; absent photons are infinitely far away.
+/// Leaf of the tree: positions of eight photons for SIMD; absent photons are infinitely far away.
 #[derive(Clone, Copy)]
 struct Leaf {
     x: f32x8,
@@ -85,7 +88,7 @@ struct Leaf {
     z: f32x8,
 }
 
-/// Bounding boxes of eight children; boxes of absent children are empty.
+/// Inner node of the tree: bounding boxes of its eight children; boxes of absent children are empty.
 #[derive(Clone, Copy)]
 struct Node {
     min: [f32x8; 3],
@@ -98,7 +101,7 @@ pub trait Located: Copy + Send + Sync {
     fn position(&self) -> Vec3;
     /// Unit geometric normal of the surface.
     fn normal(&self) -> Vec3;
-    /// Whether all its data are finite.
+    /// Whether all data of the photon are finite.
     fn is_finite(&self) -> bool;
 }
 
@@ -122,12 +125,12 @@ impl Located for Photon {
 /// Photons of one iteration with a tree for range queries.
 pub struct PhotonMap<P = Photon> {
     photons: Vec<P>,
-    /// Number of photons that were not finite.
+    /// Number of photons that were left out because a value was not finite.
     rejected: u64,
     paths: u32,
     leaves: Vec<Leaf>,
     quantiser: Quantiser,
-    /// `levels[0]` has the root node; the children of the last level are leaves.
+    /// Nodes of the tree by level. `levels[0]` has the root node; the children of the last level are leaves.
     levels: Vec<Vec<Node>>,
 }
 
@@ -142,7 +145,7 @@ fn spread(v: u64) -> u64 {
     (x | x << 2) & 0x1249_2492_4924_9249
 }
 
-/// Maps positions to Morton codes.
+/// Maps positions in a bounding box to Morton codes.
 #[derive(Clone, Copy)]
 struct Quantiser {
     min: Vec3,
@@ -178,9 +181,9 @@ impl Aabb {
 }
 
 impl<P: Located> PhotonMap<P> {
-    /// Builds a map. The order of `photons` must be fixed (by path, then vertex). Photons in one Morton cell keep it,
-    /// so the order in which queries visit photons depends on the photons alone. Photons that are not finite are left
-    /// out.
+    /// Builds a map. The order of `photons` must be fixed (by path, then vertex): photons with equal Morton codes stay
+    /// in it, so the order in which queries visit photons depends on the photons alone. Photons that are not finite are
+    /// left out.
     pub fn build(mut photons: Vec<P>) -> PhotonMap<P> {
         let all = photons.len();
         photons.retain(P::is_finite);
@@ -230,7 +233,7 @@ impl<P: Located> PhotonMap<P> {
         PhotonMap { photons, rejected, paths: 0, leaves, quantiser, levels }
     }
 
-    /// Sets the number of light paths, from which expected numbers of photons are derived.
+    /// Sets the number of light paths that left the photons, from which expected numbers of photons are derived.
     #[must_use]
     pub fn of_paths(self, paths: u32) -> PhotonMap<P> {
         PhotonMap { paths, ..self }
@@ -252,7 +255,7 @@ impl<P: Located> PhotonMap<P> {
         &self.photons
     }
 
-    /// Memory used, in bytes.
+    /// Memory that the map uses, in bytes.
     pub fn bytes(&self) -> usize {
         self.photons.len() * size_of::<P>()
             + self.leaves.len() * size_of::<Leaf>()
@@ -276,8 +279,8 @@ impl<P: Located> PhotonMap<P> {
         });
     }
 
-    /// As [`PhotonMap::within`], but `visit` also receives the squared radius and returns a new one, which must not be
-    /// larger.
+    /// Calls `visit(photon, squared distance, squared radius)` for every photon nearer to `p` than the radius, in
+    /// Morton order. `visit` returns the squared radius for the rest of the search, which must not be larger.
     #[inline]
     pub(super) fn traverse(&self, p: Vec3, mut radius2: f32, mut visit: impl FnMut(&P, f32, f32) -> f32) {
         if self.levels.is_empty() {
@@ -318,7 +321,7 @@ impl<P: Located> PhotonMap<P> {
         }
     }
 
-    /// Bits of the children of a node whose boxes are nearer than the radius.
+    /// Bit mask of the children of a node whose boxes are nearer to the query point than the radius.
     #[inline]
     fn hit_children(&self, level: usize, node: usize, px: f32x8, py: f32x8, pz: f32x8, radius2: f32) -> u32 {
         let node = &self.levels[level][node];

@@ -7,52 +7,53 @@ use super::map::{Located, PhotonMap};
 use crate::math::Vec3;
 use wide::{CmpGt, CmpLt, f32x8};
 
-/// A photon belongs to another surface if the cosine between its normal and that of the gathering point is smaller.
+/// Smallest cosine between the normals of a photon and of a gathering point at which both lie on one surface.
 const NORMAL_COSINE: f32 = 0.7;
 
-/// Whether a photon lies on the surface around a point with geometric normal `ng`.
+/// Whether the normal of a photon is close enough to `ng`, the geometric normal of a gathering point, to lie on the
+/// same surface.
 #[inline]
 pub fn same_surface(photon: &impl Located, ng: Vec3) -> bool {
     photon.normal().dot(ng) > NORMAL_COSINE
 }
 
-/// Radius of the cache over the radius of the query that filled it. A larger cache serves more queries but takes longer
-/// to scan.
+/// Radius of the photon cache over the radius of the query that filled it. A larger cache serves more queries but takes
+/// longer to scan.
 const CACHE_RADIUS_RATIO: f32 = 1.75;
-/// Largest number of cached photons; with more, the tree is faster.
+/// Largest number of cached photons; with more, a search of the tree is faster.
 const MAX_CACHED: usize = 512;
-/// A query fills the cache if its distance from the previous query, relative to the radius, is below this.
+/// A query fills the photon cache if its distance from the previous query, as a multiple of the radius, is below this.
 const MAX_MOVE: f32 = 0.75;
 /// Bound of the relative rounding error of distances.
 const ROUNDING: f32 = 1e-4;
 
-/// Positions and normals of eight photons; absent photons are infinitely far away.
+/// Positions and normals of eight photons for SIMD; absent photons are infinitely far away.
 #[derive(Clone, Copy)]
 struct Eight {
     p: [f32x8; 3],
     n: [f32x8; 3],
 }
 
-/// Photons of an [`Eight`] that a query has found.
+/// Which photons of an [`Eight`] a query has found.
 #[derive(Clone, Copy)]
 struct Hits {
     distance2: f32x8,
-    /// A bit for each photon found.
+    /// Bit mask with a bit for each of the eight photons that is within the radius and on the surface.
     inside: u32,
-    /// Index of the first photon of the eight.
+    /// Index in the cache of the first photon of the eight.
     first: u32,
 }
 
-/// Cache of the photons around a point. Each thread has one per map.
+/// Cache of the photons of one map around a point, which speeds up nearby queries. Each thread has one per map.
 pub struct Near<P> {
     center: Vec3,
-    /// All photons nearer to the centre are cached; 0 if none are.
+    /// Radius of the ball around the centre of the cache (scene units) in which all photons are cached; 0 if none are.
     radius: f32,
-    /// Position of the last query.
+    /// Position of the previous query.
     last: Vec3,
     photons: Vec<P>,
     eights: Vec<Eight>,
-    /// Result of the last scan. Its length is the number of eights plus one.
+    /// Photons found by the last scan of the cache. Its length is the number of eights plus one.
     hits: Vec<Hits>,
 }
 
@@ -83,7 +84,8 @@ impl<P: Located> PhotonMap<P> {
         }
     }
 
-    /// Caches the photons around `center`. Returns false, with an empty cache, if there are too many.
+    /// Caches all photons within `radius` of `center`. Returns false, with an empty cache, if they are more than
+    /// [`MAX_CACHED`].
     #[cold]
     fn fill(&self, near: &mut Near<P>, center: Vec3, radius: f32) -> bool {
         near.photons.clear();
@@ -128,7 +130,8 @@ impl<P: Located> Near<P> {
         }
     }
 
-    /// Writes the photons near `p` to [`Near::hits`] and returns the number of entries.
+    /// Writes the cached photons within `sqrt(radius2)` of `p` on the surface with normal `ng` to [`Near::hits`] and
+    /// returns the number of entries.
     #[inline(never)]
     fn find(&mut self, p: Vec3, ng: Vec3, radius2: f32) -> usize {
         let (p, ng) = (p.to_array().map(f32x8::splat), ng.to_array().map(f32x8::splat));

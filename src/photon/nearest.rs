@@ -5,18 +5,19 @@ use super::near::{Near, same_surface};
 use super::{Photon, PhotonMap};
 use crate::math::Vec3;
 
-/// Largest k.
+/// Largest k in a search for the k-th nearest photon.
 pub const MAX_NEIGHBOURS: usize = 1024;
 
-/// First search radius over the result of the last search; a little larger, so that it mostly suffices.
+/// First search radius over the distance that the previous search found; a little larger than 1, so that it mostly
+/// suffices.
 const GUESS_RATIO: f32 = 1.3;
 
-/// Searches for the k-th nearest photon. Each thread has one per map. The result of the last search is the first guess
-/// of the next, which affects the time only.
+/// Searches a photon map for the k-th nearest photon. Each thread has one per map. The result of the last search is the
+/// first guess of the next, which affects the time only.
 pub struct Nearest<P = Photon> {
     near: Near<P>,
     distances2: Vec<f32>,
-    /// Squared distance found by the last search.
+    /// Squared distance (square scene units) found by the previous search.
     last2: f32,
 }
 
@@ -47,7 +48,7 @@ impl<P: Located> Nearest<P> {
         found
     }
 
-    /// Searches without a guess.
+    /// As [`Nearest::radius2`], without a guess of the distance.
     fn search(&mut self, map: &PhotonMap<P>, p: Vec3, ng: Vec3, k: usize, limit2: f32) -> Option<f32> {
         // The k smallest distances, sorted: k is small, and an insertion moves half of them.
         let best = &mut self.distances2;
@@ -75,7 +76,8 @@ impl<P: Located> Nearest<P> {
     }
 }
 
-/// Inserts a distance into the `k` smallest, which are sorted. Returns the squared radius within which others matter.
+/// Inserts a squared distance into `best`, the `k` smallest so far in ascending order. Returns the squared radius
+/// within which further photons matter.
 fn insert(best: &mut Vec<f32>, k: usize, distance2: f32, radius2: f32) -> f32 {
     best.insert(best.partition_point(|&d| d <= distance2), distance2);
     best.truncate(k);

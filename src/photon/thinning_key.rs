@@ -10,18 +10,18 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ThinningKey(u32);
 
-/// The leading bits of a nonnegative number, which sort like the number.
+/// The leading bits of a nonnegative number as an integer, which sorts like the number.
 fn leading(x: f32) -> u32 {
     x.to_bits() >> 15
 }
 
 impl ThinningKey {
-    /// The key of a weight above 0; `u` is uniform on `[0, 1)`.
+    /// Packs a weight above 0 and the rank that follows from `u`, which is uniform on `[0, 1)`.
     pub fn new(weight: f32, u: f32) -> ThinningKey {
         ThinningKey(leading(weight) << 16 | leading(weight / u))
     }
 
-    /// The weight, with a relative error of at most 1/250.
+    /// The weight of the photon, with a relative error of at most 1/250.
     #[inline]
     pub fn weight(self) -> f32 {
         f32::from_bits(weight(self.0) << 15)
@@ -34,19 +34,19 @@ impl ThinningKey {
     }
 }
 
-/// The weight in [`ThinningKey::bits`], as an integer that sorts like the weight.
+/// The weight of a photon from its [`ThinningKey::bits`], as an integer that sorts like the weight.
 #[inline]
 pub fn weight(bits: u32) -> u32 {
     bits >> 16
 }
 
-/// Whether the rank in [`ThinningKey::bits`] exceeds a weight.
+/// Whether the rank in a photon's [`ThinningKey::bits`] exceeds `weight` (an integer as [`weight`] returns it).
 #[inline]
 pub fn above(bits: u32, weight: u32) -> bool {
     bits & 0xffff > weight
 }
 
-/// Lower bound of all ranks that `above(_, weight)` accepts.
+/// Lower bound of all ranks that [`above`] accepts for this weight.
 pub fn bound(weight: u32) -> f32 {
     f32::from_bits((weight + 1) << 15)
 }

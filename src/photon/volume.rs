@@ -4,25 +4,25 @@ use super::map::Located;
 use crate::math::{Rgb, Vec3};
 use crate::spectrum::Band;
 
-/// A light vertex in a medium, reduced to the data that gathering needs.
+/// A photon in a medium: a vertex of a light path, reduced to the data that gathering needs.
 #[derive(Clone, Copy, Debug)]
 pub struct VolumePhoton {
     /// World position.
     pub p: Vec3,
-    /// Unit direction towards the previous vertex.
+    /// Unit direction towards the previous vertex of the light path.
     pub wi: Vec3,
     /// Flux times length (W m), already divided by the number of light paths of the iteration. The sum over a volume,
     /// divided by the volume, is the fluence.
     pub flux: Rgb,
-    /// Identifier of its medium; gathering points in other media ignore it.
+    /// Identifier of the medium that contains the photon; gathering points in other media ignore it.
     pub medium: u32,
-    /// Number of segments of the light path.
+    /// Number of segments of the light path up to the photon.
     pub depth: u16,
-    /// Band of the light path's wavelength.
+    /// Band of wavelengths that the light path carries.
     pub band: Band,
 }
 
-/// The normal of all photons in media. Queries with this normal find all of them.
+/// Normal that all photons in media have. Queries with this normal find all of them.
 pub const NO_NORMAL: Vec3 = Vec3::Z;
 
 impl Located for VolumePhoton {

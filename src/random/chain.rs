@@ -15,7 +15,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// Standard deviation of a small step.
+/// Standard deviation of a small step, in the unit square of a coordinate pair.
 const STEP: f32 = 0.01;
 /// Probability of a large step, which redraws all coordinates \[Kelemen et al. 2002, 3\]. Low, because chains are short
 /// and restart in every iteration.
@@ -25,7 +25,7 @@ thread_local! {
     static ACTIVE: RefCell<Option<Chain>> = const { RefCell::new(None) };
 }
 
-/// Hasher of keys that are hashes already.
+/// Hasher for map keys that are hashes already; it returns them unchanged.
 #[derive(Default)]
 struct KeyHasher(u64);
 
@@ -46,25 +46,25 @@ impl Hasher for KeyHasher {
 #[derive(Clone, Copy)]
 struct Coordinate {
     value: Vec2,
-    /// Number of accepted steps of the chain that `value` includes.
+    /// Number of accepted steps of the chain up to which `value` is current; later ones are applied when it is read.
     step: u64,
 }
 
-/// A Markov chain in primary sample space.
+/// A Markov chain in primary sample space, whose state is the random numbers of a path.
 #[derive(Default)]
 pub struct Chain {
     key: u64,
     coordinates: HashMap<u64, Coordinate, BuildHasherDefault<KeyHasher>>,
-    /// Earlier values of the coordinates that the current proposal has changed, for its rejection. `None`: the
-    /// proposal has created the coordinate.
+    /// Values before the current proposal of the coordinates that it has changed, by id, to restore them if it is
+    /// rejected. `None`: the proposal has created the coordinate.
     replaced: Vec<(u64, Option<Coordinate>)>,
     /// Number of accepted steps.
     steps: u64,
     /// Value of `steps` after the last accepted large step.
     last_large_step: u64,
-    /// Number of proposals.
+    /// Number of proposals so far.
     proposals: u64,
-    /// The current proposal.
+    /// The current proposal; `None` if there is none to accept or reject.
     proposed: Option<Proposal>,
 }
 
@@ -74,16 +74,17 @@ enum Proposal {
     Small,
 }
 
-/// Key of the random numbers that decide about steps and acceptance.
+/// Key that separates the random numbers for steps and acceptance from all others.
 const STEP_KEY: u64 = 0x6d6c_745f_6f77_6e00;
 
 impl Chain {
-    /// A chain that starts at the ordinary draws of its first path. Chains of different `key` are independent.
+    /// A chain that starts at the ordinary random numbers of its first path. Chains of different `key` are independent.
     pub fn new(key: u64) -> Chain {
         Chain { key, ..Chain::default() }
     }
 
-    /// Sets the initial value of the coordinates `id` (see [`Draws::id`](super::Draws::id)).
+    /// Sets the initial value of coordinate pair `id` (see [`Draws::id`](super::Draws::id)), a point of the unit
+    /// square.
     pub fn set_initial(&mut self, id: u64, value: Vec2) {
         self.coordinates.insert(id, Coordinate { value, step: 0 });
     }
@@ -92,7 +93,7 @@ impl Chain {
         mix(mix(self.key ^ id).wrapping_add((self.proposals ^ salt << 56).wrapping_mul(GOLDEN)))
     }
 
-    /// A uniform number for decision number `decision` about the current proposal.
+    /// A uniform number in [0, 1) for decision number `decision` about the current proposal.
     fn step_draw(&self, decision: u64) -> f32 {
         unit((self.hash(STEP_KEY ^ decision, 3) >> 32) as u32)
     }

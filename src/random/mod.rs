@@ -17,19 +17,19 @@ pub use sobol::SobolPair;
 
 use glam::Vec2;
 
-/// The kind of path that a stream belongs to. Streams of different domains are independent.
+/// The kind of path that random numbers are for. Streams of different domains are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Domain {
-    /// The camera path of a pixel for bandwidth level 1, and for methods with one camera path per pixel.
+    /// Camera path of a pixel for the smallest bandwidth level, and for methods with one camera path per pixel.
     CameraIndependent = 1,
-    /// The camera path of a pixel that the bandwidth levels 2 and up share.
+    /// Camera path of a pixel that all bandwidth levels but the smallest share.
     CameraCorrelated = 2,
     /// Light paths.
     Light = 3,
-    /// Camera paths of the pilot iteration that sets initial bandwidths.
+    /// Camera paths of the pilot iteration, which runs before the first and sets initial bandwidths.
     PilotCamera = 4,
-    /// Light paths of the pilot iteration that sets initial bandwidths.
+    /// Light paths of the pilot iteration, which runs before the first and sets initial bandwidths.
     PilotLight = 5,
     /// Light paths for the camera paths of [`Domain::CameraCorrelated`].
     LightCorrelated = 6,
@@ -37,11 +37,12 @@ pub enum Domain {
     GuideLight = 7,
     /// Camera paths that train the guiding of emission.
     GuideCamera = 8,
-    /// Paths in tests.
+    /// Paths in unit tests.
     Test = 99,
 }
 
-/// The decision that a draw is for. (2D) marks decisions that take a point of the unit square, [`Draws::two`].
+/// The decision at a path vertex that a random number is for. (2D) marks decisions that take a point of the unit
+/// square, [`Draws::two`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
@@ -53,7 +54,7 @@ pub enum Purpose {
     Lobe = 3,
     /// Direction from a lobe (2D).
     Direction = 4,
-    /// Russian roulette.
+    /// Russian roulette: whether the path continues.
     Roulette = 5,
     /// Choice of the light in next-event estimation.
     LightChoice = 6,
@@ -61,17 +62,17 @@ pub enum Purpose {
     LightPoint = 7,
     /// Choice of the light that a light path starts from.
     EmitterChoice = 8,
-    /// Point of emission (2D).
+    /// Point on the light that a light path starts from (2D).
     EmitterPoint = 9,
-    /// Direction of emission (2D).
+    /// Direction in which a light path starts (2D).
     EmitterDirection = 10,
     /// Alpha cut-outs along the segment that leaves this vertex.
     Alpha = 11,
-    /// Whether direct light is also estimated by BSDF sampling, the second technique.
+    /// Whether direct light is also estimated by BSDF sampling.
     SecondTechnique = 12,
-    /// Lobe of the second technique.
+    /// Choice of a lobe of the BSDF sample for direct light.
     SecondLobe = 13,
-    /// Direction of the second technique (2D).
+    /// Direction of the BSDF sample for direct light (2D).
     SecondDirection = 14,
     /// Free-flight distance in a medium (2D).
     Flight = 15,
@@ -81,25 +82,25 @@ pub enum Purpose {
     Wavelength = 17,
     /// Alpha cut-outs along a shadow ray.
     ShadowAlpha = 18,
-    /// Alpha cut-outs along the ray of the second technique.
+    /// Alpha cut-outs along the ray of the BSDF sample for direct light.
     SecondAlpha = 19,
-    /// Russian roulette that keeps the flux of photons constant.
+    /// Russian roulette by which losses end light paths instead of lowering the flux of photons.
     Loss = 20,
     /// Choice among the sets of lobes that a path may continue with.
     LobeChoice = 21,
-    /// Distance of a point in a medium, sampled equiangularly.
+    /// Distance of a point in a medium, sampled uniformly in the angle as seen from a light.
     Equiangular = 22,
-    /// Thinning rank of a photon.
+    /// Rank in the thinning key of a photon.
     ThinningKey = 23,
     /// Directions of the rays that look for the boundaries of a medium.
     Border = 24,
-    /// Rotation of these directions.
+    /// Random rotation of the rays that look for the boundaries of a medium.
     BorderTurn = 25,
     /// Choice of the pixel that receives a light path's contribution to a film point (2D).
     Splat = 26,
     /// Film point where a path of a Markov chain starts (2D).
     Film = 27,
-    /// Number of camera and light vertices of a path of a Markov chain.
+    /// How many vertices of a path of a Markov chain lie on its camera and on its light subpath.
     Division = 28,
 }
 
@@ -137,35 +138,39 @@ fn unit_f64(bits: u32) -> f64 {
 /// quarters, and fewer give no usable variance.
 pub const QUARTERS: u64 = 4;
 
-/// Number of vertices of a path, its endpoint included, whose draws are points of sequences. Eight instead of four
-/// lowers squared errors by up to 3 % at no measurable cost; more gain too little.
+/// Number of vertices of a path, its endpoint on the lens or light included, whose random numbers are points of
+/// low-discrepancy sequences. Eight instead of four lowers squared errors by up to 3 % at no measurable cost; more gain
+/// too little.
 const SEQUENCE_VERTICES: u32 = 8;
 
-/// The quarter of an iteration. Iterations count from 1 and take quarters in turn.
+/// The quarter (0 to 3) of an iteration. Iterations count from 1 and take quarters in turn.
 #[inline]
 pub fn quarter(iteration: u64) -> u64 {
     iterations_before(iteration) % QUARTERS
 }
 
-/// Number of iterations before this one. Iteration 0, which is not part of the picture, counts as the last.
+/// Number of iterations before this one. Iteration 0, which is not part of the picture, counts as the last possible
+/// one.
 #[inline]
 fn iterations_before(iteration: u64) -> u64 {
     iteration.wrapping_sub(1)
 }
 
-/// The draws of all paths of a domain in one iteration.
+/// Random numbers of all paths of one domain (kind of path) in one iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct Streams(Stream);
 
 impl Streams {
-    /// Streams of hashes for `domain` in an iteration of a render with `seed`.
+    /// Streams of independent random numbers (hashes) for the paths of `domain` in an iteration of a render with
+    /// `seed`.
     pub fn new(seed: u64, iteration: u64, domain: Domain) -> Streams {
         let key = mix(seed.wrapping_add(GOLDEN));
         let key = mix(key ^ iteration.wrapping_mul(GOLDEN).wrapping_add(domain as u64));
         Streams(Stream { key, reversed: 0, vertices: 0, chained: false })
     }
 
-    /// Streams whose draws at the first vertices of every path are points of Sobol' sequences, one point per iteration.
+    /// Streams whose random numbers at the first vertices of every path are points of Sobol' sequences, one point per
+    /// iteration.
     pub fn in_sequence(seed: u64, iteration: u64, domain: Domain) -> Streams {
         let index = iterations_before(iteration) / QUARTERS;
         // Points have 32 bits of index. The higher bits of the index select other sequences.
@@ -175,41 +180,42 @@ impl Streams {
         Streams(Stream { key, reversed: (index as u32).reverse_bits(), vertices: SEQUENCE_VERTICES, chained: false })
     }
 
-    /// The stream of path number `index`.
+    /// The random numbers of path number `index`.
     #[inline]
     pub fn path(self, index: u64) -> Stream {
         Stream { key: mix(self.0.key.wrapping_add(index.wrapping_mul(GOLDEN))), ..self.0 }
     }
 }
 
-/// The draws of one path.
+/// Random numbers of one path.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream {
-    /// Key of the hashes. With sequences, all iterations of a quarter share it.
+    /// Key of the hashes of this path. With sequences, all iterations of a quarter share it.
     key: u64,
-    /// Index of this iteration's point in the sequences, with its bits in reverse order; 0 without sequences.
+    /// Index of the point of this iteration in the low-discrepancy sequences, with its bits in reverse order; 0 without
+    /// sequences.
     reversed: u32,
-    /// Number of vertices whose draws are points of sequences.
+    /// Number of vertices, from the start of the path, whose random numbers are points of sequences.
     vertices: u32,
-    /// Whether draws are the coordinates of the active Markov chain.
+    /// Whether random numbers are the coordinates of the Markov chain that is active on the thread.
     chained: bool,
 }
 
 impl Stream {
-    /// The stream of hashes of path number `index` of `domain` in an iteration of a render with `seed`.
+    /// Independent random numbers (hashes) of path number `index` of `domain` in an iteration of a render with `seed`.
     #[inline]
     pub fn new(seed: u64, iteration: u64, domain: Domain, index: u64) -> Stream {
         Streams::new(seed, iteration, domain).path(index)
     }
 
-    /// A stream whose draws are the coordinates of the thread's active [`Chain`]. This stream's own draws are the
-    /// chain's initial state.
+    /// A stream whose random numbers are the coordinates of the thread's active [`Chain`]. The numbers of `self` are
+    /// the initial state of the chain.
     #[must_use]
     pub fn chained(self) -> Stream {
         Stream { chained: true, ..self }
     }
 
-    /// The draws at vertex number `vertex` of the path. Vertex 0 is its endpoint on the lens or light.
+    /// Random numbers at vertex number `vertex` of the path. Vertex 0 is its endpoint on the lens or light.
     #[inline]
     pub fn vertex(self, vertex: u32) -> Draws {
         Draws {
@@ -224,7 +230,7 @@ impl Stream {
     }
 }
 
-/// How draws are computed.
+/// How the random numbers at a vertex are computed: as hashes, points of sequences, or coordinates of a Markov chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Generator {
     Hash,
@@ -232,36 +238,36 @@ enum Generator {
     Chain,
 }
 
-/// The draws at one vertex of a path.
+/// Random numbers at one vertex of a path, one or two for each [`Purpose`].
 #[derive(Clone, Copy, Debug)]
 pub struct Draws {
-    /// Key of the hashes. With sequences, all iterations of a quarter share it.
+    /// Key of the hashes at this vertex. With sequences, all iterations of a quarter share it.
     key: u64,
     reversed: u32,
     generator: Generator,
 }
 
 impl Draws {
-    /// Draws for decision number `n`, where a vertex makes several decisions of the same purpose.
+    /// Random numbers for decision number `n`, where a vertex makes several decisions of one purpose.
     #[inline]
     pub fn nth(self, n: u32) -> Draws {
         Draws { key: mix(self.key ^ (u64::from(n) + 1).wrapping_mul(0xa076_1d64_78bd_642f)), ..self }
     }
 
-    /// Key for `purpose`. With sequences, all iterations of a quarter share it.
+    /// Key of the hash for `purpose`. With sequences, all iterations of a quarter share it.
     #[inline]
     fn key_of(self, purpose: Purpose) -> u64 {
         self.key.wrapping_add((purpose as u64).wrapping_mul(GOLDEN))
     }
 
-    /// The coordinates for `purpose` in the active chain.
+    /// Coordinates for `purpose` in the active Markov chain, a point of the unit square.
     #[cold]
     #[inline(never)]
     fn chained(self, purpose: Purpose) -> Vec2 {
         Chain::draw_active(self.id(purpose), square(self.hash(purpose)))
     }
 
-    /// Identifies the coordinates for `purpose` in a [`Chain`].
+    /// Identifies the coordinates for `purpose` at this vertex in a Markov [`Chain`].
     pub fn id(self, purpose: Purpose) -> u64 {
         mix(self.key_of(purpose))
     }
@@ -286,7 +292,7 @@ impl Draws {
         SobolPair::keyed(mix(self.key_of(purpose)))
     }
 
-    /// Uniform on `[0, 1)`.
+    /// A uniform random number in `[0, 1)` for `purpose`.
     #[inline]
     pub fn one(self, purpose: Purpose) -> f32 {
         match self.generator {
@@ -306,7 +312,7 @@ impl Draws {
         }
     }
 
-    /// Uniform on `[0, 1)^2`.
+    /// A uniform random point of the unit square `[0, 1)^2` for `purpose`.
     #[inline]
     pub fn two(self, purpose: Purpose) -> Vec2 {
         match self.generator {
@@ -350,7 +356,7 @@ mod tests {
         }
     }
 
-    /// The iteration that takes point `index` of a quarter's sequences.
+    /// The iteration that uses point number `index` of the sequences of a quarter.
     fn iteration(quarter: u64, index: u64) -> u64 {
         1 + quarter + QUARTERS * index
     }

@@ -10,8 +10,8 @@
 use super::mix;
 use glam::{DVec2, Vec2};
 
-/// Laine-Karras style hash: a random binary-tree permutation of bit-reversed integers. The constants are those of
-/// Vegdahl 2021.
+/// Laine-Karras style hash: a random binary-tree permutation of bit-reversed integers. The constants are from Vegdahl
+/// 2021.
 #[inline]
 fn tree_hash(mut x: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -37,7 +37,7 @@ fn sobol_second(index: u32) -> u32 {
     x ^ (x >> 16)
 }
 
-/// One scrambled pair of dimensions.
+/// One scrambled pair of dimensions of the Sobol' sequence.
 #[derive(Clone, Copy, Debug)]
 pub struct SobolPair {
     shuffle: u32,
@@ -45,27 +45,28 @@ pub struct SobolPair {
 }
 
 impl SobolPair {
-    /// The pair keyed by `seed`, which may be any number.
+    /// The pair of dimensions scrambled by `seed`, which may be any number.
     pub fn new(seed: u64) -> SobolPair {
         let a = mix(seed);
         let b = mix(a ^ 0x5851_f42d_4c95_7f2d);
         SobolPair { shuffle: a as u32, scramble: [b as u32, (b >> 32) as u32] }
     }
 
-    /// The pair keyed by 64 random bits. The first dimension uses them directly; only the second costs a hash.
+    /// The pair of dimensions scrambled by 64 random bits. The first dimension uses them directly; only the second
+    /// costs a hash.
     #[inline]
     pub(super) fn keyed(bits: u64) -> SobolPair {
         let second = mix(bits ^ 0x5851_f42d_4c95_7f2d);
         SobolPair { shuffle: bits as u32, scramble: [(bits >> 32) as u32, second as u32] }
     }
 
-    /// Point `index` of the sequence, in `[0, 1)^2`.
+    /// Point number `index` of the sequence, in `[0, 1)^2`.
     #[inline]
     pub fn point(&self, index: u32) -> Vec2 {
         self.point_reversed(index.reverse_bits())
     }
 
-    /// The point whose index has these bits in reverse order.
+    /// Point of the sequence in `[0, 1)^2`; `reversed` is its index with the bits in reverse order.
     #[inline]
     pub(super) fn point_reversed(&self, reversed: u32) -> Vec2 {
         let index = self.shuffled(reversed);
@@ -73,19 +74,20 @@ impl SobolPair {
         Vec2::new(super::unit(self.bits_of(index)), super::unit(y))
     }
 
-    /// First coordinate of the point whose index has these bits in reverse order.
+    /// First coordinate of a point, in `[0, 1)`; `reversed` is its index with the bits in reverse order.
     #[inline]
     pub(super) fn first_reversed(&self, reversed: u32) -> f32 {
         super::unit(self.first_bits(reversed))
     }
 
-    /// All 32 bits of the first coordinate of the point whose index has these bits in reverse order.
+    /// First coordinate of a point as a 32-bit fixed-point number; `reversed` is its index with the bits in reverse
+    /// order.
     #[inline]
     pub(super) fn first_bits(&self, reversed: u32) -> u32 {
         self.bits_of(self.shuffled(reversed))
     }
 
-    /// [`SobolPair::point`] with all 32 bits of each coordinate.
+    /// Point number `index` of the sequence in `[0, 1)^2`, with all 32 bits of each coordinate.
     #[inline]
     pub fn point_f64(&self, index: u32) -> DVec2 {
         let index = self.shuffled(index.reverse_bits());

@@ -4,10 +4,10 @@
 //! is about 1. In a picture with a mean of 0.01 the constant would hide all errors. An error estimate must not depend
 //! on the unit of radiance, so it adds 0.01 times the squared mean radiance, which is the same number if the mean is 1.
 
-/// The constant of the papers' relMSE.
+/// The constant that papers add to the squared reference in the denominator of relMSE.
 pub const ABSOLUTE: f64 = 0.01;
 
-/// Share of the pixels that the mean leaves out, the brightest ones: visible lights and fireflies.
+/// Share of the pixels that the mean of pixel values leaves out, the brightest ones: visible lights and fireflies.
 const BRIGHTEST_SHARE: f64 = 0.01;
 
 /// 0.01 times the squared mean of the pixel `values`, without the brightest 1 %. If all others are black, the mean

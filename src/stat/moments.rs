@@ -7,7 +7,7 @@ use super::sum::{Grid, Rounding, Sum};
 use crate::math::{DVec3, Rgb};
 use serde::{Deserialize, Serialize};
 
-/// The summation grids of values and of their squares.
+/// Rounding grids for a sum of values and a sum of their squares, which make both sums independent of order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grids {
     values: Grid,
@@ -27,25 +27,25 @@ impl Grids {
         Grids { values: self.values.with_room_for(max), squares: self.squares.with_room_for(max * max) }
     }
 
-    /// The coarser grid of values and the coarser grid of squares.
+    /// For values and for squares, the coarser one of the grids of `self` and `other`.
     #[must_use]
     pub fn max(self, other: Grids) -> Grids {
         Grids { values: self.values.max(other.values), squares: self.squares.max(other.squares) }
     }
 
-    /// Rounding of values and of squares to these grids.
+    /// How values (first) and their squares (second) are rounded to these grids.
     #[inline]
     pub fn rounding(self) -> [Rounding; 2] {
         [self.values.rounding(), self.squares.rounding()]
     }
 
-    /// Converts a sum of values from these grids to coarser ones.
+    /// Converts a sum of values from these grids to the coarser grids `to`.
     #[inline]
     pub fn coarsen_values(self, sum: &mut Sum<DVec3>, to: Grids) {
         sum.coarsen(self.values, to.values);
     }
 
-    /// Converts a sum of squares from these grids to coarser ones.
+    /// Converts a sum of squares from these grids to the coarser grids `to`.
     #[inline]
     pub fn coarsen_squares(self, sum: &mut Sum<DVec3>, to: Grids) {
         sum.coarsen(self.squares, to.squares);
@@ -63,7 +63,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Adds a value.
+    /// Adds a value and its square, rounded for grids that must have room for them.
     #[inline(always)]
     pub fn add(&mut self, value: Rgb, [values, squares]: [Rounding; 2]) {
         let value = value.as_dvec3();
@@ -71,19 +71,19 @@ impl Moments {
         self.squares.add(value * value, squares);
     }
 
-    /// Mean of `count` values; zero if `count` is zero.
+    /// Mean of the values, whose number is `count`; zero if `count` is zero.
     #[inline]
     pub fn mean(&self, count: f64) -> DVec3 {
         if count == 0.0 { DVec3::ZERO } else { self.values.value() / count }
     }
 
-    /// Variance of the mean of `count` values, see [`variance_of_mean`].
+    /// Variance of the mean of the values, whose number is `count`, per channel; see [`variance_of_mean`].
     #[inline]
     pub fn variance_of_mean(&self, count: f64) -> DVec3 {
         variance_of_mean(self.values.value(), self.squares.value(), count)
     }
 
-    /// Converts the sums to grids that are equal or coarser.
+    /// Converts both sums from the grids `from` to equal or coarser grids `to`.
     #[inline]
     pub fn coarsen(&mut self, from: Grids, to: Grids) {
         from.coarsen_values(&mut self.values, to);

@@ -7,7 +7,7 @@ pub struct PowerLaw {
     pub exponent: f64,
     /// Standard error of the exponent from the scatter of the points about the line, if the points are independent.
     pub exponent_error: f64,
-    /// `y` at `x = 1`.
+    /// The fitted value `y` at `x = 1`.
     pub factor: f64,
 }
 
@@ -33,7 +33,7 @@ impl PowerLaw {
         })
     }
 
-    /// `y` at `x`.
+    /// The fitted value `y` at `x`.
     pub fn at(&self, x: f64) -> f64 {
         self.factor * x.powf(self.exponent)
     }

@@ -11,17 +11,17 @@ use crate::math::DVec3;
 use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign, Sub};
 
-/// Powers of two from one grid to the next.
+/// Powers of two from one rounding grid to the next coarser one.
 const STEP: i16 = 30;
-/// Exponent of the finest coarse grid: below the squares of all f32 values.
+/// Exponent of the finest rounding grid for sums: below the squares of all f32 values.
 const MIN_EXPONENT: i16 = -330;
 /// Number of terms that can be added before a sum may lose a bit: a term has at most 30 bits above its grid, an f64 has
 /// 53 bits.
 pub const MAX_TERMS: u64 = 1 << (53 - STEP as u64);
 
-/// A number or vector that can be summed.
+/// A number or vector that can be summed independently of order.
 pub trait Term: Copy + Default + Add<Output = Self> + AddAssign + Sub<Output = Self> {
-    /// Rounds to the nearest multiple of the spacing of f64 numbers around `magic`.
+    /// Rounds to the nearest multiple of the spacing of f64 numbers around `magic`, by adding and subtracting it.
     #[must_use]
     fn rounded(self, magic: f64) -> Self;
 }
@@ -52,7 +52,7 @@ fn two_to(exponent: i16) -> f64 {
     f64::from_bits(((1023 + i64::from(exponent)) as u64) << 52)
 }
 
-/// The coarse grid of a sum: multiples of two to this exponent.
+/// Rounding grid of a sum: the multiples of two to this exponent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Grid(i16);
 
@@ -81,14 +81,14 @@ impl Grid {
         grid
     }
 
-    /// Rounding of terms to this grid and the next finer one.
+    /// How terms are rounded to this grid, and their rests to the next finer one.
     #[inline]
     pub fn rounding(self) -> Rounding {
         Rounding { coarse: magic(self.0), fine: magic(self.0 - STEP) }
     }
 }
 
-/// How terms are rounded to a [`Grid`] and the next finer one.
+/// How the terms of a sum are rounded to a [`Grid`], and their rests to the next finer one.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounding {
     coarse: f64,
@@ -111,7 +111,7 @@ impl<T: Term> Sum<T> {
         self.fine += (term - coarse).rounded(rounding.fine);
     }
 
-    /// The sum.
+    /// Value of the sum.
     #[inline]
     pub fn value(&self) -> T {
         self.coarse + self.fine
@@ -149,12 +149,12 @@ impl Total {
         self.sum.add(term, self.grid.rounding());
     }
 
-    /// The sum.
+    /// Value of the sum.
     pub fn value(&self) -> f64 {
         self.sum.value()
     }
 
-    /// Adds another sum.
+    /// Adds another sum, of any grid.
     pub fn join(&mut self, other: &Total) {
         let mut other = *other;
         let grid = self.grid.max(other.grid);

@@ -5,17 +5,17 @@ use crate::math::Vec3;
 use crate::photon::{ByKind, Kind, PhotonMap, ThinningKey};
 use wide::f32x8;
 
-/// Largest number of bandwidth levels of one camera path.
+/// Largest number of bandwidth levels (gathering radii) of one camera path.
 pub const MAX_LEVELS: usize = 5;
 
-/// Squared radii of the levels of one camera path, in ascending order.
+/// Squared gathering radii of the bandwidth levels of one camera path, in ascending order.
 #[derive(Clone, Copy, Debug)]
 pub struct LevelRadii {
     pub(super) radius2: [f32; MAX_LEVELS],
     pub(super) count: usize,
-    /// Largest squared radius after the camera path's first broad bounce.
+    /// Largest squared radius after the camera path's first broad bounce (square scene units).
     pub(super) indirect_cap2: f32,
-    /// The level that each radius belongs to.
+    /// The bandwidth level that each radius belongs to.
     pub(super) order: [u8; MAX_LEVELS],
 }
 
@@ -55,13 +55,13 @@ impl LevelRadii {
 /// Up to eight photons found around a vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct FoundPhotons {
-    /// Positions relative to the vertex.
+    /// Positions of the photons relative to the vertex.
     pub offset: [f32x8; 3],
-    /// Squared distances from the vertex; infinite in unused lanes.
+    /// Squared distances of the photons from the vertex; infinite in unused lanes.
     pub distance2: f32x8,
     /// Radiance times area that each photon adds to the path's sample, mean of RGB.
     pub light: f32x8,
-    /// Bits of their thinning keys; zero unless [`PhotonCounter::NEEDS_THINNING_KEYS`].
+    /// Bits of the thinning keys of the photons; zero unless [`PhotonCounter::NEEDS_THINNING_KEYS`].
     pub thinning_keys: [u32; 8],
 }
 
@@ -82,9 +82,9 @@ pub(super) fn first_lane(x: f32, others: f32) -> f32x8 {
     f32x8::from([x, others, others, others, others, others, others, others])
 }
 
-/// The bandwidths that one camera path gathers photons with.
+/// The gathering radii of one camera path, and how its photons are counted.
 pub trait GatherBandwidths {
-    /// Frame of a vertex, as the counter needs it.
+    /// Coordinate frame of a vertex, as the counter needs it.
     type Frame;
     /// Counter of the photons found at a vertex.
     type Counter<'c>: PhotonCounter
@@ -94,7 +94,8 @@ pub trait GatherBandwidths {
     /// The frame of a vertex with geometric normal `ng`.
     fn frame(ng: Vec3) -> Self::Frame;
 
-    /// Radii for photons of `kind` at a vertex at `p` with geometric normal `ng`, where the path has this `length`.
+    /// Gathering radii for photons of `kind` at a vertex at `p` with geometric normal `ng`, where the camera path has
+    /// this `length`.
     fn radii(&mut self, kind: Kind, photons: &PhotonMap, p: Vec3, ng: Vec3, length: f32) -> LevelRadii;
 
     /// The counter of the photons of `kind` that are found at a vertex.

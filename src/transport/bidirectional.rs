@@ -13,49 +13,51 @@ use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::plan::PathClass;
 
-/// The techniques of a method.
+/// The sampling techniques that a bidirectional method combines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TechniqueSet {
-    /// Light vertices are connected to the camera.
+    /// Whether light vertices are connected to the camera.
     pub camera: bool,
-    /// Next-event estimation, connections of vertices, and camera paths that hit lights.
+    /// Whether next-event estimation, connections of vertices, and camera paths that hit lights count.
     pub connect: bool,
-    /// Photons are merged.
+    /// Whether photons are merged.
     pub merge: bool,
     /// Depth of the first merged vertex of a light path, and of a camera path (1 is the first surface).
     pub first_merged: [u32; 2],
 }
 
 impl TechniqueSet {
-    /// Light tracing.
+    /// The techniques of light tracing.
     pub const LIGHT: TechniqueSet = TechniqueSet { camera: true, connect: false, merge: false, first_merged: [1, 1] };
-    /// Bidirectional path tracing.
+    /// The techniques of bidirectional path tracing.
     pub const BDPT: TechniqueSet = TechniqueSet { camera: true, connect: true, merge: false, first_merged: [1, 1] };
-    /// Bidirectional photon mapping: every vertex merges, direct light included.
+    /// The techniques of bidirectional photon mapping: every vertex merges, direct light included.
     pub const BPM: TechniqueSet = TechniqueSet { camera: false, connect: false, merge: true, first_merged: [1, 1] };
-    /// Vertex connection and merging. Direct light and directly visible vertices are not merged, because other
-    /// techniques sample them better, without bias.
+    /// The techniques of vertex connection and merging. Direct light and directly visible vertices are not merged,
+    /// because other techniques sample them better, without bias.
     pub const VCM: TechniqueSet = TechniqueSet { camera: true, connect: true, merge: true, first_merged: [2, 2] };
 
-    /// Whether a light vertex at `depth` leaves a photon.
+    /// Whether a light path leaves a photon at its vertex number `depth` (1 is the first surface).
     #[inline]
     pub fn light_vertex_merges(&self, depth: u32) -> bool {
         self.merge && depth >= self.first_merged[0]
     }
 
-    /// Whether a camera vertex at `depth` merges photons.
+    /// Whether a camera path merges photons at its vertex number `depth` (1 is the first surface).
     #[inline]
     pub fn camera_vertex_merges(&self, depth: u32) -> bool {
         self.merge && depth >= self.first_merged[1]
     }
 
-    /// The merge of a camera vertex at `depth` in MIS weights. `clear`: all earlier vertices are delta.
+    /// How often merging at camera vertex number `depth` counts in MIS weights: once or not at all. `clear`: all
+    /// earlier vertices are delta.
     #[inline]
     pub fn camera_vertex_merge(&self, depth: u32, clear: bool) -> Merges {
         if self.camera_vertex_merges(depth) { one_merge(clear) } else { Merges::ZERO }
     }
 
-    /// The merge of a light vertex at `depth` in MIS weights. The camera path behind it has a vertex that is not delta.
+    /// How often merging at light vertex number `depth` counts in MIS weights: once or not at all. The camera path
+    /// behind it has a vertex that is not delta.
     #[inline]
     pub fn light_vertex_merge(&self, depth: u32) -> Merges {
         if self.light_vertex_merges(depth) { one_merge(false) } else { Merges::ZERO }
@@ -65,32 +67,33 @@ impl TechniqueSet {
 /// Settings and shared data of the bidirectional paths of a render.
 #[derive(Clone, Copy)]
 pub struct Bidirectional<'a> {
-    /// Camera paths.
+    /// Settings and shared data of the camera paths.
     pub camera_paths: CameraPaths<'a>,
-    /// The solids around camera and lights.
+    /// The solids around the camera and around each light.
     pub initial_media: &'a InitialMedia,
-    /// Techniques of the method.
+    /// Techniques that the method combines.
     pub techniques: TechniqueSet,
-    /// Number of light paths connected to the camera per camera path of a pixel.
+    /// Number of light paths connected to the camera, for each camera path of a pixel.
     pub light_paths: f32,
-    /// Number of light paths of an iteration whose photons are merged.
+    /// Number of light paths whose photons are merged in one iteration.
     pub merged_paths: f32,
-    /// Limits the walks to the paths of one division, if set.
+    /// Limits paths to one division between camera and light subpath; `None` for no limit.
     pub only: Option<Division>,
 }
 
-/// Division of a path of `segments` among the two walks. The camera path reaches its vertex at depth `camera`, the
-/// light path the vertex before it.
+/// How the segments of a path are divided among camera subpath and light subpath. The camera path reaches its vertex at
+/// depth `camera`, the light path the vertex before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Division {
-    /// Number of segments of the path.
+    /// Number of segments of the whole path.
     pub segments: u32,
-    /// 0 if a light vertex is connected to the camera; `segments` if the camera path hits a light.
+    /// Depth of the last camera vertex: 0 if a light vertex is connected to the camera; `segments` if the camera path
+    /// hits a light.
     pub camera: u32,
 }
 
 impl Division {
-    /// The division of a path found by `technique`; `None` for merging.
+    /// The division of the path that `technique` found; `None` for merging.
     pub fn of(technique: Technique) -> Option<Division> {
         let (segments, camera) = match technique {
             Technique::Hit { camera } => (camera, camera),
@@ -102,7 +105,7 @@ impl Division {
         Some(Division { segments, camera })
     }
 
-    /// Depth of the light path's last vertex, 0 for the light; `None` if the camera path hits the light.
+    /// Depth of the last vertex of the light path, 0 for the light itself; `None` if the camera path hits the light.
     #[inline]
     pub fn light(self) -> Option<u32> {
         self.segments.checked_sub(self.camera + 1)
@@ -159,7 +162,8 @@ impl Bidirectional<'_> {
     }
 }
 
-/// The technique that found a path. `light` and `camera` are the depths of the last vertices of the two subpaths.
+/// The technique that found a path. `light` and `camera` are the depths (numbers of segments) of the last vertices of
+/// the two subpaths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Technique {
     /// Segment number `camera` of the camera path hit a light.
@@ -184,7 +188,7 @@ pub enum Technique {
         /// Depth of the light subpath.
         light: u32,
     },
-    /// A photon was merged.
+    /// A photon was merged with a camera vertex.
     Merge {
         /// Depth of the light subpath.
         light: u32,
@@ -194,7 +198,7 @@ pub enum Technique {
 }
 
 impl Technique {
-    /// The cause of rejection if a contribution is not finite.
+    /// The cause to report if a contribution of the technique is not finite.
     pub(super) fn cause(self) -> Cause {
         match self {
             Technique::Hit { .. } => Cause::Emission,
@@ -225,7 +229,7 @@ pub trait PathRecorder {
 
 impl PathRecorder for () {}
 
-/// Merging radii of the levels of a pixel, ascending, with their etas.
+/// Merging radii of the bandwidth levels of a pixel, ascending, each with its eta (factor of merging in MIS weights).
 #[derive(Clone, Copy, Debug)]
 pub struct MergeLevels {
     radius2: [f32; super::MAX_LEVELS],
@@ -246,13 +250,13 @@ impl MergeLevels {
         all
     }
 
-    /// Squared radii.
+    /// Squared merging radii in ascending order (square scene units).
     #[inline]
     pub fn radius2(&self) -> &[f32] {
         &self.radius2[..self.count]
     }
 
-    /// Etas.
+    /// Eta of each radius: the factor of merging in MIS weights.
     #[inline]
     pub fn eta(&self) -> &[Eta] {
         &self.eta[..self.count]

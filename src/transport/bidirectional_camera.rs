@@ -25,17 +25,18 @@ use crate::random::{Purpose, Stream, mix};
 use crate::stop::Stop;
 use bumpalo::Bump;
 
-/// The light path and photons of a camera path.
+/// Light path and photons that the vertices of a camera path are connected to and merged with.
 pub struct CameraWalkContext<'a> {
-    /// Vertices of its light path.
+    /// Vertices of the light path that this camera path connects to.
     pub vertices: &'a [LightVertex<'a>],
-    /// Photons of the previous iteration; `None` if there is none. Then all etas must be [`mis::Eta::NONE`].
+    /// Photons of the previous iteration; `None` if none are merged. Then all etas, the factors of merging in MIS
+    /// weights, must be [`mis::Eta::NONE`].
     pub photons: Option<&'a PhotonMap<MergePhoton>>,
-    /// Merging radii of its pixel.
+    /// Merging radii of the pixel of the camera path, by bandwidth level.
     pub levels: &'a MergeLevels,
 }
 
-/// Number of vertices between two checks whether the iteration is aborted.
+/// Number of vertices between two checks whether the iteration is aborted before its end.
 const ABORT_CHECK_INTERVAL: u32 = 64;
 
 struct CameraWalk<'a, R> {
@@ -43,23 +44,23 @@ struct CameraWalk<'a, R> {
     context: &'a CameraWalkContext<'a>,
     mis: MisState,
     history: PathHistory,
-    /// The last vertex.
+    /// The last vertex of the camera path, as a receiver of direct light.
     last: Receiver,
-    /// Depth of the last vertex.
+    /// Number of path segments up to the last vertex.
     depth: u32,
     sample: &'a mut PixelSample,
     record: &'a mut R,
 }
 
-/// A hit of a light, as it is recorded.
+/// Hit of a light by a camera path, as the recorder receives it.
 struct LightHit {
-    /// Number of the segment; 0 for light from infinity.
+    /// Number of the path segment that hits the light; 0 for light from infinity.
     depth: u32,
-    /// Position of the hit; the direction for light from infinity.
+    /// Position of the hit; for light from infinity, its direction.
     at: Vec3,
 }
 
-/// Records the first hit and the features of a path that arrives at a surface.
+/// Stores the first hit and the G-buffer in the sample of a camera path that arrives at a surface.
 #[inline]
 pub(super) fn record_surface(
     history: &mut PathHistory,
@@ -83,7 +84,7 @@ pub(super) fn record_surface(
     }
 }
 
-/// Records the first hit and the features of a path that arrives at a vertex of a medium.
+/// Stores the first hit and the G-buffer in the sample of a camera path that arrives at a vertex in a medium.
 #[inline]
 pub(super) fn record_medium(
     history: &mut PathHistory,
@@ -102,7 +103,7 @@ pub(super) fn record_medium(
 }
 
 impl<R: PathRecorder> CameraWalk<'_, R> {
-    /// Whether light is worth a shadow ray. NaN rejects the sample.
+    /// Whether `light`, which `technique` has found, is worth a shadow ray. NaN rejects the sample.
     #[inline]
     fn finds(&mut self, technique: Technique, light: Rgb) -> bool {
         if light.is_nan() {
@@ -245,7 +246,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         }
     }
 
-    /// Next-event estimation and connections with all vertices of the light path.
+    /// Adds next-event estimation and connections with all vertices of the light path at a vertex of the camera path.
     #[inline]
     fn connect_all(&mut self, vertex: &impl ScatterPoint) {
         if !self.shared.connects_camera_vertex(vertex.depth()) {
@@ -260,13 +261,14 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         }
     }
 
-    /// Squared distance for the conversion of densities; 1 for the parallel rays of an orthographic camera.
+    /// Squared length of a segment, which converts densities per solid angle to area; 1 for the parallel rays of an
+    /// orthographic camera.
     #[inline]
     fn distance2(&self, distance: f32, scattered: Option<Scattered>) -> f32 {
         if scattered.is_none() && self.shared.camera_paths.camera.is_orthographic() { 1.0 } else { distance * distance }
     }
 
-    /// Whether the iteration is aborted. Checked at every few vertices only.
+    /// Whether the iteration is aborted before its end. Checked at every few vertices only.
     #[inline]
     fn is_given_up(&self, depth: u32) -> bool {
         depth.is_multiple_of(ABORT_CHECK_INTERVAL) && self.shared.camera_paths.stop.is_some_and(Stop::should_abort)
@@ -399,7 +401,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
 }
 
 impl Bidirectional<'_> {
-    /// Walks a camera path and overwrites `sample` with its light at all levels.
+    /// Traces a camera path and overwrites `sample` with its light at all bandwidth levels.
     #[inline]
     pub fn camera_path<R: PathRecorder>(
         &self,

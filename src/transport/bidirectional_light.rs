@@ -19,25 +19,26 @@ use crate::medium::FlightDensity;
 use crate::plan::{CameraSuffix, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 
-/// Light that a light path sends to a pixel. Its weight depends on the bandwidths of that pixel.
+/// Light that a light path sends to a pixel through a connection to the camera. Its MIS weight depends on the
+/// bandwidths of that pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Splat {
     /// Index of the pixel, row by row.
     pub pixel: u32,
-    /// Depth of the light vertex.
+    /// Number of segments of the light path up to the light vertex.
     pub light: u32,
-    /// Class of the path.
+    /// Class of the whole path: the kinds of its bounces.
     pub class: PathClass,
-    /// Group of the light.
+    /// Light group of the light that the path starts from.
     pub group: Group,
-    /// Radiance, without weight.
+    /// Radiance, without MIS weight.
     pub value: Rgb,
-    /// Ratios that determine the weight.
+    /// Ratios of densities that determine the MIS weight.
     pub ratios: Ratios,
 }
 
 impl Splat {
-    /// Adds the weighted light to the pixel's sample.
+    /// Adds the light, times its MIS weight at each bandwidth level, to the sample of its pixel.
     #[inline]
     pub fn apply(&self, levels: &MergeLevels, sample: &mut PixelSample) {
         if !self.value.is_finite() {
@@ -47,7 +48,7 @@ impl Splat {
     }
 }
 
-/// Adds light to all levels of a sample, each with its weight.
+/// Adds light to all bandwidth levels of a sample, each with its MIS weight.
 #[inline]
 pub(super) fn add(sample: &mut PixelSample, levels: &MergeLevels, class: PathClass, value: Rgb, ratios: Ratios) {
     let into = match class.part() {
@@ -63,10 +64,10 @@ pub(super) fn add(sample: &mut PixelSample, levels: &MergeLevels, class: PathCla
     }
 }
 
-/// Vertices of one light path, for its camera path.
+/// Vertices of one light path, which a camera path connects to.
 pub type LightVertices<'s> = bumpalo::collections::Vec<'s, LightVertex<'s>>;
 
-/// Splats and photons that light paths leave.
+/// Splats (light for pixels) and photons that light paths leave.
 #[derive(Default)]
 pub struct Deposits {
     /// Light for pixels, of all paths so far.
@@ -89,12 +90,12 @@ impl Deposits {
 struct LightWalk<'a, 's, R> {
     shared: &'a Bidirectional<'a>,
     mis: MisState,
-    /// Index of the light.
+    /// Index of the light that the path starts from.
     light: u32,
     group: Group,
     infinite: bool,
     prefix: LightPrefix,
-    /// Lobes of the last vertex; `None` in a medium.
+    /// Lobes of the BSDF at the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
     photons_only: bool,
     vertices: &'a mut LightVertices<'s>,
@@ -278,7 +279,8 @@ pub(super) fn scatter(
 }
 
 impl<'s> Bidirectional<'s> {
-    /// Walks light path `index`, which leaves vertices, splats and photons; with `photons_only` it leaves photons only.
+    /// Traces light path `index`, which leaves vertices, splats and photons; with `photons_only` it leaves photons
+    /// only.
     #[inline]
     pub fn light_path<R: PathRecorder>(
         &self,
@@ -293,7 +295,7 @@ impl<'s> Bidirectional<'s> {
         self.light_path_of(paths, &emitted, photons_only, vertices, left, record);
     }
 
-    /// Walks the light path that starts with `emitted`.
+    /// Traces the light path that starts with `emitted`.
     #[inline]
     pub fn light_path_of<R: PathRecorder>(
         &self,

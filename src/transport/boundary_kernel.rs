@@ -20,16 +20,17 @@ use crate::scene::contact::RaySurfaces;
 use crate::trace::{Hit, Ray};
 use std::f32::consts::TAU;
 
-/// Number of rays. They point to the corners of a randomly rotated cube. Each has an opposite one, so that planes
-/// through the centre are exact.
+/// Number of rays that look for the boundaries of a medium around a vertex. They point to the corners of a randomly
+/// rotated cube. Each has an opposite one, so that planes through the centre are exact.
 const RAYS: usize = 8;
-/// Smallest mass inside the medium. A smaller divisor would give photons an unbounded weight.
+/// Smallest fraction of the kernel inside the medium by which light is divided. A smaller divisor would give photons an
+/// unbounded weight.
 const MIN_MASS: f32 = 0.05;
 /// Largest number of boundaries that a ray crosses.
 const MAX_BORDERS: u32 = 32;
 
 impl Volume<'_> {
-    /// The kernel's mass inside the medium around `vertex`, by level.
+    /// Fraction (0 to 1) of the gathering kernel around `vertex` that is inside the medium, by bandwidth level.
     pub(super) fn kernel_mass_inside<K: Kernel>(
         &self,
         _: K,

@@ -28,7 +28,7 @@ pub enum Indirect {
 }
 
 impl Indirect {
-    /// Whether photons of each kind are needed to find the classes in `wanted`.
+    /// For each kind of photons, whether they are needed to find light of the path classes in `wanted`.
     pub fn kinds(self, wanted: ClassSet) -> ByKind<bool> {
         let caustics: ClassSet = match self {
             Indirect::Photons => [PathClass::Caustic, PathClass::Sds].into_iter().collect(),
@@ -39,7 +39,7 @@ impl Indirect {
     }
 }
 
-/// The start of a camera path, and its random numbers.
+/// The first ray of a camera path, and the random numbers of the path.
 pub type CameraPathStart = (PathStart, Stream);
 
 /// Settings and shared data of all camera paths of a render.
@@ -49,26 +49,27 @@ pub struct CameraPaths<'a> {
     pub scene: &'a Scene,
     /// The camera.
     pub camera: &'a Camera,
-    /// The solids around the camera.
+    /// The solids around the origins of camera rays.
     pub interior: InitialMedium,
     /// Largest number of segments of a path.
     pub max_depth: u32,
-    /// Technique for indirect light where photons are gathered.
+    /// Technique for indirect light in methods that gather photons.
     pub indirect: Indirect,
-    /// Classes of paths that contribute.
+    /// Classes of paths (by kinds of bounces) whose light the picture shows.
     pub classes: ClassSet,
-    /// The switch that aborts an iteration, if there is one.
+    /// The switch that aborts an iteration before its end; `None` if there is none.
     pub stop: Option<&'a Stop>,
 }
 
 impl CameraPaths<'_> {
-    /// Whether the current iteration is aborted.
+    /// Whether the current iteration is aborted before its end.
     #[inline]
     pub fn is_given_up(&self) -> bool {
         self.stop.is_some_and(Stop::should_abort)
     }
 
-    /// Camera depth and position of the first hit of a sample (scene units, in the coordinates of the scene file).
+    /// Depth along the camera axis and position of the first hit of a sample (scene units, in the coordinates of the
+    /// scene file); `None` if it hits nothing.
     pub fn first_hit(&self, sample: &PixelSample) -> Option<(f32, Vec3)> {
         let p = sample.first?.p;
         Some((self.camera.depth(p), (p.as_dvec3() + self.scene.origin).as_vec3()))

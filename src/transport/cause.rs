@@ -1,21 +1,21 @@
 //! Why samples are rejected.
 
-/// Source of a value in a sample that is not finite.
+/// Source of a value in a sample that is not finite; the sample is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// The throughput of the camera path.
     Path,
     /// A light that the camera path has hit.
     Emission,
-    /// Next-event estimation, on surfaces or in media.
+    /// Light from next-event estimation, on surfaces or in media.
     DirectLight,
-    /// A light vertex connected to the camera path.
+    /// Light from a light vertex connected to the camera path.
     Connection,
-    /// Photons, gathered or merged.
+    /// Light from photons, gathered or merged.
     Photons,
-    /// A light vertex connected to the camera.
+    /// Light from a light vertex connected to the camera.
     Splat,
-    /// A weight, or the sum of finite values.
+    /// A MIS weight, or the sum of finite values.
     Sum,
 }
 

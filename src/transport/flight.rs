@@ -33,17 +33,17 @@ fn arrival(scene: &Scene, span: &Span, collision: Collision) -> MediumArrival {
     }
 }
 
-/// Flight with random collisions.
+/// Crosses media with random collisions: a medium may scatter the ray at a sampled point.
 pub(super) struct Fly<'a> {
     pub scene: &'a Scene,
     /// Throughput of the path at the start of the ray.
     pub throughput: Rgb,
     pub draws: Draws,
-    /// The ray starts at a vertex in a medium.
+    /// Whether the ray starts at a vertex in a medium.
     pub from_medium: bool,
-    /// The ray comes from infinity.
+    /// Whether the ray comes from a light at infinity.
     pub from_infinity: bool,
-    /// Densities of the flight so far.
+    /// Probability densities of the flight through media so far, in both directions.
     pub flight: FlightDensity,
 }
 
@@ -71,7 +71,8 @@ impl Through for Fly<'_> {
     }
 }
 
-/// Flight that splits.
+/// Crosses media by splitting: the visitor gets one vertex in every medium, and the ray continues, attenuated, to the
+/// surface behind.
 pub(super) struct Split<'a, V> {
     pub scene: &'a Scene,
     pub visitor: &'a mut V,
@@ -85,8 +86,8 @@ pub(super) struct Split<'a, V> {
 }
 
 impl<V> Split<'_, V> {
-    /// Equiangular distribution along `span` as seen from the light point of next-event estimation, if the light is
-    /// near or lights only a small part of the span.
+    /// Equiangular distribution along `span` as seen from the light point of next-event estimation; `None` unless the
+    /// light is near or lights only a small part of the span.
     #[inline]
     fn near_light(&self, span: &Span, draws: &Draws) -> Option<Equiangular> {
         let (choice, point) = (draws.one_fine(Purpose::LightChoice), draws.two(Purpose::LightPoint));
@@ -101,7 +102,7 @@ impl<V> Split<'_, V> {
         (seen.is_near(length) || seen.is_short(length)).then_some(seen)
     }
 
-    /// The vertex at `at`; [`MediumVertex`] explains `opacity` and `next_event`.
+    /// The medium vertex for the collision `at`; [`MediumVertex`] explains `opacity` and `next_event`.
     #[inline]
     fn vertex(&self, span: &Span, at: Collision, draws: Draws, opacity: f32, next_event: f32) -> MediumVertex {
         let met = arrival(self.scene, span, at);

@@ -107,8 +107,8 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
     }
 }
 
-/// Visits the photons around a vertex whose path has a wavelength: those whose wavelength is compatible, with their flux
-/// weighted. Not inlined, so that the common case stays small.
+/// Visits the photons around a vertex whose path has a wavelength: photons with a compatible wavelength, with their
+/// flux weighted. Not inlined, so that the common case stays small.
 #[inline(never)]
 fn gather_dispersed(
     photons: &PhotonMap,

@@ -41,7 +41,8 @@ use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, Part};
 use crate::random::Purpose;
 use crate::scene::Scene;
 
-/// Smallest probability of continuing by broad lobes, and by the others, at a vertex that has both.
+/// Smallest probability with which a camera path continues by broad lobes, and by the other lobes, at a vertex that has
+/// both.
 const MIN_CHANCE: f32 = 0.1;
 
 /// Visitor of a camera path that gathers. `PATHS`: the path continues by broad lobes ([`Indirect::Paths`]).
@@ -56,17 +57,17 @@ pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
     pub bandwidths: &'a mut B,
     pub max_depth: u32,
     pub sample: PixelSample,
-    /// Length of the path so far.
+    /// Length of the path so far (scene units).
     pub length: f32,
-    /// Class of the path up to the last vertex.
+    /// Class of the path up to the last vertex: the kinds of its bounces.
     pub suffix: CameraSuffix,
-    /// Lobes of the last vertex.
+    /// Lobes of the BSDF at the last vertex.
     pub lobes: LobeSet,
     pub classes: ClassSet,
-    /// The path has had a broad bounce.
+    /// Whether the path has had a bounce at a broad lobe.
     pub scattered_broadly: bool,
     pub glints: Glints,
-    /// The last vertex.
+    /// The last vertex, as a receiver of direct light.
     pub last: Receiver,
 }
 
@@ -116,7 +117,8 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
         scattered.map_or(self.suffix, |scattered| self.suffix.then(Event::at_surface(scattered.lobe, self.lobes)))
     }
 
-    /// `broad` and `onward`, each empty if its class of direct light is switched off.
+    /// The lobes for which direct light is sampled: `broad` and `onward`, each empty if the picture does not show its
+    /// class of direct light.
     #[inline]
     fn lit_lobes(&self, broad: LobeSet, onward: LobeSet) -> (LobeSet, LobeSet) {
         let on =
@@ -125,13 +127,13 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
         (only(broad, Event::Broad), only(onward, Event::Sharp))
     }
 
-    /// Whether direct light in a medium is switched on.
+    /// Whether the picture shows direct light in a medium at the end of a path of class `suffix`.
     #[inline]
     fn lit_in_medium(&self, suffix: CameraSuffix) -> bool {
         self.classes.has(suffix.then(Event::Medium).class_at_light(false))
     }
 
-    /// Whether continuing by the lobes in `set` of the last vertex can reach light of a class that is switched on.
+    /// Whether continuing by the lobes in `set` of the last vertex can reach light that the picture shows.
     #[inline]
     fn leads(&self, set: LobeSet) -> bool {
         self.classes.is_all() || leads(self.suffix, self.lobes, set, self.classes)
@@ -314,7 +316,8 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
 }
 
 impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
-    /// Radiance by level from the photons around a vertex of a medium, if their class is switched on.
+    /// Radiance by bandwidth level from the photons around a vertex in a medium; zero if the picture does not show
+    /// their class.
     #[inline]
     fn gather_in_medium(
         &mut self,
@@ -336,8 +339,8 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
 }
 
 impl CameraPaths<'_> {
-    /// Traces one camera path and samples all levels of `bandwidths`, and of `volume` where media scatter, with
-    /// `kernel`. `scratch` must not have served photons of another iteration.
+    /// Traces one camera path and samples its light at all bandwidth levels of `bandwidths`, and of `volume` where
+    /// media scatter, with `kernel`. `scratch` must not have served photons of another iteration.
     #[inline]
     pub fn sample(
         &self,

@@ -28,15 +28,15 @@ pub(super) struct Onward {
     pub probability: f32,
 }
 
-/// Kernel area for glints over the kernel area of other photons. It is smaller because photons are only one of two
-/// techniques here.
+/// Kernel area for glints, light that both photons and camera paths find at sharp lobes, over the kernel area of other
+/// photons. It is smaller because photons are only one of two techniques here.
 const AREA_RATIO: f32 = 1.0 / 4.0;
 
-/// Number of light paths times kernel area at a vertex, by level: `n pi r^2`.
+/// At one vertex, number of light paths times kernel area, `n pi r^2`, for each bandwidth level.
 #[derive(Clone, Copy, Debug)]
 struct MergeAreas {
     areas: [f32; MAX_LEVELS],
-    /// The level of each area.
+    /// The bandwidth level of each area.
     order: [u8; MAX_LEVELS],
     /// Number of areas; 0 where no photons are gathered.
     count: usize,
@@ -48,21 +48,22 @@ impl MergeAreas {
     const NONE: MergeAreas = MergeAreas { areas: [0.0; MAX_LEVELS], order: [0; MAX_LEVELS], count: 0, going: 1.0 };
 }
 
-/// State of a camera path from which the weights of glints follow.
+/// State of a camera path from which the MIS weights of glints follow: light that both photons and the path find at a
+/// sharp lobe.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glints {
-    /// At the last vertex that is not a perfect mirror or clear glass.
+    /// Kernel areas at the last vertex that is not a perfect mirror or clear glass.
     here: MergeAreas,
-    /// At X, if the path left it by a sharp lobe and met delta lobes only since.
+    /// Kernel areas at X, the last vertex that the path left by a sharp lobe, if it has met delta lobes only since.
     at: MergeAreas,
-    /// Cosine over density of the direction in which the path left X.
+    /// Cosine over probability density of the direction in which the path left X.
     onward: f32,
 }
 
 impl Glints {
     pub const NONE: Glints = Glints { here: MergeAreas::NONE, at: MergeAreas::NONE, onward: 0.0 };
 
-    /// The path arrives at a vertex. Glints are not gathered there unless [`Glints::gather`] is called.
+    /// Notes that the path arrives at a vertex. Glints are not gathered there unless [`Glints::gather`] is called.
     #[inline]
     pub fn arrive(&mut self) {
         self.here.count = 0;
@@ -99,7 +100,7 @@ impl Glints {
         }
     }
 
-    /// The path leaves a vertex with geometric normal `ng` along `sample`.
+    /// Notes that the path leaves a vertex with geometric normal `ng` along `sample`.
     #[inline]
     pub fn scatter(&mut self, ng: Vec3, sample: &BsdfSample) {
         if sample.lobe.intersects(LobeSet::SHARP) {
@@ -110,13 +111,14 @@ impl Glints {
         }
     }
 
-    /// Whether photons, too, find the light that the path hits now.
+    /// Whether photons also find the light that the camera path hits now, so that its weight is below 1.
     #[inline]
     pub fn are_shared(&self) -> bool {
         self.at.count > 0
     }
 
-    /// Levels, and the weight of the camera path at each, if it hits light of this density.
+    /// For a camera path that hits a light with this density of emission: each bandwidth level and the MIS weight of
+    /// the path there.
     #[inline]
     pub fn path_weights(&self, density: &EmissionDensity) -> impl Iterator<Item = (usize, f32)> {
         let density = PhotonFlags::from_area_light(density.ray_density()).density();
@@ -134,9 +136,9 @@ pub(super) struct GlintGather<'s, K> {
     onward: Onward,
     paths: f32,
     radius2: [f32; MAX_LEVELS],
-    /// Area of the largest kernel.
+    /// Area of the largest gathering kernel (square scene units).
     largest: f32,
-    /// Squared radius within which photons are evaluated.
+    /// Squared radius within which photons are evaluated (square scene units).
     reach2: f32,
     sums: [Rgb; MAX_LEVELS],
 }
@@ -148,8 +150,8 @@ impl<K: Kernel> GlintGather<'_, K> {
         self.reach2 = self.reach2.max(reach2);
     }
 
-    /// Adds a photon at this squared distance, if it came directly from a light with a size. Returns its light within the
-    /// largest kernel, before division by an area.
+    /// Adds a photon at this squared distance, if it came from a light with a size by delta bounces only. Returns its
+    /// light within the largest kernel, before division by an area.
     #[inline(always)]
     pub fn push(&mut self, photon: &Photon, distance2: f32) -> Rgb {
         if distance2 < self.reach2 && photon.flags.density() > 0.0 { self.add(photon, distance2) } else { Rgb::ZERO }
@@ -178,7 +180,7 @@ impl<K: Kernel> GlintGather<'_, K> {
         light * (self.largest / (area_per_photon + self.largest))
     }
 
-    /// Radiance by level, in the order of radii.
+    /// Radiance from the gathered photons by bandwidth level, in the order of radii.
     #[inline]
     pub fn finish(self) -> [Rgb; MAX_LEVELS] {
         self.sums

@@ -10,14 +10,14 @@ use std::collections::HashMap;
 /// The solids around the points where paths from one camera or light start.
 #[derive(Clone, Copy, Debug)]
 pub enum InitialMedium {
-    /// The solids are the same for all points.
+    /// The solids are equal for all start points.
     Same(Interior),
-    /// The points may lie on both sides of a solid's surface, so each is queried.
+    /// The start points may lie on both sides of a solid's surface, so the solids are found for each point.
     Differs,
 }
 
 impl InitialMedium {
-    /// The solids around one of the points.
+    /// The solids around `p`, one of the start points.
     #[inline]
     pub fn at(&self, scene: &Scene, p: Vec3) -> Interior {
         match self {
@@ -29,9 +29,9 @@ impl InitialMedium {
 
 /// The solids around the camera and around each light.
 pub struct InitialMedia {
-    /// Around the camera.
+    /// The solids around the camera.
     pub camera: InitialMedium,
-    /// Around the lights, by index; empty when the scene has no solids.
+    /// The solids around each light, by index; empty when the scene has no solids.
     lights: Vec<InitialMedium>,
 }
 
@@ -77,7 +77,7 @@ impl Extent {
     }
 }
 
-/// An instance whose surface bounds a solid.
+/// An instance whose surface bounds a solid, with its bounding box.
 struct Solid {
     instance: u32,
     extent: Extent,
@@ -91,7 +91,7 @@ impl Solid {
         solid.map(|(instance, _)| Solid { instance, extent: extent(scene, instance) }).collect()
     }
 
-    /// Whether the bounding box of one of its triangles intersects `other`.
+    /// Whether the bounding box of a triangle of the solid intersects `other`.
     fn intersects(&self, scene: &Scene, other: &Extent) -> bool {
         let instance = &scene.shapes.instances[self.instance as usize];
         let mesh = &scene.shapes.meshes[instance.mesh as usize];

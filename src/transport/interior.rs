@@ -14,10 +14,11 @@ use crate::spectrum::Wavelength;
 use crate::trace::Ray;
 use smallvec::SmallVec;
 
-/// Number of solids stored with a path, the innermost ones. A single index stands for all outer ones.
+/// Number of solids around a path that are stored with it, the innermost ones. A single index stands for all outer
+/// ones.
 const MAX_STORED_SOLIDS: usize = 5;
 
-/// Hits of an object belong to one edge if their distances differ by less than this, relative.
+/// Hits of an object belong to one edge if their distances differ by less than this fraction.
 const EDGE_TOLERANCE: f32 = 8.0 * f32::EPSILON;
 
 /// A hit of the ray that finds the solids around a point.
@@ -45,18 +46,19 @@ impl PartialEq for Interior {
 }
 
 impl Default for Interior {
-    /// The open space.
+    /// The open space: no solid is around the path.
     fn default() -> Interior {
         Interior { inside: [0; MAX_STORED_SOLIDS], len: 0, outer: EMPTY_STACK }
     }
 }
 
-/// The media on both sides of a solid's surface.
+/// The media on both sides of the surface of a solid that a path hits.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
-    /// Material before the surface, on the side of the path; `None` is the open space.
+    /// Index of the material that fills the space before the surface, on the side of the path; `None` is the open
+    /// space.
     pub before: Option<u32>,
-    /// Material behind the surface.
+    /// Index of the material that fills the space behind the surface; `None` is the open space.
     pub after: Option<u32>,
     /// The solids around the path behind the surface.
     pub interior: Interior,
@@ -172,13 +174,13 @@ impl Interior {
         self
     }
 
-    /// Material that fills the space; `None` is the open space.
+    /// Index of the material that fills the space around the path; `None` is the open space.
     #[inline]
     pub fn material(&self, scene: &Scene) -> Option<u32> {
         self.host(scene).map(|instance| scene.shapes.instances[instance as usize].material)
     }
 
-    /// The instance whose material fills the space; `None` is the open space.
+    /// Index of the instance whose material fills the space around the path; `None` is the open space.
     #[inline]
     pub fn host(&self, scene: &Scene) -> Option<u32> {
         // `max_by_key` returns the last of equal ones, which belong to one object.
@@ -186,7 +188,7 @@ impl Interior {
         if self.outer == EMPTY_STACK { inner } else { inner.map(|inner| stronger(scene, self.outer, inner)) }
     }
 
-    /// Medium that fills the space.
+    /// The medium that fills the space around the path; `None` without one.
     #[inline]
     pub fn medium(&self, scene: &Scene) -> Option<MediumParameters> {
         match self.material(scene) {
@@ -195,7 +197,7 @@ impl Interior {
         }
     }
 
-    /// Index of refraction of the medium that fills the space.
+    /// Index of refraction of the medium that fills the space around the path; 1 in the open.
     #[inline]
     pub fn ior(&self, scene: &Scene) -> f32 {
         ior(scene, self.material(scene))
@@ -215,7 +217,7 @@ impl Interior {
     }
 }
 
-/// Priority and rank of an instance; the instance with the larger pair fills the space.
+/// Priority and rank of an instance; of several solids around a point, the one with the larger pair fills the space.
 #[inline]
 fn strength(scene: &Scene, instance: u32) -> (i32, u32) {
     let material = scene.shapes.instances[instance as usize].material;
@@ -259,13 +261,13 @@ fn finite_ior(material: &Material) -> f32 {
 }
 
 impl Crossing {
-    /// Whether both sides have the same material, so that the surface does not scatter.
+    /// Whether both sides of the surface have one material, so that it does not scatter.
     #[inline]
     pub fn is_nothing(&self) -> bool {
         self.before == self.after
     }
 
-    /// Whether the index of refraction on one of the sides depends on the wavelength.
+    /// Whether the index of refraction on one of the sides of the surface depends on the wavelength.
     #[inline]
     pub fn disperses(&self, scene: &Scene) -> bool {
         [self.before, self.after].into_iter().flatten().any(|m| scene.materials.list[m as usize].disperses())

@@ -40,36 +40,37 @@ const ABORT_CHECK_INTERVAL: u32 = 16;
 /// The start of a light path.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitted {
-    /// First ray and throughput.
+    /// First ray of the path, and its throughput.
     pub start: PathStart,
     /// Random numbers of the path.
     pub stream: Stream,
-    /// Rays cannot hit the light.
+    /// Whether the light is a delta light, which rays cannot hit.
     pub delta: bool,
-    /// Index of the light.
+    /// Index of the light that the path starts from.
     pub light: u32,
-    /// Densities of the start.
+    /// Probability densities of origin and direction of the first ray.
     pub density: EmissionDensity,
-    /// Component of the guide that sampled it; [`guide::UNGUIDED`] without a guide.
+    /// Component of the guide (distribution that aims light paths at what makes caustics) that sampled the start;
+    /// [`guide::UNGUIDED`] without a guide.
     pub cell: usize,
     /// Density of unguided emission without a region of interest over the guide's density; 1 without a guide.
     pub ratio: f32,
     /// Density of starts sampled by power alone over the guide's density; 1 without a guide.
     pub weight: f32,
-    /// Fraction of the start's density that is not aimed at what makes caustics.
+    /// Fraction of the density of the start that is not aimed at objects that make caustics, 0 to 1.
     pub unaimed: f32,
 }
 
 /// Random numbers of the emission of a light path.
 struct EmissionDraws {
-    /// Choice of the light, and of how it is aimed.
+    /// Choice of the light, and of the target that it is aimed at.
     choice: DVec2,
     point: Vec2,
     direction: Vec2,
 }
 
 impl<'a> LightPaths<'a> {
-    /// `count` light paths of iteration `i`.
+    /// The `count` light paths of iteration `i`.
     pub fn new(seed: u64, i: u64, domain: Domain, count: u32, max_depth: u32) -> LightPaths<'a> {
         let key = mix(mix(seed ^ 0x6c62_272e_07bb_0142).wrapping_add(i.wrapping_mul(GOLDEN)) ^ domain as u64);
         let pair = |k: u64| SobolPair::new(key.wrapping_add(k));
@@ -89,12 +90,12 @@ impl<'a> LightPaths<'a> {
         }
     }
 
-    /// Guides emission, if there is a guide.
+    /// Aims light paths by `guide`, a distribution that prefers objects that make caustics; `None` for no guide.
     pub fn guided(self, guide: Option<&'a Guide>) -> LightPaths<'a> {
         LightPaths { guide, ..self }
     }
 
-    /// Sends part of the light from infinity through a region of interest, if there is one.
+    /// Sends part of the light from infinity through a region of interest; `None` for no region.
     #[must_use]
     pub fn lighting(self, region: Option<Region>) -> LightPaths<'a> {
         LightPaths { region, ..self }
@@ -113,7 +114,7 @@ impl<'a> LightPaths<'a> {
         LightPaths { count: if wanted.is_empty() { 0 } else { self.count }, kinds: indirect.kinds(wanted), ..self }
     }
 
-    /// Limits the wavelengths of the paths to those of an iteration.
+    /// Limits the wavelengths of the paths to the ones chosen for an iteration.
     #[must_use]
     pub fn with(self, wavelengths: IterationWavelengths) -> LightPaths<'a> {
         LightPaths { wavelengths: Some(wavelengths), ..self }
@@ -125,26 +126,26 @@ impl<'a> LightPaths<'a> {
         LightPaths { stop: Some(stop), ..self }
     }
 
-    /// Whether the iteration is aborted. Checked at every few paths only; `index` is that of the path.
+    /// Whether the iteration is aborted. Checked at every few paths only, by `index`, the number of the path.
     #[inline]
     pub fn is_given_up(&self, index: u32) -> bool {
         index.is_multiple_of(ABORT_CHECK_INTERVAL) && self.stop.is_some_and(Stop::should_abort)
     }
 
-    /// The wavelength of path `index`.
+    /// The wavelength that light path `index` takes if it meets dispersive glass.
     #[inline]
     pub fn wavelength(&self, index: u32) -> WavelengthSample {
         self.wavelength_sample_of(self.stream(u64::from(index)))
     }
 
-    /// The wavelength of the path with these random numbers.
+    /// The wavelength that a path with these random numbers takes if it meets dispersive glass.
     #[inline]
     pub fn wavelength_sample_of(&self, stream: Stream) -> WavelengthSample {
         let wavelength = WavelengthSample::new(stream.vertex(0).one(Purpose::Wavelength));
         self.wavelengths.map_or(wavelength, |wavelengths| wavelengths.nearest(wavelength))
     }
 
-    /// Number of light paths.
+    /// Number of light paths of the iteration.
     pub fn count(&self) -> u32 {
         self.count
     }
@@ -154,7 +155,7 @@ impl<'a> LightPaths<'a> {
         self.streams.path(index)
     }
 
-    /// The start of path `index`. Its flux is divided by the number of paths.
+    /// The start of light path `index`; its flux is divided by the number of paths. `None` if no light emits.
     #[inline]
     pub fn emit(&self, scene: &Scene, initial_media: &InitialMedia, index: u32) -> Option<Emitted> {
         let draws = EmissionDraws {
@@ -256,23 +257,23 @@ pub struct Photons {
 struct Deposit<'a> {
     scene: &'a Scene,
     photons: &'a mut Photons,
-    /// Lobes by which a path continues.
+    /// Lobes by which the path continues.
     onward: LobeSet,
     kinds: ByKind<bool>,
     caustic: bool,
     flags: PhotonFlags,
-    /// A medium in a solid has scattered the path, and it has met nothing opaque since.
+    /// Whether a medium in a solid has scattered the path, and it has met nothing opaque since.
     inside_solid: bool,
-    /// The roulette after the first broad bounce has taken place.
+    /// Whether the roulette after the first broad bounce has taken place.
     thinned: bool,
-    /// Outcome of that roulette; a surviving path's flux is multiplied by `gain`.
+    /// Whether the path survives the roulette after its first broad bounce; its flux is then multiplied by `gain`.
     goes_on: bool,
     gain: f32,
-    /// Current factor of the flux.
+    /// Factor by which the flux of the path is multiplied now.
     scale: f32,
-    /// Weight of photons at a factor of 1; `None` if no light path is guided.
+    /// Weight in the thinning keys of photons at a `scale` of 1; `None` if no light path is guided.
     weight: Option<f32>,
-    /// Number of vertices so far.
+    /// Number of vertices of the path so far.
     vertices: u32,
 }
 
@@ -307,7 +308,7 @@ impl<'a> Deposit<'a> {
         }
     }
 
-    /// Arrives at a vertex. Returns false if the path ends there.
+    /// Notes that the path arrives at a vertex. Returns false if it ends there.
     #[inline]
     fn arrives(&mut self, scattered: Option<Scattered>) -> bool {
         self.vertices += 1;
@@ -376,8 +377,8 @@ impl<'a> Visitor<'a> for Deposit<'_> {
     }
 }
 
-/// Traces light path `index` and appends its photons. Returns the guide's component that sampled it and the number of
-/// its vertices; `None` if no light emits.
+/// Traces light path `index` and appends its photons. Returns the component of the guide that sampled it and the number
+/// of its vertices; `None` if no light emits.
 #[inline]
 pub fn light_path(
     scene: &Scene,
@@ -409,7 +410,7 @@ pub fn emitted_flux(scene: &Scene, initial_media: &InitialMedia) -> DVec3 {
 #[derive(Clone, Copy, Debug)]
 pub struct EqualFlux {
     channel: usize,
-    /// Flux (W) of a path if an iteration has one path only.
+    /// Flux (W) that each path would have if an iteration had one path only.
     flux: f32,
 }
 

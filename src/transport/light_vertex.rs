@@ -29,15 +29,15 @@ pub struct LightVertex<'s> {
     pub wo: Vec3,
     /// Flux (W) as if the path were the only one.
     pub throughput: Rgb,
-    /// Number of segments up to the vertex.
+    /// Number of path segments up to the vertex.
     pub depth: u32,
-    /// Partial sums of MIS weights.
+    /// Partial sums of MIS weights of the light path at the vertex.
     pub mis: MisState,
-    /// Class of the light path up to the vertex.
+    /// Class of the light path up to the vertex: the kinds of its bounces.
     pub prefix: LightPrefix,
-    /// The path has a wavelength; its camera path uses the same.
+    /// Whether the path has a wavelength because it has met dispersive glass; its camera path uses the same one.
     pub dispersed: bool,
-    /// Group of the light that the path starts from.
+    /// Light group of the light that the path starts from.
     pub group: Group,
 }
 
@@ -66,7 +66,7 @@ impl LightVertex<'_> {
         }
     }
 
-    /// The surface of the vertex, if other surfaces lie on it.
+    /// The point of the vertex on its surface, if other surfaces touch it there.
     #[inline]
     pub fn touching(&self) -> Option<ContactPoint> {
         match &self.scatterer {
@@ -75,7 +75,7 @@ impl LightVertex<'_> {
         }
     }
 
-    /// Geometric cosine of a direction; 1 in a medium.
+    /// Absolute cosine between `w` and the geometric normal; 1 in a medium.
     #[inline]
     pub fn cos(&self, w: Vec3) -> f32 {
         match &self.scatterer {
@@ -84,7 +84,7 @@ impl LightVertex<'_> {
         }
     }
 
-    /// Lobes that are not delta.
+    /// The lobes of the vertex that are not delta.
     #[inline]
     pub fn smooth(&self) -> LobeSet {
         match &self.scatterer {

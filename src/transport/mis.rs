@@ -36,7 +36,8 @@ use crate::medium::FlightDensity;
 /// Smaller cosines are treated as this one. f32 hardly resolves such directions.
 const MIN_COSINE: f32 = 1e-30;
 
-/// `pi r^2 n_VM / n_VC` \[Georgiev (20)\]: number of merges per connection and unit of density.
+/// Factor of merging in MIS weights, `pi r^2 n_VM / n_VC` \[Georgiev (20)\]: number of merges per connection and unit
+/// of density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eta {
     value: f64,
@@ -44,8 +45,8 @@ pub struct Eta {
     worth: Merges,
 }
 
-/// A pair of coefficients: for merges where all earlier vertices of the camera path are delta (`x`), and for merges
-/// that share a random camera path (`y`).
+/// A pair of coefficients of merging in MIS weights: for merges where all earlier vertices of the camera path are delta
+/// (`x`), and for merges that share a random camera path (`y`).
 pub type Merges = DVec2;
 
 /// The coefficient pair of a single merge. `clear`: all earlier vertices of the camera path are delta.
@@ -55,18 +56,20 @@ pub fn one_merge(clear: bool) -> Merges {
 }
 
 impl Eta {
-    /// No merging.
+    /// Eta of methods without merging.
     pub const NONE: Eta = Eta { value: 0.0, worth: DVec2::ONE };
-    /// Merging only.
+    /// Eta of methods that have no technique but merging.
     pub const MERGE_ONLY: Eta = Eta { value: f64::INFINITY, worth: DVec2::ONE };
 
-    /// For `light_paths` of an iteration merged within a squared radius per connected one. Merges count as independent.
+    /// Eta for merging within a squared radius, where `light_paths` is the number of merged light paths of an iteration
+    /// per connected one. Merges count as independent samples.
     #[inline]
     pub fn new(radius2: f32, light_paths: f32) -> Eta {
         Eta { value: std::f64::consts::PI * f64::from(radius2) * f64::from(light_paths), worth: DVec2::ONE }
     }
 
-    /// Accounts for the camera path that `photons` expected photons in a disc share.
+    /// Lowers the value of merges: all `photons` that are expected in a merging disc share one camera path and are not
+    /// independent.
     #[must_use]
     #[inline]
     pub fn sharing_camera_path(self, photons: f32) -> Eta {
@@ -77,19 +80,19 @@ impl Eta {
 /// Densities of all techniques that sample a path, over the density of the technique at hand: affine in eta.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratios {
-    /// Coefficient without eta.
+    /// Coefficient without eta: the sum over techniques other than merging.
     pub plain: f64,
-    /// Coefficients of eta.
+    /// Coefficients of eta: the sum over all merges.
     pub merged: Merges,
-    /// For a merge: its own part of `merged`.
+    /// Part of `merged` that belongs to the merge at hand, if the technique is merging.
     pub own: Merges,
 }
 
 impl Ratios {
-    /// For a path that only one technique samples.
+    /// Ratios of a path that only one technique samples.
     pub const ALONE: Ratios = Ratios { plain: 1.0, merged: DVec2::ZERO, own: DVec2::ZERO };
 
-    /// Weight of any technique except merging \[(37), balance heuristic\].
+    /// MIS weight of any technique except merging \[(37), balance heuristic\].
     #[inline]
     pub fn weight(self, eta: Eta) -> f32 {
         let merged = self.merged.dot(eta.worth);
@@ -98,29 +101,29 @@ impl Ratios {
         (1.0 / sum) as f32
     }
 
-    /// Weight of merging; requires an eta above 0.
+    /// MIS weight of merging; requires an eta above 0.
     #[inline]
     pub fn merge_weight(self, eta: Eta) -> f32 {
         (self.own.dot(eta.worth) / (self.merged.dot(eta.worth) + self.plain / eta.value)) as f32
     }
 }
 
-/// Partial sums at a vertex: `dVC = plain + eta * (merged + last)`.
+/// Partial sums of MIS weights at a vertex of a subpath: dVCM, and `dVC = plain + eta * (merged + last)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MisState {
-    /// dVCM \[(31)\].
+    /// The partial sum dVCM \[(31)\].
     pub d_vcm: f64,
-    /// Part of dVC \[(32)\] without eta.
+    /// Part of the partial sum dVC \[(32)\] without eta.
     pub plain: f64,
     /// Coefficients of eta in dVC, without the merge at the previous vertex.
     pub merged: Merges,
-    /// The merge at the previous vertex.
+    /// Coefficients of eta in dVC that belong to the merge at the previous vertex.
     pub last: Merges,
 }
 
 impl MisState {
-    /// Start of a light path \[(31), (32), (48) to (52)\]. Next-event estimation and emission choose the light with
-    /// equal probability until [`MisState::received`] is called. Camera paths cannot hit a delta light.
+    /// State at the start of a light path \[(31), (32), (48) to (52)\]. Next-event estimation and emission choose the
+    /// light with equal probability until [`MisState::received`] is called. Camera paths cannot hit a delta light.
     #[inline]
     pub fn light(start: &EmissionDensity) -> MisState {
         let onward = f64::from(start.onward);
@@ -128,16 +131,17 @@ impl MisState {
         MisState { d_vcm: 1.0 / onward, plain, ..MisState::default() }
     }
 
-    /// Start of a camera path \[(31)\]: `light_paths` connected to the camera per camera path of a pixel, over the
-    /// density of the camera path per solid angle. The latter is 0 if nothing can be connected to the camera.
+    /// State at the start of a camera path \[(31)\]. `light_paths` is the number of light paths connected to the camera
+    /// per camera path of a pixel, `camera_pdf_w` the density of the camera path per solid angle; 0 if nothing can be
+    /// connected to the camera.
     #[inline]
     pub fn camera(light_paths: f32, camera_pdf_w: f32) -> MisState {
         let d_vcm = if camera_pdf_w > 0.0 { f64::from(light_paths) / f64::from(camera_pdf_w) } else { 0.0 };
         MisState { d_vcm, ..MisState::default() }
     }
 
-    /// Arrival at a vertex \[(31) to (33), conversion of measures\]: squared distance (1 on the first segment of light
-    /// from infinity), and the cosine at the vertex, 1 in a medium.
+    /// State after arrival at a vertex \[(31) to (33), conversion of measures\]. `distance2` is the squared length of
+    /// the segment (1 on the first segment of light from infinity), `cos` the cosine at the vertex, 1 in a medium.
     #[must_use]
     #[inline]
     pub fn arrive(self, distance2: f32, cos: f32) -> MisState {
@@ -151,17 +155,17 @@ impl MisState {
         }
     }
 
-    /// Correction at the first vertex: the probability that next-event estimation chooses the light, over the
-    /// probability that emission does.
+    /// State corrected at the first vertex. `chosen` is the probability that next-event estimation there chooses the
+    /// light, over the probability that emission does.
     #[must_use]
     #[inline]
     pub fn received(self, chosen: f32) -> MisState {
         MisState { d_vcm: self.d_vcm * f64::from(chosen), ..self }
     }
 
-    /// Flight through media up to the vertex: the densities per length, or probabilities, of both directions. They
-    /// belong to the densities per area (per volume) of the vertices at both ends \[Georgiev (2), with the flight's
-    /// factor as in Lafortune and Willems 1996\].
+    /// State after flight through media up to the vertex, whose densities per length, or probabilities, in both
+    /// directions are `flight`. They belong to the densities per area (per volume) of the vertices at both ends
+    /// \[Georgiev (2), with the flight's factor as in Lafortune and Willems 1996\].
     #[must_use]
     #[inline]
     pub fn fly(self, flight: FlightDensity) -> MisState {
@@ -175,8 +179,8 @@ impl MisState {
         }
     }
 
-    /// Scattering by a lobe that is not delta \[(34), (35)\]: the cosine, and densities per solid angle of the
-    /// direction and of its reverse. `merges` is the [`one_merge`] of this vertex, or zero.
+    /// State after scattering by a lobe that is not delta \[(34), (35)\], from the cosine, and the densities per solid
+    /// angle of the direction and of its reverse. `merges` is the [`one_merge`] of this vertex, or zero.
     #[must_use]
     #[inline]
     pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, merges: Merges) -> MisState {
@@ -190,7 +194,7 @@ impl MisState {
         }
     }
 
-    /// Scattering by a delta lobe, whose forward and reverse densities cancel \[(53) to (55)\].
+    /// State after scattering by a delta lobe, whose forward and reverse densities cancel \[(53) to (55)\].
     #[must_use]
     #[inline]
     pub fn scatter_delta(self, cos: f32) -> MisState {
@@ -214,8 +218,8 @@ struct Side {
     merged: Merges,
 }
 
-/// A camera path hits a light \[(43)\]. For light from infinity, `camera` is the state before the arrival \[5.1\].
-/// Direct light is never merged.
+/// Ratios if a camera path hits a light \[(43)\]. For light from infinity, `camera` is the state before the arrival
+/// \[5.1\]. Direct light is never merged.
 #[inline]
 pub fn hit(camera: &MisState, light: &EmissionDensity) -> Ratios {
     let emission = f64::from(light.start) * f64::from(light.onward);
@@ -223,7 +227,7 @@ pub fn hit(camera: &MisState, light: &EmissionDensity) -> Ratios {
     Ratios { plain, merged: camera.merged * emission, own: DVec2::ZERO }
 }
 
-/// Densities of next-event estimation.
+/// Probability densities that the MIS weight of next-event estimation needs.
 #[derive(Clone, Copy, Debug)]
 pub struct NextEventPdfs {
     /// Density of scattering towards the light, per solid angle.
@@ -235,11 +239,11 @@ pub struct NextEventPdfs {
     /// Density per area at the vertex of emission from the light sample, including the probability that emission chooses
     /// the light over the probability that next-event estimation does.
     pub arrival_pdf_a: f32,
-    /// Camera paths cannot hit the light.
+    /// Whether the light is a delta light, which camera paths cannot hit.
     pub delta: bool,
 }
 
-/// Next-event estimation \[(44), (45)\]. Direct light is never merged.
+/// Ratios of next-event estimation \[(44), (45)\]. Direct light is never merged.
 #[inline]
 pub fn next_event(camera: &MisState, pdfs: &NextEventPdfs) -> Ratios {
     let hit = if pdfs.delta { 0.0 } else { f64::from(pdfs.pdf_w) / f64::from(pdfs.light_pdf_w) };
@@ -248,9 +252,9 @@ pub fn next_event(camera: &MisState, pdfs: &NextEventPdfs) -> Ratios {
     Ratios { plain: hit + 1.0 + arrival_pdf_a * camera.plain, merged: camera.merged * arrival_pdf_a, own: DVec2::ZERO }
 }
 
-/// A light vertex is connected to the camera \[(46), (47)\]. `camera_pdf_a` is the density of a camera path's arrival
-/// per area at the vertex, `light_paths` the number of connected light paths, `reverse_pdf_w` the density of scattering
-/// back along the light path. Vertices that the camera sees directly are not merged.
+/// Ratios if a light vertex is connected to the camera \[(46), (47)\]. `camera_pdf_a` is the density of a camera path's
+/// arrival per area at the vertex, `light_paths` the number of connected light paths, `reverse_pdf_w` the density of
+/// scattering back along the light path. Vertices that the camera sees directly are not merged.
 #[inline]
 pub fn camera(light: &MisState, camera_pdf_a: f32, light_paths: f32, reverse_pdf_w: f32) -> Ratios {
     let light = light.earlier(reverse_pdf_w);
@@ -258,20 +262,20 @@ pub fn camera(light: &MisState, camera_pdf_a: f32, light_paths: f32, reverse_pdf
     Ratios { plain: 1.0 + scale * light.plain, merged: light.merged * scale, own: DVec2::ZERO }
 }
 
-/// One end of a connection.
+/// One of the two vertices that a connection joins.
 #[derive(Clone, Copy, Debug)]
 pub struct End<'a> {
-    /// Partial sums of its subpath.
+    /// Partial sums of MIS weights of the subpath that ends at the vertex.
     pub mis: &'a MisState,
-    /// Density per solid angle of scattering back along its subpath.
+    /// Density per solid angle of scattering back along the subpath of the vertex.
     pub reverse_pdf_w: f32,
     /// Density per area at which the other end's subpath would arrive here.
     pub arrival_pdf_a: f32,
-    /// The [`one_merge`] of the vertex, or zero.
+    /// Coefficients of a merge at the vertex ([`one_merge`]), or zero if nothing is merged there.
     pub merges: Merges,
 }
 
-/// Two vertices are connected \[(40), (41)\].
+/// Ratios if a light vertex and a camera vertex are connected \[(40), (41)\].
 #[inline]
 pub fn connect(light: &End<'_>, camera: &End<'_>) -> Ratios {
     let (l, e) = (light.mis.earlier(light.reverse_pdf_w), camera.mis.earlier(camera.reverse_pdf_w));
@@ -283,7 +287,7 @@ pub fn connect(light: &End<'_>, camera: &End<'_>) -> Ratios {
     }
 }
 
-/// A light vertex is merged with a camera vertex \[(38), (39)\], for [`Ratios::merge_weight`]. `pdf_w` and
+/// Ratios if a photon is merged with a camera vertex \[(38), (39)\], for [`Ratios::merge_weight`]. `pdf_w` and
 /// `reverse_pdf_w` are the densities of scattering along the light path and back along the camera path; `own` is the
 /// vertex's [`one_merge`].
 #[inline]

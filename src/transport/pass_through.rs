@@ -11,19 +11,19 @@ use crate::medium::FlightDensity;
 use crate::scene::Scene;
 use crate::trace::{Hit, Ray};
 
-/// A pass-through light on a segment of a camera path.
+/// A segment of a camera path crosses a pass-through light, which emits but does not block rays.
 pub struct PassThroughHit {
-    /// Point of the light on the segment.
+    /// Point where the segment crosses the light.
     pub surface: Surface,
     /// Unit direction back along the path.
     pub wo: Vec3,
     /// Throughput of the path up to the light.
     pub throughput: Rgb,
-    /// Number of segments up to the light.
+    /// Number of path segments up to the light.
     pub depth: u32,
-    /// Distance from the last vertex.
+    /// Distance from the last vertex to the light (scene units).
     pub distance: f32,
-    /// Densities of the flight from the last vertex.
+    /// Probability densities of flight through media from the last vertex to the light.
     pub flight: FlightDensity,
 }
 

@@ -31,13 +31,14 @@ struct PathTracer<'a, R> {
     sample: &'a mut PixelSample,
     history: PathHistory,
     last: Receiver,
-    /// Depth of the last vertex.
+    /// Number of path segments up to the last vertex.
     depth: u32,
     record: &'a mut R,
 }
 
 impl<R: PathRecorder> PathTracer<'_, R> {
-    /// Weight of hitting a light; 1 if next-event estimation could not have sampled it.
+    /// MIS weight of hitting a light whose density by next-event estimation is `pdf_light`; 1 if next-event estimation
+    /// could not have sampled it.
     fn weight(scattered: Option<Scattered>, pdf_light: f32) -> f32 {
         match scattered {
             Some(s) if !s.lobe.intersects(LobeSet::DELTA) => s.pdf_w / (s.pdf_w + pdf_light),
@@ -45,7 +46,7 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         }
     }
 
-    /// Next-event estimation at a vertex.
+    /// Adds next-event estimation at a vertex of the path.
     fn lit<S: ScatterPoint>(&mut self, vertex: &S) {
         let (scene, draws) = (self.scene, vertex.draws());
         let halves = PathHalves { suffix: self.history.suffix, prefix: LightPrefix::start(false) };
@@ -77,7 +78,8 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         }
     }
 
-    /// Adds light whose weight is applied already.
+    /// Adds light, already multiplied by its MIS weight, to the sample; class, light group and weight are for the
+    /// recorder.
     fn add(&mut self, technique: Technique, of: (PathClass, Group), light: Rgb, weight: f32) {
         let (class, _) = of;
         if !self.classes.has(class) {
@@ -99,15 +101,16 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         } += light;
     }
 
-    /// Decides how the walk continues.
+    /// Decides how the path continues after a vertex.
     fn next(&self) -> Next {
         if self.history.leads(self.classes) { Next::Continue(LobeSet::ALL) } else { Next::Stop }
     }
 }
 
 impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
-    /// Roulette increases the weight of surviving paths. From the first bounce on, it would save nearly half of the
-    /// time but more than double squared errors; this value is about optimal.
+    /// Fraction of the initial throughput down to which roulette does not end a path. Roulette increases the weight of
+    /// surviving paths. From the first bounce on, it would save nearly half of the time but more than double squared
+    /// errors; this value is about optimal.
     const SPARED: f32 = 0.25;
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {

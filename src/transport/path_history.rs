@@ -4,16 +4,16 @@ use super::shares::leads;
 use crate::bsdf::LobeSet;
 use crate::plan::{CameraSuffix, ClassSet, Event};
 
-/// History of a camera path up to its last vertex.
+/// Class, lobes and length of a camera path up to its last vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PathHistory {
-    /// Class of the path up to the last vertex.
+    /// Class of the path up to the last vertex: the kinds of its bounces.
     pub suffix: CameraSuffix,
-    /// Lobes of the last vertex; `None` in a medium.
+    /// Lobes of the BSDF at the last vertex; `None` in a medium.
     lobes: Option<LobeSet>,
     /// Length of the path so far (scene units).
     pub length: f32,
-    /// All vertices scattered by delta lobes.
+    /// Whether all vertices so far scattered the path by delta lobes.
     pub delta: bool,
 }
 

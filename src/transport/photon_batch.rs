@@ -11,18 +11,18 @@ use wide::{CmpEq, CmpLt, f32x8};
 /// Memory that a thread reuses for all camera paths of one iteration.
 #[derive(Default)]
 pub struct Scratch {
-    /// Shading data of the vertices of a path.
+    /// Memory for the shading data of the vertices of a path.
     pub(super) arena: Bump,
-    /// Cache of the photons around the last vertices, by kind.
+    /// Cache of the photons on surfaces around the last vertices, by kind.
     pub(super) near: ByKind<Near<Photon>>,
     /// Cache of the photons in media around the last vertices.
     pub(super) near_volume: Near<VolumePhoton>,
-    /// Photons that wait for their BSDF.
+    /// Photons that have been found and whose BSDF is not evaluated yet.
     pub(super) waiting: Waiting,
 }
 
-/// Photons that wait for their BSDF. They are stored as rows, which takes two stores each; shuffles make columns of
-/// eight rows.
+/// Photons whose BSDF is not evaluated yet; eight are evaluated at once. They are stored as rows, which takes two
+/// stores each; shuffles make columns of eight rows.
 #[derive(Default)]
 pub(super) struct Waiting {
     photons: [Photon; 8],
@@ -36,7 +36,7 @@ impl Waiting {
         self.count += 1;
     }
 
-    /// Positions, directions, normals and fluxes of the photons, by component.
+    /// Positions, directions, normals and fluxes of the eight photons, by component.
     #[inline(always)]
     fn columns(&self) -> [[f32x8; 3]; 4] {
         let photons = self.photons.each_ref();
@@ -49,7 +49,7 @@ impl Waiting {
     }
 }
 
-/// Lane numbers.
+/// Numbers of the eight SIMD lanes.
 const LANES: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
 /// Eight dot products, summed in the order of `Vec3::dot`.
@@ -65,10 +65,10 @@ pub(super) struct Batch<'a, 's, K> {
     p: Vec3,
     throughput: Rgb,
     gathering: Gathering<'a>,
-    /// For photons that no continued camera path could find; `None` if the lobes are those of `gathering`.
+    /// BSDF for photons whose light no continued camera path could find; `None` if it is that of `gathering`.
     unreachable: Option<Gathering<'a>>,
     waiting: &'s mut Waiting,
-    /// Sums by level; each lane sums every eighth photon.
+    /// Sums of light by bandwidth level; each lane sums every eighth photon.
     sums: [[f32x8; 3]; MAX_LEVELS],
 }
 
@@ -158,7 +158,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         self.waiting.count = 0;
     }
 
-    /// Adds photons to each level whose radius exceeds their distance.
+    /// Adds the light of eight photons to each bandwidth level whose radius exceeds their distance.
     #[inline(always)]
     fn add<C: PhotonCounter>(&mut self, light: &[f32x8; 3], distance2: f32x8) {
         // With one level, each photon within reach is within its radius.
@@ -176,7 +176,7 @@ impl<'a, 's, K: Kernel> Batch<'a, 's, K> {
         }
     }
 
-    /// The sums by level.
+    /// Evaluates the waiting photons and returns the sums of light by bandwidth level.
     #[inline]
     pub fn finish<C: PhotonCounter>(&mut self, counter: &mut C) -> [Rgb; MAX_LEVELS] {
         if self.waiting.count > 0 {

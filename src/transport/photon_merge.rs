@@ -12,28 +12,29 @@ use crate::plan::{CameraSuffix, ClassSet, LightPrefix, PathClass};
 use crate::spectrum::Band;
 use std::f32::consts::FRAC_1_PI;
 
-/// A light vertex, reduced to the data that merging in the next iteration needs.
+/// A photon for merging in the next iteration: a light vertex, reduced to the data that this needs.
 #[derive(Clone, Copy, Debug)]
 pub struct MergePhoton {
     /// World position.
     pub p: Vec3,
-    /// Unit direction towards the previous vertex.
+    /// Unit direction towards the previous vertex of the light path.
     pub wi: Vec3,
     /// Unit geometric normal of the surface.
     pub ng: Vec3,
     /// Flux (W), already divided by the number of merged light paths of the iteration.
     pub flux: Rgb,
-    /// Partial sums of MIS weights: dVCM, and the coefficients of dVC. Light paths have merges of one kind only.
+    /// Partial sums of MIS weights: dVCM, and the coefficients of dVC. On light paths all merges count with one
+    /// coefficient.
     d_vcm: f32,
     plain: f32,
     merged: f32,
-    /// Number of segments of the light path.
+    /// Number of segments of the light path up to the photon.
     pub depth: u16,
-    /// Class of the light path.
+    /// Class of the light path up to the photon: the kinds of its bounces.
     pub prefix: LightPrefix,
-    /// Band of the light path's wavelength.
+    /// Band of wavelengths that the light path carries.
     band: Band,
-    /// Group of the light that the path starts from.
+    /// Light group of the light that the path starts from.
     group: Group,
 }
 
@@ -54,8 +55,8 @@ impl Located for MergePhoton {
     }
 }
 
-/// A partial sum as a photon stores it. Merging has no weight against larger sums, so they are clamped; infinity times
-/// zero would give NaN.
+/// A partial sum of MIS weights as a photon stores it. Merging has no weight against larger sums, so they are clamped;
+/// infinity times zero would give NaN.
 #[inline]
 fn single(sum: f64) -> f32 {
     sum.min(f64::from(f32::MAX)) as f32
@@ -80,7 +81,7 @@ impl MergePhoton {
         }
     }
 
-    /// Partial sums of MIS weights.
+    /// Partial sums of MIS weights of the light path at the photon.
     #[inline]
     pub fn mis(&self) -> MisState {
         let [d_vcm, plain, merged] = [self.d_vcm, self.plain, self.merged].map(f64::from);
@@ -88,25 +89,25 @@ impl MergePhoton {
     }
 }
 
-/// Merging at one vertex of a camera path.
+/// Data for merging photons at one vertex of a camera path.
 pub(super) struct Merge<'a> {
     pub photons: &'a PhotonMap<MergePhoton>,
     pub levels: &'a MergeLevels,
-    /// Partial sums of the camera path.
+    /// Partial sums of MIS weights of the camera path at the vertex.
     pub mis: &'a MisState,
-    /// The vertex's [`mis::one_merge`].
+    /// Coefficients with which a merge at this vertex counts in MIS weights ([`mis::one_merge`]).
     pub own: Merges,
-    /// Class of the camera path up to the vertex.
+    /// Class of the camera path up to the vertex: the kinds of its bounces.
     pub suffix: CameraSuffix,
-    /// Classes that are switched on.
+    /// Path classes (by kinds of bounces) that the picture shows.
     pub classes: ClassSet,
     /// Largest number of segments of a photon's light path.
     pub longest: u32,
 }
 
 impl Merge<'_> {
-    /// Merges the photons around `vertex` at all levels with one query. Calls `add(class, level, radiance)`. Returns
-    /// whether all contributions are finite.
+    /// Merges the photons around `vertex` at all bandwidth levels with one query. Calls `add(class, level, radiance)`
+    /// for each contribution. Returns whether all contributions are finite.
     #[inline]
     pub fn run<R: PathRecorder>(
         &self,

@@ -5,7 +5,7 @@ use super::cause::Cause;
 use super::segment::FirstHit;
 use crate::math::{Rgb, Vec3};
 
-/// G-buffer of one camera path, at its first vertex that is not a perfect mirror or clear glass.
+/// G-buffer of one camera path, at its first vertex that is not a perfect mirror or clear glass; zero if there is none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Features {
     /// Directional albedo.
@@ -25,19 +25,19 @@ pub struct PixelSample {
     pub direct: Rgb,
     /// All other light that the camera path finds and that photons do not find, too.
     pub indirect: Rgb,
-    /// Radiance from photons of caustics, by level.
+    /// Radiance from photons of caustics, by bandwidth level (0 is the smallest).
     pub caustic_photons: [Rgb; MAX_LEVELS],
-    /// Radiance from all other photons, and from light that camera path and photons both find, by level.
+    /// Radiance from all other photons, and from light that camera path and photons both find, by bandwidth level.
     pub indirect_photons: [Rgb; MAX_LEVELS],
     /// Light whose first vertex (apart from clear ones) lies in a medium, found without photons.
     pub volume: Rgb,
     /// Light whose first vertex (apart from clear ones) lies in a medium, as far as it depends on a bandwidth, by level.
     pub volume_photons: [Rgb; MAX_LEVELS],
-    /// G-buffer.
+    /// G-buffer of the camera path.
     pub features: Features,
-    /// First visible hit.
+    /// First visible hit of the camera path; `None` if it hits nothing.
     pub first: Option<FirstHit>,
-    /// Why the sample has to be rejected: the source of its first value that is not finite.
+    /// Why the sample has to be rejected: the source of its first value that is not finite; `None` if all are finite.
     pub rejection: Option<Cause>,
 }
 
@@ -48,7 +48,7 @@ impl PixelSample {
         self.rejection.get_or_insert(cause);
     }
 
-    /// The radiance estimate of a level, all parts together.
+    /// Radiance estimate at a bandwidth level (from 0, the smallest), the sum of all parts.
     #[inline]
     pub fn radiance(&self, level: usize) -> Rgb {
         let surfaces =

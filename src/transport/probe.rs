@@ -26,7 +26,7 @@ pub struct GatherPoint {
 /// The first surface vertex where a camera path gathers photons, with its light.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
-    /// Position of the vertex.
+    /// Position, normal and path length of the vertex.
     pub point: GatherPoint,
     /// Radiance that a photon adds to the pixel, per flux over area, for a Lambertian surface of the vertex's albedo.
     pub weight: Rgb,
@@ -34,7 +34,7 @@ pub struct Probe {
     pub direct: Rgb,
 }
 
-/// Visitor that finds the vertex and evaluates it with `look`.
+/// Visitor that finds the first vertex where a camera path gathers photons and evaluates it with `look`.
 struct Find<F, T> {
     look: F,
     found: Option<(GatherPoint, T)>,
@@ -57,12 +57,12 @@ impl<'a, T, F: FnMut(&Vertex<'_, '_>) -> T> Visitor<'a> for Find<F, T> {
 }
 
 impl CameraPaths<'_> {
-    /// The first surface point where a camera path gathers photons.
+    /// The first surface point where a camera path gathers photons; `None` if there is none.
     pub fn gather_point(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<GatherPoint> {
         self.find(arena, start, |_| ()).map(|(point, ())| point)
     }
 
-    /// The first surface vertex where a camera path gathers photons, with its light.
+    /// The first surface vertex where a camera path gathers photons, with its light; `None` if there is none.
     pub fn probe(&self, arena: &Bump, start: &(PathStart, Stream)) -> Option<Probe> {
         let look = |vertex: &Vertex<'_, '_>| {
             let weight = vertex.throughput * vertex.shading.albedo(LobeSet::BROAD) * FRAC_1_PI;
@@ -85,7 +85,7 @@ impl CameraPaths<'_> {
 }
 
 impl CameraPaths<'_> {
-    /// The first point of a scattering medium on a camera path.
+    /// The first point in a scattering medium on a camera path; `None` if there is none.
     pub fn volume_point(&self, arena: &Bump, (start, stream): &(PathStart, Stream)) -> Option<GatherPoint> {
         let mut find = FindVolumePoint { found: None, length: 0.0 };
         walk(self.scene, arena, start, *stream, Transport::Radiance, self.max_depth, &mut find);

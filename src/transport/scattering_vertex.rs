@@ -22,44 +22,44 @@ pub trait ScatterPoint {
     fn p(&self) -> Vec3;
     /// Throughput of the path before the vertex scatters.
     fn throughput(&self) -> Rgb;
-    /// Number of segments up to the vertex.
+    /// Number of path segments up to the vertex.
     fn depth(&self) -> u32;
-    /// Random numbers of the vertex.
+    /// Random numbers for the decisions at the vertex.
     fn draws(&self) -> Draws;
-    /// The wavelength of the path, if it has met dispersive glass.
+    /// The wavelength of the path; `None` if it has not met dispersive glass.
     fn wavelength(&self) -> Option<&Wavelength>;
-    /// Lobes that are not delta.
+    /// The lobes of the vertex that are not delta.
     fn smooth(&self) -> LobeSet;
     /// Value of the lobes in `set` for light from `wi` times the cosine, and the density of sampling `wi`
     /// ([`crate::bsdf::Shading::evaluate_cos`]).
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
-    /// Density of sampling `wo` from `wi` ([`crate::bsdf::Shading::reverse_pdf`]).
+    /// Density of sampling `wo` if light arrives from `wi` ([`crate::bsdf::Shading::reverse_pdf`]).
     fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32;
-    /// Samples a direction ([`crate::bsdf::Shading::sample`]).
+    /// Samples a direction from the lobes in `set` ([`crate::bsdf::Shading::sample`]); `None` if there is none.
     fn sample(&self, transport: Transport, set: LobeSet, u_lobe: f32, u: Vec2) -> Option<BsdfSample>;
-    /// Geometric cosine of a direction.
+    /// Absolute cosine between `w` and the geometric normal; 1 in a medium.
     fn cos(&self, w: Vec3) -> f32;
     /// Origin of a ray towards `w`.
     fn ray_origin(&self, w: Vec3) -> Vec3;
-    /// The solids on the side of `wo`, and on the other side.
+    /// The solids around the path on the side of `wo`, and on the other side of the surface.
     fn interiors(&self) -> [&Interior; 2];
-    /// Whether `w` points to the other side than `wo`.
+    /// Whether `w` points to the other side of the surface than `wo`.
     fn crosses(&self, w: Vec3) -> bool;
-    /// The vertex as a receiver of direct light.
+    /// The vertex as a receiver of direct light, for the choice of a light.
     fn receiver(&self) -> Receiver;
     /// Whether back-face culling hides the surface from a camera along `wi`.
     fn is_culled(&self, _scene: &Scene, _wi: Vec3) -> bool {
         false
     }
-    /// See [`Vertex::survival`].
+    /// Probability that roulette lets the path continue by the lobes in `set`, see [`Vertex::survival`].
     fn survival(&self, set: LobeSet) -> f32;
-    /// See [`MediumVertex::next_event`].
+    /// MIS weight (0 to 1) of next-event estimation at the vertex, see [`MediumVertex::next_event`].
     #[inline]
     fn next_event_share(&self) -> f32 {
         1.0
     }
 
-    /// The surface of the vertex, if other surfaces lie on it.
+    /// The point of the vertex on its surface, if other surfaces touch it there.
     #[inline]
     fn touching(&self) -> Option<ContactPoint> {
         None

@@ -11,52 +11,52 @@ use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint, RaySurfaces};
 use crate::trace::{CAMERA_RAY_BIT, Hit, Ray};
 
-/// Largest number of non-scattering boundaries on a segment, as between many drops of one liquid. More are taken for a
-/// numerical trap and end the path.
+/// Largest number of boundaries without scattering that a path segment may cross, as between many drops of one liquid.
+/// More are taken for a numerical trap and end the path.
 const MAX_NULL_CROSSINGS: u32 = 1 << 16;
 
-/// The next scattering surface along a ray.
+/// The next scattering surface along a ray, and what the ray has crossed before.
 pub struct Arrival {
-    /// The surface point.
+    /// The point where the ray hits the surface.
     pub surface: Surface,
-    /// Index of refraction on its back over that on its front.
+    /// Index of refraction on the back of the surface over that on its front.
     pub eta: f32,
-    /// The media on both sides, if it bounds a solid.
+    /// The media on both sides of the surface, if it bounds a solid.
     pub crossing: Option<Crossing>,
     /// The solids around the ray on arrival.
     pub interior: Interior,
-    /// Transmittance of absorbing media and tinted boundaries on the segment.
+    /// Transmittance of absorbing media and tinted boundaries on the segment, 0 to 1 per channel.
     pub transmittance: Rgb,
-    /// Length of the segment.
+    /// Length of the path segment (scene units).
     pub distance: f32,
 }
 
-/// The first visible hit of a camera path.
+/// The first visible hit of a camera path, for coverage and depth.
 #[derive(Clone, Copy, Debug)]
 pub struct FirstHit {
     /// World position.
     pub p: Vec3,
-    /// Index of the instance.
+    /// Index of the instance that is hit.
     pub instance: u32,
 }
 
-/// A collision in a medium along a ray.
+/// A collision of a ray in a medium.
 pub struct MediumArrival {
-    /// World position.
+    /// World position of the collision.
     pub p: Vec3,
-    /// The medium.
+    /// The medium that the ray collides in.
     pub medium: MediumParameters,
-    /// The solids around it.
+    /// The solids around the point of collision.
     pub interior: Interior,
-    /// Transmittance up to the point over the density of the point per length.
+    /// Transmittance up to the collision over the probability density of the collision per length.
     pub weight: Rgb,
-    /// Length of the segment.
+    /// Length of the path segment (scene units).
     pub distance: f32,
-    /// The hit to report if it is the path's first.
+    /// The hit to report if this collision is the first hit of its camera path.
     pub first: Option<FirstHit>,
 }
 
-/// The hit of a ray, if the ray has been traced already.
+/// The first hit of a ray, if the ray has been traced already, for example in a packet.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum PrecomputedHit {
     /// The ray has not been traced.
@@ -76,31 +76,31 @@ pub enum End {
     Surface(Arrival),
     /// A medium scatters the ray.
     Medium(MediumArrival),
-    /// The ray leaves the scene, with this transmittance.
+    /// The ray leaves the scene, with this transmittance (0 to 1 per channel).
     Escaped(Rgb),
-    /// The ray is in a numerical trap.
+    /// The ray is in a numerical trap: it has crossed too many boundaries.
     Lost,
 }
 
 /// The part of a ray that lies in one medium.
 pub(super) struct Span {
-    /// The medium.
+    /// The medium that the span lies in.
     pub medium: MediumParameters,
-    /// The solids around it.
+    /// The solids around the span.
     pub interior: Interior,
-    /// Its start.
+    /// Point where the ray enters the span.
     pub origin: Vec3,
-    /// Unit direction.
+    /// Unit direction of the ray.
     pub direction: Vec3,
-    /// Its length; may be infinite.
+    /// Length of the span; may be infinite.
     pub distance: f32,
-    /// Distance from the ray's origin to its start.
+    /// Distance from the origin of the ray to the start of the span.
     pub before: f32,
-    /// Transmittance up to its start.
+    /// Transmittance of the ray up to the start of the span.
     pub left: Rgb,
-    /// Number of parts of the ray before it, in media or not.
+    /// Number of parts of the ray before the span, in media or not.
     pub crossed: u32,
-    /// The surface at its end.
+    /// Hit on the surface at the end of the span; `None` if there is none.
     pub beyond: Option<FirstHit>,
 }
 
@@ -115,11 +115,11 @@ impl Span {
     }
 }
 
-/// How a ray crosses media.
+/// How a ray crosses media: attenuated, with random collisions, or by splitting.
 pub(super) trait Through {
-    /// False if there are no media.
+    /// False if the scene has no media.
     const MEDIA: bool = true;
-    /// Crosses `span`.
+    /// Takes the ray through `span`, and returns whether it reaches the end or collides.
     fn pass(&mut self, span: &Span) -> Passage;
 }
 
@@ -131,7 +131,7 @@ pub(super) enum Passage {
     Ended(MediumArrival),
 }
 
-/// Attenuates only \[Beer-Lambert\].
+/// Media only attenuate the ray \[Beer-Lambert\].
 pub(super) struct Attenuate;
 
 impl Through for Attenuate {
@@ -141,7 +141,7 @@ impl Through for Attenuate {
     }
 }
 
-/// There are no media.
+/// For scenes without media, where there is nothing to cross.
 pub(super) struct Clear;
 
 impl Through for Clear {
@@ -153,7 +153,8 @@ impl Through for Clear {
     }
 }
 
-/// Not inlined, so that rays without media keep their state in registers: only a copy of it escapes here.
+/// Crosses one span of a medium. Not inlined, so that rays without media keep their state in registers: only a copy of
+/// it escapes here.
 #[cold]
 #[inline(never)]
 fn cross(through: &mut impl Through, span: &Span) -> Passage {
@@ -162,10 +163,10 @@ fn cross(through: &mut impl Through, span: &Span) -> Passage {
 
 /// How a surface affects a ray that hits it.
 enum Boundary {
-    /// The ray continues behind it, with this tint and inside these solids.
+    /// The ray continues behind the surface, with this tint and inside these solids.
     None(Rgb, Interior),
-    /// It scatters. Index of refraction behind it over that before it, and the media on both sides if it bounds a
-    /// solid.
+    /// The surface scatters the ray. Fields: index of refraction behind the surface over that before it, and the media
+    /// on both sides if the surface bounds a solid.
     Scattering(f32, Option<Crossing>),
 }
 
@@ -201,48 +202,50 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     Boundary::Scattering(eta, Some(crossing))
 }
 
-/// Random bits that decide about cut-outs along a ray; 0 if the scene has none.
+/// Random bits from which alpha cut-outs along a ray are decided; 0 if the scene has none.
 #[inline(always)]
 pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
     let bits = if scene.survey.alpha { draws.token(purpose) } else { 0 };
     with_camera_bit(scene, bits, false)
 }
 
-/// [`token`] of a ray from or to the lens. Such rays pass objects that are hidden from cameras.
+/// Random bits as [`token`], for a ray from or to the lens. Such rays pass objects that are hidden from cameras.
 #[inline(always)]
 pub(super) fn camera_token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
     with_camera_bit(scene, token(scene, draws, purpose), true)
 }
 
-/// Sets or clears the bit that marks rays of the camera, if the scene needs it.
+/// Sets or clears the bit in a token that marks rays of the camera, if the scene has objects that are hidden from
+/// cameras.
 #[inline(always)]
 pub(super) fn with_camera_bit(scene: &Scene, bits: u32, camera: bool) -> u32 {
     let matters = scene.survey.hidden_from_camera || scene.survey.culled;
     if matters { bits & !CAMERA_RAY_BIT | if camera { CAMERA_RAY_BIT } else { 0 } } else { bits }
 }
 
-/// Start of a ray.
+/// Start of a ray between two path vertices.
 #[derive(Clone, Copy)]
 pub struct Start {
-    /// Its origin.
+    /// Origin of the ray.
     pub origin: Vec3,
-    /// Unit direction.
+    /// Unit direction of the ray.
     pub direction: Vec3,
-    /// The solids around its origin.
+    /// The solids around the origin of the ray.
     pub interior: Interior,
-    /// The surface that it leaves, if other surfaces lie on it.
+    /// The point on a surface that the ray leaves, if other surfaces touch it there.
     pub leaving: Option<ContactPoint>,
-    /// Random bits that decide about cut-outs.
+    /// Random bits from which alpha cut-outs along the ray are decided.
     pub token: u32,
 }
 
-/// Follows a ray to the next scattering surface. Media attenuate it.
+/// Follows a ray to the next scattering surface and returns where it ends. Media attenuate it.
 #[inline(always)]
 pub fn next_surface(scene: &Scene, start: Start) -> End {
     next_vertex(scene, start, &PrecomputedHit::Unknown, &mut Attenuate)
 }
 
-/// Follows a ray to the next scattering surface, or to a collision in a medium that `through` crosses.
+/// Follows a ray to the next scattering surface, or to a collision in a medium, and returns where it ends. `known` is
+/// its first hit if it has been traced; `through` crosses media.
 #[inline(always)]
 pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &PrecomputedHit, through: &mut T) -> End {
     let Start { origin, direction, mut interior, leaving, token } = start;
@@ -300,19 +303,20 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
     End::Lost
 }
 
-/// Result of a shadow ray.
+/// Result of a shadow ray: how much light passes, and the densities of a path along it.
 #[derive(Clone, Copy, Debug)]
 pub struct Visibility {
-    /// Transmittance; zero if the ray is blocked.
+    /// Transmittance, 0 to 1 per channel; zero if the ray is blocked.
     pub transmittance: Rgb,
-    /// Densities of the flight in both directions.
+    /// Probability densities of flight through media along the ray in both directions, for MIS.
     pub flight: FlightDensity,
 }
 
 impl Visibility {
     const BLOCKED: Visibility = Visibility { transmittance: Rgb::ZERO, flight: FlightDensity::ONE };
 
-    /// Crosses `distance` of the medium inside `interior`.
+    /// Crosses `distance` of the medium inside `interior`. `starts` and `ends`: a path vertex in the medium lies at the
+    /// start or at the end.
     #[inline]
     fn pass(&mut self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) {
         if scene.survey.media {
@@ -334,13 +338,13 @@ impl Visibility {
 /// A shadow ray: a ray to a point or to infinity.
 #[derive(Clone, Copy)]
 pub struct ShadowRay {
-    /// Its start.
+    /// Start of the shadow ray.
     pub start: Start,
-    /// Its length; may be infinite.
+    /// Length of the shadow ray; may be infinite.
     pub tmax: f32,
-    /// The surface at its end, if other surfaces lie on it.
+    /// The point on a surface at the end of the ray, if other surfaces touch it there.
     pub reaching: Option<ContactPoint>,
-    /// Whether it starts and ends at a vertex of a medium.
+    /// Whether the shadow ray starts at a vertex in a medium, and whether it ends at one.
     pub in_medium: [bool; 2],
 }
 
@@ -362,7 +366,7 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
     visibility
 }
 
-/// [`shadow_ray`] through non-scattering boundaries.
+/// Traces a [`shadow_ray`] through boundaries that do not scatter.
 fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
     let ShadowRay { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);

@@ -12,7 +12,8 @@ use crate::bsdf::{LobeSet, Transport};
 use crate::math::{Rgb, Vec3};
 use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, PathClass};
 
-/// Classes of some light, and the share of each, by channel.
+/// The path classes (by kinds of bounces) that some light belongs to, and the fraction of the light in each, by
+/// channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shares {
     list: [(PathClass, Rgb); 4],
@@ -30,13 +31,13 @@ impl Shares {
         }
     }
 
-    /// Whether all classes are switched off.
+    /// Whether the light belongs only to classes that the picture does not show.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Classes that are switched on, with their shares.
+    /// Path classes of the light that the picture shows, each with its fraction of the light by channel.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (PathClass, Rgb)> {
         self.list.into_iter().take(self.count)
@@ -46,13 +47,13 @@ impl Shares {
 /// The two halves of a path that meet at a vertex; together they determine its class.
 #[derive(Clone, Copy)]
 pub(super) struct PathHalves {
-    /// Class of the camera path up to the vertex.
+    /// Class of the camera path up to the vertex: the kinds of its bounces.
     pub suffix: CameraSuffix,
-    /// Class of the light path up to the vertex.
+    /// Class of the light path up to the vertex: the kinds of its bounces.
     pub prefix: LightPrefix,
 }
 
-/// Light that arrives at a vertex.
+/// Direction and BSDF value of light that arrives at a vertex.
 #[derive(Clone, Copy)]
 pub(super) struct Incident {
     /// Unit direction towards where the light comes from.
@@ -62,7 +63,7 @@ pub(super) struct Incident {
     pub f: Rgb,
 }
 
-/// Events of the smooth lobes of a vertex, broad ones first.
+/// Kinds of bounces that the lobes of a vertex other than delta make: broad first, and sharp if there are both.
 #[inline]
 fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
     match smooth {
@@ -73,7 +74,8 @@ fn events(smooth: LobeSet, in_medium: bool) -> (Event, Option<Event>) {
     }
 }
 
-/// Classes of the light of a path through a vertex, for its broad and its sharp lobes.
+/// Classes of a path through a vertex: if its broad lobes scatter the light, and, if it also has sharp lobes, if these
+/// do.
 #[inline]
 fn classes<S: ScatterPoint>(vertex: &S, halves: PathHalves) -> (PathClass, Option<PathClass>) {
     let (first, second) = events(vertex.smooth(), S::IN_MEDIUM);
@@ -81,7 +83,7 @@ fn classes<S: ScatterPoint>(vertex: &S, halves: PathHalves) -> (PathClass, Optio
     (class(first), second.map(class))
 }
 
-/// Whether any class of a path through a vertex is switched on.
+/// Whether a path whose halves meet at a vertex belongs to a class in `on`, the classes that the picture shows.
 #[inline]
 pub(super) fn wanted<S: ScatterPoint>(vertex: &S, halves: PathHalves, on: ClassSet) -> bool {
     on.is_all() || {
@@ -90,26 +92,28 @@ pub(super) fn wanted<S: ScatterPoint>(vertex: &S, halves: PathHalves, on: ClassS
     }
 }
 
-/// Whether continuing by a lobe of `set`, at a surface that has `lobes`, can reach light of a class in `on`.
+/// Whether a camera path of class `suffix` that continues by a lobe of `set`, at a surface that has `lobes`, can reach
+/// light of a class in `on`.
 pub(super) fn leads(suffix: CameraSuffix, lobes: LobeSet, set: LobeSet, on: ClassSet) -> bool {
     let each = [LobeSet::DELTA, LobeSet::SHARP, LobeSet::BROAD].into_iter();
     let ahead = |lobe: LobeSet| !(suffix.then(Event::at_surface(lobe, lobes)).reachable_classes() & on).is_empty();
     each.filter(|lobe| set.intersects(*lobe)).any(ahead)
 }
 
-/// Fraction of the light that broad lobes scatter.
+/// Fraction of the scattered light (`all`) that broad lobes scatter (`broad`), 0 to 1 by channel; 0 without light.
 #[inline]
 fn ratio(broad: Rgb, all: Rgb) -> Rgb {
     Rgb::select(all.cmpgt(Rgb::ZERO), (broad / all).min(Rgb::ONE), Rgb::ZERO)
 }
 
-/// Shares of light that a vertex scatters.
+/// Divides the light that a vertex scatters among its path classes; classes outside `on` are left out.
 #[inline]
 pub(super) fn shares<S: ScatterPoint>(vertex: &S, halves: PathHalves, incident: Incident, on: ClassSet) -> Shares {
     shares_of(vertex, classes(vertex, halves), incident, on)
 }
 
-/// Shares of light that a vertex scatters, for known classes.
+/// Divides the light that a vertex scatters between the class of its broad lobes and the class of its sharp lobes;
+/// classes outside `on` are left out.
 #[inline]
 fn shares_of<S: ScatterPoint>(
     vertex: &S,
@@ -129,7 +133,8 @@ fn shares_of<S: ScatterPoint>(
     shares
 }
 
-/// Shares of the light of many photons at one vertex. The classes of each [`LightPrefix`] are computed once.
+/// Divides the light of many photons at one vertex among path classes. The classes of each [`LightPrefix`] are computed
+/// once.
 pub(super) struct PhotonShares<'v, S> {
     vertex: &'v S,
     suffix: CameraSuffix,
@@ -138,13 +143,15 @@ pub(super) struct PhotonShares<'v, S> {
 }
 
 impl<'v, S: ScatterPoint> PhotonShares<'v, S> {
-    /// At a vertex at the end of a camera path of class `suffix`.
+    /// For photons at a vertex that ends a camera path of class `suffix`; only classes in `on` are shown in the
+    /// picture.
     #[inline]
     pub fn new(vertex: &'v S, suffix: CameraSuffix, on: ClassSet) -> PhotonShares<'v, S> {
         PhotonShares { vertex, suffix, on, known: [None; LightPrefix::COUNT] }
     }
 
-    /// Shares of light of a photon that arrives along `wi`, of which all lobes scatter `f` towards the camera.
+    /// Path classes, with their fractions, of the light of a photon that arrives along `wi`, of which all lobes scatter
+    /// `f` towards the camera.
     #[inline]
     pub fn shares(&mut self, prefix: LightPrefix, wi: Vec3, f: Rgb) -> Shares {
         let known = &mut self.known[prefix.index()];
@@ -163,7 +170,7 @@ pub(super) struct Connection {
     pub f_light: Rgb,
 }
 
-/// Shares of the light on a connection.
+/// Divides the light on a connection between two vertices among its path classes.
 #[inline]
 pub(super) fn connection_shares<S: ScatterPoint>(
     vertex: &S,

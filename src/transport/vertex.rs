@@ -14,43 +14,44 @@ use crate::spectrum::Wavelength;
 
 /// A vertex of a path on a surface. References with lifetime `'a` outlive the walk.
 pub struct Vertex<'v, 'a> {
-    /// The surface point.
+    /// The surface point of the vertex.
     pub surface: &'v Surface,
     /// The BSDF, for light scattered towards `wo`.
     pub shading: &'v Shading<'a>,
-    /// Unit direction back along the path.
+    /// Unit direction back along the path, to the previous vertex.
     pub wo: Vec3,
     /// Throughput of the path before this vertex scatters.
     pub throughput: Rgb,
-    /// Number of segments up to this vertex: 1 at the first surface.
+    /// Number of path segments up to this vertex: 1 at the first surface.
     pub depth: u32,
-    /// Length of the last segment.
+    /// Length of the path segment that ends here (scene units).
     pub distance: f32,
-    /// Origin of the last segment.
+    /// Origin of the path segment that ends here.
     pub from: Vec3,
-    /// The solids around the path on the side of `wo`.
+    /// The solids around the path before the surface, on the side of `wo`.
     pub interior: Interior,
     /// The solids on the other side of the surface.
     pub interior_behind: Interior,
-    /// Random numbers of this vertex.
+    /// Random numbers for the decisions at this vertex.
     pub draws: Draws,
-    /// Densities of the last segment's flight through media.
+    /// Probability densities of flight through media on the segment that ends here, in both directions.
     pub flight: FlightDensity,
-    /// The wavelength of the path, if it has met dispersive glass (this vertex included). The throughput contains its
-    /// weight.
+    /// The wavelength of the path; `None` if it has not met dispersive glass (this vertex included). The throughput
+    /// contains its weight.
     pub wavelength: Option<Wavelength>,
     pub(super) survival_scale: f32,
 }
 
 impl Vertex<'_, '_> {
-    /// Probability that the walk continues if the visitor asks for the lobes in `set`. It does not depend on the
-    /// sampled direction, so MIS weights can use it.
+    /// Probability that roulette lets the path continue if the visitor asks for the lobes in `set`. It does not depend
+    /// on the sampled direction, so MIS weights can use it.
     #[inline]
     pub fn survival(&self, set: LobeSet) -> f32 {
         self.survival_chosen(set, 1.0)
     }
 
-    /// As [`Vertex::survival`], if the visitor chooses `set` among several sets with probability `chance`.
+    /// Probability that roulette lets the path continue, if the visitor chooses the lobes in `set` among several sets
+    /// with probability `chance`.
     #[inline]
     pub fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32 {
         let expected = (self.throughput * self.shading.albedo(set)).max_element() * self.survival_scale / chance;
@@ -60,40 +61,41 @@ impl Vertex<'_, '_> {
 
 /// A vertex of a path in a medium.
 pub struct MediumVertex {
-    /// Position and medium.
+    /// Position and medium of the vertex.
     pub arrival: MediumArrival,
-    /// Unit direction back along the path.
+    /// Unit direction back along the path, to the previous vertex.
     pub wo: Vec3,
     /// Throughput of the path times the scattering coefficient; the phase function is the remaining factor.
     pub throughput: Rgb,
     /// Throughput without the scattering coefficient: arriving radiance, or flux times length for light paths.
     pub arriving: Rgb,
-    /// Number of segments up to this vertex.
+    /// Number of path segments up to this vertex.
     pub depth: u32,
-    /// Origin of the last segment.
+    /// Origin of the path segment that ends here.
     pub from: Vec3,
-    /// Random numbers of this vertex.
+    /// Random numbers for the decisions at this vertex.
     pub draws: Draws,
-    /// Densities of the last segment's flight.
+    /// Probability densities of flight through media on the segment that ends here, in both directions.
     pub flight: FlightDensity,
-    /// Fraction of light that the medium removes along its whole part of the ray, for walks that split; 1 for sampled
-    /// collisions.
+    /// Fraction of light that the medium removes along its whole part of the ray, for walks that pass every medium with
+    /// one vertex in it; 1 for sampled collisions.
     pub opacity: f32,
-    /// This vertex's share of next-event estimation, where a second vertex is sampled for it (`flight.rs`).
+    /// MIS weight (0 to 1) of next-event estimation at this vertex, where a second vertex is sampled for it
+    /// (`flight.rs`).
     pub next_event: f32,
-    /// The wavelength of the path, if it has met dispersive glass.
+    /// The wavelength of the path; `None` if it has not met dispersive glass.
     pub wavelength: Option<Wavelength>,
     pub(super) survival_scale: f32,
 }
 
 impl MediumVertex {
-    /// The phase function.
+    /// The phase function of the medium.
     #[inline]
     pub fn phase(&self) -> HenyeyGreenstein {
         self.arrival.medium.phase()
     }
 
-    /// Single-scattering albedo.
+    /// Single-scattering albedo of the medium.
     pub fn albedo(&self) -> Rgb {
         let sigma_t = self.arrival.medium.sigma_t();
         Rgb::select(sigma_t.cmpgt(Rgb::ZERO), self.arrival.medium.sigma_s / sigma_t, Rgb::ZERO)
@@ -109,14 +111,14 @@ impl MediumVertex {
 /// How the previous vertex scattered the path.
 #[derive(Clone, Copy, Debug)]
 pub struct Scattered {
-    /// Lobe that scattered it.
+    /// The lobe of the BSDF that scattered the path.
     pub lobe: LobeSet,
     /// Density of the direction per solid angle, times the probabilities that roulette let the path continue and that
     /// no medium scattered it on the segment. Undefined for delta lobes.
     pub pdf_w: f32,
 }
 
-/// A visitor's decision at a vertex.
+/// Decision of a [`Visitor`] how the path continues after a vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
     /// End the path.
@@ -127,44 +129,49 @@ pub enum Next {
     Choose(LobeSet, f32),
 }
 
-/// Receives the vertices of a walk.
+/// Receives the vertices of a walk, which traces one path, and decides how the path continues. Each rendering algorithm
+/// is a visitor.
 pub trait Visitor<'a> {
-    /// Fraction of the initial throughput down to which a path is exempt from roulette (except trapped light). Below
-    /// it, a path survives with probability throughput over that fraction.
+    /// Fraction of the initial throughput down to which roulette does not end a path (except trapped light). Below it,
+    /// a path survives with probability throughput over that fraction.
     const SPARED: f32 = 1.0;
-    /// The walk crosses media by splitting (`flight.rs`) and does not scatter at their vertices.
+    /// Whether the walk splits at media (`flight.rs`): it shows one vertex in every medium and continues to the surface
+    /// behind without scattering there.
     const SPLITS: bool = false;
-    /// A surface vertex. `scattered` describes the previous vertex; `None` at the first.
+    /// The path arrives at a surface vertex; the result decides how it continues. `scattered` describes the scattering
+    /// at the previous vertex; `None` at the first.
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;
-    /// A pass-through light on the segment to the next vertex; camera paths only.
+    /// The segment to the next vertex crosses a pass-through light, which emits but does not block rays; camera paths
+    /// only.
     #[inline]
     fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
         let _ = (hit, scattered);
     }
-    /// A vertex in a scattering medium. A walk that splits ignores the answer.
+    /// The path arrives at a vertex in a scattering medium; the result decides how it continues. A walk that splits
+    /// ignores it.
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {
         let _ = (vertex, scattered);
         Next::Stop
     }
-    /// A second vertex in the same medium, for walks that split: only its share of next-event estimation is to be
-    /// added.
+    /// A walk that splits shows a second vertex in a medium, for which only next-event estimation, weighted by
+    /// [`MediumVertex::next_event`], is to be added.
     #[inline]
     fn medium_next_event(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) {
         let _ = (vertex, scattered);
     }
-    /// The path continues along `sample`, which was drawn at `vertex`.
+    /// The path continues from the surface vertex `vertex` along `sample`.
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         let _ = (vertex, sample);
     }
-    /// The path continues along `sample`, which was drawn at a vertex of a medium.
+    /// The path continues from `vertex`, which lies in a medium, along `sample`.
     #[inline]
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
         let _ = (vertex, sample);
     }
     /// The path has ended because its throughput is not finite.
     fn lost(&mut self) {}
-    /// The path leaves the scene along `direction`. `flight` has the densities of the flight to infinity.
+    /// The path leaves the scene along `direction`. `flight` has the probability densities of flight to infinity.
     fn escape(&mut self, direction: Vec3, throughput: Rgb, scattered: Option<Scattered>, flight: FlightDensity) {
         let _ = (direction, throughput, scattered, flight);
     }

@@ -14,37 +14,38 @@ use crate::scene::Scene;
 use bumpalo::Bump;
 use rayon::prelude::*;
 
-/// Number of paths of each kind.
+/// Number of paths of each kind (camera and light) that are traced to count vertices.
 const PATHS: u32 = 4096;
-/// Paths per unit of work.
+/// Number of paths that a thread traces as one unit of work.
 const CHUNK: usize = 256;
 
-/// Mean numbers of vertices of a path. "Full" paths continue by all lobes and collide in media; "short" paths end at
-/// broad lobes and cross media straight.
+/// Mean numbers of vertices of a path in a scene, from which the costs of methods are estimated. "Full" paths continue
+/// by all lobes and collide in media; "short" paths end at broad lobes and cross media straight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VertexCounts {
-    /// Surface vertices of a full camera path.
+    /// Mean number of surface vertices of a full camera path.
     pub camera: f64,
-    /// Surface vertices of a short camera path.
+    /// Mean number of surface vertices of a camera path that ends at broad lobes.
     pub camera_to_broad: f64,
-    /// Surface vertices of a full light path.
+    /// Mean number of surface vertices of a full light path.
     pub light: f64,
-    /// Surface vertices of a light path that ends at broad lobes.
+    /// Mean number of surface vertices of a light path that ends at broad lobes.
     pub light_to_broad: f64,
-    /// Surface vertices of a full camera path that have lobes other than delta: they sample lights, gather photons and
-    /// are connected.
+    /// Mean number of surface vertices of a full camera path that have lobes other than delta: they sample lights,
+    /// gather photons and are connected.
     pub camera_connectable: f64,
-    /// Surface vertices of a full light path that have lobes other than delta.
+    /// Mean number of surface vertices of a full light path that have lobes other than delta.
     pub light_connectable: f64,
-    /// Vertices of a full camera path in scattering media.
+    /// Mean number of vertices of a full camera path in scattering media.
     pub camera_media: f64,
-    /// Vertices of a full light path in scattering media.
+    /// Mean number of vertices of a full light path in scattering media.
     pub light_media: f64,
-    /// Points in scattering media that a short camera path samples.
+    /// Mean number of points in scattering media that a camera path samples which ends at broad lobes and crosses media
+    /// straight.
     pub media_samples: f64,
-    /// Fraction of surface vertices whose material has textures.
+    /// Fraction of surface vertices whose material has textures, 0 to 1.
     pub textured: f64,
-    /// Light vertices that a full camera path merges with, if there is one light path per pixel.
+    /// Mean number of light vertices that a full camera path merges with, if there is one light path per pixel.
     pub merged: f64,
 }
 
@@ -80,7 +81,7 @@ struct Count<'a, const THROUGH: bool> {
     textured: u32,
     open: Vec<Open>,
     narrow: bool,
-    /// Length of the path up to the first listed vertex.
+    /// Length of the path up to the first vertex that is not a perfect mirror or clear glass.
     length: f32,
 }
 
@@ -182,7 +183,7 @@ impl VertexCounts {
         VertexCounts::from_means(full, short, light, merged)
     }
 
-    /// From means of [`Count::counts`] of full and short camera paths and of full light paths.
+    /// Combines the means of [`Count::counts`] over full camera paths, short camera paths and full light paths.
     fn from_means(full: [f64; 6], short: [f64; 6], light: [f64; 6], merged: f64) -> VertexCounts {
         let [camera, _, camera_connectable, camera_media, _, camera_textured] = full;
         let [light, light_to_broad, light_connectable, light_media, _, light_textured] = light;

@@ -11,17 +11,18 @@ use crate::math::Rgb;
 use crate::photon::{Kernel, NO_NORMAL, Near, PhotonMap, VolumePhoton};
 use std::f32::consts::FRAC_1_PI;
 
-/// The photons in media, and the radii of a camera path's levels.
+/// The photons in media, and the gathering radii of the bandwidth levels of a camera path.
 #[derive(Clone, Copy)]
 pub struct Volume<'a> {
     photons: &'a PhotonMap<VolumePhoton>,
-    /// Squared radii, in any order.
+    /// Squared gathering radii of the bandwidth levels, in any order.
     radius2: [f32; MAX_LEVELS],
     count: usize,
 }
 
 impl<'a> Volume<'a> {
-    /// Takes the radii of at most [`MAX_LEVELS`] levels, in the order of the results.
+    /// Takes the gathering radii of at most [`MAX_LEVELS`] bandwidth levels, in the order in which results are
+    /// returned.
     #[inline]
     pub fn new(photons: &'a PhotonMap<VolumePhoton>, radii: impl Iterator<Item = f32>) -> Volume<'a> {
         let mut volume = Volume { photons, radius2: [0.0; MAX_LEVELS], count: 0 };
@@ -32,7 +33,7 @@ impl<'a> Volume<'a> {
         volume
     }
 
-    /// The squared radii, in the order of the results.
+    /// Squared gathering radii of the bandwidth levels, in the order in which results are returned.
     #[inline]
     pub(super) fn radii2(&self) -> &[f32] {
         &self.radius2[..self.count]

@@ -19,31 +19,32 @@ use crate::scene::contact::ContactPoint;
 use crate::spectrum::{Wavelength, WavelengthSample};
 use bumpalo::Bump;
 
-/// The start of a path.
+/// The start of a camera path or light path.
 #[derive(Clone, Copy, Debug)]
 pub struct PathStart {
     /// Origin of the first ray, offset from any surface.
     pub origin: Vec3,
     /// Unit direction of the first ray.
     pub direction: Vec3,
-    /// Throughput: flux or importance.
+    /// Throughput at the start: flux of a light path, or importance of a camera path.
     pub throughput: Rgb,
     /// The solids around the origin.
     pub interior: Interior,
-    /// The surface that the first ray leaves, if other surfaces lie on it.
+    /// The point on a surface that the first ray leaves, if other surfaces touch it there.
     pub leaving: Option<ContactPoint>,
     /// Hit of the first ray, if it has been traced already.
     pub first: PrecomputedHit,
-    /// The path comes from infinity.
+    /// Whether the path comes from a light at infinity.
     pub far: bool,
-    /// For a path of a single channel: that channel. Such a path keeps its weight; losses become the probability that
-    /// it ends.
+    /// Index of the color channel of a path of a single channel; `None` for all channels. A path of a single channel
+    /// keeps its weight; losses become the probability that it ends.
     pub channel: Option<usize>,
     /// The wavelength that the path takes if it meets dispersive glass.
     pub wavelength_sample: WavelengthSample,
 }
 
-/// Walks from `start`, with at most `max_depth` segments. The vertices store their shading data in `arena`.
+/// Traces the path from `start`, with at most `max_depth` segments, and shows its vertices to the visitor. The vertices
+/// store their shading data in `arena`.
 #[inline]
 pub fn walk<'a, V: Visitor<'a>>(
     scene: &'a Scene,
@@ -67,14 +68,14 @@ pub fn walk<'a, V: Visitor<'a>>(
     }
 }
 
-/// Features of a scene besides surfaces. Each value includes the smaller ones: nothing, absorbing media, scattering
-/// media, dispersive solids.
+/// Contents of a scene besides surfaces, as constants 0 to 3. Each value includes the smaller ones: nothing, absorbing
+/// media, scattering media, dispersive solids.
 const NOTHING: u8 = 0;
 const ABSORPTION: u8 = 1;
 const SCATTERING: u8 = 2;
 const DISPERSION: u8 = 3;
 
-/// Not inlined, so that the case without media stays small.
+/// Traces a path in a scene with media. Not inlined, so that the case without media stays small.
 #[inline(never)]
 fn walk_aside<'a, V: Visitor<'a>, const BESIDES: u8>(
     scene: &'a Scene,
@@ -162,32 +163,32 @@ struct Path<'a> {
     stream: Stream,
     transport: Transport,
     max_depth: u32,
-    /// The channel of a path of a single channel, and its weight.
+    /// Channel index and weight of a path of a single channel; `None` for all channels.
     channel: Option<(usize, f32)>,
     wavelength_sample: WavelengthSample,
     far: bool,
-    /// Number of the current segment, from 1.
+    /// Number of the current path segment, from 1.
     depth: u32,
     origin: Vec3,
     direction: Vec3,
     throughput: Rgb,
     interior: Interior,
-    /// See [`Vertex::survival_scale`].
+    /// Factor of the throughput in roulette, see [`Vertex::survival_scale`].
     survival_scale: f32,
     /// Distance from the scene's centre beyond which the path's contribution falls off ([`Scene::reach`]).
     reach: f32,
     /// How the last vertex scattered the path.
     scattered: Option<Scattered>,
-    /// The last vertex lies in a medium.
+    /// Whether the last vertex lies in a medium.
     in_medium: bool,
-    /// The surface that the path leaves.
+    /// The point on a surface that the path leaves, if other surfaces touch it there.
     leaving: Option<ContactPoint>,
     wavelength: Option<Wavelength>,
 }
 
 impl<'a> Path<'a> {
-    /// Follows the path to the next vertex. Returns the end of the segment, and the densities of the flight through
-    /// media.
+    /// Follows the path to the next vertex. Returns where the segment ends, and the probability densities of flight
+    /// through media along it.
     #[inline(always)]
     fn travel<V: Visitor<'a>, const BESIDES: u8>(
         &mut self,
@@ -388,7 +389,7 @@ impl<'a> Path<'a> {
 struct Segment<'s> {
     start: &'s Start,
     end: &'s End,
-    /// The segment starts at a vertex in a medium.
+    /// Whether the segment starts at a vertex in a medium.
     from_medium: bool,
     throughput: Rgb,
     /// Number of the segment, from 1.

@@ -26,50 +26,51 @@ use std::f64::consts::PI;
 use std::marker::PhantomData;
 use wide::{CmpLt, f32x8};
 
-/// Initial squared bandwidth of the Laplacian over the squared bandwidth of the picture level.
+/// Initial squared radius of the kernel that estimates the Laplacian, over the squared radius of the picture level (the
+/// bandwidth level that the picture shows).
 const PILOT_RATIO: f32 = 4.0;
-/// Smallest and largest squared bandwidth, relative to the memoryless rule with alpha 2/3.
+/// Smallest and largest squared radius, as multiples of the squared radius of the memoryless rule with alpha 2/3.
 const BOUNDS: (f64, f64) = (1.0 / 64.0, 4.0);
 
 /// Smallest number of photons from which bandwidths are estimated.
 const MIN_PHOTONS: u32 = 10;
 
-/// The adaptive rule for a kernel.
+/// The adaptive bandwidth rule of Kaplanyan and Dachsbacher 2013 for gathering with the kernel `K`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Adaptive<K>(PhantomData<K>);
 
-/// The bandwidth of one level of one pixel. The sums of the largest level of a camera path determine all levels, which
-/// keep their ratio.
+/// Bandwidth of one level of one pixel, with the sums that determine it. The sums of the largest level of a camera path
+/// determine all levels, which keep their ratio.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Radius squared (m2).
+    /// Squared gathering radius (m2).
     pub radius2: f32,
-    /// Initial squared radius (m2).
+    /// Squared gathering radius before the first iteration (m2).
     initial2: f32,
-    /// Squared radius over that of the picture level.
+    /// Squared radius of this level over that of the level that the picture shows.
     scale: f32,
-    /// Squared radius of the Laplacian's kernel.
+    /// Squared radius of the kernel that estimates the Laplacian (m2).
     pilot2: f32,
-    /// Number of photons found within the bandwidth.
+    /// Number of photons found within the bandwidth, over all iterations.
     photons: u32,
-    /// Sum over iterations of the estimates of q.
+    /// Sum over iterations of the estimates of q, the density of squared photon contributions.
     shot: f64,
-    /// Sum over iterations of the estimates of D.
+    /// Sum over iterations of the estimates of D, the Laplacian of the light.
     laplacian: f64,
     /// Sum over iterations of the variances of the estimates of D.
     noise: f64,
 }
 
-/// Photons that a camera path has found.
+/// Sums over the photons that one camera path has found.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Number of photons within the bandwidth.
+    /// Number of photons within the bandwidth, in this iteration.
     photons: u32,
-    /// Sum of their squared contributions.
+    /// Sum of the squared contributions of these photons.
     squares: f64,
-    /// Estimate of D.
+    /// Estimate of D, the Laplacian of the light, in this iteration.
     laplacian: f64,
-    /// Sum of the squared contributions to it: its variance, for a Poisson process.
+    /// Sum of the squared contributions of photons to the estimate of D: its variance, for a Poisson process.
     noise: f64,
 }
 
@@ -133,7 +134,8 @@ impl<K: Kernel> CountingRule for Adaptive<K> {
     }
 }
 
-/// Squared radius of least error after `n` iterations, where `squared` is D^2; NaN if nothing is known.
+/// Squared radius of least error after `n` iterations; `shot` is the density q of squared contributions, `squared` the
+/// squared Laplacian D^2. NaN if nothing is known.
 fn optimum2<K: Kernel>(shot: f64, squared: f64, n: f64) -> f64 {
     let bias2 = f64::from(K::SECOND_MOMENT).powi(2) * squared;
     (2.0 * shot * f64::from(K::ROUGHNESS) / (3.0 * PI * n * bias2)).cbrt()

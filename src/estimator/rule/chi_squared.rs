@@ -12,20 +12,21 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared as Distribution, ContinuousCDF};
 use wide::{CmpGe, CmpGt, CmpLt, f32x8, f64x4, i32x4, u32x4, u64x4};
 
-/// Parameters, with the paper's defaults (section 9.1).
+/// Parameters of the chi-squared bandwidth rule, with the defaults of the paper (section 9.1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChiSquaredSettings {
-    /// Number of annuli, n_a.
+    /// Number of annuli, n_a, into which the gathering disc is divided to count photons; at least 1.
     pub annuli: usize,
-    /// Number of sectors per annulus, n_s.
+    /// Number of sectors per annulus, n_s; at least 1.
     pub sectors: usize,
-    /// Factor of the squared bandwidth in a reduction if no smaller disc looks uniform, k.
+    /// Factor of the squared radius, k, in a reduction where no smaller disc looks uniform.
     pub k: f64,
-    /// Factor by which the smallest count for a test grows with every reduction, beta.
+    /// Factor by which the smallest number of photons for a test grows with every reduction, beta.
     pub beta: f64,
-    /// Probability of rejecting uniform photons, alpha_chi.
+    /// Probability with which the test rejects uniform photons, alpha_chi, in (0, 1).
     pub significance: f64,
-    /// Separate channels with photons of equal flux (section 9.4), so that the test also detects variations of flux.
+    /// Whether the color channels are rendered separately, with photons of equal flux (section 9.4), so that the test
+    /// also detects variations of flux.
     pub plus: bool,
 }
 
@@ -35,32 +36,33 @@ impl Default for ChiSquaredSettings {
     }
 }
 
-/// Smallest count for the first test, B_1, even if fewer neighbours set the bandwidth. With fewer photons the statistic
-/// does not follow its distribution.
+/// Smallest number of photons for the first test, B_1, even if fewer neighbours set the bandwidth. With fewer photons
+/// the statistic does not follow its distribution.
 pub const MIN_BOUND: f32 = 10.0;
 
-/// Largest total count of a level; see [`ChiSquared::sums`].
+/// Largest number of photons in all cells of a bandwidth level together; see [`ChiSquared::sums`].
 const MAX_COUNT: f64 = (1u32 << 30) as f64;
 
-/// The chi-squared rule.
+/// The chi-squared bandwidth rule: a radius shrinks when the photons in the cells of its disc do not look uniform.
 #[derive(Clone, Debug)]
 pub struct ChiSquared {
     annuli: usize,
     sectors: usize,
     k: f32,
     beta: f32,
-    /// Quantile for the disc of the `j + 1` innermost annuli; infinite for a single cell.
+    /// Quantile of the chi-squared distribution for the cells of the `j + 1` innermost annuli, at index `j`; infinite
+    /// for a single cell.
     critical: Vec<f64>,
-    /// Borders between annuli: squared radii over that of the disc.
+    /// Borders between annuli: squared radii over that of the whole disc.
     rings: Vec<f32>,
-    /// Directions of the borders between sectors, from the first axis. Of an even number only those in one half of the
-    /// disc.
+    /// Unit directions of the borders between sectors, as components along the two axes of the disc. If their number is
+    /// even, only the borders in one half of the disc.
     rays: Vec<(f32, f32)>,
-    /// Whether there are two annuli of six sectors.
+    /// Whether the disc has two annuli of six sectors, which are counted by a faster function.
     has_default_cells: bool,
 }
 
-/// Cells of two annuli of six sectors.
+/// Number of cells with the default of two annuli of six sectors.
 const DEFAULT_CELLS: usize = 12;
 /// Bits of a cell in [`Tally::packed`], and the largest number of octets of photons that they can count. Each of four
 /// numbers counts a quarter of the photons.
@@ -78,20 +80,20 @@ const EVEN: u64 = {
     mask
 };
 
-/// Counts of the photons that one camera path finds.
+/// Counts of the photons that one camera path finds, by bandwidth level.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// By level, photons in each of the default cells. The remaining bits count photons outside. The counts are the
-    /// sums of four numbers.
+    /// By bandwidth level, number of photons in each of the default cells, packed into bits. The remaining bits count
+    /// photons outside. The counts are the sums of four numbers.
     packed: [u64x4; MAX_LEVELS],
-    /// Number of octets of photons that have been added.
+    /// Number of groups of eight photons that have been added.
     octets: u32,
-    /// By level, whether photons have been counted directly.
+    /// By bandwidth level, whether photons have been counted without `packed`.
     counted: [bool; MAX_LEVELS],
 }
 
 impl Tally {
-    /// Adds the photons of a level to its counts. Returns whether there are any.
+    /// Adds the packed photons of one bandwidth level to its cell counts. Returns whether there are any.
     #[inline(always)]
     fn unpack(&mut self, level: usize, counts: &mut [u32]) -> bool {
         let packed = std::mem::take(&mut self.packed[level]).to_array();
@@ -111,7 +113,7 @@ impl Tally {
         true
     }
 
-    /// Adds the photons of all levels to their counts.
+    /// Adds the packed photons of all bandwidth levels to their cell counts.
     #[cold]
     #[inline(never)]
     pub fn settle(&mut self, counts: &mut [u32]) {
@@ -122,12 +124,12 @@ impl Tally {
     }
 }
 
-/// The bandwidth of one level of one pixel.
+/// Bandwidth of one level of one pixel, with the state of its test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Squared radius (m2).
+    /// Squared gathering radius (m2).
     pub radius2: f32,
-    /// Number of photons required for a test, B.
+    /// Number of photons required before the next test, B.
     pub bound: f32,
 }
 
@@ -234,7 +236,7 @@ impl ChiSquared {
         }
     }
 
-    /// Sum of counts, and of their squares. Exact while these are below 2^53 and each count is below 2^31.
+    /// Sum of cell counts, and sum of their squares. Exact while these are below 2^53 and each count is below 2^31.
     #[inline]
     fn sums(counts: &[u32]) -> (f64, f64) {
         let (mut totals, mut squares) = (f64x4::ZERO, f64x4::ZERO);
@@ -254,7 +256,7 @@ impl ChiSquared {
         (totals.reduce_add(), squares.reduce_add())
     }
 
-    /// Statistic of counts with equal expectations \[(12)\]; 0 without photons.
+    /// Chi-squared statistic of cell counts with equal expectations \[(12)\]; 0 without photons.
     pub fn statistic(counts: &[u32]) -> f64 {
         let (total, squares) = Self::sums(counts);
         if total == 0.0 {
@@ -263,23 +265,24 @@ impl ChiSquared {
         squares * counts.len() as f64 / total - total
     }
 
-    /// Whether counts in the innermost annuli pass the test, given their [`ChiSquared::sums`]. Compares the statistic
-    /// times the total with the quantile, which needs no division.
+    /// Whether the photons in this number of innermost annuli pass the test for uniformity, given the
+    /// [`ChiSquared::sums`] of their cells. Compares the statistic times the total with the quantile, which needs no
+    /// division.
     #[inline]
     fn looks_uniform(&self, annuli: usize, (total, squares): (f64, f64)) -> bool {
         squares * (annuli * self.sectors) as f64 <= total * (total + self.critical[annuli - 1])
     }
 
-    /// Halves counts before they exceed signed integers. Photons that look uniform after a thousand million still do
-    /// with half of the counts.
+    /// Halves all cell counts of a bandwidth level, before they exceed signed integers. Photons that look uniform after
+    /// a thousand million still do with half of the counts.
     #[cold]
     #[inline(never)]
     fn halve(counts: &mut [u32]) {
         counts.iter_mut().for_each(|count| *count /= 2);
     }
 
-    /// Tests the counts after an iteration if there are enough photons, and shrinks the bandwidth if they do not look
-    /// uniform. Returns whether it has shrunk.
+    /// Tests the cell counts of a level after an iteration if there are enough photons, and shrinks the bandwidth if
+    /// they do not look uniform. Returns whether it has shrunk.
     #[inline(always)]
     fn test(&self, bandwidth: &mut Bandwidth, counts: &mut [u32]) -> bool {
         let all = Self::sums(counts);
@@ -313,7 +316,7 @@ impl ChiSquared {
     }
 }
 
-/// Component of vectors along an axis.
+/// Components of eight vectors along an axis.
 #[inline(always)]
 fn along(axis: Vec3, [x, y, z]: &[f32x8; 3]) -> f32x8 {
     x.mul_add(f32x8::splat(axis.x), y.mul_add(f32x8::splat(axis.y), *z * axis.z))
@@ -324,7 +327,7 @@ impl CountingRule for ChiSquared {
     type Count = u32;
     type Tally = Tally;
 
-    /// One count per cell.
+    /// Number of counts per bandwidth: one per cell of the disc.
     fn counts(&self) -> usize {
         self.annuli * self.sectors
     }
@@ -354,7 +357,7 @@ impl CountingRule for ChiSquared {
         self.count_any(bandwidths, counts, tally, frame, &photons.clone());
     }
 
-    /// Only levels with new photons are tested: the others have passed the test already.
+    /// Tests bandwidth levels with new photons only: the others have passed the test already.
     #[inline(always)]
     fn update(&self, _: u64, bandwidths: &mut [Bandwidth], counts: &mut [u32], tally: &mut Tally) {
         for (level, (bandwidth, counts)) in
@@ -377,7 +380,7 @@ mod tests {
         ChiSquared::new(&ChiSquaredSettings::default())
     }
 
-    /// A uniform point of the unit disc.
+    /// A uniform random point of the unit disc, for photon number `i` of a trial.
     fn uniform(trial: u64, i: u64) -> (f32, f32) {
         let u = Stream::new(7, trial, Domain::Test, i).vertex(0).two(Purpose::Pixel);
         let (sin, cos) = (std::f32::consts::TAU * u.y).sin_cos();

@@ -12,18 +12,19 @@ use crate::transport::{FoundPhotons, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 use wide::{CmpLt, f32x8};
 
-/// The rule of local statistics.
+/// The bandwidth rule of progressive photon mapping: each radius shrinks by the number of photons found locally.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalStatistics {
-    /// Fraction of new photons that is kept, in (0, 1].
+    /// Fraction of the new photons of each iteration that is kept, in (0, 1]; the rest is removed by shrinking the
+    /// radius.
     pub alpha: f64,
 }
 
-/// The bandwidth of one level of one pixel.
+/// Bandwidth of one level of one pixel, with its photon count.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bandwidth {
-    /// Squared radius (m2). In f32, the factor of the millionth iteration would be off by a tenth of its difference to
-    /// one.
+    /// Squared gathering radius (m2). In f32, the factor of the millionth iteration would be off by a tenth of its
+    /// difference to one.
     pub radius2: f64,
     /// Accumulated number of photons, N. Fractional, because only a fraction of each iteration's photons is kept.
     pub photons: f64,

@@ -3,7 +3,8 @@
 //!
 //! `r_{i+1}^2 / r_i^2 = (i + alpha) / (i + 1)` \[post-reconstruction 2021, (4)\].
 
-/// Default of alpha, which balances variance and bias asymptotically \[Kaplanyan and Dachsbacher 2013\].
+/// Default of the reduction rate alpha, which balances variance and bias asymptotically \[Kaplanyan and Dachsbacher
+/// 2013\].
 pub const ALPHA: f64 = 2.0 / 3.0;
 
 /// Squared radius of iteration `i` (from 1) over the initial one: `prod_{k=1}^{i-1} (k + alpha) / (k + 1)` = `Gamma(i +

@@ -12,38 +12,40 @@ use crate::transport::FoundPhotons;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// A bandwidth rule that counts photons. It has one bandwidth per level of a pixel; the levels of a camera path are
-/// counted and updated together.
+/// A rule that shrinks the bandwidths of a pixel by the photons counted around its gathering points. It has one
+/// bandwidth per level of a pixel; the levels of a camera path are counted and updated together.
 pub trait CountingRule: Clone + Sync {
-    /// State of a level of a pixel.
+    /// State of one bandwidth level of one pixel: its squared radius and the statistics that determine it.
     type Bandwidth: Copy + Send + Sync + Serialize + DeserializeOwned;
-    /// A count that belongs to a bandwidth.
+    /// A photon count in the state of a bandwidth level, for example in one cell of its disc.
     type Count: Copy + Default + Send + Sync + Serialize + DeserializeOwned;
-    /// Summary of the photons that one camera path finds, at all its levels.
+    /// Summary of the photons that one camera path finds, at all its bandwidth levels.
     type Tally: Default;
 
-    /// Whether photons beyond the largest bandwidth are counted.
+    /// Whether photons further away than the largest bandwidth are counted.
     const BEYOND: bool = false;
 
-    /// Whether the rule needs photons' thinning keys.
+    /// Whether the rule reads the thinning keys of photons, from which it decides which photons it counts.
     const NEEDS_THINNING_KEYS: bool = false;
 
-    /// Number of counts per bandwidth.
+    /// Number of counts in the state of each bandwidth.
     fn counts(&self) -> usize {
         1
     }
-    /// The bandwidth before the first iteration: `radius2` is the squared radius, `photons` the number of the pilot's
-    /// photons within it (0 if unknown), `above` the number of levels by which it is larger than the picture level.
+    /// The bandwidth of a level before the first iteration: `radius2` is the squared radius, `photons` the number of
+    /// photons of the pilot iteration within it (0 if unknown), `above` by how many levels it is larger than the level
+    /// that the picture shows (negative if smaller).
     fn initial(&self, radius2: f32, photons: f32, above: i32) -> Self::Bandwidth;
-    /// Squared radius of a bandwidth.
+    /// Squared gathering radius of a bandwidth (m2).
     fn radius2(bandwidth: &Self::Bandwidth) -> f32;
-    /// Squared radius within which photons are counted, if [`CountingRule::BEYOND`].
+    /// Squared radius within which photons are counted, if [`CountingRule::BEYOND`]; `largest2` is the largest squared
+    /// gathering radius.
     #[inline]
     fn reach2(&self, bandwidths: &[Self::Bandwidth], largest2: f32) -> f32 {
         let _ = bandwidths;
         largest2
     }
-    /// Counts photons around a gathering point with this frame, which is a fixed function of the normal.
+    /// Counts photons around a gathering point. The frame is a fixed function of the normal there.
     fn count(
         &self,
         bandwidths: &[Self::Bandwidth],

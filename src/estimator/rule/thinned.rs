@@ -16,7 +16,8 @@ use crate::random::{GOLDEN, mix};
 use crate::transport::{FoundPhotons, MAX_LEVELS};
 use wide::f32x8;
 
-/// The chi-squared rule with thinning.
+/// The chi-squared bandwidth rule for guided light paths: it counts a random subset of photons, thinned to the density
+/// of the heaviest photon.
 #[derive(Clone, Debug)]
 pub struct Thinned(ChiSquared);
 
@@ -27,7 +28,7 @@ impl Thinned {
     }
 }
 
-/// Keeps each of the counted photons with a probability.
+/// Keeps each of the counted photons with this probability, and reduces the counts accordingly.
 #[cold]
 fn thin(counts: &mut [u32], probability: f64, seed: u64) {
     let threshold = (probability * 2f64.powi(64)) as u64;
@@ -48,7 +49,7 @@ impl CountingRule for Thinned {
 
     const NEEDS_THINNING_KEYS: bool = true;
 
-    /// One count per cell, and the largest weight.
+    /// Number of counts per bandwidth: one per cell of the disc, and one for the largest photon weight.
     fn counts(&self) -> usize {
         self.0.counts() + 1
     }

@@ -6,17 +6,19 @@
 
 use super::memoryless::radius2_factor;
 
-/// Default of alpha. Variance falls as `N^-alpha`, and squared bias, of order r^4, as `N^(-4 (1 - alpha) / 3)`. Both
-/// are equally fast for 4/7, where the mean squared error falls as `N^(-4/7)` \[Kaplanyan and Dachsbacher 2013, for
-/// kernels in three dimensions\].
+/// Default of the reduction rate alpha in media. Variance falls as `N^-alpha`, and squared bias, of order r^4, as
+/// `N^(-4 (1 - alpha) / 3)`. Both are equally fast for 4/7, where the mean squared error falls as `N^(-4/7)`
+/// \[Kaplanyan and Dachsbacher 2013, for kernels in three dimensions\].
 pub const ALPHA: f64 = 4.0 / 7.0;
 
-/// Radius of iteration `i` (from 1) over the initial one; [`radius2_factor`] is the factor of the cubed radius.
+/// Gathering radius in media of iteration `i` (from 1) over the initial one; [`radius2_factor`] is the factor of the
+/// cubed radius.
 pub fn radius_factor(i: u64, alpha: f64) -> f64 {
     radius2_factor(i, alpha).cbrt()
 }
 
-/// Radius of level `level` (from 0, the smallest) of `count` over the largest.
+/// Gathering radius in media of bandwidth level `level` (from 0, the smallest) of `count`, over that of the largest
+/// level.
 pub fn level_factor(level: usize, count: usize) -> f32 {
     (-((count - 1 - level) as f32) / 3.0).exp2()
 }
