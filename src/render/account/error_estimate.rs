@@ -42,7 +42,7 @@ impl ErrorEstimate {
         (self.variance + self.squared_bias + self.unknown).sqrt()
     }
 
-    /// Estimates the error of pixels by their samples alone, without unseen light; `None` if all pixels are black.
+    /// Estimates the error of pixels by their samples alone, without unseen light; `None` if no pixel is known to be lit.
     fn of_samples(state: &PixelState<'_>) -> Option<ErrorEstimate> {
         let (own, compared) = (state.settings.levels.picture_level(), state.settings.compared_levels());
         let mut sum = ErrorEstimate::default();

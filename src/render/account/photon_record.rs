@@ -53,7 +53,7 @@ pub struct PhotonRecord {
 pub struct UnseenLight {
     /// Squared relative error of the picture by this light.
     pub squared: f64,
-    /// The kind of photons that contributes most of this error; `None` if there is no such error.
+    /// The kind of photons that contributes most of this error; `None` while nothing is estimated.
     pub largest: Option<UnseenKind>,
 }
 
@@ -125,7 +125,7 @@ impl UnseenLight {
         2.0 * self.squared > error * error
     }
 
-    /// A sentence for users that names the missing light and the options that help; `None` if no light is missing.
+    /// A sentence for users that names the missing light and the options that help; `None` if nothing is estimated.
     pub fn sentence(&self, settings: &Settings) -> Option<String> {
         let UnseenKind { kind, stored, gathered } = self.largest?;
         let light = match kind {

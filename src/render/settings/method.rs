@@ -59,7 +59,7 @@ struct Row {
     has_fixed_points: bool,
     /// Whether samples are states of Markov chains.
     has_chains: bool,
-    /// Method that replaces this one where bandwidth levels must keep a fixed ratio; `None` if this one keeps it.
+    /// Method that replaces this one where bandwidth levels must keep a fixed ratio; `None` if none has to.
     pilot: Option<Method>,
 }
 
@@ -324,7 +324,7 @@ impl Method {
         self.row().alpha
     }
 
-    /// Method that replaces this one in pilots whose bandwidth levels must keep a fixed ratio; this one if it keeps it.
+    /// Method that replaces this one in pilots whose bandwidth levels must keep a fixed ratio, or this one itself.
     pub fn pilot_method(self) -> Method {
         self.row().pilot.unwrap_or(self)
     }

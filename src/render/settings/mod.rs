@@ -188,7 +188,7 @@ impl Settings {
         }
     }
 
-    /// Traces camera paths as these settings ask.
+    /// Makes the tracer of camera paths for a render with these settings.
     pub(in crate::render) fn camera_paths<'a>(
         &'a self,
         scene: &'a Scene,
