@@ -24,11 +24,11 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 
 pub(super) const ROUNDS: u64 = 5;
-/// Number of light paths of a round of learning over that of an iteration.
+/// Number of light paths of a round of learning over that of an iteration, and bounds of the number.
 const LIGHT_PATHS_RATIO: f64 = 0.25;
 const MIN_LIGHT_PATHS: u32 = 1 << 12;
 const MAX_LIGHT_PATHS: u32 = 1 << 15;
-/// Largest number of camera paths of a round of learning.
+/// Largest number of camera paths of a round of learning, and the number of pixels per camera path in small pictures.
 const MAX_CAMERA_PATHS: u32 = 1 << 13;
 const PIXELS_PER_CAMERA_PATH: u64 = 4;
 /// Camera paths per parallel task.

@@ -149,8 +149,8 @@ impl<'a> PhotonTracer<'a> {
     }
 
     /// Traces photons, builds their map, and adds times and counts to `phases` and `work`. `expected_paths` is the
-    /// number of light paths from which glints (light that narrow lobes reflect) derive the expected number of photons;
-    /// 0 if glints are not gathered.
+    /// number of light paths from which glints (light that mirrors and clear glass send to sharp lobes) derive the
+    /// expected number of photons; 0 if glints are not gathered.
     fn timed_map(
         &self,
         i: u64,
@@ -173,8 +173,8 @@ impl<'a> PhotonTracer<'a> {
         maps
     }
 
-    /// Builds the maps of the photons of iteration `i`. Glints (light that narrow lobes reflect) are gathered if
-    /// photons of caustics are traced.
+    /// Builds the maps of the photons of iteration `i`. Glints (light that mirrors and clear glass send to
+    /// sharp lobes) are gathered if photons of caustics are traced.
     fn build(&self, photons: Photons, expected_paths: u32, i: u64) -> Maps {
         let survey = &self.camera_paths.scene.survey;
         let lost = photons.lost;
