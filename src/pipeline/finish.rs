@@ -132,7 +132,7 @@ impl OpenFinish {
         }
     }
 
-    /// The value of the key `combined` in the EXR's header, which names the network and its training.
+    /// The value of the key `combined` in the EXR's header, which describes the finish: denoiser, network, error.
     pub fn header(&self, finished: &Finished) -> Value {
         let quality = match self.finish.quality {
             Quality::High => "high",
