@@ -33,7 +33,7 @@ const SIGNIFICANCE: f64 = 2.0;
 /// Core-seconds per triangle to commit a scene to Embree. Measured: 0.4 us with 250,000 triangles on one core.
 const SECONDS_PER_TRIANGLE: f64 = 1e-6;
 
-/// What an effect, such as caustics, contributes to a picture: its light, and the error and the cost of leaving it out.
+/// Contribution of an effect, such as caustics, to a picture: its light, and the error and the cost of leaving it out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EffectWeight {
     /// The effect that was measured.

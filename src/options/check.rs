@@ -22,7 +22,8 @@ pub fn takes(option: &str, method: Method) -> bool {
     }
 }
 
-/// Makes the error of an option that has no effect with the method `with`; the hint suggests the method `other`.
+/// Makes the error of an option that has no effect in the case `with`, such as `with --method path`; the hint suggests the
+/// method `other`.
 fn no_effect(option: &str, with: &str, other: &str) -> Error {
     let option = format!("--{}", option.replace('_', "-"));
     let error = Error::usage(format!("{option} has no effect {with}"));

@@ -203,7 +203,7 @@ struct Layers {
     visible: Visible,
 }
 
-/// What the finish of a picture gives: names of network and denoiser, the header's key `combined`, and the error.
+/// The result of finishing a picture: names of network and denoiser, the header's key `combined`, and the error.
 struct FinishedPicture {
     name: String,
     header: Value,

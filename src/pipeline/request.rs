@@ -34,7 +34,7 @@ pub struct AutoRequest<'a> {
 }
 
 impl<'a> MethodRequest<'a> {
-    /// Changes the settings of a named method or, for `auto`, of every candidate.
+    /// The request with changed settings of every candidate of `auto`; a method that the user names keeps its settings.
     pub fn map_candidates(self, change: impl Fn(Settings) -> Settings + 'a) -> MethodRequest<'a> {
         match self {
             MethodRequest::Auto(auto) => {

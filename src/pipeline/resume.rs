@@ -34,7 +34,7 @@ impl Resumption {
     }
 }
 
-/// A hash of the files that the scene is read from; `None` if it came through a pipe.
+/// A hash of the files that the scene is read from; `None` if it came through a pipe and cannot be read again.
 fn hash(request: &Request<'_>, scene: &Scene) -> Result<Option<String>> {
     let environment = match &request.scene.environment {
         Some(Environment::File(path)) => Some(path.as_path()),

@@ -196,7 +196,7 @@ impl Seeds {
     }
 }
 
-/// Whether all renders state the errors of their finished pictures.
+/// Whether any of the renders states the error of its finished picture.
 fn have_finished_errors(sources: &[Source]) -> bool {
     sources.iter().any(|source| source.header["error_of"] == FINISHED_PICTURE)
 }

@@ -12,17 +12,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Tiles along the longer side of a picture.
+/// Number of tiles along the longer side of a picture.
 const TILES_ALONG: usize = 20;
-/// Most tiles that are reported.
+/// Largest number of tiles that are reported.
 const MAX_TILES: usize = 10;
 /// Smallest share of the squared error for which an object and a kind of light are reported.
 const MIN_SHARE: f64 = 0.05;
-/// Pixels to each side of the windows in which noise is averaged.
+/// Pixels on each side of the middle one in the windows in which noise is averaged.
 const REACH: usize = 7;
-/// Added to the albedo before the division, so that black surfaces do not divide by zero.
+/// Added to the albedo by which noise is divided, so that black surfaces do not divide by zero.
 const ALBEDO_OFFSET: f32 = 0.01;
-/// Layers of the kinds of light, with their names for people.
+/// Layer names of the kinds of light, with the names of these kinds for people.
 const LIGHTS: [(&str, &str); 4] = [
     ("Direct", "direct light"),
     ("Indirect", "indirect light"),
@@ -97,8 +97,8 @@ pub struct Worst {
     pub tiles: Vec<Tile>,
 }
 
-/// What squared error is assigned to: indices of object and material, `None` without an object, and the index of a kind
-/// of light.
+/// Holder of squared error: indices of an object and its material, `None` without an object, and the index of a kind of
+/// light.
 type Holder = (Option<[u32; 2]>, usize);
 
 /// Sums of squared errors by object, material and kind of light.
