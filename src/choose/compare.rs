@@ -14,39 +14,39 @@ use crate::finish::{Estimate, Finish, quarters, reads_for_error};
 use crate::render::{Candidate, RenderInput, Session};
 use rayon::prelude::*;
 
-/// Least iterations of a pilot: one for each quarter.
+/// Smallest number of iterations of a pilot, one for each quarter of them.
 pub(super) const MIN_ITERATIONS: u64 = 4;
-/// Most iterations of a pilot.
+/// Largest number of iterations of a pilot.
 const MAX_ITERATIONS: u64 = 256;
-/// Share of the work of all pilots that is divided equally among all candidates, in the first of two rounds.
+/// Share of the work of all pilots that the first of two rounds divides equally among all candidates.
 const FIRST_ROUND_SHARE: f64 = 0.4;
-/// After the first round a candidate is out if its squared error exceeds the smallest one by this factor.
+/// Ratio of a candidate's squared error to the smallest one above which the candidate is out after the first round.
 const MAX_ERROR_RATIO: f64 = 2.0;
-/// Standard errors by which a difference of errors must exceed 0 to be significant.
+/// Number of standard errors by which a difference of errors must exceed 0 to be significant.
 const SIGNIFICANCE: f64 = 2.0;
 
-/// Result of a candidate's pilot.
+/// Result of a candidate's pilot, a short render in a small picture by one of the methods that `auto` compares.
 #[derive(Clone, Copy, Debug)]
 pub struct PilotResult {
-    /// The candidate.
+    /// The candidate (method and settings) that the pilot has rendered with.
     pub candidate: Candidate,
-    /// Expected relMSE of the finished picture at the end of the render, trimmed of the worst pixels. Infinite if the
-    /// pilot has seen no light.
+    /// Expected squared relative error (relMSE) of the finished picture at the end of the render, trimmed of the worst
+    /// pixels. Infinite if the pilot has seen no light.
     pub squared_error: f64,
-    /// Counted core-seconds of an iteration of the whole picture.
+    /// Core-seconds of an iteration of the whole picture, predicted from counted vertices.
     pub seconds_per_iteration: f64,
-    /// Whether this candidate is chosen.
+    /// Whether `auto` has chosen this candidate for the render.
     pub chosen: bool,
 }
 
 impl PilotResult {
-    /// The relative error: the root of [`PilotResult::squared_error`].
+    /// The expected relative error: the root of [`PilotResult::squared_error`].
     pub fn error(&self) -> f64 {
         self.squared_error.sqrt()
     }
 }
 
-/// Counted core-seconds that pilots and render may take.
+/// Core-seconds that pilots and render may take, as predicted from counted vertices.
 #[derive(Clone, Copy)]
 pub(super) struct Budget {
     /// Core-seconds of all pilots together.
@@ -55,32 +55,33 @@ pub(super) struct Budget {
     pub render: f64,
 }
 
-/// The pilot of a candidate.
+/// The pilot of a candidate, a short render in a small picture, between its iterations.
 pub(super) struct PilotRun<'a> {
     candidate: Candidate,
     session: Session<'a>,
-    /// Counted core-seconds of an iteration of the pilot.
+    /// Core-seconds of an iteration of the pilot, predicted from counted vertices.
     seconds_per_iteration: f64,
-    /// Counted core-seconds of an iteration of the whole picture.
+    /// Core-seconds of an iteration of the whole picture, predicted from counted vertices.
     render_seconds_per_iteration: f64,
-    /// Counted core-seconds of all iterations so far.
+    /// Predicted core-seconds of all iterations of the pilot so far.
     spent: f64,
 }
 
-/// Pictures of a pilot.
+/// Pictures of a pilot, from halves and quarters of its iterations.
 struct PilotPictures {
-    /// Finished from the first half of the iterations.
+    /// Picture finished from the first half of the iterations.
     half: Picture,
-    /// Finished from each quarter in that half.
+    /// Pictures finished from each quarter in the first half of the iterations.
     quarters: [Picture; 2],
-    /// The other two quarters, unfinished: independent estimates.
+    /// Pictures of the other two quarters of the iterations, unfinished: independent estimates.
     estimates: [Picture; 2],
     /// Relative variance of the estimates, trimmed of the worst pixels.
     noise: f64,
 }
 
 impl<'a> PilotRun<'a> {
-    /// Prepares a pilot. Both costs are counted core-seconds of an iteration: of the pilot, and of the whole picture.
+    /// Prepares a pilot. Both costs are core-seconds of an iteration, predicted from counted vertices: of the pilot,
+    /// and of the whole picture.
     pub fn new(
         input: &'a RenderInput<'a>,
         candidate: Candidate,
@@ -91,8 +92,8 @@ impl<'a> PilotRun<'a> {
         PilotRun { candidate, session, seconds_per_iteration, render_seconds_per_iteration, spent: 0.0 }
     }
 
-    /// Iterates until `seconds` core-seconds are spent in all. Once `stopped` returns true it ends after
-    /// [`MIN_ITERATIONS`].
+    /// Iterates until the pilot has taken `seconds` core-seconds in all, as predicted. Once `stopped` returns true it
+    /// ends after [`MIN_ITERATIONS`].
     fn advance(&mut self, seconds: f64, stopped: &dyn Fn() -> bool) {
         let to = ((seconds / self.seconds_per_iteration) as u64).clamp(MIN_ITERATIONS, MAX_ITERATIONS);
         while self.session.iterations() < to && !(self.session.iterations() >= MIN_ITERATIONS && stopped()) {
@@ -101,7 +102,7 @@ impl<'a> PilotRun<'a> {
         }
     }
 
-    /// The pictures so far; `None` if a quarter is black or the finish fails.
+    /// Makes the pictures of the iterations so far; `None` if a quarter is black or the finish fails.
     fn pictures(&self, finish: &mut Finish) -> Option<PilotPictures> {
         let set = self.session.layers(reads_for_error).ok()?;
         let quarters = quarters(&set)?;
@@ -115,8 +116,8 @@ impl<'a> PilotRun<'a> {
     }
 }
 
-/// Mean squared difference of two pictures relative to `values`, trimmed of the pixels with the largest: in some
-/// pictures one bright sample would be all of it.
+/// Mean squared difference of two pictures relative to the squares of `values`, trimmed of the pixels with the largest:
+/// in some pictures one bright sample would be all of it.
 fn relative_variance(a: &Picture, b: &Picture, values: &Picture) -> f64 {
     let floor = values.relative_floor();
     let squared_difference = |index: usize| -> f64 {
@@ -129,15 +130,15 @@ fn relative_variance(a: &Picture, b: &Picture, values: &Picture) -> f64 {
     squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
-/// Estimates that all pictures are compared with.
+/// Estimates of the true picture that the finished pictures of all pilots are compared with.
 struct CommonEstimates<'a> {
-    /// Means over all candidates, weighted by inverse variance.
+    /// Two independent means over the pilots of all candidates, weighted by inverse variance.
     estimates: [Picture; 2],
-    /// Values that errors are relative to: the finished picture of the candidate with the least noise.
+    /// Pixels that errors are relative to: the finished picture of the candidate with the least noise.
     values: &'a Picture,
 }
 
-/// `None` if no pilot has pictures.
+/// Makes the estimates of the true picture from the pictures of all pilots; `None` if no pilot has pictures.
 fn common_estimates(pictures: &[Option<PilotPictures>]) -> Option<CommonEstimates<'_>> {
     let all: Vec<&PilotPictures> = pictures.iter().flatten().collect();
     let values = &all.iter().min_by(|a, b| a.noise.total_cmp(&b.noise))?.half;
@@ -154,10 +155,10 @@ fn common_estimates(pictures: &[Option<PilotPictures>]) -> Option<CommonEstimate
     Some(CommonEstimates { estimates: [mean(0), mean(1)], values })
 }
 
-/// Expected errors of a candidate's pixels at the end of the render; `None` if the pilot has no pictures.
+/// Expected squared errors of a candidate's pixels at the end of the render; `None` if its pilot has no pictures.
 struct ExpectedErrors(Option<Vec<PixelError>>);
 
-/// How much larger the mean squared error of one candidate is than that of another.
+/// Excess of one candidate's mean squared error over that of another, with its noise.
 struct Difference {
     mean: f64,
     /// Standard error of `mean` from the noise of the common estimates.
@@ -196,13 +197,13 @@ impl ExpectedErrors {
         ExpectedErrors(Some(half.iter().zip(quarters[0]).zip(quarters[1]).map(pixel).collect()))
     }
 
-    /// Mean squared error; infinite without pictures.
+    /// Mean squared error over pixels; infinite if the pilot has no pictures.
     fn mean_squared(&self) -> f64 {
         let error = |pixels: &Vec<PixelError>| mean(pixels.iter().map(|pixel| pixel.squared)).max(f64::MIN_POSITIVE);
         self.0.as_ref().map_or(f64::INFINITY, error)
     }
 
-    /// The excess over another candidate's error. Both are errors against the same estimates.
+    /// The excess of this candidate's error over another one's. Both are errors against the same estimates.
     fn excess_over(&self, other: &ExpectedErrors) -> Difference {
         let (Some(pixels), Some(others)) = (&self.0, &other.0) else {
             let mean = if self.0.is_none() { f64::INFINITY } else { f64::NEG_INFINITY };
@@ -217,14 +218,15 @@ impl ExpectedErrors {
         }
     }
 
-    /// Whether more iterations may show that this candidate is as good as the best one.
+    /// Whether this candidate remains for the second round: more iterations may show that it is as good as the best
+    /// one.
     fn is_open(&self, best: &ExpectedErrors) -> bool {
         let excess = self.excess_over(best);
         excess.mean < ((MAX_ERROR_RATIO - 1.0) * best.mean_squared()).max(SIGNIFICANCE * excess.noise)
     }
 
-    /// Whether the excess is significant against the noise of the estimates and against its spread over pixels, so that
-    /// a few blotches alone do not decide.
+    /// Whether this candidate's excess of error is significant against the noise of the estimates and against its
+    /// spread over pixels, so that a few blotches alone do not decide.
     fn is_clearly_worse(&self, than: &ExpectedErrors) -> bool {
         let (Some(pixels), Some(others)) = (&self.0, &than.0) else { return self.0.is_none() };
         let excess = self.excess_over(than);
@@ -265,7 +267,7 @@ pub(super) fn run_pilots(
     runs.iter().zip(&errors).enumerate().map(result).collect()
 }
 
-/// Divides what the first round has left of `budget` equally among the open candidates.
+/// Divides what the first round has left of `budget` (core-seconds) equally among the candidates that are still `open`.
 fn run_second_round(runs: &mut [PilotRun<'_>], open: &[bool], budget: f64, stopped: &dyn Fn() -> bool) {
     let count = open.iter().filter(|open| **open).count();
     let closed: f64 = runs.iter().zip(open).map(|(run, open)| if *open { 0.0 } else { run.spent }).sum();
@@ -274,20 +276,21 @@ fn run_second_round(runs: &mut [PilotRun<'_>], open: &[bool], budget: f64, stopp
     remaining.for_each(|(run, _)| run.advance(share, stopped));
 }
 
-/// The open candidate with the smallest error.
+/// Index of the candidate with the smallest error among those that are `open`.
 fn index_of_least(errors: &[ExpectedErrors], open: &[bool]) -> usize {
     let open = (0..errors.len()).filter(|&k| open[k]);
     open.min_by(|&a, &b| errors[a].mean_squared().total_cmp(&errors[b].mean_squared())).unwrap_or(0)
 }
 
-/// The default candidate, unless it is clearly worse than the one with the smallest error.
+/// Index of the default candidate, unless it is clearly worse than the one with the smallest error, whose index it is
+/// then.
 fn choose(runs: &[PilotRun<'_>], errors: &[ExpectedErrors], open: &[bool]) -> usize {
     let best = index_of_least(errors, open);
     let default = runs.iter().position(|run| run.candidate == Candidate::DEFAULT);
     default.filter(|&default| open[default] && !errors[default].is_clearly_worse(&errors[best])).unwrap_or(best)
 }
 
-/// Expected errors of all candidates after a render of `budget` core-seconds.
+/// Expected errors of all candidates after a render that takes `budget` core-seconds.
 fn expected_errors(runs: &[PilotRun<'_>], finish: &mut Finish, budget: f64) -> Vec<ExpectedErrors> {
     let pictures: Vec<Option<PilotPictures>> = runs.iter().map(|run| run.pictures(finish)).collect();
     let common = common_estimates(&pictures);

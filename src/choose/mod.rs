@@ -25,26 +25,26 @@ use crate::render::{Candidate, Cost, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::{Scene, View};
 use pilot::Pilot;
 
-/// The chosen candidate, and why it was chosen.
+/// The candidate (method and settings) that `auto` has chosen, and why.
 pub struct Choice {
-    /// Settings of the render.
+    /// Settings of the render by the chosen candidate.
     pub settings: Settings,
-    /// The chosen candidate.
+    /// The chosen candidate, a method with settings.
     pub candidate: Candidate,
-    /// Results of all pilots; empty if none was rendered.
+    /// Results of the pilots (short renders) of all compared candidates; empty if none was rendered.
     pub pilots: Vec<PilotResult>,
-    /// Light, error and cost of each effect; empty if the render is too short to measure them.
+    /// Light, error and cost of each effect of the scene; empty if the render is too short to measure them.
     pub weights: Vec<EffectWeight>,
-    /// Why no pilot was rendered.
+    /// Why no pilot was rendered; `None` if some were.
     pub reason: Option<&'static str>,
-    /// Counted core-seconds of an iteration.
+    /// Core-seconds of an iteration of the render, predicted from counted vertices.
     pub seconds_per_iteration: f64,
-    /// Time that choosing took.
+    /// Time that the choice took, pilots included.
     pub spent: TimeSpent,
 }
 
 impl Choice {
-    /// The pilot of the chosen candidate.
+    /// The pilot result of the chosen candidate; `None` if no pilot was rendered.
     pub fn chosen_pilot(&self) -> Option<&PilotResult> {
         self.pilots.iter().find(|pilot| pilot.chosen)
     }
@@ -84,21 +84,21 @@ fn choose_untimed(
     Some(Choice { settings, candidate, pilots, weights, reason, seconds_per_iteration, spent: TimeSpent::default() })
 }
 
-/// The first candidate that the user's options allow.
+/// The first candidate that the user's options allow, taken where no pilot is rendered.
 fn candidate_without_pilot(scene: &Scene, settings_of: &impl Fn(Candidate) -> Option<Settings>) -> Candidate {
     let mut candidates = pilot::candidates_for_focused_light(scene).iter().chain(&[Candidate::DEFAULT]).copied();
     candidates.find(|candidate| settings_of(*candidate).is_some()).unwrap_or(Candidate::GATHERING)
 }
 
-/// Counted core-seconds of an iteration.
+/// Core-seconds of an iteration, predicted from the counted vertices of sampled paths.
 pub fn counted_cost(scene: &Scene, camera: &Camera, candidate: Candidate, settings: &Settings) -> f64 {
     let input = RenderInput::new(scene, camera, settings);
     let session = Session::new(&input);
     Cost::count(scene, camera, settings, session.guide()).film_seconds(candidate, settings, camera)
 }
 
-/// Counted cost of an iteration of a film, relative to the cost if the film were the whole picture. It is above 1 for
-/// windows of methods that trace the light paths of the whole picture.
+/// Predicted cost of an iteration of the camera's film, relative to the cost if the film were the whole picture. It is
+/// above 1 for windows of methods that trace the light paths of the whole picture.
 pub fn window_cost_ratio(scene: &Scene, camera: &Camera, settings: &Settings) -> f64 {
     let [film, whole] = camera.sizes();
     if film == whole || !settings.method.walks_whole_picture() {

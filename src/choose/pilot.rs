@@ -9,29 +9,31 @@ use crate::plan::{Effect, Presence};
 use crate::render::{Candidate, Cost, Method, RenderInput, Settings};
 use crate::scene::{Scene, View};
 
-/// Share of the render's work that pilots and the measurement of effects may take together.
+/// Share of the render's work that pilots (short renders by the compared methods) and the measurement of effects may
+/// take together.
 const PILOT_WORK_SHARE: f64 = 0.05;
-/// Share of that for the measurement of effects.
+/// Share of [`PILOT_WORK_SHARE`] that the measurement of effects may take.
 const EFFECTS_WORK_SHARE: f64 = 0.2;
 /// Share of the render's work that the smallest possible pilots may take. It is larger than [`PILOT_WORK_SHARE`] because
 /// in a short render a wrong choice costs more than a pilot.
 const MAX_PILOT_WORK_SHARE: f64 = 0.1;
-/// Least pixels of a pilot: a denoiser needs them.
+/// Smallest number of pixels of a pilot's picture: a denoiser needs them.
 const MIN_PIXELS: f64 = 1024.0;
-/// Most pixels of a pilot: more would leave fewer iterations.
+/// Largest number of pixels of a pilot's picture: more would leave fewer iterations.
 const MAX_PIXELS: f64 = 16384.0;
-/// Pixels of the pictures that measure effects.
+/// Number of pixels of the pictures that measure the effects of a scene.
 const EFFECTS_PIXELS: f64 = 768.0;
-/// Iterations of a pilot relative to those of the render. Close to 1, so that the pilot's error is like the render's, and
-/// small enough for a picture of some size.
+/// Number of a pilot's iterations over that of the render. Close to 1, so that the pilot's error is like the render's,
+/// and small enough for a picture of some size.
 const ITERATION_SHARE: f64 = 0.25;
-/// Core-seconds that one second of `--time` counts as on every machine. It is small, so that on most machines pilots take
-/// less than their share; on one core they take twice their share.
+/// Core-seconds that one second of the time limit `--time` counts as, on every machine. It is small, so that on most
+/// machines pilots take less than their share; on one core they take twice their share.
 const ASSUMED_CORES: f64 = 2.0;
 /// Core-seconds that a render without limits of time and iterations counts as.
 const UNLIMITED_CORE_SECONDS: f64 = 1000.0;
 
-/// Candidates for a scene where glass or mirrors focus light, the best one first; empty for other scenes.
+/// Candidates (methods with settings) for a scene where glass or mirrors focus light, the best one first; empty for
+/// other scenes.
 pub(super) fn candidates_for_focused_light(scene: &Scene) -> &'static [Candidate] {
     if scene.lights.targets().spheres().is_empty() {
         &[]
@@ -42,8 +44,9 @@ pub(super) fn candidates_for_focused_light(scene: &Scene) -> &'static [Candidate
     }
 }
 
-/// Candidates that the user's options allow, with their settings. Where glass or mirrors focus light it is the best one
-/// only: a pilot is too short to miss the light that other candidates do not find, and would favour them for it.
+/// Candidates (methods with settings) to compare, as far as the user's options allow them. Where glass or mirrors focus
+/// light it is the best one only: a pilot is too short to miss the light that other candidates do not find, and would
+/// favour them for it.
 fn candidates(scene: &Scene, settings_of: &impl Fn(Candidate) -> Option<Settings>) -> Vec<(Candidate, Settings)> {
     let with_settings = |candidate: &Candidate| settings_of(*candidate).map(|settings| (*candidate, settings));
     let focused = candidates_for_focused_light(scene);
@@ -56,7 +59,7 @@ fn candidates(scene: &Scene, settings_of: &impl Fn(Candidate) -> Option<Settings
         .collect()
 }
 
-/// Why a single candidate is chosen without a pilot.
+/// Reason, for messages, why a single candidate is chosen without a pilot.
 fn reason_without_pilot(candidate: Option<Candidate>, focused: bool) -> &'static str {
     match candidate.map(|candidate| candidate.method) {
         Some(Method::Vcm) if focused => "light is focused here, which it finds by all techniques",
@@ -72,23 +75,23 @@ fn pixel_count(camera: &Camera) -> f64 {
     f64::from(width) * f64::from(height)
 }
 
-/// Pilots of a render.
+/// Plans and runs the pilots of a render: short renders by which `auto` compares methods.
 pub(super) struct Pilot<'a> {
     view: View<'a>,
     /// Settings of [`Candidate::GATHERING`].
     gathering: &'a Settings,
-    /// Vertices of paths in the scene.
+    /// Cost of iterations, from the counted vertices of sampled paths in the scene.
     pub cost: Cost,
-    /// Pixels of the render.
+    /// Number of pixels of the render.
     pub pixels: f64,
-    /// Counted core-seconds of the render.
+    /// Core-seconds that the render takes, as predicted from counted vertices and its limits.
     budget: f64,
 }
 
-/// Picture of the pilots, and their work.
+/// Size of the pilots' picture, and their work.
 struct PilotSize {
     camera: Camera,
-    /// Counted core-seconds of all pilots together.
+    /// Core-seconds of all pilots together, as predicted from counted vertices.
     seconds: f64,
 }
 
@@ -107,8 +110,8 @@ impl<'a> Pilot<'a> {
         Pilot { view, gathering, cost, pixels, budget }
     }
 
-    /// Measures what each effect adds to the picture. Also returns the counted core-seconds of the measurement. If the
-    /// render is too short for all of it, measures light effects only, or nothing.
+    /// Measures what each effect of the scene adds to the picture. Also returns the predicted core-seconds of the
+    /// measurement. If the render is too short for all of it, measures light effects only, or nothing.
     pub fn weigh_effects(&self) -> (Vec<WeighedEffect>, f64) {
         let settings = weights::settings(self.gathering, EFFECTS_PHOTON_SHARE);
         let pixels = EFFECTS_PIXELS.min(self.pixels);
@@ -134,7 +137,7 @@ impl<'a> Pilot<'a> {
     }
 
     /// Runs the pilots of all candidates, with the work that the measurement of effects (`effects_seconds`) has left.
-    /// Returns their results, or why there are none.
+    /// Returns their results, or the reason why there are none.
     pub fn run(
         &self,
         effects_seconds: f64,

@@ -9,16 +9,16 @@ use crate::render::{Levels, Settings, Shard};
 use crate::stat::median;
 use crate::transport::MAX_LEVELS;
 
-/// Share of the light paths of an iteration that measures effects.
+/// Share of the render's light paths per iteration in pictures that measure effects.
 pub(super) const EFFECTS_PHOTON_SHARE: f64 = 0.125;
-/// Share of the pixels that means leave out, those with the largest noise. One bright sample in about a hundred pixels
-/// says next to nothing about how frequent such samples are.
+/// Share of the pixels, those with the largest noise, that means over a pilot's pixels leave out. One bright sample in
+/// about a hundred pixels says next to nothing about how frequent such samples are.
 pub(super) const TRIMMED_PILOT_SHARE: f64 = 0.01;
-/// Pixels to each side of the window of a median.
+/// Pixels on each side of the middle one in the window of a median.
 const MEDIAN_REACH: usize = 2;
 
-/// Settings of a small render: `photon_share` of the light paths, and bandwidths as much larger as the same number of
-/// neighbours needs.
+/// Settings of a pilot, a small render: `photon_share` of the light paths, and bandwidths as much larger as an equal
+/// number of neighbours needs.
 pub fn pilot_settings(settings: &Settings, photon_share: f64) -> Settings {
     with_fewer_photons(settings, photon_share, 1.0 / photon_share as f32)
 }
@@ -54,7 +54,7 @@ pub(super) fn with_all_levels(settings: &Settings, photon_share: f64) -> Setting
     Settings { method, levels, initial_bandwidth, ..fewer }
 }
 
-/// Mean over RGB.
+/// Mean over red, green and blue.
 pub(super) fn mean(v: DVec3) -> f64 {
     v.element_sum() / 3.0
 }

@@ -15,45 +15,48 @@ use crate::render::{Candidate, Cost, RenderInput, Session, Settings};
 use crate::scene::{Scene, View};
 use crate::stat::floor;
 
-/// Number of additive parts of a pixel.
+/// Number of additive parts of a pixel's light.
 const PARTS: usize = 5;
-/// Light effects that are a part of the picture, in the order of [`parts()`].
+/// Light effects that are one additive part of the picture each, in the order of [`parts()`].
 const EFFECTS_OF_PARTS: [Effect; PARTS] =
     [Effect::Emission, Effect::Direct, Effect::Indirect, Effect::Caustic, Effect::Volume];
-/// Light effects that share parts with others.
+/// Light effects that are not an additive part of the picture but share parts with others.
 const EFFECTS_WITHOUT_PART: [Effect; 2] = [Effect::Glossy, Effect::Sds];
-/// Iterations of each picture.
+/// Iterations of each picture that measures effects.
 pub(super) const ITERATIONS: u64 = 6;
-/// Iterations of each half of a picture.
+/// Iterations of each half of a picture that measures effects.
 const HALF: u64 = ITERATIONS / 2;
-/// Most pictures that light effects need.
+/// Largest number of pictures that the light effects of a scene need.
 pub(super) const MAX_LIGHT_PICTURES: usize = 1 + EFFECTS_WITHOUT_PART.len();
-/// Standard errors by which an error must exceed 0 to be significant.
+/// Number of standard errors by which an error must exceed 0 to be significant.
 const SIGNIFICANCE: f64 = 2.0;
 /// Core-seconds per triangle to commit a scene to Embree. Measured: 0.4 us with 250,000 triangles on one core.
 const SECONDS_PER_TRIANGLE: f64 = 1e-6;
 
-/// Light, error and cost of an effect in a picture.
+/// Contribution of an effect, such as caustics, to a picture: its light, and the error and the cost of leaving it out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EffectWeight {
-    /// The effect.
+    /// The effect that was measured.
     pub effect: Effect,
-    /// Share of the picture's light, 0 to 1; `None` for effects that only change the light of others.
+    /// Share of the picture's light that the effect brings, 0 to 1; `None` for effects that only change the light of
+    /// others.
     pub energy: Option<f64>,
     /// Relative error (the root of relMSE) of the picture without the effect; `None` if noise hides it.
     pub error_if_off: Option<f64>,
-    /// Counted core-seconds per iteration that leaving the effect out would save; `None` before a candidate is chosen.
+    /// Core-seconds per iteration that leaving the effect out would save, predicted from counted vertices; `None`
+    /// before a candidate is chosen.
     pub saved: Option<f64>,
 }
 
-/// Weight of an effect before a candidate is chosen.
+/// Weight of an effect (light, and error without it) before a candidate is chosen.
 pub(super) struct WeighedEffect {
     weight: EffectWeight,
-    /// Counted vertices in the scene without the effect, for effects that are properties of the scene.
+    /// Cost of iterations in the scene without the effect; `None` for effects that are not properties of the scene.
     cost_without: Option<Cost>,
 }
 
-/// Effects of the scene that are properties of the scene, so that a scene without them has to be built.
+/// Effects present that are properties of the scene, such as dispersion: to measure one, a scene without it has to be
+/// built.
 pub(super) fn scene_effects(presence: &Presence) -> Vec<Effect> {
     Effect::ALL.into_iter().filter(|effect| !effect.is_class() && presence.has(*effect)).collect()
 }
@@ -63,19 +66,20 @@ pub(super) fn rebuild_seconds(scene: &Scene, effect: Effect) -> f64 {
     if effect == Effect::Alpha { scene.shapes.triangles() as f64 * SECONDS_PER_TRIANGLE } else { 0.0 }
 }
 
-/// Settings of the pictures that measure effects. They find all classes of light paths, so that classes that the user has
-/// switched off are measured, too.
+/// Settings of the pictures that measure effects. They find all classes of light paths, so that classes that the user
+/// has switched off are measured, too.
 pub(super) fn settings(settings: &Settings, photon_share: f64) -> Settings {
     Settings { classes: ClassSet::ALL, ..pilot_settings::with_all_levels(settings, photon_share) }
 }
 
-/// Additive parts of each pixel, by half of the iterations.
+/// Additive parts of each pixel's light, for each half of the iterations.
 type Halves = [Vec<[DVec3; PARTS]>; 2];
 
-/// Light of each pixel, by half of the iterations.
+/// Light of each pixel, for each half of the iterations.
 type LightHalves = [Vec<DVec3>; 2];
 
-/// Renders a picture. Returns its pixels, and the means of their parts over each half of the iterations.
+/// Renders a picture to measure effects. Returns its pixels, and the means of their additive parts over each half of
+/// the iterations.
 fn render_halves(scene: &Scene, camera: &Camera, settings: &Settings) -> (Vec<PixelAccumulator>, Halves) {
     let input = RenderInput::new(scene, camera, settings);
     let mut session = Session::new(&input);
@@ -104,7 +108,7 @@ fn difference(a: &[DVec3; PARTS], b: &[DVec3; PARTS]) -> [DVec3; PARTS] {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
-/// Sum of all parts of each pixel, minus the sum of the parts of `other`.
+/// Sum of all additive parts of each pixel, minus that of `other`, for each half of the iterations.
 fn light(halves: &Halves, other: Option<&Halves>) -> LightHalves {
     std::array::from_fn(|half| {
         let sum = |parts: &[DVec3; PARTS]| parts.iter().sum::<DVec3>();
@@ -117,14 +121,14 @@ fn light_of_part(halves: &Halves, part: usize) -> LightHalves {
     halves.each_ref().map(|half| half.iter().map(|parts| parts[part]).collect())
 }
 
-/// Picture that effects are measured against.
+/// Picture with all effects that pictures without one are compared with.
 struct Reference {
     halves: Halves,
-    /// Values that errors are relative to.
+    /// Value of each pixel that errors are relative to.
     values: Vec<f64>,
-    /// Added to squared values, see [`floor`].
+    /// Floor of relative errors, added to squared values, see [`floor`].
     floor: f64,
-    /// Sum of all light.
+    /// Sum of the light of all pixels.
     total: f64,
 }
 
@@ -137,12 +141,13 @@ impl Reference {
         Reference { halves, values, floor, total: total.max(f64::MIN_POSITIVE) }
     }
 
-    /// Share of all light, 0 to 1.
+    /// Share of this light in all light of the picture, 0 to 1.
     fn energy(&self, light: &LightHalves) -> f64 {
         (0.5 * light.iter().flatten().map(|light| mean(*light)).sum::<f64>() / self.total).clamp(0.0, 1.0)
     }
 
-    /// relMSE of the picture without `light`, and its standard error, trimmed of the pixels where the halves differ most.
+    /// Squared relative error (relMSE) of the picture without `light`, and its standard error, trimmed of the pixels
+    /// where the halves differ most.
     fn relmse(&self, [first, second]: &LightHalves) -> (f64, f64) {
         let pixels = first.iter().zip(second).zip(&self.values).map(|((first, second), value)| {
             let (weight, difference) = (relative_weight(*value, self.floor), *first - *second);
@@ -157,14 +162,14 @@ impl Reference {
         (relmse, (sum(2) / n - relmse * relmse).max(0.0).sqrt() / n.sqrt())
     }
 
-    /// Weight of a light effect. Light is not negative, so its error is given however noisy it is.
+    /// Weight of a light effect by its light. Light is not negative, so its error is given however noisy it is.
     fn weigh_light(&self, effect: Effect, light: &LightHalves) -> WeighedEffect {
         let error_if_off = Some(self.relmse(light).0.max(0.0).sqrt());
         let weight = EffectWeight { effect, energy: Some(self.energy(light)), error_if_off, saved: None };
         WeighedEffect { weight, cost_without: None }
     }
 
-    /// Weights of all light effects that are present.
+    /// Weights of all light effects that are present in the scene.
     fn weigh_light_effects(&self, view: View<'_>, settings: &Settings, presence: &Presence) -> Vec<WeighedEffect> {
         let mut weighed = Vec::new();
         let mut rest = self.halves.clone();
@@ -187,8 +192,8 @@ impl Reference {
         weighed
     }
 
-    /// Weight of an effect that is a property of the scene, by a picture without it. `energy` is its share of the light,
-    /// if it also is a light effect.
+    /// Weight of an effect that is a property of the scene, measured by a picture without it. `energy` is its share of
+    /// the light, if it also is a light effect.
     fn weigh_scene_effect(
         &self,
         effect: Effect,
@@ -205,8 +210,8 @@ impl Reference {
     }
 }
 
-/// Measures the light effects that are present, and `scene_effects`, in a small picture. `settings` find all light;
-/// `count` counts the vertices in a scene without an effect.
+/// Measures the weights of the light effects that are present, and of `scene_effects`, in a small picture. `settings`
+/// find all light; `count` counts the vertices in a scene without an effect.
 pub(super) fn weigh(
     view: View<'_>,
     settings: &Settings,
@@ -233,7 +238,8 @@ pub(super) fn weigh(
 }
 
 impl WeighedEffect {
-    /// The weight with the core-seconds that a candidate would save without the effect. `cost` is counted without a guide.
+    /// Completes the weight with the core-seconds that a candidate would save without the effect. `cost` is counted
+    /// without a guide.
     pub fn weight_for(self, cost: &Cost, candidate: Candidate, settings: &Settings, pixels: f64) -> EffectWeight {
         let saved = match self.cost_without {
             Some(without) => {

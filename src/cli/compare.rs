@@ -41,7 +41,7 @@ pub struct CompareArgs {
     json: bool,
 }
 
-/// Compares two files and prints the errors.
+/// Compares an EXR with a reference and prints the errors.
 pub fn run(args: &CompareArgs) -> Result<()> {
     if let Some(png) = &args.png {
         output::check(png, "png")?;
@@ -66,7 +66,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if args.json { print_json(&json!(comparison)) } else { print(&text(&comparison)) }
 }
 
-/// Reads a file. If a layer is named, it becomes the picture, without the other layers.
+/// Reads the layers of an EXR. If a layer is named, it becomes the picture, without the other layers.
 fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
     let (mut set, _) = exr::read(path)?;
     if let Some(name) = layer {
@@ -81,7 +81,7 @@ fn read(path: &Path, layer: Option<&str>) -> Result<LayerSet> {
     Ok(set)
 }
 
-/// The name of a layer, or the channels of the beauty layer, which has no name.
+/// The name of a layer for messages, or the channels of the beauty layer, which has no name.
 fn describe_layer(layer: &Layer) -> String {
     let components: Vec<&str> = layer.planes.iter().map(|plane| plane.component.as_str()).collect();
     if layer.name.is_empty() { components.join(" ") } else { layer.name.clone() }

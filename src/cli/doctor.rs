@@ -19,7 +19,7 @@ pub struct DoctorArgs {
     json: bool,
 }
 
-/// The result of the search for a library.
+/// The result of the search for a library that the program loads.
 struct Finding {
     name: &'static str,
     key: &'static str,
@@ -32,7 +32,7 @@ struct Finding {
 /// A library that was found: its version, its file, and the origin of the file.
 struct Found(String, String, &'static str);
 
-/// Prints the libraries. Returns an error if a required library is missing.
+/// Prints the libraries that were found and those that are missing. Returns an error if a required one is missing.
 pub fn run(args: &DoctorArgs) -> Result<()> {
     let findings = [embree(), onnxruntime(), oidn(), usd()];
     if args.json {

@@ -36,7 +36,7 @@ pub struct FinishArgs {
     threads: usize,
 }
 
-/// Finishes the picture of a file.
+/// Finishes the picture of an EXR, as `caustique finish`.
 pub fn run(args: &FinishArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
@@ -67,7 +67,8 @@ pub fn run(args: &FinishArgs) -> Result<()> {
     })
 }
 
-/// Opens a finish and warns if the preferred denoiser is missing.
+/// Opens a finish (denoiser and network) for this number of bandwidth levels, and warns if the preferred denoiser is
+/// missing.
 ///
 /// # Errors
 /// Errors of [`finish::open`].

@@ -31,7 +31,7 @@ pub struct InfoArgs {
     json: bool,
 }
 
-/// Prints the contents of a file.
+/// Prints the contents of a scene or an EXR, as `caustique info`.
 pub fn run(args: &InfoArgs) -> Result<()> {
     let path = &args.file;
     if is_exr(path)? {
@@ -55,7 +55,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
     print(&scene_text(path, &object))
 }
 
-/// Escapes control characters in all texts of a value.
+/// Escapes control characters in all texts of a JSON value.
 fn escape(value: &mut Value) {
     match value {
         Value::String(text) => *text = printable(text),
@@ -75,7 +75,7 @@ fn is_exr(path: &Path) -> Result<bool> {
     Ok(start == EXR_MAGIC)
 }
 
-/// The header's object, with the size and the layers of the file.
+/// The header of an EXR as a JSON object, with the size and the layers of the file.
 fn image_object(set: &LayerSet, header: Option<Value>) -> Map<String, Value> {
     let mut object = match header {
         Some(Value::Object(object)) => object,
@@ -146,7 +146,7 @@ fn image_text(path: &Path, set: &LayerSet, object: &Value) -> String {
     text + &plot::log_log(&points, name, of)
 }
 
-/// The interval of the error, and the places of the largest errors.
+/// The interval of the error and the places of the largest errors, as text for people.
 fn accuracy_text(object: &Value) -> String {
     let accuracy = object.get("accuracy");
     let number = |value: &Value, key: &str| value.get(key).and_then(Value::as_f64);
@@ -217,7 +217,7 @@ fn kind(emitter: &Emitter) -> &'static str {
     }
 }
 
-/// Most names of a kind that the text lists.
+/// Largest number of names of a kind (such as materials) that the text lists.
 const MAX_NAMES: usize = 24;
 
 fn scene_text(path: &Path, object: &Value) -> String {

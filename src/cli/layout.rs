@@ -2,7 +2,7 @@
 
 use clap::{Arg, ArgAction, Command};
 
-/// Headings of options in the order of the help. Options without a heading come first.
+/// Headings in the help in their order. Options without a heading come first.
 const HEADINGS: [&str; 12] = [
     "When to stop",
     "Runs",
@@ -17,9 +17,9 @@ const HEADINGS: [&str; 12] = [
     RUNNING,
     EXPERT,
 ];
-/// Heading of options that do not change the picture.
+/// Heading in the help of options that do not change the picture.
 const RUNNING: &str = "Running";
-/// Heading of options for researchers, which `-h` leaves out.
+/// Heading in the help of options for researchers, which `-h` leaves out.
 const EXPERT: &str = "Expert";
 
 /// Sorts the options of a command by the order of their headings.
@@ -43,7 +43,7 @@ pub fn arrange(command: Command) -> Command {
     }
 }
 
-/// Settings of every option: `-h` leaves out options for experts, and a negative number is a value.
+/// Sets what every option has: `-h` leaves out options for experts, and a negative number is a value.
 fn with_common_settings(option: Arg) -> Arg {
     let is_long = option.get_help_heading() == Some(EXPERT) || option.is_hide_short_help_set();
     let option = option.hide_short_help(is_long);
@@ -51,7 +51,7 @@ fn with_common_settings(option: Arg) -> Arg {
     if has_value { option.allow_negative_numbers(true) } else { option }
 }
 
-/// The command with its help option, which is the last before the options for experts.
+/// Adds the help option to a command, as the last before the options for experts.
 pub fn with_help(command: Command) -> Command {
     let long = command.get_arguments().any(|option| option.is_hide_short_help_set());
     let about = if long { "Print help: -h what you need first, --help everything" } else { "Print help" };

@@ -58,7 +58,7 @@ pub struct MergeArgs {
     threads: usize,
 }
 
-/// Merges shards if there are any, else averages renders.
+/// Merges the files: shards to the picture of their render, or else renders to their mean.
 pub fn run(args: &MergeArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
@@ -69,13 +69,15 @@ pub fn run(args: &MergeArgs) -> Result<()> {
     super::pool(args.threads)?.install(|| if shards.contains(&true) { merge_shards(args) } else { average_seeds(args) })
 }
 
-/// The value of an option in the header's `arguments`, if it has the expected type.
+/// The value of an option in `arguments`, the options in an EXR's header; `None` if it is missing or not of the
+/// expected type.
 fn given<T: DeserializeOwned>(arguments: &Value, name: &str) -> Option<T> {
     arguments.get(name).and_then(|value| serde_json::from_value(value.clone()).ok())
 }
 
 impl MergeArgs {
-    /// The finish of these options, else of the options of the shards.
+    /// The finish (denoiser and network) that these options ask for, else that of the shards' options; `None`: no
+    /// finish.
     fn finish(&self, arguments: &Value) -> Option<FinishRequest> {
         let denoise = self.denoise.or_else(|| given(arguments, "denoise")).unwrap_or_default();
         let model = self.model.clone().or_else(|| given(arguments, "model"));
@@ -88,7 +90,7 @@ impl MergeArgs {
         self.exr_naming.or_else(|| given(arguments, "exr-naming")).unwrap_or(Naming::Plain)
     }
 
-    /// Writes the EXR and the PNG.
+    /// Writes the merged picture as EXR, and as PNG if the user wants one.
     fn write(&self, set: &LayerSet, attributes: &Attributes, naming: Naming, made_for: &PictureDefaults) -> Result<()> {
         exr::write(&self.output, set, attributes, self.picture.exr_options(naming))?;
         self.picture.write_png(set, made_for)?;
@@ -97,7 +99,7 @@ impl MergeArgs {
     }
 }
 
-/// Merges shards to the picture of their render.
+/// Merges shards (parts of a render's iterations) to the picture of their render.
 fn merge_shards(args: &MergeArgs) -> Result<()> {
     let shards = Shards::open(&args.inputs, args.partial)?;
     let arguments = shards.arguments();

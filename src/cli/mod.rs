@@ -64,7 +64,7 @@ enum Command {
     Options,
 }
 
-/// The command line with all commands, arranged for the help.
+/// Makes the parser of the command line with all commands, arranged for the help.
 fn command_line() -> clap::Command {
     let mut places = 0..;
     Cli::command().mut_subcommands(|command| {
@@ -72,7 +72,7 @@ fn command_line() -> clap::Command {
     })
 }
 
-/// The command that the first argument names.
+/// The command that the program's first argument names; `None` if it names none.
 fn named_command(line: &clap::Command) -> Option<&clap::Command> {
     std::env::args_os().nth(1).and_then(|word| line.find_subcommand(word))
 }
@@ -120,7 +120,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Prints an error with its hint, and returns its exit code.
+/// Prints an error with its hint to stderr, and returns its exit code.
 fn fail(error: &Error) -> ExitCode {
     say(&error.to_string());
     if let Some(hint) = &error.hint {
@@ -129,10 +129,10 @@ fn fail(error: &Error) -> ExitCode {
     ExitCode::from(error.exit_code())
 }
 
-/// More threads per core than this are taken for a typing error.
+/// Number of threads per core above which `--threads` is taken for a typing error.
 const MAX_THREADS_PER_CORE: usize = 4;
 
-/// The thread pool of a command; 0 threads: one for each core.
+/// Makes the thread pool of a command; 0 threads: one for each core.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
     if threads > MAX_THREADS_PER_CORE * cores {
@@ -162,7 +162,7 @@ fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Prints data to stdout. A closed pipe is no error.
+/// Prints a text to stdout. A closed pipe is no error.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {

@@ -43,12 +43,12 @@ impl PictureArgs {
         self.png.as_deref().map_or(Ok(()), |path| check(path, "png"))
     }
 
-    /// Options for writing the EXR.
+    /// How the EXR is written: its compression, and its channel names.
     pub fn exr_options(&self, naming: Naming) -> exr::Options {
         exr::Options { compression: self.compression, naming }
     }
 
-    /// Exposure in stops and tone curve: the user's, else the scene's.
+    /// Exposure in stops and tone curve of the PNG: the user's, else the scene's.
     pub fn look(&self, made_for: &PictureDefaults) -> (f32, ToneMap) {
         let exposure = self.exposure.map(|ev| ev as f32).or(made_for.exposure).unwrap_or(0.0);
         (exposure, self.tonemap.or(made_for.tonemap).unwrap_or_default())
@@ -97,7 +97,7 @@ pub fn check_inputs<'a>(output: &Path, mut inputs: impl Iterator<Item = &'a Path
     }
 }
 
-/// Whether a path stands for standard output.
+/// Whether a path, `-`, stands for standard output.
 pub fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }

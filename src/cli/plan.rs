@@ -31,13 +31,13 @@ pub struct PlanArgs {
 }
 
 impl PlanArgs {
-    /// The options of the scene.
+    /// The options about the scene and how it is read.
     pub fn scene(&self) -> &SceneOptions {
         &self.options.scene
     }
 }
 
-/// Prints the plan of a render.
+/// Prints the plan of a render: its effects and why they are simulated.
 pub fn run(args: &PlanArgs) -> Result<()> {
     super::pool(args.threads)?.install(|| report(args))
 }
@@ -75,7 +75,7 @@ fn report(args: &PlanArgs) -> Result<()> {
     Ok(())
 }
 
-/// The cost of a target error.
+/// Forecasts the cost of rendering to the relative error `target`; `None` if it cannot be known.
 fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, target: f64) -> Result<Option<Forecast>> {
     let view = View::new(&loaded.scene, &planned.camera);
     let settings = with_light_paths(planned.chosen.settings.clone(), args.options.photons, view.camera.size());
@@ -84,7 +84,8 @@ fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, ta
     Form::for_output(args.json).during("trying how the error falls", work)
 }
 
-/// `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, and the pilot that this follows from.
+/// The forecast as a sentence: `error 2.0 % after about 3 min 20 s (0.11 core-hours, 400 iterations)`, and the pilot
+/// that this follows from.
 fn sentence(error: f64, forecast: Option<Forecast>) -> String {
     let Some(Forecast { iterations, seconds, core_seconds, pilot: (done, reached), .. }) = forecast else {
         return format!("error {}: a pilot tells no time after which it is reached\n", percent(error));
@@ -98,14 +99,14 @@ fn sentence(error: f64, forecast: Option<Forecast>) -> String {
     )
 }
 
-/// A column: its title, and its text for an effect.
+/// A column of the plan's table: its title, and its text for an effect.
 type Column = (&'static str, fn(&EffectPlan) -> String);
 
 fn figure(x: Option<f64>, say: fn(f64) -> String) -> String {
     x.map_or("-".into(), say)
 }
 
-/// The columns before the reasons. Columns of figures exist if a pilot has estimated some.
+/// The columns of the plan's table before the reasons. Columns of figures exist if a pilot has estimated some.
 fn columns(plan: &Plan) -> Vec<Column> {
     let mut columns: Vec<Column> = vec![("effect", |e| e.effect.name().into()), ("simulated by", carrier)];
     let any = |figure: fn(&EffectPlan) -> Option<f64>| plan.effects.iter().any(|e| figure(e).is_some());
@@ -132,7 +133,7 @@ fn carrier(e: &EffectPlan) -> String {
     }
 }
 
-/// The plan as a table for people.
+/// The plan as text: a table of effects for people.
 fn text(plan: &Plan) -> String {
     let columns = columns(plan);
     let cells = |row: &dyn Fn(&Column) -> String| columns.iter().map(row).collect::<Vec<String>>();

@@ -1,9 +1,10 @@
 //! A small plot for the terminal: error against seconds or iterations, with logarithmic axes.
 
-/// Columns and rows of the plotting area.
+/// Number of columns and rows of characters in the plotting area.
 const SIZE: (usize, usize) = (56, 10);
 
-/// Plots points (x, y) above zero. Returns an empty text for fewer than two points. `x_name` includes the unit.
+/// Plots points (x, y) above zero on logarithmic axes, as text. Returns an empty text for fewer than two points.
+/// `x_name` includes the unit.
 pub fn log_log(points: &[(f64, f64)], x_name: &str, y_name: &str) -> String {
     let logs: Vec<(f64, f64)> = points
         .iter()
@@ -41,7 +42,7 @@ pub fn log_log(points: &[(f64, f64)], x_name: &str, y_name: &str) -> String {
     text
 }
 
-/// A number with three significant digits.
+/// A number as text with three significant digits.
 fn short(x: f64) -> String {
     let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 8.0) as usize;
     if x >= 1e6 { format!("{x:.2e}") } else { format!("{x:.digits$}") }

@@ -29,41 +29,41 @@ pub enum Form {
 }
 
 impl Form {
-    /// Whether people read the reports. Programs get neither notes nor a summary.
+    /// Whether people, not programs, read the reports. Programs get neither notes nor a summary.
     pub fn for_people(self) -> bool {
         matches!(self, Form::Auto | Form::Plain)
     }
 
-    /// The form of commands without `--progress`: no reports if the output is JSON.
+    /// The form of reports for commands without `--progress`: no reports if the output is JSON.
     pub fn for_output(json: bool) -> Form {
         if json { Form::None } else { Form::Auto }
     }
 
-    /// Replaces `Auto` by `Plain` if stderr is no terminal.
+    /// This form, with `Auto` replaced by `Plain` if stderr is no terminal.
     pub fn resolved(self) -> Form {
         if self == Form::Auto && !std::io::stderr().is_terminal() { Form::Plain } else { self }
     }
 
-    /// Runs `work` and shows `what` while it takes long.
+    /// Runs `work`, shows `what` on the terminal while it takes long, and returns the result.
     pub fn during<T>(self, what: &str, work: impl FnOnce() -> T) -> T {
         let _waiting = Waiting::begin(self, what);
         work()
     }
 }
 
-/// Seconds between two plain lines.
+/// Seconds between two lines of plain progress reports.
 pub const PLAIN_INTERVAL: f64 = 5.0;
-/// Steps of the bar.
+/// Number of steps of the progress bar.
 const BAR_STEPS: u64 = 1000;
-/// Waits shorter than this are not shown.
+/// Shortest wait that a spinner shows.
 const MIN_SHOWN_WAIT: Duration = Duration::from_secs(1);
 /// Time between two frames of a spinner.
 const SPINNER_INTERVAL: Duration = Duration::from_millis(100);
 
-/// The bar or spinner on the terminal.
+/// The progress bar or spinner that is shown on the terminal; `None` if there is none.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Hides the bar on the terminal while `print` writes lines to stderr.
+/// Hides the progress bar on the terminal while `print` writes lines to stderr.
 pub fn hide_bar_during(print: impl FnOnce()) {
     let shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone();
     match shown {
@@ -72,11 +72,11 @@ pub fn hide_bar_during(print: impl FnOnce()) {
     }
 }
 
-/// A bar or spinner, shown on the terminal until it is dropped.
+/// A progress bar or spinner, shown on the terminal until it is dropped.
 pub struct Bar(ProgressBar);
 
 impl Bar {
-    /// Shows the bar of [`Form::Auto`].
+    /// Shows the progress bar of [`Form::Auto`].
     pub fn new() -> Bar {
         Bar::show("{bar:24} {percent:>3} %  {msg}", Duration::ZERO)
     }
@@ -90,7 +90,7 @@ impl Bar {
         Bar(bar)
     }
 
-    /// Sets the finished fraction, 0 to 1, and the message.
+    /// Sets the finished fraction, 0 to 1, and the message of the progress bar.
     pub fn set(&self, fraction: f64, message: String) {
         self.0.set_position((fraction * BAR_STEPS as f64) as u64);
         self.0.set_message(message);
@@ -112,7 +112,7 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// Begins to show `what`.
+    /// Begins to show `what` as work of unknown length.
     pub fn begin(form: Form, what: &str) -> Waiting {
         let (over, end) = channel::<()>();
         let (form, what) = (form.resolved(), printable(what));
@@ -146,14 +146,14 @@ impl Drop for Waiting {
     }
 }
 
-/// The position of a frame in a run over several frames.
+/// The position of a frame among the frames that one command renders.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameOfRun {
     /// Number of the frame in the animation.
     pub frame: u32,
-    /// Number of frames before it in the run.
+    /// Number of frames that the command renders before this one.
     pub before: usize,
-    /// Number of frames in the run.
+    /// Number of frames that the command renders.
     pub count: usize,
 }
 
@@ -167,7 +167,7 @@ pub struct Reporter {
     next_line: f64,
 }
 
-/// A line of `--progress json`. Scripts rely on its keys.
+/// A line of `--progress json` about one iteration. Scripts rely on its keys.
 #[derive(Serialize)]
 struct Line {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -179,20 +179,20 @@ struct Line {
     light_paths: u64,
     error: Option<f64>,
     error_of: &'static str,
-    /// A smaller error, and the seconds until the render reaches it.
+    /// A smaller relative error, and the seconds until the render reaches it; `None` if they are not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     expected: Option<ExpectedError>,
 }
 
 impl Reporter {
-    /// A reporter for a render with these settings.
+    /// Makes a reporter for a render with these settings. `turn` is `None` unless the command renders several frames.
     pub fn new(form: Form, settings: &Settings, turn: Option<FrameOfRun>) -> Reporter {
         let first = Some(Waiting::begin(form, "first iteration"));
         let form = form.resolved();
         Reporter { form, turn, bar: None, first, time: settings.time, next_line: 0.0 }
     }
 
-    /// Prints the state after an iteration, if a line or an update of the bar is due.
+    /// Prints the state of the render after an iteration, if a line or an update of the bar is due.
     pub fn report(&mut self, progress: &Progress) {
         self.first = None;
         match self.form {
@@ -229,12 +229,12 @@ impl Reporter {
         }
     }
 
-    /// Removes the bar from the terminal.
+    /// Removes the progress bar from the terminal.
     pub fn finish(&mut self) {
         (self.first, self.bar) = (None, None);
     }
 
-    /// The text of a line, with the frame if the run has several.
+    /// The progress as text, with the frame if the command renders several.
     fn sentence(&self, progress: &Progress) -> String {
         let frame = self.turn.map(|turn| format!("frame {}, ", turn.frame)).unwrap_or_default();
         frame + &sentence(progress)

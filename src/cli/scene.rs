@@ -8,7 +8,7 @@ use caustique::pipeline::Loaded;
 use caustique::pipeline::load::load;
 use caustique::stop::Stop;
 
-/// Reads and builds a scene.
+/// Reads and builds a scene, and shows that while it takes long.
 ///
 /// # Errors
 /// Errors of [`load`]; the options name several frames.
@@ -27,7 +27,7 @@ pub fn read(args: &SceneOptions, form: Form, threads: usize) -> Result<Loaded> {
     load(&args.request(), threads, &Stop::default())
 }
 
-/// Prints a line for each warning.
+/// Prints a line for each warning about the scene.
 ///
 /// # Errors
 /// `--strict` is set and there are warnings.
@@ -41,7 +41,7 @@ pub fn print_warnings(args: &SceneOptions, warnings: &[String]) -> Result<()> {
     Err(strict_error(args, warnings.len()))
 }
 
-/// The error that `--strict` raises.
+/// The error that `--strict` makes of this number of warnings.
 pub fn strict_error(args: &SceneOptions, warnings: usize) -> Error {
     let things = if warnings == 1 { "1 thing is" } else { &format!("{warnings} things are") };
     let cause = format!("{things} ignored or approximated, and --strict forbids it");

@@ -10,15 +10,15 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// The flag that the first signal sets.
+/// The flag that the first signal to stop (such as Ctrl-C) sets.
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicBool>);
 
-/// The flag, once the handlers are installed.
+/// The flag that the first signal sets, once the handlers are installed.
 static INSTALLED: OnceLock<Interrupt> = OnceLock::new();
 
 impl Interrupt {
-    /// Installs the handlers, once for all frames of a run.
+    /// Installs the handlers of signals, once for all frames that the command renders.
     pub fn install() -> Result<Interrupt> {
         if let Some(interrupt) = INSTALLED.get() {
             return Ok(interrupt.clone());
@@ -58,7 +58,7 @@ impl Interrupt {
         Err(Error::new(ErrorKind::Interrupted, output.display(), cause))
     }
 
-    /// The stop flag for a render.
+    /// The flag by which a render learns that a signal has come.
     pub fn stop() -> Stop {
         INSTALLED.get().map(|interrupt| Stop::from_flag(Arc::clone(&interrupt.0))).unwrap_or_default()
     }

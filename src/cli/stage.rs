@@ -7,7 +7,7 @@ use caustique::scene::usd;
 use clap::FromArgMatches;
 use std::ffi::OsString;
 
-/// Prefix of the argument that names the output of a product; nothing follows if the product has no name.
+/// Prefix of the argument that names the output of a USD RenderProduct; nothing follows if the product has no name.
 const OUTPUT_PREFIX: &str = "--output=";
 
 /// Parses the command line again with the options of its USD stage in front, so that those of the command line take
@@ -52,13 +52,13 @@ pub fn add_stage_options(command: Command, line: &mut clap::Command) -> Result<C
     }
 }
 
-/// Whether an option has a name, or had it formerly.
+/// Whether an option has this name, or had it formerly.
 fn has_name(argument: &clap::Arg, name: Option<&str>) -> bool {
     let aliases = argument.get_all_aliases().unwrap_or_default();
     argument.get_long() == name || name.is_some_and(|name| aliases.contains(&name))
 }
 
-/// The argument with the output of the stage's product, if the product has a name.
+/// The argument that names the output, by the RenderProduct of the USD stage; `None` if it has no name.
 ///
 /// # Errors
 /// The stage has several products.
@@ -72,7 +72,7 @@ fn output(scene: &SceneOptions, mut products: Vec<String>) -> Result<Option<Stri
     Err(Error::new(ErrorKind::Usage, scene.path.display(), cause).hint(hint))
 }
 
-/// The scene; of a sequence of files the file of the first frame.
+/// The scene's options, with the path of a sequence of files replaced by that of its first frame's file.
 fn first_file(scene: &SceneOptions) -> SceneOptions {
     let first = scene.frames.and_then(|frames| frames.iter().next());
     first.map_or_else(|| scene.clone(), |frame| scene.at(frame))

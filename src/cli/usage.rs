@@ -4,8 +4,8 @@ use caustique::error::Error;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-/// Options of other programs, our option for the same purpose, and the hint if the command has our option. An empty name
-/// stands for every command.
+/// Options of other renderers, our option for an equal purpose, and the hint if the command has our option. An empty
+/// name stands for every command.
 const FOREIGN_OPTIONS: [(&[&str], &str, &str); 16] = [
     (
         &["--samples", "--spp", "-s", "--aa-samples", "--num-samples"],
@@ -50,7 +50,7 @@ const FOREIGN_OPTIONS: [(&[&str], &str, &str); 16] = [
     (&["--version", "-v"], "", "'caustique --version' prints the version"),
 ];
 
-/// The error of a command line; `None` if the user asks for help or the version.
+/// The error to print for a command line that clap rejects; `None` if the user asks for help or the version.
 pub fn explain(error: &clap::Error, command: Option<&Command>) -> Option<Error> {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => None,
@@ -78,7 +78,7 @@ pub fn explain(error: &clap::Error, command: Option<&Command>) -> Option<Error> 
     }
 }
 
-/// A detail of clap's error; empty if the error has none.
+/// A detail of clap's error as text; empty if the error has none.
 fn context(error: &clap::Error, kind: ContextKind) -> String {
     match error.get(kind) {
         Some(ContextValue::String(text)) => text.clone(),
@@ -86,7 +86,7 @@ fn context(error: &clap::Error, kind: ContextKind) -> String {
     }
 }
 
-/// The hint for an unknown option, if the command has an option for the same purpose.
+/// The hint for an unknown option that another program has; `None` unless the command has an option for that purpose.
 fn hint_for_foreign_option(word: &str, command: Option<&Command>) -> Option<String> {
     if word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')) {
         return Some("a value that begins with '-' is joined to its option, as in --option=-1,2".into());
@@ -101,7 +101,7 @@ fn hint_for_foreign_option(word: &str, command: Option<&Command>) -> Option<Stri
         .map(|(.., hint)| (*hint).to_string())
 }
 
-/// The hint for a relative error that the user gives in percent.
+/// The hint for a relative error that the user gives in percent; `None` for other errors.
 fn hint_for_percentage(error: &clap::Error) -> Option<String> {
     if !context(error, ContextKind::InvalidArg).starts_with("--target-error ") {
         return None;
@@ -112,7 +112,8 @@ fn hint_for_percentage(error: &clap::Error) -> Option<String> {
     (fraction > 0.0 && fraction < 1.0).then(|| format!("did you mean {fraction}, which is {percent} %?"))
 }
 
-/// Turns clap's message into a cause and a hint. The message has paragraphs: the fault, tips, the usage, a note on help.
+/// Turns clap's message into an error with a cause and a hint. The message has paragraphs: the fault, tips, the usage,
+/// a note on help.
 fn rephrase(text: &str) -> Error {
     let words = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut paragraphs = text.split("\n\n");

@@ -10,38 +10,38 @@ use serde::Serialize;
 use std::any::TypeId;
 use std::path::PathBuf;
 
-/// The description of an option.
+/// The description of an option of `caustique render`, from which documents and the Python module are made.
 #[derive(Clone, Debug, Serialize)]
 pub struct OptionDescription {
-    /// Name of the field, such as `max_depth`.
+    /// Name of the option's field, such as `max_depth`.
     pub name: String,
-    /// Name on the command line, such as `--max-depth`.
+    /// Name of the option on the command line, such as `--max-depth`.
     pub option: String,
-    /// Former names of the field, which files may still give.
+    /// Former names of the option's field, which files may still give.
     pub aliases: Vec<String>,
     /// Kind of value that the option takes.
     pub kind: ValueKind,
     /// Placeholders of the values in the help, one for each value.
     pub values: Vec<String>,
-    /// The default, if it is a single value.
+    /// The default value; `None` if there is none or it is not a single value.
     pub default: Option<String>,
-    /// Range of a numeric value.
+    /// Range of a numeric value; `None` for other values and without bounds.
     pub range: Option<ValueRange>,
-    /// Names to choose from, each with its help.
+    /// Names that the option chooses from, each with its help.
     pub choices: Vec<(String, String)>,
-    /// Heading in the help.
+    /// Heading under which the help lists the option.
     pub heading: String,
-    /// Help text.
+    /// Help text of the option.
     pub help: String,
     /// Names of the methods that take the option; empty if all do.
     pub methods: Vec<&'static str>,
     /// Whether the render settings of a USD stage may contain the option.
     pub stage: bool,
-    /// Name of the argument of Python's `render` or `Scene`; `None` if there is no such argument.
+    /// Name of the option as an argument of Python's `render` or `Scene`; `None` if there is no such argument.
     pub python: Option<String>,
     /// Whether the option is an argument of Python's `Scene`.
     pub of_scene: bool,
-    /// Why Python has no such argument.
+    /// Why the option is no argument in Python; `None` if it is one.
     pub not_in_python: Option<&'static str>,
 }
 
@@ -49,19 +49,19 @@ pub struct OptionDescription {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ValueKind {
-    /// No value: the option is present or not.
+    /// The option takes no value: it is present or not.
     Flag,
-    /// A whole number.
+    /// The option takes a whole number.
     Integer,
-    /// A number.
+    /// The option takes a number.
     Number,
-    /// One of some names.
+    /// The option takes one of some names.
     Choice,
-    /// `on` or `off`.
+    /// The option takes `on` or `off`.
     Switch,
-    /// A file.
+    /// The option takes the path of a file.
     Path,
-    /// Text in another format.
+    /// The option takes text in another format.
     Text,
 }
 
@@ -110,12 +110,12 @@ pub fn describe(command: &Command) -> Vec<OptionDescription> {
     command.get_arguments().filter(|arg| arg.get_long().is_some() && arg.get_id() != "help").map(entry).collect()
 }
 
-/// The options that are arguments of Python's `render`.
+/// Descriptions of the options that are arguments of Python's `render`.
 pub fn of_python() -> Vec<OptionDescription> {
     describe(&command()).into_iter().filter(|entry| entry.python.is_some() && !entry.of_scene).collect()
 }
 
-/// The options that are arguments of Python's `Scene`.
+/// Descriptions of the options that are arguments of Python's `Scene`.
 pub fn of_scene() -> Vec<OptionDescription> {
     describe(&command()).into_iter().filter(|entry| entry.of_scene).collect()
 }

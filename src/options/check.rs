@@ -22,7 +22,8 @@ pub fn takes(option: &str, method: Method) -> bool {
     }
 }
 
-/// The error of an option that has no effect; the hint suggests the method `other`.
+/// Makes the error of an option that has no effect in the case `with`, such as `with --method path`; the hint suggests the
+/// method `other`.
 fn no_effect(option: &str, with: &str, other: &str) -> Error {
     let option = format!("--{}", option.replace('_', "-"));
     let error = Error::usage(format!("{option} has no effect {with}"));
@@ -30,7 +31,7 @@ fn no_effect(option: &str, with: &str, other: &str) -> Error {
 }
 
 impl RenderOptions {
-    /// The error of an option that has no effect with the chosen method; the hint suggests the method `other`.
+    /// Makes the error of an option that has no effect with the chosen method; the hint suggests the method `other`.
     pub fn no_effect(&self, option: &str, chosen: Option<Method>, other: &str) -> Error {
         let plus = if self.cppm_plus { " --cppm-plus" } else { "" };
         match chosen {
@@ -39,7 +40,7 @@ impl RenderOptions {
         }
     }
 
-    /// Names of the options that depend on the method, and whether each is set to something other than off.
+    /// Names of the options that depend on the method, and whether the user has set each to something other than off.
     fn method_options(&self) -> [(&'static str, bool); 14] {
         [
             ("photons", self.photons.is_some()),
@@ -88,7 +89,8 @@ impl RenderOptions {
         Err(self.no_effect(shown, chosen, other))
     }
 
-    /// Rejects a shard without iterations, and shards of a method whose iterations depend on each other.
+    /// Rejects a shard (a part of the iterations) that has none, and shards of a method whose iterations depend on each
+    /// other.
     pub(super) fn check_shard(&self, settings: &Settings) -> Result<()> {
         let Settings { shard: Shard { index, count }, iterations, method, .. } = *settings;
         if let Some(n) = iterations.filter(|n| index >= *n) {

@@ -14,22 +14,22 @@ pub struct Frames {
     step: u32,
 }
 
-/// Maximum frame number.
+/// Largest number of a frame.
 const MAX_FRAME: u32 = 10_000_000;
 
 impl Frames {
-    /// One frame.
+    /// A range of frames with one frame alone.
     pub fn one(frame: u32) -> Frames {
         Frames { first: frame, last: frame, step: 1 }
     }
 
-    /// The frame numbers, in order.
+    /// The numbers of the frames, in order.
     pub fn iter(self) -> impl ExactSizeIterator<Item = u32> {
         let count = (self.last - self.first) / self.step + 1;
         (0..count).map(move |i| self.first + i * self.step)
     }
 
-    /// The frame number, if there is only one.
+    /// The number of the frame, if there is only one; `None` otherwise.
     pub fn single(self) -> Option<u32> {
         (self.iter().len() == 1).then_some(self.first)
     }
@@ -87,7 +87,8 @@ pub fn is_pattern(path: &Path) -> bool {
     name.contains("##") || name.contains('%') && path_of_frame(path, 0).is_some_and(|_| !name.contains('#'))
 }
 
-/// Finds the first placeholder. Returns the text before it, its minimum number of digits, and the text after it.
+/// Finds the first placeholder for a frame's number in a file name. Returns the text before it, its minimum number of
+/// digits, and the text after it; `None` without a placeholder.
 fn placeholder(name: &str) -> Option<(&str, usize, &str)> {
     name.char_indices().find_map(|(at, sign)| {
         let rest = &name[at + sign.len_utf8()..];

@@ -9,32 +9,32 @@ use std::ops::Bound::{self, Excluded, Included, Unbounded};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// Range of a numeric option.
+/// Range of the values of a numeric option.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ValueRange {
-    /// The smallest value, if there is one.
+    /// The smallest value or bound; `None` if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<Number>,
-    /// Whether the range excludes `min`.
+    /// Whether the range excludes `min` itself.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub above_min: bool,
-    /// The largest value, if there is one.
+    /// The largest value or bound; `None` if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<Number>,
-    /// Whether the range excludes `max`.
+    /// Whether the range excludes `max` itself.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub below_max: bool,
 }
 
 impl ArgExt for ValueRange {}
 
-/// Attributes of numeric options: parser and range.
+/// Extends clap's arguments by numeric options, which have a parser and a range.
 pub trait Ranged {
-    /// The option takes a whole number in a range.
+    /// Makes the option take a whole number in a range.
     fn whole<T>(self, range: RangeInclusive<T>) -> Self
     where
         T: FromStr + PartialOrd + Display + Clone + Send + Sync + 'static;
-    /// The option takes a finite number in a range.
+    /// Makes the option take a finite number in a range.
     fn between(self, range: (Bound<f64>, Bound<f64>)) -> Self;
 }
 
@@ -63,7 +63,7 @@ impl Ranged for Arg {
     }
 }
 
-/// A parser of finite numbers between two bounds.
+/// Makes a parser of finite numbers between two bounds.
 pub fn between(low: Bound<f64>, high: Bound<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
     move |text| {
         let value: f64 = text.trim().parse().map_err(|_| "it is not a number".to_string())?;
@@ -117,7 +117,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
     between(Excluded(0.0), Unbounded)(text)
 }
 
-/// A parser of whole numbers in a range.
+/// Makes a parser of whole numbers in a range.
 pub fn whole<T>(range: RangeInclusive<T>) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
 where
     T: FromStr + PartialOrd + Display + Clone + Send + Sync,
@@ -138,10 +138,10 @@ pub fn threads(text: &str) -> Result<usize, String> {
     whole(0..=1024)(text)
 }
 
-/// Range of a colour channel. Sums over pixels of larger values would overflow single precision.
+/// Range of a colour channel of radiance. Sums over pixels of larger values would overflow single precision.
 const CHANNEL_RANGE: RangeInclusive<f64> = 0.0..=1e30;
 
-/// Parses a factor of radiance.
+/// Parses a factor on radiance, a number in the range of a colour channel.
 pub fn strength(text: &str) -> Result<f64, String> {
     let factor = finite(text)?;
     if CHANNEL_RANGE.contains(&factor) {
@@ -151,7 +151,8 @@ pub fn strength(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses a colour, three numbers separated by commas. `None` if the text is not a list of numbers.
+/// Parses a colour, three numbers separated by commas, each in the range of a channel. `None` if the text is not a list
+/// of numbers.
 pub fn rgb(text: &str) -> Option<Result<[f32; 3], String>> {
     let values: Vec<f64> = text.split(',').map(|part| part.trim().parse().ok()).collect::<Option<_>>()?;
     let color: Result<[f64; 3], _> = values.try_into();

@@ -7,12 +7,12 @@ use clap::{Args, Command, FromArgMatches, ValueEnum};
 use std::error::Error;
 use std::ffi::OsString;
 
-/// Why arguments were rejected.
+/// Why arguments of a render were rejected: the option and the problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InvalidOption {
     /// Field name of the invalid option; empty if the error concerns no single option.
     pub option: String,
-    /// The problem, or the valid values.
+    /// The problem with the value, or the valid values.
     pub reason: String,
 }
 
@@ -32,7 +32,7 @@ pub fn parse(words: impl IntoIterator<Item = OsString>) -> Result<(RenderOptions
     parsed.and_then(both).map_err(|error| InvalidOption::of(&error))
 }
 
-/// The value with a name, in which `_` may replace `-`.
+/// The value of an enumeration with the name `name`, in which `_` may replace `-`.
 ///
 /// # Errors
 /// No value has the name; the error lists the valid names.

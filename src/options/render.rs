@@ -180,7 +180,7 @@ impl RenderOptions {
         Ok(CameraRequest { camera: self.camera.clone(), width: self.width, height: self.height, crop, filter })
     }
 
-    /// The picture and its method, for the pipeline.
+    /// The picture and its method as the pipeline, which renders it, wants them.
     ///
     /// # Errors
     /// Options contradict each other.
@@ -194,7 +194,7 @@ impl RenderOptions {
         })
     }
 
-    /// The method with its settings, or the settings that `auto` chooses from.
+    /// The method that the user names with its settings, or the settings of each method that `auto` chooses from.
     ///
     /// # Errors
     /// Options contradict each other.
@@ -210,7 +210,7 @@ impl RenderOptions {
         })
     }
 
-    /// Settings of the method; of the library's default method if `auto` chooses.
+    /// Settings of the method that the user names; of the library's default method if `auto` chooses.
     ///
     /// # Errors
     /// Options contradict each other.
@@ -222,17 +222,18 @@ impl RenderOptions {
         self.settings_of(candidate, self.method.0)
     }
 
-    /// The denoiser of the picture.
+    /// The denoiser of the picture; none with `--no-finish`.
     fn denoiser(&self) -> DenoiserChoice {
         if self.no_finish { DenoiserChoice::None } else { self.finish.denoise }
     }
 
-    /// The finish of the pilots of `auto`.
+    /// The denoiser for the pictures of the pilots, the short renders by which `auto` compares methods.
     fn pilot_finish(&self) -> Finish {
         Finish::for_pilots(self.denoiser())
     }
 
-    /// The finish of a pilot that predicts the error of the render: the denoiser of the render, without a network.
+    /// The finish of a pilot (a small render) that predicts the error of the render: the denoiser of the render,
+    /// without a network.
     ///
     /// # Errors
     /// The user chose a denoiser whose library is missing.
@@ -240,7 +241,8 @@ impl RenderOptions {
         Ok(Finish::new(Denoiser::open(self.denoiser())?.0, None))
     }
 
-    /// Settings of a candidate of `auto`, for a picture of `size` pixels; `None` if the options exclude the candidate.
+    /// Settings of a candidate, one of the methods that `auto` compares, for a picture of `size` pixels (width,
+    /// height); `None` if the options exclude the candidate.
     fn candidate_settings(&self, candidate: Candidate, size: (u32, u32)) -> Option<Settings> {
         let method = candidate.method;
         let guide = match self.guide {
@@ -257,7 +259,7 @@ impl RenderOptions {
         allowed.map(|settings| with_light_paths(settings, self.photons, size))
     }
 
-    /// The seed of the rendered frame.
+    /// The seed of the frame that is rendered, which depends on its number with `--frame-seed vary`.
     fn frame_seed(&self) -> u64 {
         let frame = self.scene.frames.and_then(Frames::single);
         match (self.frame_seed, frame) {
@@ -266,7 +268,7 @@ impl RenderOptions {
         }
     }
 
-    /// Parameters of the chi-squared rule.
+    /// Parameters of the chi-squared rule by which bandwidths of `cppm` shrink.
     fn chi_squared(&self) -> ChiSquaredSettings {
         let default = ChiSquaredSettings::default();
         ChiSquaredSettings {
@@ -279,7 +281,7 @@ impl RenderOptions {
         }
     }
 
-    /// The largest initial bandwidth of a method with `levels` levels.
+    /// The rule for the largest initial bandwidth of a method with this number of bandwidth levels.
     fn initial_bandwidth(&self, method: Method, levels: usize) -> Result<InitialBandwidth> {
         let default = if method.takes_photon_count() { BandwidthChoice::Knn } else { BandwidthChoice::Footprint };
         match (self.initial_bandwidth.unwrap_or(default), self.knn) {
@@ -302,7 +304,8 @@ impl RenderOptions {
         if two_paths { Levels::decorrelated(count) } else { Levels::new(count) }
     }
 
-    /// Settings of a candidate. `chosen` is the method to name in errors, `None` before `auto` has chosen.
+    /// Settings of a candidate (a method with indirect light and guiding). `chosen` is the method to name in errors,
+    /// `None` before `auto` has chosen.
     fn settings_of(&self, candidate: Candidate, chosen: Option<Method>) -> Result<Settings> {
         let method = candidate.method;
         let local = method.rules().first() == Some(&BandwidthRule::Local);

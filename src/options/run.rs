@@ -69,7 +69,7 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// The layers to deliver.
+    /// The layers to deliver in the EXR, as `--layers` names them.
     ///
     /// # Errors
     /// No layer has such a name.
@@ -77,7 +77,7 @@ impl RunOptions {
         Selection::parse(&self.layers)
     }
 
-    /// The cap on memory, if one is given.
+    /// The limit on memory of `--memory`; `None` if it is not given.
     pub fn memory_limit(&self) -> Option<MemoryLimit> {
         self.memory.map(|mib| MemoryLimit { bytes: u64::from(mib) << 20 })
     }

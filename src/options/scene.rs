@@ -69,13 +69,13 @@ pub struct SceneOptions {
     pub strict: bool,
 }
 
-/// The value of `--env`.
+/// The value of `--env`, the environment light.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum EnvironmentChoice {
-    /// Uniform radiance.
+    /// The environment has equal radiance R,G,B from all directions.
     Color([f32; 3]),
-    /// A latitude-longitude image.
+    /// The environment is a latitude-longitude image in this file.
     File(#[serde(serialize_with = "lossy")] PathBuf),
 }
 
@@ -109,7 +109,7 @@ impl SceneOptions {
     }
 
     /// The options for one frame of the animation. If the name of the scene is a pattern such as `a.####.glb`, and no
-    /// file has exactly this name, each frame is a file of its own.
+    /// file has exactly this name, each frame is a file by itself.
     pub fn at(&self, frame: u32) -> SceneOptions {
         let file = path_of_frame(&self.path, frame).filter(|_| !self.path.exists());
         let of_sequence = self.of_sequence || file.is_some();
@@ -117,7 +117,7 @@ impl SceneOptions {
         SceneOptions { path, frames: Some(Frames::one(frame)), of_sequence, ..self.clone() }
     }
 
-    /// The request for the pipeline.
+    /// The request for the pipeline to read this scene.
     pub fn request(&self) -> SceneRequest {
         let environment = self.env.clone().map(|choice| match choice {
             EnvironmentChoice::Color(color) => Environment::Color(color.into()),
@@ -133,7 +133,7 @@ impl SceneOptions {
         }
     }
 
-    /// The effects to switch off or to ask for.
+    /// The effects, such as dispersion, that the user switches off or asks for.
     pub fn switches(&self) -> Switches {
         self.effects.unwrap_or_default()
     }

@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MethodChoice(pub Option<Method>);
 
-/// Help of `--method auto`.
+/// Help text of `--method auto`.
 const AUTO: &str =
     "vcm, guided where light is focused; elsewhere path or bdpt where a short pilot shows them to be clearly better";
 
@@ -69,15 +69,15 @@ pub enum FrameSeed {
     Same,
 }
 
-/// The value of `--initial-bandwidth`.
+/// The value of `--initial-bandwidth`, the rule for the largest initial bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BandwidthChoice {
-    /// The distance to the k-th nearest photon.
+    /// The bandwidth is the distance to the k-th nearest photon.
     Knn,
-    /// A multiple of the pixel's footprint.
+    /// The bandwidth is a multiple of the pixel's footprint.
     Footprint,
-    /// A length in scene units.
+    /// The bandwidth is a length in scene units.
     #[serde(untagged)]
     Length(f64),
 }
@@ -97,10 +97,10 @@ impl FromStr for BandwidthChoice {
     }
 }
 
-/// The value of `--cppm-grid NA,NS`: cells of the chi-squared test.
+/// The value of `--cppm-grid NA,NS`: cells in which the chi-squared test counts photons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct GridChoice {
-    /// Number of annuli.
+    /// Number of annuli into which the kernel's disc is divided.
     pub annuli: usize,
     /// Number of sectors of each annulus.
     pub sectors: usize,
@@ -123,9 +123,9 @@ impl FromStr for GridChoice {
 /// The value of `--crop`: a window of the picture.
 #[derive(Clone, Debug, Serialize)]
 pub struct CropChoice {
-    /// The text that was parsed.
+    /// The text that the user has given.
     pub window: String,
-    /// The parsed window.
+    /// The window that the text describes.
     #[serde(skip)]
     pub crop: Crop,
 }

@@ -14,11 +14,11 @@ use crate::scene::{Scene, View};
 use crate::transport::Indirect;
 use std::path::Path;
 
-/// The camera and the settings of a picture that fits its scene.
+/// The camera and the settings of a picture that were found to fit its scene.
 pub struct Checked {
-    /// The camera, of the size that is rendered.
+    /// The camera, with the size of the picture that is rendered.
     pub camera: Camera,
-    /// Settings of the method; of the fallback if `auto` is still to choose.
+    /// Settings of the method; default settings if `auto` is still to choose the method.
     pub settings: Settings,
 }
 
@@ -34,7 +34,7 @@ pub fn check_picture(picture: &PictureRequest<'_>, path: &Path, scene: &Scene) -
     Ok(Checked { camera, settings })
 }
 
-/// Checks a render: its picture, its layers and its memory.
+/// Checks a render before it starts: its picture, its layers and its memory.
 ///
 /// # Errors
 /// Errors of [`check_picture`]; the scene has no such layer; the render does not fit into memory.
@@ -49,7 +49,7 @@ pub(super) fn check(request: &Request<'_>, scene: &Scene) -> Result<Checked> {
     Ok(checked)
 }
 
-/// Settings with the number of light paths per iteration; `photons`: `None` for the default of a picture of this width
+/// Sets the number of light paths per iteration: `photons`, or if it is `None` the default for a picture of this width
 /// and height.
 pub fn with_light_paths(settings: Settings, photons: Option<u32>, size: (u32, u32)) -> Settings {
     Settings { photons: photons.unwrap_or(settings.default_photons(size)), ..settings }
@@ -64,7 +64,7 @@ pub fn check_settings(settings: &Settings, path: &Path, scene: &Scene) -> Result
     check_bandwidth(settings, path, scene)
 }
 
-/// Errors: media scatter, and the method stores photons on surfaces only.
+/// Rejects settings whose method stores photons on surfaces only, if the scene has scattering media.
 fn check_media(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let method = settings.method;
     let (option, hint) = match method.search() {
@@ -79,8 +79,8 @@ fn check_media(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     Err(Error::new(ErrorKind::Usage, path.display(), cause).hint(hint))
 }
 
-/// Errors: the initial bandwidth is below what single precision resolves in this scene, or larger than the scene, so
-/// that most of the area of a density estimate lies outside.
+/// Rejects an initial bandwidth that is below what single precision resolves in this scene, or larger than the scene,
+/// so that most of the area of a density estimate lies outside.
 fn check_bandwidth(settings: &Settings, path: &Path, scene: &Scene) -> Result<()> {
     let radius = scene.lights.sky().radius;
     let least = MIN_USER_RADIUS_RATIO * radius;

@@ -15,35 +15,36 @@ use std::fs::File;
 use std::io::{BufReader, Read, Write};
 use std::path::Path;
 
-/// The first bytes of every checkpoint.
+/// The first bytes of every checkpoint of this version of the format.
 pub const MAGIC: &[u8; 23] = b"caustique checkpoint 6\n";
-/// The first bytes that checkpoints of all versions share.
+/// The first bytes of checkpoints in all versions of the format.
 const KIND: &[u8] = b"caustique checkpoint ";
-/// Pixels per record.
+/// Number of pixels in a record, a separately compressed part of the file.
 pub(super) const PIXELS_PER_RECORD: usize = 2048;
-/// Options that may differ when a render continues: its limits, and how its files are written.
+/// Options that may differ from those of the checkpoint when a render continues: its limits, and how its files are
+/// written.
 const FREE_OPTIONS: [&str; 8] =
     ["iterations", "time", "target-error", "layers", "exr-naming", "compression", "scene", "path"];
 
 /// The identity of the render that a checkpoint or a shard belongs to, and the decisions made for it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Head {
-    /// Version of the program.
+    /// Version of the program that has written the file.
     pub version: String,
-    /// Hash of the scene's files.
+    /// Hash of the scene's files, hexadecimal.
     pub scene: String,
-    /// Options of the user.
+    /// Options of the render as the user gave them, a JSON object.
     pub arguments: Value,
-    /// The candidate that `auto` has chosen, if it has compared any.
+    /// The candidate (method and settings) that `auto` has chosen; `None` if it has compared none.
     pub candidate: Option<Candidate>,
-    /// The plan, for the header.
+    /// The plan of the render (effects and warnings) for the header of its EXR.
     pub plan: Value,
     /// Whether the render was done when the checkpoint was saved, and its picture was about to be written.
     #[serde(default)]
     pub finished: bool,
 }
 
-/// Writes a checkpoint. Replaces the file atomically.
+/// Writes a checkpoint of the render `head` with the state of its iterations. Replaces the file atomically.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -88,7 +89,7 @@ pub fn check_replaceable(path: &Path, overwrite: bool, remedy: &str) -> Result<(
     Err(error.hint(remedy))
 }
 
-/// Reads a checkpoint.
+/// Reads a checkpoint: the identity of its render, and the state of its iterations.
 ///
 /// # Errors
 /// The file is missing, is no checkpoint, was written by another version of the program, or is damaged.
@@ -137,7 +138,8 @@ pub fn check(path: &Path, head: &Head, scene: Option<&str>, arguments: &Value) -
     Ok(())
 }
 
-/// The first option by name whose values differ, with both values. Options in `free` may differ.
+/// The first option by name whose values differ between two JSON objects, with both values; `None` if none differs.
+/// Options in `free` may differ.
 pub(super) fn first_difference(there: &Value, here: &Value, free: &[&str]) -> Option<(String, Value, Value)> {
     let none = Map::new();
     let (there, here) = (there.as_object().unwrap_or(&none), here.as_object().unwrap_or(&none));

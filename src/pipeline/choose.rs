@@ -9,30 +9,33 @@ use crate::render::output::layer_shape;
 use crate::render::{Candidate, Settings, TimeSpent};
 use crate::scene::View;
 
-/// The settings of a render, and how they were chosen.
+/// The settings of a render, and how its method was chosen.
 pub struct Chosen {
-    /// The settings.
+    /// The settings of the render.
     pub settings: Settings,
-    /// The candidate that `auto` has chosen, in this run or before the checkpoint.
+    /// The candidate (method and settings) that `auto` has chosen, in this run or before the checkpoint; `None` if it
+    /// has compared none.
     pub candidate: Option<Candidate>,
-    /// The comparison of `auto` in this run. `None` if the user names the method, or the options leave nothing to compare.
+    /// The comparison of candidates by `auto` in this run. `None` if the user names the method, or the options leave
+    /// nothing to compare.
     pub choice: Option<Choice>,
 }
 
 impl Chosen {
-    /// Settings that were not chosen among candidates.
+    /// Wraps settings that were not chosen among candidates.
     pub fn named(settings: Settings) -> Chosen {
         Chosen { settings, candidate: None, choice: None }
     }
 
-    /// Time that the comparison has taken.
+    /// Time that `auto` has taken to compare candidates in this run.
     pub fn spent(&self) -> TimeSpent {
         self.choice.as_ref().map(|choice| choice.spent).unwrap_or_default()
     }
 }
 
-/// Settles the method. `checked`: the settings if nothing is compared. `accepts` rejects candidates by their settings.
-/// Once `stop` returns true, the comparison ends as soon as it can, and its result is not to be used.
+/// Settles the method: the one that the user names, or the candidate (method and settings) that `auto` finds best.
+/// `checked`: the settings if nothing is compared. `accepts` rejects candidates by their settings. Once `stop` returns
+/// true, the comparison ends as soon as it can, and its result is not to be used.
 pub fn choose(
     method: &mut MethodRequest<'_>,
     checked: Settings,
@@ -88,7 +91,7 @@ pub(super) fn chosen_before(
     Chosen { settings: settings.unwrap_or(checked), candidate, choice: None }
 }
 
-/// Errors: the user has stopped the render before its first iteration.
+/// Fails if the user has stopped the render before its first iteration.
 pub(super) fn refuse_stop(observer: &dyn Observer) -> Result<()> {
     match observer.stop().requested() {
         true => Err(Error::new(ErrorKind::Interrupted, "", "interrupted before the first iteration")),

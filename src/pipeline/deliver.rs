@@ -17,36 +17,38 @@ use crate::render::{Accuracy, CONFIDENCE, Clock, HistoryEntry, Rendered, Techniq
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
-/// Value of the header's key `error_of` if the error is that of the finished picture.
+/// Value of the header's key `error_of` if the stated error is that of the finished picture.
 pub const FINISHED_PICTURE: &str = "finished picture";
 
-/// A picture with its layers and its header.
+/// A rendered picture with its layers and its header, ready to be written.
 pub struct Delivery {
-    /// The layers of the request, finished. If the finish failed, the unfinished layers with all that a finish reads.
+    /// The layers that the user asked for, finished. If the finish failed, the unfinished layers with all that a finish
+    /// reads.
     pub set: LayerSet,
-    /// Attributes of the EXR.
+    /// Attributes of the EXR file, its JSON header included.
     pub attributes: Attributes,
-    /// Pictures per sampling technique, if the request has them.
+    /// Pictures per sampling technique; empty unless the user asked for them.
     pub techniques: Vec<TechniquePicture>,
-    /// Network and denoiser that have finished the picture.
+    /// Names of the network and the denoiser that have finished the picture; `None` if it is not finished.
     pub finished_by: Option<String>,
-    /// Error of the finished picture, and the cost of halving it. `None` if the picture has no quarters.
+    /// Error of the finished picture, and the cost of halving it. `None` if the picture has no quarters (means over a
+    /// quarter of the iterations).
     pub reached: Option<Reached>,
-    /// Where the error is largest.
+    /// The places of the picture where the error is largest, if known.
     pub worst: Option<Worst>,
-    /// Seconds that the layers and the finish took.
+    /// Seconds that making the layers and finishing the picture took.
     pub finish_seconds: f64,
-    /// A warning if most of the error is light that hardly any photon has carried.
+    /// A warning if most of the error is light that hardly any photon has carried; `None` if not.
     pub unseen: Option<String>,
-    /// Why the finish failed.
+    /// Why the finish failed; `None` if it did not.
     pub finish_error: Option<Error>,
-    /// Pixel sums, if the render is a shard.
+    /// Pixel sums for a merge, if the render is a shard.
     pub sums: Option<ShardSums>,
-    /// A checkpoint that is no longer needed once the picture is written.
+    /// Path of a checkpoint that is no longer needed once the picture is written.
     pub obsolete_checkpoint: Option<PathBuf>,
 }
 
-/// The choice of layers and the contents of the header.
+/// The layers of a delivered picture and the contents of its header.
 pub(super) struct Contents<'a> {
     pub facts: &'a SceneFacts,
     pub selection: &'a Selection,
@@ -55,9 +57,9 @@ pub(super) struct Contents<'a> {
     pub arguments: &'a Value,
     /// Whether the header leaves out clocks and the number of threads.
     pub reproducible: bool,
-    /// Further keys of the header.
+    /// Further keys and values of the header.
     pub more: Map<String, Value>,
-    /// Whether the render is a shard, which keeps its pixel sums and may lack layers of the request.
+    /// Whether the render is a shard, which keeps its pixel sums and may lack layers that the user asked for.
     pub is_shard: bool,
 }
 
@@ -88,7 +90,7 @@ pub(super) fn deliver_render(
     Ok(Delivery { sums, obsolete_checkpoint, ..delivery })
 }
 
-/// Makes the layers, finishes them and writes the header. Returns also the pixel sums of a shard.
+/// Makes the layers of a render, finishes them and writes the header. Returns also the pixel sums of a shard.
 ///
 /// # Errors
 /// Errors of [`deliver_render`].
@@ -134,7 +136,7 @@ pub(super) fn deliver(
 }
 
 impl Contents<'_> {
-    /// The header of the estimate, before it is finished.
+    /// The header of the picture before it is finished.
     fn header(&self, rendered: &Rendered) -> Map<String, Value> {
         let mut header = rendered.header((!self.reproducible).then_some(rayon::current_num_threads()));
         let rejections = rendered.rejections();
@@ -169,7 +171,7 @@ impl Contents<'_> {
         header.extend(self.more.clone());
     }
 
-    /// Adds the cost of the layers and their finish to the header, unless it leaves out clocks.
+    /// Adds the core-seconds of the layers and their finish to the header, unless it leaves out clocks.
     fn add_costs(&self, header: &mut Map<String, Value>, core_seconds: f64) {
         if self.reproducible {
             return;
@@ -180,7 +182,7 @@ impl Contents<'_> {
         header.insert("peak_memory".into(), peak_memory().into());
     }
 
-    /// The layers of the request. A render that is still to be finished keeps all that a finish reads.
+    /// Selects the layers that the user asked for. A render that is still to be finished keeps all that a finish reads.
     fn select(&self, mut set: LayerSet, finishes: bool, failed: bool) -> Result<LayerSet> {
         layers::add_black(self.selection, &self.facts.shape, finishes, &mut set)?;
         if self.is_shard {
@@ -192,7 +194,7 @@ impl Contents<'_> {
     }
 }
 
-/// The layers of a render, with its techniques, its history and the objects in its pixels.
+/// The layers of a render, with its technique pictures, its error history and the objects in its pixels.
 struct Layers {
     set: LayerSet,
     attributes: Attributes,
@@ -201,7 +203,7 @@ struct Layers {
     visible: Visible,
 }
 
-/// A finished picture: network and denoiser, the header's key `combined`, and the error.
+/// The result of finishing a picture: names of network and denoiser, the header's key `combined`, and the error.
 struct FinishedPicture {
     name: String,
     header: Value,
@@ -210,8 +212,8 @@ struct FinishedPicture {
 }
 
 impl Layers {
-    /// Makes the layers of the request, and those that a finish reads. Returns also the pixel sums of a shard; other
-    /// pixel sums are freed, because they are most of the memory.
+    /// Makes the layers that the user asked for, and those that a finish reads. Returns also the pixel sums of a shard;
+    /// other pixel sums are freed, because they are most of the memory.
     fn make(
         contents: &Contents<'_>,
         mut rendered: Rendered,
@@ -230,7 +232,7 @@ impl Layers {
         Ok((Layers { set, attributes, techniques, history, visible }, pixels))
     }
 
-    /// Sends the layers of the estimate, with all that a finish reads, to the observer.
+    /// Sends the unfinished layers, with all that a finish reads, to the observer.
     fn send_estimate(&self, header: &Map<String, Value>, observer: &mut dyn Observer) -> Result<()> {
         let mut attributes = self.attributes.clone();
         attributes.insert(exr::ATTRIBUTE, header)?;
@@ -247,16 +249,17 @@ impl Layers {
     }
 }
 
-/// The error that a finished picture has reached, and how it falls.
+/// The error that a finished picture has reached, and how it falls with more iterations.
 pub struct Reached {
     accuracy: Accuracy,
-    /// The history, of which the last moment holds the error of the delivered picture.
+    /// The error history of the render, of which the last moment holds the error of the delivered picture.
     history: Vec<HistoryEntry>,
     last: HistoryEntry,
 }
 
 impl Reached {
-    /// `error`: the error of the finished picture. Returns `None` if the history has no error of finished pictures.
+    /// Adds `error`, the error of the finished picture, to the history. Returns `None` if the history has no error of
+    /// finished pictures.
     fn of(mut history: Vec<HistoryEntry>, error: Option<FinishedError>) -> Option<Reached> {
         let last = history.last_mut()?;
         if error.is_some() {
@@ -271,12 +274,12 @@ impl Reached {
         self.accuracy.error(self.last.iterations)
     }
 
-    /// Bounds of the error, which hold for a share [`CONFIDENCE`] of all renders.
+    /// Bounds of the relative error, which hold for a share [`CONFIDENCE`] of all renders.
     pub fn interval(&self) -> [f64; 2] {
         self.accuracy.interval(self.last.iterations)
     }
 
-    /// Share of the noise that few bright samples hold, 0 to 1.
+    /// Share of the noise that a few bright samples hold, 0 to 1.
     pub fn rare(&self) -> f64 {
         self.accuracy.rare
     }
@@ -287,7 +290,7 @@ impl Reached {
         Some(iterations / self.last.iterations as f64 - 1.0)
     }
 
-    /// Additional seconds for half of the error.
+    /// Additional seconds after which the error is half of what it is; `None` if bias forbids it.
     pub fn seconds_to_half(&self) -> Option<f64> {
         Some(self.halving()? * self.last.seconds)
     }

@@ -16,20 +16,20 @@ use crate::error::Result;
 /// The facts of a scene that the layers and the header of its picture need.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SceneFacts {
-    /// The layers that the render has.
+    /// The layers that the render's EXR has.
     pub shape: Shape,
-    /// Names for cryptomattes.
+    /// Names of objects and materials for the cryptomatte layers.
     pub(super) names: SceneNames,
-    /// Position within the whole picture, and the matrices of the camera.
+    /// Position of the rendered window within the whole picture, and the matrices of the camera.
     pub frame: exr::Frame,
     /// Warnings from reading the scene.
     pub warnings: Vec<String>,
-    /// Frame, frame rate and look that the scene asks for.
+    /// Frame, frame rate, exposure and tone curve that the scene asks for.
     pub made_for: PictureDefaults,
 }
 
 impl SceneFacts {
-    /// The facts for a render of a scene with these settings.
+    /// Collects the facts for a render of a scene with these settings.
     ///
     /// # Errors
     /// The scene has no such camera.
@@ -47,7 +47,7 @@ impl SceneFacts {
         })
     }
 
-    /// Whether the facts fit a shard: both may come from a damaged or forged file.
+    /// Whether the facts fit the shard `part`: both may come from a damaged or forged file.
     pub(super) fn are_sound(&self, part: &ShardResult) -> bool {
         let Settings { method, levels, .. } = &part.settings;
         let Shape { levels: count, own, compared, groups, .. } = &self.shape;

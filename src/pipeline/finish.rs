@@ -7,26 +7,27 @@ use crate::finish::{Denoiser, DenoiserChoice, Finish, Finished, Quality};
 use crate::render::Clock;
 use serde_json::{Value, json};
 
-/// Largest share of the time limit that one run of the denoiser may take at a quality above the lowest.
+/// Largest share of the render's time limit that one run of the denoiser may take at a quality above the lowest.
 const MAX_DENOISING_SHARE: f64 = 0.07;
-/// Width and height of the picture by which the denoiser is timed.
+/// Width and height of the picture by which the denoiser is timed (pixels).
 const TIMED_SIDE: usize = 192;
-/// Largest share of the time limit that the finish may take.
+/// Largest share of the render's time limit that the finish (network and denoiser) may take.
 const MAX_FINISH_SHARE: f64 = 0.5;
 
-/// The finish that the user asks for.
+/// The finish (network and denoiser) that the user asks for.
 pub struct FinishRequest {
-    /// The denoiser.
+    /// The denoiser that the user asks for.
     pub denoiser: DenoiserChoice,
-    /// The network of equation (6), which combines bandwidth levels: the name of a built-in network, or an ONNX file.
+    /// The network of equation (6), which combines bandwidth levels: the name of a built-in network, or an ONNX file;
+    /// `None`: levels are not combined.
     pub model: Option<String>,
 }
 
-/// A finish whose libraries have been found and whose network has been loaded.
+/// A finish (denoiser and network) whose libraries have been found and whose network has been loaded.
 pub struct OpenFinish {
     finish: Finish,
     model: Option<Network>,
-    /// Why the preferred denoiser is missing, if the built-in one takes its place.
+    /// Why the preferred denoiser is missing, if the built-in one takes its place; `None` otherwise.
     pub missing: Option<Error>,
 }
 
@@ -67,7 +68,7 @@ fn open_network(name: &str, levels: Option<usize>) -> Result<(Network, Combiner)
 }
 
 impl OpenFinish {
-    /// The finish itself.
+    /// The denoiser and the network, to finish pictures with.
     pub fn finish(&mut self) -> &mut Finish {
         &mut self.finish
     }
@@ -117,12 +118,12 @@ impl OpenFinish {
         applied.map(|_| ())
     }
 
-    /// The finish, without the name of its network.
+    /// The denoiser and the network, without the name of the network.
     pub fn into_finish(self) -> Finish {
         self.finish
     }
 
-    /// Network and denoiser, for messages.
+    /// Names of the network and the denoiser, for messages.
     pub fn name(&self) -> String {
         let denoiser = self.finish.denoiser();
         match &self.model {
@@ -131,7 +132,7 @@ impl OpenFinish {
         }
     }
 
-    /// The value of the header's key `combined`.
+    /// The value of the key `combined` in the EXR's header, which describes the finish: denoiser, network, error.
     pub fn header(&self, finished: &Finished) -> Value {
         let quality = match self.finish.quality {
             Quality::High => "high",

@@ -8,9 +8,10 @@ use crate::error::Result;
 use crate::finish::reads_for_error;
 use crate::render::{Accuracy, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, Session, TimeSpent};
 
-/// Without a target error, the factor by which the iterations grow between two estimates.
+/// Factor by which the iterations grow between two estimates of the finished picture's error, without a target error.
 const GROWTH: u64 = 4;
-/// Once the target is expected to be reached, the growth of the iterations between two estimates, as a share.
+/// Share by which the iterations grow between two estimates of the finished picture's error, once it is expected to
+/// reach the target.
 const GROWTH_NEAR_TARGET: f64 = 0.1;
 
 /// Estimates the error of the finished picture if an estimate is due. Returns how the error falls with the iterations,
@@ -47,7 +48,7 @@ pub(super) fn estimate(
     Ok(Accuracy::fit(session.history()))
 }
 
-/// Progress with the error of the finished picture, and the time at which the error reaches the target, or half of its
+/// Progress with the error of the finished picture, and the time at which that error reaches the target, or half of its
 /// value if there is no target.
 pub(super) fn add_to_progress(
     progress: &Progress,

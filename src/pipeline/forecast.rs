@@ -9,29 +9,31 @@ use crate::render::{Accuracy, MIN_ITERATIONS_FOR_ERROR, RenderInput, Session, Se
 use crate::scene::View;
 use serde::Serialize;
 
-/// Most pixels of the pilot.
+/// Largest number of pixels of the pilot, the small render from which a forecast follows.
 const MAX_PIXELS: f64 = 240.0 * 160.0;
-/// Seconds after which the pilot ends, if it has enough iterations for an error estimate.
+/// Seconds after which the pilot of a forecast ends, if it has enough iterations for an error estimate.
 const PILOT_SECONDS: f64 = 5.0;
-/// Most iterations of the pilot.
+/// Largest number of iterations of the pilot of a forecast.
 const MAX_ITERATIONS: u64 = 1 << 10;
 
-/// The cost of a finished picture with a target error.
+/// The cost of rendering a picture until its finished form reaches a target error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Forecast {
-    /// The target, as in `--target-error`.
+    /// The target, a relative error as in `--target-error`.
     pub error: f64,
-    /// Iterations.
+    /// Number of iterations until the target is reached.
     pub iterations: u64,
-    /// Seconds.
+    /// Wall-clock seconds until the target is reached.
     pub seconds: f64,
-    /// Core-seconds.
+    /// Core-seconds until the target is reached.
     pub core_seconds: f64,
-    /// Iterations of the pilot, and the error of its finished picture.
+    /// Number of iterations of the pilot (the small render that this follows from), and the relative error of its
+    /// finished picture.
     pub pilot: (u64, f64),
 }
 
-/// Forecasts the cost of a target error. `None` if the pilot finds no error, or if bias keeps the error above the target.
+/// Forecasts the cost of a target error by a pilot, a small render. `None` if the pilot finds no error, or if bias
+/// keeps the error above the target.
 ///
 /// # Errors
 /// The denoiser fails.
@@ -63,7 +65,7 @@ pub fn forecast(
     }))
 }
 
-/// Iterates the pilot, and estimates the error of its finished picture each time the iterations have doubled.
+/// Renders the pilot's iterations, and estimates the error of its finished picture each time their number has doubled.
 fn run_pilot(session: &mut Session<'_>, finish: &mut Finish) -> Result<()> {
     let mut next = MIN_ITERATIONS_FOR_ERROR;
     loop {

@@ -13,12 +13,12 @@ use crate::scene::Scene;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Names of the layers of one kind of cryptomatte.
+/// Names of the layers of a cryptomatte of this kind: objects or materials.
 fn cryptomatte_layers(kind: &str) -> impl Iterator<Item = String> {
     (0..RANKS / 2).map(move |index| format!("{kind}{index:02}"))
 }
 
-/// Names of the layers that a render of this shape can have. `finished`: including finished parts.
+/// Names of the layers that the EXR of a render of this shape can have. `finished`: including finished parts.
 fn names(shape: &Shape, finished: bool) -> Vec<String> {
     let mut names = output::names(shape);
     if finished {
@@ -28,7 +28,7 @@ fn names(shape: &Shape, finished: bool) -> Vec<String> {
     names
 }
 
-/// Number of channels that a render of this shape can have.
+/// Number of channels that the EXR of a render of this shape can have.
 pub fn channels(shape: &Shape) -> usize {
     names(shape, true).iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
@@ -43,7 +43,8 @@ pub(super) fn check(selection: &Selection, shape: &Shape, finished: bool) -> Res
     selection.apply(LayerSet { width: 0, height: 0, layers }).map(drop)
 }
 
-/// Selected layers of additive parts that a render of this shape has no light for. They are delivered black.
+/// Names of the selected layers of additive parts that a render of this shape has no light for. They are delivered
+/// black.
 pub(super) fn black(selection: &Selection, shape: &Shape, finished: bool) -> Vec<String> {
     let Selection::List(selected) = selection else { return Vec::new() };
     let present = names(shape, finished);
@@ -55,7 +56,7 @@ pub(super) fn black(selection: &Selection, shape: &Shape, finished: bool) -> Vec
     black
 }
 
-/// Adds the black layers to a picture.
+/// Adds the selected layers without light to a picture, as black layers.
 pub(super) fn add_black(selection: &Selection, shape: &Shape, finished: bool, set: &mut LayerSet) -> Result<()> {
     let pixels = vec![[0.0; 3]; set.width * set.height];
     black(selection, shape, finished)
@@ -77,17 +78,17 @@ pub(super) fn check_names(selection: &Selection, shape: &Shape, finished: bool, 
     film::check_names(&LayerSet { width: 0, height: 0, layers: selected.map(layer).collect() }, naming)
 }
 
-/// Names of objects and materials, for cryptomattes.
+/// Names of a scene's objects and materials, for cryptomattes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct SceneNames {
     pub objects: Vec<String>,
     pub materials: Vec<String>,
-    /// Indices of the object and the material of each instance.
+    /// Indices of the object and the material of each instance in the scene.
     pub instances: Vec<[u32; 2]>,
 }
 
 impl SceneNames {
-    /// The names of a scene.
+    /// Collects the names of a scene's objects and materials.
     pub fn of(scene: &Scene) -> SceneNames {
         SceneNames {
             objects: scene.objects.clone(),

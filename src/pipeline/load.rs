@@ -10,8 +10,8 @@ use crate::scene::{Scene, environment_file, gltf, usd};
 use crate::stop::Stop;
 use std::path::PathBuf;
 
-/// Bytes for Embree's library, and for each of its threads: Embree ends the process if they get none. Bounds found by
-/// lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
+/// Bytes kept free for Embree's library, and for each of its threads: Embree ends the process if they get none. Bounds
+/// found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
 const EMBREE_BYTES: u64 = 256 << 20;
 const EMBREE_BYTES_PER_THREAD: u64 = 16 << 20;
 
@@ -20,25 +20,25 @@ const MAX_RADIANCE: f32 = 1e30;
 
 /// A scene file, and how it is read.
 pub struct SceneRequest {
-    /// The file.
+    /// Path of the scene file.
     pub path: PathBuf,
-    /// The environment that replaces the scene's own.
+    /// The environment light that replaces the scene's own; `None`: the scene's own.
     pub environment: Option<Environment>,
-    /// Rotation of the environment about the vertical (degrees).
+    /// Rotation of the environment about the vertical (degrees); `None`: the scene's own.
     pub rotation: Option<f64>,
-    /// Factor on the environment's radiance.
+    /// Factor on the environment's radiance; `None`: the scene's own.
     pub strength: Option<f64>,
-    /// Choices that the file leaves open.
+    /// Choices about reading that the file leaves open.
     pub options: gltf::ReadOptions,
-    /// Effects that are switched off.
+    /// Effects, such as dispersion, that are switched off.
     pub off: EffectSet,
 }
 
 /// An environment light.
 pub enum Environment {
-    /// The same radiance from all directions.
+    /// Equal radiance from all directions (linear Rec. 709).
     Color(Rgb),
-    /// A latitude-longitude image in a file.
+    /// Path of a latitude-longitude image.
     File(PathBuf),
     /// Texels of a latitude-longitude image: finite and not negative.
     Image(EnvironmentSource),
@@ -46,9 +46,9 @@ pub enum Environment {
 
 /// A scene that has been read and built.
 pub struct Loaded {
-    /// The scene.
+    /// The scene, ready to be rendered.
     pub scene: Scene,
-    /// Effects that were removed from it.
+    /// Effects that were switched off and so removed from the scene.
     pub removed: Removed,
 }
 
@@ -86,7 +86,7 @@ fn build(mut description: Description, request: &SceneRequest, threads: usize) -
     Ok(Loaded { scene: Scene::build(description, threads)?, removed })
 }
 
-/// Replaces and changes the environment as the request says.
+/// Replaces the environment of a scene description and changes it, as the request says.
 fn set_environment(description: &mut Description, request: &SceneRequest) -> Result<()> {
     if let Some(choice) = &request.environment {
         let source = match choice {
@@ -111,7 +111,7 @@ fn set_environment(description: &mut Description, request: &SceneRequest) -> Res
     Err(Error::new(ErrorKind::Scene, request.path.display(), cause).hint("lower --env or --env-strength"))
 }
 
-/// Sets rotation and strength, also of the scene's own environment.
+/// Sets rotation and strength of the environment that the request names, also of the scene's own environment.
 fn set_rotation_and_strength(description: &mut Description, request: &SceneRequest) -> Result<()> {
     let given = [("--env-rotation", request.rotation), ("--env-strength", request.strength)];
     let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };

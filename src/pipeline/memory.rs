@@ -19,24 +19,24 @@ use crate::transport::{MergePhoton, Splat};
 use std::fmt::Display;
 use std::mem::size_of;
 
-/// Bytes per photon that carries the terms of its MIS weight: as traced, joined and sorted in this iteration, and in the
-/// map of the last iteration.
+/// Bytes per photon of methods that merge, which carries the terms of its MIS weight: as traced, joined and sorted in
+/// this iteration, and in the map of the last iteration.
 const MERGED_BYTES: u64 = 5 * size_of::<MergePhoton>() as u64 + 32;
 
 /// Bytes per vertex of a light path that sends light to the film: lists grow to twice their length, and are sorted.
 const SPLAT_BYTES: u64 = 2 * size_of::<Splat>() as u64 + 8;
 
-/// Bytes per pixel of a technique's weighted and unweighted picture.
+/// Bytes per pixel of the weighted and the unweighted picture of one sampling technique.
 const BYTES_PER_TECHNIQUE: u64 = 24;
 
-/// Channels of the layers that a finish with a network reads.
+/// Number of channels of the layers that a finish with a network reads.
 const FINISH_CHANNELS: usize = 37;
 
-/// Bytes of a finish whatever the size of the picture: the library of the denoiser and its network. A bound found by
-/// lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
+/// Bytes that a finish takes whatever the size of the picture: the library of the denoiser and its network. A bound
+/// found by lowering `ulimit -v` (`no_limit_of_memory_aborts` in `tests/cli/limits.rs`).
 const FINISH_BYTES: u64 = 192 << 20;
 
-/// Fewest light paths per iteration that a limit on memory may leave.
+/// Smallest number of light paths per iteration that a limit on memory may leave.
 const MIN_PHOTONS: u32 = 1000;
 
 /// The sizes that the memory of a render depends on, besides its settings.
@@ -46,11 +46,11 @@ struct Extent {
     film: (u32, u32),
     /// Width and height of the whole picture (pixels).
     whole: (u32, u32),
-    /// Channels of all layers.
+    /// Number of channels in all layers of the EXR.
     channels: usize,
-    /// Light groups.
+    /// Number of light groups (lights with layers of their own).
     groups: usize,
-    /// Photons per light path.
+    /// Mean number of photons that a light path stores.
     photons_per_path: f64,
 }
 
@@ -69,7 +69,7 @@ impl Extent {
         pixels(self.film) * self.bytes_per_pixel(settings) + self.bytes_of_map(settings) + tiles
     }
 
-    /// Bytes of the photon map.
+    /// Bytes of the photon map while it is built.
     fn bytes_of_map(&self, settings: &Settings) -> u64 {
         let bytes = (f64::from(settings.photons) * self.photons_per_path * PHOTON_BYTES as f64) as u64;
         match settings.method {
@@ -79,8 +79,8 @@ impl Extent {
         }
     }
 
-    /// Bytes of a pixel: sums, bandwidths, layers, and the light paths that methods without a number of photons send
-    /// for each pixel.
+    /// Bytes per pixel: sums, bandwidths, layers, and the light paths that methods without a number of photons send for
+    /// each pixel.
     fn bytes_per_pixel(&self, settings: &Settings) -> u64 {
         let method = settings.method;
         let vertices = (1.0 + f64::from(u8::from(settings.levels.two_paths))) * self.photons_per_path;
@@ -104,7 +104,7 @@ fn pixels((width, height): (u32, u32)) -> u64 {
     u64::from(width) * u64::from(height)
 }
 
-/// Bytes of a pixel's bandwidths and photon counts.
+/// Bytes per pixel for its bandwidths and photon counts.
 fn bytes_of_bandwidths(settings: &Settings) -> u64 {
     let cells = settings.chi_squared.annuli * settings.chi_squared.sectors;
     let state = match settings.bandwidth_rule() {
@@ -121,7 +121,7 @@ fn bytes_of_bandwidths(settings: &Settings) -> u64 {
     2 * (settings.levels.count * channels * photon::Kind::ALL.len() * state) as u64
 }
 
-/// Bytes of a finish besides pixels and layers; the denoiser works in tiles if memory is short.
+/// Bytes that a finish takes besides pixels and layers; the denoiser works in tiles if memory is short.
 fn finish_bytes(size: (u32, u32), groups: usize) -> u64 {
     let pixels = pixels(size);
     // The parts by effect, and for each light group its part and its caustics.
@@ -129,16 +129,16 @@ fn finish_bytes(size: (u32, u32), groups: usize) -> u64 {
     FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
 }
 
-/// A limit on the memory of photons, pixels and layers.
+/// A limit on the memory of photons, pixels and layers, set by the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryLimit {
-    /// Bytes.
+    /// Most bytes that they may take.
     pub bytes: u64,
 }
 
 impl MemoryLimit {
-    /// Settings that keep to the limit, and a warning of what they go without. Only the photons can shrink: the light
-    /// paths per iteration, or the one map of `pm`.
+    /// Changes the settings so that they keep to the limit, and returns a warning of what they go without. Only the
+    /// photons can shrink: the light paths per iteration, or the one map of `pm`.
     fn fit(self, extent: Extent, settings: Settings, method: &str) -> Result<(Settings, Option<String>)> {
         let whole = extent.bytes(&settings);
         if whole <= self.bytes {
@@ -163,7 +163,7 @@ impl MemoryLimit {
         Ok((Settings { photons, ..settings }, Some(warning)))
     }
 
-    /// The error of a render that needs more than the limit.
+    /// Makes the error of a render that needs at least `least` bytes, more than the limit.
     fn refuse(self, (width, height): (u32, u32), method: &str, least: u64) -> Error {
         let (least, mib) = (least.div_ceil(1 << 20), self.bytes >> 20);
         let cause = format!(
@@ -174,16 +174,16 @@ impl MemoryLimit {
     }
 }
 
-/// A render whose memory is checked.
+/// A render whose need of memory is checked, and the limit that it has to keep to.
 #[derive(Clone, Copy)]
 pub(super) struct MemoryCheck<'a> {
-    /// Scene and camera.
+    /// Scene and camera of the render.
     pub view: View<'a>,
     /// Value of `--method`, for messages.
     pub method: &'a str,
     /// Whether the picture is finished.
     pub finishes: bool,
-    /// The user's limit.
+    /// The user's limit; `None`: the memory of the machine alone.
     pub limit: Option<MemoryLimit>,
 }
 
@@ -207,7 +207,7 @@ impl MemoryCheck<'_> {
         Ok((settings, warning))
     }
 
-    /// The light paths or the method of a render, and how it takes less memory.
+    /// Names, for messages, the light paths or the method of a render, and how it takes less memory.
     fn describe(&self, settings: &Settings) -> (String, &'static str) {
         let method = settings.method;
         let is_chosen = method.name() == self.method;
@@ -231,7 +231,7 @@ pub fn check_all<'a>(view: View<'_>, all: impl Iterator<Item = &'a Settings>) ->
     require(all.map(bytes).sum(), format_args!("all runs together at {width} x {height} pixels"), "fewer runs")
 }
 
-/// Errors: `what` needs more bytes than there are.
+/// Fails if `what` needs more bytes than there are.
 fn require(bytes: u64, what: impl Display, remedy: &str) -> Result<()> {
     memory::require(bytes, what).map_err(|error| error.hint(format!("use a smaller --width and --height, or {remedy}")))
 }

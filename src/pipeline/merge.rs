@@ -17,18 +17,18 @@ use std::path::{Path, PathBuf};
 /// Options, by their names in the header, that may differ between the shards of one render.
 const FREE_OPTIONS: [&str; 6] = ["shard", "layers", "exr-naming", "compression", "scene", "path"];
 
-/// The shards of one render, ordered by their index.
+/// The opened files of the shards of one render (parts of its iterations), ordered by their index.
 pub struct Shards {
     files: Vec<(PathBuf, ShardFile)>,
-    /// Indices of missing shards.
+    /// Indices of shards of the render for which no file is given.
     missing: Vec<u64>,
 }
 
-/// How shards are merged.
+/// How shards are merged to a picture, and how it is finished.
 pub struct MergeRequest {
     /// How the picture is finished; `None`: it stays the unfinished estimate.
     pub finish: Option<FinishRequest>,
-    /// Layers to deliver.
+    /// Layers to deliver in the EXR.
     pub layers: Selection,
     /// Style of channel names, which the cryptomatte attributes repeat.
     pub naming: Naming,
@@ -44,12 +44,12 @@ pub enum MergeEvent<'a> {
     Finishing {
         /// The merged render.
         rendered: &'a Rendered,
-        /// Why the preferred denoiser is missing, if the built-in one takes its place.
+        /// Why the preferred denoiser is missing, if the built-in one takes its place; `None` otherwise.
         missing: Option<&'a Error>,
     },
 }
 
-/// Whether a file is a shard of a render.
+/// Whether a file is a shard, with pixel sums behind its picture.
 ///
 /// # Errors
 /// The file cannot be read, or is damaged.
@@ -90,19 +90,19 @@ impl Shards {
         Ok(Shards { files, missing })
     }
 
-    /// Options of the render, without the shard; null if there are no shards.
+    /// Options of the render as the user gave them, without the shard; null if there are no shards.
     pub fn arguments(&self) -> Value {
         let mut arguments = self.files.first().map_or(Value::Null, |(_, file)| file.head.arguments.clone());
         arguments["shard"] = Value::Null;
         arguments
     }
 
-    /// Facts of the scene; `None` if there are no shards.
+    /// Facts of the scene for layers and header, from the first shard; `None` if there are no shards.
     pub fn facts(&self) -> Option<&SceneFacts> {
         self.files.first().map(|(_, file)| &file.facts)
     }
 
-    /// Warnings of shards that ended early, and of missing shards.
+    /// Warnings about shards that ended early, and about missing shards.
     pub fn warnings(&self) -> Vec<String> {
         let early = self.files.iter().filter_map(|(path, file)| {
             let ShardResult { settings, stats, .. } = &file.part;
@@ -158,7 +158,7 @@ impl Shards {
     }
 }
 
-/// Errors: shards are missing.
+/// Fails if shards are missing among the `count` shards of the render.
 fn check_complete(missing: &[u64], count: u64) -> Result<()> {
     let Some(shard) = missing.first() else { return Ok(()) };
     let cause = match missing.len() {
@@ -169,7 +169,7 @@ fn check_complete(missing: &[u64], count: u64) -> Result<()> {
     Err(Error::usage(cause).hint(hint))
 }
 
-/// Adds the pixel sums of a file to the sums of the files before.
+/// Adds the pixel sums of a shard's file to `pixels`, the sums of the files before it.
 fn add_pixels(path: &Path, file: &mut ShardFile, pixels: &mut Vec<PixelAccumulator>) -> Result<()> {
     let first = pixels.is_empty();
     let mut at = 0;
@@ -185,7 +185,7 @@ fn add_pixels(path: &Path, file: &mut ShardFile, pixels: &mut Vec<PixelAccumulat
     })
 }
 
-/// Errors: the second shard is not of the render of the first.
+/// Fails if the second shard is not of the render of the first.
 fn check_same_render((first, whole): (&Path, &ShardFile), (path, file): (&Path, &ShardFile)) -> Result<()> {
     let error = |cause: String| Error::new(ErrorKind::Usage, path.display(), cause);
     let first = first.display();

@@ -9,12 +9,12 @@ use crate::render::{Progress, Rendered, Settings};
 use crate::scene::Scene;
 use crate::stop::Stop;
 
-/// A part of a render that may take long and does not report how far it is.
+/// A part of a render that may take long and does not report its progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// Reading and building the scene.
+    /// Reading the scene's files and building the scene.
     Reading,
-    /// Comparing candidates for `auto`.
+    /// Comparing candidates (methods with settings) for `auto`.
     Choosing,
     /// Making the layers and finishing the picture.
     Finishing,
@@ -22,24 +22,24 @@ pub enum Phase {
 
 /// An event of a render. The variants stand in the order in which they occur.
 pub enum Event<'a> {
-    /// A phase begins.
+    /// A long part of the render begins.
     PhaseBegins(Phase),
-    /// The current phase has ended.
+    /// The current long part of the render has ended.
     PhaseEnds,
     /// The scene has been read and built.
     Loaded(&'a Scene),
     /// The method is settled. Holds the choice of `auto` if it has compared candidates.
     Chosen(Option<&'a Choice>),
-    /// The finish has been opened.
+    /// The denoiser and the network of the finish have been opened.
     FinishOpened {
-        /// Why the preferred denoiser is missing, if the built-in one takes its place.
+        /// Why the preferred denoiser is missing, if the built-in one takes its place; `None` otherwise.
         missing: Option<&'a Error>,
     },
     /// The first iteration is about to begin.
     Begins {
         /// The effects that the render simulates, and its warnings.
         plan: &'a Plan,
-        /// The final settings.
+        /// The final settings of the render.
         settings: &'a Settings,
     },
     /// The render continues from a checkpoint with this number of iterations.
@@ -50,7 +50,7 @@ pub enum Event<'a> {
     Preview {
         /// The beauty layer alone (radiance), or why it could not be made.
         picture: Result<LayerSet>,
-        /// Position within the whole picture.
+        /// Position of the rendered window within the whole picture.
         frame: &'a exr::Frame,
     },
     /// A checkpoint could not be saved; the render continues.
@@ -59,16 +59,16 @@ pub enum Event<'a> {
     Rendered(&'a Rendered),
     /// The finish is about to begin. A file with these layers can be finished later if the process is killed meanwhile.
     Estimated {
-        /// The estimate and all layers that a finish reads.
+        /// The unfinished layers, with all that a finish reads.
         set: &'a LayerSet,
-        /// Attributes of the EXR.
+        /// Attributes of the EXR file, its JSON header included.
         attributes: &'a exr::Attributes,
     },
 }
 
 /// Receives the events of a render: the command line or a host program.
 pub trait Observer {
-    /// Receives an event.
+    /// Receives an event of the render.
     ///
     /// # Errors
     /// An error ends the render.
@@ -83,7 +83,7 @@ pub trait Observer {
     }
 }
 
-/// Runs `work` between the begin and the end of a phase.
+/// Runs `work` and tells the observer when the phase begins and ends.
 pub(super) fn during<T>(
     phase: Phase,
     observer: &mut dyn Observer,

@@ -16,18 +16,18 @@ use crate::render::output::layer_shape;
 use crate::scene::{Scene, View};
 use std::path::Path;
 
-/// The input of a plan besides the scene.
+/// Method and switches of a render, the input of its plan besides the scene.
 #[derive(Clone, Copy)]
 pub struct PlanInput<'a> {
-    /// The method, and how it was chosen.
+    /// The settings with the method, and how they were chosen.
     pub chosen: &'a Chosen,
     /// Longest light path in segments; `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Effects that are switched on or off.
+    /// Effects, such as dispersion, that the user has switched on or off.
     pub switches: Switches,
 }
 
-/// The plan of a render of a scene that was built without the effects in `removed`.
+/// Plans which effects a render simulates, for a scene that was built without the effects in `removed`.
 pub fn plan(PlanInput { chosen, max_depth, switches }: PlanInput<'_>, view: View<'_>, removed: &Removed) -> Plan {
     let choice = chosen.choice.as_ref();
     let method = chosen.settings.method;
@@ -48,13 +48,13 @@ pub fn plan(PlanInput { chosen, max_depth, switches }: PlanInput<'_>, view: View
     plan
 }
 
-/// A picture with its method and its plan, not rendered.
+/// A picture with its method and its plan (effects and warnings), not rendered.
 pub struct PlannedPicture {
-    /// The camera, of the size that is rendered.
+    /// The camera, with the size of the picture.
     pub camera: Camera,
-    /// The settings, and how they were chosen.
+    /// The settings of the picture, and how they were chosen.
     pub chosen: Chosen,
-    /// The plan, with the warnings of the scene in front.
+    /// The plan (effects and warnings), with the warnings of the scene in front.
     pub plan: Plan,
 }
 
@@ -78,15 +78,15 @@ pub fn plan_picture(
     Ok(PlannedPicture { camera: checked.camera, chosen, plan })
 }
 
-/// A render with its plan, whose settings fit into memory.
+/// The settings of a render, which fit into memory, and its plan (effects and warnings).
 pub(super) struct Planned {
-    /// The settings.
+    /// The settings, which may have fewer light paths than requested.
     pub settings: Settings,
-    /// The plan, without the warnings of the scene.
+    /// The plan (effects and warnings), without the warnings of the scene.
     pub plan: Plan,
 }
 
-/// Fits a render into memory and plans it.
+/// Fits the settings of a render into memory and plans its effects.
 ///
 /// # Errors
 /// The render does not fit.
@@ -109,7 +109,8 @@ pub(super) fn plan_render(
     Ok(Planned { settings, plan })
 }
 
-/// A warning if the scene has light groups and the method does not separate the light of groups.
+/// Returns a warning if the scene has light groups and the method does not separate the light of groups; `None`
+/// otherwise.
 fn warn_ungrouped_lights(scene: &Scene, settings: &Settings) -> Option<String> {
     let groups = scene.lights.groups().names.len();
     let lost = groups > 0 && layer_shape(settings, scene).groups.is_empty();
@@ -117,7 +118,7 @@ fn warn_ungrouped_lights(scene: &Scene, settings: &Settings) -> Option<String> {
     lost.then(|| format!("its {groups} light groups have no layers: --method {name} does not tell lights apart (auto, path, light, bdpt, bpm and vcm do)"))
 }
 
-/// The reason for the choice of `auto`, for people.
+/// The reason for the choice of `auto`, as a sentence for people.
 pub fn reason(choice: &Choice) -> String {
     let because = choice.reason.map(|because| format!(", for {because}")).unwrap_or_default();
     let Some(trial) = choice.chosen_pilot() else { return format!("auto: {}{because}", choice.candidate.name()) };

@@ -12,19 +12,21 @@ use crate::render::Settings;
 use crate::render::output::layer_shape;
 use crate::scene::View;
 
-/// A render that is ready for its first iteration.
+/// A render that is ready for its first iteration: its settings, finish and plan.
 pub(super) struct Prepared {
-    /// The settings, of which the time is what the finish leaves.
+    /// The settings, with the time limit less the time that the finish takes.
     pub settings: Settings,
-    /// The finish; `None`: the picture stays the unfinished estimate, or is a shard, which is finished after the merge.
+    /// The finish (denoiser and network); `None`: the picture stays the unfinished estimate, or is a shard, which is
+    /// finished after the merge.
     pub finish: Option<OpenFinish>,
-    /// Error of the finished picture at which the render stops. Without a finish the settings hold it.
+    /// Relative error of the finished picture at which the render stops; `None`: no target. Without a finish the
+    /// settings hold it.
     pub target: Option<f64>,
-    /// The plan for the header, with the warnings of the scene.
+    /// The plan (effects and warnings) for the header, with the warnings of the scene.
     pub plan: Plan,
 }
 
-/// Opens the finish and announces the render to the observer.
+/// Opens the finish (denoiser and network) and announces the render to the observer.
 ///
 /// # Errors
 /// The denoiser or the network cannot be opened.
@@ -45,7 +47,8 @@ pub(super) fn prepare(
     Ok(Prepared { settings, finish, target, plan })
 }
 
-/// The finish, if there is to be one, and settings without the time that the finish takes.
+/// Opens the finish, if there is to be one. Returns it with settings whose time limit leaves out the time that it
+/// takes.
 fn open_finish(
     request: &Request<'_>,
     View { scene, camera }: View<'_>,
@@ -63,7 +66,8 @@ fn open_finish(
     Ok((Some(finish), Settings { time: Some(left), ..settings }))
 }
 
-/// Sends the plan. The warning of slow iterations depends on a clock, so the plan does not keep it for the header.
+/// Sends the plan to the observer. The warning of slow iterations depends on a clock, so the plan does not keep it for
+/// the header.
 fn announce(plan: &mut Plan, view: View<'_>, settings: &Settings, observer: &mut dyn Observer) -> Result<()> {
     let kept = plan.warnings.len();
     plan.warnings.extend(slow_iteration::warning(view, settings));

@@ -7,25 +7,25 @@
 use rayon::prelude::*;
 use std::io::{self, Read, Write};
 
-/// Most bytes of a record, compressed or not: limits the memory that a damaged file can demand.
+/// Most bytes of a record (a part of a file), compressed or not: limits the memory that a damaged file can demand.
 const MAX_BYTES: usize = 1 << 30;
-/// Largest compression ratio of LZ4.
+/// Largest ratio of bytes to compressed bytes that LZ4 reaches.
 const MAX_RATIO: usize = 256;
 
-/// A compressed record.
+/// A record: a separately compressed part of a file.
 pub struct Record {
     hash: blake3::Hash,
     packed: Vec<u8>,
 }
 
 impl Record {
-    /// Compresses bytes to a record.
+    /// Compresses bytes to a record of a file.
     pub fn new(bytes: &[u8]) -> Record {
         let packed = lz4_flex::compress_prepend_size(bytes);
         Record { hash: blake3::hash(&packed), packed }
     }
 
-    /// Writes the record.
+    /// Writes the record to a file.
     ///
     /// # Errors
     /// The file cannot be written, or the record is too large.
@@ -124,7 +124,7 @@ pub fn read_blocks<T: serde::de::DeserializeOwned + Send>(
     Ok(())
 }
 
-/// Records in memory at the same time.
+/// Number of records in memory at a time while a file is written or read.
 fn records_per_batch() -> usize {
     2 * rayon::current_num_threads()
 }

@@ -11,10 +11,11 @@ use crate::scene::CameraRequest;
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Settings of a candidate for a picture of a width and height in pixels; `None` if the options exclude the candidate.
+/// Function that makes the settings of a candidate (a method that `auto` compares) for a picture of a width and height
+/// in pixels; `None` if the options exclude the candidate.
 pub type SettingsOf<'a> = Box<dyn Fn(Candidate, (u32, u32)) -> Option<Settings> + 'a>;
 
-/// The method that the user asks for.
+/// The method that the user asks for: one by name, or the choice of `auto`.
 pub enum MethodRequest<'a> {
     /// The user names a method; the settings are those of this method.
     Named(Settings),
@@ -22,18 +23,18 @@ pub enum MethodRequest<'a> {
     Auto(AutoRequest<'a>),
 }
 
-/// The candidates of `auto`, and the finish of its pilots.
+/// The candidates of `auto` (methods with settings), and the finish of its pilots.
 pub struct AutoRequest<'a> {
     /// Settings for the checks that precede the choice, and for the render if the options leave nothing to compare.
     pub fallback: Settings,
-    /// Settings of each candidate.
+    /// Makes the settings of each candidate.
     pub settings_of: SettingsOf<'a>,
-    /// Finish of the pilots' pictures.
+    /// Denoiser for the pictures of the pilots, the short renders that `auto` compares.
     pub finish: Box<Finish>,
 }
 
 impl<'a> MethodRequest<'a> {
-    /// The request with changed settings of every candidate of `auto`.
+    /// The request with changed settings of every candidate of `auto`; a method that the user names keeps its settings.
     pub fn map_candidates(self, change: impl Fn(Settings) -> Settings + 'a) -> MethodRequest<'a> {
         match self {
             MethodRequest::Auto(auto) => {
@@ -53,7 +54,7 @@ impl<'a> MethodRequest<'a> {
         }
     }
 
-    /// Value of `--method`.
+    /// Value of `--method` that stands for the request.
     pub fn name(&self) -> &'static str {
         match self {
             MethodRequest::Named(settings) => settings.method.name(),
@@ -64,15 +65,15 @@ impl<'a> MethodRequest<'a> {
 
 /// A picture and how its light is found: the part of a request that `plan` and `render` share.
 pub struct PictureRequest<'a> {
-    /// Camera and size.
+    /// Camera of the scene, and size of the picture.
     pub camera: CameraRequest,
-    /// The method with its settings.
+    /// The requested method with its settings.
     pub method: MethodRequest<'a>,
     /// Light paths per iteration; `None`: the method's default for the size of the picture.
     pub photons: Option<u32>,
     /// Longest light path in segments; `None`: no limit.
     pub max_depth: Option<u32>,
-    /// Effects that are switched on or off.
+    /// Effects, such as dispersion, that the user has switched on or off.
     pub switches: Switches,
 }
 
@@ -80,33 +81,33 @@ pub struct PictureRequest<'a> {
 pub struct Request<'a> {
     /// The scene file and how it is read.
     pub scene: SceneRequest,
-    /// Camera, size and method.
+    /// The picture: camera, size and method.
     pub picture: PictureRequest<'a>,
     /// How the picture is finished; `None`: it stays the unfinished estimate.
     pub finish: Option<FinishRequest>,
-    /// Layers to deliver.
+    /// Layers to deliver in the EXR.
     pub layers: Selection,
     /// Style of channel names, which the cryptomatte attributes repeat.
     pub naming: Naming,
-    /// Options as the user gave them, for the header.
+    /// Options as the user gave them, a JSON object for the header.
     pub arguments: Value,
     /// Whether the header leaves out clocks and the number of threads.
     pub reproducible: bool,
-    /// Limit on the memory of photons, pixels and layers.
+    /// Limit on the memory of photons, pixels and layers; `None`: the memory of the machine alone.
     pub memory: Option<MemoryLimit>,
     /// Where the checkpoint is saved during the render; `None`: nowhere.
     pub saving: Option<Saving>,
-    /// A checkpoint to continue from.
+    /// Path of a checkpoint from which the render continues; `None`: it starts anew.
     pub resume: Option<PathBuf>,
 }
 
 /// Where and how often the checkpoint of a render is saved.
 #[derive(Clone, Debug)]
 pub struct Saving {
-    /// The file.
+    /// Path of the checkpoint.
     pub path: PathBuf,
-    /// Seconds between two saves.
+    /// Seconds between two saves of the checkpoint.
     pub every: f64,
-    /// Whether the file stays, with the last state, when the render is done, so that the render can be extended.
+    /// Whether the checkpoint stays, with the last state, when the render is done, so that the render can be extended.
     pub keep: bool,
 }

@@ -9,15 +9,15 @@ use crate::scene::Scene;
 
 /// The identity of a render's scene, and the state that the render continues from.
 pub(super) struct Resumption {
-    /// Hash of the scene's files. `None` if nothing needs it, or if the scene came through a pipe and cannot be read
-    /// again.
+    /// Hash of the scene's files, hexadecimal. `None` if nothing needs it, or if the scene came through a pipe and
+    /// cannot be read again.
     pub scene: Option<String>,
-    /// The checkpoint, if the render continues from one.
+    /// The checkpoint from which the render continues; `None` if it starts anew.
     pub saved: Option<(Head, State)>,
 }
 
 impl Resumption {
-    /// Reads the checkpoint of a request.
+    /// Reads the checkpoint of a request, if it names one, and checks that it belongs to the render.
     ///
     /// # Errors
     /// The checkpoint cannot be read, or belongs to another render.
@@ -34,7 +34,7 @@ impl Resumption {
     }
 }
 
-/// A hash of the files that the scene is read from.
+/// A hash of the files that the scene is read from; `None` if it came through a pipe and cannot be read again.
 fn hash(request: &Request<'_>, scene: &Scene) -> Result<Option<String>> {
     let environment = match &request.scene.environment {
         Some(Environment::File(path)) => Some(path.as_path()),

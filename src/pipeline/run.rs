@@ -24,20 +24,20 @@ pub(super) struct Running<'a> {
     head: Head,
 }
 
-/// A render whose iterations have ended.
+/// A render whose iterations have ended and whose picture is not finished yet.
 pub(super) struct Iterated {
-    /// The pixel sums.
+    /// The pixel sums and statistics of the render.
     pub rendered: Rendered,
-    /// The identity of the render, for shards.
+    /// The identity of the render, which the file of a shard stores.
     pub head: Head,
-    /// The finish that makes the picture.
+    /// The denoiser and the network that finish the picture; `None`: it stays unfinished.
     pub finish: Option<OpenFinish>,
-    /// A checkpoint that is no longer needed once the picture is written.
+    /// Path of a checkpoint that is no longer needed once the picture is written.
     pub obsolete_checkpoint: Option<PathBuf>,
 }
 
 impl<'a> Running<'a> {
-    /// Starts a session, or continues the one of a checkpoint.
+    /// Starts the iterations of a render, or continues those of a checkpoint.
     ///
     /// # Errors
     /// The checkpoint is of a picture of another size or method.
@@ -98,7 +98,7 @@ impl<'a> Running<'a> {
     }
 }
 
-/// Continues the session of a checkpoint.
+/// Continues the iterations of a checkpoint.
 fn resume<'a>(
     request: &Request<'_>,
     stage: &'a RenderInput<'a>,
@@ -111,10 +111,10 @@ fn resume<'a>(
     Session::resume(stage, state).ok_or_else(other)
 }
 
-/// The work between two iterations.
+/// What a render does between two iterations: error estimates, previews and checkpoints.
 struct BetweenIterations<'a> {
     finish: Option<OpenFinish>,
-    /// Error of the finished picture at which the render stops.
+    /// Relative error of the finished picture at which the render stops; `None`: no target.
     target: Option<f64>,
     frame: exr::Frame,
     saver: Option<Saver<'a>>,

@@ -7,26 +7,26 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::render::{Clock, Session, StopReason, TimeSpent};
 use std::path::PathBuf;
 
-/// Saves the checkpoints of one render.
+/// Saves the checkpoints of one render at intervals.
 pub(super) struct Saver<'a> {
     saving: &'a Saving,
     head: Head,
     clock: Clock,
-    /// Time of the next save (seconds).
+    /// Time of the render at which the next checkpoint is due (seconds).
     next: f64,
-    /// Whether the last save failed, which has been reported.
+    /// Whether the last save of the checkpoint failed, which has been reported.
     failed: bool,
-    /// Whether the file is a checkpoint of this render.
+    /// Whether the file at the checkpoint's path is one of this render.
     written: bool,
 }
 
 impl<'a> Saver<'a> {
-    /// `written`: whether the render continues from this file.
+    /// Makes the saver of a render. `written`: whether the render continues from the checkpoint at this path.
     pub fn new(saving: &'a Saving, head: Head, written: bool) -> Saver<'a> {
         Saver { saving, head, clock: Clock::start(), next: saving.every, failed: false, written }
     }
 
-    /// Saves the state if a save is due. The time of the save counts as time of the render.
+    /// Saves a checkpoint if one is due. The time of the save counts as time of the render.
     pub fn save_if_due(&mut self, session: &mut Session<'_>, observer: &mut dyn Observer) -> Result<()> {
         if self.clock.seconds() < self.next {
             return Ok(());
@@ -54,7 +54,7 @@ impl<'a> Saver<'a> {
         Ok(self.written.then(|| self.saving.path.clone()))
     }
 
-    /// Saves the state. A failure is reported once until a save succeeds again.
+    /// Saves a checkpoint. A failure is reported once until a save succeeds again.
     fn save(&mut self, session: &Session<'_>, observer: &mut dyn Observer) -> Result<()> {
         match self.write(session) {
             Ok(()) => (self.written, self.failed) = (true, false),

@@ -12,33 +12,33 @@ use crate::math::Vec3;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// Options that may differ between the renders.
+/// Options that may differ between renders whose mean is made.
 const FREE_OPTIONS: [&str; 9] =
     ["seed", "iterations", "time", "target-error", "layers", "exr-naming", "compression", "scene", "path"];
 
-/// A render that has been added.
+/// A render whose picture has been added to the mean.
 struct Source {
     path: PathBuf,
     header: Value,
     iterations: f64,
 }
 
-/// The sum of the renders that have been added.
+/// Renders of one picture with different seeds, added up to make their mean.
 #[derive(Default)]
 pub struct Seeds {
     sources: Vec<Source>,
     sum: Option<(LayerSet, Attributes)>,
-    /// Prefix of the layer names of each cryptomatte, and the ranks of its pixels.
+    /// For each cryptomatte, the prefix of its layer names and the ranks of its pixels.
     mattes: Vec<(String, Vec<PixelRanks>)>,
 }
 
-/// The rule by which values of a layer are merged.
+/// The rule by which the values of the layer `name` are merged.
 fn merge_rule(name: &str) -> Merge {
     kind_of(name).map_or(Merge::Mean, |(kind, _)| kind.merge)
 }
 
 impl Merge {
-    /// Adds the value of a render with this number of iterations to the sum over the renders before.
+    /// Adds the layer value of a render with this number of iterations to the sum over the renders before.
     fn add(self, sum: f32, value: f32, iterations: f64) -> f32 {
         let (total, value) = (f64::from(sum), f64::from(value));
         let added = match self {
@@ -51,7 +51,7 @@ impl Merge {
         added as f32
     }
 
-    /// The merged value from the sum over renders; `iterations`: their total number.
+    /// The merged layer value from the sum over renders; `iterations`: their total number.
     fn finish(self, sum: f32, iterations: f64) -> f32 {
         let total = f64::from(sum);
         let value = match self {
@@ -64,7 +64,7 @@ impl Merge {
 }
 
 impl Seeds {
-    /// Adds a render. The mean keeps the layers that all renders have.
+    /// Adds a render to the mean, which keeps the layers that all renders have.
     ///
     /// # Errors
     /// The file is no render, differs from the first in its size or in an option, or has the seed of another render.
@@ -159,7 +159,7 @@ impl Seeds {
         }
     }
 
-    /// The mean with its header, which describes no finish: the mean has to be finished again.
+    /// The mean of the renders with its header, which describes no finish: the mean has to be finished again.
     ///
     /// # Errors
     /// No render was added, or the header cannot be written.
@@ -196,7 +196,7 @@ impl Seeds {
     }
 }
 
-/// Whether the renders state the errors of their finished pictures.
+/// Whether any of the renders states the error of its finished picture.
 fn have_finished_errors(sources: &[Source]) -> bool {
     sources.iter().any(|source| source.header["error_of"] == FINISHED_PICTURE)
 }
@@ -215,7 +215,7 @@ fn set_error_of_mean(set: &mut LayerSet, variance: &str, renders: usize) {
     }
 }
 
-/// Scales vectors to unit length, except zero vectors.
+/// Scales the vectors of a layer to unit length, except zero vectors.
 fn normalise(layer: &mut Layer) {
     let [x, y, z] = layer.planes.as_mut_slice() else { return };
     for ((x, y), z) in x.values.iter_mut().zip(&mut y.values).zip(&mut z.values) {
@@ -224,7 +224,7 @@ fn normalise(layer: &mut Layer) {
     }
 }
 
-/// Sums of the rejected samples of all renders, by cause.
+/// The header's key `rejected_by`: sums of the rejected samples of all renders, by cause.
 fn rejected_by(sources: &[Source]) -> Value {
     let mut all: Map<String, Value> = Map::new();
     for (name, count) in sources.iter().filter_map(|source| source.header["rejected_by"].as_object()).flatten() {

@@ -15,25 +15,25 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// The last bytes of a shard's file.
+/// The last bytes of the file of a shard (a part of a render's iterations).
 pub const MARK: &[u8; 8] = b"caustqS4";
-/// Bytes of the length and the mark.
+/// Bytes of the length and the mark at the end of a shard's file.
 const END_BYTES: i64 = 16;
 
-/// The pixel sums of a shard, and all that a merge needs besides.
+/// The pixel sums of a shard (a part of a render's iterations), and all that a merge needs besides.
 pub struct ShardSums {
-    /// The identity of the render.
+    /// The identity of the render: its scene, options and decisions.
     pub head: Head,
-    /// Facts of the scene.
+    /// Facts of the scene that layers and header need.
     pub facts: SceneFacts,
     /// Settings, size and counts of the shard.
     pub part: ShardResult,
-    /// The pixel sums.
+    /// The pixel sums, row by row from the top.
     pub pixels: Vec<PixelAccumulator>,
 }
 
 impl ShardSums {
-    /// Writes the sums behind the picture.
+    /// Writes the pixel sums to a shard's file, behind its picture.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -53,9 +53,9 @@ impl ShardSums {
 
 /// The open file of a shard, whose pixel sums have not been read yet.
 pub struct ShardFile {
-    /// The identity of the render.
+    /// The identity of the render: its scene, options and decisions.
     pub head: Head,
-    /// Facts of the scene.
+    /// Facts of the scene that layers and header need.
     pub facts: SceneFacts,
     /// Settings, size and counts of the shard.
     pub part: ShardResult,
@@ -63,7 +63,7 @@ pub struct ShardFile {
 }
 
 impl ShardFile {
-    /// Opens a file; `None` if the file is no shard.
+    /// Opens the file of a shard; `None` if the file is no shard.
     ///
     /// # Errors
     /// The file cannot be read, is damaged, or was written by another version of the program.
@@ -113,7 +113,7 @@ fn damaged(path: &Path) -> Error {
     Error::new(ErrorKind::Io, path.display(), "the sums behind its picture are damaged").hint("render this shard again")
 }
 
-/// Position of the first record, if the file is a shard.
+/// Position of the first record of pixel sums in a file; `None` if the file is no shard.
 fn find_records(file: &mut (impl Read + Seek)) -> io::Result<Option<SeekFrom>> {
     let length = file.seek(SeekFrom::End(0))?;
     if length < END_BYTES as u64 {

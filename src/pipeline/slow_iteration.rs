@@ -5,16 +5,16 @@ use crate::choose::{pilot_settings, window_cost_ratio};
 use crate::render::{RenderInput, Session, Settings};
 use crate::scene::View;
 
-/// Most pixels of the picture that is timed.
+/// Largest number of pixels of the picture by which an iteration is timed.
 const MAX_PIXELS: f64 = 64.0 * 64.0;
-/// Largest share of the picture's pixels that is timed.
+/// Largest size of that picture, as a share of the render's pixels.
 const MAX_SHARE: f64 = 1.0 / 64.0;
-/// Estimated time of an iteration over the time limit above which a warning is given: the estimate is rough.
+/// Ratio of the estimated time of an iteration to the time limit above which a warning is given: the estimate is rough.
 const WARNING_RATIO: f64 = 1.25;
 /// Shortest estimated iteration that a warning is given for (seconds).
 const MIN_SECONDS: f64 = 1.0;
 
-/// The warning, if an iteration takes longer than the render may.
+/// Returns a warning if one iteration is likely to take longer than the render may; `None` otherwise.
 pub(super) fn warning(view: View<'_>, settings: &Settings) -> Option<String> {
     let time = settings.time?;
     let seconds = estimate_seconds(view, settings)?;
@@ -27,8 +27,8 @@ pub(super) fn warning(view: View<'_>, settings: &Settings) -> Option<String> {
     })
 }
 
-/// Seconds of an iteration, estimated by one iteration of a smaller picture with the same work per pixel. The smaller
-/// picture shows the whole film; a factor accounts for light paths outside the film.
+/// Seconds that an iteration takes, estimated by one iteration of a smaller picture with equal work per pixel. The
+/// smaller picture shows the whole film; a factor accounts for light paths outside the film.
 fn estimate_seconds(View { scene, camera }: View<'_>, settings: &Settings) -> Option<f64> {
     let count = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
     let pixels = |camera: &Camera| count(camera.size());

@@ -12,17 +12,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Tiles along the longer side of a picture.
+/// Number of tiles along the longer side of a picture.
 const TILES_ALONG: usize = 20;
-/// Most tiles that are reported.
+/// Largest number of tiles that are reported.
 const MAX_TILES: usize = 10;
 /// Smallest share of the squared error for which an object and a kind of light are reported.
 const MIN_SHARE: f64 = 0.05;
-/// Pixels to each side of the windows in which noise is averaged.
+/// Pixels on each side of the middle one in the windows in which noise is averaged.
 const REACH: usize = 7;
-/// Added to the albedo before the division, so that black surfaces do not divide by zero.
+/// Added to the albedo by which noise is divided, so that black surfaces do not divide by zero.
 const ALBEDO_OFFSET: f32 = 0.01;
-/// Layers of the kinds of light, with their names for people.
+/// Layer names of the kinds of light, with the names of these kinds for people.
 const LIGHTS: [(&str, &str); 4] = [
     ("Direct", "direct light"),
     ("Indirect", "indirect light"),
@@ -33,7 +33,7 @@ const LIGHTS: [(&str, &str); 4] = [
 /// The object and the material that each pixel shows.
 #[derive(Default)]
 pub(super) struct Visible {
-    /// Indices of object and material; `None` if no object covers half of the pixel.
+    /// For each pixel, indices of its object and material; `None` if no object covers half of the pixel.
     of_pixels: Vec<Option<[u32; 2]>>,
     objects: Vec<String>,
     materials: Vec<String>,
@@ -52,22 +52,22 @@ impl Visible {
         }
     }
 
-    /// Names of an object and a material.
+    /// Names of the object and the material with these indices; `None` if there are none.
     fn names(&self, of: [u32; 2]) -> Option<[&str; 2]> {
         Some([self.objects.get(of[0] as usize)?, self.materials.get(of[1] as usize)?])
     }
 }
 
-/// An object and a kind of light with their share of the squared error.
+/// An object and a kind of light, with their share of the picture's squared error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Place {
-    /// Share of the squared error, 0 to 1.
+    /// Share of the picture's squared error, 0 to 1.
     pub share: f64,
     /// Name of the object; empty if there is none.
     pub object: String,
-    /// Name of the material.
+    /// Name of the object's material.
     pub material: String,
-    /// The kind of light.
+    /// The kind of light, such as `caustics`.
     pub light: String,
 }
 
@@ -82,24 +82,26 @@ pub struct Tile {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Share of the tile, with the object and the kind of light that hold most of it.
+    /// The object and the kind of light that hold most of the tile's squared error, with the tile's share of the
+    /// picture's.
     #[serde(flatten)]
     pub place: Place,
 }
 
-/// Where the error of a picture is.
+/// The objects, kinds of light and tiles that hold most of a picture's squared error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Worst {
-    /// Objects and kinds of light, the largest share first.
+    /// Objects and kinds of light, that with the largest share of the squared error first.
     pub by: Vec<Place>,
-    /// Tiles, the largest share first.
+    /// Tiles, that with the largest share of the squared error first.
     pub tiles: Vec<Tile>,
 }
 
-/// Indices of object and material, if there is an object, and the index of a kind of light.
+/// Holder of squared error: indices of an object and its material, `None` without an object, and the index of a kind of
+/// light.
 type Holder = (Option<[u32; 2]>, usize);
 
-/// Squared errors by holder.
+/// Sums of squared errors by object, material and kind of light.
 #[derive(Clone, Default)]
 struct Holders(BTreeMap<Holder, f64>);
 
@@ -110,7 +112,7 @@ impl Holders {
         }
     }
 
-    /// Holders, the largest squared error first.
+    /// Objects and kinds of light with their squared errors, the largest first.
     fn sorted(&self) -> Vec<(Holder, f64)> {
         let mut sorted: Vec<_> = self.0.iter().map(|(key, squared)| (*key, *squared)).collect();
         sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -119,8 +121,8 @@ impl Holders {
 }
 
 impl Worst {
-    /// Finds the worst places. `squared`: squared errors of the pixels; `weight`: factors that make them relative; `set`:
-    /// the layers of the kinds of light; `visible`: the objects in the pixels.
+    /// Finds where most of a picture's squared error is. `squared`: squared errors of the pixels; `weight`: factors
+    /// that make them relative; `set`: the layers of the kinds of light; `visible`: the objects in the pixels.
     pub(super) fn of(squared: &Picture, weight: &[f32], set: &LayerSet, visible: &Visible) -> Worst {
         let relative: Vec<f64> =
             squared.iter().zip(weight).map(|(rgb, weight)| f64::from(rgb.iter().sum::<f32>() / 3.0 * weight)).collect();
@@ -158,7 +160,7 @@ impl Worst {
     }
 }
 
-/// Share of each kind of light in the noise of each pixel.
+/// Share of each kind of light in the noise of each pixel, 0 to 1.
 fn noise_shares(set: &LayerSet) -> Vec<[f32; LIGHTS.len()]> {
     let size = set.size();
     let albedo = set.picture("albedo");

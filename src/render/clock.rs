@@ -9,19 +9,19 @@ use serde::{Deserialize, Serialize};
 pub struct Clock(std::time::Instant);
 
 impl Clock {
-    /// Starts the stopwatch.
+    /// Starts a stopwatch.
     #[allow(clippy::disallowed_methods, reason = "progress and stop conditions are what clocks are for")]
     pub fn start() -> Clock {
         Clock(std::time::Instant::now())
     }
 
-    /// Seconds since the start.
+    /// Wall-clock seconds since the stopwatch was started.
     pub fn seconds(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
     }
 }
 
-/// Processor time of the process (seconds).
+/// Processor time that the process has taken since it began (seconds).
 pub fn cpu_seconds() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
@@ -48,7 +48,7 @@ pub struct TimeSpent {
 }
 
 impl TimeSpent {
-    /// Runs `work` and adds its time.
+    /// Runs `work`, adds the time that it takes, and returns its result.
     pub fn measure<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let (clock, cpu_start) = (Clock::start(), cpu_seconds());
         let done = work();
@@ -57,7 +57,7 @@ impl TimeSpent {
         done
     }
 
-    /// Adds `other`.
+    /// Adds the seconds of `other`.
     pub fn add(&mut self, other: TimeSpent) {
         self.seconds += other.seconds;
         self.cpu_seconds += other.cpu_seconds;
@@ -67,9 +67,9 @@ impl TimeSpent {
 /// Core-seconds (processor time of the whole process) per phase of a render.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Phases {
-    /// Choice of the method, pilots, and initial bandwidths.
+    /// Choice of the method, pilots (short runs before the first iteration), and initial bandwidths.
     pub pilot: f64,
-    /// Light paths.
+    /// Tracing of light paths.
     pub light: f64,
     /// Construction of photon maps.
     pub map: f64,

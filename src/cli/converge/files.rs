@@ -16,7 +16,7 @@ use caustique::report::{data, page, plot};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Checks that the folder is writable or can be created.
+/// Checks that the output folder of a comparison is writable or can be created.
 ///
 /// # Errors
 /// The folder is neither.
@@ -37,7 +37,7 @@ pub fn check(folder: &Path) -> Result<()> {
     atomic::check_writable(new)
 }
 
-/// Writes all files, the figures first, so that a full disk does not lose them.
+/// Writes all files of a comparison, the figures first, so that a full disk does not lose them.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -82,7 +82,7 @@ pub fn write(
     Ok(())
 }
 
-/// Writes the last picture of every curve with the first seed as EXR.
+/// Writes the last picture of every curve (the errors of a run over time) with the first seed as EXR.
 fn write_pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threads: usize) -> Result<()> {
     let mut names: Vec<String> = Vec::new();
     for (line, of) in subject.lines.iter().enumerate() {
@@ -103,7 +103,7 @@ fn write_pictures(folder: &Path, subject: &Subject, outcome: &mut Outcome, threa
     Ok(())
 }
 
-/// The header of a curve's picture.
+/// The JSON header for the last picture of a curve, the errors of a run over time.
 fn header(subject: &Subject, outcome: &Outcome, line: &Line, threads: usize) -> Value {
     let mut header = match line.source {
         PictureSource::Estimate(run) | PictureSource::Finished(run) => {
@@ -124,7 +124,7 @@ fn header(subject: &Subject, outcome: &Outcome, line: &Line, threads: usize) -> 
     header
 }
 
-/// A name as a file name: lower-case letters, digits and hyphens.
+/// Turns a run's name into a file name: lower-case letters, digits and hyphens.
 fn slug(name: &str) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' }).collect();

@@ -30,15 +30,15 @@ use progress::Reporter;
 use runs::Run;
 use std::collections::HashSet;
 
-/// Seconds of each run if no option limits it.
+/// Seconds of each run (a render by one method) if no option limits it.
 const DEFAULT_TIME: f64 = 60.0;
 
-/// Seconds of each run; `None`: only the iterations are limited.
+/// Seconds that each run may take; `None`: only the iterations are limited.
 fn time(args: &ConvergeArgs) -> Option<f64> {
     args.time.or(args.iterations.is_none().then_some(DEFAULT_TIME))
 }
 
-/// Compares methods. Everything that can be wrong is found before the first light path.
+/// Compares methods, as `caustique converge`. Everything that can be wrong is found before the first light path.
 pub fn run(args: &ConvergeArgs) -> Result<()> {
     let runs = runs::all(args)?;
     let more = targets_of(args, &runs)?;
@@ -113,7 +113,7 @@ fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Res
     Ok(())
 }
 
-/// The runs and iterations of `--target-of`, whose errors are targets.
+/// Index and number of iterations of each run of `--target-of`, whose errors at these iterations are targets.
 fn targets_of(args: &ConvergeArgs, runs: &[Run]) -> Result<Vec<(usize, u64)>> {
     let entries: Vec<Entry> = runs.iter().map(|run| run.entry.clone()).collect();
     let place = |target: &options::TargetOf| {
@@ -131,7 +131,7 @@ fn targets_of(args: &ConvergeArgs, runs: &[Run]) -> Result<Vec<(usize, u64)>> {
     args.target_of.iter().map(place).collect()
 }
 
-/// The windows of `--crop`.
+/// The windows of `--crop`, after a check that they lie within the picture.
 fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     let (width, height) = camera.size();
     let windows: Vec<Window> = args.crop.iter().map(|crop| crop.0).collect();
@@ -143,7 +143,8 @@ fn windows(args: &ConvergeArgs, camera: &Camera) -> Result<Vec<Window>> {
     Ok(windows)
 }
 
-/// Settles the light paths of all runs and the method of runs by `auto`, with the limits of a run. Prints the choices.
+/// Settles the light paths of all runs, and the method of the runs by `auto`, with the limits of a run. Prints the
+/// choices.
 fn choose_all(
     args: &ConvergeArgs,
     runs: Vec<Run>,
@@ -170,7 +171,7 @@ fn choose_all(
     runs.into_iter().map(choose_one).collect()
 }
 
-/// Opens the finishes of the runs, and prints the warnings of their plans, each once.
+/// Opens the finishes (denoiser and network) of the runs, and prints the warnings of their plans, each once.
 fn open_finishes(
     args: &ConvergeArgs,
     runs: Vec<(Run, Chosen)>,
@@ -205,7 +206,7 @@ fn open_finishes(
     Ok((entries, finishes))
 }
 
-/// Options of all runs, for the report.
+/// Names and values of the options of all runs, for the report.
 fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
     let mut settings = vec![("scene".to_string(), args.scene.path.display().to_string())];
     let mut put = |name: &str, value: Option<String>| settings.extend(value.map(|value| (name.to_string(), value)));
@@ -221,7 +222,7 @@ fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
     settings
 }
 
-/// Facts about the machine and the libraries, for the report.
+/// Names and values of facts about the machine and the libraries, for the report.
 fn machine(threads: usize, entries: &[Entry]) -> Vec<(String, String)> {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));

@@ -131,12 +131,12 @@ impl ConvergeArgs {
     }
 }
 
-/// `--target-of RUN@N`.
+/// The value of `--target-of RUN@N`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TargetOf {
-    /// Name of the run.
+    /// Name of the run whose error is a target.
     pub run: String,
-    /// Iterations of the run.
+    /// Number of iterations of the run at which its error is the target.
     pub iterations: u64,
 }
 
@@ -151,7 +151,7 @@ impl FromStr for TargetOf {
     }
 }
 
-/// `--crop X,Y,W,H`.
+/// The value of `--crop X,Y,W,H`, a window of the picture (pixels).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CropChoice(pub Window);
 

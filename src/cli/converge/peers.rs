@@ -11,7 +11,7 @@ use caustique::report::peer_renders::{Driver, PeerDenoiser, PeerRenders};
 use caustique::scene::gltf::{Glass, LightUnits};
 use caustique::scene::{View, usd};
 
-/// The peers of `--with`; `None` if there are none.
+/// Prepares the other renderers of `--with`; `None` if there are none.
 ///
 /// # Errors
 /// A renderer is not installed, or `--time` is missing.
@@ -56,7 +56,8 @@ pub fn prepare(
     Ok(Some(PeerRenders { peers, driver, denoiser: denoising, time, stop }))
 }
 
-/// An option or a kind of file that the drivers do not support, so that the peers would render another scene.
+/// An option or a kind of file that the drivers of other renderers do not support, so that these would render another
+/// scene; `None` if all are supported.
 fn unsupported(args: &ConvergeArgs) -> Option<String> {
     let SceneOptions { path, frames, env, env_rotation, env_strength, light_units, glass, effects, .. } = &args.scene;
     let option = [

@@ -17,20 +17,20 @@ pub struct Reporter {
 }
 
 impl Reporter {
-    /// A reporter in the form of `--progress`.
+    /// Makes a reporter that prints in the form of `--progress`.
     pub fn new(form: Form) -> Reporter {
         let first = Some(Waiting::begin(form, "first iteration"));
         Reporter { form: form.resolved(), bar: None, first, clock: Clock::start(), next_line: 0.0 }
     }
 
-    /// Prints the progress of the reference. `fraction`: the finished share, 0 to 1.
+    /// Prints the progress of rendering the reference. `fraction`: the finished share, 0 to 1.
     pub fn reference(&mut self, iterations: u64, seconds: f64, fraction: f64) {
         let sentence = format!("reference: {iterations} iterations of each half, {}", duration(seconds));
         let line = json!({"reference": true, "iteration": iterations, "seconds": seconds, "fraction": fraction});
         self.tell(fraction, &sentence, &line.to_string());
     }
 
-    /// Prints the progress after a step of a run.
+    /// Prints the progress after a step of a run, a render by one of the compared methods.
     pub fn step(&mut self, step: &Step<'_>) {
         let name = step.name;
         let relmse = step.point.map(|point| point.errors.relmse);
@@ -67,7 +67,7 @@ impl Reporter {
         }
     }
 
-    /// Removes the bar from the terminal.
+    /// Removes the progress bar from the terminal.
     pub fn finish(&mut self) {
         (self.first, self.bar) = (None, None);
     }

@@ -14,11 +14,11 @@ use caustique::render::{Control, Method, Settings};
 use caustique::report::reference::{Halves, OwnError, Reference};
 use caustique::scene::View;
 
-/// The origin of a reference.
+/// The origin of the reference, the picture that errors are measured against.
 pub enum Source {
-    /// Read from a file.
+    /// The reference was read from a file.
     File(Reference),
-    /// To be rendered with these settings.
+    /// The reference is to be rendered with these settings.
     Own(Box<Settings>),
 }
 
@@ -61,7 +61,7 @@ pub fn source(
     Ok(Source::File(reference))
 }
 
-/// Settings for rendering a reference.
+/// Settings for rendering a reference, as the options ask.
 fn reference_settings(args: &ConvergeArgs, View { scene, camera }: View<'_>) -> Result<Box<Settings>> {
     let method = match args.reference_method {
         Some(method) => method,
@@ -84,7 +84,7 @@ fn reference_settings(args: &ConvergeArgs, View { scene, camera }: View<'_>) -> 
     Ok(Box::new(settings))
 }
 
-/// Prints the time of the reference and of the runs after it.
+/// Prints how long the rendering of the reference and the `runs` runs after it will take.
 fn announce(args: &ConvergeArgs, settings: &Settings, runs: usize) {
     let method = settings.method.name();
     let count = settings.iterations.map(|n| format!("{n} iterations each"));
@@ -102,7 +102,7 @@ fn announce(args: &ConvergeArgs, settings: &Settings, runs: usize) {
     ));
 }
 
-/// The reference. A reference that is rendered here is also written to the folder.
+/// Returns the reference. A reference that is rendered here is also written to the folder.
 ///
 /// # Errors
 /// The file cannot be written; a signal has stopped the render, after its file was written.

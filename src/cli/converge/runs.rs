@@ -11,20 +11,20 @@ use caustique::report::entry::Entry;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 
-/// Options under the headings of a run that a run may not have: all runs share them, or they write files.
+/// Options under [`HEADINGS_OF_RUN`] that a single run may not have: all runs share them, or they write files.
 const NOT_OF_RUN: [&str; 3] = ["seed", "max_depth", "debug_techniques"];
-/// Headings of options that may differ between runs.
+/// Help headings of the options that may differ between runs.
 const HEADINGS_OF_RUN: [&str; 3] = ["Method", "Finish", "Expert"];
 
-/// A run with its options.
+/// A run, one of the compared renders, with its options.
 pub struct Run {
-    /// Name and settings for the report. The finish is set when its libraries have been found.
+    /// Name and settings of the run for the report. The finish is set when its libraries have been found.
     pub entry: Entry,
-    /// Options of the render.
+    /// Options of the run, those of `caustique render`.
     pub args: RenderOptions,
 }
 
-/// The runs of `--methods` and `--run`.
+/// The runs that `--methods` and `--run` ask for.
 ///
 /// # Errors
 /// A run has an option that a render does not have, or that may not differ between runs; two runs have the same name.
@@ -57,7 +57,7 @@ pub fn all(args: &ConvergeArgs) -> Result<Vec<Run>> {
     Ok(runs)
 }
 
-/// A run of a method with its defaults and one level.
+/// A run of a method with its defaults and one bandwidth level.
 pub fn by_method(args: &ConvergeArgs, method: MethodChoice) -> Result<Run> {
     let name = method.name().to_string();
     let mut words = vec!["--method".to_string(), name.clone()];
@@ -94,7 +94,7 @@ fn parse(args: &ConvergeArgs, name: &str, options: &str, words: Vec<String>) -> 
     Ok(Run { entry, args: options })
 }
 
-/// Errors: an option concerns neither the method nor the finish of one run.
+/// Fails if an option concerns neither the method nor the finish of one run.
 fn check_options_of_run(command: &Command, matches: &ArgMatches) -> Result<()> {
     let given = |arg: &&clap::Arg| matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
     for arg in command.get_arguments().filter(given) {

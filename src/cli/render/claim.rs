@@ -17,14 +17,14 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
-/// Time between two touches of a claim.
+/// Time between two touches of a claim, the file by which a process says that it renders a frame.
 const TOUCH_INTERVAL: Duration = Duration::from_secs(15);
-/// Age from which the owner of an untouched claim counts as dead: servers may show a file's time a minute late.
+/// Age from which the process of an untouched claim counts as dead: servers may show a file's time a minute late.
 const MAX_AGE: Duration = Duration::from_secs(180);
-/// Most bytes that are read of a claim.
+/// Most bytes that are read of a claim's file.
 const MAX_BYTES: u64 = 1 << 12;
 
-/// The result of claiming a frame.
+/// The result of claiming a frame for this process.
 pub enum Claimed {
     /// This process renders the frame.
     Here(Claim),
@@ -32,7 +32,7 @@ pub enum Claimed {
     Elsewhere(String),
 }
 
-/// The claim of a frame, released when dropped.
+/// The claim of a frame: a file that keeps other processes from rendering it, removed when dropped.
 pub struct Claim {
     path: PathBuf,
     owner: String,
@@ -41,7 +41,7 @@ pub struct Claim {
 }
 
 impl Claim {
-    /// Claims the frame that is written to `output`.
+    /// Claims for this process the frame that is written to `output`.
     ///
     /// # Errors
     /// The folder is not writable.
@@ -84,7 +84,7 @@ impl Claim {
         }
     }
 
-    /// Starts a thread that touches the file until the claim is dropped.
+    /// Starts a thread that touches the claim's file until the claim is dropped.
     fn keep(path: PathBuf, owner: String, file: File) -> Claim {
         let (over, end) = channel::<()>();
         let touch = move || {
@@ -118,7 +118,7 @@ fn touch(file: &File) -> io::Result<()> {
     file.sync_all()
 }
 
-/// The text of a claim and its modification time; `None` if there is no claim.
+/// The text of a claim's file and its modification time; `None` if there is no claim.
 fn read(path: &Path) -> io::Result<Option<(String, SystemTime)>> {
     let read = || {
         let file = File::open(path)?;
@@ -133,15 +133,15 @@ fn read(path: &Path) -> io::Result<Option<(String, SystemTime)>> {
     }
 }
 
-/// Time since a claim was touched, by the server's clock.
+/// Time since a claim's file was touched, by the server's clock.
 fn age(path: &Path, touched: SystemTime) -> io::Result<Duration> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let now = tempfile::tempfile_in(folder)?.metadata()?.modified()?;
     Ok(now.duration_since(touched).unwrap_or_default())
 }
 
-/// Whether the owner of a claim has died: it is a process of this machine that does not exist, or it has not touched the
-/// claim for [`MAX_AGE`].
+/// Whether the process that holds a claim has died: it is a process of this machine that does not exist, or it has not
+/// touched the claim for [`MAX_AGE`].
 fn is_dead(holder: &str, age: Duration) -> bool {
     let mut lines = holder.split('\n').skip(1);
     let of_here = lines.next() == Some(machine().as_str());
@@ -154,8 +154,8 @@ fn is_gone(process: &str) -> bool {
     process.is_some_and(|process| test_kill_process(process) == Err(Errno::SRCH))
 }
 
-/// Removes the claim of a dead owner. Several processes may try this at once: under a lock, each checks that the file is
-/// still the claim that it has read. On file systems without locks a frame may be rendered twice.
+/// Removes the claim's file of a dead process. Several processes may try this at once: under a lock, each checks that
+/// the file is still the claim that it has read. On file systems without locks a frame may be rendered twice.
 fn remove(path: &Path, touched: SystemTime) -> io::Result<()> {
     let removed = || {
         let file = File::open(path)?;
@@ -170,8 +170,8 @@ fn remove(path: &Path, touched: SystemTime) -> io::Result<()> {
     }
 }
 
-/// The text of a claim of this process: a line for people, the machine, the process, and the current time to tell claims
-/// apart.
+/// The text by which this process claims a frame: a line for people, the machine, the process, and the current time to
+/// tell claims apart.
 fn owner() -> String {
     let process = std::process::id();
     let moment = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default().as_nanos();
@@ -185,7 +185,7 @@ fn machine() -> String {
     format!("{} {} {}", host(), boot.trim(), namespace.display())
 }
 
-/// Name of the machine.
+/// Name of this machine.
 fn host() -> String {
     fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned()
 }

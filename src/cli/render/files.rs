@@ -17,7 +17,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// Writes the EXR. If that fails, writes it to the system's folder for temporary files, so that the render is not lost.
+/// Writes the EXR of a render. If that fails, writes it to the system's folder for temporary files, so that the render
+/// is not lost.
 ///
 /// # Errors
 /// The EXR could not be written to its file or to standard output. The hint names the temporary file.
@@ -40,14 +41,14 @@ pub fn write(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, sums: O
     })
 }
 
-/// Largest share of the time of a render that writing its estimate may take.
+/// Largest share of a render's time that writing its unfinished picture may take.
 const MAX_ESTIMATE_SHARE: f64 = 0.05;
 /// Bytes per second that a slow disk writes.
 const MIN_BYTES_PER_SECOND: f64 = 2e8;
 
-/// Writes the unfinished EXR beside the output, in case the program is killed during the finish. The output itself is only
-/// ever a finished picture. Writes nothing if that takes a large share of the `seconds` of the render. Ignores errors,
-/// which occur again when the finished picture is written.
+/// Writes the unfinished EXR beside the output, in case the program is killed during the finish, and returns its path.
+/// The output itself is only ever a finished picture. Writes nothing if that takes a large share of the `seconds` of
+/// the render. Ignores errors, which occur again when the finished picture is written.
 pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes, seconds: f64) -> Option<PathBuf> {
     let is_file = std::fs::metadata(&args.output).map_or(true, |data| data.is_file());
     let bytes: usize = set.layers.iter().flat_map(|layer| &layer.planes).map(|p| size_of_val(&p.values[..])).sum();
@@ -111,7 +112,7 @@ pub fn check_usd_layer(args: &RenderArgs) -> Result<()> {
     output::check(path, "usda")
 }
 
-/// Writes the USD layer, if the user wants one.
+/// Writes the USD layer that points to the EXR, if the user wants one.
 ///
 /// # Errors
 /// The layer could not be written.
@@ -119,7 +120,7 @@ pub fn write_usd_layer(args: &RenderArgs, set: &LayerSet) -> Result<()> {
     args.usd_layer.as_ref().map_or(Ok(()), |path| usd_layer::write(path, &args.output, set))
 }
 
-/// An EXR in a new temporary folder.
+/// An EXR in a new folder for temporary files, to save a render whose output cannot be written.
 struct TemporaryExr {
     folder: TempDir,
     path: PathBuf,
@@ -133,7 +134,7 @@ impl TemporaryExr {
         Ok(TemporaryExr { folder, path })
     }
 
-    /// Keeps the EXR, and adds its path to an error.
+    /// Keeps the temporary EXR, and adds its path to an error.
     fn keep(self, error: Error) -> Error {
         let _ = self.folder.keep();
         error.hint(format!("the render is in {}", self.path.display()))

@@ -28,7 +28,7 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 pub use summary::{Summary, place, print_finish, print_picture, warn_unseen};
 
-/// Renders a scene, or frames of its animation.
+/// Renders a scene, or frames of its animation, as `caustique render`.
 pub fn run(args: &RenderArgs) -> Result<()> {
     if !args.has_output() {
         let cause = "the following required arguments were not provided: --output <OUT.exr>";
@@ -43,7 +43,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     })
 }
 
-/// Renders one picture. Everything that can be wrong is found before the first light path.
+/// Renders one picture, of a scene or of a frame. Everything that can be wrong is found before the first light path.
 fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
     let picture = args.picture_request()?;
     let layers = args.run.selection()?;
@@ -79,16 +79,16 @@ struct Reports<'a> {
     waiting: Option<Waiting>,
     reporter: Option<Reporter>,
     preview: Option<Preview<'a>>,
-    /// The reason for the choice of `auto`.
+    /// The reason for which `auto` has chosen the method, for the summary.
     reason: Option<String>,
     summary: Option<Summary>,
-    /// Seconds of the render.
+    /// Seconds that the render has taken.
     seconds: f64,
-    /// The file of the estimate, until the finished picture is written.
+    /// Path of the unfinished picture, which is kept until the finished picture is written.
     estimate: Option<PathBuf>,
-    /// An explanation, should the picture turn out black.
+    /// Explanation to print if the picture turns out black.
     reason_if_black: String,
-    /// Frame and look that the scene asks for.
+    /// Frame, exposure and tone curve that the scene asks for.
     made_for: PictureDefaults,
 }
 
@@ -153,7 +153,7 @@ impl<'a> Reports<'a> {
         }
     }
 
-    /// A phase, for people who wait.
+    /// Describes a long part of the render to people who wait.
     fn describe(&self, phase: Phase) -> String {
         match phase {
             Phase::Reading => format!("reading {}", self.args.options.scene.path.display()),
@@ -180,13 +180,13 @@ impl<'a> Reports<'a> {
         self.reason_if_black.clone_from(&plan.reason_if_black);
     }
 
-    /// Adds to the error of a signal before the first iteration that nothing is written.
+    /// Adds to the error of a render that a signal stopped before the first iteration that nothing is written.
     fn explain(&self, error: Error) -> Error {
         let interrupt = self.interrupt.as_ref().filter(|_| error.kind == ErrorKind::Interrupted);
         interrupt.and_then(|interrupt| interrupt.check_before_first_iteration(&self.args.output).err()).unwrap_or(error)
     }
 
-    /// Writes all files, and reports how the render ended.
+    /// Writes all files of a render, and reports how it ended.
     fn deliver(self, delivery: Delivery) -> Result<()> {
         let Reports { args, summary, preview, made_for, reason_if_black, estimate, .. } = self;
         let Delivery { set, attributes, techniques, sums, .. } = &delivery;
@@ -217,7 +217,7 @@ impl<'a> Reports<'a> {
     }
 }
 
-/// Reports time, error and warnings of a render.
+/// Prints time, error and warnings of a render that has ended.
 fn print_end(args: &RenderArgs, summary: &Summary, delivery: &Delivery, reason_if_black: &str) {
     let talk = args.progress.for_people();
     if talk {
@@ -235,14 +235,14 @@ fn print_end(args: &RenderArgs, summary: &Summary, delivery: &Delivery, reason_i
     summary.print_rejected(&args.output, talk);
 }
 
-/// The beauty layer without the others.
+/// The beauty layer of a picture without the other layers.
 fn beauty(set: &LayerSet) -> Result<LayerSet> {
     let mut alone = LayerSet::new(set.width, set.height);
     alone.layers.extend(set.get("").cloned());
     Ok(alone)
 }
 
-/// Prints the warnings of a plan.
+/// Prints the warnings of a render's plan.
 pub fn print_plan_warnings(scene: &Path, warnings: &[String]) {
     for warning in warnings {
         say(&format!("warning: {}: {warning}", scene.display()));

@@ -73,7 +73,7 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// The picture and its method, for the pipeline.
+    /// The picture and its method as the pipeline, which renders it, wants them.
     ///
     /// # Errors
     /// Options contradict each other.
@@ -129,7 +129,7 @@ impl RenderArgs {
         files.into_iter().filter_map(|(option, path)| Some((option, path?)))
     }
 
-    /// Where and how often the checkpoint is saved; `None`: nowhere.
+    /// Where and how often the checkpoint of the render is saved; `None`: nowhere.
     pub fn saving(&self) -> Option<Saving> {
         // Checkpoints do not hold pictures per technique.
         if self.debug_techniques.is_some() { None } else { self.run.saving(Some(&self.output)) }

@@ -14,21 +14,22 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
-/// Least seconds between two previews.
+/// Smallest number of seconds between two previews.
 const MIN_INTERVAL: f64 = 2.0;
-/// Time between two previews over the time that one takes, so that previews take at most a tenth of the render.
+/// Ratio of the time between two previews to the time that one takes, so that previews take at most a tenth of the
+/// render.
 const INTERVAL_RATIO: f64 = 10.0;
-/// Address of tev.
+/// Address (host and port) at which the viewer tev listens.
 const TEV_ADDRESS: &str = "127.0.0.1:14158";
 
-/// Where previews are shown.
+/// Where previews of an unfinished render are shown.
 #[derive(Clone, Debug, Serialize)]
 pub enum Target {
-    /// An sRGB file with the exposure and the tone curve of the PNG.
+    /// Previews go to an sRGB file with the exposure and the tone curve of the PNG.
     Png(PathBuf),
-    /// A file with scene-linear Rec. 709 radiance and alpha.
+    /// Previews go to a file with scene-linear Rec. 709 radiance and alpha.
     Exr(PathBuf),
-    /// The viewer tev on this machine.
+    /// Previews go to the viewer tev on this machine.
     Tev,
 }
 
@@ -48,7 +49,7 @@ impl FromStr for Target {
 }
 
 impl Target {
-    /// The file, unless the target is a viewer.
+    /// Path of the preview's file; `None` for the viewer.
     pub fn file(&self) -> Option<&std::path::Path> {
         match self {
             Target::Png(path) | Target::Exr(path) => Some(path),
@@ -73,10 +74,10 @@ impl Target {
     }
 }
 
-/// Shows previews at intervals.
+/// Shows previews of an unfinished render at intervals.
 pub struct Preview<'a> {
     target: &'a Target,
-    /// The user's exposure and tone curve.
+    /// The user's exposure and tone curve for a PNG.
     look: &'a PictureArgs,
     /// Name of the picture in tev: the path of the output.
     name: String,
@@ -91,19 +92,20 @@ pub struct Preview<'a> {
 }
 
 impl<'a> Preview<'a> {
-    /// Previews of the picture that is written to `output`.
+    /// Makes the previews of the picture that is written to `output`.
     pub fn new(target: &'a Target, output: &Path, look: &'a PictureArgs, made_for: PictureDefaults) -> Preview<'a> {
         let name = output.display().to_string();
         Preview { target, look, name, made_for, clock: Clock::start(), next: 0.0, began: 0.0, tev: None, failed: false }
     }
 
-    /// Whether a preview is due.
+    /// Whether the next preview is due.
     pub fn due(&mut self) -> bool {
         self.began = self.clock.seconds();
         !self.failed && self.began >= self.next
     }
 
-    /// Shows a picture. `frame`: position within the whole picture. A failure is a warning and ends the previews.
+    /// Shows a picture as a preview. `frame`: position within the whole picture. A failure is a warning and ends the
+    /// previews.
     pub fn show(&mut self, picture: Result<LayerSet>, frame: Option<Frame>) {
         if let Err(error) = picture.and_then(|set| self.write(&set, frame)) {
             say(&format!("warning: --preview: {error}; the render goes on without"));
@@ -130,7 +132,7 @@ impl<'a> Preview<'a> {
         }
     }
 
-    /// Sends a picture to tev, which replaces the picture of the same name.
+    /// Sends a picture to tev, which replaces its picture of this name.
     fn stream(&mut self, set: &LayerSet) -> std::io::Result<()> {
         let name = self.name.clone();
         let beauty = set.beauty().map_err(std::io::Error::other)?;

@@ -68,8 +68,8 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     Ok(())
 }
 
-/// Whether the output of a frame exists. Files are replaced atomically, so an existing file is complete, unless it is an
-/// empty placeholder.
+/// Whether the output of the frame exists. Files are replaced atomically, so an existing file is complete, unless it is
+/// an empty placeholder.
 fn is_there(args: &RenderArgs) -> bool {
     std::fs::metadata(&args.output).is_ok_and(|data| data.is_file() && data.len() > 0)
 }

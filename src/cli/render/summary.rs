@@ -10,22 +10,22 @@ use caustique::pipeline::{Delivery, Place, Reached};
 use caustique::render::{ErrorCoverage, Rejections, Rendered, StopReason, peak_memory};
 use std::path::Path;
 
-/// Figures of a render, kept after its pixels are freed.
+/// Figures of a render for its report, kept after its pixels are freed.
 pub struct Summary {
     iterations: u64,
     light_paths: u64,
     seconds: f64,
     phases: String,
     error: Option<f64>,
-    /// Parts of the error that the error of the estimate includes.
+    /// Parts of the true error (noise, bias) that the error of the unfinished picture includes.
     error_coverage: ErrorCoverage,
-    /// Whether photons are merged or gathered within bandwidths of a single level.
+    /// Whether photons are merged or gathered within bandwidths of a single level, which do not show bias.
     has_one_bandwidth: bool,
     rejections: Rejections,
-    /// Bytes of a pixel's sums and of its samples in one iteration, and the number of levels.
+    /// Bytes of a pixel's sums and of its samples in one iteration, and the number of bandwidth levels.
     pixel: ([usize; 2], usize),
     stop: StopReason,
-    /// Photons, requested light paths and allowed bytes, if the map of `pm` became full.
+    /// Number of photons, requested light paths and allowed bytes; `None` unless the photon map of `pm` became full.
     full: Option<(u64, u32, u64)>,
 }
 
@@ -53,7 +53,7 @@ impl Summary {
         }
     }
 
-    /// Prints time, error and memory.
+    /// Prints time, error and memory of the render.
     pub fn print(&self) {
         let mut line = format!("{} iterations in {} ({})", self.iterations, duration(self.seconds), self.phases);
         if self.light_paths > 0 {
@@ -75,13 +75,13 @@ impl Summary {
         say(&format!("peak memory {peak:.2} GiB; the sums of a pixel, of {levels}, take {sums} bytes{measures}"));
     }
 
-    /// Parts of the error that the error of the finished picture includes. All quarters share the bias of the kernel, so
-    /// only levels show it.
+    /// Parts of the true error (noise, bias) that the error of the finished picture includes. All quarters share the
+    /// bias of the kernel, so only levels show it.
     pub fn coverage_of_finished(&self) -> ErrorCoverage {
         if self.has_one_bandwidth { ErrorCoverage::Noise } else { self.error_coverage }
     }
 
-    /// Prints the names of the written files.
+    /// Prints the names of the files that the render has written.
     pub fn print_files(args: &RenderArgs, set: &LayerSet, techniques: usize) {
         print_picture(&args.output, set);
         if let Some(png) = &args.picture.png {
@@ -92,7 +92,7 @@ impl Summary {
         }
     }
 
-    /// Warns if the photon map became full.
+    /// Warns if the photon map of `pm` became full.
     pub fn warn_full_map(&self) {
         if let Some((photons, light_paths, bytes)) = self.full {
             say(&format!(
@@ -112,7 +112,7 @@ impl Summary {
         }
     }
 
-    /// Errors: a signal has stopped the render.
+    /// Fails if a signal has stopped the render.
     pub fn check_interrupted(&self, args: &RenderArgs) -> Result<()> {
         if self.stop != StopReason::Interrupted {
             return Ok(());
@@ -139,11 +139,11 @@ pub fn print_picture(output: &Path, set: &LayerSet) {
     say(&format!("{name}: {} x {}, {channels} channels", set.width, set.height));
 }
 
-/// Share of the noise in few bright samples above which a warning is printed.
+/// Share of the noise in a few bright samples above which a warning is printed.
 const MAX_RARE_SHARE: f64 = 0.5;
 
-/// Prints the denoiser and the time of the finish, the error of the finished picture, the cost of halving it, and where it
-/// is largest. `coverage`: parts of the error that it includes.
+/// Prints the denoiser and the time of the finish, the error of the finished picture, the cost of halving it, and where
+/// it is largest. `coverage`: parts of the true error that it includes.
 pub fn print_finish(name: &str, delivery: &Delivery, coverage: ErrorCoverage) {
     let reached = delivery.reached.as_ref();
     let error = reached.map(|reached| {
@@ -172,7 +172,7 @@ pub fn warn_unseen(output: &Path, delivery: &Delivery) {
     }
 }
 
-/// A place for people: `caustics at 'Lamp' (Glass): 61 %`.
+/// A place of large error for people, with its share: `caustics at 'Lamp' (Glass): 61 %`.
 pub fn place(place: &Place) -> String {
     let Place { share, object, material, light } = place;
     let share = percent(*share);

@@ -9,7 +9,7 @@ use caustique::render::TechniquePicture;
 use caustique::scene::description::PictureDefaults;
 use std::path::Path;
 
-/// Creates the folder.
+/// Creates the folder for the technique pictures, if the user wants them.
 ///
 /// # Errors
 /// The folder cannot be created.

@@ -9,11 +9,12 @@
 use super::history::HistoryEntry;
 use crate::finish::{DEFAULT_CONVERGENCE_RATE, FinishedError};
 
-/// Range of the fitted exponent. Pure noise has 0.5; an error does not grow with the iterations.
+/// Range of the fitted exponent `s`: noise falls as iterations^-s. Pure noise has 0.5; an error does not grow with the
+/// iterations.
 const EXPONENT_RANGE: (f64, f64) = (0.1, 0.55);
-/// Number of moments, the last ones, that determine the level of the error.
+/// Number of moments of the error history, the last ones, that determine the level of the error.
 const LATEST_MOMENTS: usize = 3;
-/// Standard deviation of log(squared error) between moments, without the noise of the measurement.
+/// Standard deviation of log(squared error) between moments of the error history, without the noise of the measurement.
 const MOMENT_SPREAD: f64 = 0.2;
 /// Standard deviation of log(estimated error / true error), without the noise of the measurement. Fitted on twelve scenes
 /// and checked on others (`docs/lab/accuracy.md`).
@@ -21,38 +22,40 @@ const MODEL_SPREAD: f64 = 0.25;
 /// Squared bias relative to its estimate, if bias grows with the bandwidth and not with its square. That happens at edges
 /// and on objects narrower than the kernel: there the next larger level has sqrt(2) times the bias, not twice the bias.
 const EDGE_BIAS_FACTOR: f64 = 5.828_427;
-/// Squared light of three photons relative to that of sqrt(2) photons. Where no photon has arrived, the expected number
-/// is below three with a probability of 95 %.
+/// Factor on the estimated squared error by light that photons have not brought, for the upper end of
+/// [`Accuracy::interval`]: squared light of three photons relative to that of sqrt(2) photons. Where no photon has
+/// arrived, the expected number is below three with a probability of 95 %.
 const UNSEEN_FACTOR: f64 = 4.5;
 /// Share of pictures whose error is inside [`Accuracy::interval`].
 pub const CONFIDENCE: f64 = 0.9;
 /// Half the width, in standard deviations, of the interval of a normal distribution with probability [`CONFIDENCE`].
 const CONFIDENCE_DEVIATIONS: f64 = 1.645;
 
-/// Model of the finished picture's error over the number of iterations.
+/// Model of how the finished picture's error falls with the number of iterations, fitted to errors measured during the
+/// render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
-    /// The exponent `s`.
+    /// Exponent `s`: noise falls as iterations^-s.
     pub exponent: f64,
-    /// Logarithm of the squared noise after one iteration, fitted to the latest moments.
+    /// Logarithm of the squared relative noise after one iteration, fitted to the latest moments of the history.
     log_noise: f64,
-    /// Squared bias, which does not change with the iterations.
+    /// Squared relative bias, which does not change with the iterations.
     pub squared_bias: f64,
-    /// Squared error by light that photons have not brought ([`FinishedError::unseen`]).
+    /// Squared relative error by light that photons have not brought ([`FinishedError::unseen`]).
     pub squared_unseen: f64,
     /// Standard error of the logarithm of the latest squared error, from the noise of its measurement.
     measurement_error: f64,
-    /// Share of the noise that a few bright samples hold ([`FinishedError::rare`]).
+    /// Share of the noise that a few bright samples hold, 0 to 1 ([`FinishedError::rare`]).
     pub rare: f64,
-    /// Iterations at the last moment with a measurement.
+    /// Number of iterations at the last moment of the history with a measured error.
     pub measured_at: u64,
 }
 
-/// Measured error at a moment, on logarithmic scales.
+/// Measured error of the finished picture at a moment of the history, on logarithmic scales.
 struct Moment {
-    /// Logarithm of the iterations of the measured picture, half of all.
+    /// Logarithm of the number of iterations in the measured picture, which is half of the render's iterations so far.
     log_iterations: f64,
-    /// Logarithm of the squared error.
+    /// Logarithm of the squared relative error.
     log_squared: f64,
     /// Standard error of `log_squared`.
     measurement_error: f64,
@@ -60,7 +63,7 @@ struct Moment {
 }
 
 impl Moment {
-    /// `None` if the picture has no noise.
+    /// Takes the logarithms of an error that was measured after `iterations`; `None` if the picture has no noise.
     fn new(iterations: u64, measured: &FinishedError) -> Option<Moment> {
         // If the noise of the measurement hides the error, the error is most likely not larger than that noise.
         let squared = measured.noise.max(measured.deviation);
@@ -76,14 +79,14 @@ impl Moment {
     }
 }
 
-/// Weighted mean over moments.
+/// Mean of a value over moments of the history, by the weights of the moments.
 fn mean(moments: &[Moment], value: impl Fn(&Moment) -> f64) -> f64 {
     let add = |(sum, weight): (f64, f64), m: &Moment| (sum + m.weight * value(m), weight + m.weight);
     let (sum, weight) = moments.iter().fold((0.0, 0.0), add);
     sum / weight
 }
 
-/// The exponent `s` by weighted least squares with a prior.
+/// Fits the exponent `s` of the noise to the moments, by weighted least squares with a prior.
 fn fit_exponent(moments: &[Moment]) -> f64 {
     let (x, y) = (mean(moments, |m| m.log_iterations), mean(moments, |m| m.log_squared));
     let variance: f64 = moments.iter().map(|m| m.weight * (m.log_iterations - x).powi(2)).sum();
@@ -94,7 +97,8 @@ fn fit_exponent(moments: &[Moment]) -> f64 {
 }
 
 impl Accuracy {
-    /// Fits the model to a history; `None` if no moment has a measured error, or the pictures have no noise.
+    /// Fits the model to the error history of a render; `None` if no moment has a measured error, or the pictures have
+    /// no noise.
     pub fn fit(history: &[HistoryEntry]) -> Option<Accuracy> {
         let measured = || history.iter().filter_map(|entry| Some((entry.iterations, entry.finished?)));
         let moments: Vec<Moment> = measured().filter_map(|(n, error)| Moment::new(n, &error)).collect();
@@ -122,9 +126,9 @@ impl Accuracy {
         (self.log_noise - 2.0 * self.exponent * (iterations as f64).ln()).exp()
     }
 
-    /// Interval that contains the error of [`CONFIDENCE`] of all pictures. The upper end assumes that the pixels with few
-    /// bright samples are as noisy as these samples suggest, that the bias is of edges, and that up to three photons are
-    /// expected where none has arrived. The lower end assumes that no light is missing.
+    /// Interval that contains the relative error of [`CONFIDENCE`] of all pictures. The upper end assumes that the
+    /// pixels with few bright samples are as noisy as these samples suggest, that the bias is of edges, and that up to
+    /// three photons are expected where none has arrived. The lower end assumes that no light is missing.
     pub fn interval(&self, iterations: u64) -> [f64; 2] {
         let factor = (CONFIDENCE_DEVIATIONS * MODEL_SPREAD.hypot(0.5 * self.measurement_error)).exp();
         let (noise, bias) = (self.squared_noise(iterations), self.squared_bias);
@@ -132,7 +136,7 @@ impl Accuracy {
         [(noise + bias).sqrt() / factor, (most + (UNSEEN_FACTOR * self.squared_unseen).min(1.0)).sqrt()]
     }
 
-    /// Iterations after which the error is `error`; `None` if bias or missing light keep it larger.
+    /// Iterations after which the relative error has fallen to `error`; `None` if bias or missing light keep it larger.
     pub fn iterations_to(&self, error: f64) -> Option<f64> {
         let noise = error * error - self.squared_bias - self.squared_unseen;
         let iterations = ((self.log_noise - noise.ln()) / (2.0 * self.exponent)).exp();

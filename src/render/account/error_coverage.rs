@@ -7,7 +7,7 @@
 use crate::render::settings::Settings;
 use serde::Serialize;
 
-/// Parts of the error that an estimate includes.
+/// Parts of a picture's true error (noise, bias) that its error estimate includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum ErrorCoverage {
     /// Noise, and bias if the method has any.
@@ -23,7 +23,7 @@ pub enum ErrorCoverage {
 }
 
 impl ErrorCoverage {
-    /// Name in the file's header.
+    /// Name of this coverage in the header of the EXR.
     pub fn name(self) -> &'static str {
         match self {
             ErrorCoverage::All => "noise and bias",
@@ -32,7 +32,8 @@ impl ErrorCoverage {
         }
     }
 
-    /// Note to print after the number, such as ` (noise only)`; empty if the estimate is complete.
+    /// Note to print after an error estimate, such as ` (noise only)`; empty if the estimate includes all parts of the
+    /// error.
     pub fn note(self) -> &'static str {
         match self {
             ErrorCoverage::All => "",
@@ -43,7 +44,7 @@ impl ErrorCoverage {
 }
 
 impl Settings {
-    /// Parts of the error that estimates of such a render include.
+    /// Parts of the error that estimates for a render with these settings include.
     pub fn error_coverage(&self) -> ErrorCoverage {
         let compared = self.levels.picture_level() + 1 < self.compared_levels();
         match self.method {

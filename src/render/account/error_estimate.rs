@@ -19,30 +19,30 @@ use serde::{Deserialize, Serialize};
 /// large: where such pixels dominate the error, the estimate is too small until they have been sampled several times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorEstimate {
-    /// Mean relative variance.
+    /// Mean over pixels of the variance relative to the squared value.
     pub variance: f64,
-    /// Mean relative squared bias, at least 0.
+    /// Mean over pixels of the squared bias relative to the squared value, at least 0.
     pub squared_bias: f64,
-    /// Squared error that the samples do not show: pixels without a known value, and [`UnseenLight`].
+    /// Mean squared relative error that the samples do not show: pixels without a known value, and [`UnseenLight`].
     pub unknown: f64,
 }
 
-/// Error of a picture and the light that is missing from it.
+/// Estimated error of a picture, and the light that photons have hardly brought to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorReport {
     /// Squared relative error, unseen light included; `None` before two iterations and while the picture is black.
     pub estimate: Option<ErrorEstimate>,
-    /// Light that photons have hardly brought.
+    /// Light that should reach the picture by photons, of which hardly any have arrived.
     pub unseen: UnseenLight,
 }
 
 impl ErrorEstimate {
-    /// The relative error: the root of the sum of all squared errors.
+    /// The relative error: the root of the sum of variance, squared bias and unknown squared error.
     pub fn root(&self) -> f64 {
         (self.variance + self.squared_bias + self.unknown).sqrt()
     }
 
-    /// Error of pixels by their samples alone.
+    /// Estimates the error of pixels by their samples alone, without unseen light; `None` if no pixel is known to be lit.
     fn of_samples(state: &PixelState<'_>) -> Option<ErrorEstimate> {
         let (own, compared) = (state.settings.levels.picture_level(), state.settings.compared_levels());
         let mut sum = ErrorEstimate::default();
@@ -79,13 +79,13 @@ impl ErrorReport {
         ErrorReport { estimate, unseen }
     }
 
-    /// The relative error: the root of [`ErrorReport::estimate`].
+    /// The relative error: the root of [`ErrorReport::estimate`]; `None` if there is no estimate.
     pub fn relative(&self) -> Option<f64> {
         self.estimate.map(|estimate| estimate.root())
     }
 }
 
-/// Whether a pixel sees a surface that is not black.
+/// Whether a pixel sees a surface whose albedo is not black.
 fn could_show_light(pixel: &PixelAccumulator) -> bool {
     pixel.depth().is_some() && pixel.albedo() != DVec3::ZERO
 }

@@ -8,26 +8,26 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
-    /// All iterations are done.
+    /// The render has done all iterations of its settings.
     Iterations,
-    /// The time limit has passed.
+    /// The time limit of the render has passed.
     Time,
     /// The estimated error has reached its target.
     Error,
-    /// The observer stopped the render.
+    /// The observer, which receives the progress, has stopped the render.
     Interrupted,
 }
 
-/// State of a render at one moment of its history.
+/// State of a render at one moment of its error history.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HistoryEntry {
-    /// Wall-clock seconds.
+    /// Wall-clock seconds since the render began.
     pub seconds: f64,
-    /// Processor seconds of the whole process.
+    /// Processor seconds of the whole process that the render has taken so far.
     pub cpu_seconds: f64,
-    /// Iterations done.
+    /// Iterations done so far.
     pub iterations: u64,
-    /// Light paths emitted.
+    /// Light paths emitted so far.
     pub light_paths: u64,
     /// Estimated squared relative error; `None` before two iterations and while the picture is black.
     pub estimate: Option<ErrorEstimate>,

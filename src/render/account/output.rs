@@ -15,7 +15,7 @@ pub fn layer_shape(settings: &Settings, scene: &Scene) -> output::Shape {
     layer_shape_of(settings, &scene.survey, &scene.lights.groups().names)
 }
 
-/// Layers of a render, for a scene with these features and names of light groups.
+/// Layers of a render with these settings, for a scene with the features in `survey` and light groups of these names.
 pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -> output::Shape {
     output::Shape {
         levels: settings.levels.count,
@@ -31,7 +31,7 @@ pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -
 }
 
 impl Rendered {
-    /// Layers whose names are `wanted`, without cryptomattes.
+    /// Makes the layers of the render's EXR whose names are `wanted`, without cryptomattes.
     ///
     /// # Errors
     /// None for renders: the number of pixels fits the size of the picture.
@@ -39,9 +39,9 @@ impl Rendered {
         output::layers((self.width, self.height), &self.pixels, &self.bandwidths, shape, wanted)
     }
 
-    /// JSON object of the file's header: settings, counts, time and estimated error of the render. The pipeline adds
-    /// arguments, warnings, the finish and the peak of memory. `threads` is `None` for a reproducible file, whose header
-    /// has no clocks, memory or threads.
+    /// JSON object of the EXR's header: settings, counts, time and estimated error of the render. The pipeline adds
+    /// arguments, warnings, the finish and the peak of memory. `threads` is `None` for a reproducible file, whose
+    /// header has no clocks, memory or threads.
     pub fn header(&self, threads: Option<usize>) -> Map<String, Value> {
         let Rendered { settings, stats, .. } = self;
         let mut header = Map::new();
@@ -75,7 +75,8 @@ impl Rendered {
         header
     }
 
-    /// Photons stored and gathered, by kind, and the relative error by light that photons have hardly brought.
+    /// The header's key `unseen`: photons stored and gathered, by kind, and the relative error by light that photons
+    /// have hardly brought.
     fn unseen_header(&self) -> Value {
         let PhotonCounts { stored, gathered } = self.stats.photon_record.counts;
         let counts = |kind: Kind| json!({"stored": stored[kind as usize], "gathered": gathered[kind as usize]});
@@ -100,7 +101,7 @@ fn history_header(entry: &HistoryEntry, with_clocks: bool) -> Value {
     value
 }
 
-/// Name of the reason in the header's `stopped`.
+/// Name of a reason to stop in the key `stopped` of the EXR's header.
 pub fn stop_name(reason: StopReason) -> &'static str {
     match reason {
         StopReason::Iterations => "iterations",

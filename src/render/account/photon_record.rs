@@ -33,30 +33,31 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Pixels whose kernels are compared with all pixels.
+/// Number of sampled pixels whose photon kernels are compared with the places of all pixels.
 const KERNEL_SAMPLES: usize = 32;
 
-/// Photons that a render expects and has counted.
+/// Photons that a render is expected to store, and numbers of those stored and gathered so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotonRecord {
-    /// Kinds of light that are present in the scene and that photons carry.
+    /// For each kind of photons (caustic or indirect), whether the scene has such light and photons carry it.
     expected: ByKind<bool>,
     /// Flux of all lights, mean of RGB (W).
     flux: f64,
-    /// Photons so far.
+    /// Photons stored and gathered so far.
     pub counts: PhotonCounts,
 }
 
-/// Error by light that photons should bring and have hardly brought, which the scatter of the samples does not show.
+/// Error by light that should come by photons of which hardly any have arrived. The scatter of the samples does not
+/// show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UnseenLight {
-    /// Squared relative error of the picture.
+    /// Squared relative error of the picture by this light.
     pub squared: f64,
-    /// The kind of light that contributes most of the error.
+    /// The kind of photons that contributes most of this error; `None` while nothing is estimated.
     pub largest: Option<UnseenKind>,
 }
 
-/// Counts of a kind of photons.
+/// Counts of one kind of photons, caustic or indirect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnseenKind {
     kind: Kind,
@@ -65,7 +66,7 @@ pub struct UnseenKind {
 }
 
 impl PhotonRecord {
-    /// The record before the first iteration.
+    /// Makes the record of a render before its first iteration.
     pub(in crate::render) fn new(scene: &Scene, settings: &Settings, initial_media: &InitialMedia) -> PhotonRecord {
         let search = settings.search();
         let owned = [Owner::Photons, Owner::Connections].map(|owner| search.owned_by(owner));
@@ -77,7 +78,7 @@ impl PhotonRecord {
         PhotonRecord { expected, flux, counts: PhotonCounts::default() }
     }
 
-    /// Error by light that photons have hardly brought, after `light_paths` light paths.
+    /// Estimates the error by light that photons have hardly brought, after `light_paths` light paths.
     pub(in crate::render) fn unseen(&self, state: &PixelState<'_>, light_paths: u64) -> UnseenLight {
         let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| self.expected[*kind as usize]).collect();
         if kinds.is_empty() || light_paths == 0 || state.values.iter().all(|value| *value == 0.0) {
@@ -119,12 +120,12 @@ impl PhotonRecord {
 }
 
 impl UnseenLight {
-    /// Whether unseen light is more than half of the square of a relative error.
+    /// Whether the squared error by unseen light is more than half of the square of the relative error `error`.
     pub fn dominates(&self, error: f64) -> bool {
         2.0 * self.squared > error * error
     }
 
-    /// A sentence for users that names the missing light and the options that help.
+    /// A sentence for users that names the missing light and the options that help; `None` if nothing is estimated.
     pub fn sentence(&self, settings: &Settings) -> Option<String> {
         let UnseenKind { kind, stored, gathered } = self.largest?;
         let light = match kind {
@@ -155,9 +156,9 @@ fn light_sum(pixels: &[PixelAccumulator], kind: Kind) -> f64 {
 
 /// First hits of the pixels that see a surface, to compare kernels with.
 struct Kernels {
-    /// Pixels of the picture.
+    /// Number of pixels of the picture.
     count: usize,
-    /// Index of a pixel, and where its first camera path hit a surface.
+    /// For each sampled pixel that sees a surface, its index and the point where its first camera path hit the surface.
     hits: Vec<(usize, Vec3)>,
 }
 
@@ -168,8 +169,8 @@ impl Kernels {
         Kernels { count: pixels.len(), hits }
     }
 
-    /// Share of the picture's pixels that lie within the kernel of one of them and so gather the same photons: the mean
-    /// over [`KERNEL_SAMPLES`] pixels.
+    /// Share of the picture's pixels that lie within the kernel of one pixel and so gather the same photons: the mean
+    /// over [`KERNEL_SAMPLES`] pixels. `radius2` is the squared kernel radius of a pixel.
     fn mean_share(&self, radius2: impl Fn(usize) -> f32 + Sync) -> f64 {
         let step = self.hits.len().div_ceil(KERNEL_SAMPLES).max(1);
         let sampled: Vec<(Vec3, f32)> = self.hits.iter().step_by(step).map(|&(i, p)| (p, radius2(i))).collect();

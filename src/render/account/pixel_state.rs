@@ -6,14 +6,14 @@ use crate::render::settings::Settings;
 use crate::stat::floor;
 use crate::transport::Indirect;
 
-/// Pixels and bandwidths after the last iteration.
+/// Pixels and bandwidths of a render after its last iteration, from which its error is estimated.
 pub(in crate::render) struct PixelState<'a> {
     pub pixels: &'a [PixelAccumulator],
     pub settings: &'a Settings,
     bandwidths: &'a BandwidthState,
-    /// Mean of RGB of each pixel, in the level that is the picture.
+    /// Value of each pixel, the mean of RGB, in the bandwidth level that is the picture.
     pub values: Vec<f64>,
-    /// Added to squared values in relative errors.
+    /// Floor of relative errors: added to the squared value by which a squared error is divided.
     pub floor: f64,
 }
 
@@ -29,7 +29,8 @@ impl<'a> PixelState<'a> {
         PixelState { pixels, settings, bandwidths, values, floor }
     }
 
-    /// Squared bandwidth of the picture's level at a pixel. With [`Indirect::Paths`] only caustic photons have one.
+    /// Squared bandwidth of photons of `kind` at the pixel `index`, in the picture's level (square scene units). With
+    /// [`Indirect::Paths`] only caustic photons have one.
     pub fn radius2(&self, index: usize, kind: Kind) -> f32 {
         let kind = if self.settings.indirect == Indirect::Paths { Kind::Caustic } else { kind };
         self.bandwidths.radius2(index, &self.pixels[index], kind, self.settings.levels.picture_level())

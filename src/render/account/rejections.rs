@@ -4,19 +4,19 @@ use crate::estimator::PixelAccumulator;
 use crate::transport::Cause;
 use serde_json::{Map, Value, json};
 
-/// Share of rejected samples above which the picture may be wrong.
+/// Share of rejected samples among all samples above which the picture may be wrong.
 const MAX_REJECTED_SHARE: f64 = 1e-6;
 
-/// Counts of rejected samples, photons and light paths.
+/// Counts of samples, photons and light paths that were rejected because they were not finite.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rejections {
-    /// Samples of pixels, rejected ones included.
+    /// Number of samples of all pixels, rejected ones included.
     samples: u64,
-    /// Rejected samples, in the order of [`Cause::ALL`].
+    /// Number of rejected samples by cause, in the order of [`Cause::ALL`].
     by_cause: [u64; Cause::ALL.len()],
-    /// Photons that are not in their map, and light paths that ended early.
+    /// Number of photons that were rejected, and so are not in their map, and of light paths that ended early.
     light: u64,
-    /// Camera paths whose albedo, normal or depth was rejected.
+    /// Number of camera paths whose albedo, normal or depth was rejected.
     features: u64,
 }
 
@@ -33,23 +33,23 @@ impl Rejections {
         all
     }
 
-    /// Number of rejected samples.
+    /// Number of rejected samples of all pixels, by any cause.
     pub fn rejected(&self) -> u64 {
         self.by_cause.iter().sum()
     }
 
-    /// Counts by the names in the header's `rejected_by`.
+    /// Names and counts of the key `rejected_by` in the EXR's header: samples by cause, light paths and features.
     fn counts(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let samples = Cause::ALL.into_iter().map(Cause::name).zip(self.by_cause);
         samples.chain([("light_paths", self.light), ("features", self.features)])
     }
 
-    /// The header's `rejected_by`.
+    /// The value of the key `rejected_by` in the EXR's header: counts by cause.
     pub fn header(&self) -> Map<String, Value> {
         self.counts().map(|(name, count)| (name.to_owned(), json!(count))).collect()
     }
 
-    /// A sentence for users; `None` if nothing was rejected.
+    /// A sentence for users about rejected samples; `None` if nothing was rejected.
     pub fn sentence(&self) -> Option<String> {
         let counts: Vec<String> = self
             .counts()
@@ -65,8 +65,8 @@ impl Rejections {
         })
     }
 
-    /// Whether the share of rejected samples and light paths is so large that the picture may be wrong. Features do not
-    /// count.
+    /// Whether the share of rejected samples and light paths is so large that the picture may be wrong. Rejected
+    /// albedos, normals and depths do not count.
     pub fn are_too_many(&self) -> bool {
         (self.rejected() + self.light) as f64 > MAX_REJECTED_SHARE * self.samples as f64
     }

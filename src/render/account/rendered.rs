@@ -10,36 +10,37 @@ use crate::photon::Kind;
 use crate::render::pass::{TechniquePicture, sample_bytes};
 use crate::render::settings::Settings;
 
-/// The result of a render.
+/// The result of a render: its pixels, bandwidths, statistics and estimated error.
 pub struct Rendered {
     /// Width of the picture (pixels).
     pub width: u32,
     /// Height of the picture (pixels).
     pub height: u32,
-    /// Pixels, row by row from the top.
+    /// Accumulated samples of each pixel, row by row from the top.
     pub pixels: Vec<PixelAccumulator>,
-    /// A picture per technique, if [`Settings::techniques`] is set and the method has several.
+    /// One picture per sampling technique, if [`Settings::techniques`] is set and the method has several; empty
+    /// otherwise.
     pub techniques: Vec<TechniquePicture>,
-    /// Bandwidths of the last iteration.
+    /// Kernel bandwidths of all pixels in the last iteration.
     pub bandwidths: BandwidthState,
     /// Settings of the render.
     pub settings: Settings,
-    /// Counts, times and error history.
+    /// Counts, times and error history of the render.
     pub stats: RenderStats,
-    /// Estimated error of the pixels.
+    /// Estimated error of the picture.
     pub error: ErrorReport,
     /// Why the render stopped.
     pub stop: StopReason,
 }
 
 impl Rendered {
-    /// Bytes per pixel: its sums with those of levels and light groups, and what one iteration keeps of it
-    /// ([`sample_bytes`]).
+    /// Bytes per pixel: its sums with those of bandwidth levels and light groups, and the samples that one iteration
+    /// keeps of it ([`sample_bytes`]).
     pub fn bytes_per_pixel(&self) -> [usize; 2] {
         [self.pixels.first().map_or(0, PixelAccumulator::size), sample_bytes(&self.settings)]
     }
 
-    /// Whether the photon map of a method that traces one map had no room for the photons of all light paths.
+    /// Whether the photon map had no room for the photons of all light paths; only for a method that traces one map.
     pub fn map_is_full(&self) -> bool {
         let RenderStats { iterations, light_paths, .. } = self.stats;
         self.settings.method.has_one_map() && iterations > 0 && light_paths < u64::from(self.settings.photons)
@@ -50,17 +51,18 @@ impl Rendered {
         self.stats.estimate_error(&PixelState::new(&self.pixels, &self.bandwidths, &self.settings))
     }
 
-    /// Squared bandwidth of the last iteration at the pixel `index`; level 0 is the smallest.
+    /// Squared bandwidth of photons of `kind` in the last iteration at the pixel `index` (square scene units); level 0
+    /// is the smallest.
     pub fn radius2(&self, index: usize, kind: Kind, level: usize) -> f32 {
         self.bandwidths.radius2(index, &self.pixels[index], kind, level)
     }
 
-    /// Samples that were rejected because they were not finite.
+    /// Number of samples of pixels that were rejected because they were not finite.
     pub fn rejected(&self) -> u64 {
         self.rejections().rejected()
     }
 
-    /// Counts of all samples, photons and light paths that were rejected because they were not finite.
+    /// Counts of samples, photons and light paths that were rejected because they were not finite.
     pub fn rejections(&self) -> Rejections {
         Rejections::count(&self.pixels, self.stats.light_rejected)
     }

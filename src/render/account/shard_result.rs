@@ -12,23 +12,24 @@ use crate::scene::MAX_SIZE;
 use crate::transport::MAX_LEVELS;
 use serde::{Deserialize, Serialize};
 
-/// The result of a shard without its pixels. Its bandwidths follow from the number of the last iteration.
+/// The result of a shard (a part of a render's iterations, for one machine) without its pixels. Its bandwidths follow
+/// from the number of the last iteration.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ShardResult {
-    /// Settings of the render.
+    /// Settings of the shard's render.
     pub settings: Settings,
-    /// Width and height (pixels).
+    /// Width and height of the picture (pixels).
     pub size: (u32, u32),
-    /// Number of the last iteration, from 1.
+    /// Number of the shard's last iteration among those of the whole render, from 1.
     pub last_iteration: u64,
-    /// Counts, times and error history.
+    /// Counts, times and error history of the shard.
     pub stats: RenderStats,
-    /// Why the render stopped.
+    /// Why the shard's render stopped.
     pub stop: StopReason,
 }
 
 impl Rendered {
-    /// The result without pixels.
+    /// The result of this shard without its pixels.
     pub fn shard_result(&self) -> ShardResult {
         ShardResult {
             settings: self.settings.clone(),
@@ -41,7 +42,7 @@ impl Rendered {
 }
 
 impl ShardResult {
-    /// Whether a render can have this result; one that was read from a file can hold any values.
+    /// Whether the values are ones that a render can have; a result that was read from a file can hold any values.
     pub fn is_sound(&self) -> bool {
         let Settings { shard, levels, .. } = &self.settings;
         let (width, height) = self.size;
@@ -53,7 +54,7 @@ impl ShardResult {
             && self.last_iteration == self.settings.last_iteration(self.stats.iterations)
     }
 
-    /// The result with its pixels, whose error ends the history.
+    /// Joins the result with its pixels, estimates their error and appends it to the error history.
     pub fn with_pixels(self, pixels: Vec<PixelAccumulator>) -> Rendered {
         let mut rendered = Rendered {
             width: self.size.0,
@@ -73,7 +74,7 @@ impl ShardResult {
         rendered
     }
 
-    /// Merges the shards of one render; `None` of an empty list.
+    /// Merges the results of the shards of one render; `None` if the list is empty.
     pub fn merge(shards: &[ShardResult]) -> Option<ShardResult> {
         let last = shards.iter().max_by_key(|shard| shard.last_iteration)?;
         let stops = shards.iter().map(|shard| shard.stop);
@@ -87,7 +88,8 @@ impl ShardResult {
     }
 }
 
-/// Sums of counts, and the wall-clock time of the slowest shard, as if machines had rendered the shards in parallel.
+/// Merges the statistics of shards: sums of counts, and the wall-clock time of the slowest shard, as if machines had
+/// rendered the shards in parallel.
 fn merge_stats(shards: &[ShardResult], last: &ShardResult) -> RenderStats {
     let stats = || shards.iter().map(|shard| &shard.stats);
     let phase = |get: fn(&Phases) -> f64| stats().map(|stats| get(&stats.phases)).sum();
@@ -120,8 +122,9 @@ fn merge_stats(shards: &[ShardResult], last: &ShardResult) -> RenderStats {
     }
 }
 
-/// The moments at which all shards had done the same number of iterations. Shards are independent: the variance of
-/// their mean is the mean of their variances divided by their number; all shards have the same bias.
+/// Merges the error histories of shards, at the moments at which all had done the same number of iterations. Shards are
+/// independent: the variance of their mean is the mean of their variances divided by their number; all shards have the
+/// same bias.
 fn merge_histories(shards: &[ShardResult]) -> Vec<HistoryEntry> {
     let Some((first, others)) = shards.split_first() else { return Vec::new() };
     let merge = |entry: &HistoryEntry| {
@@ -140,7 +143,7 @@ fn merge_histories(shards: &[ShardResult]) -> Vec<HistoryEntry> {
     first.stats.history.iter().filter_map(merge).collect()
 }
 
-/// Error of the mean of all shards; `None` if a shard has no estimate.
+/// Estimated error of the mean of all shards at one moment; `None` if a shard has no estimate.
 fn merge_estimates(entries: &[&HistoryEntry]) -> Option<ErrorEstimate> {
     let estimates: Vec<ErrorEstimate> = entries.iter().map(|entry| entry.estimate).collect::<Option<_>>()?;
     let count = estimates.len() as f64;

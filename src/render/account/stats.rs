@@ -11,21 +11,21 @@ use serde::{Deserialize, Serialize};
 /// Counts, times and error history of a render or of one shard.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RenderStats {
-    /// Iterations done.
+    /// Number of iterations done.
     pub iterations: u64,
-    /// Light paths emitted.
+    /// Number of light paths emitted in all iterations.
     pub light_paths: u64,
-    /// Photons in the map of the last iteration.
+    /// Number of photons in the map of the last iteration.
     pub photons: u64,
-    /// Photons and light paths rejected because they were not finite.
+    /// Number of photons and light paths that were rejected because they were not finite.
     pub light_rejected: u64,
-    /// Photons stored and gathered, and the light that they are expected to bring.
+    /// Numbers of photons stored and gathered, and the light that they are expected to bring.
     pub photon_record: PhotonRecord,
-    /// Time spent on the pilot, the iterations, and what the caller adds.
+    /// Time spent on the pilot (the short run before the first iteration), the iterations, and what the caller adds.
     pub time: TimeSpent,
-    /// Core-seconds per phase.
+    /// Core-seconds per phase: pilot, light paths, photon maps and camera paths.
     pub phases: Phases,
-    /// Estimated error against time.
+    /// Estimated error at moments of the render, in the order of time.
     pub history: Vec<HistoryEntry>,
 }
 
@@ -44,7 +44,7 @@ impl RenderStats {
         }
     }
 
-    /// Counts one iteration.
+    /// Adds the counts of one iteration.
     pub(in crate::render) fn add_iteration(&mut self, work: &Work) {
         self.iterations += 1;
         self.light_paths += work.light_paths;
@@ -58,14 +58,14 @@ impl RenderStats {
         ErrorReport::new(state, &self.photon_record, self.light_paths)
     }
 
-    /// Appends the current moment to the history.
+    /// Appends a moment with the current counts and times and this error to the history.
     pub(in crate::render) fn record_error(&mut self, estimate: Option<ErrorEstimate>) {
         let RenderStats { iterations, light_paths, time: TimeSpent { seconds, cpu_seconds }, .. } = *self;
         let entry = HistoryEntry { seconds, cpu_seconds, iterations, light_paths, estimate, finished: None };
         self.history.push(entry);
     }
 
-    /// Whether the last entry of the history is of the last iteration.
+    /// Whether the last moment of the error history is that of the last iteration.
     pub(in crate::render) fn is_recorded(&self) -> bool {
         self.history.last().is_some_and(|entry| entry.iterations == self.iterations)
     }

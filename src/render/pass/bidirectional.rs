@@ -38,22 +38,23 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// A light path and a camera path for every pixel, and the levels that they sample.
+/// Random numbers of the one light path and one camera path that an iteration traces for every pixel, and the bandwidth
+/// levels that this pair of paths samples.
 struct Pair {
     light: Domain,
     camera: Domain,
-    /// First level and number of levels.
+    /// Index of the first bandwidth level that the pair samples, and number of levels.
     levels: (usize, usize),
 }
 
 impl Pair {
-    /// The index of the picture level among the levels of the pair, if it has it.
+    /// Index of the picture's level `own` among the levels of the pair; `None` if the pair does not sample it.
     fn own(&self, own: usize) -> Option<usize> {
         own.checked_sub(self.levels.0).filter(|level| *level < self.levels.1)
     }
 }
 
-/// Integrator of the bidirectional methods.
+/// Integrator of the bidirectional methods (bdpt, bpm, vcm).
 pub struct Passes<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
@@ -63,20 +64,22 @@ pub struct Passes<'a> {
     guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
     tiles: Tiles,
-    /// Tiles whose light paths are walked, and what these leave. The lists keep their capacity over iterations.
+    /// Tiles whose light paths are traced, and, in `left`, the photons and splats of these paths. The lists keep their
+    /// capacity over iterations.
     sources: Vec<WholeTile>,
     left: Vec<Deposits>,
-    /// Samples of the current iteration, by pair.
+    /// Samples of all pixels in the current iteration, for each pair of paths.
     samples: Vec<SampleBuffer>,
-    /// Photons, and the iteration that left them.
+    /// Number of the iteration that traced the photons, and their map; `None` before the first one.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     recorder: FilmRecorder,
-    /// Expected number of photons within the largest initial bandwidth: the number of pixels that it covers.
+    /// Expected number of photons within the largest initial bandwidth: one light path starts per pixel, so it is the
+    /// number of pixels that the bandwidth covers.
     covered: f32,
 }
 
 impl<'a> Passes<'a> {
-    /// `settings.levels` must be one level unless the method has levels.
+    /// Makes the integrator. `settings.levels` must be one level unless the method has levels.
     pub fn new(
         scene: &'a Scene,
         camera: &'a Camera,
@@ -139,7 +142,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// Traces the photons of iteration `i`, if that was not rendered here.
+    /// Traces the photons of iteration `i`, if it was not rendered in this process.
     fn photons_of(&self, i: u64) -> PhotonMap<MergePhoton> {
         let (shared, tiles) = (self.shared, self.tiles);
         let mut parts = Vec::new();
@@ -163,7 +166,7 @@ impl<'a> Passes<'a> {
         PhotonMap::build(parts.concat())
     }
 
-    /// Adds iteration `i` (from 1) to all pixels; `None` if it was aborted.
+    /// Adds iteration `i` (from 1) to all pixels; `None` if the iteration was aborted.
     fn pass<W: TileRecorder>(&mut self, i: u64, pixels: &mut [PixelAccumulator], recorders: &mut [W]) -> Option<Work> {
         let shared = self.shared;
         if shared.techniques.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
@@ -229,7 +232,7 @@ impl<'a> Passes<'a> {
 struct Iteration<'i, 'a> {
     shared: Bidirectional<'a>,
     tiles: Tiles,
-    /// Photons of the previous iteration.
+    /// Map of the photons of the previous iteration; `None` without merging.
     map: Option<&'i PhotonMap<MergePhoton>>,
     schedule: Schedule,
     /// Expected number of photons within the largest initial bandwidth.
@@ -238,18 +241,18 @@ struct Iteration<'i, 'a> {
     pixels: &'i [PixelAccumulator],
 }
 
-/// The walks of one pair of paths per pixel.
+/// The paths of one pair, a light path and a camera path for every pixel, in one iteration.
 struct PairWalks<'i> {
     pair: &'i Pair,
     light_paths: &'i LightPaths<'i>,
-    /// Index of the picture level among the levels of the pair, if it has it.
+    /// Index of the picture's level among the levels of the pair; `None` if the pair does not sample it.
     own: Option<usize>,
     /// Random numbers of the camera paths.
     streams: Streams,
 }
 
 impl Iteration<'_, '_> {
-    /// Merging radii of a pixel at the levels of a pair.
+    /// Merging radii of a pixel at the bandwidth levels that a pair of paths samples.
     #[inline]
     fn levels(&self, pixel: u32, pair: &Pair) -> MergeLevels {
         let bandwidth = self.pixels[pixel as usize].bandwidths[0];
@@ -266,7 +269,7 @@ impl Iteration<'_, '_> {
         }))
     }
 
-    /// Walks the light paths of a tile, and its camera paths if the tile is on the film.
+    /// Traces the light paths of a tile, and its camera paths if the tile is on the film.
     fn walk_tile<W: TileRecorder>(
         &self,
         walks: &PairWalks<'_>,
@@ -305,7 +308,7 @@ impl Iteration<'_, '_> {
         }
     }
 
-    /// Adds the splats that a tile of the film receives.
+    /// Adds to the samples of a tile the splats that it receives: light that light paths send to the film.
     fn add_splats<'l, W: TileRecorder>(
         &self,
         walks: &PairWalks<'_>,
@@ -323,7 +326,7 @@ impl Iteration<'_, '_> {
     }
 }
 
-/// Number of photons by kind, as a surface with broad lobes would classify them.
+/// Number of photons by kind (caustic, indirect), classified as a surface with broad lobes would see them.
 fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
     let suffix = CameraSuffix::START.then(Event::Broad);
     let caustics =
@@ -337,17 +340,18 @@ fn light_paths(camera: &Camera, techniques: TechniqueSet) -> u32 {
     width * height
 }
 
-/// Bytes per tile of the whole picture whose light paths are walked, without splats and photons.
+/// Bytes that each tile of the whole picture takes while its light paths are traced, without splats and photons.
 pub fn bytes_per_whole_tile() -> u64 {
     (size_of::<WholeTile>() + size_of::<Deposits>()) as u64
 }
 
-/// Splats by receiving tile, in the order of the sending tiles, so that sums do not depend on threads.
+/// Splats (light that light paths send to the film) by receiving tile, in the order of the sending tiles, so that sums
+/// do not depend on threads.
 struct SplatsByTile<'l> {
     left: &'l [Deposits],
-    /// For each splat, the sending tile and the index in its list.
+    /// For each splat, the index of the sending tile and the index in that tile's list.
     order: Vec<(u32, u32)>,
-    /// The end of each tile's range in `order`.
+    /// For each receiving tile, the end of its range in `order`.
     ends: Vec<usize>,
 }
 

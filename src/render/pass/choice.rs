@@ -20,7 +20,7 @@ use crate::render::settings::{KernelChoice, Settings};
 use crate::scene::Scene;
 use crate::transport::{InitialMedia, TechniqueSet};
 
-/// The integrator of the method, before the first iteration.
+/// Makes the integrator of the settings' method, before the first iteration.
 pub(in crate::render) fn integrator<'a>(
     scene: &'a Scene,
     camera: &'a Camera,
@@ -42,7 +42,7 @@ pub(in crate::render) fn integrator<'a>(
     }
 }
 
-/// Progressive photon mapping with the bandwidth rule and the kernel of the settings.
+/// Makes the integrator of progressive photon mapping with the bandwidth rule and the kernel of the settings.
 fn sppm<'a>(tracer: PhotonTracer<'a>, settings: &'a Settings) -> Box<dyn Integrator + 'a> {
     use BandwidthRule as Rule;
     match settings.bandwidth_rule() {

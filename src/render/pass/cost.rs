@@ -10,51 +10,53 @@ use crate::render::settings::{BandwidthRule, Candidate, Settings};
 use crate::scene::{Scene, Survey};
 use crate::transport::{CameraPaths, Indirect, InitialMedia, VertexCounts};
 
-/// Start of a camera path: its ray, the pixel, and the pixel's statistics.
+/// Core-seconds for the start of a camera path: its ray, the pixel, and the pixel's statistics.
 const CAMERA_PATH: f64 = 0.135e-6;
-/// Vertex of a camera path with its light sample.
+/// Core-seconds for a vertex of a camera path with its light sample.
 const CAMERA_VERTEX: f64 = 0.83e-6;
-/// Light sample at the first vertex with broad lobes, included in [`CAMERA_VERTEX`].
+/// Core-seconds for the light sample at the first vertex with broad lobes, included in [`CAMERA_VERTEX`].
 const DIRECT_LIGHT: f64 = 0.2e-6;
-/// Gathering of photons at a vertex.
+/// Core-seconds for the gathering of photons at a vertex.
 const GATHER: f64 = 0.047e-6;
-/// Start of a light path.
+/// Core-seconds for the start of a light path.
 const LIGHT_PATH: f64 = 0.17e-6;
-/// Guiding of the start of a light path, on top of [`LIGHT_PATH`].
+/// Core-seconds for the guiding of a light path's start, on top of [`LIGHT_PATH`].
 const GUIDE: f64 = 0.11e-6;
-/// Vertex of a light path with its photon and the photon's share of building the map, on surfaces and in media.
+/// Core-seconds for a vertex of a light path with its photon and the photon's share of building the map, on surfaces
+/// and in media.
 const LIGHT_VERTEX: f64 = 0.7e-6;
-/// Vertex of a camera or light path, where both are stored with their MIS weights.
+/// Core-seconds for a vertex of a camera or light path in methods that store both with their MIS weights.
 const TWO_WAY_VERTEX: f64 = 0.78e-6;
-/// Connection of two vertices.
+/// Core-seconds for the connection of two vertices.
 const CONNECTION: f64 = 0.51e-6;
-/// Query for photons to merge with at a vertex.
+/// Core-seconds for the query for photons to merge with at a vertex.
 const MERGE_QUERY: f64 = 0.155e-6;
-/// Merging of a photon.
+/// Core-seconds for the merging of one photon.
 const MERGE: f64 = 0.039e-6;
-/// Counting of photons at a vertex, on top of [`GATHER`].
+/// Core-seconds for the counting of photons at a vertex, on top of [`GATHER`].
 const COUNTING: f64 = 0.04e-6;
-/// Vertex of a camera path in a medium.
+/// Core-seconds for a vertex of a camera path in a medium.
 const CAMERA_MEDIUM_VERTEX: f64 = 0.89e-6;
-/// Vertex of a camera or light path in a medium, where both are stored.
+/// Core-seconds for a vertex in a medium of a camera or light path in methods that store both.
 const TWO_WAY_MEDIUM_VERTEX: f64 = 1.05e-6;
-/// Point on a camera ray through a medium, with the photons gathered around it.
+/// Core-seconds for a point on a camera ray through a medium, with the photons gathered around it.
 const MEDIUM_SAMPLE: f64 = 1.04e-6;
-/// Extra cost of a textured vertex, relative to an untextured one.
+/// Extra cost of a vertex on a textured surface, relative to an untextured one.
 const TEXTURED: f64 = 0.4;
-/// Factor of all costs in a scene with dispersion.
+/// Factor on all costs in a scene with dispersion.
 const DISPERSION: f64 = 1.1;
 /// Number of triangles in the scenes that the constants were fitted in.
 const FITTED_TRIANGLES: f64 = 50_000.0;
-/// Costs grow as the number of triangles to this power.
+/// Exponent of the number of triangles: costs grow as the number to this power.
 const TRIANGLES_POWER: f64 = 0.1;
-/// Cost of the start of a guided light path, in vertices of a light path.
+/// Cost of the start of a guided light path, in units of the cost of a light path's vertex.
 pub(super) const GUIDED_START: f64 = (LIGHT_PATH + GUIDE) / LIGHT_VERTEX;
-/// Light that has been scattered by a broad lobe or a medium before it arrives at the surface that the camera path sees.
+/// Classes of light that a broad lobe or a medium has scattered before it arrives at the surface that the camera path
+/// sees.
 const SCATTERED: ClassSet = ClassSet::one(PathClass::Indirect)
     .and(ClassSet::one(PathClass::IndirectFocus))
     .and(ClassSet::one(PathClass::Volume));
-/// Scattered light that the camera sees by narrow lobes.
+/// Classes of scattered light that the camera sees by narrow lobes.
 const REFLECTED: ClassSet = ClassSet::one(PathClass::ReflectedIndirect).and(ClassSet::one(PathClass::ReflectedFocus));
 
 /// Camera paths per pixel in an iteration.
@@ -66,10 +68,10 @@ fn light_start_seconds(candidate: Candidate) -> f64 {
     LIGHT_PATH + if candidate.guided { GUIDE } else { 0.0 }
 }
 
-/// Counted vertices of the paths of a view.
+/// Cost model of an iteration, by the counted vertices of sampled paths of a scene and camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cost {
-    /// Mean numbers of vertices per path.
+    /// Mean numbers of vertices per camera path and light path.
     counts: VertexCounts,
     /// Features of the scene.
     survey: Survey,
@@ -78,7 +80,7 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// Counts the vertices of the paths of a view. Light paths are guided if there is a guide.
+    /// Counts the vertices of sampled paths of the scene from the camera. Light paths are guided if there is a guide.
     pub fn count(scene: &Scene, camera: &Camera, settings: &Settings, guide: Option<&Guide>) -> Cost {
         let initial_media = InitialMedia::of(scene, camera);
         let camera_paths =
@@ -94,8 +96,8 @@ impl Cost {
         Cost { counts, survey: scene.survey, factor }
     }
 
-    /// Core-seconds of an iteration of the camera's film. If the film is a window, some methods also trace the light paths
-    /// of the whole picture.
+    /// Core-seconds of an iteration of the camera's film with the candidate's method. If the film is a window, some
+    /// methods also trace the light paths of the whole picture.
     pub fn film_seconds(&self, candidate: Candidate, settings: &Settings, camera: &Camera) -> f64 {
         let [film, whole] = camera.sizes().map(|(width, height)| f64::from(width) * f64::from(height));
         let outside = if candidate.method.walks_whole_picture() { whole - film } else { 0.0 };
@@ -106,7 +108,7 @@ impl Cost {
         self.iteration_seconds(candidate, settings, film) + outside * path * self.factor
     }
 
-    /// Core-seconds of an iteration of a whole picture of `pixels` pixels.
+    /// Core-seconds of an iteration of a whole picture of `pixels` pixels with the candidate's method.
     pub fn iteration_seconds(&self, candidate: Candidate, settings: &Settings, pixels: f64) -> f64 {
         let camera_paths = pixels * camera_paths_per_pixel(settings);
         let method = candidate.method;
@@ -126,34 +128,35 @@ impl Cost {
         (sum - unused).max(0.0) * self.factor
     }
 
-    /// Whether the render finds any of these classes of light paths that exist in the scene.
+    /// Whether the render finds light of any of these classes and the scene has it.
     fn finds_any(&self, settings: &Settings, classes: ClassSet) -> bool {
         !(settings.classes & classes_in(&self.survey) & classes).is_empty()
     }
 
-    /// Light paths of an iteration that gathers photons; none are traced if no class of light needs them.
+    /// Number of light paths in an iteration of a method that gathers photons; 0 if no class of light needs photons.
     fn light_paths(&self, settings: &Settings) -> f64 {
         if settings.photon_classes(&self.survey).is_empty() { 0.0 } else { f64::from(settings.photons) }
     }
 
-    /// Mean cost of a vertex, of which a share is textured.
+    /// Mean cost of a vertex on a surface that costs `vertex` without textures, as a share of the vertices is textured.
     fn textured(&self, vertex: f64) -> f64 {
         vertex * (1.0 + TEXTURED * self.counts.textured)
     }
 
-    /// A camera path that is not connected to a light path. Without scattered light it ends at the first broad lobe.
+    /// Core-seconds of a camera path that is not connected to a light path. Without scattered light it ends at the
+    /// first broad lobe.
     fn path_tracing_seconds(&self, settings: &Settings) -> f64 {
         let (vertices, media) = self.camera_vertices(settings);
         CAMERA_PATH + vertices * self.textured(CAMERA_VERTEX) + media * CAMERA_MEDIUM_VERTEX
     }
 
-    /// Vertices of such a camera path on surfaces and in media.
+    /// Mean numbers of vertices on surfaces and in media of a camera path that is not connected to a light path.
     fn camera_vertices(&self, settings: &Settings) -> (f64, f64) {
         let VertexCounts { camera, camera_media, camera_to_broad, .. } = self.counts;
         if self.finds_any(settings, SCATTERED) { (camera, camera_media) } else { (camera_to_broad, 0.0) }
     }
 
-    /// A camera path that gathers photons.
+    /// Core-seconds of a camera path that gathers photons.
     fn gathering_path_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
         let VertexCounts { camera_to_broad, camera_connectable, media_samples, .. } = self.counts;
         let gather = match candidate.method.rules() {
@@ -168,7 +171,7 @@ impl Cost {
         }
     }
 
-    /// A light path that stores photons. Without scattered light it ends at the first broad lobe.
+    /// Core-seconds of a light path that stores photons. Without scattered light it ends at the first broad lobe.
     fn photon_path_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
         let VertexCounts { light, light_media, light_to_broad, .. } = self.counts;
         let (start, vertex) = (light_start_seconds(candidate), self.textured(LIGHT_VERTEX));
@@ -182,8 +185,8 @@ impl Cost {
         }
     }
 
-    /// A camera path and a light path with all their connections and merges. Without scattered light few pairs of
-    /// vertices are connected.
+    /// Core-seconds of a camera path and a light path with all their connections and merges. Without scattered light
+    /// few pairs of vertices are connected.
     fn two_way_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
         let VertexCounts { camera, camera_media, camera_to_broad, light, light_media, light_to_broad, .. } =
             self.counts;

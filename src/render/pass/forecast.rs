@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::spectrum::IterationWavelengths;
 use crate::transport::{InitialMedia, LightPaths};
 
-/// Light paths that are traced to estimate the number of photons.
+/// Number of light paths that are traced to estimate how many photons a render stores.
 const SAMPLED_PATHS: u32 = 2048;
 
 /// Mean number of photons that a light path stores on surfaces and in media: below 1 if most of the light misses the

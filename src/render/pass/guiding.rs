@@ -24,25 +24,25 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 
 pub(super) const ROUNDS: u64 = 5;
-/// Light paths of a round over those of an iteration, and bounds of their number.
+/// Number of light paths of a round of learning over that of an iteration, and bounds of the number.
 const LIGHT_PATHS_RATIO: f64 = 0.25;
 const MIN_LIGHT_PATHS: u32 = 1 << 12;
 const MAX_LIGHT_PATHS: u32 = 1 << 15;
-/// Largest number of camera paths of a round, and the number of pixels per camera path in small pictures.
+/// Largest number of camera paths of a round of learning, and the number of pixels per camera path in small pictures.
 const MAX_CAMERA_PATHS: u32 = 1 << 13;
 const PIXELS_PER_CAMERA_PATH: u64 = 4;
-/// Camera paths per unit of work.
+/// Camera paths per parallel task.
 const CHUNK: u32 = 256;
-/// Number of photons of each kind that a pixel gathers.
+/// Number of photons of each kind (caustic, indirect) that a pixel gathers.
 const NEIGHBOURS: usize = 16;
-/// Added to a pixel's squared value, as in the papers' relMSE. This error depends on the unit of radiance; it only
-/// affects how well light paths are guided, not the reported error.
+/// Added to a pixel's squared value by which squared errors are divided, as in the papers' relMSE. It makes this error
+/// depend on the unit of radiance; that only affects how well light paths are guided, not the reported error.
 const DARK_OFFSET: f32 = 0.01;
 
-/// A guide must reduce squared error times cost of an iteration below this fraction of the unguided one's.
+/// Largest squared error times cost of an iteration, relative to the unguided one, at which a guide is used.
 const MAX_ERROR_COST_RATIO: f64 = 0.9;
 
-/// A photon, and the cell of the guide that sampled its path.
+/// A photon, and the cell of the guide (a part of the distribution of starts) that sampled its light path.
 #[derive(Clone, Copy)]
 struct GuidedPhoton {
     photon: Photon,
@@ -63,7 +63,7 @@ impl Located for GuidedPhoton {
     }
 }
 
-/// Learns the guide of a view; `None` if there is nothing to choose, or no gain.
+/// Learns where light paths should start for a scene and camera; `None` if there is nothing to choose, or no gain.
 pub(super) fn learn_guide(
     camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
@@ -90,8 +90,8 @@ pub(super) fn learn_guide(
     Some(guide)
 }
 
-/// Counted cost of an iteration with the guide over that without: guided light paths meet glass at once, and are
-/// longer.
+/// Cost of an iteration with the guide over that without, by counted vertices: guided light paths meet glass at once,
+/// and are longer.
 fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide: &Guide) -> f64 {
     let (width, height) = camera_paths.camera.size();
     let cost = |guide: Option<&Guide>| {
@@ -105,25 +105,26 @@ fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide
     cost(Some(guide)) / cost(None)
 }
 
-/// Light paths sampled by a cell.
+/// Light paths of a round that one cell of the guide has sampled.
 #[derive(Clone, Copy, Default)]
 struct CellPaths {
     paths: f64,
-    /// Their cost, in vertices.
+    /// Cost of these light paths, in units of the cost of a light path's vertex.
     work: f64,
 }
 
-/// Light paths of a round.
+/// Settings of the light paths in one round of learning.
 struct Round {
     seed: u64,
-    /// Number of the round, from 0.
+    /// Number of the round of learning, from 0.
     index: u64,
     light_paths: u32,
-    /// Region of interest of light from infinity.
+    /// Sphere toward which lights at infinity send their light paths; `None`: the whole scene.
     region: Option<Region>,
 }
 
-/// Traces the photons of a round. Also returns the light paths by cell.
+/// Traces the photons of a round of learning. Returns their maps by kind, and the number and cost of light paths by
+/// cell of the guide.
 fn trace_photons(
     camera_paths: &CameraPaths<'_>,
     initial_media: &InitialMedia,
@@ -165,10 +166,10 @@ fn trace_photons(
     (all.map(PhotonMap::build), walked)
 }
 
-/// Sums of squared relative errors over the camera paths of a round.
+/// Sums of squared relative errors over the camera paths of a round of learning, by cell of the guide.
 struct CellErrors {
     of_cells: Vec<f64>,
-    /// Error of the same number of unguided light paths at the same bandwidths: a photon of weight w represents w
+    /// Error of an equal number of unguided light paths at the same bandwidths: a photon of weight w represents w
     /// unguided ones, each 1 / w times as bright.
     unguided: f64,
 }
@@ -183,13 +184,13 @@ impl CellErrors {
         self.unguided += other.unguided;
     }
 
-    /// Guided over unguided squared error.
+    /// Squared error with the guide over that without.
     fn ratio(&self) -> f64 {
         self.of_cells.iter().sum::<f64>() / self.unguided
     }
 }
 
-/// Estimates the error that the photons of a round cause along its camera paths.
+/// Estimates the error that the photons of a round of learning cause along its camera paths.
 fn estimate_error(
     camera_paths: &CameraPaths<'_>,
     seed: u64,
@@ -223,7 +224,7 @@ fn estimate_error(
     sum
 }
 
-/// Adds the errors of the photons around a probe.
+/// Adds to `error` the errors of the photons around a probe, a point of a camera path.
 fn add_errors(
     camera_paths: &CameraPaths<'_>,
     maps: &ByKind<PhotonMap<GuidedPhoton>>,

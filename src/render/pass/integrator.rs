@@ -7,22 +7,23 @@ use crate::light::Guide;
 use crate::photon::ByKind;
 use crate::render::clock::Phases;
 
-/// Counts of one iteration.
+/// Numbers of light paths and photons of one iteration.
 #[derive(Default)]
 pub(in crate::render) struct Work {
-    /// Light paths traced.
+    /// Number of light paths traced.
     pub light_paths: u64,
-    /// Photons in the map.
+    /// Number of photons in the map.
     pub photons: usize,
-    /// Photons and light paths that were rejected because they were not finite.
+    /// Number of photons and light paths that were rejected because they were not finite.
     pub rejected: u64,
-    /// Photons on surfaces by kind, for methods with photons.
+    /// Numbers of surface photons stored and gathered, by kind (caustic, indirect); zero for methods without photons.
     pub counts: PhotonCounts,
 }
 
-/// Renders the iterations of a method.
+/// Renders the iterations of a method, one at a time.
 pub(in crate::render) trait Integrator {
-    /// Runs the pilot, if there is one, and makes the pixels for the first iteration.
+    /// Runs the pilot that finds the initial bandwidths, if the method has one, and makes the pixels for the first
+    /// iteration.
     fn pixels(&mut self) -> Vec<PixelAccumulator>;
     /// Adds iteration `i` (from 1) to all pixels, and its core-seconds to `phases`. Returns `None` if the iteration was
     /// interrupted ([`Settings::stop`](crate::render::Settings::stop)) and has changed nothing.
@@ -32,18 +33,20 @@ pub(in crate::render) trait Integrator {
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {
         None
     }
-    /// State that the next iteration needs from earlier ones, packed. It leaves out data that follow from the settings.
+    /// State that the next iteration needs from earlier ones, packed to bytes. It leaves out data that follow from the
+    /// settings.
     ///
     /// # Errors
     /// None: the state is packed in memory.
     fn state(&self) -> postcard::Result<Vec<u8>> {
         Ok(Vec::new())
     }
-    /// Restores a state, after [`Integrator::pixels`]. Returns false if the state is of another method or picture.
+    /// Restores a packed state, after [`Integrator::pixels`]. Returns false if the state is of another method or
+    /// picture.
     fn restore(&mut self, state: &[u8]) -> bool {
         state.is_empty()
     }
-    /// Learnt distribution of the starts of light paths, if they are guided.
+    /// Learnt distribution of the starts of light paths; `None` if they are not guided.
     fn guide(&self) -> Option<&Guide> {
         None
     }

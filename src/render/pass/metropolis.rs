@@ -36,10 +36,11 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// Steps per chain in large pictures. Each iteration starts new chains in proportion to light, so many short chains are
-/// better stratified: 512 steps gave 1.1 to 1.2 times the error.
+/// Steps of a Markov chain in large pictures. Each iteration starts new chains in proportion to light, so many short
+/// chains are better stratified: 512 steps gave 1.1 to 1.2 times the error.
 const STEPS: usize = 64;
-/// Vertex of a camera path whose random numbers select the pixel and the division.
+/// Vertex number under which a chain draws the random numbers that select the pixel and the division of a path into
+/// subpaths.
 const CHAIN_VERTEX: u32 = u32::MAX;
 
 /// Smallest number of chains in an iteration.
@@ -53,29 +54,29 @@ struct Deposit {
     value: Rgb,
 }
 
-/// Whether chains sample the class: all light except directly visible lights and direct light.
+/// Whether Markov chains sample light of this class: all light except directly visible lights and direct light.
 fn is_sampled_by_chains(class: PathClass) -> bool {
     !matches!(class.part(), Part::Emission | Part::Direct)
 }
 
-/// A path found in step 1 at which a chain may start.
+/// A path of step 1, which samples all pixels as usual, at which a Markov chain may start.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    /// Index of its pixel.
+    /// Index of the pixel in which the path starts.
     path: u32,
     division: Division,
     importance: f32,
 }
 
-/// The light of one path that chains sample.
+/// Light of one path, as far as Markov chains sample it.
 #[derive(Default)]
 struct Found {
-    /// The pixel in which its camera path starts.
+    /// Index of the pixel in which the camera subpath starts.
     pixel: u32,
     deposits: SmallVec<[(Technique, Deposit); 4]>,
 }
 
-/// Target density of chains: the sum of the channels.
+/// Target density of Markov chains at a path with this light: the sum of the channels.
 fn importance(value: Rgb) -> f32 {
     let sum = value.element_sum();
     if sum.is_finite() { sum } else { 0.0 }
@@ -102,7 +103,7 @@ impl PathRecorder for Found {
     }
 }
 
-/// A state of a chain, or a proposal.
+/// A state of a Markov chain, or the proposal of one: a path's light in pixels.
 #[derive(Default)]
 struct State {
     deposits: SmallVec<[Deposit; 4]>,
@@ -119,7 +120,7 @@ pub(super) struct Metropolis<'a> {
     levels: MergeLevels,
 }
 
-/// The paths of one iteration.
+/// Random numbers and shared data for the paths of one iteration.
 struct Walks<'i, 'a> {
     shared: &'i Bidirectional<'a>,
     light_paths: LightPaths<'i>,
@@ -129,17 +130,17 @@ struct Walks<'i, 'a> {
     size: UVec2,
 }
 
-/// Random numbers of both subpaths of a path.
+/// Random numbers of the camera subpath and the light subpath of a path.
 #[derive(Clone, Copy)]
 struct PairStreams {
     camera: Stream,
     light: Stream,
 }
 
-/// Start of both subpaths of a path.
+/// Start of the camera subpath and the light subpath of a path.
 struct PairStart {
     pixel: UVec2,
-    /// Point in the pixel, uniform on the unit square.
+    /// Start point within the pixel, uniform on the unit square.
     within: Vec2,
     streams: PairStreams,
 }
@@ -149,7 +150,7 @@ impl Walks<'_, '_> {
         PairStreams { camera: self.cameras.path(u64::from(path)), light: self.lights.path(u64::from(path)) }
     }
 
-    /// Walks both subpaths of a path. Their light goes to `left`, `found` and `sample`.
+    /// Traces both subpaths of a path. Their light goes to `left`, `found` and `sample`.
     fn walk<'s>(
         &self,
         shared: &Bidirectional<'s>,
@@ -174,7 +175,8 @@ impl Walks<'_, '_> {
         }
     }
 
-    /// Walks the path of a pixel with all techniques, and appends the starts that it offers to `candidates`.
+    /// Samples the path of a pixel with all techniques, and appends to `candidates` the paths at which chains may
+    /// start.
     fn ordinary(
         &self,
         arena: &mut Bump,
@@ -198,7 +200,7 @@ impl Walks<'_, '_> {
         sample
     }
 
-    /// Evaluates the state of a chain.
+    /// Evaluates the path that a chain's random numbers give: its light in pixels.
     fn state(&self, arena: &mut Bump, chain: &mut Chain, segments: u32, streams: PairStreams) -> State {
         arena.reset();
         let own = streams.camera.vertex(CHAIN_VERTEX);
@@ -219,8 +221,8 @@ impl Walks<'_, '_> {
         State { deposits, importance }
     }
 
-    /// Runs a chain from `candidate`. Returns its contributions, divided by their importance, with weights that sum to
-    /// one for each step.
+    /// Runs a Markov chain of `steps` steps from `candidate`. Returns its light in pixels, divided by its importance,
+    /// with weights that sum to one for each step.
     fn chain(&self, arena: &mut Bump, number: u64, candidate: &Candidate, steps: usize) -> Vec<Deposit> {
         let Candidate { path, division: Division { segments, camera }, .. } = *candidate;
         let PairStreams { camera: camera_stream, light: light_stream } = self.streams(path);
@@ -266,8 +268,8 @@ impl Walks<'_, '_> {
     }
 }
 
-/// Starts of chains: `count` of the candidates, sampled in proportion to importance by a stratified sequence with the
-/// random number `u`. Also returns the sum of all importances.
+/// Chooses the starts of chains: `count` of the candidates, sampled in proportion to importance by a stratified
+/// sequence with the random number `u`. Also returns the sum of all importances.
 fn starts(candidates: &[Candidate], count: usize, u: f64) -> (Vec<Candidate>, f64) {
     let total: f64 = candidates.iter().map(|candidate| f64::from(candidate.importance)).sum();
     let step = total / count as f64;
@@ -310,8 +312,8 @@ impl<'a> Metropolis<'a> {
         Metropolis { camera_paths, settings, shared, tiles, samples, levels }
     }
 
-    /// Step 1 for all pixels. Returns the candidates, and the number of light paths that ended because they were not
-    /// finite.
+    /// Samples the paths of all pixels as usual (step 1). Returns the paths at which chains may start, and the number
+    /// of light paths that ended because they were not finite.
     fn walk_all(&mut self, walks: &Walks<'_, '_>) -> (Vec<Candidate>, u64) {
         let (tiles, width) = (self.tiles, walks.size.x);
         let left: Vec<(Deposits, Vec<Candidate>)> = self

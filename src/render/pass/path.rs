@@ -35,7 +35,7 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// Adds iteration `i` (from 1) to all pixels; false if it was aborted.
+    /// Adds iteration `i` (from 1) to all pixels; false if the iteration was aborted.
     fn pass<W: TileRecorder>(&mut self, i: u64, pixels: &mut [PixelAccumulator], recorders: &mut [W]) -> bool {
         let (camera_paths, tiles) = (self.camera_paths, self.tiles);
         let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);

@@ -3,12 +3,12 @@
 use crate::photon::{ByKind, Kind};
 use serde::{Deserialize, Serialize};
 
-/// Numbers of surface photons and of their effects, by kind.
+/// Numbers of surface photons stored, and of samples that gathered some, by kind (caustic, indirect).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotonCounts {
-    /// Photons in the maps of all iterations.
+    /// Number of photons in the maps of all iterations.
     pub stored: ByKind<u64>,
-    /// Samples of pixels that have gathered light from photons.
+    /// Number of samples of pixels that have gathered light from photons.
     pub gathered: ByKind<u64>,
 }
 

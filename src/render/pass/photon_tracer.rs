@@ -21,7 +21,7 @@ use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Traces all light paths of an iteration. Photons are in the order of paths and vertices.
+/// Traces all light paths of an iteration and returns their photons, in the order of paths and vertices.
 pub fn trace_photons(scene: &Scene, initial_media: &InitialMedia, paths: &LightPaths) -> Photons {
     trace_range(scene, initial_media, paths, 0..paths.count())
 }
@@ -38,7 +38,8 @@ pub(super) fn trace_range(
     })
 }
 
-/// Calls `light_path` for the light paths whose indices lie in `range`. Photons are in the order of paths.
+/// Calls `light_path` for the light paths whose indices lie in `range`, and returns their photons in the order of
+/// paths.
 fn trace_by(
     paths: &LightPaths,
     range: Range<u32>,
@@ -63,7 +64,7 @@ fn trace_by(
     photons
 }
 
-/// Pixels before the first iteration, with their initial bandwidths.
+/// Pixels before the first iteration, with their initial bandwidths, and a bound of bandwidths.
 pub(super) struct InitialPixels {
     pub pixels: Vec<PixelAccumulator>,
     /// Largest squared radius after a camera path's first broad bounce, before the radii shrink.
@@ -76,14 +77,14 @@ pub(super) struct PhotonTracer<'a> {
     settings: &'a Settings,
     initial_media: &'a InitialMedia,
     guide: Option<Guide>,
-    /// Region of interest of light from infinity.
+    /// Sphere toward which lights at infinity send their light paths; `None`: the whole scene.
     region: Option<Region>,
     /// Photons of equal flux, where the channels are traced separately.
     equal_flux: Option<[Option<EqualFlux>; 3]>,
 }
 
 impl<'a> PhotonTracer<'a> {
-    /// Learns the guide, if the settings ask for one.
+    /// Makes the tracer, and learns the guide of light paths if the settings ask for one.
     pub fn new(
         scene: &'a Scene,
         camera: &'a Camera,
@@ -99,12 +100,12 @@ impl<'a> PhotonTracer<'a> {
         PhotonTracer { camera_paths, settings, initial_media, guide, region, equal_flux }
     }
 
-    /// Camera paths of the render.
+    /// The tracer of the render's camera paths.
     pub fn camera_paths(&self) -> CameraPaths<'a> {
         self.camera_paths
     }
 
-    /// The guide of the light paths, if it is worth its cost.
+    /// The learnt distribution of starts of light paths; `None` if guiding is off or not worth its cost.
     pub fn guide(&self) -> Option<&Guide> {
         self.guide.as_ref()
     }
@@ -114,7 +115,7 @@ impl<'a> PhotonTracer<'a> {
         self.equal_flux.map_or(1, |channels| channels.len())
     }
 
-    /// Traces the photons of iteration `i`: one map, or one for each channel.
+    /// Traces the photons of iteration `i` and builds their maps: one, or one for each colour channel.
     pub fn maps(&self, i: u64, phases: &mut Phases) -> (Vec<Maps>, Work) {
         let mut work = Work::default();
         let maps = match &self.equal_flux {
@@ -128,7 +129,7 @@ impl<'a> PhotonTracer<'a> {
         (maps, work)
     }
 
-    /// The photons of one channel, from a third of the light paths.
+    /// Traces a third of the light paths for one colour channel and builds the map of their photons.
     fn channel_map(&self, i: u64, channel: u64, flux: Option<EqualFlux>, phases: &mut Phases, work: &mut Work) -> Maps {
         let Settings { seed, max_depth, photons, .. } = *self.settings;
         let scene = self.camera_paths.scene;
@@ -147,8 +148,9 @@ impl<'a> PhotonTracer<'a> {
         self.timed_map(i, &paths, 0, trace, phases, work)
     }
 
-    /// Traces photons, builds their map, and adds times and counts to `phases` and `work`. `expected_paths` is the number
-    /// of light paths from which glints derive the expected number of photons; 0 if glints are not gathered.
+    /// Traces photons, builds their map, and adds times and counts to `phases` and `work`. `expected_paths` is the
+    /// number of light paths from which glints (light that mirrors and clear glass send to sharp lobes) derive the
+    /// expected number of photons; 0 if glints are not gathered.
     fn timed_map(
         &self,
         i: u64,
@@ -171,7 +173,8 @@ impl<'a> PhotonTracer<'a> {
         maps
     }
 
-    /// Builds the maps of the photons of iteration `i`. Glints are gathered if photons of caustics are traced.
+    /// Builds the maps of the photons of iteration `i`. Glints (light that mirrors and clear glass send to
+    /// sharp lobes) are gathered if photons of caustics are traced.
     fn build(&self, photons: Photons, expected_paths: u32, i: u64) -> Maps {
         let survey = &self.camera_paths.scene.survey;
         let lost = photons.lost;
@@ -192,8 +195,8 @@ impl<'a> PhotonTracer<'a> {
             .stopped_by(&self.settings.stop)
     }
 
-    /// The pixels before the first iteration. Initial bandwidths come from a pilot, if the settings derive them from
-    /// photons.
+    /// Makes the pixels before the first iteration. Their bandwidths come from a pilot, if the settings derive them
+    /// from photons.
     pub fn initial_pixels(&self) -> InitialPixels {
         let Settings { initial_bandwidth: initial, max_initial_bandwidth: [surface, volume], seed, .. } =
             *self.settings;

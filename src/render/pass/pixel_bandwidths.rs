@@ -16,16 +16,17 @@ use std::ops::Range;
 
 /// The bandwidths of all pixels under one rule.
 pub(super) trait PixelBandwidths: Clone {
-    /// Bandwidths of the pixels of a unit of work.
+    /// Bandwidths of the pixels of one parallel task.
     type Chunk<'c>: BandwidthChunk
     where
         Self: 'c;
 
-    /// Sets the bandwidths before the first iteration. `indirect_cap2` is the largest squared radius after a camera
-    /// path's first broad bounce.
+    /// Sets the bandwidths of all pixels before the first iteration. `indirect_cap2` is the largest squared radius
+    /// after a camera path's first broad bounce.
     fn start(&mut self, pixels: &[PixelAccumulator], indirect_cap2: f32);
 
-    /// The bandwidths of iteration `i`, in units of work of `size` pixels. `pixels` is the number of all pixels.
+    /// The bandwidths of iteration `i`, divided into parallel tasks of `size` pixels. `pixels` is the number of all
+    /// pixels.
     fn par_chunks(
         &mut self,
         i: u64,
@@ -37,39 +38,40 @@ pub(super) trait PixelBandwidths: Clone {
     /// they follow from the iteration's number.
     fn radii2(&self) -> Option<ByKind<Vec<f32>>>;
 
-    /// The state that the next iteration needs, serialized.
+    /// The state of the bandwidths that the next iteration needs, serialized.
     ///
     /// # Errors
     /// None: it is written to memory.
     fn state(&self) -> postcard::Result<Vec<u8>>;
 
-    /// Restores a serialized state. Returns false if it belongs to another render.
+    /// Restores a serialized state of the bandwidths. Returns false if it belongs to another render.
     fn restore(&mut self, state: &[u8]) -> bool;
 }
 
-/// Bandwidths of the pixels of a unit of work.
+/// Bandwidths of the pixels of one parallel task.
 pub(super) trait BandwidthChunk: Send {
-    /// Bandwidths of one camera path.
+    /// Bandwidths that one camera path uses.
     type Path<'p>: PathBandwidths
     where
         Self: 'p;
 
-    /// Loads the state of the pixel at `at` into the cache.
+    /// Loads the state of the pixel at index `at` of the task into the cache.
     #[inline(always)]
     fn prefetch(&self, _at: usize) {}
 
-    /// The bandwidths of a camera path of `pixel`, at `at` in the chunk, that samples `levels` of a channel.
+    /// The bandwidths of a camera path of `pixel`, at index `at` of the task, that samples `levels` of a colour
+    /// channel.
     fn path(&mut self, pixel: &PixelAccumulator, at: usize, channel: usize, levels: Range<usize>) -> Self::Path<'_>;
 }
 
-/// Bandwidths of one camera path.
+/// Bandwidths that one camera path uses.
 pub(super) trait PathBandwidths: GatherBandwidths {
-    /// Updates the state of the pixel after the path.
+    /// Updates the bandwidths of the pixel after the camera path has ended.
     #[inline(always)]
     fn finish(&mut self) {}
 }
 
-/// Bandwidths of the memoryless rule.
+/// Bandwidths of all pixels under the memoryless rule, which only needs the number of the iteration.
 #[derive(Clone)]
 pub(super) struct Scheduled<'a> {
     settings: &'a Settings,
@@ -116,7 +118,7 @@ impl PixelBandwidths for Scheduled<'_> {
     }
 }
 
-/// Bandwidths of the memoryless rule in one iteration.
+/// Bandwidths of the pixels of one parallel task under the memoryless rule, in one iteration.
 #[derive(Clone, Copy)]
 pub(super) struct ScheduledChunk {
     schedule: Schedule,
@@ -137,37 +139,37 @@ impl BandwidthChunk for ScheduledChunk {
 
 impl PathBandwidths for ByKind<LevelRadii> {}
 
-/// Arrangement of the states of a pixel and channel: by kind, then by level.
+/// Arrangement in memory of the bandwidths of a pixel: by colour channel, then by kind of photons, then by level.
 #[derive(Clone, Copy)]
 struct Layout {
-    /// Kinds of photons that exist.
+    /// For each kind of photons, whether it exists and has bandwidths.
     kinds: ByKind<bool>,
     levels: usize,
-    /// Counts per bandwidth.
+    /// Number of photon counts per bandwidth.
     counts: usize,
     channels: usize,
 }
 
 impl Layout {
-    /// Bandwidths of a kind in a channel.
+    /// Number of bandwidths for a kind of photons in one colour channel.
     #[inline(always)]
     fn kind_len(&self, kind: Kind) -> usize {
         if self.kinds[kind as usize] { self.levels } else { 0 }
     }
 
-    /// Bandwidths of a channel.
+    /// Number of bandwidths in one colour channel.
     #[inline(always)]
     fn channel_len(&self) -> usize {
         self.kind_len(Kind::Indirect) + self.kind_len(Kind::Caustic)
     }
 
-    /// Bandwidths of a pixel.
+    /// Number of bandwidths of a pixel.
     #[inline(always)]
     fn pixel_len(&self) -> usize {
         self.channel_len() * self.channels
     }
 
-    /// The states of some levels of a channel, out of all states of a pixel.
+    /// The bandwidths and counts of some levels of a colour channel by kind of photons, out of all those of a pixel.
     #[inline(always)]
     fn states<'a, R: CountingRule>(
         &self,
@@ -189,20 +191,20 @@ impl Layout {
     }
 }
 
-/// Bandwidths of a rule that counts photons.
+/// Bandwidths of all pixels under a rule that counts photons.
 #[derive(Clone)]
 pub(super) struct Counted<'a, R: CountingRule> {
     settings: &'a Settings,
     rule: R,
     layout: Layout,
-    /// States of every pixel, channel, kind and level.
+    /// Bandwidth of every pixel, colour channel, kind of photons and level, in this order.
     bandwidths: Vec<R::Bandwidth>,
-    /// [`CountingRule::counts`] counts for each of `bandwidths`.
+    /// Photon counts, [`CountingRule::counts`] for each of `bandwidths`.
     counts: Vec<R::Count>,
 }
 
 impl<'a, R: CountingRule> Counted<'a, R> {
-    /// Bandwidths of photons of these `kinds`, in each of `channels` channels.
+    /// Makes the bandwidths for photons of these `kinds`, in each of `channels` colour channels.
     pub fn new(settings: &'a Settings, kinds: ByKind<bool>, channels: usize, rule: R) -> Counted<'a, R> {
         // Without photons pixels still have a state.
         let kinds = if kinds == [false; 2] { [true, false] } else { kinds };
@@ -281,7 +283,7 @@ impl<R: CountingRule> PixelBandwidths for Counted<'_, R> {
     }
 }
 
-/// Counted bandwidths of the pixels of a unit of work in iteration `i`.
+/// Bandwidths of the pixels of one parallel task in iteration `i`, under a rule that counts photons.
 pub(super) struct CountedChunk<'c, R: CountingRule> {
     rule: &'c R,
     i: u64,
@@ -315,7 +317,7 @@ impl<R: CountingRule> BandwidthChunk for CountedChunk<'_, R> {
     }
 }
 
-/// Bandwidths of some levels for one kind of photons, and the photons counted within them.
+/// Bandwidths of some levels for one kind of photons at a pixel, and the photons counted within them.
 struct KindBandwidths<'a, R: CountingRule> {
     bandwidths: &'a mut [R::Bandwidth],
     counts: &'a mut [R::Count],
@@ -324,7 +326,7 @@ struct KindBandwidths<'a, R: CountingRule> {
 }
 
 impl<R: CountingRule> KindBandwidths<'_, R> {
-    /// Radii in ascending order. Levels shrink independently, so their order may change.
+    /// The radii of the levels in ascending order. Levels shrink independently, so their order may change.
     #[inline(always)]
     fn radii(&self) -> LevelRadii {
         if let [only] = &self.bandwidths {
@@ -341,7 +343,7 @@ impl<R: CountingRule> KindBandwidths<'_, R> {
     }
 }
 
-/// Counted bandwidths of one camera path.
+/// Bandwidths that one camera path uses, under a rule that counts photons.
 pub(super) struct CountedPath<'a, R: CountingRule> {
     rule: &'a R,
     i: u64,
@@ -364,7 +366,8 @@ impl<'a, R: CountingRule> GatherBandwidths for CountedPath<'a, R> {
     where
         Self: 'c;
 
-    /// A function of the normal alone, because counts of different gathering points are added.
+    /// Makes the frame in which photons around a point with the normal `ng` are counted. It depends on the normal
+    /// alone, because counts of different gathering points are added.
     #[inline(always)]
     fn frame(ng: Vec3) -> Frame {
         Frame::from_normal(ng)
@@ -381,7 +384,7 @@ impl<'a, R: CountingRule> GatherBandwidths for CountedPath<'a, R> {
     }
 }
 
-/// Counts the photons of one kind at a vertex.
+/// Counts the photons of one kind around a vertex of a camera path.
 pub(super) struct VertexCounter<'c, 'a, R: CountingRule> {
     rule: &'a R,
     of_kind: &'c mut KindBandwidths<'a, R>,

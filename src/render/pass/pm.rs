@@ -29,13 +29,13 @@ use crate::transport::{
 };
 use bumpalo::Bump;
 
-/// Light paths between two checks of the memory.
+/// Light paths traced between two checks of the photons' memory.
 const BATCH: u32 = 1 << 16;
 /// Bytes per photon while the map is built: the photon in the order of tracing and sorted, its Morton code, and its
 /// share of the tree.
 pub const PHOTON_BYTES: u64 = 2 * size_of::<Photon>() as u64 + 16 + 32;
 
-/// Traces photons up to the number `most`.
+/// Traces light paths until there are `most` photons or all paths are traced.
 fn trace(
     scene: &Scene,
     initial_media: &InitialMedia,
@@ -73,8 +73,8 @@ fn trace(
     (photons, traced, lost)
 }
 
-/// Bandwidths by the distance to the k-th nearest photon. That photon is outside, so `k - 1` are inside, which is the
-/// expected number in this area.
+/// Bandwidths of classical photon mapping: the distance to the k-th nearest photon. That photon is outside, so `k - 1`
+/// are inside, which is the expected number in this area.
 struct Neighbours<'a> {
     count: usize,
     nearest: &'a mut ByKind<Nearest>,
@@ -107,9 +107,9 @@ pub(super) struct Pm<'a> {
     camera_paths: CameraPaths<'a>,
     settings: &'a Settings,
     initial_media: &'a InitialMedia,
-    /// Built in the first iteration.
+    /// Photon maps of the render; `None` before the first iteration, which builds them.
     maps: Option<PhotonMaps>,
-    /// Whether the light paths of the maps have been reported.
+    /// Whether the light paths of the maps have been reported in the counts of an iteration.
     counted: bool,
     samples: [SampleBuffer; 1],
 }
@@ -126,7 +126,7 @@ impl<'a> Pm<'a> {
         Pm { camera_paths, settings, initial_media, maps: None, counted: false, samples }
     }
 
-    /// Traces photons and builds the maps.
+    /// Traces photons and builds the maps of the render.
     fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32, u64) {
         let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
         let start = cpu_seconds();

@@ -11,16 +11,17 @@ use crate::transport::CameraPaths;
 use bumpalo::Bump;
 use rayon::prelude::*;
 
-/// Camera paths that find the region.
+/// Number of camera paths that find the region, a sphere around most visible points.
 const SAMPLED_PATHS: f64 = 1024.0;
-/// Share of the visible points that determine the radius of the region.
+/// Share of the visible points that lie within the sphere before it is enlarged.
 const COVERED_SHARE: f64 = 0.8;
-/// Factor of that radius: objects that light the points are around them.
+/// Factor by which the sphere's radius is enlarged, because objects that light the points are around them.
 const RADIUS_FACTOR: f32 = 1.5;
-/// Largest area of a region, relative to the scene's disc.
+/// Largest area of the sphere's disc at which it is used, relative to the disc around the scene.
 const MAX_AREA_SHARE: f32 = 0.25;
 
-/// A sphere around most of the visible points; `None` if that is most of the scene, or if no light is at infinity.
+/// A sphere around most of the visible points, toward which lights at infinity send light paths; `None` if that is most
+/// of the scene, or if no light is at infinity.
 pub(super) fn region(camera_paths: &CameraPaths<'_>, seed: u64) -> Option<Region> {
     let Scene { lights, .. } = camera_paths.scene;
     if !lights.emitters().iter().any(|emitter| emitter.is_infinite()) {

@@ -11,10 +11,10 @@ use crate::transport::{CameraPaths, Cause, Features, FirstHit, PixelSample};
 use rayon::prelude::*;
 use std::mem::size_of;
 
-/// Pixels to which a task adds an iteration.
+/// Pixels that one parallel task updates after an iteration.
 const PIXELS_PER_TASK: usize = 1024;
 
-/// Of a measure, what all levels share.
+/// Parts of a pixel's sample that do not depend on the bandwidth level.
 #[derive(Clone, Copy, Default)]
 struct Shared {
     emission: Rgb,
@@ -26,10 +26,10 @@ struct Shared {
     rejection: Option<Cause>,
 }
 
-/// What photons bring at a level, or what depends on their bandwidth: caustics, indirect light, light from media.
+/// Parts of a pixel's sample that depend on the bandwidth level: caustics, indirect light and light from media.
 type OfLevel = [Rgb; 3];
 
-/// Bytes that an iteration keeps of a pixel besides its sums.
+/// Bytes per pixel for the samples of one iteration, besides the pixel's sums over iterations.
 pub fn sample_bytes(settings: &Settings) -> usize {
     let pairs = 1 + usize::from(settings.levels.two_paths);
     match settings.method.has_chains() {
@@ -38,7 +38,7 @@ pub fn sample_bytes(settings: &Settings) -> usize {
     }
 }
 
-/// Measures of all pixels, in the order of the units of work.
+/// Samples that one iteration has measured for all pixels, in the order of the parallel tasks.
 pub(super) struct SampleBuffer {
     levels: usize,
     shared: Vec<Shared>,
@@ -46,7 +46,7 @@ pub(super) struct SampleBuffer {
 }
 
 impl SampleBuffer {
-    /// Those of a render whose pixels have two eye paths or one, by path.
+    /// Buffers for the samples of a render, one per camera path of a pixel: one or two.
     pub fn of_paths(pixels: usize, levels: Levels) -> Vec<SampleBuffer> {
         if levels.two_paths {
             vec![SampleBuffer::new(pixels, 1), SampleBuffer::new(pixels, levels.count.max(2) - 1)]
@@ -55,18 +55,18 @@ impl SampleBuffer {
         }
     }
 
-    /// Of so many pixels and levels; nothing measured yet.
+    /// A black buffer for the samples of `pixels` pixels at `levels` bandwidth levels.
     pub fn new(pixels: usize, levels: usize) -> SampleBuffer {
         let by_level = vec![OfLevel::default(); pixels * levels];
         SampleBuffer { levels, shared: vec![Shared::default(); pixels], by_level }
     }
 
-    /// Those of each tile.
+    /// The buffer divided into the samples of each tile, for parallel tasks.
     pub fn par_tiles(&mut self) -> impl IndexedParallelIterator<Item = SampleBufferPart<'_>> {
         self.par_parts(TILE_PIXELS)
     }
 
-    /// Those of each unit of work of so many pixels.
+    /// The buffer divided into the samples of `pixels` pixels each, for parallel tasks.
     pub fn par_parts(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = SampleBufferPart<'_>> {
         let levels = self.levels;
         let by_level = self.by_level.par_chunks_mut(pixels * levels);
@@ -74,7 +74,8 @@ impl SampleBuffer {
         self.shared.par_chunks_mut(pixels).zip(by_level).map(part)
     }
 
-    /// Those of each unit of work of so many pixels, by one or two eye paths.
+    /// The buffers of one or two camera paths, each divided into the samples of `pixels` pixels, for parallel tasks.
+    /// The second part is `None` if pixels have one camera path.
     pub fn par_of_paths(
         all: &mut [SampleBuffer],
         pixels: usize,
@@ -87,14 +88,14 @@ impl SampleBuffer {
         first.into_par_iter().zip(others)
     }
 
-    /// The measure of the pixel that is kept at `slot`.
+    /// The sample of the pixel at index `slot` of the buffer.
     #[inline]
     pub fn get(&self, slot: usize) -> PixelSample {
         unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
     }
 }
 
-/// Measures of the pixels of a unit of work.
+/// Samples of the pixels of one parallel task.
 pub(super) struct SampleBufferPart<'m> {
     levels: usize,
     shared: &'m mut [Shared],
@@ -102,13 +103,13 @@ pub(super) struct SampleBufferPart<'m> {
 }
 
 impl SampleBufferPart<'_> {
-    /// The measure at a slot of them.
+    /// The sample at index `slot` of this part.
     #[inline]
     pub fn get(&self, slot: usize) -> PixelSample {
         unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
     }
 
-    /// Keeps a measure; nothing of it but its first levels may be lit.
+    /// Stores a sample at index `slot` of this part. Light at levels beyond those of the buffer is lost.
     #[inline]
     pub fn set(&mut self, slot: usize, sample: &PixelSample) {
         let &PixelSample { emission, direct, indirect, volume, features, first, rejection, .. } = sample;
@@ -119,8 +120,9 @@ impl SampleBufferPart<'_> {
     }
 }
 
-/// Adds iteration `i`, measured by one or two eye paths, to the pixels: the measures that are kept at the pixel's `slot`,
-/// and its light by `groups`. Returns the number of pixels to whose own image photons of each kind have brought light.
+/// Adds the samples of iteration `i`, by one or two camera paths, to the pixels. `slot` gives the place of a pixel in
+/// the buffers, `groups` its light by light group. Returns for each kind of photons the number of pixels to whose own
+/// image it has brought light.
 pub(super) fn add<'g>(
     samples: &[SampleBuffer],
     camera_paths: &CameraPaths<'_>,
@@ -165,7 +167,7 @@ mod tests {
     use super::*;
     use crate::transport::MAX_LEVELS;
 
-    /// A measure comes back as it was kept, whatever its neighbours are.
+    /// A sample is read as it was stored, whatever its neighbours are.
     #[test]
     fn a_measure_comes_back() {
         for levels in [1, 4, MAX_LEVELS] {

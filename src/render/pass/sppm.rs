@@ -21,13 +21,13 @@ use crate::transport::{CameraPathStart, PixelSample, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Progressive photon mapping with the bandwidths `B` and the kernel `K`.
+/// Integrator of progressive photon mapping with the bandwidth rule `B` and the kernel `K`.
 pub(super) struct Sppm<'a, B, K> {
     tracer: PhotonTracer<'a>,
     settings: &'a Settings,
     bandwidths: B,
     kernel: K,
-    /// Samples of the current iteration, by camera path.
+    /// Samples of all pixels in the current iteration, for each of a pixel's camera paths.
     samples: Vec<SampleBuffer>,
 }
 
@@ -38,7 +38,7 @@ impl<'a, B: PixelBandwidths, K: Kernel> Sppm<'a, B, K> {
         Sppm { tracer, settings, bandwidths, kernel, samples }
     }
 
-    /// Random numbers of the camera paths of a domain in iteration `i`: for their points on film and lens, and for
+    /// Random numbers of the camera paths of `domain` in iteration `i`: for their points on film and lens, and for
     /// everything else.
     fn streams(&self, i: u64, domain: Domain) -> [Streams; 2] {
         // Measurement points of `ppm` stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: at everything that one point
@@ -48,7 +48,7 @@ impl<'a, B: PixelBandwidths, K: Kernel> Sppm<'a, B, K> {
     }
 
     /// Traces the camera paths of iteration `i` (from 1) and stores their samples. `maps` has the photons of the
-    /// iteration, or of each channel.
+    /// iteration: one map, or one for each colour channel.
     fn trace_camera_paths(&mut self, i: u64, maps: &[Maps], pixels: &[PixelAccumulator]) {
         let [independent, correlated] =
             [Domain::CameraIndependent, Domain::CameraCorrelated].map(|domain| self.streams(i, domain));
@@ -101,7 +101,7 @@ impl<'a, B: PixelBandwidths, K: Kernel> Sppm<'a, B, K> {
     }
 }
 
-/// Adds the light of photons in `sample` to another sample of the same camera path.
+/// Adds the light of photons in `sample` to `all`, a sample of the same camera path.
 fn add_photons(all: &mut PixelSample, sample: &PixelSample) {
     let sums = all.caustic_photons.iter_mut().chain(&mut all.indirect_photons).chain(&mut all.volume_photons);
     let photons = sample.caustic_photons.iter().chain(&sample.indirect_photons).chain(&sample.volume_photons);

@@ -14,15 +14,15 @@ use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::{MergeLevels, PathRecorder, Splat, Technique};
 
-/// Subpaths of this depth and all deeper ones share a picture, because the depth of paths has no bound.
+/// Depth from which all deeper subpaths share one picture, because the depth of paths has no bound.
 const MAX_PICTURE_DEPTH: u32 = 6;
 const DEPTHS: usize = MAX_PICTURE_DEPTH as usize;
-/// Most pictures of a render.
+/// Largest number of technique pictures of a render.
 pub const MAX_TECHNIQUES: usize = 3 * DEPTHS + 2 * DEPTHS * DEPTHS;
 
-/// Light that one technique finds.
+/// Picture of the light that one sampling technique finds.
 pub struct TechniquePicture {
-    /// The technique.
+    /// Sampling technique that finds the light.
     pub technique: Technique,
     /// Radiance with MIS weights. The sum over all techniques is the method's picture.
     pub weighted: Picture,
@@ -47,7 +47,7 @@ impl TechniquePicture {
     }
 }
 
-/// Index of the picture of a technique. Depths begin at 1.
+/// Index of a technique's picture among those of all techniques. Depths begin at 1.
 fn index(technique: Technique) -> usize {
     let at = |depth: u32| depth.clamp(1, MAX_PICTURE_DEPTH) as usize - 1;
     match technique {
@@ -59,7 +59,7 @@ fn index(technique: Technique) -> usize {
     }
 }
 
-/// The inverse of [`index`].
+/// Technique of the picture with this index; the inverse of [`index`].
 fn technique(index: usize) -> Technique {
     let (row, camera) = (index / DEPTHS, (index % DEPTHS) as u32 + 1);
     let light = |row: usize| row as u32 + 1;
@@ -74,19 +74,20 @@ fn technique(index: usize) -> Technique {
 
 /// Records the light that reaches the pixels of a tile, beside the picture itself. `()` records nothing, at no cost.
 pub(super) trait TileRecorder: PathRecorder + Send + Sync {
-    /// Light of the following camera path belongs to the pixel at `slot`. Only light of `level` counts, if any.
+    /// Assigns the light of the following camera path to the pixel at index `slot` of the tile. Only light of the
+    /// bandwidth level `level` counts; `None`: no light does.
     #[inline]
     fn select_pixel(&mut self, slot: usize, level: Option<usize>) {
         let _ = (slot, level);
     }
 
-    /// Records light that a light path has sent to the pixel at `slot`.
+    /// Records the splat that a light path has sent to the pixel at index `slot` of the tile.
     #[inline]
     fn record_splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
         let _ = (slot, level, splat, levels);
     }
 
-    /// Light of this iteration at the pixel at `slot`, by light group.
+    /// Light of this iteration in the pixel at index `slot` of the tile, by light group.
     #[inline]
     fn group_light(&self, slot: usize) -> &[GroupLight] {
         let _ = slot;
@@ -96,7 +97,7 @@ pub(super) trait TileRecorder: PathRecorder + Send + Sync {
 
 impl TileRecorder for () {}
 
-/// Recorded light of a tile: pictures of techniques, and light of groups.
+/// Light recorded in a tile: pictures of sampling techniques, and light of light groups.
 pub(super) struct TileRecords {
     slot: usize,
     level: Option<usize>,
@@ -105,7 +106,8 @@ pub(super) struct TileRecords {
 }
 
 impl TileRecords {
-    /// Records pictures of techniques if `techniques` is true, and the light of `groups` groups.
+    /// Makes a tile that records pictures of techniques if `techniques` is true, and the light of `groups` light
+    /// groups.
     fn new(techniques: bool, groups: usize) -> TileRecords {
         let groups = (groups > 0).then(|| TileGroups::new(groups));
         TileRecords { slot: 0, level: None, pictures: techniques.then(TilePictures::new), groups }
@@ -121,26 +123,26 @@ impl TileRecords {
     }
 }
 
-/// Recorded light of all tiles; `None` if nothing is recorded.
+/// Recorders of all tiles of the film; `None` if nothing is recorded.
 #[derive(Default)]
 pub(super) struct FilmRecorder(Option<Vec<TileRecords>>);
 
 impl FilmRecorder {
-    /// Records what the settings ask for.
+    /// Makes the recorders of the technique pictures and light groups that the settings ask for.
     pub fn new(settings: &Settings, scene: &Scene, tiles: &Tiles) -> FilmRecorder {
         let (techniques, groups) = (settings.techniques, settings.light_groups(scene));
         let records = || (0..tiles.count()).map(|_| TileRecords::new(techniques, groups)).collect();
         FilmRecorder((techniques || groups > 0).then(records))
     }
 
-    /// Starts an iteration. Returns the recorders of all tiles, `None` if nothing is recorded.
+    /// Starts an iteration. Returns the recorders of all tiles; `None` if nothing is recorded.
     pub fn start_iteration(&mut self) -> Option<&mut [TileRecords]> {
         let tiles = self.0.as_deref_mut()?;
         tiles.iter_mut().filter_map(|tile| tile.groups.as_mut()).for_each(TileGroups::clear);
         Some(tiles)
     }
 
-    /// Takes the pictures of all techniques that have found light: means over `iterations`.
+    /// Takes the pictures of all techniques that have found light, as means over `iterations`.
     pub fn take_pictures(&mut self, tiles: &Tiles, iterations: u64) -> Vec<TechniquePicture> {
         let parts: Vec<_> = self.0.take().into_iter().flatten().filter_map(|tile| tile.pictures).collect();
         if parts.is_empty() { Vec::new() } else { collect(tiles, parts, iterations) }
@@ -177,16 +179,16 @@ impl TileRecorder for TileRecords {
     }
 }
 
-/// Weighted and unweighted sums over iterations, pixel by pixel.
+/// Weighted and unweighted light of one technique for each pixel of a tile, as sums over iterations.
 type Sums = [[Rgb; 2]; TILE_PIXELS];
 
-/// Pictures of all techniques in a tile.
+/// Pictures of all sampling techniques in one tile.
 struct TilePictures {
     pictures: Vec<Option<Box<Sums>>>,
 }
 
 impl TilePictures {
-    /// Black pictures.
+    /// Makes a tile whose pictures are black.
     fn new() -> TilePictures {
         let pictures = std::iter::repeat_with(|| None).take(MAX_TECHNIQUES).collect();
         TilePictures { pictures }
@@ -203,7 +205,7 @@ impl TilePictures {
     }
 }
 
-/// Pictures of all techniques that have found light: means over `iterations`.
+/// Joins the tiles to pictures of all techniques that have found light, as means over `iterations`.
 fn collect(tiles: &Tiles, mut parts: Vec<TilePictures>, iterations: u64) -> Vec<TechniquePicture> {
     let scale = 1.0 / iterations.max(1) as f32;
     let mut pictures = Vec::new();

@@ -14,7 +14,7 @@ pub(super) const TILE_PIXELS: usize = (TILE * TILE) as usize;
 pub(super) struct Tiles {
     width: u32,
     height: u32,
-    /// Size of the whole picture, and the first column and row of the film in it.
+    /// Size of the whole picture, and the first column and row of the film in it (pixels).
     whole: [(u32, u32); 2],
     across: u32,
     down: u32,
@@ -23,17 +23,17 @@ pub(super) struct Tiles {
 /// A tile of the whole picture.
 #[derive(Clone, Copy)]
 pub(super) struct WholeTile {
-    /// Index among the tiles of the film; `None` outside the film.
+    /// Index among the tiles of the film; `None` if the tile lies outside the film.
     pub tile: Option<usize>,
-    /// First column and row.
+    /// First column and row of the tile in the whole picture (pixels).
     corner: (u32, u32),
 }
 
 /// A block of neighbouring pixels in a tile of the whole picture.
 pub(super) struct PixelBlock {
-    /// Indices in the whole picture, row by row; `None` outside it.
+    /// Index of each pixel in the whole picture, row by row; `None` for pixels outside it.
     pub keys: [Option<u64>; GROUP_SIZE],
-    /// Pixels of the block that are on the film.
+    /// Place of each pixel on the film; `None` for pixels outside it.
     pub places: [Option<TilePixel>; GROUP_SIZE],
 }
 
@@ -59,7 +59,7 @@ impl Tiles {
         })
     }
 
-    /// Tiles of the whole picture that the film contains a part of.
+    /// Tiles of the whole picture of which the film contains at least a part.
     pub fn film_tiles(self) -> impl Iterator<Item = WholeTile> {
         self.whole_tiles().filter(|tile| tile.tile.is_some())
     }
@@ -69,13 +69,13 @@ impl Tiles {
         (self.width, self.height).into()
     }
 
-    /// Index of a pixel, row by row.
+    /// Index of the film's pixel at column `x` and row `y`, row by row.
     #[inline]
     pub fn index(&self, x: u32, y: u32) -> u32 {
         y * self.width + x
     }
 
-    /// The tile of pixel `index` (row by row), and the pixel's slot in the tile.
+    /// Index of the tile that holds the pixel `index` (row by row), and the pixel's index in the tile.
     #[inline]
     pub fn place(&self, index: u32) -> (usize, usize) {
         let first = (self.whole[1].0 % TILE, self.whole[1].1 % TILE);
@@ -90,7 +90,8 @@ impl Tiles {
         tile * TILE_PIXELS + slot
     }
 
-    /// All pixels of a tile of the whole picture, in blocks of two rows. [`TilePixel::at`] is the slot in the tile.
+    /// All pixels of a tile of the whole picture, in blocks of two rows. [`TilePixel::at`] is the pixel's index in the
+    /// tile.
     pub fn blocks(self, tile: WholeTile) -> impl Iterator<Item = PixelBlock> {
         let [size, at] = self.whole;
         let columns = GROUP_SIZE as u32 / 2;

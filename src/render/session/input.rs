@@ -14,7 +14,7 @@ pub struct RenderInput<'a> {
 }
 
 impl<'a> RenderInput<'a> {
-    /// Sets one bandwidth level for methods without levels.
+    /// Joins the input of a render. For methods without bandwidth levels it sets one level.
     pub fn new(scene: &'a Scene, camera: &'a Camera, settings: &Settings) -> RenderInput<'a> {
         let mut settings = settings.clone();
         if !settings.method.has_levels() {

@@ -24,18 +24,18 @@ use crate::render::settings::Settings;
 use crate::stat::sum::MAX_TERMS;
 use state::Counters;
 
-/// A render between two iterations.
+/// A render between two of its iterations.
 pub struct Session<'a> {
     input: &'a RenderInput<'a>,
     integrator: Box<dyn Integrator + 'a>,
     pixels: Vec<PixelAccumulator>,
     counters: Counters,
-    /// Error after the last iteration, if it has been estimated.
+    /// Error of the picture after the last iteration; `None` if it has not been estimated.
     error: Option<ErrorReport>,
 }
 
 impl<'a> Session<'a> {
-    /// Starts a render: runs the pilot, if the method has one.
+    /// Starts a render and runs its pilot, which finds the initial bandwidths, if the method has one.
     pub fn new(input: &'a RenderInput<'a>) -> Session<'a> {
         Session::with_time_spent(input, TimeSpent::default())
     }
@@ -54,7 +54,7 @@ impl<'a> Session<'a> {
         Session { input, integrator, pixels, counters, error: None }
     }
 
-    /// Continues from a saved state; `None` if the state is of another picture or method.
+    /// Continues a render from a saved state; `None` if the state is of another picture or method.
     pub fn resume(input: &'a RenderInput<'a>, state: State) -> Option<Session<'a>> {
         let mut session = Session::new(input);
         let State { pixels, counters, passes } = state;
@@ -65,7 +65,7 @@ impl<'a> Session<'a> {
         fits.then(|| Session { pixels, counters, ..session })
     }
 
-    /// The current state, to be saved.
+    /// The current state of the render, to be saved in a checkpoint.
     ///
     /// # Errors
     /// None: the state of the passes is packed in memory.
@@ -73,18 +73,18 @@ impl<'a> Session<'a> {
         Ok(State { pixels: &self.pixels, counters: self.counters.clone(), passes: self.integrator.state()? })
     }
 
-    /// Whether the render has done all iterations of its settings, or the most that pixels can sum exactly.
+    /// Whether the render has done all iterations of its settings, or the largest number that pixels can sum exactly.
     pub fn is_finished(&self) -> bool {
         self.counters.next >= self.settings().iterations.unwrap_or(u64::MAX).min(MAX_TERMS)
     }
 
-    /// Adds one iteration, or none if the user stops it ([`Settings::stop`]).
+    /// Renders one iteration, or none if the user stops it ([`Settings::stop`]), and returns the progress.
     pub fn step(&mut self) -> Progress {
         self.step_within(None);
         self.progress()
     }
 
-    /// Adds one iteration; discards it and returns false if it takes more than `seconds` or the user stops it.
+    /// Renders one iteration; discards it and returns false if it takes more than `seconds` or the user stops it.
     pub fn step_within(&mut self, seconds: Option<f64>) -> bool {
         let mut time = self.counters.stats.time;
         self.settings().stop.start_iteration(seconds);
@@ -111,7 +111,7 @@ impl<'a> Session<'a> {
         true
     }
 
-    /// Whether the history records the error after this iteration: at powers of sqrt(2), and after the last one.
+    /// Whether the error history gets an entry after this iteration: at powers of sqrt(2), and after the last one.
     fn is_record_due(&self) -> bool {
         self.iterations() >= self.counters.next_record || Some(self.iterations()) == self.iterations_of_shard()
     }
@@ -122,7 +122,7 @@ impl<'a> Session<'a> {
         self.counters.next_record = (self.iterations() as f64 * std::f64::consts::SQRT_2).ceil() as u64;
     }
 
-    /// Progress after the last iteration.
+    /// Progress of the render after its last iteration.
     pub fn progress(&self) -> Progress {
         let Counters { stats, pilot_seconds, .. } = &self.counters;
         let recorded = || stats.history.last().and_then(|entry| entry.estimate);
@@ -142,17 +142,17 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Whether the history has an entry of the last iteration.
+    /// Whether the error history has an entry of the last iteration.
     pub fn is_recorded(&self) -> bool {
         self.counters.stats.is_recorded()
     }
 
-    /// Estimated error against time.
+    /// Estimated error at moments of the render, in the order of time.
     pub fn history(&self) -> &[HistoryEntry] {
         &self.counters.stats.history
     }
 
-    /// Adds the measured error of the picture finished from half of the iterations so far to the history
+    /// Adds to the history the measured error of the picture that was finished from half of the iterations so far
     /// ([`HistoryEntry::finished`]).
     pub fn record_finished_error(&mut self, finished: Option<FinishedError>) {
         let error = self.estimate_error();
@@ -172,17 +172,17 @@ impl<'a> Session<'a> {
         (iterations - done as f64).max(0.0) * pace
     }
 
-    /// Iterations of this shard, if their number stops the render.
+    /// Number of iterations of this shard; `None` if their number does not stop the render.
     fn iterations_of_shard(&self) -> Option<u64> {
         self.settings().iterations_of_shard()
     }
 
-    /// The learnt distribution of starts of light paths, if they are guided.
+    /// The learnt distribution of starts of light paths; `None` if they are not guided.
     pub(crate) fn guide(&self) -> Option<&Guide> {
         self.integrator.guide()
     }
 
-    /// Pixels, row by row from the top.
+    /// Accumulated samples of each pixel, row by row from the top.
     pub fn pixels(&self) -> &[PixelAccumulator] {
         &self.pixels
     }
@@ -197,12 +197,12 @@ impl<'a> Session<'a> {
         &self.input.settings
     }
 
-    /// Iterations done.
+    /// Number of iterations done.
     pub fn iterations(&self) -> u64 {
         self.counters.stats.iterations
     }
 
-    /// Light paths emitted.
+    /// Number of light paths emitted.
     pub fn light_paths(&self) -> u64 {
         self.counters.stats.light_paths
     }
@@ -245,13 +245,13 @@ impl<'a> Session<'a> {
         film::output::layers(self.input.size(), &self.pixels, &self.bandwidths(), &shape, wanted)
     }
 
-    /// Bandwidths of the last iteration.
+    /// Kernel bandwidths of all pixels in the last iteration.
     fn bandwidths(&self) -> BandwidthState {
         let settings = self.settings();
         BandwidthState::new(settings.schedule(settings.last_iteration(self.iterations())), self.integrator.counted())
     }
 
-    /// Ends the render.
+    /// Ends the render for the reason `stop`, and returns its result.
     pub fn finish(mut self, stop: StopReason) -> Rendered {
         let error = self.estimate_error();
         self.error = Some(error);

@@ -62,7 +62,7 @@ pub fn run_session<'a>(
 }
 
 impl Settings {
-    /// The reason to stop after `seconds`, with the estimated relative error `error`.
+    /// The reason to stop after `seconds` with the estimated relative error `error`; `None` to continue.
     fn stop_reason(&self, seconds: f64, error: Option<f64>) -> Option<StopReason> {
         if self.time.is_some_and(|t| seconds >= t) {
             Some(StopReason::Time)

@@ -8,27 +8,27 @@ use serde::{Deserialize, Serialize};
 /// settings and the number of the iteration.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct State<P = Vec<PixelAccumulator>> {
-    /// Pixels, row by row from the top.
+    /// Accumulated samples of each pixel, row by row from the top.
     pub(super) pixels: P,
     pub(super) counters: Counters,
     /// State of the method's passes, packed by them.
     pub(super) passes: Vec<u8>,
 }
 
-/// Counts of a render, and its position in the sequence of iterations.
+/// Counts of a render, and its position in its sequence of iterations.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Counters {
     pub(super) stats: RenderStats,
-    /// The next iteration, from 0.
+    /// Number of the next iteration, from 0.
     pub(super) next: u64,
-    /// Number of iterations after which the error is recorded next.
+    /// Number of iterations after which the error history gets its next entry.
     pub(super) next_record: u64,
-    /// Wall-clock seconds spent before the first iteration.
+    /// Wall-clock seconds spent on the pilot and other preparations, before the first iteration.
     pub(super) pilot_seconds: f64,
 }
 
 impl<P> State<P> {
-    /// This state with other pixels, and the pixels that it had.
+    /// Exchanges the pixels of the state. Returns the state with the new pixels, and the old pixels.
     pub fn replace_pixels<Q>(self, pixels: Q) -> (State<Q>, P) {
         (State { pixels, counters: self.counters, passes: self.passes }, self.pixels)
     }

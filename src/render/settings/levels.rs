@@ -3,7 +3,8 @@
 use crate::transport::MAX_LEVELS;
 use serde::{Deserialize, Serialize};
 
-/// Bandwidth levels. The bandwidth of each is 1/sqrt(2) times that of the next larger one.
+/// Bandwidth levels: pictures of one render with different kernel bandwidths. The bandwidth of each is 1/sqrt(2) times
+/// that of the next larger one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Levels {
     /// Number of levels, 1 to [`MAX_LEVELS`].
@@ -15,12 +16,12 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// `count` levels that share one camera path.
+    /// Makes `count` levels that share one camera path per pixel.
     pub fn new(count: usize) -> Levels {
         Levels { count: count.clamp(1, MAX_LEVELS), two_paths: false }
     }
 
-    /// `count` levels; if there are several, level 1 has a camera path of its own.
+    /// Makes `count` levels; if there are several, level 1 has a camera path of its own.
     pub fn decorrelated(count: usize) -> Levels {
         Levels { two_paths: count > 1, ..Levels::new(count) }
     }

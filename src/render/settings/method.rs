@@ -5,64 +5,66 @@ use crate::estimator::rule::memoryless;
 use crate::plan::Search;
 use serde::{Deserialize, Serialize};
 
-/// Default light paths per iteration, as in the papers.
+/// Default number of light paths per iteration, as in the papers.
 pub const DEFAULT_PHOTONS: u32 = 100_000;
-/// Default light paths of [`Method::Pm`], which are traced once.
+/// Default number of light paths of [`Method::Pm`], which are traced once.
 pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
-/// Default number of neighbours whose distance is the bandwidth of [`Method::Pm`].
+/// Default `k` of [`Method::Pm`], whose bandwidth is the distance to the k-th nearest photon.
 pub const DEFAULT_MAP_KNN: usize = 100;
-/// Default number of neighbours whose distance is the largest initial bandwidth, with several levels
+/// Default `k` of the largest initial bandwidth, the distance to the k-th nearest photon: with several levels
 /// \[post-reconstruction 2021, 4.1\] and with one.
 pub const DEFAULT_KNN: (usize, usize) = (20, 10);
 
-/// Default reduction rate where merging complements connections \[Georgiev et al. 2012\].
+/// Default reduction rate of bandwidths where merging complements connections \[Georgiev et al. 2012\].
 const MERGING_ALPHA: f64 = 0.75;
 
-/// Rule by which bandwidths shrink.
+/// Rule by which kernel bandwidths shrink from one iteration to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BandwidthRule {
-    /// By the number of the iteration alone ([`memoryless`]).
+    /// Bandwidths follow from the number of the iteration alone ([`memoryless`]).
     Memoryless,
-    /// By the number of photons found ([`local`](crate::estimator::rule::local)).
+    /// Bandwidths follow from the number of photons found ([`local`](crate::estimator::rule::local)).
     Local,
-    /// To the least estimated error ([`adaptive`](crate::estimator::rule::adaptive)).
+    /// Bandwidths take the least estimated error ([`adaptive`](crate::estimator::rule::adaptive)).
     Adaptive,
-    /// While a test finds that photons are not uniform ([`chi_squared`](crate::estimator::rule::chi_squared)).
+    /// Bandwidths shrink where a test finds that photons are not uniform
+    /// ([`chi_squared`](crate::estimator::rule::chi_squared)).
     ChiSquared,
 }
 
-/// Properties of a method.
+/// Properties of a rendering method.
 struct Row {
-    /// Name on the command line and in files.
+    /// Name of the method on the command line and in files.
     name: &'static str,
-    /// One line for help texts.
+    /// One line about the method for help texts.
     help: &'static str,
     /// Techniques that find the light, if photons carry all indirect light.
     search: Search,
     /// Techniques that find the light if photons carry caustics alone; `None` if the method does not support that.
     search_with_paths: Option<Search>,
-    /// Rules that bandwidths can follow, the default first; empty if the method has no shrinking bandwidths.
+    /// Rules by which bandwidths can shrink, the default first; empty if the method has no shrinking bandwidths.
     rules: &'static [BandwidthRule],
-    /// Whether the method has several bandwidth levels.
+    /// Whether the method can render several bandwidth levels (pictures with different kernel bandwidths).
     has_levels: bool,
-    /// Default number of light paths; `None` if it is no setting: other methods trace one per camera path, or none.
+    /// Default number of light paths; `None` if the number is no setting: such methods trace one per camera path, or
+    /// none.
     photons: Option<u32>,
-    /// Default number of neighbours that determine initial bandwidths, with several levels and with one.
+    /// Default `k` of initial bandwidths, the distance to the k-th nearest photon: with several levels and with one.
     neighbours: (usize, usize),
-    /// Default reduction rate of the memoryless rule.
+    /// Default reduction rate of bandwidths under the memoryless rule.
     alpha: f64,
-    /// Whether light paths can be guided.
+    /// Whether light paths can be guided: started preferably toward objects that focus light.
     guides: bool,
     /// Whether camera paths gather at the same points in every iteration.
     has_fixed_points: bool,
     /// Whether samples are states of Markov chains.
     has_chains: bool,
-    /// Method that replaces this one where bandwidth levels must keep a fixed ratio.
+    /// Method that replaces this one where bandwidth levels must keep a fixed ratio; `None` if none has to.
     pilot: Option<Method>,
 }
 
 impl Row {
-    /// An unbiased method.
+    /// Defaults for the rows of methods without bias.
     const UNBIASED: Row = Row {
         name: "",
         help: "",
@@ -79,7 +81,7 @@ impl Row {
         pilot: None,
     };
 
-    /// A method whose camera paths gather the photons of a new map in every iteration.
+    /// Defaults for the rows of methods whose camera paths gather the photons of a new map in every iteration.
     const GATHERING: Row = Row {
         search: Search::Photons,
         has_levels: true,
@@ -89,10 +91,10 @@ impl Row {
     };
 }
 
-/// Declares [`Method`] and its rows.
+/// Declares [`Method`] and its table of properties, one row per method.
 macro_rules! methods {
     ($($(#[$attribute:meta])* $method:ident = $row:expr;)*) => {
-        /// Algorithm that finds the light.
+        /// Rendering method: the algorithm that finds the light.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub enum Method {
@@ -208,17 +210,17 @@ methods! {
 }
 
 impl Method {
-    /// Name on the command line and in files.
+    /// Name of the method on the command line and in files.
     pub fn name(self) -> &'static str {
         self.row().name
     }
 
-    /// The method of that name.
+    /// The method with this name; `None` if there is none.
     pub fn named(name: &str) -> Option<Method> {
         Method::ALL.iter().copied().find(|method| method.name() == name)
     }
 
-    /// One line for help texts.
+    /// One line about the method for help texts.
     pub fn help(self) -> &'static str {
         self.row().help
     }
@@ -233,7 +235,7 @@ impl Method {
         self.row().search_with_paths
     }
 
-    /// Rules that bandwidths can follow, the default first; empty if the method has no shrinking bandwidths.
+    /// Rules by which bandwidths can shrink, the default first; empty if the method has no shrinking bandwidths.
     pub fn rules(self) -> &'static [BandwidthRule] {
         self.row().rules
     }
@@ -255,12 +257,12 @@ impl Method {
         self.row().has_chains
     }
 
-    /// Whether the method has several bandwidth levels.
+    /// Whether the method can render several bandwidth levels (pictures with different kernel bandwidths).
     pub fn has_levels(self) -> bool {
         self.row().has_levels
     }
 
-    /// Whether the method has bandwidths that shrink.
+    /// Whether the method has kernel bandwidths that shrink.
     pub fn has_bandwidths(self) -> bool {
         !self.rules().is_empty()
     }
@@ -270,7 +272,7 @@ impl Method {
         self.rules().iter().any(|rule| matches!(rule, BandwidthRule::Memoryless | BandwidthRule::Local))
     }
 
-    /// Whether the method supports other kernels than the box with a bandwidth rule.
+    /// Whether the method supports, under this bandwidth rule, other kernels than the box.
     pub fn takes_kernels(self, rule: BandwidthRule) -> bool {
         self.gathers() && matches!(self.rule(rule), Some(BandwidthRule::Memoryless | BandwidthRule::Adaptive))
     }
@@ -301,7 +303,7 @@ impl Method {
         self.row().photons.is_some()
     }
 
-    /// Whether light paths can be guided.
+    /// Whether light paths can be guided: started preferably toward objects that focus light.
     pub fn supports_guiding(self) -> bool {
         self.row().guides
     }
@@ -311,18 +313,18 @@ impl Method {
         self.row().photons.unwrap_or(DEFAULT_PHOTONS)
     }
 
-    /// Default number of neighbours that determine initial bandwidths.
+    /// Default `k` of initial bandwidths, the distance to the k-th nearest photon, with this number of levels.
     pub fn default_neighbours(self, levels: usize) -> usize {
         let (several, one) = self.row().neighbours;
         if levels == 1 { one } else { several }
     }
 
-    /// Default reduction rate of the memoryless rule.
+    /// Default reduction rate of bandwidths under the memoryless rule.
     pub fn default_alpha(self) -> f64 {
         self.row().alpha
     }
 
-    /// Method that replaces this one in pilots whose bandwidth levels must keep a fixed ratio.
+    /// Method that replaces this one in pilots whose bandwidth levels must keep a fixed ratio, or this one itself.
     pub fn pilot_method(self) -> Method {
         self.row().pilot.unwrap_or(self)
     }

@@ -24,12 +24,12 @@ use crate::stop::Stop;
 use crate::transport::{CameraPaths, Indirect, InitialMedia, MAX_LEVELS};
 use serde::{Deserialize, Serialize};
 
-/// Iterations if no stop condition is given.
+/// Number of iterations of a render without a stop condition.
 pub const DEFAULT_ITERATIONS: u64 = 64;
 /// Default of [`Settings::photon_memory`] (bytes).
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
 
-/// Kernel of density estimation.
+/// Kernel of photon density estimation: the weight of a photon by its distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -79,20 +79,20 @@ impl From<RadiusRule> for BandwidthRule {
 pub struct Settings {
     /// Algorithm that finds the light.
     pub method: Method,
-    /// Seed of all random numbers.
+    /// Seed of all random numbers of the render.
     pub seed: u64,
-    /// Light paths per iteration; for [`Method::Pm`], light paths of the whole render.
+    /// Number of light paths per iteration; for [`Method::Pm`], of the whole render.
     pub photons: u32,
     /// Most bytes that the photon map of [`Method::Pm`] may take while it is built.
     pub photon_memory: u64,
     /// Light that photons of [`Method::Sppm`] carry: all indirect light, or caustics alone.
     pub indirect: Indirect,
-    /// Classes of light paths that the render finds.
+    /// Classes of light paths (such as caustics) that the render finds.
     pub classes: ClassSet,
     /// Guide the starts of light paths toward objects that focus light, if a pilot finds that it pays. See
     /// [`Method::supports_guiding`].
     pub guided: bool,
-    /// Bandwidth levels.
+    /// Bandwidth levels: pictures with different kernel bandwidths that one render makes.
     pub levels: Levels,
     /// Also make a picture per sampling technique ([`Method::has_techniques`]).
     pub techniques: bool,
@@ -101,7 +101,7 @@ pub struct Settings {
     pub initial_bandwidth: InitialBandwidth,
     /// Upper bound of initial bandwidths on surfaces and in media, relative to the width of the picture.
     pub max_initial_bandwidth: [f32; 2],
-    /// Reduction rate of the memoryless rule and of the rule of local statistics, in (0, 1].
+    /// Reduction rate of bandwidths under the memoryless rule and the rule of local statistics, in (0, 1].
     pub alpha: f64,
     /// Reduction rate of bandwidths in media, in (0, 1].
     pub volume_alpha: f64,
@@ -111,17 +111,17 @@ pub struct Settings {
     pub kernel: KernelChoice,
     /// Parameters of the bandwidth rule of [`Method::Cppm`].
     pub chi_squared: ChiSquaredSettings,
-    /// Most segments of a path.
+    /// Most segments of a path, from the camera to the light.
     pub max_depth: u32,
-    /// Stop after this many iterations of the whole render, all shards together.
+    /// Stop after this many iterations of the whole render, all shards together; `None`: no limit.
     pub iterations: Option<u64>,
-    /// Stop after this many seconds.
+    /// Stop after this many wall-clock seconds; `None`: no limit.
     pub time: Option<f64>,
-    /// Stop at this estimated relative error.
+    /// Stop when the estimated relative error is at most this; `None`: no target.
     pub target_error: Option<f64>,
-    /// Part of the iterations to render.
+    /// Part of the render's iterations that this process renders.
     pub shard: Shard,
-    /// Request that ends the current iteration early.
+    /// Flag by which the user ends the current iteration early.
     #[serde(skip)]
     pub stop: Stop,
 }
@@ -156,7 +156,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Default settings of a candidate.
+    /// Default settings of a candidate, one of the methods that `auto` compares.
     pub fn for_candidate(candidate: Candidate) -> Settings {
         let method = candidate.method;
         let levels = Levels::new(if method.has_levels() { MAX_LEVELS } else { 1 });
@@ -188,7 +188,7 @@ impl Settings {
         }
     }
 
-    /// Camera paths of a render with these settings.
+    /// Makes the tracer of camera paths for a render with these settings.
     pub(in crate::render) fn camera_paths<'a>(
         &'a self,
         scene: &'a Scene,
@@ -201,7 +201,8 @@ impl Settings {
         CameraPaths { scene, camera, interior: initial_media.camera, max_depth, indirect, classes, stop }
     }
 
-    /// Function that makes a pixel before the first iteration, from its largest initial bandwidths.
+    /// Returns a function that makes a pixel before the first iteration, from its largest initial bandwidths by kind of
+    /// photons.
     pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.power_exponent());
         let groups = self.light_groups(scene);
@@ -214,8 +215,8 @@ impl Settings {
         vec![self.pixel_factory(scene)([0.0; 2]); width as usize * height as usize]
     }
 
-    /// Number of light groups with layers of their own. Photons do not store their light, so methods that gather them
-    /// have none.
+    /// Number of light groups with layers of their own. Photons do not store the group of their light, so methods that
+    /// gather them have none.
     pub(in crate::render) fn light_groups(&self, scene: &Scene) -> usize {
         if self.method.has_techniques() { scene.lights.groups().names.len() } else { 0 }
     }
@@ -225,7 +226,7 @@ impl Settings {
         self.shard.index + done.saturating_sub(1) * self.shard.count + 1
     }
 
-    /// Reduction of bandwidths at iteration `i` (from 1) by the memoryless rules.
+    /// Factors by which the memoryless rules have shrunk the bandwidths at iteration `i` (from 1).
     pub fn schedule(&self, i: u64) -> Schedule {
         Schedule::new(i, self.levels.count, self.alpha, self.volume_alpha)
     }
@@ -235,12 +236,12 @@ impl Settings {
         self.shard.count > 1
     }
 
-    /// Iterations of this shard, if their number stops the render.
+    /// Number of iterations of this shard; `None` if their number does not stop the render.
     pub fn iterations_of_shard(&self) -> Option<u64> {
         self.iterations.map(|n| n.saturating_sub(self.shard.index).div_ceil(self.shard.count))
     }
 
-    /// Techniques that find the light.
+    /// Techniques by which the render finds the light.
     pub fn search(&self) -> Search {
         let with_paths = self.method.search_with_paths().filter(|_| self.indirect == Indirect::Paths);
         with_paths.unwrap_or(self.method.search())
@@ -251,8 +252,8 @@ impl Settings {
         self.search().owned_by(Owner::Photons) & self.classes & classes_in(survey)
     }
 
-    /// Kinds of photons that have bandwidths. Methods that merge light paths have one bandwidth for all photons, stored as
-    /// the first kind.
+    /// For each kind of photons, whether it has bandwidths. Methods that merge light paths have one bandwidth for all
+    /// photons, stored as the first kind.
     pub fn bandwidth_kinds(&self, survey: &Survey) -> ByKind<bool> {
         if self.method.gathers() {
             self.indirect.kinds(self.photon_classes(survey))
@@ -261,12 +262,12 @@ impl Settings {
         }
     }
 
-    /// Rule that bandwidths follow, if they shrink.
+    /// Rule by which bandwidths shrink; `None` if they do not.
     pub fn bandwidth_rule(&self) -> Option<BandwidthRule> {
         self.method.rule(self.radius_rule.into())
     }
 
-    /// Whether red, green and blue have bandwidths of their own.
+    /// Whether red, green and blue have separate bandwidths.
     pub fn has_channels(&self) -> bool {
         self.bandwidth_rule() == Some(BandwidthRule::ChiSquared) && self.chi_squared.plus
     }
@@ -277,8 +278,9 @@ impl Settings {
         self.bandwidth_rule().is_none_or(|rule| rule == BandwidthRule::Memoryless)
     }
 
-    /// Number of levels that keep the fixed ratio of bandwidths from which bias is estimated. Under rules that shrink each
-    /// level on its own, it ends with the picture's level, so that there is no larger level to compare with.
+    /// Number of bandwidth levels that keep a fixed ratio of bandwidths, so that bias is estimated from them. Under
+    /// rules that shrink each level on its own, it ends with the picture's level, so that there is no larger level to
+    /// compare with.
     pub fn compared_levels(&self) -> usize {
         if self.is_memoryless() || self.bandwidth_rule() == Some(BandwidthRule::Adaptive) {
             self.levels.count
