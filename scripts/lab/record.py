@@ -37,7 +37,7 @@ def _git(*args):
 
 
 def machine():
-    """Processor, usable cores, memory and system."""
+    """The machine that runs this: its processor, usable cores, memory and system."""
     try:
         info = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         cpu = next(line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name"))
@@ -58,7 +58,7 @@ def same(one, other):
 
 
 def entries(file=RESULTS):
-    """All stored entries."""
+    """All measurements stored in a file of results."""
     file = Path(file)
     return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
 
