@@ -35,7 +35,7 @@ class Mix:
 
 @dataclass
 class Sum:
-    """An Add Shader: both shader trees below it reflect with their full weights."""
+    """An Add Shader: the two shader trees below it, both with full weight. None stands for black."""
     first: object
     second: object
 

@@ -81,7 +81,7 @@ def fraction(progress):
 
 
 def sentence(progress):
-    """The render's progress as a sentence: its iteration, relative error in per cent, and time left."""
+    """The render's progress as a sentence: its iteration, error in per cent if known, and time left if known."""
     if progress["iteration"] == progress["iterations"]:
         return "Finishing"
     text = f"Iteration {progress['iteration']}"
