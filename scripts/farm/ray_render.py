@@ -85,7 +85,7 @@ def program():
 
 @dataclass
 class Picture:
-    """A picture and its progress: shards left, done, and in the last picture so far."""
+    """A picture and the number of its shards that are unfinished, finished, and merged into its last preview."""
 
     output: Path
     frame: int | None
@@ -101,12 +101,12 @@ class Picture:
 
     @property
     def partial(self):
-        """The file of the picture so far."""
+        """The path of the EXR file of the picture's last preview."""
         return self.output.with_suffix(".partial.exr")
 
     @property
     def frame_arguments(self):
-        """Arguments of the scripts for the frame."""
+        """The arguments that name the frame to the scripts of this folder; empty for a picture without one."""
         return [] if self.frame is None else ["--frame", self.frame]
 
 
@@ -182,7 +182,7 @@ def show(picture):
 
 @dataclass
 class Request:
-    """The parsed command line."""
+    """The parsed command line of a farm's render."""
 
     scene: Path
     output: Path

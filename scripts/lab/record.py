@@ -52,7 +52,7 @@ def machine():
 
 
 def same(one, other):
-    """Whether two entries store the same figure."""
+    """Whether two stored measurements have equal names and equal values of `SUBJECT_KEYS`."""
     values = [[entry["values"].get(key) for key in SUBJECT_KEYS] for entry in (one, other)]
     return one["name"] == other["name"] and values[0] == values[1]
 
@@ -64,7 +64,7 @@ def entries(file=RESULTS):
 
 
 def record(name, values, file=RESULTS):
-    """Stores a figure and returns its entry. `values` is a dict for JSON, without NaN."""
+    """Stores the measurement `values` under `name` and returns its entry. `values` is a dict for JSON, without NaN."""
     now = datetime.datetime.now(datetime.UTC)
     entry = {
         "name": name,
