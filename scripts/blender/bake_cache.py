@@ -24,7 +24,7 @@ def folder():
 
 
 def load(key):
-    """The array stored under `key`, or None."""
+    """The texels of a baked texture, the array stored under `key`. None if it is missing or unreadable."""
     path = os.path.join(folder(), key + ".npy")
     try:
         texels = numpy.load(path, allow_pickle=False)

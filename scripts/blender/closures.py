@@ -35,7 +35,7 @@ class Mix:
 
 @dataclass
 class Sum:
-    """The sum of two surfaces."""
+    """An Add Shader: the two shader trees below it, both with full weight. None stands for black."""
     first: object
     second: object
 
@@ -85,14 +85,14 @@ def weigh(tree, graph, weight=1.0):
 
 
 def adds_up(tree):
-    """Whether the weights of all leaves sum to one."""
+    """Whether the weights of a shader tree's leaves sum to one: it has no Add Shader and no black branch."""
     if isinstance(tree, Mix):
         return adds_up(tree.first) and adds_up(tree.second)
     return isinstance(tree, Leaf)
 
 
 def facets(tree):
-    """The leaves below a dielectric layer."""
+    """The leaves of a shader tree that have a dielectric coat, as a list."""
     if isinstance(tree, Leaf):
         return [tree] if tree.coat is not None else []
     return facets(tree.first) + facets(tree.second) if tree is not None else []

@@ -57,7 +57,7 @@ task = ray.remote(retry_exceptions=[Failed])
 
 @task
 def shard(request, picture, index):
-    """Render a shard."""
+    """Render one shard of a picture, a part of its iterations, by a script of this folder."""
     words = [HERE / "shard.sh", request.scene, request.output, f"{index}/{request.shards}", *picture.frame_arguments]
     run([*words, "--threads", request.cores, *request.render], picture.folder / f"{index}.log")
 
@@ -71,7 +71,7 @@ def merge(request, picture):
 
 @task
 def partial(picture):
-    """Merge the finished shards to a picture so far."""
+    """Merge the finished shards of an unfinished picture into a preview of it."""
     so_far = picture.partial
     words = [program(), "merge", "--partial", *sorted(picture.folder.glob("shard-*.exr"))]
     run([*words, "-o", so_far, "--png", so_far.with_suffix(".png")], picture.folder / "partial.log")
@@ -85,7 +85,7 @@ def program():
 
 @dataclass
 class Picture:
-    """A picture and its progress: shards left, done, and in the last picture so far."""
+    """A picture and the number of its shards that are unfinished, finished, and merged into its last preview."""
 
     output: Path
     frame: int | None
@@ -96,17 +96,17 @@ class Picture:
 
     @property
     def folder(self):
-        """The folder of the picture's shards."""
+        """The path of the folder that holds the picture's shards."""
         return self.output.with_suffix(".shards")
 
     @property
     def partial(self):
-        """The file of the picture so far."""
+        """The path of the EXR file of the picture's last preview."""
         return self.output.with_suffix(".partial.exr")
 
     @property
     def frame_arguments(self):
-        """Arguments of the scripts for the frame."""
+        """The arguments that name the frame to the scripts of this folder; empty for a picture without one."""
         return [] if self.frame is None else ["--frame", self.frame]
 
 
@@ -116,7 +116,7 @@ def numbered(path, frame):
 
 
 def frames_of(text):
-    """Parse the frames A, A-B or A-B,STEP."""
+    """Parse a range of frame numbers: A, A-B or A-B,STEP."""
     match = re.fullmatch(r"(\d+)(?:-(\d+))?(?:,([1-9]\d*))?", text)
     if not match or (match[2] and int(match[2]) < int(match[1])):
         raise argparse.ArgumentTypeError(f"{text!r}: give A-B or A-B,STEP, such as 1-100")
@@ -182,7 +182,7 @@ def show(picture):
 
 @dataclass
 class Request:
-    """The parsed command line."""
+    """The parsed command line of a farm's render."""
 
     scene: Path
     output: Path

@@ -51,7 +51,7 @@ class Farm:
 
     @property
     def workers(self):
-        """Number of parallel tasks."""
+        """The number of tasks that the farm runs in parallel."""
         return self.places or max(1, self.cores // self.threads)
 
     @property
@@ -189,7 +189,7 @@ def simulate(costs, farm, job):
 
 
 def powers(most):
-    """1, 2, 4 ... and `most`."""
+    """The powers of two below `most`, and `most` itself, as numbers to try."""
     return sorted({2**i for i in range(most.bit_length()) if 2**i <= most} | {most})
 
 

@@ -24,7 +24,7 @@ def summary(ratios, limit=1.0):
 
 
 def best(candidates, figure):
-    """The candidate with the smallest error."""
+    """The candidate whose error `figure` is smallest."""
     return min(candidates, key=lambda one: one[figure])
 
 

@@ -37,7 +37,7 @@ def _git(*args):
 
 
 def machine():
-    """Processor, usable cores, memory and system."""
+    """The machine that runs this: its processor, usable cores, memory and system."""
     try:
         info = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         cpu = next(line.split(":", 1)[1].strip() for line in info.splitlines() if line.startswith("model name"))
@@ -52,19 +52,19 @@ def machine():
 
 
 def same(one, other):
-    """Whether two entries store the same figure."""
+    """Whether two stored measurements have equal names and equal values of `SUBJECT_KEYS`."""
     values = [[entry["values"].get(key) for key in SUBJECT_KEYS] for entry in (one, other)]
     return one["name"] == other["name"] and values[0] == values[1]
 
 
 def entries(file=RESULTS):
-    """All stored entries."""
+    """All measurements stored in a file of results."""
     file = Path(file)
     return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
 
 
 def record(name, values, file=RESULTS):
-    """Stores a figure and returns its entry. `values` is a dict for JSON, without NaN."""
+    """Stores the measurement `values` under `name` and returns its entry. `values` is a dict for JSON, without NaN."""
     now = datetime.datetime.now(datetime.UTC)
     entry = {
         "name": name,

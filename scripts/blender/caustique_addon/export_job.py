@@ -13,7 +13,7 @@ import bpy
 
 
 def export(job):
-    """Do the job. Returns the exporter's warnings."""
+    """Export the scene and frame that `job` names to its GLB file. Returns the exporter's warnings."""
     bpy.ops.wm.open_mainfile(filepath=job["blend"], load_ui=False, use_scripts=job["scripts"])
     scene = bpy.data.scenes[job["scene"]]
     bpy.context.window.scene = scene

@@ -18,7 +18,7 @@ _LINE_HEADER_BYTES = 8  # the line's y, and the size of its data
 
 
 class Picture:
-    """An EXR file.
+    """The pixels and header strings of an uncompressed EXR file of 32-bit floats.
 
     `text`: the header's strings. `window`: x and y of the upper left pixel. `width`, `height`: size of the data window.
     `display`: width and height of the whole picture. `channels`: {name: array (height, width), top row first}.
@@ -48,7 +48,7 @@ class Picture:
 
 
 def _header(data, path):
-    """The attributes, {name: bytes}, and the end of the header."""
+    """The attributes of an EXR file's header, {name: bytes}, and the offset in bytes of the header's end."""
     if data[:8] != _MAGIC:
         raise Fault(f"{path} is not an EXR file of one part", "render again")
     attributes, at = {}, 8
@@ -62,7 +62,7 @@ def _header(data, path):
 
 
 def _channels(data, path):
-    """The names of the channels, in file order."""
+    """The names of an EXR file's channels in file order, from the header's attribute `channels`."""
     names, at = [], 0
     while data[at] != 0:
         end = data.index(b"\0", at)

@@ -33,7 +33,7 @@ def read(words, folder, stopped):
 
 
 def headline(said):
-    """One sentence about the caustics in a plan."""
+    """One sentence that says whether caustics are rendered, from `said`, the program's plan of the render."""
     caustics = [effect for effect in said["effects"] if effect["name"] in _CAUSTICS]
     rendered = [effect for effect in caustics if effect["simulated"]]
     if rendered:

@@ -81,7 +81,7 @@ def fraction(progress):
 
 
 def sentence(progress):
-    """Progress as a sentence."""
+    """The render's progress as a sentence: its iteration, error in per cent if known, and time left if known."""
     if progress["iteration"] == progress["iterations"]:
         return "Finishing"
     text = f"Iteration {progress['iteration']}"
@@ -95,7 +95,7 @@ def sentence(progress):
 
 
 def duration(seconds):
-    """A duration in seconds as text."""
+    """Text for a duration given in seconds, rounded to seconds, minutes or hours."""
     minutes, hours = seconds / 60, seconds / 3600
     if hours >= 2:
         return f"{hours:.0f} h"

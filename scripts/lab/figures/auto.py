@@ -63,7 +63,7 @@ def fixed(method):
 
 
 def renders(scene, method):
-    """Whether a method can render a scene: some have no photons in media."""
+    """Whether the program accepts a method for a scene; methods without photons in media refuse some."""
     line = command("plan", ROOT / "scenes" / f"{scene}.glb", *fixed("sppm" if method == "auto" else method).split())
     return subprocess.run(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
 

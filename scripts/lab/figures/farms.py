@@ -64,7 +64,7 @@ def render_of(output, shard):
 
 
 def parent(process):
-    """The parent of a process."""
+    """The process id of a process's parent."""
     return int(re.search(r"PPid:\s*(\d+)", Path(f"/proc/{process}/status").read_text())[1])
 
 

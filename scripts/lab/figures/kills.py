@@ -42,7 +42,7 @@ def render_command(method, file, *options):
 
 
 def run(words):
-    """Runs a command to its end; returns the seconds."""
+    """Runs a command to its end; returns its wall-clock seconds."""
     start = time.perf_counter()
     subprocess.run(words, check=True, stderr=subprocess.DEVNULL)
     return time.perf_counter() - start
