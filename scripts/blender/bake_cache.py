@@ -53,7 +53,7 @@ def store(key, texels):
 
 
 def digest(*parts):
-    """A key made from texts, numbers, bytes and arrays."""
+    """A key of the bake cache: a digest of the given texts, numbers, bytes and arrays."""
     total = hashlib.sha256()
     for part in parts:
         part = part.tobytes() if isinstance(part, numpy.ndarray) else part

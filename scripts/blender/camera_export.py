@@ -12,7 +12,9 @@ _GRID = 16
 
 
 def extras(thing, flat, warn):
-    """Keys of a camera: `shift` (widths and heights of the picture), `aperture_radius` and `focus_distance` (m)."""
+    """Keys of the camera object `thing`: `shift` (in widths and heights of the picture), `aperture_radius` and
+    `focus_distance` (m).
+    """
     camera, render, where, said = thing.data, flat.scene.render, flat.where(thing), {}
     if camera.type == "PANO":
         warn(where, "panoramic cameras are not carried: it is a perspective camera here")

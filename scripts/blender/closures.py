@@ -26,7 +26,7 @@ class Leaf:
 
 @dataclass
 class Mix:
-    """Two surfaces with weights 1 - f and f. `factor` is the input socket of f, at `path`."""
+    """A Mix Shader: two shader trees with weights 1 - f and f. `factor` is the input socket of f, at `path`."""
     factor: bpy.types.NodeSocket
     path: tuple
     first: object

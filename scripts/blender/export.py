@@ -140,7 +140,7 @@ def _run_exporter(path):
 
 
 def _materials_of(things):
-    """The materials of `things`."""
+    """The materials in the material slots of the objects `things`."""
     found = {m.name: m for thing in things for m in surfaces.materials_of(thing) if m is not None}
     return list(found.values())
 

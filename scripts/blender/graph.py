@@ -180,7 +180,7 @@ class Graph:
         return self.node(kind, operation, a, b)
 
     def multiply(self, a, b):
-        """The product of two values."""
+        """The product of two values, which are numbers, colours or sockets of shader nodes."""
         for one, other in ((a, b), (b, a)):
             if is_constant(one) and one in (1.0, (1.0,) * 3) and (is_colour(other) or not is_colour(one)):
                 return other
@@ -189,14 +189,14 @@ class Graph:
         return self._binary("MULTIPLY", lambda x, y: x * y, a, b)
 
     def add(self, a, b):
-        """The sum of two values."""
+        """The sum of two values, which are numbers, colours or sockets of shader nodes."""
         for one, other in ((a, b), (b, a)):
             if is_constant(one) and one in (0.0, (0.0,) * 3) and (is_colour(other) or not is_colour(one)):
                 return other
         return self._binary("ADD", lambda x, y: x + y, a, b)
 
     def subtract(self, a, b):
-        """The difference of two values."""
+        """The difference a - b of numbers, colours or sockets of shader nodes."""
         return self.add(a, self.multiply(b, -1.0))
 
     def divide(self, a, b):
@@ -206,11 +206,11 @@ class Graph:
         return self._binary("DIVIDE", lambda x, y: x / y if y else 0.0, a, b)
 
     def minimum(self, a, b):
-        """The smaller of two values, per component."""
+        """The smaller of two values (numbers, colours or sockets of shader nodes), per component."""
         return self._binary("MINIMUM", min, a, b)
 
     def maximum(self, a, b):
-        """The larger of two values, per component."""
+        """The larger of two values (numbers, colours or sockets of shader nodes), per component."""
         return self._binary("MAXIMUM", max, a, b)
 
     def power(self, a, exponent):
@@ -218,7 +218,7 @@ class Graph:
         return self._binary("POWER", lambda x, y: max(x, 0.0) ** y, a, exponent)
 
     def clamp(self, a):
-        """A value clamped to [0, 1]."""
+        """The value `a`, a number, a colour or a socket of a shader node, clamped to [0, 1]."""
         return self.minimum(self.maximum(a, 0.0), 1.0)
 
     def max_component(self, colour):
@@ -232,7 +232,7 @@ class Graph:
         return self.maximum(self.maximum(*split.outputs[:2]), split.outputs[2])
 
     def combine_channels(self, values):
-        """A colour of three numbers."""
+        """A colour of three values, its red, green and blue."""
         if all(map(is_constant, values)):
             return tuple(map(float, values))
         node = self.tree.nodes.new("ShaderNodeCombineXYZ")

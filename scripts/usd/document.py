@@ -48,7 +48,7 @@ class Document:
         return {name: {"light": len(lights) - 1}}
 
     def node(self, entry):
-        """Add a node to the scene."""
+        """Add the node `entry`, a glTF object as a dictionary, to the document's scene."""
         self.json["scenes"][0]["nodes"].append(self.add("nodes", entry))
 
     def floats(self, array, bounds=False):
@@ -61,7 +61,7 @@ class Document:
         return self.add("accessors", entry)
 
     def indices(self, array):
-        """Add an accessor of vertex indices."""
+        """Add an accessor of vertex indices. Returns the accessor's index."""
         array = numpy.ascontiguousarray(array, numpy.uint32)
         return self.add("accessors", {"bufferView": self._view(array.tobytes()), "componentType": _UINT,
                                       "count": len(array), "type": "SCALAR"})

@@ -37,11 +37,11 @@ class Light:
                 self.add_loss(f"{collection.GetName()} is not carried: it shines on everything, and all casts shadows")
 
     def get(self, name, default):
-        """The value of an input."""
+        """The value of the light's input `name`, or `default` if it is unset."""
         return self.stage.get(self.prim.GetAttribute("inputs:" + name), default)
 
     def add_loss(self, what):
-        """Record a loss of this light."""
+        """Record `what`, a feature of this light that the conversion ignores or approximates."""
         self.stage.losses.add(self.where, what)
 
     @property
@@ -105,7 +105,7 @@ def node(prim, stage, document, matrix):
 
 
 def _axis_lengths(matrix):
-    """Lengths of the transformed axes."""
+    """Lengths of the X, Y and Z axes after the transform `matrix`."""
     return [matrix.TransformDir(Gf.Vec3d(*axis)).GetLength() for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
 
 

@@ -35,7 +35,7 @@ class Texture:
 
 @dataclasses.dataclass
 class Primvar:
-    """A primvar of the mesh as the value of an input."""
+    """A primvar of the mesh as the value of a shader's input."""
 
     name: str
 

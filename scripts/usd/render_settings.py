@@ -55,7 +55,7 @@ class Settings:
         return default
 
     def camera(self):
-        """The path of the camera, or None."""
+        """The path of the camera prim that the RenderSettings name, or None."""
         for prim in (self.product, self.prim):
             targets = prim.GetRelationship("camera").GetForwardedTargets() if prim else ()
             if targets:
@@ -68,7 +68,7 @@ class Settings:
         return None
 
     def purposes(self):
-        """The purposes to render."""
+        """The purposes of UsdGeom prims (such as "default" and "render") that the RenderSettings include."""
         found = self.get("includedPurposes")
         return {"default", "render"} if found is None else {"default", *found}
 

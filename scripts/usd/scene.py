@@ -32,7 +32,7 @@ class Scene:
         self._within = []  # stack of instancers whose prototypes are being visited
 
     def fill(self):
-        """Traverse the whole stage."""
+        """Traverse the whole USD stage and add its visible prims to the glTF document."""
         purposes = self._settings.purposes()
         for child in self._stage.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE):
             for make, matrix in self._walk(child, Gf.Matrix4d(1), True, "default", purposes):
@@ -202,7 +202,7 @@ class Scene:
         return self.document.add("meshes", {"name": str(where), "primitives": made}) if made else None
 
     def _subset_faces(self, subset, count):
-        """The face indices of a GeomSubset."""
+        """The face indices of a GeomSubset on a mesh of `count` faces."""
         where = subset.GetPrim().GetPath()
         if self._stage.get(subset.GetElementTypeAttr(), "face") != "face":
             self._stage.losses.add(where, "a subset of anything but faces is not carried")

@@ -5,7 +5,7 @@ import dataclasses
 
 @dataclasses.dataclass
 class Surface:
-    """A surface. Each value is a constant or a `network.Texture`; `base` may be a `network.Primvar`."""
+    """A surface shader's parameters. Each is a constant or a `network.Texture`; `base` may be a `network.Primvar`."""
 
     base: object = (0.18, 0.18, 0.18)
     metallic: object = 0.0

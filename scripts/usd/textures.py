@@ -203,7 +203,7 @@ def _scaled(texels, bits):
 
 
 def _decode(data, name, where):
-    """Texels as stored in the file."""
+    """Texels of the image file with the bytes `data`, as stored, without colour conversion."""
     if data[:4] == b"\x76\x2f\x31\x01":
         return _read_exr(data, where), 32
     try:

@@ -31,7 +31,7 @@ def method(settings):
 
 
 def additional(text):
-    """Split the additional arguments into words, and check them."""
+    """Split the user's additional command-line arguments into words, and check them."""
     try:
         words = shlex.split(text)
     except ValueError as error:
@@ -46,7 +46,7 @@ def additional(text):
 
 
 def resolution(width, height):
-    """Options for the resolution in pixels."""
+    """Command-line options that set the picture's `width` and `height` in pixels."""
     return ["--width", str(width), "--height", str(height)]
 
 

@@ -46,7 +46,7 @@ def version(path):
 
 
 def options(path):
-    """The options of its `render` command, such as "--preview"."""
+    """The options of the `render` command of the program at `path`, such as "--preview"."""
     return set(re.findall(r"--[a-z][a-z-]*", _ask(path, "render", "--help").stdout))
 
 

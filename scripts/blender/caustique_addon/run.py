@@ -13,7 +13,7 @@ _MIN_GRACE_SECONDS = 20  # from the interrupt to killing the program; finishing 
 
 
 class Run:
-    """A process of `command` (a list) in a folder. `progress`: the last progress object, or None."""
+    """A process of the program: `command` (a list) in `folder`. `progress`: the last progress object, or None."""
 
     def __init__(self, command, folder):
         self.progress, self.warnings = None, []

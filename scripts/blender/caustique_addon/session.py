@@ -11,7 +11,7 @@ plans = {}
 
 
 def clear():
-    """Clear all messages."""
+    """Clear the warnings, faults and plans of all scenes, which the add-on's panels show."""
     warnings.clear()
     faults.clear()
     plans.clear()

@@ -202,7 +202,7 @@ class Reader:
         return self.folder / name
 
     def texture(self, element, place):
-        """A bitmap's bytes (height, width, 3), in sRGB."""
+        """The sRGB bytes (height, width, 3) of the bitmap texture `element`; warnings name `place`."""
         if element.get("type") != "bitmap":
             self.lose(f"{place}: a texture of type {element.get('type')} is taken as its mean, a half")
             return None
