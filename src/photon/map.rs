@@ -66,7 +66,7 @@ pub struct Photon {
     pub depth: u16,
     /// Whether, and how likely, camera paths find the light of the photon on their own.
     pub flags: PhotonFlags,
-    /// Band of wavelengths that the light path carries.
+    /// Band of the light path's wavelength; 0 for a path without one, which has not met dispersive glass.
     pub band: Band,
     /// Weight and rank, for bandwidth rules that count photons; zero if light paths are not guided.
     pub thinning_key: ThinningKey,

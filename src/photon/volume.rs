@@ -18,7 +18,7 @@ pub struct VolumePhoton {
     pub medium: u32,
     /// Number of segments of the light path up to the photon.
     pub depth: u16,
-    /// Band of wavelengths that the light path carries.
+    /// Band of the light path's wavelength; 0 for a path without one, which has not met dispersive glass.
     pub band: Band,
 }
 

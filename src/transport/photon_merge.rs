@@ -32,7 +32,7 @@ pub struct MergePhoton {
     pub depth: u16,
     /// Class of the light path up to the photon: the kinds of its bounces.
     pub prefix: LightPrefix,
-    /// Band of wavelengths that the light path carries.
+    /// Band of the light path's wavelength; 0 for a path without one, which has not met dispersive glass.
     band: Band,
     /// Light group of the light that the path starts from.
     group: Group,
