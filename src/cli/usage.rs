@@ -86,7 +86,8 @@ fn context(error: &clap::Error, kind: ContextKind) -> String {
     }
 }
 
-/// The hint for an unknown option that another program has; `None` unless the command has an option for that purpose.
+/// The hint for an unknown option, if it is a negative number, or another program has it and the command has one for
+/// its purpose; `None` otherwise.
 fn hint_for_foreign_option(word: &str, command: Option<&Command>) -> Option<String> {
     if word.strip_prefix('-').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')) {
         return Some("a value that begins with '-' is joined to its option, as in --option=-1,2".into());

@@ -111,7 +111,7 @@ fn resume<'a>(
     Session::resume(stage, state).ok_or_else(other)
 }
 
-/// What a render does between two iterations: error estimates, previews and checkpoints.
+/// The work of a render between two iterations: error estimates, previews and checkpoints.
 struct BetweenIterations<'a> {
     finish: Option<OpenFinish>,
     /// Relative error of the finished picture at which the render stops; `None`: no target.

@@ -180,7 +180,7 @@ impl<'a> Reports<'a> {
         self.reason_if_black.clone_from(&plan.reason_if_black);
     }
 
-    /// Adds to the error of a render that a signal stopped before the first iteration that nothing is written.
+    /// Replaces the error of a render that a signal has stopped before its first iteration by one that says so.
     fn explain(&self, error: Error) -> Error {
         let interrupt = self.interrupt.as_ref().filter(|_| error.kind == ErrorKind::Interrupted);
         interrupt.and_then(|interrupt| interrupt.check_before_first_iteration(&self.args.output).err()).unwrap_or(error)
