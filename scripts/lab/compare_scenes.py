@@ -261,7 +261,7 @@ def ball(g, name, material, at, radius, shape=None, **more):
 
 
 def glass(folder):
-    """Smooth interfaces."""
+    """Builds the comparison scene of glass with smooth interfaces."""
     g = Glb()
     g.extras(environment={"color": [0.35, 0.4, 0.5]})
     white = g.matte("white", (0.7, 0.7, 0.68))
@@ -286,7 +286,7 @@ def glass(folder):
 
 
 def frosted(folder):
-    """Rough glass."""
+    """Builds the comparison scene of rough glass."""
     g = Glb()
     g.extras(environment={"color": [0.5, 0.5, 0.55]})
     white = g.matte("white", (0.75, 0.73, 0.7))
@@ -345,7 +345,7 @@ def metal(folder):
 
 
 def textures(folder):
-    """Textures and point lights."""
+    """Builds the comparison scene of textures and point lights."""
     g = Glb()
     g.extras(light_units="photometric", environment={"color": [1.0, 1.05, 1.15]})
     mirrored = g.texture(pattern(seed=7), wrap=33648, scale=[3, 3])
@@ -389,7 +389,7 @@ def textures(folder):
 
 
 def wide(folder):
-    """Rough metal and glass."""
+    """Builds the comparison scene of rough metal and glass."""
     g = Glb()
     g.extras(environment={"color": [1.0, 1.0, 1.0]})
     g.node(name="floor", mesh=g.mesh(quad([-3, 0, 3], [6, 0, 0], [0, 0, -6]), g.matte("floor", (0.5, 0.5, 0.5))))

@@ -52,7 +52,7 @@ def summary(rows):
 
 
 def line(label, found):
-    """A row of the table."""
+    """A row of the printed table, as text."""
     if not found.get("told"):
         return f"{label:<28}{found['pictures']:>9}{0:>6}"
     text = f"{label:<28}{found['pictures']:>9}{found['told']:>6}{found['within']:>8}{found['geometric_mean']:>8.2f}"

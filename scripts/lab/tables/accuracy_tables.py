@@ -38,7 +38,7 @@ def target(figures):
 
 
 def knobs(figures):
-    """Errors and core-seconds by option."""
+    """Table of errors and core-seconds of renders, by option."""
     rows = []
     for group, label, options, spent, estimate, picture, gain, gain_finished, size in figures.one("knobs")["rows"]:
         errors = [f"{100 * error:.1f} %" for error in (estimate, picture)]

@@ -8,7 +8,7 @@ EFFECTS += "dispersion depth_of_field environment alpha textures".split()
 
 
 def media(figures):
-    """Errors by method."""
+    """Table of the errors of renders, by method."""
     runs = figures.one("media")["methods"]
     rows = [
         [f"`{name}`", f"{of['mean_ratio']:.3f}", digits(of["relmse"]), digits(of["relmse_trimmed"])]

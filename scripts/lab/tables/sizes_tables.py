@@ -6,7 +6,7 @@ COMPRESSIONS = ["zip", "zips", "piz", "none"]
 
 
 def sizes(figures):
-    """Megabytes by layers and compression."""
+    """Table of the sizes of EXR files in megabytes, by layers and compression."""
     rows = []
     for layers, found in figures.one("sizes")["layers"].items():
         cells = [found[name] for name in COMPRESSIONS] + [found["longer"]]
