@@ -68,11 +68,11 @@ pub(super) fn choose_for_render(
     let method = &mut request.picture.method;
     let chosen = if let MethodRequest::Auto(_) = method {
         let stop = observer.stop();
-        during(Phase::Choosing, observer, |_| choose(method, checked, view, has_layers, || stop.requested()))?
+        during(Phase::Choosing, observer, |_| choose(method, checked, view, has_layers, || stop.requested()))
     } else {
         choose(method, checked, view, has_layers, || false)
     };
-    observer.event(Event::Chosen(chosen.choice.as_ref()))?;
+    observer.event(Event::Chosen(chosen.choice.as_ref()));
     refuse_stop(observer)?;
     Ok(chosen)
 }

@@ -66,8 +66,7 @@ pub(super) struct Contents<'a> {
 /// Delivers a render.
 ///
 /// # Errors
-/// The layers cannot be made, or the observer rejects the estimate. A finish that fails is no error:
-/// [`Delivery::finish_error`].
+/// The layers cannot be made. A finish that fails is no error: [`Delivery::finish_error`].
 pub(super) fn deliver_render(
     request: &Request<'_>,
     Iterated { rendered, head, mut finish, obsolete_checkpoint }: Iterated,
@@ -236,7 +235,8 @@ impl Layers {
     fn send_estimate(&self, header: &Map<String, Value>, observer: &mut dyn Observer) -> Result<()> {
         let mut attributes = self.attributes.clone();
         attributes.insert(exr::ATTRIBUTE, header)?;
-        observer.event(Event::Estimated { set: &self.set, attributes: &attributes })
+        observer.event(Event::Estimated { set: &self.set, attributes: &attributes });
+        Ok(())
     }
 
     /// Finishes the picture. `unseen`: squared relative error by light that hardly any photon has carried.

@@ -55,11 +55,10 @@ use run::Running;
 /// fails, which keeps the estimate ([`Delivery::finish_error`]).
 ///
 /// # Errors
-/// The scene; options that contradict it; memory; a stop before the first iteration; an error of the observer.
+/// The scene; options that contradict it; memory; a stop before the first iteration; a scene that the observer rejects.
 pub fn render(request: Request<'_>, observer: &mut dyn Observer) -> Result<Delivery> {
     let stop = observer.stop();
-    let loaded =
-        during(Phase::Reading, observer, |_| load::load(&request.scene, rayon::current_num_threads(), &stop))??;
+    let loaded = during(Phase::Reading, observer, |_| load::load(&request.scene, rayon::current_num_threads(), &stop))?;
     render_loaded(request, &loaded, observer)
 }
 
@@ -68,7 +67,7 @@ pub fn render(request: Request<'_>, observer: &mut dyn Observer) -> Result<Deliv
 /// # Errors
 /// Errors of [`render`].
 pub fn render_loaded(mut request: Request<'_>, loaded: &Loaded, observer: &mut dyn Observer) -> Result<Delivery> {
-    observer.event(Event::Loaded(&loaded.scene))?;
+    observer.accept(&loaded.scene)?;
     let Checked { camera, settings } = check::check(&request, &loaded.scene)?;
     let view = View::new(&loaded.scene, &camera);
     let resumption = Resumption::read(&request, view.scene, &settings)?;
@@ -82,6 +81,6 @@ pub fn render_loaded(mut request: Request<'_>, loaded: &Loaded, observer: &mut d
     let stage = RenderInput::new(view.scene, view.camera, &prepared.settings);
     let running = Running::start(&request, &stage, &chosen, prepared, resumption, facts.frame, observer)?;
     let iterated = running.iterate(observer)?;
-    observer.event(Event::Rendered(&iterated.rendered))?;
-    during(Phase::Finishing, observer, |observer| deliver::deliver_render(&request, iterated, facts, observer))?
+    observer.event(Event::Rendered(&iterated.rendered));
+    during(Phase::Finishing, observer, |observer| deliver::deliver_render(&request, iterated, facts, observer))
 }

@@ -26,8 +26,6 @@ pub enum Event<'a> {
     PhaseBegins(Phase),
     /// The current long part of the render has ended.
     PhaseEnds,
-    /// The scene has been read and built.
-    Loaded(&'a Scene),
     /// The method is settled. Holds the choice of `auto` if it has compared candidates.
     Chosen(Option<&'a Choice>),
     /// The denoiser and the network of the finish have been opened.
@@ -68,11 +66,17 @@ pub enum Event<'a> {
 
 /// Receives the events of a render: the command line or a host program.
 pub trait Observer {
-    /// Receives an event of the render.
+    /// Receives the scene when it has been read and built.
     ///
     /// # Errors
-    /// An error ends the render.
-    fn event(&mut self, event: Event<'_>) -> Result<()>;
+    /// The observer rejects the scene, which ends the render before any work that could be lost.
+    fn accept(&mut self, scene: &Scene) -> Result<()> {
+        let _ = scene;
+        Ok(())
+    }
+
+    /// Receives an event of the render.
+    fn event(&mut self, event: Event<'_>);
 
     /// The flag by which the user stops the render, also within an iteration.
     fn stop(&self) -> Stop;
@@ -84,13 +88,9 @@ pub trait Observer {
 }
 
 /// Runs `work` and tells the observer when the phase begins and ends.
-pub(super) fn during<T>(
-    phase: Phase,
-    observer: &mut dyn Observer,
-    work: impl FnOnce(&mut dyn Observer) -> T,
-) -> Result<T> {
-    observer.event(Event::PhaseBegins(phase))?;
+pub(super) fn during<T>(phase: Phase, observer: &mut dyn Observer, work: impl FnOnce(&mut dyn Observer) -> T) -> T {
+    observer.event(Event::PhaseBegins(phase));
     let done = work(observer);
-    observer.event(Event::PhaseEnds)?;
-    Ok(done)
+    observer.event(Event::PhaseEnds);
+    done
 }

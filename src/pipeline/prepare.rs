@@ -42,7 +42,7 @@ pub(super) fn prepare(
         None => (None, settings.target_error),
     };
     let settings = Settings { target_error, stop: observer.stop(), ..settings };
-    announce(&mut plan, view, &settings, observer)?;
+    announce(&mut plan, view, &settings, observer);
     plan.warnings.splice(0..0, view.scene.warnings.iter().cloned());
     Ok(Prepared { settings, finish, target, plan })
 }
@@ -57,7 +57,7 @@ fn open_finish(
 ) -> Result<(Option<OpenFinish>, Settings)> {
     let Some(wanted) = request.finish.as_ref().filter(|_| !settings.is_shard()) else { return Ok((None, settings)) };
     let mut finish = finish::open(wanted, Some(settings.levels.count))?;
-    observer.event(Event::FinishOpened { missing: finish.missing.as_ref() })?;
+    observer.event(Event::FinishOpened { missing: finish.missing.as_ref() });
     let Some(time) = settings.time else { return Ok((Some(finish), settings)) };
     let parts = film::names(&layer_shape(&settings, scene));
     let parts = parts.iter().filter_map(|name| finished_part(name)).filter(|part| request.layers.wants(part)).count();
@@ -68,10 +68,9 @@ fn open_finish(
 
 /// Sends the plan to the observer. The warning of slow iterations depends on a clock, so the plan does not keep it for
 /// the header.
-fn announce(plan: &mut Plan, view: View<'_>, settings: &Settings, observer: &mut dyn Observer) -> Result<()> {
+fn announce(plan: &mut Plan, view: View<'_>, settings: &Settings, observer: &mut dyn Observer) {
     let kept = plan.warnings.len();
     plan.warnings.extend(slow_iteration::warning(view, settings));
-    observer.event(Event::Begins { plan, settings })?;
+    observer.event(Event::Begins { plan, settings });
     plan.warnings.truncate(kept);
-    Ok(())
 }

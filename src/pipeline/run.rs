@@ -75,25 +75,15 @@ impl<'a> Running<'a> {
     /// Iterates until the settings, the error of the finished picture or the user end the render.
     ///
     /// # Errors
-    /// The observer rejects an event, or the user has stopped the render before its first iteration.
+    /// The user has stopped the render before its first iteration.
     pub fn iterate(self, observer: &mut dyn Observer) -> Result<Iterated> {
         let Running { mut session, mut between, head } = self;
-        let mut failed = None;
-        let stop = run_session(&mut session, |progress, session| {
-            between.after_iteration(progress, session, observer).unwrap_or_else(|error| {
-                failed = Some(error);
-                Control::Stop
-            })
-        });
-        failed.map_or(Ok(()), Err)?;
+        let stop = run_session(&mut session, |progress, session| between.after_iteration(progress, session, observer));
         if session.iterations() == 0 && stop == StopReason::Interrupted {
             refuse_stop(observer)?;
         }
         let BetweenIterations { finish, saver, .. } = between;
-        let obsolete_checkpoint = match saver {
-            Some(saver) => saver.save_at_end(&session, stop, observer)?,
-            None => None,
-        };
+        let obsolete_checkpoint = saver.and_then(|saver| saver.save_at_end(&session, stop, observer));
         Ok(Iterated { rendered: session.finish(stop), head, finish, obsolete_checkpoint })
     }
 }
@@ -105,7 +95,7 @@ fn resume<'a>(
     state: State,
     observer: &mut dyn Observer,
 ) -> Result<Session<'a>> {
-    observer.event(Event::Resumed(state.iterations()))?;
+    observer.event(Event::Resumed(state.iterations()));
     let path = request.resume.as_deref().unwrap_or("".as_ref());
     let other = || Error::new(ErrorKind::Usage, path.display(), "is of a picture of another size or method");
     Session::resume(stage, state).ok_or_else(other)
@@ -126,31 +116,31 @@ impl BetweenIterations<'_> {
         progress: &Progress,
         session: &mut Session<'a>,
         observer: &mut dyn Observer,
-    ) -> Result<Control> {
+    ) -> Control {
         let estimated = finished_error::estimate(session, self.finish.as_mut(), self.target);
         // A denoiser that fails here fails again in the finish, which reports the error and keeps the estimate.
         let (accuracy, failed) = estimated.map_or((None, true), |accuracy| (accuracy, false));
         let progress = finished_error::add_to_progress(progress, session, accuracy, self.target);
-        observer.event(Event::Progress(&progress))?;
-        self.preview(session, observer)?;
+        observer.event(Event::Progress(&progress));
+        self.preview(session, observer);
         if let Some(saver) = &mut self.saver {
-            saver.save_if_due(session, observer)?;
+            saver.save_if_due(session, observer);
         }
-        Ok(match self.target {
+        match self.target {
             _ if failed || observer.stop().requested() => Control::Stop,
             Some(target) if finished_error::is_reached(&progress, session, accuracy, target) => Control::Reached,
             _ => Control::Continue,
-        })
+        }
     }
 
     /// Sends a preview if the observer wants one, finished at the lowest quality.
-    fn preview(&mut self, session: &mut Session<'_>, observer: &mut dyn Observer) -> Result<()> {
+    fn preview(&mut self, session: &mut Session<'_>, observer: &mut dyn Observer) {
         if !observer.wants_preview() {
-            return Ok(());
+            return;
         }
         let BetweenIterations { finish, frame, .. } = self;
         let mut spent = TimeSpent::default();
-        let sent = spent.measure(|| {
+        spent.measure(|| {
             let wanted = |name: &str| name.is_empty() || (finish.is_some() && reads_for_picture(name));
             let picture = session.layers(wanted).and_then(|mut set| {
                 if let Some(finish) = finish {
@@ -159,9 +149,8 @@ impl BetweenIterations<'_> {
                 set.layers.retain(|layer| layer.name.is_empty());
                 Ok(set)
             });
-            observer.event(Event::Preview { picture, frame })
+            observer.event(Event::Preview { picture, frame });
         });
         session.add_time(spent);
-        sent
     }
 }

@@ -27,15 +27,14 @@ impl<'a> Saver<'a> {
     }
 
     /// Saves a checkpoint if one is due. The time of the save counts as time of the render.
-    pub fn save_if_due(&mut self, session: &mut Session<'_>, observer: &mut dyn Observer) -> Result<()> {
+    pub fn save_if_due(&mut self, session: &mut Session<'_>, observer: &mut dyn Observer) {
         if self.clock.seconds() < self.next {
-            return Ok(());
+            return;
         }
         let mut spent = TimeSpent::default();
-        let saved = spent.measure(|| self.save(session, observer));
+        spent.measure(|| self.save(session, observer));
         session.add_time(spent);
         self.next = self.clock.seconds() + self.saving.every;
-        saved
     }
 
     /// After the last iteration: saves the state of an interrupted render, or of one whose checkpoint the user keeps.
@@ -45,23 +44,22 @@ impl<'a> Saver<'a> {
         session: &Session<'_>,
         stop: StopReason,
         observer: &mut dyn Observer,
-    ) -> Result<Option<PathBuf>> {
+    ) -> Option<PathBuf> {
         self.head.finished = stop != StopReason::Interrupted;
         if self.saving.keep || !self.head.finished {
-            self.save(session, observer)?;
-            return Ok(None);
+            self.save(session, observer);
+            return None;
         }
-        Ok(self.written.then(|| self.saving.path.clone()))
+        self.written.then(|| self.saving.path.clone())
     }
 
     /// Saves a checkpoint. A failure is reported once until a save succeeds again.
-    fn save(&mut self, session: &Session<'_>, observer: &mut dyn Observer) -> Result<()> {
+    fn save(&mut self, session: &Session<'_>, observer: &mut dyn Observer) {
         match self.write(session) {
             Ok(()) => (self.written, self.failed) = (true, false),
-            Err(error) if !std::mem::replace(&mut self.failed, true) => observer.event(Event::SaveFailed(&error))?,
+            Err(error) if !std::mem::replace(&mut self.failed, true) => observer.event(Event::SaveFailed(&error)),
             Err(_) => {}
         }
-        Ok(())
     }
 
     fn write(&self, session: &Session<'_>) -> Result<()> {

@@ -8,7 +8,6 @@ use crate::options;
 use crate::progress::Progress;
 use crate::value::{to_json, to_python};
 use crate::work::{Caller, warn, work};
-use caustique::error::Result;
 use caustique::film::Naming;
 use caustique::image::atomic;
 use caustique::options::SceneOptions;
@@ -294,7 +293,7 @@ struct CallerReports<'a> {
 }
 
 impl Observer for CallerReports<'_> {
-    fn event(&mut self, event: Event<'_>) -> Result<()> {
+    fn event(&mut self, event: Event<'_>) {
         match event {
             Event::FinishOpened { missing } => {
                 self.caller.warn(&missing.map(options::missing_denoiser).into_iter().collect::<Vec<_>>());
@@ -306,7 +305,6 @@ impl Observer for CallerReports<'_> {
             }
             _ => {}
         }
-        Ok(())
     }
 
     fn stop(&self) -> Stop {

@@ -93,11 +93,17 @@ struct Reports<'a> {
 }
 
 impl Observer for Reports<'_> {
-    fn event(&mut self, event: Event<'_>) -> Result<()> {
+    fn accept(&mut self, scene: &Scene) -> Result<()> {
+        scene::print_warnings(&self.args.options.scene, &scene.warnings)?;
+        self.made_for = scene.picture;
+        self.interrupt = Some(Interrupt::install()?);
+        Ok(())
+    }
+
+    fn event(&mut self, event: Event<'_>) {
         match event {
             Event::PhaseBegins(phase) => self.waiting = Some(Waiting::begin(self.args.progress, &self.describe(phase))),
             Event::PhaseEnds => self.waiting = None,
-            Event::Loaded(scene) => self.loaded(scene)?,
             Event::Chosen(choice) => self.reason = choice.map(reason),
             Event::FinishOpened { missing } => warn_missing_denoiser(missing),
             Event::Begins { plan, settings } => self.begins(plan, settings),
@@ -123,7 +129,6 @@ impl Observer for Reports<'_> {
                 self.estimate = files::write_estimate(self.args, set, attributes, self.seconds);
             }
         }
-        Ok(())
     }
 
     fn stop(&self) -> Stop {
@@ -160,13 +165,6 @@ impl<'a> Reports<'a> {
             Phase::Choosing => "choosing a method".into(),
             Phase::Finishing => "finishing the picture".into(),
         }
-    }
-
-    fn loaded(&mut self, scene: &Scene) -> Result<()> {
-        scene::print_warnings(&self.args.options.scene, &scene.warnings)?;
-        self.made_for = scene.picture;
-        self.interrupt = Some(Interrupt::install()?);
-        Ok(())
     }
 
     fn begins(&mut self, plan: &Plan, settings: &Settings) {
