@@ -21,7 +21,7 @@ pub use clap::ValueEnum;
 pub use finish::FinishOptions;
 pub use frames::{Frames, is_pattern, path_of_frame};
 pub use parse::{InvalidOption, one_of, parse};
-pub use render::RenderOptions;
+pub use render::{RenderOptions, SizeOptions};
 pub use run::RunOptions;
 pub use scene::{EnvironmentChoice, SceneOptions};
 pub use values::{BandwidthChoice, CropChoice, FrameSeed, GridChoice, MethodChoice, OnOff};

@@ -130,12 +130,10 @@ pub struct RenderOptions {
     #[arg(hide_short_help = true)]
     pub shard: Option<Shard>,
 
-    /// Width in pixels; alone it keeps the camera's aspect ratio [default: the scene's, else 1280]
-    #[arg(long, value_name = "W", whole = 1..=MAX_SIZE, help_heading = "Picture")]
-    pub width: Option<u32>,
-    /// Height in pixels; alone it keeps the camera's aspect ratio
-    #[arg(long, value_name = "H", whole = 1..=MAX_SIZE, help_heading = "Picture")]
-    pub height: Option<u32>,
+    /// Width and height of the picture.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub size: SizeOptions,
     /// Render only a window of the picture: left edge, top edge, width and height, in pixels, or in fractions such as
     /// 0.25,0,0.5,1 [default: the scene's, else the whole picture]
     #[arg(long, value_name = "X,Y,W,H", help_heading = "Picture")]
@@ -166,6 +164,18 @@ pub struct RenderOptions {
     pub finish: FinishOptions,
 }
 
+/// The size of the picture.
+#[derive(clap::Args, Clone, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub struct SizeOptions {
+    /// Width in pixels; alone it keeps the camera's aspect ratio [default: the scene's, else 1280]
+    #[arg(long, value_name = "W", whole = 1..=MAX_SIZE, help_heading = "Picture")]
+    pub width: Option<u32>,
+    /// Height in pixels; alone it keeps the camera's aspect ratio
+    #[arg(long, value_name = "H", whole = 1..=MAX_SIZE, help_heading = "Picture")]
+    pub height: Option<u32>,
+}
+
 /// The help texts of `--levels` and `--photon-memory` repeat these numbers.
 const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 160);
 
@@ -177,7 +187,13 @@ impl RenderOptions {
     pub fn camera_request(&self) -> Result<CameraRequest> {
         let crop = self.crop.as_ref().map(|choice| choice.crop);
         let filter = self.filter.as_deref().map_or(Ok(Filter::default()), filter)?;
-        Ok(CameraRequest { camera: self.camera.clone(), width: self.width, height: self.height, crop, filter })
+        Ok(CameraRequest {
+            camera: self.camera.clone(),
+            width: self.size.width,
+            height: self.size.height,
+            crop,
+            filter,
+        })
     }
 
     /// The picture and its method as the pipeline, which renders it, wants them.

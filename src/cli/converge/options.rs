@@ -3,11 +3,11 @@
 use crate::cli::progress::Form;
 use caustique::image::tonemap::ToneMap;
 use caustique::options::number::{Ranged, finite, positive, threads};
-use caustique::options::{MethodChoice, SceneOptions};
+use caustique::options::{MethodChoice, SceneOptions, SizeOptions};
 use caustique::peers::Renderer;
 use caustique::report::crop::Window;
 use caustique::report::entry::Metric;
-use caustique::scene::{CameraRequest, MAX_SIZE};
+use caustique::scene::CameraRequest;
 use caustique::stat::sum::MAX_TERMS;
 use std::ops::Bound::{Excluded, Included};
 use std::path::PathBuf;
@@ -85,12 +85,9 @@ pub struct ConvergeArgs {
     #[arg(long, value_name = "N", whole = 2_u64..=MAX_TERMS, conflicts_with = "reference", help_heading = "Error")]
     pub reference_iterations: Option<u64>,
 
-    /// Width in pixels; alone it keeps the camera's aspect ratio [default: the scene's, else 1280]
-    #[arg(long, value_name = "W", whole = 1..=MAX_SIZE, help_heading = "Picture")]
-    pub width: Option<u32>,
-    /// Height in pixels; alone it keeps the camera's aspect ratio
-    #[arg(long, value_name = "H", whole = 1..=MAX_SIZE, help_heading = "Picture")]
-    pub height: Option<u32>,
+    /// Width and height of the pictures.
+    #[command(flatten)]
+    pub size: SizeOptions,
     /// Name of the camera [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     pub camera: Option<String>,
@@ -124,8 +121,8 @@ impl ConvergeArgs {
     pub fn camera_request(&self) -> CameraRequest {
         CameraRequest {
             camera: self.camera.clone(),
-            width: self.width,
-            height: self.height,
+            width: self.size.width,
+            height: self.size.height,
             ..CameraRequest::default()
         }
     }
