@@ -24,20 +24,20 @@ esac
 passed=0
 failed=0
 summary=()
-LOG=
-TIMES=$(mktemp)
-beside=          # process group of the parts that run beside the others
-BESIDE_OUTPUT=$(mktemp)
-BESIDE_RESULT=$(mktemp)
+beside= # process group of the parts that run beside the others
+WORK=$(mktemp -d)
 
 finish() {
     local status=$?
-    [ -z "$beside" ] || kill -- "-$beside" 2>/dev/null || true
-    if [ -s "$TIMES" ]; then
-        printf '\nslowest tests, in seconds\n'
-        sort -rn "$TIMES" | sed -n 1,20p
+    if [ -n "$beside" ]; then
+        kill -- "-$beside" 2>/dev/null || true
+        wait "$beside" 2>/dev/null || true
     fi
-    rm -f "$TIMES" "$BESIDE_OUTPUT" "$BESIDE_RESULT" ${LOG:+"$LOG"}
+    if [ -s "$WORK/times" ]; then
+        printf '\nslowest tests, in seconds\n'
+        sort -rn "$WORK/times" | sed -n 1,20p
+    fi
+    rm -rf "$WORK"
     # An exit outside of the parts, during installation for example.
     if [ "$status" -ne 0 ] && [ "$failed" -eq 0 ]; then
         summary+=("FAILED   before all parts had run")
@@ -54,15 +54,13 @@ trap 'exit 130' INT TERM
 
 # part NAME COMMAND...: runs the command, shows its output, and adds its tests to the counts
 part() {
-    local name=$1 start=$SECONDS status=0 good bad skipped
+    local name=$1 start=$SECONDS status=0 log good bad skipped
     shift
     printf '\n== %s\n' "$name"
-    LOG=$(mktemp)
-    "$@" 2>&1 | tee "$LOG" || status=$?
-    read -r good bad skipped < <(awk -f "$ROOT/tests/test_counts.awk" "$LOG")
-    awk -f "$ROOT/tests/test_times.awk" "$LOG" >>"$TIMES"
-    rm -f "$LOG"
-    LOG=
+    log=$(mktemp -p "$WORK")
+    "$@" 2>&1 | tee "$log" || status=$?
+    read -r good bad skipped < <(awk -f "$ROOT/tests/test_counts.awk" "$log")
+    awk -f "$ROOT/tests/test_times.awk" "$log" >>"$WORK/times"
     # Skipped tests are errors, because everything that they need is installed.
     if [ "$skipped" -gt 0 ] && [ "$status" -eq 0 ]; then
         printf '%d tests were skipped or ignored\n' "$skipped"
@@ -93,11 +91,11 @@ run_beside() {
     # Job control gives them a process group of their own, and does not let them ignore SIGINT, which tests send.
     set -m
     (
-        trap 'printf "passed=\$((passed + %d))\nfailed=\$((failed + %d))\n" "$passed" "$failed" >"$BESIDE_RESULT"
-              [ ${#summary[@]} -eq 0 ] || printf "summary+=(%q)\n" "${summary[@]}" >>"$BESIDE_RESULT"' EXIT
+        trap 'printf "passed=\$((passed + %d))\nfailed=\$((failed + %d))\n" "$passed" "$failed" >"$WORK/beside_result"
+              [ ${#summary[@]} -eq 0 ] || printf "summary+=(%q)\n" "${summary[@]}" >>"$WORK/beside_result"' EXIT
         passed=0 failed=0 summary=()
         "$1"
-    ) </dev/null >"$BESIDE_OUTPUT" 2>&1 &
+    ) </dev/null >"$WORK/beside_output" 2>&1 &
     beside=$!
     set +m
 }
@@ -107,9 +105,9 @@ join_beside() {
     local status=0
     wait "$beside" || status=$?
     beside=
-    cat "$BESIDE_OUTPUT"
+    cat "$WORK/beside_output"
     # shellcheck source=/dev/null
-    . "$BESIDE_RESULT"
+    . "$WORK/beside_result"
     [ "$status" -eq 0 ] || exit 1
 }
 
