@@ -3,6 +3,7 @@
 `tests/test_times.awk` reads these lines.
 """
 
+import signal
 import sys
 import time
 import unittest
@@ -23,4 +24,6 @@ class TimedResult(unittest.TextTestResult):
 
 
 if __name__ == "__main__":
+    # Background jobs of a shell ignore SIGINT, and so would the programs that tests start and interrupt.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     unittest.main(module=None, testRunner=unittest.TextTestRunner(resultclass=TimedResult))
