@@ -42,7 +42,7 @@ struct Folder {
     folder: tempfile::TempDir,
 }
 
-/// What a run of the program left behind.
+/// Output and exit code of a run of the program.
 struct Outcome {
     code: Option<i32>,
     stdout: String,

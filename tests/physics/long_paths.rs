@@ -75,7 +75,7 @@ fn furnace_of_dense_media() {
     }
 }
 
-/// The same ball in a glass, in a scene a thousand times as wide, where light paths must be aimed at it. When nearly
+/// A ball in a glass, in a scene a thousand times as wide, where light paths must be aimed at it. When nearly
 /// all of them ended at their first scattering in the medium, photon methods gave 0.20, the light scattered once.
 #[test]
 fn milk_in_a_wide_scene_is_lit() {

@@ -171,7 +171,7 @@ fn frames_of_mirrored_nodes_are_mirror_images() {
     }
 }
 
-/// Of thirty glasses of one roughness, no row is computed before two of them touch. Then the two rows adjacent to that
+/// Thirty glasses of one roughness compute no row before two of them touch. Then the two rows adjacent to that
 /// roughness are computed for both sides, and for index 1.5, which gives the loss of facets. Their values do not depend
 /// on when or by which thread they are computed.
 #[test]

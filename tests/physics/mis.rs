@@ -483,7 +483,7 @@ struct Lab<'a> {
     shared: Bidirectional<'a>,
     levels: MergeLevels,
     eta: Eta,
-    /// The same number as the explicit densities count merges.
+    /// Merges that the explicit densities count.
     oracle: f64,
 }
 

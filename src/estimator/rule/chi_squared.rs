@@ -509,9 +509,9 @@ mod tests {
         }
     }
 
-    /// Of 120 and 1000 uniform photons the test rejects 5 %, within five standard errors of 10^5 trials plus the error
-    /// of the chi-squared approximation, which is below half a percent for 120 photons in 12 cells. Photons with a
-    /// gradient are rejected more often.
+    /// The test rejects 5 % of fields of 120 and 1000 uniform photons, within five standard errors of 10^5 trials plus
+    /// the error of the chi-squared approximation, which is below half a percent for 120 photons in 12 cells. Photons
+    /// with a gradient are rejected more often.
     #[test]
     fn the_test_rejects_uniform_photons_at_its_significance() {
         let rule = rule();

@@ -1,6 +1,5 @@
-//! What an iteration has measured of all pixels, until it is done: light of one pixel's paths arrives in others, and an
-//! iteration that is given up counts for none of them. One level takes half the bytes of a measure that has room for
-//! all.
+//! The samples of all pixels during an iteration. Light of one pixel's paths arrives in others, and an iteration that is
+//! aborted counts for no pixel. A sample with one level takes half the bytes of one that has room for all levels.
 
 use super::tiles::TILE_PIXELS;
 use crate::estimator::PixelAccumulator;

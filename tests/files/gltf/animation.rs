@@ -166,7 +166,7 @@ fn cameras_lamps_and_materials_move() {
     assert_eq!(scene.warnings, [lost]);
 }
 
-/// Of two animations of the same property, only the first is played.
+/// If two animations move the same property, only the first is played.
 #[test]
 fn the_first_of_two_actions_is_played() {
     let mut file = moves("LINEAR", &[0.0, 1.0], &KEYS[..2]);

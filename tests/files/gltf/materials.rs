@@ -228,7 +228,7 @@ fn inner_shells_that_look_outwards_are_turned_over() {
     assert!((0..24).all(|t| area(&right, t) == area(&turned, t)));
 }
 
-/// The same for shells that are primitives of a mesh, if they have one material: a drink in a glass stays.
+/// Inner shells that are primitives of one mesh are found, too, if they have one material: a drink in a glass stays.
 #[test]
 fn inner_shells_of_other_primitives_are_turned_over() {
     let clear = json!({"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}});

@@ -1,4 +1,4 @@
-//! What tests and fuzz targets share.
+//! Support code of tests and fuzz targets.
 
 #[path = "../../../support/promises.rs"]
 pub mod promises;
