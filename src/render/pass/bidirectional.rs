@@ -76,6 +76,9 @@ pub struct Passes<'a> {
     /// Expected number of photons within the largest initial bandwidth: one light path starts per pixel, so it is the
     /// number of pixels that the bandwidth covers.
     covered: f32,
+    /// Initial radii of the largest bandwidth level of all pixels (scene units), apart from the accumulators: every
+    /// iteration reads them before its camera paths, and the accumulators, a kilobyte each, would miss the cache.
+    initial: Vec<f32>,
 }
 
 impl<'a> Passes<'a> {
@@ -121,6 +124,7 @@ impl<'a> Passes<'a> {
             photons: None,
             recorder: FilmRecorder::new(settings, scene, &tiles),
             covered: 0.0,
+            initial: Vec::new(),
         }
     }
 
@@ -190,7 +194,7 @@ impl<'a> Passes<'a> {
             map,
             schedule: self.settings.schedule(i),
             expected: self.covered * self.pairs.len() as f32,
-            pixels,
+            initial: &self.initial,
         };
         for ((pair, light_paths), samples) in self.pairs.iter().zip(&light).zip(&mut self.samples) {
             let own = pair.own(self.settings.levels.picture_level());
@@ -237,8 +241,8 @@ struct Iteration<'i, 'a> {
     schedule: Schedule,
     /// Expected number of photons within the largest initial bandwidth.
     expected: f32,
-    /// Accumulators of all pixels, with their initial bandwidths.
-    pixels: &'i [PixelAccumulator],
+    /// Initial radii of the largest bandwidth level of all pixels (scene units); empty without merging.
+    initial: &'i [f32],
 }
 
 /// The paths of one pair, a light path and a camera path for every pixel, in one iteration.
@@ -255,7 +259,7 @@ impl Iteration<'_, '_> {
     /// Merging radii of a pixel at the bandwidth levels that a pair of paths samples.
     #[inline]
     fn levels(&self, pixel: u32, pair: &Pair) -> MergeLevels {
-        let bandwidth = self.pixels[pixel as usize].bandwidths[0];
+        let bandwidth = self.initial.get(pixel as usize).copied().unwrap_or_default();
         let Iteration { shared, schedule, .. } = self;
         MergeLevels::new((pair.levels.0..pair.levels.0 + pair.levels.1).map(|level| {
             let radius2 = schedule.radius2(bandwidth, level);
@@ -397,7 +401,7 @@ impl Integrator for Passes<'_> {
         let all = initial_bandwidths(&camera_paths, initial, widest, seed, [&none; 2]);
         // A footprint covers the same number of pixels everywhere; a fixed radius is compared with the median
         // footprint.
-        let pixels = match initial {
+        let covered = match initial {
             InitialBandwidth::Fixed(radius) => {
                 let footprints =
                     initial_bandwidths(&camera_paths, InitialBandwidth::Footprint, f32::INFINITY, seed, [&none; 1]);
@@ -406,8 +410,10 @@ impl Integrator for Passes<'_> {
             }
             _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
         };
-        self.covered = std::f32::consts::PI * pixels * pixels;
-        all.into_iter().map(self.settings.pixel_factory(self.scene)).collect()
+        self.covered = std::f32::consts::PI * covered * covered;
+        let pixels: Vec<PixelAccumulator> = all.into_iter().map(self.settings.pixel_factory(self.scene)).collect();
+        self.initial = pixels.iter().map(|pixel| pixel.bandwidths[0]).collect();
+        pixels
     }
 
     fn guide(&self) -> Option<&Guide> {

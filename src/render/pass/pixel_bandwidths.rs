@@ -10,9 +10,9 @@ use crate::photon::{ByKind, Kind, PhotonMap};
 use crate::processor::prefetch;
 use crate::render::settings::Settings;
 use crate::transport::{FoundPhotons, GatherBandwidths, LevelRadii, PhotonCounter};
-use rayon::iter::repeat_n;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The bandwidths of all pixels under one rule.
 pub(super) trait PixelBandwidths: Clone {
@@ -25,14 +25,8 @@ pub(super) trait PixelBandwidths: Clone {
     /// after a camera path's first broad bounce.
     fn start(&mut self, pixels: &[PixelAccumulator], indirect_cap2: f32);
 
-    /// The bandwidths of iteration `i`, divided into parallel tasks of `size` pixels. `pixels` is the number of all
-    /// pixels.
-    fn par_chunks(
-        &mut self,
-        i: u64,
-        pixels: usize,
-        size: usize,
-    ) -> impl IndexedParallelIterator<Item = Self::Chunk<'_>>;
+    /// The bandwidths of iteration `i`, divided into parallel tasks of `size` pixels.
+    fn par_chunks(&mut self, i: u64, size: usize) -> impl IndexedParallelIterator<Item = Self::Chunk<'_>>;
 
     /// Squared radii after the last iteration by kind of photons, of every pixel and level (square scene units); `None` if
     /// they follow from the iteration's number.
@@ -59,9 +53,8 @@ pub(super) trait BandwidthChunk: Send {
     #[inline(always)]
     fn prefetch(&self, _at: usize) {}
 
-    /// The bandwidths of a camera path of `pixel`, at index `at` of the task, that samples `levels` of a colour
-    /// channel.
-    fn path(&mut self, pixel: &PixelAccumulator, at: usize, channel: usize, levels: Range<usize>) -> Self::Path<'_>;
+    /// The bandwidths of a camera path of the pixel at index `at` of the task that samples `levels` of a colour channel.
+    fn path(&mut self, at: usize, channel: usize, levels: Range<usize>) -> Self::Path<'_>;
 }
 
 /// Bandwidths that one camera path uses.
@@ -75,34 +68,33 @@ pub(super) trait PathBandwidths: GatherBandwidths {
 #[derive(Clone)]
 pub(super) struct Scheduled<'a> {
     settings: &'a Settings,
+    /// Initial radii of all pixels by kind of photons (scene units), apart from the accumulators: every iteration reads
+    /// them before its camera paths, and the accumulators, a kilobyte each, would miss the cache.
+    initial: Arc<[ByKind<f32>]>,
     indirect_cap2: f32,
 }
 
 impl<'a> Scheduled<'a> {
     pub fn new(settings: &'a Settings) -> Scheduled<'a> {
-        Scheduled { settings, indirect_cap2: f32::INFINITY }
+        Scheduled { settings, initial: Arc::default(), indirect_cap2: f32::INFINITY }
     }
 }
 
 impl PixelBandwidths for Scheduled<'_> {
     type Chunk<'c>
-        = ScheduledChunk
+        = ScheduledChunk<'c>
     where
         Self: 'c;
 
-    fn start(&mut self, _: &[PixelAccumulator], indirect_cap2: f32) {
+    fn start(&mut self, pixels: &[PixelAccumulator], indirect_cap2: f32) {
+        self.initial = pixels.iter().map(|pixel| pixel.bandwidths).collect();
         self.indirect_cap2 = indirect_cap2;
     }
 
-    fn par_chunks(
-        &mut self,
-        i: u64,
-        pixels: usize,
-        size: usize,
-    ) -> impl IndexedParallelIterator<Item = ScheduledChunk> {
+    fn par_chunks(&mut self, i: u64, size: usize) -> impl IndexedParallelIterator<Item = ScheduledChunk<'_>> {
         let schedule = self.settings.schedule(i);
         let indirect_cap2 = self.indirect_cap2 * schedule.factor2();
-        repeat_n(ScheduledChunk { schedule, indirect_cap2 }, pixels.div_ceil(size.max(1)))
+        self.initial.par_chunks(size).map(move |initial| ScheduledChunk { initial, schedule, indirect_cap2 })
     }
 
     fn radii2(&self) -> Option<ByKind<Vec<f32>>> {
@@ -120,17 +112,21 @@ impl PixelBandwidths for Scheduled<'_> {
 
 /// Bandwidths of the pixels of one parallel task under the memoryless rule, in one iteration.
 #[derive(Clone, Copy)]
-pub(super) struct ScheduledChunk {
+pub(super) struct ScheduledChunk<'c> {
+    initial: &'c [ByKind<f32>],
     schedule: Schedule,
     indirect_cap2: f32,
 }
 
-impl BandwidthChunk for ScheduledChunk {
-    type Path<'p> = ByKind<LevelRadii>;
+impl BandwidthChunk for ScheduledChunk<'_> {
+    type Path<'p>
+        = ByKind<LevelRadii>
+    where
+        Self: 'p;
 
     #[inline(always)]
-    fn path(&mut self, pixel: &PixelAccumulator, _: usize, _: usize, levels: Range<usize>) -> ByKind<LevelRadii> {
-        pixel.bandwidths.map(|bandwidth| {
+    fn path(&mut self, at: usize, _: usize, levels: Range<usize>) -> ByKind<LevelRadii> {
+        self.initial[at].map(|bandwidth| {
             let radii2 = levels.clone().map(|level| self.schedule.radius2(bandwidth, level));
             LevelRadii::new(radii2).capped_after_broad_bounce(self.indirect_cap2)
         })
@@ -244,12 +240,7 @@ impl<R: CountingRule> PixelBandwidths for Counted<'_, R> {
         self.bandwidths = bandwidths;
     }
 
-    fn par_chunks(
-        &mut self,
-        i: u64,
-        _: usize,
-        size: usize,
-    ) -> impl IndexedParallelIterator<Item = CountedChunk<'_, R>> {
+    fn par_chunks(&mut self, i: u64, size: usize) -> impl IndexedParallelIterator<Item = CountedChunk<'_, R>> {
         let (rule, layout, states) = (&self.rule, self.layout, self.layout.pixel_len());
         let counts = self.counts.par_chunks_mut(size * states * layout.counts);
         let chunks = self.bandwidths.par_chunks_mut(size * states).zip(counts);
@@ -309,7 +300,7 @@ impl<R: CountingRule> BandwidthChunk for CountedChunk<'_, R> {
     }
 
     #[inline(always)]
-    fn path(&mut self, _: &PixelAccumulator, at: usize, channel: usize, levels: Range<usize>) -> CountedPath<'_, R> {
+    fn path(&mut self, at: usize, channel: usize, levels: Range<usize>) -> CountedPath<'_, R> {
         let (states, each) = (self.layout.pixel_len(), self.layout.counts);
         let bandwidths = &mut self.bandwidths[at * states..][..states];
         let counts = &mut self.counts[at * states * each..][..states * each];

@@ -151,14 +151,14 @@ pub(super) fn add<'g>(
 #[inline]
 fn unpack(shared: &Shared, by_level: &[OfLevel]) -> PixelSample {
     let Shared { emission, direct, indirect, volume, features, first, rejection } = *shared;
-    let shared =
+    let mut sample =
         PixelSample { emission, direct, indirect, volume, features, first, rejection, ..PixelSample::default() };
-    by_level.iter().enumerate().fold(shared, |mut sample, (level, &[caustic, indirect, volume])| {
+    for (level, &[caustic, indirect, volume]) in by_level.iter().enumerate() {
         sample.caustic_photons[level] = caustic;
         sample.indirect_photons[level] = indirect;
         sample.volume_photons[level] = volume;
-        sample
-    })
+    }
+    sample
 }
 
 #[cfg(test)]

@@ -56,11 +56,8 @@ impl<'a, B: PixelBandwidths, K: Kernel> Sppm<'a, B, K> {
         let (camera_paths, levels, kernel) = (tracer.camera_paths(), settings.levels, *kernel);
         let size = camera_paths.camera.size();
         let band = pixels_per_band(size.0);
-        let bands = pixels.par_chunks(band).zip(SampleBuffer::par_of_paths(samples, band)).zip(bandwidths.par_chunks(
-            i,
-            pixels.len(),
-            band,
-        ));
+        let bands =
+            pixels.par_chunks(band).zip(SampleBuffer::par_of_paths(samples, band)).zip(bandwidths.par_chunks(i, band));
         let scratches = || maps.iter().map(|_| Scratch::default()).collect::<Vec<_>>();
         par_pixels(bands, size, scratches, |scratches, ((pixels, (first, second)), bandwidths), places| {
             if camera_paths.is_given_up() {
@@ -80,7 +77,7 @@ impl<'a, B: PixelBandwidths, K: Kernel> Sppm<'a, B, K> {
                     let mut of_channel = |channel: usize| {
                         let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
                         let volume = maps.volume(pixel, levels.clone());
-                        let mut own = bandwidths.path(pixel, place.at, channel, levels.clone());
+                        let mut own = bandwidths.path(place.at, channel, levels.clone());
                         let sample = camera_paths.sample(scratch, start, &maps.surface, volume, &mut own, kernel);
                         own.finish();
                         sample
