@@ -6,7 +6,8 @@
 #   scripts/setup.sh python    render, and the Python packages of the tests in .venv
 #   scripts/setup.sh wheel     render, and packages to build and test the Python package in .venv-python
 #   scripts/setup.sh usd       render, and packages to read USD stages in .venv-usd
-#   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy
+#   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy, .venv-bpy-oldest and
+#                              .venv-bpy-newest
 #   scripts/setup.sh farm      python, and packages of scripts/farm in .venv-farm: Ray, Open Job Description
 #
 # Other scripts source this file and call `setup MODE`. If nothing is missing, it takes a second.
@@ -227,16 +228,22 @@ need_venv() {
     printf '%s\n' "$stamp" >"$directory/.complete"
 }
 
-# Blender's module exists for some Python versions only.
-find_bpy_python() {
+# python_of VERSION...: prints a Python of one of these versions that can make virtual environments
+python_of() {
     local python
     for python in "$PYTHON" python3.13 python3.11; do
-        if "$python" -I -c 'import sys, venv, ensurepip; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)))' 2>/dev/null; then
-            BPY_PYTHON=$python
+        if "$python" -I -c 'import sys, venv, ensurepip
+sys.exit("{}.{}".format(*sys.version_info) not in sys.argv[1:])' "$@" 2>/dev/null; then
+            printf '%s\n' "$python"
             return
         fi
     done
-    fail "Blender's Python module needs Python 3.11 or 3.13 with venv, and neither is here" \
+    return 1
+}
+
+# Blender's module exists for some Python versions only.
+find_bpy_python() {
+    BPY_PYTHON=$(python_of 3.11 3.13) || fail "Blender's Python module needs Python 3.11 or 3.13 with venv, and neither is here" \
         "install one of them and set CAUSTIQUE_PYTHON to it"
 }
 
@@ -244,11 +251,26 @@ missing_libraries() { LC_ALL=C ldd "$1" | sed -n 's/^[[:space:]]*\([^ ]*\) => no
 
 need_bpy() {
     find_bpy_python
-    need_venv .venv-bpy "$BPY_PYTHON" requirements-bpy.txt
+    need_blender .venv-bpy "$BPY_PYTHON" requirements-bpy.txt
+}
+
+# The oldest supported Blender exists for Python 3.11 alone; the newest one depends on the Python.
+need_other_bpy() {
+    local python
+    if python=$(python_of 3.11); then
+        need_blender .venv-bpy-oldest "$python" requirements-bpy-oldest.txt
+    fi
+    python=$(python_of 3.13 || python_of 3.11)
+    need_blender .venv-bpy-newest "$python" requirements-bpy-newest.txt
+}
+
+# need_blender DIRECTORY PYTHON REQUIREMENTS: Blender as a Python module, and the libraries that it links to
+need_blender() {
+    need_venv "$@"
     # ldd names all missing libraries; importing the module would start Blender and stop at the first.
     local module
-    for module in "$ROOT"/.venv-bpy/lib/python3*/site-packages/bpy/__init__*.so; do :; done
-    [ -f "$module" ] || fail "$module is not there" "remove .venv-bpy, then run this script again"
+    for module in "$ROOT/$1"/lib/python3*/site-packages/bpy/__init__*.so; do :; done
+    [ -f "$module" ] || fail "$module is not there" "remove $1, then run this script again"
     [ -z "$(missing_libraries "$module")" ] || apt_install "${BPY_LIBRARIES[@]}"
     [ -z "$(missing_libraries "$module")" ] ||
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
@@ -275,7 +297,10 @@ setup() {
     [ "$1" != usd ] || return 0
     need_venv .venv "$PYTHON" requirements-test.txt
     case $1 in
-    test) need_bpy ;;
+    test)
+        need_bpy
+        need_other_bpy
+        ;;
     farm) need_venv .venv-farm "$PYTHON" requirements-farm.txt ;;
     esac
 }

@@ -124,9 +124,22 @@ else
     without 'cargo fmt' 'rustfmt is not installed: rustup component add rustfmt'
 fi
 part 'cargo build' cargo build --locked --release --workspace
+# other_blenders [VARIABLE=VALUE]: the exporter in the oldest and the newest Blender
+other_blenders() {
+    local which python
+    for which in oldest newest; do
+        python=.venv-bpy-$which/bin/python
+        if [ -x "$python" ]; then
+            tests "Python, $which Blender" env "$@" "$python" tests/python/timed.py blender_torture blender_broken blender_export
+        else
+            without "Python, $which Blender" 'it needs Python 3.11'
+        fi
+    done
+}
 program_tests() {
     tests 'Python' .venv/bin/python tests/python/timed.py discover -s tests/python -p 'test_*.py'
     tests 'Python with Blender' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'blender_*.py'
+    other_blenders
     tests 'Python with USD' .venv-usd/bin/python tests/python/timed.py discover -s tests/python -p 'usd_*.py'
     tests 'Hard cases' tests/hard-cases.sh ${hard_cases[@]+"${hard_cases[@]}"}
     part 'Python wheel' scripts/python.sh
@@ -149,6 +162,7 @@ part 'cargo test --doc' cargo test --locked --release --workspace --doc
 join_beside
 if [ "$SECONDS" -lt "$long_within" ]; then
     tests 'cargo test, long' "${rust[@]}" --ignored
+    other_blenders CAUSTIQUE_LONG=1
 else
     without 'cargo test, long' 'scripts/test.sh --long runs them'
 fi

@@ -11,7 +11,6 @@ import numpy
 import bake_cache
 import standin
 from graph import is_constant
-from shading import output_of
 
 SIZE = 1024  # texels per side
 _SAMPLES = 4  # per texel, against aliasing
@@ -156,15 +155,11 @@ def _has_three(value):
     return not is_constant(value) and value.type in {"RGBA", "VECTOR"}
 
 
-def _surface(graph):
-    return output_of(graph.tree).inputs["Surface"]
-
-
 def _connect_emission(graph, value):
     """Make the material emit a value. Returns the shader's node."""
     node = graph.tree.nodes.new("ShaderNodeEmission")
     graph.connect(value, node.inputs["Color"])
-    graph.tree.links.new(node.outputs[0], _surface(graph))
+    graph.tree.links.new(node.outputs[0], graph.output.inputs["Surface"])
     return node
 
 
@@ -173,5 +168,5 @@ def _connect_normal(graph, normal):
     node = graph.tree.nodes.new("ShaderNodeBsdfDiffuse")
     if normal is not None:
         graph.connect(normal, node.inputs["Normal"])
-    graph.tree.links.new(node.outputs[0], _surface(graph))
+    graph.tree.links.new(node.outputs[0], graph.output.inputs["Surface"])
     return node

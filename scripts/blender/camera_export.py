@@ -6,9 +6,22 @@ import math
 
 import bpy
 
+import export_guard as guard
+
 _TONEMAPS = {"AgX": "agx", "Filmic": "filmic", "Standard": "srgb"}
 # Rays along each side of the picture that search for clipped objects.
 _GRID = 16
+
+
+def add_cameras(flat, warn):
+    """Give the cameras of a flat scene their keys of `extras.caustique`, and warn of the active one's clipping."""
+    for thing in (thing for thing in flat.things if thing.type == "CAMERA"):
+        keys = guard.attempt(warn, flat.where(thing), {}, "it has no lens, shift or other projection",
+                             extras, thing, flat, warn)
+        flat.add_extras(thing, **keys)
+    if flat.scene.camera is not None:
+        guard.attempt(warn, flat.where(flat.scene.camera), None, "clipped objects are not found",
+                      warn_of_clipping, flat.scene.camera, flat, warn)
 
 
 def extras(thing, flat, warn):

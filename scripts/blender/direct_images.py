@@ -18,7 +18,7 @@ def image_of(value, data):
     if node.type != "TEX_IMAGE" or value.name != "Color" or node.mute:
         return None
     image = node.image
-    if image is None or image.source not in {"FILE", "GENERATED"} or node.projection != "FLAT":
+    if is_missing(image) or image.source not in {"FILE", "GENERATED"} or node.projection != "FLAT":
         return None
     if node.extension not in _WRAPS or image.colorspace_settings.name != ("Non-Color" if data else "sRGB"):
         return None
@@ -28,6 +28,20 @@ def image_of(value, data):
     if image.is_float or not _uses_render_uv(node.inputs["Vector"]):
         return None
     return node
+
+
+def is_missing(image):
+    """Whether there is no image, or its file cannot be read."""
+    return image is None or 0 in image.size
+
+
+def warn_of_missing(trees, where, warn):
+    """Warn of the missing images that node trees use."""
+    images = {n.image for t in trees for n in t.nodes if n.type in {"TEX_IMAGE", "TEX_ENVIRONMENT"} and not n.mute
+              and any(s.is_linked for s in n.outputs) and n.image is not None and is_missing(n.image)}
+    for image in sorted(images, key=lambda image: image.name):
+        warn(where, f'its image "{image.name}" cannot be read ({image.filepath or "no file"}): it is magenta, as in '
+             "Cycles; find it by File > External Data > Find Missing Files")
 
 
 def is_opaque(image):

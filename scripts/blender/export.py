@@ -38,6 +38,7 @@ import numpy
 import bake
 import camera_export
 import glb
+import export_guard as guard
 import lighting
 import objects
 import shading
@@ -69,16 +70,13 @@ def write(path, scene=None, bake_size=bake.SIZE):
     with contextlib.ExitStack() as undo:
         _open_scene(scene, undo)
         said, sun = world.extras(scene, path, warn)
-        said.update(camera_export.picture(scene, warn))
+        said.update(guard.attempt(warn, f'scene "{scene.name}"', {}, "the picture has the program's own settings",
+                                  camera_export.picture, scene, warn))
         flat = objects.FlatScene(scene, undo, warn)
         _open_scene(flat.scene, undo)
         bpy.context.view_layer.update()
-        for thing in flat.things:
-            if thing.type == "CAMERA":
-                flat.add_extras(thing, **camera_export.extras(thing, flat, warn))
-        if flat.scene.camera is not None:
-            camera_export.warn_of_clipping(flat.scene.camera, flat, warn)
-        worn = surfaces.Surfaces(flat.things, _materials_of(flat.things), undo, warn, bake_size)
+        camera_export.add_cameras(flat, warn)
+        worn = surfaces.Surfaces(flat, _materials_of(flat.things), undo, warn, bake_size)
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.add_lamps(flat, warn)
         if sun is not None:
@@ -86,12 +84,12 @@ def write(path, scene=None, bake_size=bake.SIZE):
             sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
         bodies = _solidity(flat.things)
         bpy.context.view_layer.update()
-        _run_exporter(path)
+        _export_all_it_can(path, flat, warn)
     document, buffer = glb.read(path)
     _restore_names(document, flat.names)
     buffer = worn.finish(document, buffer, bodies)
     _warn_of_stretched_normals(document, warn)
-    _correct_lamps(document)
+    _correct_lamps(document, flat.lamp_factors, warn)
     _put_active_camera_first(document, scene)
     said["losses"] = warnings
     document["scenes"][document.get("scene", 0)].setdefault("extras", {})["caustique"] = said
@@ -137,6 +135,30 @@ def _run_exporter(path):
         export_apply=False, export_cameras=True, export_lights=True, export_extras=True, use_active_scene=True,
         export_animations=False, export_current_frame=True, export_skins=False, export_morph=False,
         export_tangents=False, export_image_format="AUTO")
+
+
+def _export_all_it_can(path, flat, warn):
+    """Run Blender's exporter. If it fails, find the objects that it cannot export, and leave them out."""
+    faults = []
+
+    def works(things):
+        for thing in flat.things:
+            (flat.hide if thing not in things else flat.show)(thing)
+        try:
+            _run_exporter(path)
+        except Exception as error:  # the operator raises the errors of a whole add-on
+            faults.append(guard.summary(error))
+            return False
+        return True
+
+    if works(flat.things):
+        return
+    _, bad = guard.exportable(flat.things, works)
+    for thing in bad:
+        warn(flat.where(thing), f"Blender's exporter fails on it ({faults[0]}): it is left out")
+        flat.remove(thing)
+    if not works(flat.things):
+        raise RuntimeError(f"Blender's glTF exporter fails: {faults[-1]}")
 
 
 def _materials_of(things):
@@ -201,12 +223,13 @@ def _restore_names(document, names):
             entry["name"] = names.get(entry.get("name", ""), entry.get("name", ""))
 
 
-def _correct_lamps(document):
+def _correct_lamps(document, factors, warn):
     """Correct lamps with an Emission node: the exporter uses it instead of power and colour, Cycles multiplies both."""
     for entry in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
         light = bpy.data.lights.get(entry.get("name", ""))
         if light is not None:
-            entry.update(lighting.punctual(light))
+            entry.update(guard.attempt(warn, f'light "{light.name}"', {}, "it shines as Blender's exporter wrote it",
+                                       lighting.punctual, light, factors))
 
 
 def _warn_of_stretched_normals(document, warn):

@@ -6,10 +6,12 @@ group nodes around a socket, outermost first. Arithmetic on values adds nodes on
 
 import bpy
 
-_SOCKETS = {"VALUE": "NodeSocketFloat", "INT": "NodeSocketFloat", "RGBA": "NodeSocketColor",
-            "VECTOR": "NodeSocketVector"}
+from shading import output_of
+
+_SOCKETS = {"VALUE": "NodeSocketFloat", "INT": "NodeSocketFloat", "BOOLEAN": "NodeSocketFloat",
+            "RGBA": "NodeSocketColor", "VECTOR": "NodeSocketVector"}
 # Nodes whose outputs depend on their inputs alone.
-_FUNCTIONS = {
+FUNCTIONS = {
     "MATH", "VECT_MATH", "MIX", "MIX_RGB", "MAP_RANGE", "CLAMP", "GAMMA", "HUE_SAT", "INVERT", "BRIGHTCONTRAST",
     "VALTORGB", "CURVE_RGB", "CURVE_FLOAT", "CURVE_VEC", "BLACKBODY", "WAVELENGTH", "SEPARATE_COLOR", "COMBINE_COLOR",
     "SEPRGB", "COMBRGB", "SEPHSV", "COMBHSV", "SEPXYZ", "COMBXYZ", "RGBTOBW", "VECTOR_ROTATE", "VALUE", "RGB",
@@ -80,13 +82,17 @@ def is_colour(value):
 
 
 class Graph:
-    """A copy of `material` and, for each use, of its groups, until `undo` (a contextlib.ExitStack) closes."""
+    """A copy of `material` and, for each use, of its groups, until `undo` (a contextlib.ExitStack) closes.
+
+    `output`: its output node, which a material without one is given.
+    """
 
     def __init__(self, material, undo):
         self.original = material
         self.material = material.copy()
         undo.callback(lambda: bpy.data.materials.remove(self.material))
         self.tree = self.material.node_tree
+        self.output = output_of(self.tree) or self.tree.nodes.new("ShaderNodeOutputMaterial")
         self._lifted = {}
         self._own_groups(self.tree, undo)
 
@@ -214,8 +220,12 @@ class Graph:
         return self._binary("MAXIMUM", max, a, b)
 
     def power(self, a, exponent):
-        """A value to a power; negative values count as 0."""
-        return self._binary("POWER", lambda x, y: max(x, 0.0) ** y, a, exponent)
+        """A value to a constant power; negative values count as 0."""
+        if is_constant(a) or not is_colour(a):
+            return self._binary("POWER", lambda x, y: max(x, 0.0) ** y, a, exponent)
+        split = self.tree.nodes.new("ShaderNodeSeparateXYZ")  # Vector Math has no power before Blender 4.5
+        self.connect(a, split.inputs[0])
+        return self.combine_channels([self.power(part, exponent) for part in split.outputs])
 
     def clamp(self, a):
         """The value `a`, a number, a colour or a socket of a shader node, clamped to [0, 1]."""
@@ -248,4 +258,4 @@ class Graph:
         self.tree.links.new(value, probe.inputs[0])
         kinds = {node.type for node, _ in upstream(probe.inputs[0]).values()}
         self.tree.nodes.remove(probe)
-        return not kinds <= _FUNCTIONS
+        return not kinds <= FUNCTIONS

@@ -3,7 +3,11 @@
 import math
 
 import bpy
+from mathutils import Vector
 
+import export_guard as guard
+import lamp_nodes
+from graph import FUNCTIONS, upstream
 from shading import constant, nodes_of, output_of, source
 
 _DISC_SIDES = 64
@@ -18,16 +22,18 @@ def emission_node(light):
     return shader if shader is not None and shader.type == "EMISSION" else None
 
 
-def _power(light):
-    """Power of a lamp per channel: W, or W/m2 for a sun."""
+def _power(light, factors):
+    """Power of a lamp per channel: W, or W/m2 for a sun. `factors`: {lamp: measured factors of its nodes}."""
     power = light.energy * 2 ** getattr(light, "exposure", 0)
     tint = list(light.color)
     if getattr(light, "use_temperature", False):
         tint = [a * b for a, b in zip(tint, light.temperature_color)]
     node = emission_node(light)
-    if node is not None:
-        power *= constant(node.inputs["Strength"], 1.0)
-        tint = [a * b for a, b in zip(tint, _colour(node.inputs["Color"]) or [1.0] * 3)]
+    if light.name in factors:
+        tint = [a * b for a, b in zip(tint, factors[light.name])]
+    elif node is not None:
+        power *= constant(node.inputs["Strength"])
+        tint = [a * b for a, b in zip(tint, _colour(node.inputs["Color"]))]
     return [c * power for c in tint]
 
 
@@ -39,6 +45,8 @@ def _colour(socket):
     temperature = constant(node.inputs["Temperature"])
     if temperature is None:
         return None
+    if not hasattr(bpy.types.Light, "temperature"):  # before Blender 4.5
+        return None
     bulb = bpy.data.lights.new("blackbody", "POINT")
     try:
         bulb.use_temperature, bulb.temperature = True, temperature
@@ -47,18 +55,18 @@ def _colour(socket):
         bpy.data.lights.remove(bulb)
 
 
-def area_radiance(light, scale=(1, 1)):
+def area_radiance(light, scale=(1, 1), factors=()):
     """Radiance L (W/sr/m2) of an area light, from its power pi L A. `scale`: the object's scale."""
     size_x, size_y = _size(light)
     area = size_x * scale[0] * size_y * scale[1] * (math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else 1)
     if not getattr(light, "normalize", True):
         area = 1  # the energy is per square metre
-    return [p / (math.pi * area) for p in _power(light)]
+    return [p / (math.pi * area) for p in _power(light, factors)]
 
 
-def punctual(light):
+def punctual(light, factors=()):
     """`color` and `intensity` (cd, or lx for a sun, at 683 lm/W) of a point, spot or sun lamp, with its nodes."""
-    power = _power(light)
+    power = _power(light, factors)
     if light.type != "SUN" and not getattr(light, "normalize", True):
         power = [p * light.area() for p in power]
     strongest = max(max(power), 1e-30)
@@ -73,21 +81,27 @@ def _size(light):
 def add_lamps(flat, warn):
     """Prepare the lamps of a flat scene for the glTF exporter: area lamps become meshes, others get extras."""
     for thing in [t for t in flat.things if t.type == "LIGHT"]:
-        light, where = thing.data, flat.where(thing)
-        if light.type == "AREA" and getattr(light.cycles, "is_portal", False):
-            # A portal emits no light: it guides the sampling of the sky in Cycles.
-            flat.remove(thing)
-            continue
-        _warn_of(thing, where, warn)
-        if light.type == "AREA":
-            _area_mesh(thing, flat)
-            flat.remove(thing)
-        elif light.type == "SUN":
-            flat.add_extras(thing, angle_deg=math.degrees(light.angle))
-        else:
-            flat.add_extras(thing, radius=light.shadow_soft_size)
-            if light.type == "SPOT":
-                flat.add_extras(thing, blend=light.spot_blend)
+        guard.attempt(warn, flat.where(thing), None, "it may shine differently from Cycles, or not at all",
+                      _add_lamp, thing, flat, warn)
+
+
+def _add_lamp(thing, flat, warn):
+    light = thing.data
+    if light.type == "AREA" and getattr(light.cycles, "is_portal", False):
+        # A portal emits no light: it guides the sampling of the sky in Cycles.
+        flat.remove(thing)
+        return
+    _warn_of(thing, flat.where(thing), warn)
+    _measure_nodes(thing, flat, warn)
+    if light.type == "AREA":
+        _area_mesh(thing, flat)
+        flat.remove(thing)
+    elif light.type == "SUN":
+        flat.add_extras(thing, angle_deg=math.degrees(light.angle))
+    else:
+        flat.add_extras(thing, radius=light.shadow_soft_size)
+        if light.type == "SPOT":
+            flat.add_extras(thing, blend=light.spot_blend)
 
 
 def _area_mesh(thing, flat):
@@ -102,7 +116,7 @@ def _area_mesh(thing, flat):
     name = flat.names[thing.name] + " (area light)"
     mesh = flat.remove_later(bpy.data.meshes.new(name))
     mesh.from_pydata(corners, [], [range(len(corners))])  # clockwise: the face points along -Z, as the light does
-    radiance = area_radiance(light, [abs(s) for s in scale[:2]])
+    radiance = area_radiance(light, [abs(s) for s in scale[:2]], flat.lamp_factors)
     strength = max(max(radiance), 1e-30)
     material = flat.remove_later(bpy.data.materials.new(name))
     if bpy.app.version < (5, 0, 0):
@@ -129,14 +143,33 @@ def _warn_of(thing, where, warn):
         warn(where, "it casts no shadows in Cycles: here it does")
     if light.type == "SPOT" and max(scale) > 1.001 * min(scale):
         warn(where, "a spot's uneven scale is not carried: its cone is round")
+
+
+def _measure_nodes(thing, flat, warn):
+    """Measure a lamp whose nodes are more than an Emission of constant strength and colour."""
+    light = thing.data
     output = output_of(nodes_of(light))
-    if output is None or source(output.inputs["Surface"]) is None:
+    if output is None or light.name in flat.lamp_factors:
         return
     node = emission_node(light)
-    if any(n.type == "TEX_IES" and n.outputs[0].is_linked for n in output.id_data.nodes):
-        warn(where, "its IES profile is not carried: it shines alike in all directions, with what power it has without")
-    elif node is None or _colour(node.inputs["Color"]) is None or constant(node.inputs["Strength"]) is None:
-        warn(where, "its shader nodes are not carried beyond an Emission of constant strength and colour or blackbody")
+    profile = any(n.type == "TEX_IES" and n.outputs[0].is_linked for n in output.id_data.nodes)
+    if node is not None and constant(node.inputs["Strength"]) is not None and _colour(node.inputs["Color"]):
+        return
+    distance = _usual_distance(thing, flat)
+    flat.lamp_factors[light.name] = lamp_nodes.strength(light, distance)
+    kinds = {n.type for n, _ in upstream(output.inputs["Surface"]).values()}
+    if not kinds <= FUNCTIONS | {"EMISSION", "ADD_SHADER", "MIX_SHADER"}:
+        what = "its IES profile is not carried" if profile else "its shader nodes are not carried"
+        warn(flat.where(thing), f"{what}: it shines alike in all directions, with their mean strength at {distance:.3g} m")
+
+
+def _usual_distance(thing, flat):
+    """Median distance (m) of a lamp from the middles of the scene's meshes, at least ten times its size."""
+    light, at = thing.data, thing.matrix_world.translation
+    size = max(_size(light)) if light.type == "AREA" else getattr(light, "shadow_soft_size", 0.0)
+    away = sorted((body.matrix_world @ (sum((Vector(c) for c in body.bound_box), Vector()) / 8) - at).length
+                  for body in flat.things if body.type == "MESH")
+    return max(away[len(away) // 2] if away else 1.0, 10 * size, 0.1)
 
 
 def warn_of_soft_falloff(flat, warn):

@@ -17,20 +17,19 @@ class Matched(Lobe):
     alpha: object = 1.0
 
 
-def match(material, output, undo, say):
+def match(material, undo, say):
     """The graph of `material` and its matched surface. `say` receives a warning for each loss.
 
     A material without a surface shader is black, or the boundary of its medium.
     """
     graph = Graph(material, undo)
-    socket = graph.tree.nodes[output.name].inputs["Surface"]
+    socket, inside = graph.output.inputs["Surface"], graph.output.inputs["Volume"].is_linked
     tree = closures.read(socket)
     if tree is None:
-        inside = output.inputs["Volume"].is_linked
         return graph, replace(_film(WHITE), thin=False) if inside else Matched()
     closures.fix_view_dependence(graph, socket, tree, say)
     weighed = closures.weigh(tree, graph)
-    return graph, _Match(graph, say, closures.adds_up(tree)).surface(weighed, output.inputs["Volume"].is_linked)
+    return graph, _Match(graph, say, closures.adds_up(tree)).surface(weighed, inside)
 
 
 def _film(colour):

@@ -8,7 +8,6 @@ import numpy
 
 import gltfmaterial
 import direct_images
-import shading
 import standin
 from gltfmaterial import PLAIN
 from graph import is_constant, source_socket
@@ -52,15 +51,15 @@ class Plan:
     def __init__(self, material, baker, may_bake, undo, warn):
         self.material, self.baker, self.may_bake, self.undo, self.warn = material, baker, may_bake, undo, warn
         self.passes, self.channels, self.unbaked, self.of_object = {}, {}, {}, False
-        output = shading.output_of(shading.nodes_of(material))
-        self.graph, self.matched = match(material, output, undo, self.say)
+        self.graph, self.matched = match(material, undo, self.say)
+        direct_images.warn_of_missing(self.graph.trees(), f'material "{material.name}"', warn)
         self.links = {}
-        self._plan(output)
+        self._plan()
 
     def say(self, what):
         self.warn(f'material "{self.material.name}"', what)
 
-    def _plan(self, output):
+    def _plan(self):
         values = {f.name: getattr(self.matched, f.name) for f in fields(Matched)}
         del values["faceted"]
         tangent = values.pop("tangent")
@@ -68,7 +67,7 @@ class Plan:
         self._fold_constants(values)
         if values["emission"] == (0.0,) * 3 or values["strength"] == 0.0:
             values["emission"], values["strength"] = (0.0,) * 3, 1.0
-        self._displacement(output, values)
+        self._displacement()
         self._find_direct_images(values)
         if not (is_constant(values["strength"]) and (is_constant(values["emission"]) or "emission" in self.links)):
             values["emission"] = self.graph.multiply(values["emission"], values["strength"])
@@ -104,9 +103,9 @@ class Plan:
                 colour = isinstance(getattr(Matched, name, 0.0), tuple)
                 values[name] = (value,) * 3 if colour and isinstance(value, float) else value
 
-    def _displacement(self, output, values):
+    def _displacement(self):
         """Set `bumped`: in Cycles, displacement changes normals alone unless the material moves the surface."""
-        self.bumped = output.inputs["Displacement"].is_linked
+        self.bumped = self.graph.output.inputs["Displacement"].is_linked
         method = getattr(self.material, "displacement_method", "BUMP")
         if self.bumped and method != "BUMP":
             self.say("true displacement is not carried: use a Displace modifier")
@@ -226,8 +225,7 @@ class Plan:
         node.inputs["Emission Strength"].default_value = 1.0 if "emission" in self.links else 0.0
         transmission = self.channels["transmission"]
         node.inputs["Transmission Weight"].default_value = transmission if isinstance(transmission, float) else 1.0
-        output = shading.output_of(tree)
-        tree.links.new(node.outputs[0], output.inputs["Surface"])
+        tree.links.new(node.outputs[0], graph.output.inputs["Surface"])
         material = graph.material.copy()
         self.undo.callback(bpy.data.materials.remove, material)
         tree.nodes.remove(node)

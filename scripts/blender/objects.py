@@ -5,15 +5,22 @@ parents.
 geometry nodes) and shared by instances; lamps and cameras have their evaluated transforms.
 """
 
-import bpy
+import math
+
+import bpy  # first: it makes the others importable
+
+import bmesh
+import numpy
 from mathutils import Matrix
 
+import export_guard as guard
 import standin
 import visibility
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 # Types of objects that are never visible in renders.
 _INVISIBLE = {"EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
+_OUT = "it is left out"
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
 _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes that vary in space are not carried",
          "POINTCLOUD": "point clouds are not carried: convert them to meshes",
@@ -25,14 +32,15 @@ class FlatScene:
     """The evaluated scene until `undo` (a contextlib.ExitStack) closes.
 
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
-    of rays that do not hit it. `groups`: the light group of each, or None.
+    of rays that do not hit it. `groups`: the light group of each, or None. `lamp_factors`: for each measured lamp, the
+    factors per channel of its nodes.
     """
 
     def __init__(self, scene, undo, warn):
         visibility.as_rendered(scene, undo, warn)
         layer = bpy.context.view_layer
         layer.update()
-        self.things, self.names, self.hidden, self.groups = [], {}, {}, {}
+        self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
         self._warn, self._meshes, self._shapes, self._made = warn, {}, [], []
         self._indirect, self._layer = visibility.indirect_only(layer), layer
         self.scene = bpy.data.scenes.new(scene.name)
@@ -52,18 +60,23 @@ class FlatScene:
         for instance in depsgraph.object_instances:
             concerned.add(instance.object.original)
             if instance.object.type == "MESH" or instance.object.original not in meshed:
-                found.append(self._take(instance, depsgraph))
+                found.append(guard.attempt(warn, f'object "{instance.object.name}"', None, _OUT,
+                                           self._take, instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
             # The camera counts even if it is hidden.
             place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()
             found.append((scene.camera, scene.camera.data, place, [], None))
         for mesh, original in self._shapes:
-            standin.add_generated_coordinates(
-                original, mesh, lambda what, name=original.name: warn(f'object "{name}"', what))
+            self._add_generated_coordinates(original, mesh)
         for taken in filter(None, found):
-            self._put(*taken)
+            guard.attempt(warn, f'object "{taken[0].name}"', None, _OUT, self._put, *taken)
         for thing in sorted(concerned, key=lambda thing: thing.name):
-            self._warn_of(thing)
+            guard.attempt(warn, f'object "{thing.name}"', None, "some of its losses are not named", self._warn_of, thing)
+
+    def _add_generated_coordinates(self, original, mesh):
+        where = f'object "{original.name}"'
+        guard.attempt(self._warn, where, None, "textures by Generated coordinates lie differently",
+                      standin.add_generated_coordinates, original, mesh, lambda what: self._warn(where, what))
 
     def add_extras(self, thing, **keys):
         """Set keys of `extras.caustique` on the node of one of `things`."""
@@ -116,6 +129,9 @@ class FlatScene:
             mesh = bpy.data.meshes.new_from_object(thing, preserve_all_data_layers=True, depsgraph=depsgraph)
             self._shapes.append((mesh, thing.original))
         self.names[self.remove_later(mesh).name] = name
+        lost = _remove_points_that_are_no_numbers(mesh)
+        if lost:
+            self._warn(f'object "{thing.name}"', f"{lost} points of its shape are not numbers: they are left out")
         for index, slot in enumerate(thing.material_slots):
             if slot.link == "OBJECT" and index < len(mesh.materials):
                 mesh.materials[index] = slot.material and slot.material.original
@@ -123,6 +139,9 @@ class FlatScene:
         return self._meshes[key]
 
     def _put(self, original, data, matrix, hidden, group):
+        if not all(math.isfinite(x) for row in matrix for x in row):
+            self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}")
+            return
         if isinstance(data, bpy.types.Mesh) and not _has_no_shear(matrix):
             # Location, rotation and scale cannot express shear: transform a copy of the mesh instead.
             sheared = data.copy()
@@ -156,10 +175,20 @@ class FlatScene:
             self.add_extras(body, light_group=group)
         return body
 
+    def hide(self, thing):
+        """Take one of `things` out of the scene until `show`."""
+        if thing.name in self.scene.collection.objects:
+            self.scene.collection.objects.unlink(thing)
+
+    def show(self, thing):
+        """Put one of `things` back into the scene."""
+        if thing.name not in self.scene.collection.objects:
+            self.scene.collection.objects.link(thing)
+
     def remove(self, thing):
         """Remove one of `things` from the scene."""
         self.things.remove(thing)
-        self.scene.collection.objects.unlink(thing)
+        self.hide(thing)
 
     def _warn_of(self, thing):
         """Warn of an object's features that are visible in Cycles and lost here."""
@@ -176,6 +205,21 @@ class FlatScene:
             self._warn(where, "light linking is not carried: every light shines on every object")
         if getattr(thing.cycles, "use_adaptive_subdivision", False):
             self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken")
+
+
+def _remove_points_that_are_no_numbers(mesh):
+    """Remove the vertices of a mesh whose position is not finite, as Cycles does. Returns their number."""
+    places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
+    mesh.vertices.foreach_get("co", places)
+    odd = numpy.flatnonzero(~numpy.isfinite(places.reshape(-1, 3)).all(1))
+    if len(odd):
+        shape = bmesh.new()
+        shape.from_mesh(mesh)
+        shape.verts.ensure_lookup_table()
+        bmesh.ops.delete(shape, geom=[shape.verts[i] for i in odd], context="VERTS")
+        shape.to_mesh(mesh)
+        shape.free()
+    return len(odd)
 
 
 def _is_pattern(instance):

@@ -137,10 +137,12 @@ def unwrap(body, size):
         other.select_set(other == body)
     layer.objects.active = body
     bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.reveal(select=True)
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.uv.smart_project(angle_limit=1.15, island_margin=4 / size, area_weight=0.0)
-    bpy.ops.object.mode_set(mode="OBJECT")
+    try:
+        bpy.ops.mesh.reveal(select=True)
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.uv.smart_project(angle_limit=1.15, island_margin=4 / size, area_weight=0.0)
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def keep_two_uv_maps(mesh):

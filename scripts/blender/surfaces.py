@@ -7,6 +7,7 @@ import bpy
 
 import bake
 import gltfmaterial
+import export_guard as guard
 import shading
 import standin
 from material_plan import Plan, matt
@@ -31,31 +32,53 @@ class Surface:
 
 
 class Surfaces:
-    """Matches the materials of `things`, which have stand-ins until `undo` (a contextlib.ExitStack) closes.
+    """Matches the materials of a flat scene, whose objects have stand-ins until `undo` (a contextlib.ExitStack) closes.
 
     `size`: texels per side of baked images; 0 bakes nothing. `warn(where, what)` receives a warning for each loss.
     """
 
-    def __init__(self, things, materials, undo, warn, size=bake.SIZE):
-        self.undo, self.warn, self.size = undo, warn, size
+    def __init__(self, flat, materials, undo, warn, size=bake.SIZE):
+        self.flat, self.undo, self.warn, self.size = flat, undo, warn, size
         self.baker = bake.Baker(size or bake.SIZE, undo)
         self.found = {}  # {name of the material that the exporter writes: Surface}
         self.plans = {}
         for material in materials:
-            if shading.nodes_of(material) is None:
-                self.found[material.name] = Surface(material, matt(material.diffuse_color[:3]))
-            else:
-                self.plans[material.name] = Plan(material, self.baker, bool(size), undo, warn)
-        self._bake(things)
+            self._plan(material)
+        self._bake()
         for plan in self.plans.values():
             if not plan.passes:
-                self._replace_material(plan)
+                self._replace(plan.material, *self._attempt(plan.material, self._principled, plan))
 
-    def _replace_material(self, plan):
-        material = plan.make_principled()
-        self.found[material.name] = Surface(plan.material, plan.channels)
-        plan.material.user_remap(material)
-        self.undo.callback(material.user_remap, plan.material)
+    def _plan(self, material):
+        if shading.nodes_of(material) is None:
+            self.found[material.name] = Surface(material, matt(material.diffuse_color[:3]))
+            return
+        plan = self._attempt(material, Plan, material, self.baker, bool(self.size), self.undo, self.warn)
+        if isinstance(plan, Plan):
+            self.plans[material.name] = plan
+        else:
+            self._replace(material, *plan)
+
+    def _attempt(self, material, work, *arguments):
+        """The result of `work`; if it fails, a plain material and its channels, and a warning."""
+        colour = tuple(material.diffuse_color[:3])
+        found = guard.attempt(self.warn, f'material "{material.name}"', None,
+                              "it is diffuse, of its colour in the viewport", work, *arguments)
+        return found if found is not None else (self._plain(material.name), matt(colour))
+
+    def _plain(self, name):
+        made = bpy.data.materials.new(name)
+        self.undo.callback(bpy.data.materials.remove, made)
+        return made
+
+    @staticmethod
+    def _principled(plan):
+        return plan.make_principled(), plan.channels
+
+    def _replace(self, material, written, channels):
+        self.found[written.name] = Surface(material, channels)
+        material.user_remap(written)
+        self.undo.callback(written.user_remap, material)
 
     def finish(self, document, buffer, bodies):
         """Complete the materials of a written document. Returns its buffer, with the baked images.
@@ -66,12 +89,17 @@ class Surfaces:
         for entry in document.get("materials", []):
             surface = self.found.get(entry.get("name")) or self._unbaked_surface(entry.get("name"))
             if surface is not None:
-                closed, least = bodies.get(entry["name"], (False, 0.0))
-                entry["name"] = surface.material.name
-                gltfmaterial.write(entry, surface.channels, writer, surface.texcoord)
-                shading.finish(entry, surface.material, closed, least, self.warn)
+                solid = bodies.get(entry["name"], (False, 0.0))
+                guard.attempt(self.warn, f'material "{surface.material.name}"', None,
+                              "it is what Blender's exporter made of it",
+                              self._finish, entry, surface, writer, *solid)
         gltfmaterial.give_default(document)
         return bytes(writer.buffer)
+
+    def _finish(self, entry, surface, writer, closed, least):
+        entry["name"] = surface.material.name
+        gltfmaterial.write(entry, surface.channels, writer, surface.texcoord)
+        shading.finish(entry, surface.material, closed, least, self.warn)
 
     def _unbaked_surface(self, name):
         """The surface of a material on an object that has no stand-in, or None."""
@@ -83,9 +111,9 @@ class Surfaces:
                      "make): the channels to bake are plain there; make such objects local and real")
         return Surface(plan.material, plan.unbaked)
 
-    def _bake(self, things):
+    def _bake(self):
         made = {}
-        for thing in things:
+        for thing in self.flat.things:
             materials = materials_of(thing)
             plans = {i: self.plans[m.name] for i, m in enumerate(materials)
                      if m is not None and m.name in self.plans and self.plans[m.name].passes}
@@ -97,7 +125,8 @@ class Surfaces:
             if key in made:
                 self._share_baked_mesh(thing, made[key])
             else:
-                made[key] = self._bake_one(thing, plans, own)
+                made[key] = guard.attempt(self.warn, self.flat.where(thing), thing.data,
+                                          "the images of its materials are not baked", self._bake_one, thing, plans, own)
 
     def _share_baked_mesh(self, thing, mesh):
         before, slots = thing.data, [(slot.link, slot.material) for slot in thing.material_slots]
@@ -107,7 +136,7 @@ class Surfaces:
             slot.link = "DATA"
 
     def _bake_one(self, thing, plans, own):
-        body = standin.swap(thing, self.undo, lambda what: self.warn(f'object "{thing.name}"', what))
+        body = standin.swap(thing, self.undo, lambda what: self.warn(self.flat.where(thing), what))
         mesh = body.data
         if not mesh.polygons:
             return mesh

@@ -6,8 +6,10 @@ import os
 
 import bpy
 
+import export_guard as guard
 import sky
 import visibility
+from direct_images import is_missing, warn_of_missing
 from shading import constant, medium, nodes_of, output_of, source
 
 
@@ -16,9 +18,15 @@ def extras(scene, path, warn):
 
     Writes images beside the .glb at `path`.
     """
-    world, said = scene.world, {"environment": {"color": [0.0, 0.0, 0.0]}}
-    if world is None:
-        return said, None
+    black = {"environment": {"color": [0.0, 0.0, 0.0]}}
+    if scene.world is None:
+        return black, None
+    return guard.attempt(warn, f'world "{scene.world.name}"', (black, None), "it is black",
+                         _world, scene, path, black, warn)
+
+
+def _world(scene, path, black, warn):
+    world, said = scene.world, dict(black, environment=dict(black["environment"]))
     where = f'world "{world.name}"'
     output = output_of(nodes_of(world))
     if output is None:
@@ -28,6 +36,7 @@ def extras(scene, path, warn):
     inside = medium(source(output.inputs["Volume"]), where, warn)
     if inside is not None:
         said["medium"] = inside
+    warn_of_missing([output.id_data], where, warn)
     shader = source(output.inputs["Surface"])
     if shader is None:
         return said, None
@@ -67,7 +76,9 @@ def _background(shader, path):
     if colour is not None:
         return {"color": [c * strength for c in colour]}
     texture = source(shader.inputs["Color"])
-    if texture.type != "TEX_ENVIRONMENT" or texture.image is None or texture.projection != "EQUIRECTANGULAR":
+    if texture.type == "TEX_ENVIRONMENT" and is_missing(texture.image):
+        return {"color": [strength, 0.0, strength]}  # magenta, as in Cycles
+    if texture.type != "TEX_ENVIRONMENT" or texture.projection != "EQUIRECTANGULAR":
         return None
     turn = _turn(texture.inputs["Vector"])
     if turn is None:

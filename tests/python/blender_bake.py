@@ -181,16 +181,15 @@ class Baked(Case):
         first, _ = self.write()
         before = self.texels(first["pbrMetallicRoughness"]["baseColorTexture"])
         with mock.patch.object(bake.Baker, "_texels", side_effect=AssertionError("baked again")):
-            second, _ = self.write()
+            second, warnings = self.write()
+            self.assertNotIn("baked again", "".join(warnings))
             numpy.testing.assert_allclose(self.texels(second["pbrMetallicRoughness"]["baseColorTexture"]), before,
                                           atol=1 / 254)
             noise.inputs["Scale"].default_value = 4
-            with self.assertRaisesRegex(AssertionError, "baked again"):
-                self.write()
+            self.assertIn("baked again", "".join(self.write()[1]))
             noise.inputs["Scale"].default_value = 3
             self.stage.body.data.vertices[0].co.x -= 0.2
-            with self.assertRaisesRegex(AssertionError, "baked again"):
-                self.write()
+            self.assertIn("baked again", "".join(self.write()[1]))
 
     def test_nothing_is_left_behind(self):
         self.stage.principled(Base_Color=self.stage.group(

@@ -125,6 +125,35 @@ class Lamps(cycles_comparison.CyclesComparison):
         body.rotation_euler = (0.5, 0.2, 0)
         self.alike(self.caustique(), self.cycles(), parts=1)
 
+    def nodes(self, body):
+        """The node tree of a lamp, and its Emission node."""
+        if bpy.app.version < (5, 0, 0):
+            body.data.use_nodes = True
+        tree = body.data.node_tree
+        return tree, next(n for n in tree.nodes if n.type == "EMISSION")
+
+    def test_nodes_of_lamps_are_measured(self):
+        """Strengths that nodes compute, light falloff, and textures shine with their mean strength."""
+        self.floor()
+        eye((0, -3, 3), (0, 0, 0), lens=35)
+        for kind, at in (("POINT", (0, 0, 2)), ("SUN", (0, 0, 2)), ("AREA", (0, 0, 2)), ("SPOT", (0, 0, 2))):
+            with self.subTest(kind):
+                body = lamp(kind, at, 5.0 if kind == "SUN" else 300.0, color=(1, 0.8, 0.6))
+                tree, node = self.nodes(body)
+                dim = tree.nodes.new("ShaderNodeMath")
+                dim.operation, dim.inputs[0].default_value, dim.inputs[1].default_value = "MULTIPLY", 0.5, 0.4
+                tree.links.new(dim.outputs[0], node.inputs["Strength"])
+                self.alike(self.caustique(), self.cycles(), parts=1, tolerance=0.03)
+                self.assertFalse(any("shader nodes" in line for line in self.warnings), self.warnings)
+                bpy.data.objects.remove(body)
+        body = lamp("POINT", (0, 0, 2), 300.0, use_soft_falloff=False)
+        tree, node = self.nodes(body)
+        falloff = tree.nodes.new("ShaderNodeLightFalloff")
+        falloff.inputs["Strength"].default_value = 0.013
+        tree.links.new(falloff.outputs["Constant"], node.inputs["Strength"])
+        self.alike(self.caustique(), self.cycles(), parts=1, tolerance=0.5)
+        self.assertIn("its shader nodes are not carried: it shines alike", "".join(self.warnings))
+
     def test_a_sun_in_the_sky_is_a_lamp(self):
         self.floor()
         world = bpy.data.worlds.new("world")

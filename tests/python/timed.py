@@ -3,6 +3,7 @@
 `tests/test_times.awk` reads these lines.
 """
 
+import os
 import signal
 import sys
 import time
@@ -26,4 +27,8 @@ class TimedResult(unittest.TextTestResult):
 if __name__ == "__main__":
     # Background jobs of a shell ignore SIGINT, and so would the programs that tests start and interrupt.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    unittest.main(module=None, testRunner=unittest.TextTestRunner(resultclass=TimedResult))
+    runner = unittest.TextTestRunner(resultclass=TimedResult)
+    done = unittest.main(module=None, testRunner=runner, exit=False)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(not done.result.wasSuccessful())  # Blender as a module may crash while it shuts down

@@ -1,0 +1,89 @@
+"""Measures lamps whose nodes only Cycles can evaluate, by small renders of their light."""
+
+import contextlib
+import math
+import os
+import tempfile
+
+import bpy
+from mathutils import Matrix
+
+import panorama
+
+_PIXELS = 16  # per side of the picture below a sun; a picture around a lamp has twice as many across
+_SAMPLES = 16
+
+
+def strength(light, distance):
+    """The factor per channel by which the nodes of a lamp change its light at `distance` (m), mean over directions."""
+    plain = light.copy()
+    try:
+        if hasattr(plain, "normalize"):
+            plain.normalize = True
+        plain.energy, plain.color = 1.0, (1.0, 1.0, 1.0)
+        shaped = _received(plain, distance)
+        _switch_nodes_off(plain)
+        reference = _received(plain, distance)
+    finally:
+        bpy.data.lights.remove(plain)
+    return [float(a / b) if b > 0 else 0.0 for a, b in zip(shaped, reference)]
+
+
+def _switch_nodes_off(light):
+    if bpy.app.version < (5, 0, 0):
+        light.use_nodes = False
+        return
+    tree = light.node_tree  # Blender 5 ignores the switch
+    tree.nodes.clear()
+    shader = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(shader.outputs[0], tree.nodes.new("ShaderNodeOutputLight").inputs["Surface"])
+
+
+def _received(light, distance):
+    """Mean light per channel on a white sphere around a lamp, or on a white plane below a sun."""
+    sun = light.type == "SUN"
+    with contextlib.ExitStack() as undo:
+        stage, observer = undo.enter_context(panorama.stage(None, "lamp"))
+        lamp = bpy.data.objects.new("lamp", light)
+        undo.callback(bpy.data.objects.remove, lamp)
+        screen = bpy.data.objects.new("screen", _plane(undo) if sun else _sphere(undo, distance))
+        undo.callback(bpy.data.objects.remove, screen)
+        for thing in (lamp, screen):
+            stage.collection.objects.link(thing)
+        stage.cycles.max_bounces = 0
+        if sun:
+            observer.matrix_world = Matrix.Translation((0, 0, 1))
+            observer.data.type, observer.data.ortho_scale = "ORTHO", 1.0
+            size = _PIXELS, _PIXELS
+        else:
+            lamp.visible_camera = False
+            panorama.look_around(observer)
+            size = 2 * _PIXELS, _PIXELS
+        folder = undo.enter_context(tempfile.TemporaryDirectory())
+        pixels = panorama.render(stage, os.path.join(folder, "lamp.exr"), *size, _SAMPLES)
+    if sun:
+        return pixels.mean((0, 1))
+    weights = [math.cos(math.pi * ((row + 0.5) / _PIXELS - 0.5)) for row in range(_PIXELS)]
+    return sum(w * row for w, row in zip(weights, pixels.mean(1))) / sum(weights)
+
+
+def _plane(undo):
+    return _mesh(undo, [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)])
+
+
+def _sphere(undo, radius, rings=12):
+    """A sphere about the origin, as a mesh of 2 * rings * rings quadrangles."""
+    turns = [(math.pi * i / rings, math.pi * j / rings) for i in range(rings + 1) for j in range(2 * rings)]
+    corners = [(radius * math.sin(a) * math.cos(b), radius * math.sin(a) * math.sin(b), radius * math.cos(a))
+               for a, b in turns]
+    across = 2 * rings
+    faces = [(i * across + j, i * across + (j + 1) % across, (i + 1) * across + (j + 1) % across, (i + 1) * across + j)
+             for i in range(rings) for j in range(across)]
+    return _mesh(undo, corners, faces)
+
+
+def _mesh(undo, corners, faces):
+    mesh = bpy.data.meshes.new("screen")
+    undo.callback(bpy.data.meshes.remove, mesh)
+    mesh.from_pydata(corners, [], faces)
+    return mesh
