@@ -1,268 +1,303 @@
-"""Render training crops: noisy stacks of levels and their references.
+"""Renders the training data: views of random scenes, noisy stacks of bandwidth levels, and independent targets.
 
-  python -m lab.train.data --caustique target/release/caustique -o DIR scenes/*.glb
+A view is a random scene of a family (families/) or a scene of scenes/, and for each method a window of SIDE x SIDE pixels
+of a picture of random width. Its folder has, for each method,
 
-Each scene is varied as in [Choi and Moon 2021, 4.3]: the camera is moved, rotated and zoomed, materials and lights are
-scaled. Variant 0 is the unchanged scene, which training does not use. Each variant is rendered once with many iterations
-for the reference, and --renders times with few, with different seeds. The number of photons per iteration is random,
-around the papers' 100,000 for 1280 x 720, in proportion to the pixels, so that small pictures have the density of large
-ones. A zoom by z multiplies it by z^2, as for a crop of a picture z times as wide. A repeated command continues: finished
-variants are skipped.
+  METHOD-seedN.npz   arrays by snapshot (ITERATIONS): levels, deviations, quarters, parts, finished, radius, albedo,
+                     normal, depth
+  METHOD-target.npz  `halves`: two independent pictures without bias (bdpt), or with a bandwidth of less than a pixel
+                     (vcm), where mirrors or glass show caustics
 
-The reference is the mean of two renders with a small bandwidth (k = 5, six times the photons). Half of their difference
-is its noise, which references.jsonl stores as a relMSE. Because its bandwidth is not zero, it has a part of the small
-bias of Level1.
+Radiance is multiplied by the exposure of the whole picture (normalise.py) and stored as float16, the targets as float32.
+view.json describes the view, manifest.jsonl lists all finished views with the SHA-256 of their files. A repeated run
+continues with the first file that is missing.
 """
 
-import argparse
+import hashlib
 import json
 import math
-import pathlib
-import struct
+import os
+import shutil
 import subprocess
-import sys
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
 
-from . import crops
-from . import normalise
+from . import families, normalise
+from ..cache import Failed, load, program, run_timed, save
 from ..commands import command
+from ..record import ROOT
 
-PAPER_PHOTONS_PER_PIXEL = 100_000 / (1280 * 720)
-# Photons per pixel of references, relative to the papers.
-REFERENCE_DENSITY = 6
-REFERENCE_KNN = 5
-
-
-def read_glb(path):
-    data = path.read_bytes()
-    magic, _, _ = struct.unpack_from("<III", data)
-    if magic != 0x46546C67:
-        raise SystemExit(f"{path}: not a .glb file")
-    length, _ = struct.unpack_from("<II", data, 12)
-    return json.loads(data[20 : 20 + length]), data[20 + length :]
-
-
-def write_glb(path, scene, rest):
-    text = json.dumps(scene).encode()
-    text += b" " * (-len(text) % 4)
-    header = struct.pack("<IIIII", 0x46546C67, 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A)
-    path.write_bytes(header + text + rest)
+SIDE = 128
+ITERATIONS = (8, 16, 32, 64, 128)
+SEEDS = (1, 2)
+LEVELS = 5
+# Additive parts, in the order in which the arrays hold them.
+PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
+# Least and greatest width of the picture of which a window is rendered. The light paths of vcm are as many as its camera
+# paths, so a window of a large picture would have too few of them.
+WIDTHS = {"sppm": (320, 1920), "vcm": (240, 480)}
+# Core-seconds of a target's half.
+TARGET_SECONDS = 16.0
+# Largest stored value; the maximum of float16 is 65504.
+LARGEST = 6e4
+# Least share of the pixels that are not black, and attempts to find a scene with that.
+LIT, ATTEMPTS = 0.5, 6
+SCOUT_WIDTH = 160
+BLENDER = ROOT / ".venv-bpy" / "bin" / "python"
 
 
-def quaternion(axis, angle):
-    axis = np.asarray(axis) / np.linalg.norm(axis)
-    return np.append(axis * math.sin(angle / 2), math.cos(angle / 2))
+class View:
+    """One view: its name, family and folder."""
+
+    def __init__(self, folder, family, index, scene=None):
+        self.family, self.index, self.scene = family, index, scene
+        self.name = f"{family}-{index}"
+        self.folder = folder / "views" / self.name
+        self.held_out = scene is not None or family in families.HELD_OUT
+
+    def rng(self, *words):
+        """A random generator of the view."""
+        return np.random.default_rng([self.index, *self.family.encode(), *(b for word in words for b in word.encode())])
 
 
-def multiply(a, b):
-    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
-    return np.array(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ]
-    )
+def views(folder, count):
+    """`count` views of every family and the scenes of scenes/, so that any first part of the list has all families."""
+    files = [*sorted((ROOT / "scenes").glob("*.glb")), *sorted((ROOT / "scenes" / "second").glob("*.glb"))]
+    found = []
+    for index in range(count):
+        found += [View(folder, family, index) for family in families.names()]
+        found += [View(folder, f"scenes_{file.stem}", index, file) for file in files[index::count]]
+    return found
 
 
-def rotate(q, v):
-    return multiply(multiply(q, np.append(v, 0)), q * [-1, -1, -1, 1])[:3]
+class Maker:
+    """Renders views with one program, which a copy in the folder of the data keeps."""
+
+    def __init__(self, folder, binary):
+        self.folder, self.binary = folder, folder / "caustique"
+        folder.mkdir(parents=True, exist_ok=True)
+        if not self.binary.exists():
+            shutil.copy2(binary, folder / "caustique.part")
+            (folder / "caustique.part").rename(self.binary)
+            save(folder / "program.json", {"program": program(), "sha256": sha256(self.binary)})
+        self.spent = 0.0
+
+    def run(self, line):
+        """Runs a command and adds up its core-seconds."""
+        out, _, spent = run_timed(line, 3600)
+        self.spent += spent
+        return out
+
+    def render(self, scene, out, **settings):
+        """Renders with one thread; returns the channels of the EXR."""
+        self.run(command("render", scene, "-o", out, program=self.binary, threads=1, progress="none", **settings))
+        channels = OpenEXR.File(str(out), separate_channels=True).channels()
+        return {name: channel.pixels.astype(np.float32) for name, channel in channels.items()}
+
+    def header(self, out):
+        """The JSON object in an EXR's header."""
+        return json.loads(self.run(command("info", out, program=self.binary, json=True)))
+
+    def make(self, view):
+        """Renders what is missing of a view, and adds it to the manifest."""
+        view.folder.mkdir(parents=True, exist_ok=True)
+        work = view.folder / "work"
+        work.mkdir(exist_ok=True)
+        note = load(view.folder / "view.json") or self.scout(view, work)
+        scene = view.scene or work / "scene.glb"
+        if not scene.exists():
+            self.build(view, note["attempt"], scene)
+        for method, window in note["windows"].items():
+            if not (view.folder / f"{method}-target.npz").exists():
+                window["target"] = self.target(view, note, method, scene, work)
+                self.store(view, note)
+            for seed in SEEDS:
+                if not (view.folder / f"{method}-seed{seed}.npz").exists():
+                    self.stacks(view, note, method, seed, scene, work)
+                    self.store(view, note)
+        shutil.rmtree(work)
+        files = {file.name: sha256(file) for file in sorted(view.folder.iterdir())}
+        line = json.dumps({"view": view.name, "family": view.family, "held_out": view.held_out, "files": files})
+        with open(self.folder / "manifest.jsonl", "a", encoding="utf-8") as manifest:
+            manifest.write(line + "\n")
+
+    def store(self, view, note):
+        """Writes view.json, with the core-seconds spent since the last time."""
+        note["core_seconds"] = round(note["core_seconds"] + self.spent, 2)
+        self.spent = 0.0
+        save(view.folder / "view.json", note)
+
+    def build(self, view, attempt, scene):
+        """Writes the random scene of a view."""
+        path = os.pathsep.join(map(str, (ROOT / "scripts", ROOT / "scripts" / "blender")))
+        line = [BLENDER, "-m", "lab.train.families", view.family, view.index, attempt, scene]
+        done = subprocess.run(list(map(str, line)), capture_output=True, text=True, env=os.environ | {"PYTHONPATH": path})
+        if done.returncode or not scene.exists():
+            raise Failed(f"{view.name}: {(done.stderr or done.stdout).strip()[-600:]}")
+
+    def scout(self, view, work):
+        """Chooses the scene and the windows of a view by a small quick picture; writes and returns view.json."""
+        for attempt in range(1 if view.scene else ATTEMPTS):
+            scene = view.scene or work / "scene.glb"
+            if not view.scene:
+                scene.unlink(missing_ok=True)
+                self.build(view, attempt, scene)
+            settings = {"method": "sppm", "levels": LEVELS, "width": SCOUT_WIDTH, "iterations": 6, "no_finish": True}
+            picture = self.render(scene, work / "scout.exr", **settings, no_checkpoint=True)
+            levels = np.stack([rgb(picture, f"Level{k + 1}") for k in range(LEVELS)])
+            if (levels[-1].mean(-1) > 0).mean() > LIT:
+                break
+        else:
+            raise Failed(f"{view.name}: all attempts are dark")
+        effects = json.loads(self.run(command("plan", scene, program=self.binary, json=True)))["effects"]
+        simulated = {effect["name"]: effect["simulated"] for effect in effects}
+        note = {
+            "family": view.family,
+            "index": view.index,
+            "attempt": attempt,
+            "scene_sha256": sha256(scene),
+            "program": load(self.folder / "program.json"),
+            "exposure": float(normalise.exposure(levels)),
+            "depth": normalise.median_depth(picture["depth.Z"]),
+            "yfov": vertical_angle(scene),
+            "parts": [part for part in PARTS if f"{part}.R" in picture],
+            "target_method": target_method(simulated),
+            "windows": {method: window(view, method, levels) for method in WIDTHS},
+            "core_seconds": 0.0,
+        }
+        note["radii"] = [name for name in ("Radius", "CausticRadius") if f"{name}5.X" in picture]
+        self.store(view, note)
+        return note
+
+    def target(self, view, note, method, scene, work):
+        """Renders both halves of the target of a window; returns their method and iterations."""
+        words, halves, counts = note["target_method"], [], []
+        for half in (1, 2):
+            out, saved = work / "half.exr", work / "half.saved"
+            saved.unlink(missing_ok=True)
+            settings = place(note, method) | words | {"levels": 1, "no_finish": True, "layers": "beauty", "checkpoint": saved}
+            settings["seed"] = 7000 + half
+            self.render(scene, out, **settings, iterations=8)
+            last = self.header(out)["history"][-1]
+            count = min(4 * math.ceil(2 * TARGET_SECONDS / max(last["cpu_seconds"], 1e-3)), 8192)
+            picture = self.render(scene, out, **settings, resume=saved, iterations=max(count, 16))
+            halves.append(rgb(picture, "") * np.float32(note["exposure"]))
+            counts.append(self.header(out)["iterations"] if "iterations" in self.header(out) else count)
+        write(view.folder / f"{method}-target.npz", {"halves": np.stack(halves)})
+        return words | {"iterations": counts}
+
+    def stacks(self, view, note, method, seed, scene, work):
+        """Renders all snapshots of a window with one seed."""
+        out, saved = work / "noisy.exr", work / "noisy.saved"
+        saved.unlink(missing_ok=True)
+        layers = ["beauty", "Level", "Variance", "Quarter", "albedo", "normal", "depth", *note["parts"]]
+        radii = note["radii"] if method == "sppm" else ["Radius"]
+        settings = place(note, method) | {"method": method, "levels": LEVELS, "eye_paths": 2, "seed": seed}
+        settings |= {"layers": ",".join([*layers, *radii]), "checkpoint": saved}
+        snapshots = []
+        for iterations in ITERATIONS:
+            resume = saved if snapshots else None
+            picture = self.render(scene, out, **settings, iterations=iterations, resume=resume)
+            snapshots.append(stack(picture, note, method, radii))
+        arrays = {key: np.stack([one[key] for one in snapshots]) for key in snapshots[0]}
+        write(view.folder / f"{method}-seed{seed}.npz", arrays | {"iterations": np.array(ITERATIONS)})
 
 
-def vary(scene, rng, folder):
-    """Change the cameras, surfaces and relative light strengths of a glTF scene in place; returns the cameras' zoom."""
-    zoom = float(np.exp(rng.uniform(0, np.log(3))))
-    for camera in scene.get("cameras", []):
-        if "perspective" in camera:
-            half = math.tan(camera["perspective"]["yfov"] / 2)
-            camera["perspective"]["yfov"] = 2 * math.atan(half / zoom)
-    for node in scene.get("nodes", []):
-        if "camera" in node and "matrix" not in node:
-            turn = np.array(node.get("rotation", [0, 0, 0, 1]), float)
-            move = np.array(node.get("translation", [0, 0, 0]), float)
-            reach = 0.04 * np.linalg.norm(move)
-            node["translation"] = list(move + rotate(turn, rng.normal(0, [reach, reach, 1.5 * reach])))
-            # The camera's own axes: x pitches, y yaws, z rolls.
-            for axis, degrees in (([1, 0, 0], 5), ([0, 1, 0], 8), ([0, 0, 1], 4)):
-                turn = multiply(turn, quaternion(axis, math.radians(rng.normal(0, degrees))))
-            node["rotation"] = list(turn / np.linalg.norm(turn))
-    for material in scene.get("materials", []):
-        pbr = material.setdefault("pbrMetallicRoughness", {})
-        colour = np.array(pbr.get("baseColorFactor", [1, 1, 1, 1]), float)
-        transmits = "KHR_materials_transmission" in material.get("extensions", {})
-        # Clear glass stays clear, and smooth glass smooth: that is what makes caustics.
-        if not transmits:
-            colour[:3] = np.clip(colour[:3] * rng.uniform(0.5, 1.3, 3), 0, 1)
-            pbr["baseColorFactor"] = list(colour)
-            if rng.random() < 0.3:
-                pbr["roughnessFactor"] = float(rng.uniform(0, 1))
-        strength = material.get("extensions", {}).get("KHR_materials_emissive_strength")
-        if strength:
-            strength["emissiveStrength"] = strength.get("emissiveStrength", 1) * float(np.exp(rng.normal(0, 0.7)))
-    for light in scene.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
-        light["intensity"] = light.get("intensity", 1) * float(np.exp(rng.normal(0, 0.7)))
-    for one in scene.get("scenes", []):
-        environment = one.get("extras", {}).get("caustique", {}).get("environment", {})
-        if "file" in environment:
-            environment["file"] = str((folder / environment["file"]).resolve())
-    return zoom
+def sha256(path):
+    """The SHA-256 of a file."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
-def render(args, scene, out, **options):
-    """Render by sppm without a finish; returns whether the program succeeded, and prints its error."""
-    size = {"width": args.width, "height": args.height, "threads": args.threads or None}
-    words = ["render", scene, "-o", out]
-    line = command(*words, program=args.caustique, method="sppm", **size, **options, no_finish=True, progress="none")
-    done = subprocess.run(line, capture_output=True, text=True)
-    if done.returncode != 0:
-        print(f"{scene.name}: {done.stderr.strip()}", file=sys.stderr)
-    return done.returncode == 0
+def write(path, arrays):
+    """Writes arrays atomically."""
+    draft = path.with_name("part-" + path.name)
+    np.savez_compressed(draft, **arrays)
+    draft.rename(path)
 
 
-def layers(path, names):
-    """Layers of an EXR as {name: [h, w, channels]}, by names such as Level1.RGB; RGB is the beauty."""
-    channels = OpenEXR.File(str(path), separate_channels=True).channels()
-    get = lambda layer, c: channels[f"{layer}.{c}" if layer else c].pixels.astype(np.float32)
+def rgb(picture, layer):
+    """A layer of colours, [h, w, 3]; the beauty has no name."""
+    return np.stack([picture[f"{layer}.{c}" if layer else c] for c in "RGB"], -1)
+
+
+def vertical_angle(scene):
+    """The vertical angle of view in radians of the first camera of a .glb file."""
+    data = scene.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    return json.loads(data[20 : 20 + length])["cameras"][0]["perspective"]["yfov"]
+
+
+def target_method(simulated):
+    """Options of the method of a target: bdpt has no bias; vcm also finds the caustics that mirrors and glass show, with a
+    bandwidth that falls below a pixel."""
+    if not simulated.get("sds", True):
+        return {"method": "bdpt"}
+    return {"method": "vcm", "guide": "on", "alpha": 0.5}
+
+
+def window(view, method, levels):
+    """The width and height of the picture, and the window's corner: more likely where bandwidths differ."""
+    rng = view.rng(method)
+    small = levels.shape[1:3]
+    width = 16 * round(math.exp(rng.uniform(*np.log(WIDTHS[method]))) / 16)
+    height = round(width * small[0] / small[1])
+    width, height = (max(SIDE, n) for n in (width, height))
+    tone = np.log1p(normalise.finite(levels) * normalise.exposure(levels))
+    spread = np.abs(tone[-1] - tone[0]).mean(-1) * ((levels[-1].mean(-1) > 0) + 1e-3)
+    sums = np.pad(spread.cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+    corners, weights = [], []
+    for y in np.unique(np.linspace(0, height - SIDE, 24).astype(int)):
+        for x in np.unique(np.linspace(0, width - SIDE, 40).astype(int)):
+            rows = np.clip(np.array([y, y + SIDE]) * small[0] / height, 0, small[0]).round().astype(int)
+            columns = np.clip(np.array([x, x + SIDE]) * small[1] / width, 0, small[1]).round().astype(int)
+            area = max((rows[1] - rows[0]) * (columns[1] - columns[0]), 1)
+            total = sums[rows[1], columns[1]] - sums[rows[0], columns[1]] - sums[rows[1], columns[0]] + sums[rows[0], columns[0]]
+            corners.append((int(x), int(y)))
+            weights.append(0.02 + total / area)
+    weights = np.array(weights) ** 2
+    x, y = corners[rng.choice(len(corners), p=weights / weights.sum())]
+    return {"width": width, "height": height, "corner": [x, y]}
+
+
+def place(note, method):
+    """The options of a window."""
+    known = note["windows"][method]
+    x, y = known["corner"]
+    return {"width": known["width"], "height": known["height"], "crop": f"{x},{y},{SIDE},{SIDE}"}
+
+
+def stack(picture, note, method, radii):
+    """The arrays of a snapshot."""
+    scale = note["exposure"]
+    bright = lambda layer: small(rgb(picture, layer) * scale)
+    # The size of a pixel at the hit, in scene units; the largest bandwidths in pixels.
+    pixel = picture["depth.Z"] * 2 * math.tan(note["yfov"] / 2) / note["windows"][method]["height"]
+    radius = [picture[f"{name}{LEVELS}.X"] / np.maximum(pixel, 1e-12) for name in radii]
+    variances = [np.maximum(rgb(picture, f"Variance{k + 1}"), 0).mean(-1) for k in range(LEVELS)]
+    black = np.zeros((SIDE, SIDE, 3), np.float16)
+    depth = picture["depth.Z"] / note["depth"]
     return {
-        name: np.stack([get(name.split(".")[0] if "." in name else "", c) for c in name.split(".")[-1]], -1)
-        for name in names
+        "levels": np.stack([bright(f"Level{k + 1}") for k in range(LEVELS)]),
+        "deviations": small(np.sqrt(np.stack(variances)) * scale),
+        "quarters": np.stack([bright(f"Quarter{k + 1}") for k in range(4)]),
+        "parts": np.stack([bright(part) if part in note["parts"] else black for part in PARTS]),
+        "finished": bright(""),
+        "radius": small(np.stack([radius[0], radius[-1]])),
+        "albedo": small(rgb(picture, "albedo")),
+        "normal": small(np.stack([picture[f"normal.{c}"] for c in "XYZ"], -1)),
+        "depth": small(np.where(picture["depth.Z"] < normalise.BACKGROUND_DEPTH, depth, LARGEST)),
     }
 
 
-def read_stack(path, levels):
-    colour = [f"Level{k + 1}.RGB" for k in range(levels)]
-    variance = [f"Variance{k + 1}.RGB" for k in range(levels)]
-    data = layers(path, [*colour, *variance, "albedo.RGB", "normal.XYZ", "depth.Z"])
-    return {
-        "levels": np.stack([data[n] for n in colour]),
-        "variances": np.stack([data[n] for n in variance]),
-        "albedo": data["albedo.RGB"],
-        "normal": data["normal.XYZ"],
-        "depth": data["depth.Z"][..., 0],
-    }
+def small(values):
+    """Values as float16, clamped to what it can hold; values that are not finite become zero."""
+    return np.nan_to_num(values, nan=0, posinf=LARGEST, neginf=-LARGEST).clip(-LARGEST, LARGEST).astype(np.float16)
 
 
-def boxes(stack, side, count, rng):
-    """Random crops, with a higher probability where the levels differ."""
-    _, h, w, _ = stack["levels"].shape
-    side = min(side, h, w) // 4 * 4
-    corners = [
-        (y, x)
-        for y in range(rng.integers(h % side + 1), h - side + 1, side)
-        for x in range(rng.integers(w % side + 1), w - side + 1, side)
-    ]
-    scale = normalise.exposure(stack["levels"])
-    spread = np.abs(np.diff(np.log1p(np.maximum(normalise.finite(stack["levels"])[[0, -1]] * scale, 0)), axis=0)).mean(
-        (0, -1)
-    )
-    weight = np.array([0.05 + spread[y : y + side, x : x + side].mean() for y, x in corners])
-    chosen = rng.choice(len(corners), min(count, len(corners)), replace=False, p=weight / weight.sum())
-    return [(*corners[k], side) for k in chosen]
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="+", type=pathlib.Path, help=".glb files")
-    parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
-    parser.add_argument("--caustique", default="caustique", help="the program")
-    parser.add_argument(
-        "--variants", type=int, nargs="+", default=list(range(6)), help="numbers of variants; 0 is the unchanged scene"
-    )
-    parser.add_argument("--renders", type=int, default=6, help="number of noisy renders per variant")
-    parser.add_argument(
-        "--iterations",
-        type=int,
-        nargs="+",
-        default=[16, 32, 64, 128, 256],
-        help="iterations of the noisy renders, in turn",
-    )
-    parser.add_argument(
-        "--reference-iterations", type=int, default=4096, help="total iterations of the two reference renders"
-    )
-    parser.add_argument("--threads", type=int, default=0, help="threads of the program; 0 uses all cores")
-    parser.add_argument("--width", type=int, default=384)
-    parser.add_argument("--height", type=int, default=256)
-    parser.add_argument("--levels", type=int, default=5)
-    parser.add_argument("--side", type=int, default=128, help="pixels of a crop's side; 0 stores whole pictures")
-    parser.add_argument("--crops", type=int, default=3, help="number of crops per noisy render")
-    parser.add_argument("--seed", type=int, default=1)
-    return parser.parse_args()
-
-
-def varied_scene(args, path, varied, exr, rng, tries=8):
-    """Write a variant whose picture is not black (a camera may move into a wall); returns its zoom, or None."""
-    for _ in range(tries):
-        scene, rest = read_glb(path)
-        zoom = vary(scene, rng, path.parent)
-        write_glb(varied, scene, rest)
-        if render(args, varied, exr, levels=1, layers="beauty", iterations=4, photons=2000):
-            if (layers(exr, ["RGB"])["RGB"] > 0).mean() > 0.6:
-                return zoom
-    print(f"{path.stem}: {tries} variants were black", file=sys.stderr)
-    return None
-
-
-def variant(args, path, index):
-    """Render a variant of a scene and write its crops; returns their number, or None if there is no reference."""
-    rng = np.random.default_rng([args.seed, index, *path.stem.encode()])
-    work = args.output / "work"
-    work.mkdir(parents=True, exist_ok=True)
-    exr = work / f"{path.stem}-{index}.exr"
-    varied, zoom = path, 1.0
-    if index:
-        varied = work / f"{path.stem}-{index}.glb"
-        zoom = varied_scene(args, path, varied, exr, rng)
-        if zoom is None:
-            return None
-    photons = lambda density: max(1000, round(density * PAPER_PHOTONS_PER_PIXEL * zoom**2 * args.width * args.height))
-    halves = []
-    settings = {"levels": 1, "knn": REFERENCE_KNN, "layers": "beauty", "photons": photons(REFERENCE_DENSITY)}
-    settings["iterations"] = args.reference_iterations // 2
-    for half in range(2):
-        if not render(args, varied, exr, **settings, seed=10_000 + 2 * index + half):
-            return None
-        halves.append(layers(exr, ["RGB"])["RGB"])
-    reference = (halves[0] + halves[1]) / 2
-    noise = np.mean(((halves[0] - reference) ** 2).mean(-1) / (reference.mean(-1) ** 2 + 0.01))
-    note = {
-        "scene": path.stem,
-        "variant": index,
-        "iterations": args.reference_iterations,
-        "relmse": round(float(noise), 6),
-    }
-    with open(args.output / "references.jsonl", "a") as log:
-        log.write(json.dumps(note) + "\n")
-    count = 0
-    for k in range(args.renders):
-        density = np.exp(rng.uniform(np.log(0.5), np.log(2))) if index else 1.0
-        iterations = args.iterations[k % len(args.iterations)]
-        settings = {"levels": args.levels, "layers": "all", "iterations": iterations, "photons": photons(density)}
-        if not render(args, varied, exr, **settings, seed=1000 * index + k + 1):
-            continue
-        stack = read_stack(exr, args.levels) | {"reference": reference}
-        parts = boxes(stack, args.side, args.crops, rng) if args.side else [None]
-        for n, box in enumerate(parts):
-            count += crops.save(args.output / f"{path.stem}--{index}-{iterations}-{k}-{n}.npz", stack, box)
-    exr.unlink(missing_ok=True)
-    return count
-
-
-def main():
-    args = arguments()
-    args.output.mkdir(parents=True, exist_ok=True)
-    for index in args.variants:
-        for path in args.scenes:
-            done = args.output / "work" / f"{path.stem}-{index}.done"
-            if not done.exists():
-                count = variant(args, path, index)
-                if count is None:
-                    continue
-                done.touch()
-                print(f"{path.stem}, variant {index}: {count} crops", flush=True)
-
-
-if __name__ == "__main__":
-    main()
+def finished(folder):
+    """The names of the views in the manifest."""
+    manifest = folder / "manifest.jsonl"
+    lines = manifest.read_text(encoding="utf-8").splitlines() if manifest.exists() else []
+    return {json.loads(line)["view"] for line in lines}
