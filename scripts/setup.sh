@@ -9,6 +9,7 @@
 #   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy, .venv-bpy-oldest and
 #                              .venv-bpy-newest
 #   scripts/setup.sh farm      python, and packages of scripts/farm in .venv-farm: Ray, Open Job Description
+#   scripts/setup.sh train     python, and packages to train the combiner in .venv-train: PyTorch (6 GB)
 #
 # Other scripts source this file and call `setup MODE`. If nothing is missing, it takes a second.
 # CAUSTIQUE_EMBREE, CAUSTIQUE_ONNXRUNTIME and CAUSTIQUE_OIDN name libraries to use instead; CAUSTIQUE_PYTHON names a
@@ -276,11 +277,11 @@ need_blender() {
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
-# setup render|python|wheel|usd|test|farm
+# setup render|python|wheel|usd|test|farm|train
 setup() {
     case $1 in
-    render | python | wheel | usd | test | farm) ;;
-    *) fail "unknown mode '$1'" "one of: render python wheel usd test farm" ;;
+    render | python | wheel | usd | test | farm | train) ;;
+    *) fail "unknown mode '$1'" "one of: render python wheel usd test farm train" ;;
     esac
     need_rust
     need_linker
@@ -302,6 +303,7 @@ setup() {
         need_other_bpy
         ;;
     farm) need_venv .venv-farm "$PYTHON" requirements-farm.txt ;;
+    train) need_venv .venv-train "$PYTHON" lab/train/requirements.txt ;;
     esac
 }
 

@@ -141,6 +141,11 @@ program_tests() {
     tests 'Python with Blender' .venv-bpy/bin/python tests/python/timed.py discover -s tests/python -p 'blender_*.py'
     other_blenders
     tests 'Python with USD' .venv-usd/bin/python tests/python/timed.py discover -s tests/python -p 'usd_*.py'
+    if [ -x .venv-train/bin/python ]; then
+        tests 'Python with PyTorch' .venv-train/bin/python tests/python/timed.py discover -s tests/python -p 'training_*.py'
+    else
+        without 'Python with PyTorch' 'scripts/setup.sh train installs it'
+    fi
     tests 'Hard cases' tests/hard-cases.sh ${hard_cases[@]+"${hard_cases[@]}"}
     part 'Python wheel' scripts/python.sh
     tests 'Python package' .venv-python/bin/python -W error::DeprecationWarning tests/python/timed.py discover -s tests/python/package

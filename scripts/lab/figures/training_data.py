@@ -1,5 +1,5 @@
-"""Renders the training data of the combiner: random scenes in families, at the lowest priority. A repeated run continues
-where the last one stopped, and renders with the same copy of the program.
+"""Renders the training data of the combiner: random scenes in families, at the lowest priority. A repeated run
+continues where the last one stopped, and renders with the same copy of the program.
 
 It takes about ten core-hours on one thread; training can start on the views that are finished.
 """
@@ -23,11 +23,14 @@ def add_arguments(parser):
 def main():
     os.nice(19)
     maker = data.Maker(options.folder, BIN)
-    for view in data.views(options.folder, options.views):
-        if view.name in data.finished(options.folder) or options.only not in (None, view.family):
-            continue
-        try:
-            maker.make(view)
-            print(f"{view.name}: done", flush=True)
-        except Failed as failed:
-            print(f"{view.name}: {failed}", flush=True)
+    chosen = [view for view in data.views(options.folder, options.views) if options.only in (None, view.family)]
+    # The deep combiner is a baseline, so its pictures come last.
+    for finished, make in ((False, maker.make), (True, maker.add_independent)):
+        for view in chosen:
+            if (view.name in data.manifest(options.folder)) != finished:
+                continue
+            try:
+                make(view)
+                print(f"{view.name}: done", flush=True)
+            except Failed as failed:
+                print(f"{view.name}: {failed}", flush=True)

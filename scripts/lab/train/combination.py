@@ -1,11 +1,26 @@
-"""Equation (6) of [Choi and Moon 2021], differentiable; it must agree with src/combine/{affinity,kernel}.rs.
+"""Equations (5) and (6) of [Choi and Moon 2021], differentiable; they must agree with src/combine/{affinity,kernel}.rs.
 
-y_c = 1/W sum_j sum_{i in window} w_i^j (y_i + z_c^j - z_i^j),   y = level 1, z^j = level j + 1
+out_c = 1/W sum_j sum_{i in window of c} w_i^j (y_i^j + z_c^j - z_i^j)
+
+In equation (6) all y^j are level 1, and z^j is level j + 1. On the CPU, the sums and their derivatives are compiled
+from equation6.cpp; on a GPU, and in tests, `reference_*` compute them by torch's own derivatives.
 """
+
+import ctypes
+import functools
+import hashlib
+import os
+import subprocess
+from pathlib import Path
 
 import torch
 from torch.nn.functional import pad
-from torch.utils.checkpoint import checkpoint
+
+from ..cache import HOME
+
+SOURCE = Path(__file__).with_name("equation6.cpp")
+COMPILE = ["c++", "-std=c++20", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math"]
+COMPILE += ["-fopenmp", "-shared", "-fPIC"]
 
 # Largest exponent of an affinity, and bounds of the logarithms: they keep every weight positive in float32.
 MAX_DISTANCE = 60.0
@@ -14,34 +29,57 @@ MAX_LOG_WEIGHT = 12.0
 LOG_FALLOFF = (-20.0, 0.0)
 
 
-def combine(output, levels, kind, window, features=0):
-    """`output` of the network [b, c, h, w], `levels` [b, m, 3, h, w] -> [b, 3, h, w]."""
-    pairs = levels.shape[1] - 1
-    difference = levels[:, :1] - levels[:, 1:]
+def combine(output, y, z, kind, window, features=0):
+    """`output` of the network [b, c, h, w], pictures y and z [b, pairs, 3, h, w] -> [b, 3, h, w]."""
+    difference = y - z
+    slow = output.is_cuda
     if kind == "features":
-        phi, source, falloff, centre = split_features(output, pairs, features)
-        total, sums = AffinitySums.apply(phi, source, falloff, difference, window)
+        phi, source, falloff, centre = split_features(output, y.shape[1], features)
+        add = reference_affinity if slow else AffinitySums.apply
+        total, sums = add(phi, source, falloff, difference, window)
         total, sums = total * centre, sums * centre.unsqueeze(2)
     else:
-        total = sums = 0
-        for dy in range(window):
-            # Rows of the window are recomputed in the backward pass, because 1444 weights per pixel do not fit in memory.
-            w, s = checkpoint(
-                weight_rows, dy, window, difference, output, use_reentrant=False, preserve_rng_state=False
-            )
-            total, sums = total + w, sums + s
+        weights = output.unflatten(1, (y.shape[1], window * window))
+        total, sums = (reference_kernel if slow else KernelSums.apply)(weights, difference, window)
     # The sums contain the weighted y_i - z_i; z_c is added with the total weight of its pair.
-    value = (sums + levels[:, 1:] * total.unsqueeze(2)).sum(1)
-    return value / total.sum(1, keepdim=True)
+    return (sums + z * total.unsqueeze(2)).sum(1) / total.sum(1, keepdim=True)
 
 
 def split_features(output, pairs, features):
-    """phi, exp(source), falloff and exp(centre) of w_i^j = exp(source_i + centre_c - falloff_c |c - i|^2 - |phi_c - phi_i|^2)."""
-    b, _, h, w = output.shape
+    """phi, exp(source), falloff and exp(centre) of the weights
+    w_i^j = exp(source_i + centre_c - falloff_c |c - i|^2 - |phi_c - phi_i|^2)."""
     phi, scalars = output[:, : pairs * features], output[:, pairs * features :]
     source, centre, falloff = scalars.chunk(3, 1)
     source, centre = (x.clamp(-MAX_LOG_WEIGHT, MAX_LOG_WEIGHT).exp() for x in (source, centre))
-    return phi.reshape(b, pairs, features, h, w), source, falloff.clamp(*LOG_FALLOFF).exp(), centre
+    return phi.unflatten(1, (pairs, features)), source, falloff.clamp(*LOG_FALLOFF).exp(), centre
+
+
+def reference_affinity(phi, weight, falloff, difference, window):
+    """Sums over the window of w_i and of w_i d_i, w_i = weight_i exp(-falloff_c |c - i|^2 - |phi_c - phi_i|^2).
+
+    Shapes: phi [b, j, f, h, w]; weight, falloff [b, j, h, w]; difference d [b, j, 3, h, w].
+    """
+    r, total, sums = window // 2, 0, 0
+    # Sources outside the image have no weight, so windows are clipped.
+    phi_p, weight_p, d_p = (pad(x, [r] * 4) for x in (phi, weight, difference))
+    for dy in range(window):
+        for dx in range(window):
+            length = float((dx - r) ** 2 + (dy - r) ** 2)
+            distance = (phi - shifted(phi_p, dy, dx, r)).square().sum(2) + falloff * length
+            w = shifted(weight_p, dy, dx, r) * (-distance.clamp(max=MAX_DISTANCE)).exp()
+            total, sums = total + w, sums + w.unsqueeze(2) * shifted(d_p, dy, dx, r)
+    return total, sums
+
+
+def reference_kernel(weights, difference, window):
+    """Sums over the window of w_i and of w_i d_i with explicit weights [b, j, window^2, h, w]."""
+    r, total, sums = window // 2, 0, 0
+    inside, d_p = pad(torch.ones_like(difference[:, :, 0]), [r] * 4), pad(difference, [r] * 4)
+    for dy in range(window):
+        for dx in range(window):
+            w = weights[:, :, dy * window + dx] * shifted(inside, dy, dx, r)
+            total, sums = total + w, sums + w.unsqueeze(2) * shifted(d_p, dy, dx, r)
+    return total, sums
 
 
 def shifted(x, dy, dx, r):
@@ -50,73 +88,64 @@ def shifted(x, dy, dx, r):
     return x[..., dy : dy + h, dx : dx + w]
 
 
-class AffinitySums(torch.autograd.Function):
-    """Sums over the window of w_i and of w_i d_i, w_i = weight_i exp(-falloff_c |c - i|^2 - |phi_c - phi_i|^2).
+@functools.cache
+def library():
+    """equation6.cpp as a library, compiled into the cache at the first use by this processor."""
+    cpu = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0].encode()
+    key = hashlib.sha256(SOURCE.read_bytes() + " ".join(COMPILE).encode() + cpu).hexdigest()[:16]
+    path = HOME / "caustique" / f"equation6-{key}.so"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = path.with_suffix(f".{os.getpid()}.part")
+        subprocess.run([*COMPILE, SOURCE, "-o", draft], check=True)
+        draft.rename(path)
+    return ctypes.CDLL(str(path))
 
-    Shapes: phi [b, j, f, h, w]; weight, falloff [b, j, h, w]; difference d [b, j, 3, h, w], which is not
-    differentiated. The derivatives are explicit and recompute the weights: automatic differentiation would keep 1444
-    weights per pixel, and is several times slower.
-    """
+
+def call(name, shape, *tensors):
+    """Calls a function of the library for contiguous tensors of one type."""
+    suffix = {torch.float32: "f32", torch.float64: "f64"}[tensors[0].dtype]
+    sizes = (ctypes.c_long * 6)(*shape, torch.get_num_threads())
+    getattr(library(), f"{name}_{suffix}")(sizes, *(ctypes.c_void_p(x.data_ptr()) for x in tensors))
+
+
+class AffinitySums(torch.autograd.Function):
+    """`reference_affinity`, compiled; the difference is not differentiated."""
 
     @staticmethod
     def forward(ctx, phi, weight, falloff, difference, window):
-        ctx.save_for_backward(phi, weight, falloff, difference)
-        ctx.window = window
-        r = window // 2
-        # Sources outside the image have no weight, so windows are clipped.
-        phi_p, weight_p, d_p = (pad(x, [r] * 4) for x in (phi, weight, difference))
-        total, sums = torch.zeros_like(weight), torch.zeros_like(difference)
-        for dy, dx in offsets(window):
-            w = affinity(phi, phi_p, falloff, dy, dx, r)[0].mul_(shifted(weight_p, dy, dx, r))
-            total += w
-            sums.addcmul_(w.unsqueeze(2), shifted(d_p, dy, dx, r))
+        given = [x.contiguous() for x in (phi, weight, falloff, difference)]
+        b, j, f, h, w = phi.shape
+        ctx.shape = (b * j, f, h, w, window)
+        ctx.save_for_backward(*given)
+        total, sums = torch.zeros_like(given[1]), torch.zeros_like(given[3])
+        call("affinity", ctx.shape, *given, total, sums)
         return total, sums
 
     @staticmethod
     def backward(ctx, total_grad, sums_grad):
-        phi, weight, falloff, difference = ctx.saved_tensors
-        r = ctx.window // 2
-        phi_p, weight_p, d_p = (pad(x, [r] * 4) for x in (phi, weight, difference))
-        phi_grad, falloff_grad = torch.zeros_like(phi), torch.zeros_like(falloff)
-        phi_p_grad, weight_p_grad = torch.zeros_like(phi_p), torch.zeros_like(weight_p)
-        for dy, dx in offsets(ctx.window):
-            a, step, cut = affinity(phi, phi_p, falloff, dy, dx, r)
-            w_grad = (sums_grad * shifted(d_p, dy, dx, r)).sum(2).add_(total_grad)
-            a_grad = w_grad.mul_(a)  # The gradient of the source's weight; times that weight, of minus the distance.
-            shifted(weight_p_grad, dy, dx, r).add_(a_grad)
-            minus = (a_grad * shifted(weight_p, dy, dx, r)).masked_fill_(cut, 0)
-            falloff_grad.sub_(minus, alpha=squared_length(dy, dx, r))
-            step.mul_(minus.unsqueeze(2))
-            phi_grad.sub_(step, alpha=2)
-            shifted(phi_p_grad, dy, dx, r).add_(step, alpha=2)
-        inner = (..., slice(r, r + phi.shape[-2]), slice(r, r + phi.shape[-1]))
-        return phi_grad + phi_p_grad[inner], weight_p_grad[inner], falloff_grad, None, None
+        given = ctx.saved_tensors
+        grads = [torch.zeros_like(x) for x in given[:3]]
+        call("affinity_gradient", ctx.shape, *given, total_grad.contiguous(), sums_grad.contiguous(), *grads)
+        return *grads, None, None
 
 
-def offsets(window):
-    return [(dy, dx) for dy in range(window) for dx in range(window)]
+class KernelSums(torch.autograd.Function):
+    """`reference_kernel`, compiled; the difference is not differentiated."""
 
+    @staticmethod
+    def forward(ctx, weights, difference, window):
+        weights, difference = weights.contiguous(), difference.contiguous()
+        b, j, _, h, w = weights.shape
+        ctx.shape, ctx.weights = (b * j, 0, h, w, window), weights.shape
+        ctx.save_for_backward(difference)
+        total, sums = torch.zeros_like(difference[:, :, 0]), torch.zeros_like(difference)
+        call("kernel", ctx.shape, weights, difference, total, sums)
+        return total, sums
 
-def squared_length(dy, dx, r):
-    return float((dx - r) ** 2 + (dy - r) ** 2)
-
-
-def affinity(phi, phi_p, falloff, dy, dx, r):
-    """exp(-distance), phi_c - phi_i, and a mask of distances that are clamped to the maximum."""
-    step = phi - shifted(phi_p, dy, dx, r)
-    distance = step.square().sum(2).add_(falloff, alpha=squared_length(dy, dx, r))
-    cut = distance > MAX_DISTANCE
-    return distance.clamp_(max=MAX_DISTANCE).neg_().exp_(), step, cut
-
-
-def weight_rows(dy, window, difference, weights):
-    r = window // 2
-    b, pairs, _, h, w = difference.shape
-    inside = pad(difference.new_ones(1, 1, h, w), [r] * 4)
-    d_i = pad(difference, [r] * 4)
-    weights = weights.reshape(b, pairs, window, window, h, w)
-    total = sums = 0
-    for dx in range(window):
-        wi = weights[:, :, dy, dx] * shifted(inside, dy, dx, r)
-        total, sums = total + wi, sums + wi.unsqueeze(2) * shifted(d_i, dy, dx, r)
-    return total, sums
+    @staticmethod
+    def backward(ctx, total_grad, sums_grad):
+        (difference,) = ctx.saved_tensors
+        grad = difference.new_zeros(ctx.weights)
+        call("kernel_gradient", ctx.shape, difference, total_grad.contiguous(), sums_grad.contiguous(), grad)
+        return grad, None, None

@@ -1,16 +1,18 @@
 """Renders the training data: views of random scenes, noisy stacks of bandwidth levels, and independent targets.
 
-A view is a random scene of a family (families/) or a scene of scenes/, and for each method a window of SIDE x SIDE pixels
-of a picture of random width. Its folder has, for each method,
+A view is a random scene of a family (families/) or a scene of scenes/, and for each method a window of SIDE x SIDE
+pixels of a picture of random width. Its folder has, for each method,
 
   METHOD-seedN.npz   arrays by snapshot (ITERATIONS): levels, deviations, quarters, parts, finished, radius, albedo,
                      normal, depth
+  METHOD-bdptN.npz   for sppm, the same snapshots of bdpt: picture, quarters, deviation; for the deep combiner,
+                     and added after all views have the other files
   METHOD-target.npz  `halves`: two independent pictures without bias (bdpt), or with a bandwidth of less than a pixel
                      (vcm), where mirrors or glass show caustics
 
-Radiance is multiplied by the exposure of the whole picture (normalise.py) and stored as float16, the targets as float32.
-view.json describes the view, manifest.jsonl lists all finished views with the SHA-256 of their files. A repeated run
-continues with the first file that is missing.
+Radiance is multiplied by the exposure of the whole picture (normalise.py) and stored as float16, the targets as
+float32. view.json describes the view, manifest.jsonl lists all finished views with the SHA-256 of their files. A
+repeated run continues with the first file that is missing.
 """
 
 import hashlib
@@ -35,8 +37,8 @@ SEEDS = (1, 2)
 LEVELS = 5
 # Additive parts, in the order in which the arrays hold them.
 PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
-# Least and greatest width of the picture of which a window is rendered. The light paths of vcm are as many as its camera
-# paths, so a window of a large picture would have too few of them.
+# Least and greatest width of the picture of which a window is rendered. The light paths of vcm are as many as its
+# camera paths, so a window of a large picture would have too few of them.
 WIDTHS = {"sppm": (320, 1920), "vcm": (240, 480)}
 # Core-seconds of a target's half.
 TARGET_SECONDS = 16.0
@@ -117,6 +119,26 @@ class Maker:
                 if not (view.folder / f"{method}-seed{seed}.npz").exists():
                     self.stacks(view, note, method, seed, scene, work)
                     self.store(view, note)
+        self.finish(view, work)
+
+    def add_independent(self, view):
+        """Renders the pictures of bdpt that are missing of a finished view."""
+        wanted = [(seed, view.folder / f"sppm-bdpt{seed}.npz") for seed in SEEDS]
+        if all(file.exists() for _, file in wanted):
+            return
+        work, note = view.folder / "work", load(view.folder / "view.json")
+        work.mkdir(exist_ok=True)
+        scene = view.scene or work / "scene.glb"
+        if not view.scene:
+            self.build(view, note["attempt"], scene)
+        for seed, file in wanted:
+            if not file.exists():
+                write(file, self.independent(note, seed, scene, work))
+                self.store(view, note)
+        self.finish(view, work)
+
+    def finish(self, view, work):
+        """Removes the temporary files of a view, and adds the others to the manifest."""
         shutil.rmtree(work)
         files = {file.name: sha256(file) for file in sorted(view.folder.iterdir())}
         line = json.dumps({"view": view.name, "family": view.family, "held_out": view.held_out, "files": files})
@@ -132,10 +154,14 @@ class Maker:
     def build(self, view, attempt, scene):
         """Writes the random scene of a view."""
         path = os.pathsep.join(map(str, (ROOT / "scripts", ROOT / "scripts" / "blender")))
-        line = [BLENDER, "-m", "lab.train.families", view.family, view.index, attempt, scene]
-        done = subprocess.run(list(map(str, line)), capture_output=True, text=True, env=os.environ | {"PYTHONPATH": path})
-        if done.returncode or not scene.exists():
-            raise Failed(f"{view.name}: {(done.stderr or done.stdout).strip()[-600:]}")
+        draft = scene.with_name("part.glb")
+        line = [BLENDER, "-m", "lab.train.families", view.family, view.index, attempt, draft]
+        done = subprocess.run(
+            list(map(str, line)), capture_output=True, text=True, env=os.environ | {"PYTHONPATH": path}
+        )
+        if done.returncode or not draft.exists():
+            raise Failed((done.stderr or done.stdout).strip()[-600:])
+        draft.rename(scene)
 
     def scout(self, view, work):
         """Chooses the scene and the windows of a view by a small quick picture; writes and returns view.json."""
@@ -150,7 +176,7 @@ class Maker:
             if (levels[-1].mean(-1) > 0).mean() > LIT:
                 break
         else:
-            raise Failed(f"{view.name}: all attempts are dark")
+            raise Failed("all attempts are dark")
         effects = json.loads(self.run(command("plan", scene, program=self.binary, json=True)))["effects"]
         simulated = {effect["name"]: effect["simulated"] for effect in effects}
         note = {
@@ -177,7 +203,9 @@ class Maker:
         for half in (1, 2):
             out, saved = work / "half.exr", work / "half.saved"
             saved.unlink(missing_ok=True)
-            settings = place(note, method) | words | {"levels": 1, "no_finish": True, "layers": "beauty", "checkpoint": saved}
+            settings = (
+                place(note, method) | words | {"levels": 1, "no_finish": True, "layers": "beauty", "checkpoint": saved}
+            )
             settings["seed"] = 7000 + half
             self.render(scene, out, **settings, iterations=8)
             last = self.header(out)["history"][-1]
@@ -190,19 +218,40 @@ class Maker:
 
     def stacks(self, view, note, method, seed, scene, work):
         """Renders all snapshots of a window with one seed."""
-        out, saved = work / "noisy.exr", work / "noisy.saved"
-        saved.unlink(missing_ok=True)
         layers = ["beauty", "Level", "Variance", "Quarter", "albedo", "normal", "depth", *note["parts"]]
         radii = note["radii"] if method == "sppm" else ["Radius"]
         settings = place(note, method) | {"method": method, "levels": LEVELS, "eye_paths": 2, "seed": seed}
-        settings |= {"layers": ",".join([*layers, *radii]), "checkpoint": saved}
-        snapshots = []
+        settings["layers"] = ",".join([*layers, *radii])
+        arrays = self.snapshots(scene, work, settings, lambda picture: stack(picture, note, method, radii))
+        write(view.folder / f"{method}-seed{seed}.npz", arrays)
+
+    def independent(self, note, seed, scene, work):
+        """All snapshots of the window of sppm by bdpt."""
+        settings = place(note, "sppm") | {
+            "method": "bdpt",
+            "seed": 500 + seed,
+            "no_finish": True,
+            "layers": "beauty,Quarter",
+        }
+
+        def arrays(picture):
+            quarters = np.stack([rgb(picture, f"Quarter{k + 1}") for k in range(4)]) * note["exposure"]
+            deviation = np.sqrt(quarters.var(0, ddof=1).mean(-1) / 4)
+            bright = rgb(picture, "") * note["exposure"]
+            return {"picture": small(bright), "quarters": small(quarters), "deviation": small(deviation)}
+
+        return self.snapshots(scene, work, settings, arrays)
+
+    def snapshots(self, scene, work, settings, arrays):
+        """Renders ITERATIONS, each continuing the one before; returns the arrays of all by name."""
+        out, saved = work / "noisy.exr", work / "noisy.saved"
+        saved.unlink(missing_ok=True)
+        found = []
         for iterations in ITERATIONS:
-            resume = saved if snapshots else None
-            picture = self.render(scene, out, **settings, iterations=iterations, resume=resume)
-            snapshots.append(stack(picture, note, method, radii))
-        arrays = {key: np.stack([one[key] for one in snapshots]) for key in snapshots[0]}
-        write(view.folder / f"{method}-seed{seed}.npz", arrays | {"iterations": np.array(ITERATIONS)})
+            resume = saved if found else None
+            picture = self.render(scene, out, **settings, checkpoint=saved, iterations=iterations, resume=resume)
+            found.append(arrays(picture))
+        return {key: np.stack([one[key] for one in found]) for key in found[0]} | {"iterations": np.array(ITERATIONS)}
 
 
 def sha256(path):
@@ -230,8 +279,8 @@ def vertical_angle(scene):
 
 
 def target_method(simulated):
-    """Options of the method of a target: bdpt has no bias; vcm also finds the caustics that mirrors and glass show, with a
-    bandwidth that falls below a pixel."""
+    """Options of the method of a target: bdpt has no bias; vcm also finds the caustics that mirrors and glass show,
+    with a bandwidth that falls below a pixel."""
     if not simulated.get("sds", True):
         return {"method": "bdpt"}
     return {"method": "vcm", "guide": "on", "alpha": 0.5}
@@ -253,7 +302,12 @@ def window(view, method, levels):
             rows = np.clip(np.array([y, y + SIDE]) * small[0] / height, 0, small[0]).round().astype(int)
             columns = np.clip(np.array([x, x + SIDE]) * small[1] / width, 0, small[1]).round().astype(int)
             area = max((rows[1] - rows[0]) * (columns[1] - columns[0]), 1)
-            total = sums[rows[1], columns[1]] - sums[rows[0], columns[1]] - sums[rows[1], columns[0]] + sums[rows[0], columns[0]]
+            total = (
+                sums[rows[1], columns[1]]
+                - sums[rows[0], columns[1]]
+                - sums[rows[1], columns[0]]
+                + sums[rows[0], columns[0]]
+            )
             corners.append((int(x), int(y)))
             weights.append(0.02 + total / area)
     weights = np.array(weights) ** 2
@@ -296,8 +350,8 @@ def small(values):
     return np.nan_to_num(values, nan=0, posinf=LARGEST, neginf=-LARGEST).clip(-LARGEST, LARGEST).astype(np.float16)
 
 
-def finished(folder):
-    """The names of the views in the manifest."""
-    manifest = folder / "manifest.jsonl"
-    lines = manifest.read_text(encoding="utf-8").splitlines() if manifest.exists() else []
-    return {json.loads(line)["view"] for line in lines}
+def manifest(folder):
+    """The lines of the manifest by the name of the view; a later line of a view replaces an earlier one."""
+    file = Path(folder) / "manifest.jsonl"
+    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+    return {entry["view"]: entry for entry in map(json.loads, lines)}

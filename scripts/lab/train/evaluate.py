@@ -1,74 +1,99 @@
-"""relMSE (and trimmed relMSE) of the combined image and of every level, scene by scene.
+"""Errors of the combined picture on held-out views, relative to the usual single level and to the delivered picture.
 
-  python -m lab.train.evaluate --checkpoint RUN/last.pt --data DIR [--all]
+  python -m lab.train.evaluate --checkpoint RUN/last.pt --data DIR
 
-Without --all, only crops that training did not use, with a row for each picture and number of iterations. Level4 of five
-is the layer `Noisy`, the image of the default single bandwidth.
+The target of a view has two independent halves t and u; the mean of (x - t)(x - u) has no contribution from their
+noise. Level4 of five is the layer `Noisy`, the picture of the default single bandwidth; `finished` is the bounded
+denoised picture.
 """
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 import torch
 
-from . import combination
-from . import crops
-from . import export_network
+from . import combination, export_network, views
+
+# Share of the pixels that the trimmed error leaves out: those with the largest noise of the target and of Level4.
+TRIMMED = 0.005
+# Snapshots that are evaluated.
+SNAPSHOTS = (0, 2, 4)
+# Least error for geometric means, because an estimate of a small error can be negative.
+LEAST = 1e-6
 
 
-def relmse(image, reference):
-    """For each pixel, the mean over RGB of (x - r)^2 / (mean_RGB(r)^2 + 0.01)."""
-    return ((image - reference).square().mean(1) / (reference.mean(1).square() + 0.01)).flatten()
+def pixel_errors(picture, halves):
+    """For each pixel, the mean over RGB of (x - t)(x - u) / (mean_RGB(r)^2 + 0.01), with the halves t and u of r."""
+    t, u = halves
+    return ((picture - t) * (picture - u)).mean(0) / ((t + u).mean(0).square() / 4 + 0.01)
 
 
-def trimmed(errors):
-    """Mean without the worst 0.5 % of pixels."""
-    kept = errors.sort().values[: errors.numel() - int(0.005 * errors.numel())]
-    return kept.mean().item()
+def trimmed_mean(errors, order):
+    """The mean without the last pixels of `order`."""
+    kept = order[: order.numel() - int(TRIMMED * order.numel())]
+    return max(errors.flatten()[kept].mean().item(), LEAST)
 
 
 @torch.no_grad()
-def errors(net, file):
-    image, levels, reference = (torch.from_numpy(x)[None] for x in crops.load(file))
-    h, w = (n // net.stride * net.stride for n in image.shape[-2:])
-    image, levels, reference = image[..., :h, :w], levels[..., :h, :w], reference[..., :h, :w]
-    combined = combination.combine(net(image), levels, net.kind, net.window, net.features)
-    return [relmse(x, reference) for x in [combined, *levels.unbind(1)]]
+def errors(net, arrays, k, device="cpu"):
+    """Trimmed errors of the combination, of Level4 and of the finished picture, for snapshot k of a stack."""
+    stack = views.snapshot(arrays, k, net.pairs)
+    image, y, z, halves = (torch.from_numpy(x).to(device) for x in views.sample(stack, net.pairs, net.version))
+    combined = combination.combine(net(image[None]), y[None], z[None], net.kind, net.window, net.features)[0]
+    planar = lambda picture: torch.from_numpy(picture).permute(2, 0, 1).to(device)
+    usual, finished = planar(stack["levels"][3]), planar(stack["finished"])
+    noise = (halves[0] - halves[1]).square().mean(0) + (usual - halves.mean(0)).square().mean(0)
+    order = (noise / (halves.mean(0).mean(0).square() + 0.01)).flatten().argsort()
+    return [trimmed_mean(pixel_errors(picture, halves), order) for picture in (combined, usual, finished)]
+
+
+def validate(net, folder, methods, device="cpu", most=60):
+    """Geometric means over at most `most` held-out snapshots: the error of the combination relative to Level4 and to
+    the finished picture, by method; and the number of snapshots."""
+    net.eval()
+    found = {}
+    for method in methods:
+        items = [item for item in views.files(folder, True, [method]) if item[2] == 1]
+        if net.pairs.startswith("deep"):
+            items = [item for item in items if (item[0] / f"{method}-bdpt1.npz").exists()]
+        items = items[:: max(1, len(items) * len(SNAPSHOTS) // most)]
+        rows = []
+        for item in items:
+            arrays = views.read(item)
+            rows += [errors(net, arrays, k, device) for k in SNAPSHOTS]
+        if rows:
+            logs = np.log(rows)
+            found[f"{method}_to_level4"] = round(float(np.exp((logs[:, 0] - logs[:, 1]).mean())), 4)
+            found[f"{method}_to_finished"] = round(float(np.exp((logs[:, 0] - logs[:, 2]).mean())), 4)
+            found[f"{method}_snapshots"] = len(rows)
+    net.train()
+    return found
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--checkpoint", required=True)
-    parser.add_argument("--data", required=True)
-    parser.add_argument("--held-out", nargs="*", default=crops.HELD_OUT, help="the value of train.py's --held-out")
-    parser.add_argument("--all", action="store_true", help="also evaluate crops that training used")
+    parser.add_argument("--data", required=True, type=Path)
+    parser.add_argument("--methods", nargs="+", default=["sppm", "vcm"])
     args = parser.parse_args()
     net, _ = export_network.load(args.checkpoint)
     net.eval()
-    scenes = crops.files(args.data)
-    scenes = scenes if args.all else crops.held_out(scenes, args.held_out)
-    heads = ["combined"] + [f"Level{k + 1}" for k in range(net.levels)]
-    print(
-        f"{'scene variant-iterations':28}"
-        + "".join(f"{h:>17}" for h in heads)
-        + "    relMSE (trimmed), means over crops"
-    )
-    table = []
-    for name, files in group(scenes).items():
-        rows = [[(e.mean().item(), trimmed(e)) for e in errors(net, file)] for file in files]
-        table.append(np.mean(rows, axis=0))
-        print(f"{name:28}" + "".join(f"{a:8.4f} ({b:6.4f})" for a, b in table[-1]), flush=True)
-    print(f"{'mean':28}" + "".join(f"{a:8.4f} ({b:6.4f})" for a, b in np.mean(table, axis=0)))
-    print(f"{'geometric mean':28}" + "".join(f"{a:8.4f} ({b:6.4f})" for a, b in np.exp(np.log(table).mean(0))))
-
-
-def group(scenes):
-    """The files of each row by its title, from names SCENE--VARIANT-ITERATIONS-... (data.py)."""
-    rows = {}
-    for name, files in scenes.items():
-        for file in files:
-            rows.setdefault(f"{name} {'-'.join(file.stem.split('--')[1].split('-')[:2])}", []).append(file)
-    return rows
+    print(f"{'view':28}{'method':8}{'iterations':>10}{'combined':>12}{'Level4':>12}{'finished':>12}")
+    ratios = []
+    for item in views.files(args.data, True, args.methods):
+        arrays = views.read(item)
+        for k in SNAPSHOTS:
+            row = errors(net, arrays, k)
+            ratios.append([row[0] / row[1], row[0] / row[2]])
+            values = "".join(f"{value:12.5f}" for value in row)
+            print(f"{item[0].name:28}{item[1]:8}{int(arrays['iterations'][k]):10}{values}", flush=True)
+    if ratios:
+        mean, worst = np.exp(np.log(ratios).mean(0)), np.max(ratios, axis=0)
+        print(
+            f"combined / Level4: {mean[0]:.3f} (worst {worst[0]:.2f}); "
+            f"combined / finished: {mean[1]:.3f} (worst {worst[1]:.2f})"
+        )
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import torch
 
 from . import model
 from . import normalise
+from .pairs import PAIRS
 
 OPSET = 17
 
@@ -18,7 +19,7 @@ OPSET = 17
 def export(net, path, training):
     net = net.eval().cpu()
     side = 8 * net.stride
-    example = torch.zeros(1, normalise.channels(net.levels), side, side)
+    example = torch.zeros(1, normalise.channels(net.levels, net.version), side, side)
     torch.onnx.export(
         net,
         (example,),
@@ -37,7 +38,8 @@ def export(net, path, training):
         "features": net.features,
         "stride": net.stride,
         "halo": net.halo,
-        "normalisation": normalise.VERSION,
+        "normalisation": net.version,
+        "pairs": net.pairs,
         "training": training,
     }
     for key, value in facts.items():
@@ -48,7 +50,7 @@ def export(net, path, training):
 
 def load(path):
     saved = torch.load(path, map_location="cpu", weights_only=True)
-    net = model.build(saved["arch"], saved["levels"], saved["window"])
+    net = model.build(saved["arch"], saved["pairs"], saved["version"], saved["levels"], saved["window"])
     net.load_state_dict(saved["best"])
     return net, saved
 
@@ -57,17 +59,18 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--checkpoint", help="checkpoint of train.py; without it the network is untrained")
     parser.add_argument("--arch", choices=["compact", "paper"], default="compact")
-    parser.add_argument("--levels", type=int, default=5)
-    parser.add_argument("--window", type=int, default=model.WINDOW)
+    parser.add_argument("--pairs", choices=list(PAIRS), default="multi")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("-o", "--output", required=True)
     args = parser.parse_args()
     if args.checkpoint:
         net, saved = load(args.checkpoint)
-        training = f"{saved['steps']} steps, {saved['seconds']:.0f} s on {saved['device']}, data {saved['data']}"
+        training = (
+            f"{saved['steps']} steps, {saved['seconds']:.0f} s on {', '.join(saved['machines'])}, data {saved['data']}"
+        )
     else:
         torch.manual_seed(args.seed)
-        net, training = model.build(args.arch, args.levels, args.window), "none"
+        net, training = model.build(args.arch, args.pairs), "none"
     export(net, args.output, training)
     print(f"{args.output}: {sum(p.numel() for p in net.parameters())} parameters, training: {training}")
 

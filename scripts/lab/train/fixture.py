@@ -15,11 +15,24 @@ from . import combination
 from . import export_network
 from . import model
 from . import normalise
-from . import synthetic
 
 HERE = pathlib.Path(__file__).parent
 TARGET = HERE / "../../src/combine/testdata/contract.f32"
 H, W, K = 16, 22, 5
+
+
+def random_stack(rng, levels=5):
+    """A random stack with noise and some background."""
+    mean = np.exp(rng.normal(0, 1, (H, W, 3)))
+    scale = 0.5 * 2.0 ** -np.arange(levels)[:, None, None, None]
+    stack = {
+        "levels": mean * np.exp(rng.normal(0, 1, (levels, H, W, 3)) * scale),
+        "variances": (mean * scale) ** 2,
+        "albedo": rng.uniform(0, 1, (H, W, 3)),
+        "normal": rng.normal(0, 0.5, (H, W, 3)),
+        "depth": np.where(rng.random((H, W)) < 0.1, 1e10, np.exp(rng.normal(0, 1, (H, W)))),
+    }
+    return {key: value.astype(np.float32) for key, value in stack.items()}
 
 
 def main():
@@ -28,10 +41,7 @@ def main():
         "--checkpoint", help="checkpoint of the shipped network; without it, the untrained network of export_network.py"
     )
     args = parser.parse_args()
-    whole = synthetic.stack(7)
-    crop = {
-        k: (v[:, 40 : 40 + H, 50 : 50 + W] if v.ndim == 4 else v[40 : 40 + H, 50 : 50 + W]) for k, v in whole.items()
-    }
+    crop = random_stack(np.random.default_rng(7))
     if args.checkpoint:
         net, _ = export_network.load(args.checkpoint)
     else:
@@ -41,17 +51,18 @@ def main():
     torch.manual_seed(2)
     m, f = net.levels, net.features
     levels = torch.from_numpy(crop["levels"]).permute(0, 3, 1, 2)[None].double()
+    y, z = levels[:, :1].expand(-1, m - 1, -1, -1, -1), levels[:, 1:]
     image = normalise.tensor(crop)
     features = torch.randn(1, (m - 1) * (f + 3), H, W)
     features[:, -(m - 1) :] -= 3.0  # falloffs of about 0.05
-    expected = combination.combine(features.double(), levels, "features", model.WINDOW, f)
+    expected = combination.combine(features.double(), y, z, "features", model.WINDOW, f)
     with torch.no_grad():
         padded = torch.nn.functional.pad(torch.from_numpy(image)[None], [0, -W % net.stride, 0, -H % net.stride])
         output = net(padded)[..., :H, :W].double()
-        network = combination.combine(output, levels, net.kind, net.window, f)
+        network = combination.combine(output, y, z, net.kind, net.window, f)
     h, w = H // 2, W // 2
     weights = torch.randn(1, (m - 1) * K * K, h, w).exp()
-    kernel = combination.combine(weights.double(), levels[..., :h, :w], "weights", K)
+    kernel = combination.combine(weights.double(), y[..., :h, :w], z[..., :h, :w], "weights", K)
     rgb = lambda x: x[0].permute(1, 2, 0).numpy()
     parts = [np.array([m, H, W, f, K]), *(crop[k] for k in ("levels", "variances", "albedo", "normal", "depth"))]
     parts += [image, features.numpy(), rgb(expected), rgb(network), weights.numpy(), rgb(kernel)]

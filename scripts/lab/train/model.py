@@ -1,17 +1,18 @@
-"""The networks that choose the weights of [Choi and Moon 2021, equation (6)].
+"""The networks that choose the weights of equations (5) and (6) of [Choi and Moon 2021].
 
-For each pixel and level pair, `Compact` computes a point phi in a small feature space and three scalars, from which
-combination.py computes the pairwise weights of equation (6). `Paper` is the paper's kernel-predicting network: ten 5x5
-convolutions of 50 filters, and a weight for every pixel of the window and level pair.
+For each pixel and pair, `Compact` computes a point phi in a small feature space and three scalars, from which
+combination.py computes the pairwise weights. `Paper` is the paper's kernel-predicting network: ten 5x5 convolutions of
+50 filters, and a weight for every pixel of the window and pair.
 """
 
 import torch
 from torch import nn
 
 from . import normalise
+from .pairs import PAIRS
 
-# The paper's window is 19, at 1.6 times the cost.
-WINDOW = 15
+# The paper's window; the compact network takes 15, at 0.6 times the cost.
+PAPER_WINDOW, WINDOW = 19, 15
 FEATURES = 4
 # Bound of the logarithms of explicit weights: keeps every sum of weights well inside float32.
 LOG_WEIGHT_BOUND = 8.0
@@ -36,7 +37,7 @@ class Compact(nn.Module):
     """A U-Net at full, half and quarter resolution with added skips; 0.07 MFLOP per pixel.
 
     Widths are multiples of 16, for which ONNX Runtime's convolutions are fast. The output, of shape
-    [b, (levels - 1) (features + 3), h, w], has phi of all pairs, then source, centre and log falloff.
+    [b, pairs (features + 3), h, w], has phi of all pairs, then source, centre and log falloff.
     """
 
     kind, output = "features", "features"
@@ -44,11 +45,11 @@ class Compact(nn.Module):
     # Receptive radius 32 of the layers below (a test looks for seams), rounded up to the stride.
     halo = 32
 
-    def __init__(self, levels=5, window=WINDOW, features=FEATURES, widths=(16, 32, 64), last=32):
+    def __init__(self, pairs, inputs, window=WINDOW, features=FEATURES, widths=(16, 32, 64), last=32):
         super().__init__()
-        self.levels, self.window, self.features = levels, window, features
+        self.window, self.features = window, features
         full, half, quarter = widths
-        self.stem = conv(normalise.channels(levels), full)
+        self.stem = conv(inputs, full)
         self.down1, self.enc1 = conv(full, half, stride=2), Block(half, half)
         self.down2, self.enc2, self.middle = (
             conv(half, quarter, stride=2),
@@ -58,9 +59,8 @@ class Compact(nn.Module):
         # A 1x1 convolution commutes with nearest-neighbour enlargement, so it comes first.
         self.up1, self.dec1 = conv(quarter, half, 1), Block(half, half)
         self.up0, self.skip0, self.dec0 = conv(half, last, 1), conv(full, last, 1), conv(last, last)
-        self.head = conv(last, (levels - 1) * (features + 3), 1)
+        self.head = conv(last, pairs * (features + 3), 1)
         # The initial filter is about a pixel wide: close to the best level, and wide enough for gradients.
-        pairs = levels - 1
         with torch.no_grad():
             self.head.bias.zero_()
             self.head.bias[-pairs:] = -1.0
@@ -76,18 +76,18 @@ class Compact(nn.Module):
 
 
 class Paper(nn.Module):
-    """[Choi and Moon 2021, 4.3]: ten convolutions, 2.4 M parameters, 4.7 MFLOP per pixel."""
+    """[Choi and Moon 2021, 4.3]: ten convolutions, 2.4 M parameters, 4.7 MFLOP per pixel with the paper's window."""
 
     kind, output = "weights", "weights"
-    stride = 1
+    stride, features = 1, 0
     halo = 20
 
-    def __init__(self, levels=5, window=WINDOW, filters=50, depth=10):
+    def __init__(self, pairs, inputs, window=PAPER_WINDOW, filters=50, depth=10):
         super().__init__()
-        self.levels, self.window, self.features = levels, window, 0
-        sizes = [normalise.channels(levels)] + [filters] * (depth - 1)
+        self.window = window
+        sizes = [inputs] + [filters] * (depth - 1)
         self.layers = nn.ModuleList(conv(a, b, 5) for a, b in zip(sizes, sizes[1:]))
-        self.last = conv(filters, (levels - 1) * window * window, 5)
+        self.last = conv(filters, pairs * window * window, 5)
         for layer in [*self.layers, self.last]:
             nn.init.xavier_uniform_(layer.weight)
             nn.init.zeros_(layer.bias)
@@ -102,5 +102,12 @@ def up(x):
     return nn.functional.interpolate(x, scale_factor=2.0, mode="nearest")
 
 
-def build(arch, levels=5, window=WINDOW):
-    return {"compact": Compact, "paper": Paper}[arch](levels=levels, window=window)
+def build(arch, pairs="multi", version=None, levels=5, window=None):
+    """A network for pairs of pictures and a version of the input, by default the least that has what the pairs need."""
+    _, count, least = PAIRS[pairs]
+    version = version or least
+    kind = {"compact": Compact, "paper": Paper}[arch]
+    sizes = {} if window is None else {"window": window}
+    net = kind(count, normalise.channels(levels, version), **sizes)
+    net.levels, net.pairs, net.version, net.arch = levels, pairs, version, arch
+    return net

@@ -5,12 +5,21 @@ python -m lab.train.families FAMILY INDEX ATTEMPT FILE.glb    (in .venv-bpy)
 
 # Modules and their families; a view of a family is a number of its random generator.
 FAMILIES = {
-    "rooms": ["closed_box", "window_room", "glazed_room", "lamp_room", "mirror_room", "corridor", "bookshelf", "breakfast"],
+    "rooms": [
+        "closed_box",
+        "window_room",
+        "glazed_room",
+        "lamp_room",
+        "mirror_room",
+        "corridor",
+        "bookshelf",
+        "breakfast",
+    ],
     "glassware": ["tumblers", "goblets", "bottles", "glass_balls", "glass_solids", "fluted", "lenses", "frosted"],
     "water": ["pool", "night_pool", "tub", "aquarium", "puddles", "water_light", "waves"],
-    "lights": ["stage", "bulbs", "shades", "neon", "small_lights", "studio"],
+    "many_lights": ["stage", "bulbs", "shades", "neon", "small_lights", "studio"],
     "gems": ["jewels", "prisms", "rings", "reflectors", "brushed", "matte_things"],
-    "media": ["foggy_room", "smoky_stage", "milky", "wax", "dusty_window"],
+    "fog_and_milk": ["foggy_room", "smoky_stage", "milky", "wax", "dusty_window"],
     "exteriors": ["courtyard", "facade", "garden", "night_street", "terrace"],
 }
 # Families without any training data.

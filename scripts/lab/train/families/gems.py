@@ -5,7 +5,20 @@ import math
 import build as b
 import numpy as np
 
-from .props import METALS, add, clear, ground, lamp_or_sun, look, matte, metal, pick, places, ripples, still_life, surface
+from .props import (
+    METALS,
+    add,
+    ground,
+    lamp_or_sun,
+    look,
+    matte,
+    metal,
+    pick,
+    places,
+    ripples,
+    still_life,
+    surface,
+)
 
 
 def cut_stone(r, name, sides, rows):
@@ -30,8 +43,20 @@ def jewels(r):
     for at in places(r, int(r.integers(4, 14)), 0.1, 0.04):
         size = r.uniform(0.018, 0.034)
         tint = tuple(r.uniform(0, 1, 3) ** 2 * r.uniform(0, 120))
-        stone = b.glass("stone", r.uniform(1.5, 2.4), absorption=tint if r.random() < 0.7 else None, abbe=r.uniform(25, 60) if r.random() < 0.3 else None)
-        add("stone", cut_stone(r, "stone", int(r.integers(4, 9)), int(r.integers(1, 4))), stone, (*at, 0.52 * size), (r.uniform(-25, 25), r.uniform(-25, 25), r.uniform(0, 360)), (size, size, size))
+        stone = b.glass(
+            "stone",
+            r.uniform(1.5, 2.4),
+            absorption=tint if r.random() < 0.7 else None,
+            abbe=r.uniform(25, 60) if r.random() < 0.3 else None,
+        )
+        add(
+            "stone",
+            cut_stone(r, "stone", int(r.integers(4, 9)), int(r.integers(1, 4))),
+            stone,
+            (*at, 0.52 * size),
+            (r.uniform(-25, 25), r.uniform(-25, 25), r.uniform(0, 360)),
+            (size, size, size),
+        )
     lamp_or_sun(r, 0.4)
     look(r, (0, 0, 0.01), 0.33, (25, 65))
 
@@ -43,7 +68,12 @@ def prisms(r):
         side, high, turn = r.uniform(0.04, 0.07), r.uniform(0.04, 0.08), r.uniform(0, 2 * math.pi)
         planes = [((0, 0, 1), high), ((0, 0, -1), -1e-4)]
         planes += [((math.cos(turn + k), math.sin(turn + k), 0), side / math.sqrt(12)) for k in (0, 2.0944, 4.1888)]
-        add("prism", b.polyhedron("prism", planes), b.glass("flint", r.uniform(1.5, 1.8), abbe=r.uniform(22, 60)), (*at, 0.0))
+        add(
+            "prism",
+            b.polyhedron("prism", planes),
+            b.glass("flint", r.uniform(1.5, 1.8), abbe=r.uniform(22, 60)),
+            (*at, 0.0),
+        )
     b.sun("sun", (math.cos(1.0), -0.3, -r.uniform(0.1, 0.6)), r.uniform(4, 30))
     b.sky((0.1, 0.11, 0.13))
     still_life(r, 2, 0.35, 0.06, surface)
@@ -73,7 +103,12 @@ def reflectors(r):
     add("wall", b.plane("wall", 5, 2.5, uv=1.0), matte(r, "wall"), (0, 0.9, 1.25), (90, 0, 0))
     for at in places(r, int(r.integers(1, 4)), 0.5, 0.4):
         wave, size, bow = ripples(r, 0.5, r.uniform(0, 0.006)), r.uniform(0.25, 0.5), r.uniform(-0.6, 0.6)
-        mesh = b.sheet("sheet", 90, 90, lambda u, v: ((u - 0.5) * size, bow * (u - 0.5) ** 2 * size + wave(u - 0.5, v - 0.5), v * size * 0.8))
+        mesh = b.sheet(
+            "sheet",
+            90,
+            90,
+            lambda u, v: ((u - 0.5) * size, bow * (u - 0.5) ** 2 * size + wave(u - 0.5, v - 0.5), v * size * 0.8),
+        )
         add("sheet", mesh, metal(r, "sheet", 0.1), (*at, 0.0005), (r.uniform(-25, 10), 0, r.uniform(-70, 70)))
     still_life(r, 3, 0.7, 0.15, surface)
     lamp_or_sun(r, 1.2)

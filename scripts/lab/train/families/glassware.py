@@ -5,7 +5,22 @@ import math
 import build as b
 import numpy as np
 
-from .props import add, clear, ground, lamp_or_sun, look, matte, metal, pick, places, solid, still_life, surface, turned, vessel
+from .props import (
+    add,
+    clear,
+    ground,
+    lamp_or_sun,
+    look,
+    matte,
+    metal,
+    pick,
+    places,
+    solid,
+    still_life,
+    surface,
+    turned,
+    vessel,
+)
 
 
 def drink(r):
@@ -19,7 +34,16 @@ def tumblers(r):
     """Tumblers with and without drinks."""
     ground(r, 2.5)
     for at in places(r, int(r.integers(2, 6)), 0.22, 0.11):
-        vessel(r, r.uniform(0.03, 0.042), r.uniform(0.07, 0.15), clear(r, tint=0.2, index=1.52), at, drink(r), r.uniform(0.05, 0.15), r.uniform(0, 0.25))
+        vessel(
+            r,
+            r.uniform(0.03, 0.042),
+            r.uniform(0.07, 0.15),
+            clear(r, tint=0.2, index=1.52),
+            at,
+            drink(r),
+            r.uniform(0.05, 0.15),
+            r.uniform(0, 0.25),
+        )
     lamp_or_sun(r, 0.8)
     look(r, (0, 0, 0.05), 0.75)
 
@@ -56,7 +80,12 @@ def bottles(r):
         inside = [(0, 0.006), (w - 0.003, 0.006), (w - 0.003, 0.6 * h), (neck - 0.003, 0.78 * h), (neck - 0.003, h)]
         profile = b.rounded(shape, 0.02, 6) + b.rounded(inside, 0.02, 6)[::-1]
         tint = pick(r, [(150, 40, 120), (20, 60, 200), (0, 0, 0), (5, 5, 8), (120, 100, 20)])
-        add("bottle", b.lathe("bottle", profile, 72), b.glass("bottle", 1.52, absorption=tint if any(tint) else None), (*at, 0.0003))
+        add(
+            "bottle",
+            b.lathe("bottle", profile, 72),
+            b.glass("bottle", 1.52, absorption=tint if any(tint) else None),
+            (*at, 0.0003),
+        )
     lamp_or_sun(r, 1.0)
     look(r, (0, 0, 0.1), 1.0, (5, 35))
 
@@ -79,7 +108,13 @@ def glass_solids(r):
         mesh, lift = solid(r, size, 6)
         add("solid", mesh, clear(r), (*at, lift + 0.0002), (0, 0, r.uniform(0, 360)))
     at = (0, 0.42) if r.random() < 0.5 else (0.42, 0)
-    add("block", b.box("block", (0.17, 0.17, 0.17), 0.004, 4), b.glass("block", 1.5), (*at, 0.0852), (0, 0, r.uniform(0, 90)))
+    add(
+        "block",
+        b.box("block", (0.17, 0.17, 0.17), 0.004, 4),
+        b.glass("block", 1.5),
+        (*at, 0.0852),
+        (0, 0, r.uniform(0, 90)),
+    )
     add("inclusion", b.torus("inclusion", 0.045, 0.016, 96, 32), surface(r), (*at, 0.085), tuple(r.uniform(0, 90, 3)))
     lamp_or_sun(r, 1.0)
     look(r, (0, 0.1, 0.05), 1.0)
@@ -96,13 +131,22 @@ def fluted(r):
             t = v if not inner else 1 - v
             z = 0.008 * inner + t * (height - 0.008 * inner)
             turn = 2 * math.pi * u
-            size = radius * (1 + bulge * math.sin(2.5 * t)) * (1 + depth * math.cos(flutes * (turn + twist * t)) * (not inner)) - 0.006 * inner
+            size = (
+                radius
+                * (1 + bulge * math.sin(2.5 * t))
+                * (1 + depth * math.cos(flutes * (turn + twist * t)) * (not inner))
+                - 0.006 * inner
+            )
             return size * math.cos(turn), size * math.sin(turn), z
 
         tall = 40
         shape = b.bmesh.new()
         sides = 12 * flutes
-        rings = [[shape.verts.new(wall(i / sides, j / tall, inner)) for i in range(sides)] for inner in (False, True) for j in range(tall + 1)]
+        rings = [
+            [shape.verts.new(wall(i / sides, j / tall, inner)) for i in range(sides)]
+            for inner in (False, True)
+            for j in range(tall + 1)
+        ]
         for low, high in zip(rings, rings[1:]):
             for i in range(sides):
                 k = (i + 1) % sides
@@ -119,7 +163,14 @@ def lenses(r):
     ground(r, 2.5, matte(r, "paper"))
     for at in places(r, int(r.integers(2, 6)), 0.25, 0.16):
         radius, thick = r.uniform(0.04, 0.08), r.uniform(0.2, 0.6)
-        add("lens", b.sphere("lens", 1.0, 6), clear(r, "lens", 0.1), (*at, radius + 0.012), (r.choice([0, 90, r.uniform(0, 90)]), 0, r.uniform(0, 360)), (radius, radius, radius * thick))
+        add(
+            "lens",
+            b.sphere("lens", 1.0, 6),
+            clear(r, "lens", 0.1),
+            (*at, radius + 0.012),
+            (r.choice([0, 90, r.uniform(0, 90)]), 0, r.uniform(0, 360)),
+            (radius, radius, radius * thick),
+        )
     still_life(r, 3, 0.4, 0.06, surface)
     lamp_or_sun(r, 1.0)
     look(r, (0, 0, 0.04), 0.9, (20, 60))

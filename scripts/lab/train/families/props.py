@@ -59,7 +59,9 @@ def pattern(r, size=384):
 def matte(r, name="matte"):
     """A diffuse material, of one colour or with a pattern."""
     texture = b.image(name, pattern(r)) if r.random() < 0.5 else None
-    return b.principled(name, colour(r), r.uniform(0.6, 1), texture=texture, Specular_IOR_Level=r.choice([0.0, 0.2, 0.5]))
+    return b.principled(
+        name, colour(r), r.uniform(0.6, 1), texture=texture, Specular_IOR_Level=r.choice([0.0, 0.2, 0.5])
+    )
 
 
 def shiny(r, name="shiny"):
@@ -171,7 +173,13 @@ def daylight(r, low=15, high=70, sun=True, sky=1.0):
     turn, lift = r.uniform(0, 2 * math.pi), math.radians(r.uniform(low, high))
     if sun:
         toward = (math.cos(turn) * math.cos(lift), math.sin(turn) * math.cos(lift), -math.sin(lift))
-        b.sun("sun", toward, r.uniform(2, 6), (1.0, r.uniform(0.8, 1), r.uniform(0.6, 1)), r.choice([0.53, 0.53, 2.0, 5.0]))
+        b.sun(
+            "sun",
+            toward,
+            r.uniform(2, 6),
+            (1.0, r.uniform(0.8, 1), r.uniform(0.6, 1)),
+            r.choice([0.53, 0.53, 2.0, 5.0]),
+        )
     b.sky(tuple(np.array([0.22, 0.3, 0.42]) * r.uniform(0.3, 1.8) * sky))
 
 
@@ -183,7 +191,16 @@ def lamp_or_sun(r, size=1.0):
     if kind == 0:
         return daylight(r, 25, 75)
     if kind == 1:
-        b.spot("spot", tuple(at), (0, 0, 0), 90 * size**2, r.uniform(30, 70), light_colour(r), r.uniform(0, 0.6), 0.01 * size)
+        b.spot(
+            "spot",
+            tuple(at),
+            (0, 0, 0),
+            90 * size**2,
+            r.uniform(30, 70),
+            light_colour(r),
+            r.uniform(0, 0.6),
+            0.01 * size,
+        )
     elif kind == 2:
         b.point("point", tuple(at), 60 * size**2, light_colour(r), r.uniform(0.005, 0.05) * size)
     else:
@@ -203,9 +220,13 @@ def solid(r, size, smooth=5):
     if kind == 2:
         return b.torus("torus", 0.35 * size, 0.14 * size, 96, 32), 0.14 * size
     if kind == 3:
-        return b.lathe("cylinder", b.rounded([(0, 0), (0.4 * size, 0), (0.4 * size, size), (0, size)], 0.05 * size, 4), 64), 0
+        return b.lathe(
+            "cylinder", b.rounded([(0, 0), (0.4 * size, 0), (0.4 * size, size), (0, size)], 0.05 * size, 4), 64
+        ), 0
     if kind == 4:
-        return b.lathe("cone", b.rounded([(0, 0), (0.45 * size, 0), (0.02 * size, size), (0, size)], 0.03 * size, 3), 64), 0
+        return b.lathe(
+            "cone", b.rounded([(0, 0), (0.45 * size, 0), (0.02 * size, size), (0, size)], 0.03 * size, 3), 64
+        ), 0
     return turned(r, size), 0
 
 
@@ -253,7 +274,12 @@ def vessel(r, radius, height, material, at, liquid=None, wall=0.08, flare=0.0, w
     inside = [(max(x - thick, 0), z) for x, z in rim(radius, height, 1.5 * thick, flare, wave)]
     inside[0] = (0, 1.5 * thick)
     material["caustique"] = {"priority": 1}
-    add("vessel", b.lathe("vessel", b.rounded(outside, thick, 3) + b.rounded(inside, thick, 3)[::-1], sides), material, (*at, 0.0003))
+    add(
+        "vessel",
+        b.lathe("vessel", b.rounded(outside, thick, 3) + b.rounded(inside, thick, 3)[::-1], sides),
+        material,
+        (*at, 0.0003),
+    )
     if liquid is not None:
         level = height * r.uniform(0.35, 0.85)
         low = [(x + 0.15 * thick * (x > 0), z - 0.15 * thick) for x, z in inside if z < level]

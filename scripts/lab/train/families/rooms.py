@@ -4,8 +4,24 @@ import build as b
 import numpy as np
 
 from .props import (
-    add, clear, colour, daylight, glowing, inside, light_colour, look, matte, metal, panel, pick, room, shiny, solid,
-    still_life, surface, turned, vessel,
+    add,
+    clear,
+    colour,
+    glowing,
+    inside,
+    light_colour,
+    look,
+    matte,
+    metal,
+    panel,
+    pick,
+    room,
+    shiny,
+    solid,
+    still_life,
+    surface,
+    turned,
+    vessel,
 )
 
 
@@ -24,9 +40,18 @@ def furniture(r, width, depth):
     for k in range(int(r.integers(3, 7))):
         size = r.uniform((0.4, 0.3, 0.4), (1.2, 0.6, 1.8))
         side = r.integers(3)
-        at = [(r.uniform(-0.4, 0.4) * width, depth / 2 - size[1] / 2), (width / 2 - size[1] / 2, r.uniform(-0.3, 0.4) * depth),
-              (-width / 2 + size[1] / 2, r.uniform(0.2, 0.4) * depth)][side]
-        add("cabinet", b.box("cabinet", tuple(size), 0.015, 2, uv=0.8), surface(r), (*at, size[2] / 2), (0, 0, 0 if side == 0 else 90))
+        at = [
+            (r.uniform(-0.4, 0.4) * width, depth / 2 - size[1] / 2),
+            (width / 2 - size[1] / 2, r.uniform(-0.3, 0.4) * depth),
+            (-width / 2 + size[1] / 2, r.uniform(0.2, 0.4) * depth),
+        ][side]
+        add(
+            "cabinet",
+            b.box("cabinet", tuple(size), 0.015, 2, uv=0.8),
+            surface(r),
+            (*at, size[2] / 2),
+            (0, 0, 0 if side == 0 else 90),
+        )
     high, at = r.uniform(0.4, 0.75), (r.uniform(-0.2, 0.2) * width, r.uniform(-0.05, 0.2) * depth)
     add("table", b.box("table", (1.2, 0.7, 0.04), 0.01, 2, uv=0.6), pick(r, [matte, shiny])(r), (*at, high))
     for x in (-0.5, 0.5):
@@ -99,7 +124,11 @@ def corridor(r):
         if r.random() < 0.7:
             panel(r, (0, y + 0.5, height - 0.002), (0.3, 0.5), r.uniform(3, 12))
     panel(r, (0, 0.45 * depth, height - 0.002), (0.5, 0.5), 8)
-    b.camera((r.uniform(-0.2, 0.2), -0.47 * depth, r.uniform(0.8, 1.8)), (0, 0.4 * depth, r.uniform(0.6, 1.4)), r.uniform(20, 35))
+    b.camera(
+        (r.uniform(-0.2, 0.2), -0.47 * depth, r.uniform(0.8, 1.8)),
+        (0, 0.4 * depth, r.uniform(0.6, 1.4)),
+        r.uniform(20, 35),
+    )
 
 
 def bookshelf(r):
@@ -120,7 +149,12 @@ def bookshelf(r):
                 add("ornament", mesh, pick(r, [metal, shiny, clear])(r), (x + 0.11, depth / 2 - 0.2, z + 0.0152 + lift))
                 x += 0.25
                 continue
-            add("book", b.box("book", (thick, 0.2, tall), 0.003, 1), pick(r, covers), (x + thick / 2, depth / 2 - 0.2, z + 0.0152 + tall / 2))
+            add(
+                "book",
+                b.box("book", (thick, 0.2, tall), 0.003, 1),
+                pick(r, covers),
+                (x + thick / 2, depth / 2 - 0.2, z + 0.0152 + tall / 2),
+            )
             x += thick + 0.001
     add("table", b.box("table", (1.3, 0.8, 0.04), 0.01, 2, uv=0.6), shiny(r, "table"), (r.uniform(-0.4, 0.4), 0.3, 0.6))
     add("vase", turned(r, 0.3), pick(r, [metal, shiny])(r), (0, 0.3, 0.62))
@@ -135,17 +169,36 @@ def breakfast(r):
     width, depth, height = 3.4, 4.0, 2.5
     room(r, width, depth, height, window=(0.3, 1.4, r.uniform(1.2, 2.2), r.uniform(0.9, 1.4)))
     high = 0.7
-    add("table", b.lathe("table", [(0, high - 0.03), (0.6, high - 0.03), (0.6, high), (0, high)], 96), pick(r, [matte, shiny])(r), (0, 0.4, 0))
+    add(
+        "table",
+        b.lathe("table", [(0, high - 0.03), (0.6, high - 0.03), (0.6, high), (0, high)], 96),
+        pick(r, [matte, shiny])(r),
+        (0, 0.4, 0),
+    )
     china = b.principled("china", (0.83, 0.81, 0.77), 0.1)
-    plate = b.lathe("plate", b.rounded([(0, 0), (0.06, 0), (0.11, 0.015), (0.108, 0.018), (0.06, 0.005), (0, 0.005)], 0.02, 5), 64)
+    plate = b.lathe(
+        "plate", b.rounded([(0, 0), (0.06, 0), (0.11, 0.015), (0.108, 0.018), (0.06, 0.005), (0, 0.005)], 0.02, 5), 64
+    )
     for angle in r.uniform(0, 6.3) + np.arange(3) * 2.1:
         x, y = 0.38 * np.cos(angle), 0.4 + 0.38 * np.sin(angle)
         add("plate", plate, china, (x, y, high + 0.0003))
-        add("knife", b.box("knife", (0.012, 0.2, 0.003), 0.001, 1), metal(r, "steel", 0.15), (x + 0.14, y, high + 0.002), (0, 0, r.uniform(-20, 20)))
+        add(
+            "knife",
+            b.box("knife", (0.012, 0.2, 0.003), 0.001, 1),
+            metal(r, "steel", 0.15),
+            (x + 0.14, y, high + 0.002),
+            (0, 0, r.uniform(-20, 20)),
+        )
         x, y = 0.24 * np.cos(angle + 0.7), 0.4 + 0.24 * np.sin(angle + 0.7)
         liquid = b.glass("drink", 1.34, absorption=tuple(r.uniform(0, 60, 3)))
-        lifted(lambda: vessel(r, r.uniform(0.025, 0.04), r.uniform(0.08, 0.15), b.glass("glass", 1.52), (x, y), liquid), high)
-    lifted(lambda: vessel(r, 0.055, 0.22, b.glass("jug", 1.52), (0, 0.4), b.glass("water", 1.333), flare=-0.2, wave=0.15), high)
+        lifted(
+            lambda: vessel(r, r.uniform(0.025, 0.04), r.uniform(0.08, 0.15), b.glass("glass", 1.52), (x, y), liquid),
+            high,
+        )
+    lifted(
+        lambda: vessel(r, 0.055, 0.22, b.glass("jug", 1.52), (0, 0.4), b.glass("water", 1.333), flare=-0.2, wave=0.15),
+        high,
+    )
     b.sun("sun", (r.uniform(0.7, 1), r.uniform(-0.4, 0.3), r.uniform(-0.7, -0.3)), r.uniform(10, 40), (1, 0.9, 0.75))
     b.sky(tuple(np.array([0.6, 0.75, 1.0]) * r.uniform(0.5, 3)))
     look(r, (0, 0.4, high), 1.3, (15, 40), (-35, 60), (30, 50))

@@ -1,20 +1,40 @@
 """Water: what lies in it is lit and seen through its ripples."""
 
-import math
-
 import build as b
 import numpy as np
 
-from .props import add, clear, daylight, ground, lamp_or_sun, look, matte, metal, pick, ripples, room, shiny, solid, surface, water
+from .props import (
+    add,
+    clear,
+    daylight,
+    ground,
+    lamp_or_sun,
+    look,
+    matte,
+    pick,
+    ripples,
+    shiny,
+    solid,
+    surface,
+    water,
+)
 
 
 def basin(r, width, depth, deep, material, wall=0.2):
     """A basin with its rim at z = 0."""
     add("bottom", b.plane("bottom", width, depth, uv=r.uniform(0.3, 1) * width), material, (0, 0, -deep))
-    for name, size, at, turn in (("left", depth, (-width / 2, 0), 90), ("right", depth, (width / 2, 0), -90), ("far", width, (0, depth / 2), 0), ("near", width, (0, -depth / 2), 180)):
+    for name, size, at, turn in (
+        ("left", depth, (-width / 2, 0), 90),
+        ("right", depth, (width / 2, 0), -90),
+        ("far", width, (0, depth / 2), 0),
+        ("near", width, (0, -depth / 2), 180),
+    ):
         add(name, b.plane(name, size, deep, uv=0.5 * width), material, (*at, -deep / 2), (90, 0, turn))
     rim = pick(r, [matte, shiny])(r, "rim")
-    for size, at in (((wall, depth + 2 * wall, 0.04), (width / 2 + wall / 2, 0)), ((width, wall, 0.04), (0, depth / 2 + wall / 2))):
+    for size, at in (
+        ((wall, depth + 2 * wall, 0.04), (width / 2 + wall / 2, 0)),
+        ((width, wall, 0.04), (0, depth / 2 + wall / 2)),
+    ):
         for sign in (-1, 1):
             add("rim", b.box("rim", size, 0.008, 2, uv=0.6 * width), rim, (sign * at[0], sign * at[1], -0.02))
 
@@ -23,7 +43,13 @@ def sunken(r, count, extent, bottom, size):
     """Things on the bottom."""
     for _ in range(count):
         mesh, lift = solid(r, size * r.uniform(0.5, 1))
-        add("sunken", mesh, surface(r), (*r.uniform(-extent, extent, 2), bottom + lift + 0.001), (0, 0, r.uniform(0, 360)))
+        add(
+            "sunken",
+            mesh,
+            surface(r),
+            (*r.uniform(-extent, extent, 2), bottom + lift + 0.001),
+            (0, 0, r.uniform(0, 360)),
+        )
 
 
 def pool(r):
@@ -74,7 +100,13 @@ def aquarium(r):
     water(r, width - 0.004, depth - 0.012, 0.025, high * 0.85, 0.15)
     for _ in range(int(r.integers(3, 9))):
         mesh, lift = solid(r, r.uniform(0.04, 0.1))
-        add("stone", mesh, surface(r), (r.uniform(-0.4, 0.4) * width, r.uniform(-0.3, 0.3) * depth, 0.032 + lift), (0, 0, r.uniform(0, 360)))
+        add(
+            "stone",
+            mesh,
+            surface(r),
+            (r.uniform(-0.4, 0.4) * width, r.uniform(-0.3, 0.3) * depth, 0.032 + lift),
+            (0, 0, r.uniform(0, 360)),
+        )
     green = b.principled("plant", (0.1, 0.4, 0.1), 0.5)
     for _ in range(int(r.integers(3, 10))):
         x, y, lean = r.uniform(-0.4, 0.4) * width, r.uniform(-0.3, 0.3) * depth, r.normal(0, 0.03, 2)
@@ -102,7 +134,13 @@ def water_light(r):
     water(r, 5, 3, -0.0001, r.uniform(0.1, 0.25), r.uniform(0.3, 0.9), False)
     for _ in range(int(r.integers(1, 5))):
         mesh, lift = solid(r, r.uniform(0.3, 0.8))
-        add("thing", mesh, surface(r), (r.uniform(-1.5, 1.5), r.uniform(0.2, 1.2), lift + 0.001), (0, 0, r.uniform(0, 360)))
+        add(
+            "thing",
+            mesh,
+            surface(r),
+            (r.uniform(-1.5, 1.5), r.uniform(0.2, 1.2), lift + 0.001),
+            (0, 0, r.uniform(0, 360)),
+        )
     b.sun("sun", (r.uniform(-0.6, 0.6), 1, r.uniform(-0.8, -0.2)), r.uniform(3, 8), (1, 0.85, 0.65))
     b.sky((0.06, 0.09, 0.14))
     look(r, (0, 0.9, 0.6), 4.5, (8, 30), (-40, 40), (28, 45))
@@ -113,7 +151,19 @@ def waves(r):
     ground(r, 3)
     for k in range(int(r.integers(1, 4))):
         size, wave = r.uniform(0.2, 0.45), ripples(r, 0.5, r.uniform(0.002, 0.012))
-        mesh = b.sheet("plate", 100, 100, lambda u, v: ((u - 0.5) * size, (v - 0.5) * size, 0.02 + wave((u - 0.5) * size, (v - 0.5) * size)), bottom=0.0)
-        add("plate", mesh, clear(r, "plate", 0.3), (*r.uniform(-0.25, 0.25, 2), 0.05 + 0.09 * k), (r.uniform(-12, 12), r.uniform(-12, 12), r.uniform(0, 360)))
+        mesh = b.sheet(
+            "plate",
+            100,
+            100,
+            lambda u, v: ((u - 0.5) * size, (v - 0.5) * size, 0.02 + wave((u - 0.5) * size, (v - 0.5) * size)),
+            bottom=0.0,
+        )
+        add(
+            "plate",
+            mesh,
+            clear(r, "plate", 0.3),
+            (*r.uniform(-0.25, 0.25, 2), 0.05 + 0.09 * k),
+            (r.uniform(-12, 12), r.uniform(-12, 12), r.uniform(0, 360)),
+        )
     lamp_or_sun(r, 1.0)
     look(r, (0, 0, 0.05), 1.1, (20, 60))

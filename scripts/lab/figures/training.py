@@ -1,0 +1,86 @@
+"""Trains the networks of the combiner in turns, at the lowest priority, and prints their errors on held-out views. A
+repeated run continues where the last one stopped, also on another machine.
+
+It needs views of scripts/lab.sh training_data; those that are finished later join. The run `paper` is the paper's
+network with its loss, the others compare inputs and pairs of pictures with the compact network
+(scripts/lab/train/README.md).
+"""
+
+import json
+import os
+import subprocess
+import time
+from pathlib import Path
+
+from ..cache import installed
+from ..options import names, options
+from ..train import data
+from .training_data import FOLDER
+
+# Options of each run. All but `paper`, whose steps take forty times as long, have the same number of steps.
+STEPS = ["--steps", 16_000]
+RUNS = {
+    "compact": ["--pairs", "multi", "--version", 2, *STEPS],
+    "finished": ["--pairs", "finished", *STEPS],
+    "levels-only": ["--pairs", "multi", *STEPS],
+    "paper": ["--arch", "paper", "--methods", "sppm", "--squared", 0, "--rate", 1e-4, "--steps", 1_600],
+    **{f"dual{n}": ["--pairs", f"dual{n}", "--version", 2, *STEPS] for n in (2, 3, 4, 5)},
+    "deep-single": ["--pairs", "deep-single", "--methods", "sppm", *STEPS],
+    "deep-multi": ["--pairs", "deep-multi", "--methods", "sppm", *STEPS],
+}
+# Minutes of a run before it is the next one's turn.
+TURN = 20.0
+
+
+def add_arguments(parser):
+    parser.add_argument("--folder", type=Path, default=FOLDER, help=f"folder of data and runs [default: {FOLDER}]")
+    parser.add_argument("--hours", type=float, default=10.0, help="hours of this call [default: 10]")
+    parser.add_argument("--runs", type=names, default=list(RUNS), help=f"runs to train [default: {','.join(RUNS)}]")
+    parser.add_argument("--threads", type=int, default=1, help="threads [default: 1]")
+
+
+def last_line(run):
+    """The last line of a run's curves, or None."""
+    log = options.folder / "runs" / run / "log.jsonl"
+    return json.loads(log.read_text(encoding="utf-8").splitlines()[-1]) if log.exists() else None
+
+
+def steps(run):
+    """The number of steps of a whole run."""
+    words = RUNS[run]
+    return words[words.index("--steps") + 1]
+
+
+def trainable(run):
+    """Whether a run is not finished, and the data have what it needs."""
+    line = last_line(run)
+    if line and line["step"] >= steps(run):
+        return False
+    entries = [entry for entry in data.manifest(options.folder).values() if not entry["held_out"]]
+    wanted = "sppm-bdpt1.npz" if run.startswith("deep") else "sppm-seed1.npz"
+    return any(wanted in entry["files"] for entry in entries)
+
+
+def train(run, minutes):
+    """Trains a run for at most some minutes."""
+    words = ["--data", options.folder, "--out", options.folder / "runs" / run, "--threads", options.threads]
+    words += ["--minutes", f"{minutes:.1f}", *RUNS[run]]
+    subprocess.run(list(map(str, [installed(".venv-train"), "-m", "lab.train.train", *words])), check=True)
+
+
+def main():
+    os.nice(19)
+    if not installed(".venv-train"):
+        raise SystemExit("training needs .venv-train; run it by scripts/lab.sh")
+    unknown = [run for run in options.runs if run not in RUNS]
+    if unknown:
+        raise SystemExit(f"--runs {unknown[0]} is not one of {', '.join(RUNS)}")
+    end = time.monotonic() + 3600 * options.hours
+    while time.monotonic() < end:
+        runs = [run for run in options.runs if trainable(run)]
+        for run in runs:
+            train(run, max(min(TURN, (end - time.monotonic()) / 60), 0.1))
+        if not runs:
+            break
+    for run in options.runs:
+        print(f"{run:14}{json.dumps(last_line(run))}")
