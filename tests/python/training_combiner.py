@@ -3,6 +3,7 @@
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import onnx.reference
@@ -10,7 +11,11 @@ import torch
 
 import support  # noqa: F401 (adds scripts to the path)
 
-from lab.train import combination, export_network, fixture, model, normalise, train
+from lab.train import apply, combination, export_network, fixture, model, normalise, train
+
+# Arrays of a stack of 70 x 101 pixels that the input of version 1 needs.
+SHAPES = {"levels": (5, 70, 101, 3), "deviations": (5, 70, 101), "depth": (70, 101)}
+SHAPES |= {"albedo": (70, 101, 3), "normal": (70, 101, 3)}
 
 
 def inputs(dimensions, dtype, window=7, size=(9, 12), seed=1):
@@ -96,6 +101,20 @@ class Training(unittest.TestCase):
             with torch.no_grad():
                 wanted = net(torch.from_numpy(image)).numpy()
             self.assertLess(np.abs(got - wanted).max() / np.abs(wanted).max(), 1e-5)
+
+    def test_tiles_equal_the_whole_picture(self):
+        rng = np.random.default_rng(7)
+        stored = {key: rng.uniform(0.1, 1, (1, *shape)).astype(np.float32) for key, shape in SHAPES.items()}
+        stored |= {"iterations": np.array([8]), "halves": np.zeros((2, 70, 101, 3), np.float32)}
+        torch.manual_seed(8)
+        net = model.build("compact").eval()
+        whole = apply.combined(net, stored)
+        with mock.patch.object(apply, "TILE", 32):
+            tiles = apply.combined(net, stored)
+        self.assertEqual(whole.shape, (70, 101, 3))
+        self.assertLess(np.abs(tiles - whole).max(), 1e-5)
+        with mock.patch.object(apply, "TILE", 32), mock.patch.object(apply, "BORDER", 8):
+            self.assertGreater(np.abs(apply.combined(net, stored) - whole).max(), 1e-5)
 
     def test_the_input_does_not_depend_on_the_unit_of_light(self):
         stack = fixture.random_stack(np.random.default_rng(6))

@@ -21,12 +21,13 @@ from .training_data import FOLDER
 STEPS = ["--steps", 16_000]
 RUNS = {
     "compact": ["--pairs", "multi", "--version", 2, *STEPS],
-    "finished": ["--pairs", "finished", *STEPS],
+    "one-path": ["--pairs", "multi", "--version", 2, "--paths", 1, *STEPS],
+    "finished": ["--pairs", "finished", "--paths", 1, *STEPS],
     "levels-only": ["--pairs", "multi", *STEPS],
     "paper": ["--arch", "paper", "--methods", "sppm", "--squared", 0, "--rate", 1e-4, "--steps", 1_600],
     **{f"dual{n}": ["--pairs", f"dual{n}", "--version", 2, *STEPS] for n in (2, 3, 4, 5)},
-    "deep-single": ["--pairs", "deep-single", "--methods", "sppm", *STEPS],
-    "deep-multi": ["--pairs", "deep-multi", "--methods", "sppm", *STEPS],
+    "deep-single": ["--pairs", "deep-single", "--methods", "sppm", "--paths", 1, *STEPS],
+    "deep-multi": ["--pairs", "deep-multi", "--methods", "sppm", "--paths", 1, *STEPS],
 }
 # Minutes of a run before it is the next one's turn.
 TURN = 20.0

@@ -33,7 +33,8 @@ from ..record import ROOT
 
 SIDE = 128
 ITERATIONS = (8, 16, 32, 64, 128)
-SEEDS = (1, 2)
+# Camera paths per pixel of the noisy stacks, by seed: the paper has two; one takes 0.6 times as long.
+PATHS = {1: 2, 2: 1}
 LEVELS = 5
 # Additive parts, in the order in which the arrays hold them.
 PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
@@ -95,12 +96,7 @@ class Maker:
     def render(self, scene, out, **settings):
         """Renders with one thread; returns the channels of the EXR."""
         self.run(command("render", scene, "-o", out, program=self.binary, threads=1, progress="none", **settings))
-        channels = OpenEXR.File(str(out), separate_channels=True).channels()
-        return {name: channel.pixels.astype(np.float32) for name, channel in channels.items()}
-
-    def header(self, out):
-        """The JSON object in an EXR's header."""
-        return json.loads(self.run(command("info", out, program=self.binary, json=True)))
+        return channels_of(out)
 
     def make(self, view):
         """Renders what is missing of a view, and adds it to the manifest."""
@@ -115,7 +111,7 @@ class Maker:
             if not (view.folder / f"{method}-target.npz").exists():
                 window["target"] = self.target(view, note, method, scene, work)
                 self.store(view, note)
-            for seed in SEEDS:
+            for seed in PATHS:
                 if not (view.folder / f"{method}-seed{seed}.npz").exists():
                     self.stacks(view, note, method, seed, scene, work)
                     self.store(view, note)
@@ -123,7 +119,7 @@ class Maker:
 
     def add_independent(self, view):
         """Renders the pictures of bdpt that are missing of a finished view."""
-        wanted = [(seed, view.folder / f"sppm-bdpt{seed}.npz") for seed in SEEDS]
+        wanted = [(seed, view.folder / f"sppm-bdpt{seed}.npz") for seed in PATHS]
         if all(file.exists() for _, file in wanted):
             return
         work, note = view.folder / "work", load(view.folder / "view.json")
@@ -185,15 +181,11 @@ class Maker:
             "attempt": attempt,
             "scene_sha256": sha256(scene),
             "program": load(self.folder / "program.json"),
-            "exposure": float(normalise.exposure(levels)),
-            "depth": normalise.median_depth(picture["depth.Z"]),
-            "yfov": vertical_angle(scene),
-            "parts": [part for part in PARTS if f"{part}.R" in picture],
             "target_method": target_method(simulated),
             "windows": {method: window(view, method, levels) for method in WIDTHS},
             "core_seconds": 0.0,
         }
-        note["radii"] = [name for name in ("Radius", "CausticRadius") if f"{name}5.X" in picture]
+        note |= scales(picture, scene)
         self.store(view, note)
         return note
 
@@ -208,11 +200,11 @@ class Maker:
             )
             settings["seed"] = 7000 + half
             self.render(scene, out, **settings, iterations=8)
-            last = self.header(out)["history"][-1]
+            last = header_of(out)["history"][-1]
             count = min(4 * math.ceil(2 * TARGET_SECONDS / max(last["cpu_seconds"], 1e-3)), 8192)
             picture = self.render(scene, out, **settings, resume=saved, iterations=max(count, 16))
             halves.append(rgb(picture, "") * np.float32(note["exposure"]))
-            counts.append(self.header(out)["iterations"] if "iterations" in self.header(out) else count)
+            counts.append(header_of(out)["history"][-1]["iterations"])
         write(view.folder / f"{method}-target.npz", {"halves": np.stack(halves)})
         return words | {"iterations": counts}
 
@@ -220,9 +212,9 @@ class Maker:
         """Renders all snapshots of a window with one seed."""
         layers = ["beauty", "Level", "Variance", "Quarter", "albedo", "normal", "depth", *note["parts"]]
         radii = note["radii"] if method == "sppm" else ["Radius"]
-        settings = place(note, method) | {"method": method, "levels": LEVELS, "eye_paths": 2, "seed": seed}
-        settings["layers"] = ",".join([*layers, *radii])
-        arrays = self.snapshots(scene, work, settings, lambda picture: stack(picture, note, method, radii))
+        settings = place(note, method) | {"method": method, "levels": LEVELS, "eye_paths": PATHS[seed], "seed": seed}
+        settings["layers"], height = ",".join([*layers, *radii]), settings["height"]
+        arrays = self.snapshots(scene, work, settings, lambda picture: stack(picture, note, height, radii))
         write(view.folder / f"{method}-seed{seed}.npz", arrays)
 
     def independent(self, note, seed, scene, work):
@@ -234,12 +226,7 @@ class Maker:
             "layers": "beauty,Quarter",
         }
 
-        def arrays(picture):
-            quarters = np.stack([rgb(picture, f"Quarter{k + 1}") for k in range(4)]) * note["exposure"]
-            deviation = np.sqrt(quarters.var(0, ddof=1).mean(-1) / 4)
-            bright = rgb(picture, "") * note["exposure"]
-            return {"picture": small(bright), "quarters": small(quarters), "deviation": small(deviation)}
-
+        arrays = lambda picture: independent_arrays(picture, note["exposure"])
         return self.snapshots(scene, work, settings, arrays)
 
     def snapshots(self, scene, work, settings, arrays):
@@ -264,6 +251,29 @@ def write(path, arrays):
     draft = path.with_name("part-" + path.name)
     np.savez_compressed(draft, **arrays)
     draft.rename(path)
+
+
+def scales(picture, scene):
+    """The scales of a picture, the vertical angle of its camera, and the layers that it has of those that vary."""
+    levels = np.stack([rgb(picture, f"Level{k + 1}") for k in range(LEVELS)])
+    return {
+        "exposure": float(normalise.exposure(levels)),
+        "depth": normalise.median_depth(picture["depth.Z"]),
+        "yfov": vertical_angle(scene),
+        "parts": [part for part in PARTS if f"{part}.R" in picture],
+        "radii": [name for name in ("Radius", "CausticRadius") if f"{name}{LEVELS}.X" in picture],
+    }
+
+
+def channels_of(path):
+    """The channels of an EXR by name."""
+    channels = OpenEXR.File(str(path), separate_channels=True).channels()
+    return {name: channel.pixels.astype(np.float32) for name, channel in channels.items()}
+
+
+def header_of(path):
+    """The JSON object that the program writes into an EXR's header."""
+    return json.loads(OpenEXR.File(str(path), header_only=True).header()["caustique"])
 
 
 def rgb(picture, layer):
@@ -322,15 +332,15 @@ def place(note, method):
     return {"width": known["width"], "height": known["height"], "crop": f"{x},{y},{SIDE},{SIDE}"}
 
 
-def stack(picture, note, method, radii):
-    """The arrays of a snapshot."""
+def stack(picture, note, height, radii):
+    """The arrays of a snapshot of a picture with this height, of which `picture` has the layers of a window."""
     scale = note["exposure"]
     bright = lambda layer: small(rgb(picture, layer) * scale)
     # The size of a pixel at the hit, in scene units; the largest bandwidths in pixels.
-    pixel = picture["depth.Z"] * 2 * math.tan(note["yfov"] / 2) / note["windows"][method]["height"]
+    pixel = picture["depth.Z"] * 2 * math.tan(note["yfov"] / 2) / height
     radius = [picture[f"{name}{LEVELS}.X"] / np.maximum(pixel, 1e-12) for name in radii]
     variances = [np.maximum(rgb(picture, f"Variance{k + 1}"), 0).mean(-1) for k in range(LEVELS)]
-    black = np.zeros((SIDE, SIDE, 3), np.float16)
+    black = np.zeros((*pixel.shape, 3), np.float16)
     depth = picture["depth.Z"] / note["depth"]
     return {
         "levels": np.stack([bright(f"Level{k + 1}") for k in range(LEVELS)]),
@@ -343,6 +353,13 @@ def stack(picture, note, method, radii):
         "normal": small(np.stack([picture[f"normal.{c}"] for c in "XYZ"], -1)),
         "depth": small(np.where(picture["depth.Z"] < normalise.BACKGROUND_DEPTH, depth, LARGEST)),
     }
+
+
+def independent_arrays(picture, exposure):
+    """The arrays of a snapshot by bdpt."""
+    quarters = np.stack([rgb(picture, f"Quarter{k + 1}") for k in range(4)]) * exposure
+    deviation = np.sqrt(quarters.var(0, ddof=1).mean(-1) / 4)
+    return {"picture": small(rgb(picture, "") * exposure), "quarters": small(quarters), "deviation": small(deviation)}
 
 
 def small(values):

@@ -48,15 +48,15 @@ def errors(net, arrays, k, device="cpu"):
     return [trimmed_mean(pixel_errors(picture, halves), order) for picture in (combined, usual, finished)]
 
 
-def validate(net, folder, methods, device="cpu", most=60):
+def validate(net, folder, methods, paths, device="cpu", most=60):
     """Geometric means over at most `most` held-out snapshots: the error of the combination relative to Level4 and to
     the finished picture, by method; and the number of snapshots."""
     net.eval()
     found = {}
     for method in methods:
-        items = [item for item in views.files(folder, True, [method]) if item[2] == 1]
+        items = views.files(folder, True, [method], paths)
         if net.pairs.startswith("deep"):
-            items = [item for item in items if (item[0] / f"{method}-bdpt1.npz").exists()]
+            items = [item for item in items if (item[0] / f"{method}-bdpt{item[2]}.npz").exists()]
         items = items[:: max(1, len(items) * len(SNAPSHOTS) // most)]
         rows = []
         for item in items:
@@ -76,12 +76,13 @@ def main():
     parser.add_argument("--checkpoint", required=True)
     parser.add_argument("--data", required=True, type=Path)
     parser.add_argument("--methods", nargs="+", default=["sppm", "vcm"])
+    parser.add_argument("--paths", nargs="+", type=int, default=[2])
     args = parser.parse_args()
     net, _ = export_network.load(args.checkpoint)
     net.eval()
     print(f"{'view':28}{'method':8}{'iterations':>10}{'combined':>12}{'Level4':>12}{'finished':>12}")
     ratios = []
-    for item in views.files(args.data, True, args.methods):
+    for item in views.files(args.data, True, args.methods, args.paths):
         arrays = views.read(item)
         for k in SNAPSHOTS:
             row = errors(net, arrays, k)

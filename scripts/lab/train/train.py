@@ -23,7 +23,7 @@ from .pairs import PAIRS
 DECAY = 0.999  # of the moving average of the weights, which is validated and exported
 SAVE_SECONDS, VALIDATE_SECONDS = 120, 1200
 # Options that belong to a run and are stored with it.
-STORED = ("arch", "pairs", "version", "window", "squared", "rate", "batch", "side", "methods", "steps", "seed")
+STORED = ("arch", "pairs", "version", "window", "squared", "rate", "batch", "side", "methods", "paths", "steps", "seed")
 
 
 def relative_loss(image, target):
@@ -63,6 +63,9 @@ def arguments():
     parser.add_argument("--version", type=int, help="version of the input (normalise.py); default: the least")
     parser.add_argument("--window", type=int, help="pixels; default: 19 (paper) or 15")
     parser.add_argument("--methods", nargs="+", default=["sppm", "vcm"], help="methods of the noisy stacks")
+    parser.add_argument(
+        "--paths", nargs="+", type=int, default=[2], help="camera paths of the noisy stacks: 1, 2 or both"
+    )
     parser.add_argument("--minutes", type=float, default=60, help="minutes of this call")
     parser.add_argument("--steps", type=int, default=40_000, help="steps of the learning-rate schedule")
     parser.add_argument("--batch", type=int, default=8)
@@ -127,7 +130,7 @@ class Run:
         """Validates, and appends a line to the curves."""
         line = {"step": self.step, "seconds": round(self.seconds), "loss": round(float(np.mean(self.losses or [0])), 5)}
         self.losses.clear()
-        line |= validate(self.average.module, self.args.data, self.args.methods, self.device)
+        line |= validate(self.average.module, self.args.data, self.args.methods, self.args.paths, self.device)
         print(json.dumps(line), flush=True)
         with open(self.args.out / "log.jsonl", "a", encoding="utf-8") as log:
             log.write(json.dumps(line) + "\n")
@@ -159,7 +162,7 @@ def main():
     args.out.mkdir(parents=True, exist_ok=True)
     if args.threads:
         torch.set_num_threads(args.threads)
-    run, pool = Run(args), views.Pool(args.data, args.methods, args.pairs)
+    run, pool = Run(args), views.Pool(args.data, args.methods, args.paths, args.pairs)
     before = run.seconds
     start = saved = time.monotonic()
     reported = start - VALIDATE_SECONDS + 120

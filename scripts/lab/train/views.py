@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from . import normalise
-from .data import manifest
+from .data import PATHS, manifest
 from .pairs import PAIRS
 
 # Arrays without a last axis of colour or direction; others have one.
@@ -16,8 +16,9 @@ DIMENSIONLESS = ("radius", "depth", "albedo", "normal", "iterations")
 EXPOSURE_SPREAD = 0.35
 
 
-def files(folder, held_out, methods=("sppm", "vcm")):
-    """Stems (folder of a view, method, seed) of the finished noisy stacks, of held-out views or of all others."""
+def files(folder, held_out, methods=("sppm", "vcm"), paths=(1, 2)):
+    """Stems (folder of a view, method, seed) of the finished noisy stacks with some numbers of camera paths, of
+    held-out views or of all others."""
     views = manifest(folder).values()
     found = [(view["view"], file) for view in views if view["held_out"] == held_out for file in view["files"]]
     parts = [
@@ -25,7 +26,8 @@ def files(folder, held_out, methods=("sppm", "vcm")):
         for view, file in found
         if "-seed" in file
     ]
-    return [(path, method, int(seed)) for path, method, seed in parts if method in methods]
+    found = [(path, method, int(seed)) for path, method, seed in parts if method in methods]
+    return [item for item in found if PATHS[item[2]] in paths]
 
 
 def read(item):
@@ -88,13 +90,13 @@ class Pool:
     """Some stacks in memory, of which each batch replaces a few; a part of the data that is finished later joins
     then."""
 
-    def __init__(self, folder, methods, pairs, size=48):
-        self.folder, self.methods, self.pairs, self.size = folder, methods, pairs, size
+    def __init__(self, folder, methods, paths, pairs, size=48):
+        self.folder, self.methods, self.paths, self.pairs, self.size = folder, methods, paths, pairs, size
         self.loaded = []
 
     def batch(self, rng, count, side, version):
         """Arrays of `count` random samples."""
-        known = files(self.folder, False, self.methods)
+        known = files(self.folder, False, self.methods, self.paths)
         if self.pairs.startswith("deep"):
             known = [item for item in known if (item[0] / f"{item[1]}-bdpt{item[2]}.npz").exists()]
         if not known:

@@ -1,0 +1,75 @@
+"""Combine the levels of rendered pictures with a checkpoint's network.
+
+  python -m lab.train.apply --checkpoint RUN/last.pt --scene SCENE.glb PICTURE.exr -o OUT.exr [--independent BDPT.exr]
+
+The picture has five levels, two camera paths, and the layers that data.py asks for. The deep combiner also needs a
+picture by bdpt with quarters.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import torch
+
+from . import combination, data, export_network, views
+
+# Side in pixels of tiles, and the border around them that their pixels depend on.
+TILE, BORDER = 256, 48
+
+
+def arrays_of(path, scene, independent=None):
+    """The arrays of a rendered picture, as data.py stores snapshots, and its exposure."""
+    picture = data.channels_of(path)
+    note = data.scales(picture, scene)
+    height = picture["depth.Z"].shape[0]
+    arrays = data.stack(picture, note, height, note["radii"])
+    if independent:
+        other = data.channels_of(independent)
+        arrays |= {f"bdpt_{key}": value for key, value in data.independent_arrays(other, note["exposure"]).items()}
+    arrays = {key: value[None] for key, value in arrays.items()}
+    iterations = data.header_of(path)["history"][-1]["iterations"]
+    blank = np.zeros((2, *arrays["depth"].shape[1:], 3), np.float32)
+    return arrays | {"iterations": np.array([iterations]), "halves": blank}, note["exposure"]
+
+
+@torch.no_grad()
+def combined(net, arrays):
+    """The combination of whole pictures, in tiles."""
+    image, y, z, _ = (
+        torch.from_numpy(x) for x in views.sample(views.snapshot(arrays, 0, net.pairs), net.pairs, net.version)
+    )
+    h, w = image.shape[-2:]
+    # The network reads zeros beyond the picture, but the windows of the equation end with it.
+    image = torch.nn.functional.pad(image, [0, -w % net.stride, 0, -h % net.stride])
+    out = torch.zeros(3, h, w)
+    for top in range(0, h, TILE):
+        for left in range(0, w, TILE):
+            above, before = max(top - BORDER, 0), max(left - BORDER, 0)
+            part = (None, ..., slice(above, top + TILE + BORDER), slice(before, left + TILE + BORDER))
+            y_part, z_part = y[part], z[part]
+            weights = net(image[part])[..., : y_part.shape[-2], : y_part.shape[-1]]
+            tile = combination.combine(weights, y_part, z_part, net.kind, net.window, net.features)[0]
+            down, right = min(top + TILE, h), min(left + TILE, w)
+            out[:, top:down, left:right] = tile[:, top - above : down - above, left - before : right - before]
+    return out.permute(1, 2, 0).numpy()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("picture", type=Path)
+    parser.add_argument("--checkpoint", required=True)
+    parser.add_argument("--scene", required=True, type=Path)
+    parser.add_argument("--independent", type=Path)
+    parser.add_argument("-o", "--output", required=True, type=Path)
+    args = parser.parse_args()
+    net, _ = export_network.load(args.checkpoint)
+    arrays, exposure = arrays_of(args.picture, args.scene, args.independent)
+    picture = combined(net.eval(), arrays) / exposure
+    channels = {c: np.ascontiguousarray(picture[..., k]) for k, c in enumerate("RGB")}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(args.output))
+
+
+if __name__ == "__main__":
+    main()
