@@ -28,9 +28,9 @@ def inputs(dimensions, dtype, window=7, size=(9, 12), seed=1):
     return [phi.requires_grad_(), weight.requires_grad_(), (0.2 * falloff).requires_grad_()], difference, window
 
 
-def results(sums, given, difference, window):
+def results(sums, given, difference, *window):
     """The sums, and the gradients of a nonlinear function of them."""
-    total, colour = sums(*given, difference, window)
+    total, colour = sums(*given, difference, *window)
     gradients = torch.autograd.grad(total.square().mean() + colour.sin().sum(), given)
     return [total, colour, *gradients]
 
@@ -45,10 +45,12 @@ class Equation(unittest.TestCase):
             for dimensions in range(1, 9):
                 given, difference, window = inputs(dimensions, dtype)
                 pair = (combination.AffinitySums.apply, combination.reference_affinity)
-                self.assert_equal(*(results(sums, given, difference, window) for sums in pair), tolerance)
+                for more in ((window,), (5, 2), (3, 7)):
+                    self.assert_equal(*(results(sums, given, difference, *more) for sums in pair), tolerance)
             weights = torch.rand(2, 3, 25, 9, 12, dtype=dtype, requires_grad=True)
             pair = (combination.KernelSums.apply, combination.reference_kernel)
-            self.assert_equal(*(results(sums, [weights], difference, 5) for sums in pair), tolerance)
+            for dilation in (1, 3):
+                self.assert_equal(*(results(sums, [weights], difference, 5, dilation) for sums in pair), tolerance)
 
     def test_gradients_equal_finite_differences(self):
         given, difference, window = inputs(2, torch.float64, 3, (4, 5))
@@ -69,12 +71,13 @@ class Equation(unittest.TestCase):
         torch.manual_seed(2)
         picture = torch.rand(1, 1, 3, 10, 11).expand(-1, 4, -1, -1, -1)
         y, z = picture + torch.randn(1, 4, 3, 10, 11), picture + torch.randn(1, 4, 3, 10, 11)
-        for kind, channels in (("features", 4 * 7), ("weights", 4 * 25)):
-            output = torch.randn(1, channels, 10, 11)
-            output = output.exp() if kind == "weights" else output
-            same = combination.combine(output, picture, picture, kind, 5, 4)
+        wide = combination.Form("features", 5, 4, (1, 3), (0, 2))
+        for form in (combination.Form("features", 5, 4), wide, combination.Form("weights", 5)):
+            output = torch.randn(1, form.channels(4), 10, 11)
+            output = output.exp() if form.kind == "weights" else output
+            same = combination.combine(output, picture, picture, form)
             self.assertLess((same - picture[:, 0]).abs().max().item(), 1e-6)
-            one, brighter = (combination.combine(output, k * y, k * z, kind, 5, 4) for k in (1, 1024))
+            one, brighter = (combination.combine(output, k * y, k * z, form) for k in (1, 1024))
             self.assertTrue(torch.equal(1024 * one, brighter))
 
 
@@ -89,9 +92,9 @@ class Training(unittest.TestCase):
 
     def test_networks_have_the_planes_of_their_input_and_equal_their_onnx_files(self):
         stack = fixture.random_stack(np.random.default_rng(4))
-        for arch, pairs in (("compact", "multi"), ("paper", "dual3")):
+        for arch, pairs, wide in (("compact", "multi", False), ("compact", "dual4", True), ("paper", "dual3", False)):
             torch.manual_seed(5)
-            net = model.build(arch, pairs, window=5).eval()
+            net = model.build(arch, pairs, window=5, wide=wide).eval()
             image = normalise.tensor(stack, version=net.version)[None, :, :16, :20]
             self.assertEqual(image.shape[1], normalise.channels(5, net.version))
             with tempfile.TemporaryDirectory() as folder:
@@ -107,7 +110,7 @@ class Training(unittest.TestCase):
         stored = {key: rng.uniform(0.1, 1, (1, *shape)).astype(np.float32) for key, shape in SHAPES.items()}
         stored |= {"iterations": np.array([8]), "halves": np.zeros((2, 70, 101, 3), np.float32)}
         torch.manual_seed(8)
-        net = model.build("compact").eval()
+        net = model.build("compact", wide=True).eval()
         whole = apply.combined(net, stored)
         with mock.patch.object(apply, "TILE", 32):
             tiles = apply.combined(net, stored)

@@ -19,10 +19,12 @@ from .training_data import FOLDER
 
 # Options of each run. All but `paper`, whose steps take forty times as long, have the same number of steps.
 STEPS = ["--steps", 16_000]
+WIDE = ["--wide", "--side", 96, *STEPS]
 RUNS = {
     "compact": ["--pairs", "multi", "--version", 2, *STEPS],
-    "one-path": ["--pairs", "multi", "--version", 2, "--paths", 1, *STEPS],
-    "finished": ["--pairs", "finished", "--paths", 1, *STEPS],
+    "wide": ["--pairs", "multi", "--version", 2, *WIDE],
+    "wide-one-path": ["--pairs", "multi", "--version", 2, "--paths", 1, *WIDE],
+    "finished": ["--pairs", "finished", "--paths", 1, *WIDE],
     "levels-only": ["--pairs", "multi", *STEPS],
     "paper": ["--arch", "paper", "--methods", "sppm", "--squared", 0, "--rate", 1e-4, "--steps", 1_600],
     **{f"dual{n}": ["--pairs", f"dual{n}", "--version", 2, *STEPS] for n in (2, 3, 4, 5)},

@@ -16,7 +16,7 @@ import torch
 from . import combination, data, export_network, views
 
 # Side in pixels of tiles, and the border around them that their pixels depend on.
-TILE, BORDER = 256, 48
+TILE, BORDER = 256, 64
 
 
 def arrays_of(path, scene, independent=None):
@@ -50,7 +50,7 @@ def combined(net, arrays):
             part = (None, ..., slice(above, top + TILE + BORDER), slice(before, left + TILE + BORDER))
             y_part, z_part = y[part], z[part]
             weights = net(image[part])[..., : y_part.shape[-2], : y_part.shape[-1]]
-            tile = combination.combine(weights, y_part, z_part, net.kind, net.window, net.features)[0]
+            tile = combination.combine(weights, y_part, z_part, net.form)[0]
             down, right = min(top + TILE, h), min(left + TILE, w)
             out[:, top:down, left:right] = tile[:, top - above : down - above, left - before : right - before]
     return out.permute(1, 2, 0).numpy()

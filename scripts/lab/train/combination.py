@@ -12,6 +12,7 @@ import hashlib
 import os
 import subprocess
 from pathlib import Path
+from typing import NamedTuple
 
 import torch
 from torch.nn.functional import pad
@@ -29,20 +30,54 @@ MAX_LOG_WEIGHT = 12.0
 LOG_FALLOFF = (-20.0, 0.0)
 
 
-def combine(output, y, z, kind, window, features=0):
+class Form(NamedTuple):
+    """How a network's output defines weights.
+
+    `kind` is `features` (of `features` dimensions) or `weights`. The window has window^2 pixels, in steps of each of the
+    `dilations`, for which each pair has weights of its own. `identities` lists pairs whose z_c has a weight alone, as if
+    y^j were z^j: then neighbours add no noise.
+    """
+
+    kind: str
+    window: int
+    features: int = 0
+    dilations: tuple = (1,)
+    identities: tuple = ()
+
+    def channels(self, pairs):
+        """The number of channels of the network's output."""
+        each = self.features + 3 if self.kind == "features" else self.window**2
+        return len(self.dilations) * pairs * each + len(self.identities)
+
+
+def combine(output, y, z, form):
     """`output` of the network [b, c, h, w], pictures y and z [b, pairs, 3, h, w] -> [b, 3, h, w]."""
-    difference = y - z
-    slow = output.is_cuda
-    if kind == "features":
-        phi, source, falloff, centre = split_features(output, y.shape[1], features)
-        add = reference_affinity if slow else AffinitySums.apply
-        total, sums = add(phi, source, falloff, difference, window)
-        total, sums = total * centre, sums * centre.unsqueeze(2)
-    else:
-        weights = output.unflatten(1, (y.shape[1], window * window))
-        total, sums = (reference_kernel if slow else KernelSums.apply)(weights, difference, window)
-    # The sums contain the weighted y_i - z_i; z_c is added with the total weight of its pair.
-    return (sums + z * total.unsqueeze(2)).sum(1) / total.sum(1, keepdim=True)
+    weights, value = pair_sums(output, y, z, form)
+    return value.sum(1) / weights.sum(1, keepdim=True)
+
+
+def pair_sums(output, y, z, form):
+    """Sums over windows of the weights and of the weighted terms y_i + z_c - z_i, by pair, then for the identities."""
+    difference, pairs = y - z, y.shape[1]
+    identities = output[:, output.shape[1] - len(form.identities) :]
+    groups = output[:, : output.shape[1] - len(form.identities)].chunk(len(form.dilations), 1)
+    weights, values = [], []
+    for group, dilation in zip(groups, form.dilations):
+        if form.kind == "features":
+            phi, source, falloff, centre = split_features(group, pairs, form.features)
+            add = reference_affinity if group.is_cuda else AffinitySums.apply
+            total, sums = add(phi, source, falloff, difference, form.window, dilation)
+            total, sums = total * centre, sums * centre.unsqueeze(2)
+        else:
+            add = reference_kernel if group.is_cuda else KernelSums.apply
+            total, sums = add(group.unflatten(1, (pairs, form.window**2)), difference, form.window, dilation)
+        weights.append(total)
+        # The sums contain the weighted y_i - z_i; z_c is added with the total weight of its pair.
+        values.append(sums + z * total.unsqueeze(2))
+    if form.identities:
+        weights.append(identities.clamp(-MAX_LOG_WEIGHT, MAX_LOG_WEIGHT).exp())
+        values.append(weights[-1].unsqueeze(2) * z[:, list(form.identities)])
+    return torch.cat(weights, 1), torch.cat(values, 1)
 
 
 def split_features(output, pairs, features):
@@ -54,31 +89,31 @@ def split_features(output, pairs, features):
     return phi.unflatten(1, (pairs, features)), source, falloff.clamp(*LOG_FALLOFF).exp(), centre
 
 
-def reference_affinity(phi, weight, falloff, difference, window):
+def reference_affinity(phi, weight, falloff, difference, window, dilation=1):
     """Sums over the window of w_i and of w_i d_i, w_i = weight_i exp(-falloff_c |c - i|^2 - |phi_c - phi_i|^2).
 
     Shapes: phi [b, j, f, h, w]; weight, falloff [b, j, h, w]; difference d [b, j, 3, h, w].
     """
-    r, total, sums = window // 2, 0, 0
+    r, reach, total, sums = window // 2, window // 2 * dilation, 0, 0
     # Sources outside the image have no weight, so windows are clipped.
-    phi_p, weight_p, d_p = (pad(x, [r] * 4) for x in (phi, weight, difference))
+    phi_p, weight_p, d_p = (pad(x, [reach] * 4) for x in (phi, weight, difference))
     for dy in range(window):
         for dx in range(window):
             length = float((dx - r) ** 2 + (dy - r) ** 2)
-            distance = (phi - shifted(phi_p, dy, dx, r)).square().sum(2) + falloff * length
-            w = shifted(weight_p, dy, dx, r) * (-distance.clamp(max=MAX_DISTANCE)).exp()
-            total, sums = total + w, sums + w.unsqueeze(2) * shifted(d_p, dy, dx, r)
+            distance = (phi - shifted(phi_p, dy * dilation, dx * dilation, reach)).square().sum(2) + falloff * length
+            w = shifted(weight_p, dy * dilation, dx * dilation, reach) * (-distance.clamp(max=MAX_DISTANCE)).exp()
+            total, sums = total + w, sums + w.unsqueeze(2) * shifted(d_p, dy * dilation, dx * dilation, reach)
     return total, sums
 
 
-def reference_kernel(weights, difference, window):
+def reference_kernel(weights, difference, window, dilation=1):
     """Sums over the window of w_i and of w_i d_i with explicit weights [b, j, window^2, h, w]."""
-    r, total, sums = window // 2, 0, 0
-    inside, d_p = pad(torch.ones_like(difference[:, :, 0]), [r] * 4), pad(difference, [r] * 4)
+    reach, total, sums = window // 2 * dilation, 0, 0
+    inside, d_p = pad(torch.ones_like(difference[:, :, 0]), [reach] * 4), pad(difference, [reach] * 4)
     for dy in range(window):
         for dx in range(window):
-            w = weights[:, :, dy * window + dx] * shifted(inside, dy, dx, r)
-            total, sums = total + w, sums + w.unsqueeze(2) * shifted(d_p, dy, dx, r)
+            w = weights[:, :, dy * window + dx] * shifted(inside, dy * dilation, dx * dilation, reach)
+            total, sums = total + w, sums + w.unsqueeze(2) * shifted(d_p, dy * dilation, dx * dilation, reach)
     return total, sums
 
 
@@ -91,8 +126,9 @@ def shifted(x, dy, dx, r):
 @functools.cache
 def library():
     """equation6.cpp as a library, compiled into the cache at the first use by this processor."""
-    cpu = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0].encode()
-    key = hashlib.sha256(SOURCE.read_bytes() + " ".join(COMPILE).encode() + cpu).hexdigest()[:16]
+    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    cpu = "".join(sorted({line for line in lines if line.startswith(("model name", "flags"))}))
+    key = hashlib.sha256(SOURCE.read_bytes() + f"{COMPILE}{cpu}".encode()).hexdigest()[:16]
     path = HOME / "caustique" / f"equation6-{key}.so"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -105,7 +141,7 @@ def library():
 def call(name, shape, *tensors):
     """Calls a function of the library for contiguous tensors of one type."""
     suffix = {torch.float32: "f32", torch.float64: "f64"}[tensors[0].dtype]
-    sizes = (ctypes.c_long * 6)(*shape, torch.get_num_threads())
+    sizes = (ctypes.c_long * 7)(*shape, torch.get_num_threads())
     getattr(library(), f"{name}_{suffix}")(sizes, *(ctypes.c_void_p(x.data_ptr()) for x in tensors))
 
 
@@ -113,10 +149,10 @@ class AffinitySums(torch.autograd.Function):
     """`reference_affinity`, compiled; the difference is not differentiated."""
 
     @staticmethod
-    def forward(ctx, phi, weight, falloff, difference, window):
+    def forward(ctx, phi, weight, falloff, difference, window, dilation=1):
         given = [x.contiguous() for x in (phi, weight, falloff, difference)]
         b, j, f, h, w = phi.shape
-        ctx.shape = (b * j, f, h, w, window)
+        ctx.shape = (b * j, f, h, w, window, dilation)
         ctx.save_for_backward(*given)
         total, sums = torch.zeros_like(given[1]), torch.zeros_like(given[3])
         call("affinity", ctx.shape, *given, total, sums)
@@ -127,17 +163,17 @@ class AffinitySums(torch.autograd.Function):
         given = ctx.saved_tensors
         grads = [torch.zeros_like(x) for x in given[:3]]
         call("affinity_gradient", ctx.shape, *given, total_grad.contiguous(), sums_grad.contiguous(), *grads)
-        return *grads, None, None
+        return *grads, None, None, None
 
 
 class KernelSums(torch.autograd.Function):
     """`reference_kernel`, compiled; the difference is not differentiated."""
 
     @staticmethod
-    def forward(ctx, weights, difference, window):
+    def forward(ctx, weights, difference, window, dilation=1):
         weights, difference = weights.contiguous(), difference.contiguous()
         b, j, _, h, w = weights.shape
-        ctx.shape, ctx.weights = (b * j, 0, h, w, window), weights.shape
+        ctx.shape, ctx.weights = (b * j, 0, h, w, window, dilation), weights.shape
         ctx.save_for_backward(difference)
         total, sums = torch.zeros_like(difference[:, :, 0]), torch.zeros_like(difference)
         call("kernel", ctx.shape, weights, difference, total, sums)
@@ -148,4 +184,4 @@ class KernelSums(torch.autograd.Function):
         (difference,) = ctx.saved_tensors
         grad = difference.new_zeros(ctx.weights)
         call("kernel_gradient", ctx.shape, difference, total_grad.contiguous(), sums_grad.contiguous(), grad)
-        return grad, None, None
+        return grad, None, None, None

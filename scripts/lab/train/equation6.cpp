@@ -14,7 +14,7 @@ namespace {
 constexpr double MAX_DISTANCE = 60.0;
 
 struct Shape {
-    long planes, height, width, window;
+    long planes, height, width, window, dilation;
     long area() const { return height * width; }
 };
 
@@ -32,15 +32,18 @@ inline float exp_minus(float x) {
 }
 inline double exp_minus(double x) { return std::exp(-x); }
 
-// Calls f(y, i_y, dy, dx, from, to) for the rows and offsets of all windows of a plane: the centre (x, y) has the
-// neighbour (x + dx, i_y) for from <= x < to.
+// Calls f(row, v, u, from, to) for all offsets (u, v) of the windows of row y, in steps of the dilation: the centre x has
+// the neighbour at the index x + row of a picture for from <= x < to.
 template <class F>
 void each_offset(const Shape& s, long y, F f) {
     const long r = s.window / 2;
-    for (long dy = -r; dy <= r; dy++) {
-        const long i_y = y + dy;
+    for (long v = -r; v <= r; v++) {
+        const long i_y = y + v * s.dilation;
         if (i_y < 0 || i_y >= s.height) continue;
-        for (long dx = -r; dx <= r; dx++) f(i_y, dy, dx, std::max(0L, -dx), std::min(s.width, s.width - dx));
+        for (long u = -r; u <= r; u++) {
+            const long dx = u * s.dilation;
+            f(i_y * s.width + dx, v, u, std::max(0L, -dx), std::min(s.width, s.width - dx));
+        }
     }
 }
 
@@ -51,10 +54,9 @@ sums) {
     for (long y = 0; y < s.height; y++) {
         T *t = total + y * s.width, *a0 = sums + y * s.width, *a1 = a0 + n, *a2 = a1 + n;
         const T *centre = phi + y * s.width, *fall = falloff + y * s.width;
-        each_offset(s, y, [&](long i_y, long dy, long dx, long from, long to) {
-            const long row = i_y * s.width + dx;
+        each_offset(s, y, [&](long row, long v, long u, long from, long to) {
             const T *other = phi + row, *source = weight + row, *d0 = difference + row, *d1 = d0 + n, *d2 = d1 + n;
-            const T length = T(dx * dx + dy * dy);
+            const T length = T(u * u + v * v);
 #pragma GCC ivdep
             for (long x = from; x < to; x++) {
                 T distance = fall[x] * length;
@@ -83,11 +85,10 @@ void affinity_gradient(const Shape& s, const T* phi, const T* weight, const T* f
         T *mine = own.data(), *fall_grad = mine + D * s.width;
         const T *centre = phi + y * s.width, *fall = falloff + y * s.width, *tg = total_grad + y * s.width;
         const T *g0 = sums_grad + y * s.width, *g1 = g0 + n, *g2 = g1 + n;
-        each_offset(s, y, [&](long i_y, long dy, long dx, long from, long to) {
-            const long row = i_y * s.width + dx;
+        each_offset(s, y, [&](long row, long v, long u, long from, long to) {
             const T *other = phi + row, *source = weight + row, *d0 = difference + row, *d1 = d0 + n, *d2 = d1 + n;
             T *other_grad = phi_grad + row, *source_grad = weight_grad + row;
-            const T length = T(dx * dx + dy * dy);
+            const T length = T(u * u + v * v);
 #pragma GCC ivdep
             for (long x = from; x < to; x++) {
                 T step[D], distance = fall[x] * length;
@@ -120,9 +121,9 @@ void kernel_plane(const Shape& s, const T* weights, const T* difference, T* tota
     const long n = s.area(), r = s.window / 2;
     for (long y = 0; y < s.height; y++) {
         T *t = total + y * s.width, *a0 = sums + y * s.width, *a1 = a0 + n, *a2 = a1 + n;
-        each_offset(s, y, [&](long i_y, long dy, long dx, long from, long to) {
-            const T* w = weights + ((dy + r) * s.window + dx + r) * n + y * s.width;
-            const T *d0 = difference + i_y * s.width + dx, *d1 = d0 + n, *d2 = d1 + n;
+        each_offset(s, y, [&](long row, long v, long u, long from, long to) {
+            const T* w = weights + ((v + r) * s.window + u + r) * n + y * s.width;
+            const T *d0 = difference + row, *d1 = d0 + n, *d2 = d1 + n;
 #pragma GCC ivdep
             for (long x = from; x < to; x++) {
                 t[x] += w[x];
@@ -139,9 +140,9 @@ void kernel_gradient(const Shape& s, const T* difference, const T* total_grad, c
     const long n = s.area(), r = s.window / 2;
     for (long y = 0; y < s.height; y++) {
         const T *tg = total_grad + y * s.width, *g0 = sums_grad + y * s.width, *g1 = g0 + n, *g2 = g1 + n;
-        each_offset(s, y, [&](long i_y, long dy, long dx, long from, long to) {
-            T* w = weights_grad + ((dy + r) * s.window + dx + r) * n + y * s.width;
-            const T *d0 = difference + i_y * s.width + dx, *d1 = d0 + n, *d2 = d1 + n;
+        each_offset(s, y, [&](long row, long v, long u, long from, long to) {
+            T* w = weights_grad + ((v + r) * s.window + u + r) * n + y * s.width;
+            const T *d0 = difference + row, *d1 = d0 + n, *d2 = d1 + n;
 #pragma GCC ivdep
             for (long x = from; x < to; x++) w[x] = tg[x] + g0[x] * d0[x] + g1[x] * d1[x] + g2[x] * d2[x];
         });
@@ -165,14 +166,14 @@ void for_dimensions(long dimensions, F f) {
 
 }  // namespace
 
-// The shape is planes, dimensions, height, width, window, threads.
+// The shape is planes, dimensions, height, width, window, dilation, threads.
 #define DEFINE(T, SUFFIX)                                                                                              \
     extern "C" void affinity_##SUFFIX(const long* shape, const T* phi, const T* weight, const T* falloff,              \
                                       const T* difference, T* total, T* sums) {                                        \
-        const Shape s{shape[0], shape[2], shape[3], shape[4]};                                                         \
+        const Shape s{shape[0], shape[2], shape[3], shape[4], shape[5]};                                                         \
         const long n = s.area(), d = shape[1];                                                                         \
         for_dimensions(d, [&]<int D>() {                                                                               \
-            _Pragma("omp parallel for num_threads(shape[5])") for (long p = 0; p < s.planes; p++)                      \
+            _Pragma("omp parallel for num_threads(shape[6])") for (long p = 0; p < s.planes; p++)                      \
                 affinity_plane<T, D>(s, phi + p * d * n, weight + p * n, falloff + p * n, difference + 3 * p * n,      \
                                      total + p * n, sums + 3 * p * n);                                                 \
         });                                                                                                            \
@@ -180,27 +181,27 @@ void for_dimensions(long dimensions, F f) {
     extern "C" void affinity_gradient_##SUFFIX(const long* shape, const T* phi, const T* weight, const T* falloff,     \
                                                const T* difference, const T* total_grad, const T* sums_grad,           \
                                                T* phi_grad, T* weight_grad, T* falloff_grad) {                         \
-        const Shape s{shape[0], shape[2], shape[3], shape[4]};                                                         \
+        const Shape s{shape[0], shape[2], shape[3], shape[4], shape[5]};                                                         \
         const long n = s.area(), d = shape[1];                                                                         \
         for_dimensions(d, [&]<int D>() {                                                                               \
-            _Pragma("omp parallel for num_threads(shape[5])") for (long p = 0; p < s.planes; p++)                      \
+            _Pragma("omp parallel for num_threads(shape[6])") for (long p = 0; p < s.planes; p++)                      \
                 affinity_gradient<T, D>(s, phi + p * d * n, weight + p * n, falloff + p * n, difference + 3 * p * n,   \
                                         total_grad + p * n, sums_grad + 3 * p * n, phi_grad + p * d * n,               \
                                         weight_grad + p * n, falloff_grad + p * n);                                    \
         });                                                                                                            \
     }                                                                                                                  \
     extern "C" void kernel_##SUFFIX(const long* shape, const T* weights, const T* difference, T* total, T* sums) {     \
-        const Shape s{shape[0], shape[2], shape[3], shape[4]};                                                         \
+        const Shape s{shape[0], shape[2], shape[3], shape[4], shape[5]};                                                         \
         const long n = s.area();                                                                                       \
-        _Pragma("omp parallel for num_threads(shape[5])") for (long p = 0; p < s.planes; p++)                          \
+        _Pragma("omp parallel for num_threads(shape[6])") for (long p = 0; p < s.planes; p++)                          \
             kernel_plane<T>(s, weights + p * s.window * s.window * n, difference + 3 * p * n, total + p * n,           \
                             sums + 3 * p * n);                                                                         \
     }                                                                                                                  \
     extern "C" void kernel_gradient_##SUFFIX(const long* shape, const T* difference, const T* total_grad,              \
                                              const T* sums_grad, T* weights_grad) {                                    \
-        const Shape s{shape[0], shape[2], shape[3], shape[4]};                                                         \
+        const Shape s{shape[0], shape[2], shape[3], shape[4], shape[5]};                                                         \
         const long n = s.area();                                                                                       \
-        _Pragma("omp parallel for num_threads(shape[5])") for (long p = 0; p < s.planes; p++)                          \
+        _Pragma("omp parallel for num_threads(shape[6])") for (long p = 0; p < s.planes; p++)                          \
             kernel_gradient<T>(s, difference + 3 * p * n, total_grad + p * n, sums_grad + 3 * p * n,                   \
                                weights_grad + p * s.window * s.window * n);                                            \
     }

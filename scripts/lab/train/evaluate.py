@@ -40,7 +40,7 @@ def errors(net, arrays, k, device="cpu"):
     """Trimmed errors of the combination, of Level4 and of the finished picture, for snapshot k of a stack."""
     stack = views.snapshot(arrays, k, net.pairs)
     image, y, z, halves = (torch.from_numpy(x).to(device) for x in views.sample(stack, net.pairs, net.version))
-    combined = combination.combine(net(image[None]), y[None], z[None], net.kind, net.window, net.features)[0]
+    combined = combination.combine(net(image[None]), y[None], z[None], net.form)[0]
     planar = lambda picture: torch.from_numpy(picture).permute(2, 0, 1).to(device)
     usual, finished = planar(stack["levels"][3]), planar(stack["finished"])
     noise = (halves[0] - halves[1]).square().mean(0) + (usual - halves.mean(0)).square().mean(0)

@@ -32,10 +32,12 @@ def export(net, path, training):
     )
     graph = onnx.load(path)
     facts = {
-        "kind": net.kind,
+        "kind": net.form.kind,
         "levels": net.levels,
-        "window": net.window,
-        "features": net.features,
+        "window": net.form.window,
+        "features": net.form.features,
+        "dilations": ",".join(map(str, net.form.dilations)),
+        "identities": ",".join(map(str, net.form.identities)),
         "stride": net.stride,
         "halo": net.halo,
         "normalisation": net.version,
@@ -50,7 +52,7 @@ def export(net, path, training):
 
 def load(path):
     saved = torch.load(path, map_location="cpu", weights_only=True)
-    net = model.build(saved["arch"], saved["pairs"], saved["version"], saved["levels"], saved["window"])
+    net = model.build(saved["arch"], saved["pairs"], saved["version"], saved["levels"], saved["window"], saved["wide"])
     net.load_state_dict(saved["best"])
     return net, saved
 

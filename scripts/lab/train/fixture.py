@@ -49,20 +49,20 @@ def main():
         net = model.build("compact")
     net.eval()
     torch.manual_seed(2)
-    m, f = net.levels, net.features
+    m, f = net.levels, net.form.features
     levels = torch.from_numpy(crop["levels"]).permute(0, 3, 1, 2)[None].double()
     y, z = levels[:, :1].expand(-1, m - 1, -1, -1, -1), levels[:, 1:]
     image = normalise.tensor(crop)
     features = torch.randn(1, (m - 1) * (f + 3), H, W)
     features[:, -(m - 1) :] -= 3.0  # falloffs of about 0.05
-    expected = combination.combine(features.double(), y, z, "features", model.WINDOW, f)
+    expected = combination.combine(features.double(), y, z, combination.Form("features", model.WINDOW, f))
     with torch.no_grad():
         padded = torch.nn.functional.pad(torch.from_numpy(image)[None], [0, -W % net.stride, 0, -H % net.stride])
         output = net(padded)[..., :H, :W].double()
-        network = combination.combine(output, y, z, net.kind, net.window, f)
+        network = combination.combine(output, y, z, net.form)
     h, w = H // 2, W // 2
     weights = torch.randn(1, (m - 1) * K * K, h, w).exp()
-    kernel = combination.combine(weights.double(), y[..., :h, :w], z[..., :h, :w], "weights", K)
+    kernel = combination.combine(weights.double(), y[..., :h, :w], z[..., :h, :w], combination.Form("weights", K))
     rgb = lambda x: x[0].permute(1, 2, 0).numpy()
     parts = [np.array([m, H, W, f, K]), *(crop[k] for k in ("levels", "variances", "albedo", "normal", "depth"))]
     parts += [image, features.numpy(), rgb(expected), rgb(network), weights.numpy(), rgb(kernel)]

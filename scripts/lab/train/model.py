@@ -9,11 +9,15 @@ import torch
 from torch import nn
 
 from . import normalise
+from .combination import Form
 from .pairs import PAIRS
 
 # The paper's window; the compact network takes 15, at 0.6 times the cost.
 PAPER_WINDOW, WINDOW = 19, 15
 FEATURES = 4
+# Steps of the windows of the wide form: photon noise is alike within a bandwidth, which is 4 to 34 pixels in real
+# pictures.
+WIDE = (1, 4)
 # Bound of the logarithms of explicit weights: keeps every sum of weights well inside float32.
 LOG_WEIGHT_BOUND = 8.0
 
@@ -36,18 +40,19 @@ class Block(nn.Module):
 class Compact(nn.Module):
     """A U-Net at full, half and quarter resolution with added skips; 0.07 MFLOP per pixel.
 
-    Widths are multiples of 16, for which ONNX Runtime's convolutions are fast. The output, of shape
-    [b, pairs (features + 3), h, w], has phi of all pairs, then source, centre and log falloff.
+    Widths are multiples of 16, for which ONNX Runtime's convolutions are fast. For each dilation of the window, the
+    output has phi of all pairs, then source, centre and log falloff; the logarithms of the identities' weights come
+    last.
     """
 
-    kind, output = "features", "features"
+    output = "features"
     stride = 4
     # Receptive radius 32 of the layers below (a test looks for seams), rounded up to the stride.
     halo = 32
 
-    def __init__(self, pairs, inputs, window=WINDOW, features=FEATURES, widths=(16, 32, 64), last=32):
+    def __init__(self, pairs, inputs, form, widths=(16, 32, 64), last=32):
         super().__init__()
-        self.window, self.features = window, features
+        self.form = form
         full, half, quarter = widths
         self.stem = conv(inputs, full)
         self.down1, self.enc1 = conv(full, half, stride=2), Block(half, half)
@@ -59,11 +64,12 @@ class Compact(nn.Module):
         # A 1x1 convolution commutes with nearest-neighbour enlargement, so it comes first.
         self.up1, self.dec1 = conv(quarter, half, 1), Block(half, half)
         self.up0, self.skip0, self.dec0 = conv(half, last, 1), conv(full, last, 1), conv(last, last)
-        self.head = conv(last, pairs * (features + 3), 1)
+        self.head = conv(last, form.channels(pairs), 1)
         # The initial filter is about a pixel wide: close to the best level, and wide enough for gradients.
         with torch.no_grad():
             self.head.bias.zero_()
-            self.head.bias[-pairs:] = -1.0
+            groups = self.head.bias[: self.head.out_channels - len(form.identities)].view(len(form.dilations), -1)
+            groups[:, -pairs:] = -1.0
 
     def forward(self, x):
         full = torch.relu(self.stem(x))
@@ -78,16 +84,16 @@ class Compact(nn.Module):
 class Paper(nn.Module):
     """[Choi and Moon 2021, 4.3]: ten convolutions, 2.4 M parameters, 4.7 MFLOP per pixel with the paper's window."""
 
-    kind, output = "weights", "weights"
-    stride, features = 1, 0
+    output = "weights"
+    stride = 1
     halo = 20
 
-    def __init__(self, pairs, inputs, window=PAPER_WINDOW, filters=50, depth=10):
+    def __init__(self, pairs, inputs, form, filters=50, depth=10):
         super().__init__()
-        self.window = window
+        self.form = form
         sizes = [inputs] + [filters] * (depth - 1)
         self.layers = nn.ModuleList(conv(a, b, 5) for a, b in zip(sizes, sizes[1:]))
-        self.last = conv(filters, pairs * window * window, 5)
+        self.last = conv(filters, form.channels(pairs), 5)
         for layer in [*self.layers, self.last]:
             nn.init.xavier_uniform_(layer.weight)
             nn.init.zeros_(layer.bias)
@@ -102,12 +108,18 @@ def up(x):
     return nn.functional.interpolate(x, scale_factor=2.0, mode="nearest")
 
 
-def build(arch, pairs="multi", version=None, levels=5, window=None):
-    """A network for pairs of pictures and a version of the input, by default the least that has what the pairs need."""
-    _, count, least = PAIRS[pairs]
-    version = version or least
-    kind = {"compact": Compact, "paper": Paper}[arch]
-    sizes = {} if window is None else {"window": window}
-    net = kind(count, normalise.channels(levels, version), **sizes)
+def build(arch, pairs="multi", version=None, levels=5, window=None, wide=False):
+    """A network for pairs of pictures and a version of the input, by default the least that has what the pairs need.
+
+    The paper's form has one window. The wide form has a second one in steps of 4 pixels, and the pictures z alone.
+    """
+    known = PAIRS[pairs]
+    version = version or known.version
+    more = {"dilations": WIDE, "identities": known.identities} if wide else {}
+    if arch == "paper":
+        net = Paper(known.count, normalise.channels(levels, version), Form("weights", window or PAPER_WINDOW))
+    else:
+        form = Form("features", window or WINDOW, FEATURES, **more)
+        net = Compact(known.count, normalise.channels(levels, version), form)
     net.levels, net.pairs, net.version, net.arch = levels, pairs, version, arch
     return net

@@ -1,5 +1,7 @@
 """The pairs of pictures (y, z) that equations (5) and (6) of [Choi and Moon 2021] combine."""
 
+from typing import NamedTuple
+
 
 def level_pairs(*numbers):
     """Level 1 with each of the levels `numbers`: equation (6), or its dual form with one of them."""
@@ -16,11 +18,20 @@ def deep_pairs(stack):
     return stack["independent"], stack["correlated"]
 
 
-# Pairs (y, z) of pictures [pairs, h, w, 3] of a stack, the number of pairs, and the least version of the input.
+class Pairs(NamedTuple):
+    """`of` returns the pictures y and z [count, h, w, 3] of a stack. `version` is the least version of the input that has
+    what they need, `identities` the pairs with different z."""
+
+    of: object
+    count: int
+    version: int
+    identities: tuple
+
+
 PAIRS = {
-    "multi": (level_pairs(2, 3, 4, 5), 4, 1),
-    **{f"dual{n}": (level_pairs(n), 1, 1) for n in (2, 3, 4, 5)},
-    "finished": (finished_pairs, 4, 3),
-    "deep-single": (deep_pairs, 1, 4),
-    "deep-multi": (deep_pairs, 4, 5),
+    "multi": Pairs(level_pairs(2, 3, 4, 5), 4, 1, (0, 1, 2, 3)),
+    **{f"dual{n}": Pairs(level_pairs(n), 1, 1, (0,)) for n in (2, 3, 4, 5)},
+    "finished": Pairs(finished_pairs, 4, 3, (0,)),
+    "deep-single": Pairs(deep_pairs, 1, 4, (0,)),
+    "deep-multi": Pairs(deep_pairs, 4, 5, (0, 1, 2, 3)),
 }

@@ -23,7 +23,21 @@ from .pairs import PAIRS
 DECAY = 0.999  # of the moving average of the weights, which is validated and exported
 SAVE_SECONDS, VALIDATE_SECONDS = 120, 1200
 # Options that belong to a run and are stored with it.
-STORED = ("arch", "pairs", "version", "window", "squared", "rate", "batch", "side", "methods", "paths", "steps", "seed")
+STORED = (
+    "arch",
+    "pairs",
+    "version",
+    "window",
+    "wide",
+    "squared",
+    "rate",
+    "batch",
+    "side",
+    "methods",
+    "paths",
+    "steps",
+    "seed",
+)
 
 
 def relative_loss(image, target):
@@ -43,7 +57,7 @@ def squared_loss(image, target):
 def loss_of(net, batch, squared):
     """The loss of a batch (input, y, z, halves)."""
     image, y, z, halves = batch
-    combined = combination.combine(net(image), y, z, net.kind, net.window, net.features)
+    combined = combination.combine(net(image), y, z, net.form)
     target = halves.mean(1)
     return (1 - squared) * relative_loss(combined, target) + squared * squared_loss(combined, target)
 
@@ -62,6 +76,7 @@ def arguments():
     parser.add_argument("--pairs", choices=list(PAIRS), default="multi")
     parser.add_argument("--version", type=int, help="version of the input (normalise.py); default: the least")
     parser.add_argument("--window", type=int, help="pixels; default: 19 (paper) or 15")
+    parser.add_argument("--wide", action="store_true", help="the wide form of the compact network (model.py)")
     parser.add_argument("--methods", nargs="+", default=["sppm", "vcm"], help="methods of the noisy stacks")
     parser.add_argument(
         "--paths", nargs="+", type=int, default=[2], help="camera paths of the noisy stacks: 1, 2 or both"
@@ -83,7 +98,7 @@ class Run:
     def __init__(self, args):
         self.args, self.device = args, "cuda" if torch.cuda.is_available() else "cpu"
         torch.manual_seed(args.seed)
-        net = model.build(args.arch, args.pairs, args.version, window=args.window).to(self.device)
+        net = model.build(args.arch, args.pairs, args.version, window=args.window, wide=args.wide).to(self.device)
         self.net, self.average = net, torch.optim.swa_utils.AveragedModel(net, avg_fn=moving_average)
         self.optimiser = torch.optim.Adam(net.parameters(), lr=args.rate)
         self.step, self.seconds, self.machines, self.losses = 0, 0.0, [], []
@@ -109,7 +124,7 @@ class Run:
     def save(self):
         known = {name: getattr(self.args, name) for name in STORED} | {
             "version": self.net.version,
-            "window": self.net.window,
+            "window": self.net.form.window,
         }
         state = known | {
             "levels": self.net.levels,

@@ -81,7 +81,7 @@ def augment(stack, rng, side):
 def sample(stack, pairs, version):
     """(input, y, z, halves): float32 arrays [c, h, w], [pairs, 3, h, w] twice, and [2, 3, h, w]. Views are stored with
     the exposure of their picture, so the scales are 1."""
-    y, z = PAIRS[pairs][0](stack)
+    y, z = PAIRS[pairs].of(stack)
     planar = lambda pictures: np.ascontiguousarray(np.moveaxis(pictures, -1, -3), np.float32)
     return normalise.tensor(stack, 1, 1, version), planar(y), planar(z), planar(stack["halves"])
 
