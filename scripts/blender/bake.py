@@ -23,7 +23,7 @@ class Baker:
     """Bakes images of `size` texels per side. `undo` removes the scene and materials that it makes in Blender."""
 
     def __init__(self, size, undo):
-        self.size, self.undo = size, undo
+        self.size, self.undo, self.frame = size, undo, bpy.context.scene.frame_current
         self._made = None
 
     @property
@@ -33,6 +33,8 @@ class Baker:
             self._made = bpy.data.scenes.new("bake")
             self.undo.callback(bpy.data.scenes.remove, self._made)
             self._made.render.engine = "CYCLES"
+            # Drivers and image sequences are baked at the frame of the export.
+            self._made.frame_set(self.frame)
             self._made.cycles.device = "CPU"
             self._made.cycles.use_denoising = False
             self._made.cycles.use_adaptive_sampling = False
@@ -95,7 +97,8 @@ class Baker:
                 connect = _connect_normal if name == "normal" else _connect_emission
                 shaders.append((graph, connect(graph, values[name])))
                 keys[slot] = bake_cache.digest(shape, slot, bake_cache.tree_digest(graph.tree), self.size, name,
-                                              place if of_object else None)
+                                              place if of_object else None,
+                                              self.frame if _depends_on_frame(graph) else None)
                 texels = bake_cache.load(keys[slot])
                 if texels is None:
                     now[slot] = graph
@@ -149,6 +152,13 @@ class Baker:
         for slot, material in enumerate(materials):
             mesh.materials[slot] = material
         return found
+
+
+def _depends_on_frame(graph):
+    """Whether a graph has image sequences, movies or animated values."""
+    trees = graph.trees()
+    images = (n.image for tree in trees for n in tree.nodes if n.type == "TEX_IMAGE" and n.image is not None)
+    return any(tree.animation_data for tree in trees) or any(i.source in {"SEQUENCE", "MOVIE"} for i in images)
 
 
 def _has_three(value):

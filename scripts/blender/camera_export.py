@@ -16,6 +16,10 @@ _GRID = 16
 def add_cameras(flat, warn):
     """Give the cameras of a flat scene their keys of `extras.caustique`, and warn of the active one's clipping."""
     for thing in (thing for thing in flat.things if thing.type == "CAMERA"):
+        if thing.data.type == "PANO":  # Blender's exporter would leave it out
+            thing.data = flat.remove_later(thing.data.copy())
+            thing.data.type = "PERSP"
+            warn(flat.where(thing), "panoramic cameras are not carried: it is a perspective camera here")
         keys = guard.attempt(warn, flat.where(thing), {}, "it has no lens, shift or other projection",
                              extras, thing, flat, warn)
         flat.add_extras(thing, **keys)
@@ -29,8 +33,6 @@ def extras(thing, flat, warn):
     `focus_distance` (m).
     """
     camera, render, where, said = thing.data, flat.scene.render, flat.where(thing), {}
-    if camera.type == "PANO":
-        warn(where, "panoramic cameras are not carried: it is a perspective camera here")
     if camera.shift_x or camera.shift_y:
         width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
         across = camera.sensor_fit == "HORIZONTAL" or camera.sensor_fit == "AUTO" and width >= height
@@ -84,6 +86,8 @@ def picture(scene, warn):
         said["crop"] = [left, 1 - high, right - left, high - low]
     if scene.render.film_transparent:
         said["film_transparent"] = True
+        if hasattr(scene, "cycles") and scene.cycles.film_transparent_glass:
+            warn(where, "Transparent Glass of its film is not carried: glass covers the background")
     film = getattr(scene.cycles, "film_exposure", 1.0) if hasattr(scene, "cycles") else 1.0
     if film != 1:
         warn(where, f"its film exposure of {film:g} brightens the PNG alone: the EXR holds radiance as it is")
@@ -101,6 +105,33 @@ def picture(scene, warn):
     if rate > 0:
         said["frame_rate"] = [rate.numerator, rate.denominator]
     said["frame"] = scene.frame_current
+    _warn_of_limits(scene, where, warn)
+    if _has_compositor(scene):
+        warn(where, "its compositor is not carried: the picture is the one before compositing")
     if render.use_motion_blur:
         warn(where, "motion blur is not carried: everything stands still")
     return said
+
+
+def _warn_of_limits(scene, where, warn):
+    """Warn of Cycles' limits on light paths where they are tighter than Blender's defaults."""
+    cycles = getattr(scene, "cycles", None)
+    if cycles is None:
+        return
+    usual = {"max_bounces": 12, "diffuse_bounces": 4, "glossy_bounces": 4, "transmission_bounces": 12}
+    tight = [f"{name.replace('_', ' ')} {getattr(cycles, name)}" for name, number in usual.items()
+             if getattr(cycles, name) < number]
+    if tight:
+        warn(where, f"Cycles' limits on light paths are not carried ({', '.join(tight)}): there is more light here")
+    clamp = [f"{name} {getattr(cycles, 'sample_clamp_' + name):g}" for name, usual in (("direct", 0), ("indirect", 10))
+             if 0 < getattr(cycles, "sample_clamp_" + name) != usual]
+    if clamp:
+        warn(where, f"Cycles' clamping of bright samples is not carried ({', '.join(clamp)}): there is more light here")
+
+
+def _has_compositor(scene):
+    """Whether Blender would change the picture by its compositor."""
+    tree = getattr(scene, "compositing_node_group", None) or getattr(scene, "node_tree", None)
+    if not scene.render.use_compositing or tree is None or not getattr(scene, "use_nodes", True):
+        return False
+    return any(n.type not in {"R_LAYERS", "COMPOSITE", "VIEWER", "REROUTE", "FRAME", "GROUP_OUTPUT"} for n in tree.nodes)

@@ -108,6 +108,9 @@ def fix_view_dependence(graph, surface, tree, say):
         if node.type == "LIGHT_PATH":
             _replace(output, 1.0 if output.name == "Is Camera Ray" else 0.0)
             say("Light Path: all rays see what the camera sees")
+        elif node.type == "ATTRIBUTE" and node.attribute_type == "INSTANCER":
+            say(f'its attribute "{node.attribute_name}" of the instancer is not carried: all instances have the value of '
+                "the object itself")
         elif output.name in _DEPENDS_ON_VIEW.get(node.type, ()):
             _replace(output, _typical(node, output))
             if node.as_pointer() not in known:

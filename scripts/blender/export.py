@@ -46,16 +46,13 @@ import sky
 import surfaces
 import world
 
-# Largest ratio of two scale factors that counts as uniform.
-_MAX_EVEN_RATIO = 1.001
 
-
-def write(path, scene=None, bake_size=bake.SIZE):
+def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
     """Export the open scene (or `scene`) at its current frame to the .glb at `path`. Returns the warnings, a list of
     texts.
 
-    `bake_size`: texels per side of baked images; 0 bakes nothing and warns of each loss instead. The file repeats the
-    warnings as the scene's `losses`. The scene is left unchanged.
+    `bake_size`: texels per side of baked images; 0 bakes nothing and warns of each loss instead. `progress(text)`
+    receives what the export does. The file repeats the warnings as the scene's `losses`. The scene is left unchanged.
     """
     path = os.path.abspath(path)
     scene = scene or bpy.context.scene
@@ -69,14 +66,16 @@ def write(path, scene=None, bake_size=bake.SIZE):
 
     with contextlib.ExitStack() as undo:
         _open_scene(scene, undo)
+        progress("Exporting the world")
         said, sun = world.extras(scene, path, warn)
         said.update(guard.attempt(warn, f'scene "{scene.name}"', {}, "the picture has the program's own settings",
                                   camera_export.picture, scene, warn))
+        progress("Exporting the objects")
         flat = objects.FlatScene(scene, undo, warn)
         _open_scene(flat.scene, undo)
         bpy.context.view_layer.update()
         camera_export.add_cameras(flat, warn)
-        worn = surfaces.Surfaces(flat, _materials_of(flat.things), undo, warn, bake_size)
+        worn = surfaces.Surfaces(flat, _materials_of(flat.things), undo, warn, bake_size, progress)
         lighting.warn_of_soft_falloff(flat, warn)
         lighting.add_lamps(flat, warn)
         if sun is not None:
@@ -84,6 +83,7 @@ def write(path, scene=None, bake_size=bake.SIZE):
             sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
         bodies = _solidity(flat.things)
         bpy.context.view_layer.update()
+        progress("Writing the exported scene")
         _export_all_it_can(path, flat, warn)
     document, buffer = glb.read(path)
     _restore_names(document, flat.names)
@@ -238,9 +238,8 @@ def _warn_of_stretched_normals(document, warn):
     for node in document.get("nodes", []):
         scale = [abs(s) for s in node.get("scale", (1, 1, 1))]
         parts = document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ()
-        if max(scale) > _MAX_EVEN_RATIO * min(scale) and any(part.get("material") in mapped for part in parts):
-            warn(f'object "{node["name"]}"', "its scale is uneven, with which Cycles stretches normal maps: here they "
-                 "keep their slopes; apply the scale (Object > Apply > Scale) to see the same in both")
+        if max(scale) > objects.MAX_EVEN_RATIO * min(scale) and any(part.get("material") in mapped for part in parts):
+            warn(f'object "{node["name"]}"', objects.STRETCHED)
 
 
 def _put_active_camera_first(document, scene):

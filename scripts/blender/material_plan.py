@@ -86,7 +86,7 @@ class Plan:
         if self.passes:
             if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
                 self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
-            standin.read_generated(self.graph)
+            standin.read_coordinates(self.graph)
             self.of_object = standin.depends_on_object(self.graph)
             names = [_DISPLAY_NAMES[n] for n in varying if n not in {"direction"}]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.baker.size} x "

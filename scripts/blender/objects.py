@@ -16,11 +16,19 @@ from mathutils import Matrix
 import export_guard as guard
 import standin
 import visibility
+from graph import upstream
+from shading import nodes_of, output_of
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 # Types of objects that are never visible in renders.
 _INVISIBLE = {"EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
 _OUT = "it is left out"
+# Most copies of a mesh with bumps, one for each scale of its instances.
+_MAX_SCALES = 16
+# Largest ratio of two scale factors that counts as uniform.
+MAX_EVEN_RATIO = 1.001
+STRETCHED = ("its scale is uneven, with which Cycles stretches normal maps: here they keep their slopes; apply the scale "
+             "(Object > Apply > Scale) to see the same in both")
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
 _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes that vary in space are not carried",
          "POINTCLOUD": "point clouds are not carried: convert them to meshes",
@@ -41,7 +49,7 @@ class FlatScene:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
-        self._warn, self._meshes, self._shapes, self._made = warn, {}, [], []
+        self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
         self._indirect, self._layer = visibility.indirect_only(layer), layer
         self.scene = bpy.data.scenes.new(scene.name)
         self.names[self.scene.name] = scene.name
@@ -59,7 +67,8 @@ class FlatScene:
         found = []
         for instance in depsgraph.object_instances:
             concerned.add(instance.object.original)
-            if instance.object.type == "MESH" or instance.object.original not in meshed:
+            kind = instance.object.type
+            if kind == "MESH" or kind in _LOST or instance.object.original not in meshed:
                 found.append(guard.attempt(warn, f'object "{instance.object.name}"', None, _OUT,
                                            self._take, instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
@@ -142,14 +151,13 @@ class FlatScene:
         if not all(math.isfinite(x) for row in matrix for x in row):
             self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}")
             return
-        if isinstance(data, bpy.types.Mesh) and not _has_no_shear(matrix):
-            # Location, rotation and scale cannot express shear: transform a copy of the mesh instead.
-            sheared = data.copy()
-            self.names[self.remove_later(sheared).name] = self.names[data.name]
-            sheared.transform(matrix)
-            if matrix.determinant() < 0:
-                sheared.flip_normals()
-            data, matrix = sheared, Matrix()
+        if isinstance(data, bpy.types.Mesh):
+            data, matrix = self._transformed(original, data, matrix)
+        elif not _has_no_shear(matrix):
+            what = "skews its picture" if isinstance(data, bpy.types.Camera) else "shears it"
+            self._warn(f'object "{original.name}"', f"the uneven scale of its parents {what} in Cycles, not here")
+        if isinstance(data, bpy.types.Camera):
+            matrix = _without_scale(matrix)
         body = self.add(original.name, data, matrix, hidden, group)
         body.color, body.pass_index = original.color, original.pass_index
         if "caustique" in original:
@@ -159,6 +167,40 @@ class FlatScene:
         rest = [ray for ray in hidden if ray != "camera"]
         if rest:
             self._warn(self.where(body), f"it is hidden from {', '.join(rest)} rays in Cycles: here they meet it")
+
+    def _transformed(self, original, mesh, matrix):
+        """The mesh and matrix of an object, with parts of the matrix applied to a copy of the mesh.
+
+        These are shear, which location, rotation and scale cannot express, and scale below bumps, because Cycles
+        evaluates bumps in world space and bakes them in object space.
+        """
+        relief, (place, turn, scale) = _relief(mesh), matrix.decompose()
+        uneven = max(map(abs, scale)) > MAX_EVEN_RATIO * min(map(abs, scale))
+        if not _has_no_shear(matrix):
+            applied, rest = matrix, Matrix()
+        elif "BUMP" in relief and any(abs(abs(s) - 1) > MAX_EVEN_RATIO - 1 for s in scale):
+            applied, rest = Matrix.Diagonal((*scale, 1)), Matrix.LocRotScale(place, turn, None)
+        else:
+            return mesh, matrix
+        where, made = f'object "{original.name}"', self._applied.setdefault(mesh.name, {})
+        key = tuple(round(x, 5) for row in applied for x in row)
+        if key not in made and rest != Matrix() and len(made) >= _MAX_SCALES:
+            self._warn(where, "its mesh has instances of many scales, and bumps of one: they are as steep as without scale")
+            return mesh, matrix
+        if uneven and "NORMAL_MAP" in relief:
+            self._warn(where, STRETCHED)
+        if key not in made:
+            made[key] = self._apply(mesh, applied)
+        return made[key], rest
+
+    def _apply(self, mesh, matrix):
+        made = mesh.copy()
+        self.names[self.remove_later(made).name] = self.names[mesh.name]
+        standin.add_object_coordinates(made)
+        made.transform(matrix)
+        if matrix.determinant() < 0:
+            made.flip_normals()
+        return made
 
     def add(self, name, data, matrix, hidden=(), group=None):
         """Add an object with this world matrix, the kinds of rays that do not hit it, and its light group."""
@@ -220,6 +262,30 @@ def _remove_points_that_are_no_numbers(mesh):
         shape.to_mesh(mesh)
         shape.free()
     return len(odd)
+
+
+def _relief(mesh):
+    """Which of "BUMP" (also displacement as bump) and "NORMAL_MAP" the materials of a mesh have."""
+    found = set()
+    for material in mesh.materials:
+        tree = nodes_of(material) if material is not None else None
+        output = output_of(tree)
+        if output is not None:
+            found |= {node.type for node, _ in upstream(output.inputs["Surface"]).values()} & {"BUMP", "NORMAL_MAP"}
+            found |= {"BUMP"} if output.inputs["Displacement"].is_linked else set()
+    return found
+
+
+def _without_scale(matrix):
+    """A camera's matrix without scale and shear, as Cycles reads it: its line of sight and the direction up."""
+    back, up = matrix.col[2].xyz.normalized(), matrix.col[1].xyz
+    right = up.cross(back).normalized()
+    if right.length == 0:
+        return matrix
+    if matrix.determinant() < 0:
+        right = -right  # a mirrored picture
+    axes = Matrix((right, back.cross(right) * (-1 if matrix.determinant() < 0 else 1), back)).transposed()
+    return Matrix.Translation(matrix.translation) @ axes.to_4x4()
 
 
 def _is_pattern(instance):

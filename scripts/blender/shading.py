@@ -134,6 +134,8 @@ def finish(entry, material, closed, thickness, warn):
         spread = 20 / float(number) if number else float(material.get("dispersion", 0))
         if spread > 0:
             extensions["KHR_materials_dispersion"] = {"dispersion": spread}
+    if isinstance(material.get("priority"), (int, float)):
+        entry.setdefault("extras", {}).setdefault("caustique", {})["priority"] = int(material["priority"])
     if inside is not None and any(inside["sigma_s"]) and closed:
         entry.setdefault("extras", {}).setdefault("caustique", {})["medium"] = inside
     elif inside is not None and (clear is None or not closed):

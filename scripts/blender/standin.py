@@ -5,7 +5,7 @@ import contextlib
 import bpy
 import numpy
 
-UV, GENERATED = "caustique bake", "caustique generated"
+UV, GENERATED, OBJECT = "caustique bake", "caustique generated", "caustique object"
 # Textures that use Generated coordinates if Vector is not linked.
 _BY_GENERATED = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
                  "TEX_GABOR", "TEX_MUSGRAVE"}
@@ -29,18 +29,22 @@ def depends_on_object(graph):
     return False
 
 
-def read_generated(graph):
-    """Make a graph read Generated coordinates from the attribute that `swap` adds: those of the undeformed shape."""
+def read_coordinates(graph):
+    """Make a graph read coordinates from the attributes that `swap` adds: Generated ones are those of the undeformed
+    shape, and Object ones those before a transform of the mesh."""
     for tree in graph.trees():
-        wanting = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
-                   if s.name == "Vector" and not s.is_linked]
-        wanting += [link.to_socket for n in tree.nodes if n.type == "TEX_COORD"
-                    for link in n.outputs["Generated"].links]
-        if wanting:
-            node = tree.nodes.new("ShaderNodeAttribute")
-            node.attribute_name = GENERATED
-            for socket in wanting:
-                tree.links.new(node.outputs["Vector"], socket)
+        generated = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
+                     if s.name == "Vector" and not s.is_linked]
+        generated += [link.to_socket for n in tree.nodes if n.type == "TEX_COORD"
+                      for link in n.outputs["Generated"].links]
+        own = [link.to_socket for n in tree.nodes if n.type == "TEX_COORD" and n.object is None
+               for link in n.outputs["Object"].links]
+        for name, wanting in ((GENERATED, generated), (OBJECT, own)):
+            if wanting:
+                node = tree.nodes.new("ShaderNodeAttribute")
+                node.attribute_name = name
+                for socket in wanting:
+                    tree.links.new(node.outputs["Vector"], socket)
 
 
 def _positions(thing):
@@ -50,6 +54,14 @@ def _positions(thing):
     mesh.vertices.foreach_get("co", places)
     thing.to_mesh_clear()
     return places.reshape(-1, 3)
+
+
+def add_object_coordinates(mesh):
+    """Add Object coordinates to the vertices of a mesh, unless it has them from before a transform."""
+    if mesh.vertices and OBJECT not in mesh.attributes:
+        places = numpy.empty(len(mesh.vertices) * 3, numpy.float32)
+        mesh.vertices.foreach_get("co", places)
+        mesh.attributes.new(OBJECT, "FLOAT_VECTOR", "POINT").data.foreach_set("vector", places)
 
 
 def add_generated_coordinates(thing, mesh, say):
@@ -96,6 +108,7 @@ def swap(thing, undo, say):
         undo.callback(setattr, mesh, "name", name + " baked")
         thing.data.name, mesh.name = name + " unbaked", name
     add_generated_coordinates(thing, mesh, say)
+    add_object_coordinates(mesh)
     if thing.type == "MESH":
         body, before = thing, thing.data
         for modifier in thing.modifiers:

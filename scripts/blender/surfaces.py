@@ -34,17 +34,18 @@ class Surface:
 class Surfaces:
     """Matches the materials of a flat scene, whose objects have stand-ins until `undo` (a contextlib.ExitStack) closes.
 
-    `size`: texels per side of baked images; 0 bakes nothing. `warn(where, what)` receives a warning for each loss.
+    `size`: texels per side of baked images; 0 bakes nothing. `warn(where, what)` receives a warning for each loss,
+    `progress(text)` how many meshes are baked.
     """
 
-    def __init__(self, flat, materials, undo, warn, size=bake.SIZE):
+    def __init__(self, flat, materials, undo, warn, size=bake.SIZE, progress=lambda text: None):
         self.flat, self.undo, self.warn, self.size = flat, undo, warn, size
         self.baker = bake.Baker(size or bake.SIZE, undo)
         self.found = {}  # {name of the material that the exporter writes: Surface}
         self.plans = {}
         for material in materials:
             self._plan(material)
-        self._bake()
+        self._bake(progress)
         for plan in self.plans.values():
             if not plan.passes:
                 self._replace(plan.material, *self._attempt(plan.material, self._principled, plan))
@@ -111,8 +112,20 @@ class Surfaces:
                      "make): the channels to bake are plain there; make such objects local and real")
         return Surface(plan.material, plan.unbaked)
 
-    def _bake(self):
+    def _bake(self, progress):
+        wanted = list(self._bodies_to_bake())
+        count = len({key for key, *_ in wanted})
         made = {}
+        for key, thing, plans, own in wanted:
+            if key in made:
+                self._share_baked_mesh(thing, made[key])
+                continue
+            progress(f"Baking materials, mesh {len(made) + 1} of {count}")
+            made[key] = guard.attempt(self.warn, self.flat.where(thing), thing.data,
+                                      "the images of its materials are not baked", self._bake_one, thing, plans, own)
+
+    def _bodies_to_bake(self):
+        """Key of the baked mesh, object, plans by slot, and whether they depend on the object, of each object to bake."""
         for thing in self.flat.things:
             materials = materials_of(thing)
             plans = {i: self.plans[m.name] for i, m in enumerate(materials)
@@ -122,11 +135,7 @@ class Surfaces:
             own = any(plan.of_object for plan in plans.values())
             alone = own or thing.type != "MESH" or thing.modifiers or thing.data.shape_keys is not None
             key = thing.name if alone else (thing.data.as_pointer(), *(m and m.name for m in materials))
-            if key in made:
-                self._share_baked_mesh(thing, made[key])
-            else:
-                made[key] = guard.attempt(self.warn, self.flat.where(thing), thing.data,
-                                          "the images of its materials are not baked", self._bake_one, thing, plans, own)
+            yield key, thing, plans, own
 
     def _share_baked_mesh(self, thing, mesh):
         before, slots = thing.data, [(slot.link, slot.material) for slot in thing.material_slots]

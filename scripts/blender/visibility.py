@@ -59,14 +59,26 @@ def as_rendered(scene, undo, warn):
         take(settings, _PARTICLES)
 
 
-def _layer(scene, warn):
+def rendered_layer(scene):
     """The rendered view layer: the current one if it is enabled, else the first enabled one."""
-    rendered = [layer for layer in scene.view_layers if layer.use] or [scene.view_layers[0]]
+    rendered = _rendered_layers(scene)
     current = bpy.context.window.view_layer
-    layer = current if current in rendered else rendered[0]
+    return current if current in rendered else rendered[0]
+
+
+def _rendered_layers(scene):
+    return [layer for layer in scene.view_layers if layer.use] or [scene.view_layers[0]]
+
+
+def _layer(scene, warn):
+    layer, rendered = rendered_layer(scene), _rendered_layers(scene)
     rest = ", ".join(f'"{other.name}"' for other in rendered if other != layer)
     if rest:
         warn(f'scene "{scene.name}"', f'of its view layers only "{layer.name}" is exported, not {rest}')
+    parts = {"use_solid": "surfaces", "use_strand": "hair", "use_volumes": "volumes"}
+    off = [name for switch, name in parts.items() if not getattr(layer, switch, True)]
+    if off:
+        warn(f'view layer "{layer.name}"', f"its filter leaves out {', '.join(off)}, which is not carried: they are seen")
     if layer.material_override is not None:
         warn(f'view layer "{layer.name}"', "its material override is not carried: objects keep their own materials")
     return layer

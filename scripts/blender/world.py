@@ -13,13 +13,16 @@ from direct_images import is_missing, warn_of_missing
 from shading import constant, medium, nodes_of, output_of, source
 
 
+_STILL = {"FILE", "GENERATED", "VIEWER"}  # kinds of images that do not depend on the frame
+
+
 def extras(scene, path, warn):
     """The scene's keys `environment` (even if black) and `medium`, and the `Sun` in its sky or None.
 
     Writes images beside the .glb at `path`.
     """
     black = {"environment": {"color": [0.0, 0.0, 0.0]}}
-    if scene.world is None:
+    if scene.world is None or not visibility.rendered_layer(scene).use_sky:  # the layer's filter "Environment"
         return black, None
     return guard.attempt(warn, f'world "{scene.world.name}"', (black, None), "it is black",
                          _world, scene, path, black, warn)
@@ -76,6 +79,8 @@ def _background(shader, path):
     if colour is not None:
         return {"color": [c * strength for c in colour]}
     texture = source(shader.inputs["Color"])
+    if texture.type == "TEX_ENVIRONMENT" and texture.image is not None and texture.image.source not in _STILL:
+        return None
     if texture.type == "TEX_ENVIRONMENT" and is_missing(texture.image):
         return {"color": [strength, 0.0, strength]}  # magenta, as in Cycles
     if texture.type != "TEX_ENVIRONMENT" or texture.projection != "EQUIRECTANGULAR":

@@ -1,6 +1,7 @@
 """Compares renders of the add-on's engine with the command line and with closed forms. Needs bpy."""
 
 import math
+import os
 import re
 import time
 import unittest
@@ -242,6 +243,7 @@ class Stops(Installed):
         with mock.patch.object(engine.run, "Run", watched), mock.patch.object(engine.Engine, "_is_cancelled", esc):
             found = self.render()
         self.assertFalse(runs and runs[-1].is_running())
+        self.assertIsNotNone(runs[-1]._process.wait(10) if runs else 0)
         return found, time.monotonic() - pressed[0]
 
     def test_in_the_middle_the_picture_so_far_is_kept(self):
@@ -252,6 +254,57 @@ class Stops(Installed):
         self.assertGreater(found["Noisy.G"].mean(), 0.1)
         self.assertAlmostEqual(float(numpy.median(found["Depth.Z"])), 10, 3)
         self.assertEqual(self.temporary(), [])
+
+    def test_a_large_picture_stops_within_two_seconds(self):
+        """The program would take longer to finish the picture. The last picture shown stays."""
+        self.scene.render.resolution_x, self.scene.render.resolution_y = 1600, 1200
+        shown, pressed, ended = [], [], []
+        engine, run = part_of_addon("engine").Engine, part_of_addon("run").Run
+        show, stop, finish = engine._show, run.stop, run.finish
+        with mock.patch.object(engine, "_show", lambda *picture: shown.append(show(*picture))), \
+                mock.patch.object(run, "stop", lambda work: (pressed.append(time.monotonic()), stop(work))), \
+                mock.patch.object(run, "finish", lambda work: (ended.append(time.monotonic()), finish(work))):
+            found, _ = self.stop_when(lambda run: shown)
+        self.assertLess(ended[0] - pressed[0], 2)
+        self.assertGreater(found["Combined.G"].mean(), 0.1)
+        self.assertEqual(self.temporary(), [])
+
+    def test_a_killed_render_goes_on(self):
+        """As if Blender were killed: its program goes on alone. The next render ends it, and starts from its checkpoint."""
+        self.enterContext(mock.patch.dict(os.environ, XDG_CACHE_HOME=str(self.dir / "cache")))
+        resume, run = part_of_addon("resume"), part_of_addon("run")
+        self.enterContext(mock.patch.object(resume, "_SECONDS_BETWEEN", 1))
+        saved = []
+
+        class Killed(BaseException):
+            pass
+
+        def watch(_engine, work, *_):
+            folder = resume._folder()
+            while not any(name.endswith(".checkpoint") for name in os.listdir(folder)):
+                time.sleep(0.1)
+            saved.append(work)
+            raise Killed
+
+        with mock.patch.multiple(part_of_addon("engine").Engine, _watch=watch), \
+                mock.patch.object(resume.Checkpoint, "remove"), mock.patch.object(run.Run, "kill"):
+            try:
+                self.render()
+            except (Killed, RuntimeError, FileNotFoundError):
+                pass
+        begun = saved[0].progress["iteration"]
+        first = []
+
+        def seen(run):
+            if run and run.progress:
+                first.append(run.progress["iteration"])
+            return bool(first)
+
+        self.stop_when(seen)
+        self.assertGreaterEqual(first[0], begun - 1)
+        self.assertGreater(first[0], 1)
+        saved[0]._process.wait(10)
+        self.assertEqual(os.listdir(resume._folder()), [])
 
     def test_during_the_export(self):
         _, seconds = self.stop_when(lambda run: not run)

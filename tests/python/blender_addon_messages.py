@@ -169,6 +169,26 @@ class Messages(Installed):
             bpy.ops.caustique.diagnose()
         self.assertEqual(self.temporary(), [])
 
+    def test_faults_of_the_exporter_itself_are_named(self):
+        self.stage()
+        exporter = self.repository / "caustique" / "exporter" / "objects.py"
+        exporter.write_text(exporter.read_text().replace("class FlatScene:", "class FlatScene(1 / 0):"))
+        self.assertRegex(self.fault(), r"could not be exported: ZeroDivisionError: .* Remedy: this is a fault of caustique's "
+                                       r"exporter \(objects.py, line \d+\): report it with the scene")
+
+    def test_the_export_says_what_it_does(self):
+        self.stage()
+        tree = bpy.data.materials["white"].node_tree
+        shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+        tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], shader.inputs["Base Color"])
+        said, job = [], part_of_addon("handoff").Job
+        run = job.run
+        watched = lambda job, stopped, tell: run(job, stopped, lambda text: (said.append(text), tell(text)))  # noqa: E731
+        with mock.patch.object(job, "run", watched), \
+                mock.patch.dict(os.environ, XDG_CACHE_HOME=str(self.dir / "cache")):
+            self.render()
+        self.assertIn("Baking materials, mesh 1 of 1", said)
+
     def test_unexpected_errors_are_shown(self):
         self.stage()
         with mock.patch.object(part_of_addon("program"), "find", lambda _: 1 / 0):
@@ -267,6 +287,12 @@ class Diagnosis(Installed):
         self.assertIn("Caustics are rendered, by photons", self.ask().headline)
         self.settings.use_caustic = self.settings.use_sds = False
         self.assertIn("they are left out", self.ask().headline)
+
+    def test_the_selection_stays_if_all_is_well(self):
+        self.stage()
+        bpy.data.objects["sun"].select_set(True)
+        self.assertEqual(self.ask().warnings, [])
+        self.assertEqual([thing.name for thing in self.scene.objects if thing.select_get()], ["sun"])
 
     def test_a_fault(self):
         self.stage()

@@ -14,7 +14,8 @@ OPTIONS = frozenset(name.replace("_", "-") for name in definition.FILES_MAY_GIVE
 def method(settings):
     """Options that `render` and `plan` share: method, seed, stop conditions, effects, finish, and the user's
     arguments."""
-    words = ["--method", settings.method, "--seed", str(settings.seed)]
+    # The exporter writes lumens, so the program need not guess.
+    words = ["--light-units", "photometric", "--method", settings.method, "--seed", str(settings.seed)]
     stops = (("use_iterations", "--iterations", settings.iterations), ("use_time", "--time", settings.time),
              ("use_error", "--target-error", settings.error / 100))
     for switch, option, value in stops:

@@ -93,8 +93,9 @@ class Diagnose(bpy.types.Operator):
         if self._plan.fault is not None:
             self.report({"ERROR"}, self._plan.fault.message())
             return {"CANCELLED"}
-        if self.select:
-            _select(context, program_plan.named_objects(context.scene, self._plan.warnings))
+        named = program_plan.named_objects(context.scene, self._plan.warnings)
+        if self.select and named:  # if all is well, the selection stays
+            _select(context, named)
         self.report({"INFO"}, self._plan.headline)
         return {"FINISHED"}
 

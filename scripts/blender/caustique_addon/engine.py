@@ -12,7 +12,7 @@ import time
 import bpy
 import numpy
 
-from . import command, exr, handoff, ignored_settings, passes, preferences, program, run, session
+from . import command, exr, handoff, ignored_settings, passes, preferences, program, resume, run, session
 from .fault import Cancelled, fault_from_error
 
 _POLL_SECONDS = 0.1  # between two checks of the program's progress
@@ -60,21 +60,25 @@ class Engine(bpy.types.RenderEngine):
         frame = scene.frame_current + scene.frame_subframe
         job = handoff.Job(depsgraph.scene, view_layer.name, frame, folder, chosen.exporter)
         self._warn(scene, handoff.in_main_thread(job.copy, self._is_cancelled))
-        self._warn(scene, job.run(self._is_cancelled))
+        self._warn(scene, job.run(self._is_cancelled, lambda text: self.update_stats("", text)))
 
         output, preview = os.path.join(folder, "render.exr"), os.path.join(folder, "preview.exr")
-        words = [path, "render", handoff.GLB, "-o", output, "--exr-naming", "blender", "--compression", "none",
+        words = [path, "render", handoff.GLB, "--exr-naming", "blender", "--compression", "none",
                  "--layers", passes.layers(passes.wanted(view_layer)), "--progress", "json",
                  *command.resolution(self.resolution_x, self.resolution_y), *command.threads(scene.render),
                  *command.method(scene.caustique_render)]
+        saved = resume.Checkpoint([program.version(path), *words], folder)
+        words += ["-o", output, *saved.options()]
         if _PREVIEW in program.options(path):
             words += [_PREVIEW, preview]
         work = run.Run(words, folder)
         try:
+            saved.started(work.process_id)
             self._watch(work, preview, view_layer.name, part)
             work.finish()
         finally:
             work.kill()
+            saved.remove()
         self._warn(scene, work.warnings)
         if not os.path.isfile(output):  # stopped before the first iteration
             raise Cancelled()
@@ -88,9 +92,10 @@ class Engine(bpy.types.RenderEngine):
         """Show the program's progress and its picture so far until it ends."""
         said, shown = None, None
         while work.is_running():
-            if self._is_cancelled():
+            cancelled = self._is_cancelled()
+            if cancelled:
                 work.stop()
-                text = "Stopping after this iteration"
+                text = "Stopping"
             elif work.progress is None:
                 text = "Rendering the first iteration"
             else:
@@ -100,7 +105,7 @@ class Engine(bpy.types.RenderEngine):
                 said = text
                 self.update_stats("", text)
             written = os.stat(preview).st_mtime_ns if os.path.isfile(preview) else None
-            if written != shown:
+            if written != shown and not cancelled:
                 shown = written
                 self._show(exr.Picture(preview), layer, part)
             time.sleep(_POLL_SECONDS)

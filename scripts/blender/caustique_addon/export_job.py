@@ -1,13 +1,14 @@
 """Exports one frame of a scene in a second Blender process: `blender -b --python export_job.py -- JOB.json`.
 
 The job is an object: `blend` (the file), `scene`, `view_layer`, `frame` (with its fraction), `scripts` (whether Python
-in the file may run), `exporter` (the folder of export.py), `glb` (the file to write) and `report` (the file to write
-{"warnings": [..]} or {"error": ".."} to).
+in the file may run), `exporter` (the folder of export.py), `glb` (the file to write), `progress` (the file to write what
+it does to) and `report` (the file to write {"warnings": [..]} or {"error": "..", "place": ".."} to).
 """
 
 import json
 import os
 import sys
+import traceback
 
 import bpy
 
@@ -21,12 +22,26 @@ def export(job):
         scene.view_layers.remove(layer)
     scene.render.engine = "CYCLES"  # this Blender lacks the add-on, and the exporter reads the scene as Cycles would
     scene.render.use_border = False  # the add-on crops the picture itself
+    scene.render.use_compositing = False  # the first Blender composes the picture
     whole = int(job["frame"] // 1)
     scene.frame_set(whole, subframe=job["frame"] - whole)
     sys.path.insert(0, job["exporter"])
     import export as exporter  # its folder is on the search path of this process alone
 
-    return exporter.write(job["glb"])
+    def tell(text):
+        with open(job["progress"] + ".new", "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(job["progress"] + ".new", job["progress"])
+
+    return exporter.write(job["glb"], progress=tell)
+
+
+def place_of(error, folder):
+    """The last line of the exporter in an error's traceback; None if Blender's own glTF exporter has failed."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith(folder)]
+    if not frames or "glTF exporter" in str(error):
+        return None
+    return f"{os.path.basename(frames[-1].filename)}, line {frames[-1].lineno}"
 
 
 def main(path):
@@ -36,7 +51,8 @@ def main(path):
     try:
         report = {"warnings": export(job)}
     except Exception as error:  # the first Blender shows any error of this one
-        report = {"error": f"{type(error).__name__}: {error}"}
+        traceback.print_exc()
+        report = {"error": f"{type(error).__name__}: {error}", "place": place_of(error, job["exporter"])}
     with open(job["report"], "w", encoding="utf-8") as file:
         json.dump(report, file)
 

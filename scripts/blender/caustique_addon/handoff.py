@@ -41,9 +41,9 @@ class Job:
             "blend": self._blend, "scene": scene.name, "view_layer": view_layer, "frame": frame,
             "scripts": scripts_allowed(),
             "exporter": os.path.join(_HERE, "exporter"), "glb": os.path.join(folder, GLB),
-            "report": os.path.join(folder, "report.json"),
+            "report": os.path.join(folder, "report.json"), "progress": os.path.join(folder, "progress.txt"),
         }
-        self._scene = scene
+        self._scene, self._said = scene, None
 
     def copy(self):
         """Write the scene and its data to a file. Call it in Blender's main thread. Returns warnings."""
@@ -52,8 +52,9 @@ class Job:
         return [f'image "{image.name}": its changes are not saved, and the render does not see them: save or pack it'
                 for image in bpy.data.images if image.is_dirty and image.packed_file is None and image.users]
 
-    def run(self, stopped):
-        """Export the copy. Returns the exporter's warnings. `stopped()` is polled for cancellation."""
+    def run(self, stopped, tell=lambda text: None):
+        """Export the copy. Returns the exporter's warnings. `stopped()` is polled for cancellation; `tell(text)` receives
+        what the export does."""
         path = os.path.join(self.folder, "job.json")
         with open(path, "w", encoding="utf-8") as file:
             json.dump(self._job, file)
@@ -70,11 +71,22 @@ class Job:
             while worker.poll() is None:
                 if stopped():
                     raise Cancelled()
+                self._tell_progress(tell)
                 time.sleep(_POLL_SECONDS)
         finally:
             worker.kill()
             worker.wait()
         return self._report(log)
+
+    def _tell_progress(self, tell):
+        try:
+            with open(self._job["progress"], encoding="utf-8") as file:
+                text = file.read()
+        except OSError:  # nothing yet
+            return
+        if text != self._said:
+            self._said = text
+            tell(text)
 
     def _command(self, job):
         script = os.path.join(_HERE, "export_job.py")
@@ -94,7 +106,9 @@ class Job:
                 last = (file.read().strip().splitlines() or ["it said nothing"])[-1]
             report = {"error": last}
         if "error" in report:
+            place = report.get("place")
             raise Fault(f"the scene could not be exported: {report['error']}",
+                        f"this is a fault of caustique's exporter ({place}): report it with the scene" if place else
                         "try File > Export > glTF 2.0, which shows what it stumbles over")
         return report["warnings"]
 

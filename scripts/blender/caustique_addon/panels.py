@@ -4,28 +4,12 @@ import bpy
 
 from . import program_plan, properties, session, text_layout
 from .diagnosis import Diagnose, Select
-from .engine import Engine
+from .panel import Panel
 
 _STOPS = ("iterations", "time", "error")
 
 
-class _Panel:
-    """Base of the panels: they are visible only if caustique is the scene's engine."""
-
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "render"
-
-    @classmethod
-    def poll(cls, context):
-        return context.engine == Engine.bl_idname
-
-    def _column(self):
-        self.layout.use_property_split, self.layout.use_property_decorate = True, False
-        return self.layout.column()
-
-
-class MethodPanel(_Panel, bpy.types.Panel):
+class MethodPanel(Panel, bpy.types.Panel):
     """The render method."""
 
     bl_idname = "CAUSTIQUE_PT_method"
@@ -37,7 +21,7 @@ class MethodPanel(_Panel, bpy.types.Panel):
             column.prop(settings, name)
 
 
-class StopPanel(_Panel, bpy.types.Panel):
+class StopPanel(Panel, bpy.types.Panel):
     """The stop conditions of a render."""
 
     bl_idname = "CAUSTIQUE_PT_stop"
@@ -55,7 +39,7 @@ class StopPanel(_Panel, bpy.types.Panel):
             text_layout.draw(column, context, "Nothing is chosen: a render stops after 64 iterations", "INFO")
 
 
-class EffectsPanel(_Panel, bpy.types.Panel):
+class EffectsPanel(Panel, bpy.types.Panel):
     """The simulated effects, with the plan's table."""
 
     bl_idname = "CAUSTIQUE_PT_effects"
@@ -99,7 +83,7 @@ def _cells(effect):
     return (effect["by"] or "left out", *("-" if share is None else f"{100 * share:.2g} %" for share in shares))
 
 
-class FinishPanel(_Panel, bpy.types.Panel):
+class FinishPanel(Panel, bpy.types.Panel):
     """Settings of the finish, which removes noise."""
 
     bl_idname = "CAUSTIQUE_PT_finish"
@@ -109,7 +93,7 @@ class FinishPanel(_Panel, bpy.types.Panel):
         self._column().prop(context.scene.caustique_render, "finish", text="Denoiser")
 
 
-class DiagnosisPanel(_Panel, bpy.types.Panel):
+class DiagnosisPanel(Panel, bpy.types.Panel):
     """The diagnosis: why there is no caustic, and likely mistakes."""
 
     bl_idname = "CAUSTIQUE_PT_diagnosis"
@@ -130,7 +114,7 @@ class DiagnosisPanel(_Panel, bpy.types.Panel):
         _messages(layout, context, plan.warnings)
 
 
-class MessagesPanel(_Panel, bpy.types.Panel):
+class MessagesPanel(Panel, bpy.types.Panel):
     """Warnings of the last render, and the fault that ended it."""
 
     bl_idname = "CAUSTIQUE_PT_messages"
@@ -157,7 +141,7 @@ def _messages(layout, context, messages):
             row.operator(Select.bl_idname, text="", icon="RESTRICT_SELECT_OFF").line = line
 
 
-class PassesPanel(_Panel, bpy.types.Panel):
+class PassesPanel(Panel, bpy.types.Panel):
     """The passes of a view layer."""
 
     bl_idname = "CAUSTIQUE_PT_passes"
@@ -181,7 +165,7 @@ class PassesPanel(_Panel, bpy.types.Panel):
                 column.prop(owner, name)
 
 
-class LightPanel(_Panel, bpy.types.Panel):
+class LightPanel(Panel, bpy.types.Panel):
     """The supported settings of a light; Cycles' own panel has more."""
 
     bl_idname = "CAUSTIQUE_PT_light"
@@ -200,7 +184,7 @@ class LightPanel(_Panel, bpy.types.Panel):
         if light.type == "SUN":
             names.append("angle")
         elif light.type == "AREA":
-            names += ["shape", "size"] + ["size_y"] * (light.shape in {"RECTANGLE", "ELLIPSE"})
+            names += ["shape", "size"] + ["size_y"] * (light.shape in {"RECTANGLE", "ELLIPSE"}) + ["spread"]
         else:
             names.append("shadow_soft_size")
         for name in names:

@@ -9,7 +9,7 @@ import time
 from . import fault, handoff
 
 _INTERRUPTED = 130  # exit code of a program that was interrupted and has written its picture
-_MIN_GRACE_SECONDS = 20  # from the interrupt to killing the program; finishing a large picture takes time
+_GRACE_SECONDS = 1.0  # from the interrupt to ending the program, whose last picture is on the screen
 
 
 class Run:
@@ -19,7 +19,7 @@ class Run:
         self.progress, self.warnings = None, []
         self._rest = []
         self._interrupted_at = None  # time of the interrupt
-        self._longest = 0.0  # seconds of the longest iteration so far
+        self._ended = False  # by `stop`, after the grace period
         # In a separate process group, else a Ctrl-C would reach it twice: from the terminal and from here.
         self._process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                          stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
@@ -30,39 +30,43 @@ class Run:
         with self._process.stderr as messages:
             for line in map(str.rstrip, messages):
                 if line.startswith("{"):
-                    self._update(json.loads(line))
+                    self.progress = json.loads(line)
                 elif line.startswith("warning: "):
                     self.warnings.append(handoff.without_file(line[len("warning: "):]))
                 elif line:
                     self._rest.append(handoff.without_file(line))
 
-    def _update(self, progress):
-        before = self.progress["seconds"] if self.progress else 0.0
-        self._longest = max(self._longest, progress["seconds"] - before)
-        self.progress = progress
+    @property
+    def process_id(self):
+        """The number of the process."""
+        return self._process.pid
 
     def is_running(self):
         """Whether the program is running."""
-        return self._process.poll() is None
+        return not self._ended and self._process.poll() is None
 
     def stop(self):
-        """Interrupt the program, which then writes its picture; kill it after a grace period. Call this repeatedly."""
+        """Interrupt the program, which then writes its picture; end it after a grace period. Call this repeatedly."""
         now = time.monotonic()
         if self._interrupted_at is None:
             self._interrupted_at = now
             self._process.send_signal(signal.SIGINT)
-        elif now - self._interrupted_at > _MIN_GRACE_SECONDS + 2 * self._longest:
-            self._process.send_signal(signal.SIGINT)
-            self._interrupted_at = now
+        elif now - self._interrupted_at > _GRACE_SECONDS:
+            self._ended = True
+            self._process.kill()
+            threading.Thread(target=self._process.wait, daemon=True).start()
 
     def kill(self):
         """Kill the program if it is running."""
         self._process.kill()
-        self._process.wait()
-        self._listener.join()
+        if not self._ended:  # otherwise nobody waits while the system frees its memory
+            self._process.wait()
+            self._listener.join()
 
     def finish(self):
-        """Wait for the end of the program. Raises a Fault if it failed."""
+        """Wait for the end of the program. Raises a Fault if it failed by itself."""
+        if self._ended:
+            return
         code = self._process.wait()
         self._listener.join()  # it may not have read the last lines yet
         if code not in (0, _INTERRUPTED):

@@ -1,0 +1,146 @@
+"""Features that had differed from Cycles without a word: each agrees now, or a warning names it."""
+
+import unittest
+
+import cycles_comparison  # first: it sets the search path
+import bpy
+import export
+import glb
+from cycles_comparison import eye, glow, lamp, shared, square
+
+
+class Agrees(cycles_comparison.CyclesComparison):
+    def world(self, color=(0.5, 0.5, 0.5)):
+        world = self.scene.world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (*color, 1)
+        return world
+
+    def material(self, kind="Principled", **inputs):
+        return shared.node_material("tested", f"ShaderNodeBsdf{kind}", **inputs)
+
+    def shader(self, material):
+        return next(n for n in material.node_tree.nodes if n.type.startswith("BSDF") or n.type == "EMISSION")
+
+    def test_drivers_are_baked_at_the_current_frame(self):
+        material = glow("tested", (1, 1, 1))
+        tree = material.node_tree
+        noise, scale = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValue")
+        noise.noise_dimensions = "4D"
+        scale.outputs[0].driver_add("default_value").driver.expression = "frame / 3"
+        tree.links.new(scale.outputs[0], noise.inputs["W"])
+        tree.links.new(noise.outputs["Color"], self.shader(material).inputs["Color"])
+        shared.place("wall", square(material, 1.0)).data.uv_layers.new()
+        eye((0, 0, 2), (0, 0, 0), lens=60)
+        for frame in (1, 40):
+            self.scene.frame_set(frame)
+            ours = self.caustique(16)
+            self.alike(ours, self.cycles(32), parts=4, tolerance=0.03)
+
+    def test_bumps_on_scaled_bodies(self):
+        """A bump on a body with scale is evaluated in world space, its texture in object space."""
+        material = self.material("Diffuse", Color=(0.8, 0.8, 0.8, 1))
+        tree = material.node_tree
+        place, wave, bump = (tree.nodes.new("ShaderNode" + kind) for kind in ("TexCoord", "TexWave", "Bump"))
+        wave.inputs["Scale"].default_value, wave.wave_profile = 1.0, "SIN"
+        bump.inputs["Distance"].default_value = 0.3
+        tree.links.new(place.outputs["Object"], wave.inputs["Vector"])
+        tree.links.new(wave.outputs[0], bump.inputs["Height"])
+        tree.links.new(bump.outputs[0], self.shader(material).inputs["Normal"])
+        body = shared.place("wall", square(material, 1.0))
+        sun = lamp("SUN", (0, 0, 3), 3.0, angle=0.1)
+        sun.rotation_euler = (0, 1.0, 0)
+        eye((0, 0, 3), (0, 0, 0), type="ORTHO", ortho_scale=1.9)
+        for scale in ((1, 3, 0.2), (2, 2, 2), (1.5, 2, -1)):
+            body.scale = scale
+            self.alike(self.caustique(32), self.cycles(64), parts=2, tolerance=0.03)
+
+    def test_single_scattering_metal(self):
+        self.world((1, 1, 1))
+        for roughness in (0.4, 0.8):
+            material = self.material(Base_Color=(0.9, 0.6, 0.3, 1), Metallic=1.0, Roughness=roughness)
+            self.shader(material).distribution = "GGX"
+            body = shared.place("wall", square(material, 1.0))
+            eye((0, -2, 2), (0, 0, 0), type="ORTHO", ortho_scale=1.0)
+            self.alike(self.caustique(32), self.cycles(64), parts=1, tolerance=0.07)
+            self.assertEqual(len(self.warnings), roughness == 0.8, self.warnings)
+            bpy.data.objects.remove(body)
+
+    def test_the_layers_filter_of_the_environment(self):
+        self.world((1, 0, 0))
+        self.floor(1.0)
+        lamp("POINT", (0, 0, 2), 100, shadow_soft_size=0.0)
+        eye((0, -3, 3), (0, 0, 0), lens=45)
+        self.scene.view_layers[0].use_sky = False
+        self.alike(self.caustique(64), self.cycles(64), parts=1, tolerance=0.03)
+
+    def test_cameras_under_scaled_parents(self):
+        self.floor(1.0)
+        self.world((1, 1, 1))
+        rig = shared.place("rig", None)
+        rig.scale, rig.rotation_euler = (1, 1, 3), (0.4, 0, 0)
+        camera = eye((0, -1, 1), (0, 0, 0), lens=45)
+        camera.parent = rig
+        bpy.context.view_layer.update()
+        self.caustique(4)
+        self.assertIn("skews its picture", "".join(self.warnings))
+        rig.rotation_euler, camera.rotation_euler = (0, 0, 0), (0, 0, 0)
+        self.silhouettes_agree(self.caustique(16), self.cycles(16))
+        self.assertEqual(self.warnings, [])
+
+    def test_panoramas_become_perspective_cameras(self):
+        self.floor(1.0)
+        eye((0, -1, 1), (0, 0, 0), type="PANO")
+        self.assertIn("panoramic cameras", "".join(export.write(self.path)))
+        self.assertEqual(glb.read(self.path)[0]["cameras"][0]["type"], "perspective")
+        self.assertEqual(self.scene.camera.data.type, "PANO")
+
+
+class Named(cycles_comparison.CyclesComparison):
+    def named(self, *lines):
+        warnings = "\n".join(export.write(self.path, bake_size=16))
+        for line in lines:
+            self.assertIn(line, warnings)
+
+    def test_settings_of_the_scene(self):
+        self.floor(1.0)
+        scene = self.scene
+        scene.render.engine = "CYCLES"
+        self.assertEqual(export.write(self.path), [])
+        scene.cycles.max_bounces, scene.cycles.sample_clamp_direct = 2, 3.0
+        scene.render.film_transparent = scene.cycles.film_transparent_glass = True
+        if bpy.app.version < (5, 0, 0):
+            scene.use_nodes = True
+            tree = scene.node_tree
+        else:
+            tree = scene.compositing_node_group = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
+        tree.nodes.new("CompositorNodeBlur")
+        self.named("limits on light paths are not carried (max bounces 2)", "clamping of bright samples",
+                   "Transparent Glass", "its compositor is not carried")
+        scene.render.use_compositing = False
+        self.assertNotIn("compositor", "".join(export.write(self.path)))
+
+    def test_attributes_of_instancers(self):
+        material = glow("tested", (1, 1, 1))
+        tree = material.node_tree
+        node = tree.nodes.new("ShaderNodeAttribute")
+        node.attribute_type, node.attribute_name = "INSTANCER", "tint"
+        tree.links.new(node.outputs["Color"], next(n for n in tree.nodes if n.type == "EMISSION").inputs["Color"])
+        shared.place("wall", square(material, 1.0))
+        self.named('its attribute "tint" of the instancer is not carried')
+
+    def test_volumes_that_nodes_make(self):
+        body = shared.place("cloud", square(glow("tested", (1, 1, 1)), 1.0))
+        tree = bpy.data.node_groups.new("cloud", "GeometryNodeTree")
+        for direction in ("INPUT", "OUTPUT"):
+            tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+        source, end, cube = (tree.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput",
+                                                               "GeometryNodeVolumeCube"))
+        tree.links.new(cube.outputs[0], end.inputs[0])
+        body.modifiers.new("nodes", "NODES").node_group = tree
+        self.named('object "cloud": volumes that vary in space are not carried')
+
+
+if __name__ == "__main__":
+    unittest.main()
