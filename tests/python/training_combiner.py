@@ -111,13 +111,14 @@ class Training(unittest.TestCase):
         stored |= {"iterations": np.array([8]), "halves": np.zeros((2, 70, 101, 3), np.float32)}
         torch.manual_seed(8)
         net = model.build("compact", wide=True).eval()
-        whole = apply.combined(net, stored)
+        whole, shares = apply.combined(net, stored)
         with mock.patch.object(apply, "TILE", 32):
-            tiles = apply.combined(net, stored)
+            tiles, _ = apply.combined(net, stored)
         self.assertEqual(whole.shape, (70, 101, 3))
         self.assertLess(np.abs(tiles - whole).max(), 1e-5)
         with mock.patch.object(apply, "TILE", 32), mock.patch.object(apply, "BORDER", 8):
-            self.assertGreater(np.abs(apply.combined(net, stored) - whole).max(), 1e-5)
+            self.assertGreater(np.abs(apply.combined(net, stored)[0] - whole).max(), 1e-5)
+        np.testing.assert_allclose(shares.sum(0), 1, atol=1e-5)
 
     def test_the_input_does_not_depend_on_the_unit_of_light(self):
         stack = fixture.random_stack(np.random.default_rng(6))

@@ -1,19 +1,21 @@
 """The table of the 2021 paper: errors at equal core-seconds on its four kinds of scenes, relative to plain `sppm`.
 
 Rows: `sppm` with one level; the networks of scripts/lab.sh training that have a checkpoint, on `sppm` with five levels
-and two camera paths, or one; the deep combiner, whose budget is half `bdpt` and half `sppm`; path tracing denoised by OIDN; and
-the default finish of `sppm`. The networks' own time is not in the budget; the last
-column has it in core-seconds, with the start of PyTorch.
+and two camera paths, or one; the deep combiner, whose budget is half `bdpt` and half `sppm`; path tracing denoised by
+OIDN; and the default finish of `sppm`. The networks' own time is not in the budget; the last column has it in
+core-seconds, with the start of PyTorch. out/combiner/ has a page of pictures for each scene and budget.
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 from .. import references, renders
 from ..accuracy import geometric
+from ..combiner_page import page
 from ..cache import Failed, create, digest, installed, load, program, run_timed, save
 from ..options import names, options
 from ..picture_errors import Layers, Reference
-from ..record import record
+from ..record import ROOT, record
 from ..train import data
 from .training import FOLDER, RUNS
 
@@ -63,86 +65,104 @@ def combine(scene, run, picture, independent=None):
     return folder / "picture.exr", load(folder / "run.json")["core_seconds"]
 
 
+class Made(NamedTuple):
+    """A picture of a row; the shares of a network's pairs in its weights, and its core-seconds."""
+
+    picture: object
+    shares: dict = {}
+    seconds: float = 0.0
+
+
 def plain(scene, budget, seed):
-    return Layers(render(scene, "sppm", "none", budget, seed, "--levels", "1") / "picture.exr").get("Noisy"), 0.0
+    folder = render(scene, "sppm", "none", budget, seed, "--levels", "1")
+    return Made(Layers(folder / "picture.exr").get("Noisy"))
 
 
 def network(run, names):
     """A function that renders and combines with a network."""
+    deep, paths = run.startswith("deep"), "1" if "--paths" in RUNS[run] else "2"
+    words = ["--levels", "5", "--eye-paths", paths, "--layers", names]
 
     def make(scene, budget, seed):
-        deep = run.startswith("deep")
         share = budget / 2 if deep else budget
-        paths = "1" if "--paths" in RUNS[run] else "2"
-        denoise = "" if run == "finished" else "none"
-        picture = render(scene, "sppm", denoise, share, seed, "--levels", "5", "--eye-paths", paths, "--layers", names)
+        picture = render(scene, "sppm", "" if run == "finished" else "none", share, seed, *words)
         other = render(scene, "bdpt", "none", share, seed, "--layers", "beauty,Quarter") if deep else None
         file, seconds = combine(scene, run, picture, other / "picture.exr" if other else None)
-        return Layers(file).get(""), seconds
+        found = Layers(file)
+        shares = {name.removesuffix(".X"): value for name, value in found.channels.items() if name.startswith("Share")}
+        return Made(found.get(""), shares, seconds)
 
     return make
 
 
 def denoised_path(scene, budget, seed):
-    return renders.pictures(render(scene, "path", "none", budget, seed)).get("oidn"), 0.0
+    picture = renders.pictures(render(scene, "path", "none", budget, seed)).get("oidn")
+    if picture is None:
+        raise Failed("not available: there is no .venv-peers")
+    return Made(picture)
 
 
 def finished(scene, budget, seed):
-    return Layers(render(scene, "sppm", "", budget, seed, "--levels", "1") / "picture.exr").get(""), 0.0
+    return Made(Layers(render(scene, "sppm", "", budget, seed, "--levels", "1") / "picture.exr").get(""))
 
 
 def rows(names):
-    """The rows of the table: functions of scene, budget and seed that return a picture and the network's seconds."""
+    """The rows of the table: functions of scene, budget and seed."""
     trained = [run for run in options.runs if (options.folder / "runs" / run / "last.pt").exists()]
     found = {"sppm": plain, **{run: network(run, names) for run in trained}}
     return found | {"path, OIDN": denoised_path, "sppm, finished": finished}
 
 
 def measure(scene, budget, reference, names):
-    """The mean errors over the seeds of each row, and the network's seconds."""
-    found = {}
+    """The mean errors over the seeds of each row, and the pictures of the last seed."""
+    found, last = {}, {}
     for name, make in rows(names).items():
-        errors, seconds = [], 0.0
         try:
-            for seed in range(1, options.seeds + 1):
-                picture, seconds = make(scene, budget, seed)
-                if picture is None:
-                    raise Failed("not available: there is no .venv-peers")
-                errors.append(reference.measure(picture))
+            made = [make(scene, budget, seed) for seed in range(1, options.seeds + 1)]
         except Failed as failed:
             print(f"    {name:<16}{failed}", flush=True)
             continue
-        found[name] = {key: sum(one[key] for one in errors) / len(errors) for key in KEYS} | {"seconds": seconds}
+        errors, last[name] = [reference.measure(one.picture) for one in made], made[-1]
+        found[name] = {key: sum(one[key] for one in errors) / len(errors) for key in KEYS}
         ratio = found[name]["relmse_trimmed"] / found["sppm"]["relmse_trimmed"]
         values = "".join(f"{found[name][key]:>11.4g}" for key in KEYS)
-        print(f"    {name:<16}{values}{ratio:>10.3f}{seconds:>9.1f}", flush=True)
-    return found
+        print(f"    {name:<16}{values}{ratio:>10.3f}{last[name].seconds:>9.1f}", flush=True)
+    return found, last
+
+
+def draw(scene, budget, last, reference):
+    """Writes the page of a scene: pictures, and the first and last shares of each network's weights."""
+    shares = {}
+    for name, made in last.items():
+        numbers = sorted(made.shares, key=lambda share: int(share.removeprefix("Share")))
+        shares |= {f"{name} {number}": made.shares[number] for number in dict.fromkeys(numbers[:1] + numbers[-1:])}
+    file = ROOT / "out" / "combiner" / f"{references.name(scene).replace('/', '-')}-{budget:g}.png"
+    page(file, {name: made.picture for name, made in last.items()}, shares, reference.mean)
+    print(f"    {file}")
+
+
+def geometric_means(cells):
+    """The geometric mean over the cells of each row's trimmed relMSE relative to `sppm`."""
+    error = lambda cell, name: cell["rows"][name]["relmse_trimmed"] / cell["rows"]["sppm"]["relmse_trimmed"]
+    names = {name: None for cell in cells for name in cell["rows"]}
+    return {name: geometric([max(error(cell, name), 1e-6) for cell in cells if name in cell["rows"]]) for name in names}
 
 
 def main():
     cells = []
     for scene in references.scenes():
         halves, _ = references.reference(scene)
-        reference, known = Reference.read(halves), layers(scene)
-        paper = PAPER.get(references.name(scene))
+        reference, known, name = Reference.read(halves), layers(scene), references.name(scene)
+        paper = f"; the paper: {PAPER[name][0]} to {PAPER[name][1]}" if name in PAPER else ""
         for budget in options.budgets:
-            print(
-                f"\n{references.name(scene)}, {budget:g} core-seconds"
-                + (f"; the paper: {paper[0]} to {paper[1]}" if paper else "")
-            )
+            print(f"\n{name}, {budget:g} core-seconds{paper}")
             print(f"{'':<20}{'relMSE':>11}{'trimmed':>11}{'FLIP':>11}{'to sppm':>10}{'network':>9}", flush=True)
-            cells.append(
-                {"scene": references.name(scene), "budget": budget, "rows": measure(scene, budget, reference, known)}
-            )
-    print(f"\ngeometric means relative to sppm, trimmed relMSE{'':<4}")
-    means = {}
-    for name in {name: 0 for cell in cells for name in cell["rows"]}:
-        ratios = [
-            cell["rows"][name]["relmse_trimmed"] / cell["rows"]["sppm"]["relmse_trimmed"]
-            for cell in cells
-            if name in cell["rows"]
-        ]
-        means[name] = geometric([max(ratio, 1e-6) for ratio in ratios])
-        print(f"    {name:<16}{means[name]:>10.3f}")
+            found, last = measure(scene, budget, reference, known)
+            draw(scene, budget, last, reference)
+            cells.append({"scene": name, "budget": budget, "rows": found})
+    means = geometric_means(cells)
+    print("\ngeometric means of the trimmed relMSE relative to sppm")
+    for name, mean in means.items():
+        print(f"    {name:<16}{mean:>10.3f}")
     settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "seeds")}}
     record("combiner", {**settings, "geometric_means": means, "cells": cells})

@@ -3,7 +3,7 @@
   python -m lab.train.apply --checkpoint RUN/last.pt --scene SCENE.glb PICTURE.exr -o OUT.exr [--independent BDPT.exr]
 
 The picture has five levels, two camera paths, and the layers that data.py asks for. The deep combiner also needs a
-picture by bdpt with quarters.
+picture by bdpt with quarters. The layers Share1, Share2, ... of the output are the shares of each pair in the sum of the weights.
 """
 
 import argparse
@@ -36,24 +36,27 @@ def arrays_of(path, scene, independent=None):
 
 @torch.no_grad()
 def combined(net, arrays):
-    """The combination of whole pictures, in tiles."""
-    image, y, z, _ = (
-        torch.from_numpy(x) for x in views.sample(views.snapshot(arrays, 0, net.pairs), net.pairs, net.version)
-    )
+    """The combination of a whole picture [h, w, 3], in tiles, and the shares of the weights [n, h, w] of each pair."""
+    sample = views.sample(views.snapshot(arrays, 0, net.pairs), net.pairs, net.version)
+    image, y, z, _ = (torch.from_numpy(x) for x in sample)
     h, w = image.shape[-2:]
     # The network reads zeros beyond the picture, but the windows of the equation end with it.
     image = torch.nn.functional.pad(image, [0, -w % net.stride, 0, -h % net.stride])
-    out = torch.zeros(3, h, w)
+    out, shares = torch.zeros(3, h, w), None
     for top in range(0, h, TILE):
         for left in range(0, w, TILE):
             above, before = max(top - BORDER, 0), max(left - BORDER, 0)
             part = (None, ..., slice(above, top + TILE + BORDER), slice(before, left + TILE + BORDER))
             y_part, z_part = y[part], z[part]
-            weights = net(image[part])[..., : y_part.shape[-2], : y_part.shape[-1]]
-            tile = combination.combine(weights, y_part, z_part, net.form)[0]
+            output = net(image[part])[..., : y_part.shape[-2], : y_part.shape[-1]]
+            weights, values = combination.pair_sums(output, y_part, z_part, net.form)
+            total = weights.sum(1, keepdim=True)
+            shares = torch.zeros(weights.shape[1], h, w) if shares is None else shares
             down, right = min(top + TILE, h), min(left + TILE, w)
-            out[:, top:down, left:right] = tile[:, top - above : down - above, left - before : right - before]
-    return out.permute(1, 2, 0).numpy()
+            core = (0, ..., slice(top - above, down - above), slice(left - before, right - before))
+            out[:, top:down, left:right] = (values.sum(1) / total)[core]
+            shares[:, top:down, left:right] = (weights / total)[core]
+    return out.permute(1, 2, 0).numpy(), shares.numpy()
 
 
 def main():
@@ -66,8 +69,9 @@ def main():
     args = parser.parse_args()
     net, _ = export_network.load(args.checkpoint)
     arrays, exposure = arrays_of(args.picture, args.scene, args.independent)
-    picture = combined(net.eval(), arrays) / exposure
-    channels = {c: np.ascontiguousarray(picture[..., k]) for k, c in enumerate("RGB")}
+    picture, shares = combined(net.eval(), arrays)
+    channels = {c: np.ascontiguousarray(picture[..., k] / exposure) for k, c in enumerate("RGB")}
+    channels |= {f"Share{k + 1}.X": share for k, share in enumerate(shares)}
     OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(args.output))
 
 

@@ -319,8 +319,8 @@ def window(view, method, levels):
                 + sums[rows[0], columns[0]]
             )
             corners.append((int(x), int(y)))
-            weights.append(0.02 + total / area)
-    weights = np.array(weights) ** 2
+            weights.append(0.01 + total / area)
+    weights = np.array(weights) ** 3
     x, y = corners[rng.choice(len(corners), p=weights / weights.sum())]
     return {"width": width, "height": height, "corner": [x, y]}
 
