@@ -21,6 +21,7 @@
 
 import argparse
 import contextlib
+import math
 import os
 import re
 import sys
@@ -45,6 +46,9 @@ import shading
 import sky
 import surfaces
 import world
+
+# Angle between the shading normal of glass and its face, and the share of its area, above which it looks darker.
+_LEANING_DEGREES, _MAX_LEANING_SHARE = 30, 0.02
 
 
 def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
@@ -82,6 +86,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
             environment = said["environment"]
             sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
         bodies = _solidity(flat.things)
+        _warn_of_bent_glass(flat, warn)
         bpy.context.view_layer.update()
         progress("Writing the exported scene")
         _export_all_it_can(path, flat, warn)
@@ -181,6 +186,33 @@ def _solidity(things):
             closed, least = bodies.get(material.name, (True, extent))
             bodies[material.name] = (closed and shapes[thing.data], min(least, extent))
     return bodies
+
+
+def _warn_of_bent_glass(flat, warn):
+    """Warn of glass whose shading normals lean far from its faces, which Cycles softens."""
+    shares = {}
+    for thing in flat.things:
+        if thing.type == "MESH" and any(slot.material and may_transmit(slot.material) for slot in thing.material_slots):
+            if thing.data not in shares:
+                shares[thing.data] = guard.attempt(warn, flat.where(thing), 0.0, "its normals are not checked",
+                                                   _leaning_share, thing.data)
+            if shares[thing.data] > _MAX_LEANING_SHARE:
+                warn(flat.where(thing), f"the smooth shading of its glass leans by more than {_LEANING_DEGREES} degrees on "
+                     f"{shares[thing.data]:.0%} of its faces: it is darker there than in Cycles; mark these edges sharp, or "
+                     "bevel them with more segments")
+
+
+def _leaning_share(mesh):
+    """The share of a mesh's area at whose corners the shading normal leans far from the face."""
+    count = len(mesh.polygons)
+    corners, faces = numpy.empty(len(mesh.loops) * 3, numpy.float32), numpy.empty(count * 3, numpy.float32)
+    areas, totals = numpy.empty(count, numpy.float32), numpy.empty(count, numpy.int32)
+    mesh.corner_normals.foreach_get("vector", corners)
+    for name, values in (("normal", faces), ("area", areas), ("loop_total", totals)):
+        mesh.polygons.foreach_get(name, values)
+    cosines = (corners.reshape(-1, 3) * numpy.repeat(faces.reshape(-1, 3), totals, axis=0)).sum(1)
+    weights = numpy.repeat(areas / totals, totals)
+    return float(weights[cosines < math.cos(math.radians(_LEANING_DEGREES))].sum() / max(weights.sum(), 1e-30))
 
 
 def may_transmit(material):

@@ -212,6 +212,8 @@ class Messages(Installed):
 
     def test_ignored_settings_of_blender_are_named(self):
         ignored_settings, render = part_of_addon("ignored_settings"), self.scene.render
+        self.assertIn("it has no objects that renders show", "".join(ignored_settings.warnings(self.scene)))
+        self.stage()
         self.assertEqual(ignored_settings.warnings(self.scene), [])
         for name in ("use_motion_blur", "use_multiview", "use_freestyle"):
             setattr(render, name, True)

@@ -121,6 +121,13 @@ class Named(cycles_comparison.CyclesComparison):
         scene.render.use_compositing = False
         self.assertNotIn("compositor", "".join(export.write(self.path)))
 
+    def test_glass_whose_normals_lean(self):
+        glass = shared.node_material("glass", "ShaderNodeBsdfGlass")
+        body = shared.cube(glass)
+        self.assertEqual(export.write(self.path), [])
+        body.data.shade_smooth()
+        self.named('object "cube": the smooth shading of its glass leans by more than 30 degrees on 100% of its faces')
+
     def test_attributes_of_instancers(self):
         material = glow("tested", (1, 1, 1))
         tree = material.node_tree

@@ -1,5 +1,6 @@
-"""Warns of Blender's settings that a render with caustique ignores, with a remedy for each."""
+"""Warns of Blender's settings that a render with caustique ignores, and of scenes without objects, with remedies."""
 
+_WITHOUT_SURFACE = {"LIGHT", "CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
 _SIMULATED = {"CLOTH", "SOFT_BODY", "FLUID", "DYNAMIC_PAINT"}
 
 
@@ -12,7 +13,15 @@ def warnings(scene):
         (render.pixel_aspect_x != render.pixel_aspect_y, "pixels are rendered as squares: set both pixel aspects to 1"),
         (render.use_freestyle, "Freestyle's lines are not drawn over the picture: render them with Cycles"),
     ]
-    return [line for there, line in found if there] + list(_simulations(scene))
+    return [line for there, line in found if there] + list(_nothing(scene)) + list(_simulations(scene))
+
+
+def _nothing(scene):
+    """A line for a scene in which renders see no object."""
+    if not any(thing.type not in _WITHOUT_SURFACE and not thing.hide_render or thing.instance_type == "COLLECTION"
+               for thing in scene.objects):
+        yield (f'scene "{scene.name}": it has no objects that renders show: add a mesh, or switch on the camera symbol beside '
+               "its name in the outliner")
 
 
 def _simulations(scene):
