@@ -17,6 +17,8 @@ pub fn takes(option: &str, method: Method) -> bool {
         "kernel" => method.takes_kernels(BandwidthRule::Memoryless),
         "guide" => method.supports_guiding(),
         "indirect" => method.search_with_paths().is_some(),
+        "light_paths" | "connections" => method.takes_counts(),
+        "merging" => method.takes_counts() && method.has_bandwidths(),
         "debug_techniques" => method.has_techniques(),
         option => !option.starts_with("cppm_") || method.rules().contains(&BandwidthRule::ChiSquared),
     }
@@ -41,9 +43,12 @@ impl RenderOptions {
     }
 
     /// Names of the options that depend on the method, and whether the user has set each to something other than off.
-    fn method_options(&self) -> [(&'static str, bool); 14] {
+    fn method_options(&self) -> [(&'static str, bool); 17] {
         [
             ("photons", self.photons.is_some()),
+            ("light_paths", self.light_paths.is_some()),
+            ("connections", self.connections.is_some()),
+            ("merging", self.merging.is_some()),
             ("photon_memory", self.photon_memory.is_some()),
             ("levels", self.levels.is_some_and(|levels| levels > 1)),
             ("knn", self.knn.is_some()),
@@ -81,6 +86,7 @@ impl RenderOptions {
         let Some((option, _)) = self.method_options().into_iter().find(has_no_effect) else { return Ok(()) };
         let other = match option {
             "photon_memory" => "pm",
+            "light_paths" | "connections" | "merging" => "vcm",
             option if option.starts_with("cppm") => "cppm",
             _ => "sppm",
         };

@@ -18,8 +18,9 @@ use crate::estimator::rule::volume::ALPHA as VOLUME_ALPHA;
 use crate::finish::{Denoiser, DenoiserChoice, Finish};
 use crate::pipeline::{AutoRequest, MethodRequest, PictureRequest, with_light_paths};
 use crate::render::{
-    BandwidthRule, Candidate, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice, Levels, Method,
-    PHOTON_BYTES, RadiusRule, Settings, Shard,
+    BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY, KernelChoice,
+    LIGHT_PATH_STEPS, Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL, Method, PHOTON_BYTES, RadiusRule, Settings,
+    Shard,
 };
 use crate::scene::{CameraRequest, MAX_SIZE};
 use crate::stat::sum::MAX_TERMS;
@@ -43,6 +44,16 @@ pub struct RenderOptions {
     #[arg(long, value_name = "N", whole = 1_u32..=50_000_000, help_heading = "Method")]
     #[arg(hide_short_help = true)]
     pub photons: Option<u32>,
+    /// Light paths of bdpt and vcm per pixel and iteration, 0 to 4 in steps of 1/16. Neighbouring pixels share fewer
+    /// than one. 0 leaves path tracing [default: 1]
+    #[arg(long, value_name = "N", between = (Included(0.0), Included(4.0)), help_heading = "Expert")]
+    pub light_paths: Option<f64>,
+    /// Light paths to whose vertices each camera path of bdpt and vcm connects, 0 to 4 [default: 1]
+    #[arg(long, value_name = "C", whole = 0..=MAX_CONNECTIONS, help_heading = "Expert")]
+    pub connections: Option<u32>,
+    /// Probability that a camera path of vcm merges with photons; 0 leaves bdpt [default: 1]
+    #[arg(long, value_name = "P", between = (Included(0.0), Included(1.0)), help_heading = "Expert")]
+    pub merging: Option<f64>,
     /// Memory for the photon map of pm in MiB, while it is built: 160 bytes per photon. A full map ends the light
     /// paths, and a warning says so [default: 1024]
     #[arg(long, value_name = "MIB", whole = 1..=u32::MAX, help_heading = "Expert")]
@@ -176,8 +187,9 @@ pub struct SizeOptions {
     pub height: Option<u32>,
 }
 
-/// The help texts of `--levels` and `--photon-memory` repeat these numbers.
+/// Help texts repeat these numbers.
 const _: () = assert!(MAX_LEVELS == 5 && PHOTON_BYTES == 160);
+const _: () = assert!(MAX_LIGHT_PATHS_PER_PIXEL == 4 && LIGHT_PATH_STEPS == 16 && MAX_CONNECTIONS == 4);
 
 impl RenderOptions {
     /// The requested camera, size, window and pixel filter.
@@ -312,6 +324,26 @@ impl RenderOptions {
         }
     }
 
+    /// Numbers of samples of the techniques of bidirectional methods.
+    fn counts(&self) -> Result<Counts> {
+        let default = Counts::default();
+        let steps = self.light_paths.map_or(f64::from(default.light_paths), |n| n * f64::from(LIGHT_PATH_STEPS));
+        if steps.fract() != 0.0 {
+            let cause = format!("--light-paths must be a multiple of 1/{LIGHT_PATH_STEPS}");
+            return Err(Error::usage(cause).hint("0.0625, 0.125, 0.25, 0.5, 1, 2 and 4 are common numbers"));
+        }
+        let without = [("connections", self.connections.map(f64::from)), ("merging", self.merging)];
+        for (option, _) in without.into_iter().filter(|(_, value)| steps == 0.0 && value.is_some_and(|x| x > 0.0)) {
+            let error = Error::usage(format!("--{option} needs light paths, and --light-paths 0 traces none"));
+            return Err(error.hint(format!("leave --{option} out, or ask for more light paths")));
+        }
+        Ok(Counts {
+            light_paths: steps as u32,
+            connections: self.connections.unwrap_or(default.connections),
+            merging: self.merging.map_or(default.merging, |probability| probability as f32),
+        })
+    }
+
     /// The number of bandwidth levels, and whether level 1 has a camera path of its own.
     fn levels(&self, method: Method) -> Levels {
         let count = self.levels.unwrap_or(if method.has_levels() { MAX_LEVELS } else { 1 });
@@ -338,6 +370,7 @@ impl RenderOptions {
             method,
             seed: self.frame_seed(),
             photons: self.photons.unwrap_or(method.default_photons()),
+            counts: self.counts()?,
             photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,
             techniques: false,
@@ -359,6 +392,6 @@ impl RenderOptions {
             classes: self.scene.switches().classes(),
         };
         self.check_shard(&settings)?;
-        Ok(settings)
+        Ok(settings.without_unused_techniques())
     }
 }

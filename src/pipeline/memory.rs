@@ -83,7 +83,8 @@ impl Extent {
     /// each pixel.
     fn bytes_per_pixel(&self, settings: &Settings) -> u64 {
         let method = settings.method;
-        let vertices = (1.0 + f64::from(u8::from(settings.levels.two_paths))) * self.photons_per_path;
+        let light_paths = settings.counts.light_paths_per_pixel() * if settings.levels.two_paths { 2.0 } else { 1.0 };
+        let vertices = light_paths * self.photons_per_path;
         let merges = method.has_bandwidths() && !method.takes_photon_count() && !method.has_one_map();
         let merged = if merges { (vertices * MERGED_BYTES as f64) as u64 } else { 0 };
         // On average a window receives one light path per pixel, as the whole picture does.

@@ -102,6 +102,8 @@ pub enum Purpose {
     Film = 27,
     /// How many vertices of a path of a Markov chain lie on its camera and on its light subpath.
     Division = 28,
+    /// Whether a camera path merges with photons.
+    Merging = 29,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

@@ -75,6 +75,8 @@ pub struct Bidirectional<'a> {
     pub techniques: TechniqueSet,
     /// Number of light paths connected to the camera, for each camera path of a pixel.
     pub light_paths: f32,
+    /// Number of light paths whose vertices each vertex of a camera path connects to.
+    pub connections: f32,
     /// Number of light paths whose photons are merged in one iteration.
     pub merged_paths: f32,
     /// Limits paths to one division between camera and light subpath; `None` for no limit.
@@ -125,10 +127,24 @@ impl Bidirectional<'_> {
         self.only.is_none_or(|only| only.camera == depth && only.segments > depth)
     }
 
+    /// Number of samples of the technique that joins the last two vertices of a subpath whose last vertex has this
+    /// `depth`. If the first of them is the light or the camera, it is next-event estimation or a connection of the light
+    /// path to the camera, else a connection.
+    #[inline]
+    pub(super) fn joins(&self, depth: u32) -> f64 {
+        if depth == 1 { 1.0 } else { f64::from(self.connections) }
+    }
+
     /// Whether camera vertices are connected to lights.
     #[inline]
     pub(super) fn next_event(&self) -> bool {
         self.only.is_none_or(|only| only.light() == Some(0))
+    }
+
+    /// Whether light paths leave vertices to which camera vertices connect.
+    #[inline]
+    pub(super) fn keeps_light_vertices(&self) -> bool {
+        self.techniques.connect && self.connections > 0.0
     }
 
     /// Whether a light vertex at `depth` is connected.
@@ -235,19 +251,39 @@ pub struct MergeLevels {
     radius2: [f32; super::MAX_LEVELS],
     eta: [Eta; super::MAX_LEVELS],
     count: usize,
+    /// Probability that a camera path of the pixel merges, which eta contains.
+    probability: f32,
 }
 
 impl MergeLevels {
     /// Takes squared radii in ascending order (at most [`super::MAX_LEVELS`]), each with its eta.
     #[inline]
     pub fn new(levels: impl Iterator<Item = (f32, Eta)>) -> MergeLevels {
-        let mut all = MergeLevels { radius2: [0.0; super::MAX_LEVELS], eta: [Eta::NONE; super::MAX_LEVELS], count: 0 };
+        let mut all = MergeLevels {
+            radius2: [0.0; super::MAX_LEVELS],
+            eta: [Eta::NONE; super::MAX_LEVELS],
+            count: 0,
+            probability: 1.0,
+        };
         for (radius2, eta) in levels.take(super::MAX_LEVELS) {
             all.radius2[all.count] = radius2;
             all.eta[all.count] = eta;
             all.count += 1;
         }
         all
+    }
+
+    /// Makes each camera path of the pixel merge with this probability, above 0. All etas must contain it.
+    #[must_use]
+    #[inline]
+    pub fn with_probability(self, probability: f32) -> MergeLevels {
+        MergeLevels { probability, ..self }
+    }
+
+    /// Probability that a camera path of the pixel merges.
+    #[inline]
+    pub fn probability(&self) -> f32 {
+        self.probability
     }
 
     /// Squared merging radii in ascending order (square scene units).

@@ -7,6 +7,7 @@ use super::cause::Cause;
 use super::light_vertex::LightVertex;
 use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
 use super::pass_through::PassThroughHit;
+use super::path::SPARED_BY_ROULETTE;
 use super::path_history::PathHistory;
 use super::photon_merge::{Merge, MergePhoton};
 use super::pixel_sample::{Features, PixelSample};
@@ -27,10 +28,10 @@ use bumpalo::Bump;
 
 /// Light path and photons that the vertices of a camera path are connected to and merged with.
 pub struct CameraWalkContext<'a> {
-    /// Vertices of the light path that this camera path connects to.
+    /// Vertices of the light paths that this camera path connects to.
     pub vertices: &'a [LightVertex<'a>],
-    /// Photons of the previous iteration; `None` if none are merged. Then all etas, the factors of merging in MIS
-    /// weights, must be [`mis::Eta::NONE`].
+    /// Photons of the previous iteration; `None` if this camera path merges none. If no camera path of the pixel merges
+    /// any, all etas, the factors of merging in MIS weights, must be [`mis::Eta::NONE`].
     pub photons: Option<&'a PhotonMap<MergePhoton>>,
     /// Merging radii of the pixel of the camera path, by bandwidth level.
     pub levels: &'a MergeLevels,
@@ -173,7 +174,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
             arrival_pdf_a: light.arrival_pdf_a * vertex.cos(light.wi) * visibility.flight.reverse,
             delta: light.delta,
         };
-        let ratios = mis::next_event(&self.mis, &pdfs);
+        let ratios = mis::next_event(&self.mis, self.shared.joins(vertex.depth()), &pdfs);
         let at = light.target.unwrap_or(light.wi);
         self.record.contribution(technique, value, at, ratios);
         let incident = Incident { wi: light.wi, transport: Transport::Radiance, f };
@@ -189,7 +190,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
 
     #[inline]
     fn connect<S: ScatterPoint>(&mut self, vertex: &S, light: &LightVertex<'_>) {
-        let Bidirectional { camera_paths, techniques, .. } = self.shared;
+        let Bidirectional { camera_paths, techniques, connections, .. } = self.shared;
         let to = light.p() - vertex.p();
         let distance2 = to.length_squared();
         let distance = distance2.sqrt();
@@ -206,7 +207,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         if !camera_paths.classes.is_all() && shares().is_empty() {
             return;
         }
-        let mut value = vertex.throughput() * f_camera * f_light * light.throughput / distance2;
+        let mut value = vertex.throughput() * f_camera * f_light * light.throughput / (distance2 * connections);
         if let (true, Some(wavelength)) = (light.dispersed, vertex.wavelength()) {
             value *= wavelength.inverse_weight();
         }
@@ -227,18 +228,21 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
                 mis: &light.mis,
                 reverse_pdf_w: light.reverse_pdf(-d),
                 arrival_pdf_a: pdf_camera * cos_light / distance2 * visibility.flight.forward,
+                joins: self.shared.joins(light.depth),
                 merges: if light.in_medium() { Merges::ZERO } else { techniques.light_vertex_merge(light.depth) },
             },
             &End {
                 mis: &self.mis,
                 reverse_pdf_w: vertex.reverse_pdf(d, Transport::Importance),
                 arrival_pdf_a: pdf_light * cos_camera / distance2 * visibility.flight.reverse,
+                joins: self.shared.joins(vertex.depth()),
                 merges: if S::IN_MEDIUM {
                     Merges::ZERO
                 } else {
                     techniques.camera_vertex_merge(vertex.depth(), self.history.delta)
                 },
             },
+            f64::from(*connections),
         );
         self.record.contribution(technique, value, light.p(), ratios);
         for (class, share) in shares().iter() {
@@ -246,7 +250,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         }
     }
 
-    /// Adds next-event estimation and connections with all vertices of the light path at a vertex of the camera path.
+    /// Adds next-event estimation and connections with all vertices of the light paths at a vertex of the camera path.
     #[inline]
     fn connect_all(&mut self, vertex: &impl ScatterPoint) {
         if !self.shared.connects_camera_vertex(vertex.depth()) {
@@ -256,7 +260,7 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
             self.next_event(vertex);
         }
         let longest = self.shared.camera_paths.max_depth - vertex.depth();
-        for light in self.context.vertices.iter().take_while(|light| light.depth < longest) {
+        for light in self.context.vertices.iter().filter(|light| light.depth < longest) {
             self.connect(vertex, light);
         }
     }
@@ -276,6 +280,13 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
 }
 
 impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
+    /// Connections make up for short walks, and long walks cause more of them. Without connections roulette is that of
+    /// path tracing.
+    #[inline]
+    fn spared(&self) -> f32 {
+        if self.shared.connections > 0.0 { 1.0 } else { SPARED_BY_ROULETTE }
+    }
+
     #[inline]
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
@@ -310,6 +321,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
                     photons,
                     levels: self.context.levels,
                     mis: &self.mis,
+                    joins: self.shared.joins(vertex.depth),
                     own: one_merge(self.history.delta),
                     suffix: self.history.suffix,
                     classes: camera_paths.classes,
@@ -355,7 +367,8 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.history.delta);
-        self.mis = scatter(self.mis, vertex, sample, Transport::Importance, merges);
+        let joins = self.shared.joins(vertex.depth);
+        self.mis = scatter(self.mis, vertex, sample, Transport::Importance, joins, merges);
     }
 
     #[inline]
@@ -380,8 +393,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     }
 
     #[inline]
-    fn scatter_medium(&mut self, _: &MediumVertex, sample: &BsdfSample) {
-        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, Merges::ZERO);
+    fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
+        let joins = self.shared.joins(vertex.depth);
+        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, joins, Merges::ZERO);
     }
 
     #[inline]

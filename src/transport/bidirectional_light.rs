@@ -152,7 +152,7 @@ impl<R: PathRecorder> LightWalk<'_, '_, R> {
         let ratios = if techniques.connect {
             let reverse = vertex.reverse_pdf(sample.wi, Transport::Radiance);
             let arrival = pdf_a * vertex.cos(sample.wi) * visibility.flight.reverse;
-            mis::camera(&self.mis, arrival, *light_paths, reverse)
+            mis::camera(&self.mis, self.shared.joins(vertex.depth()), arrival, *light_paths, reverse)
         } else {
             Ratios::ALONE
         };
@@ -193,12 +193,13 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
             && vertex.depth < camera_paths.max_depth
         {
             let flux = vertex.throughput / *merged_paths;
-            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis));
+            let joins = self.shared.joins(vertex.depth);
+            self.left.photons.push(MergePhoton::new(vertex, flux, self.prefix, self.group, &self.mis, joins));
         }
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && lobes.intersects(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth
         {
-            if techniques.connect {
+            if self.shared.keeps_light_vertices() {
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Surface(*vertex.surface, *vertex.shading),
                     wo: vertex.wo,
@@ -227,7 +228,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
         self.lobes = None;
         let connected = self.shared.connects_light_vertex(vertex.depth);
         if connected && !self.photons_only && vertex.depth < camera_paths.max_depth {
-            if techniques.connect {
+            if self.shared.keeps_light_vertices() {
                 self.vertices.push(LightVertex {
                     scatterer: Scatterer::Medium(vertex.arrival.p, vertex.phase()),
                     wo: vertex.wo,
@@ -251,31 +252,35 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     }
 
     #[inline]
-    fn scatter_medium(&mut self, _: &MediumVertex, sample: &BsdfSample) {
-        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, Merges::ZERO);
+    fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
+        let joins = self.shared.joins(vertex.depth);
+        self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, joins, Merges::ZERO);
     }
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 's>, sample: &BsdfSample) {
         let merges = self.shared.techniques.light_vertex_merge(vertex.depth);
-        self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, merges);
+        let joins = self.shared.joins(vertex.depth);
+        self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, joins, merges);
     }
 }
 
-/// MIS state after a surface vertex has scattered; `back` is the transport of the opposite subpath.
+/// MIS state after a surface vertex has scattered; `back` is the transport of the opposite subpath, `joins` the number of
+/// samples of the technique that joins the vertex and the previous one.
 #[inline]
 pub(super) fn scatter(
     mis: MisState,
     vertex: &Vertex<'_, '_>,
     sample: &BsdfSample,
     back: Transport,
+    joins: f64,
     merges: Merges,
 ) -> MisState {
     let cos = sample.wi.dot(vertex.surface.ng).abs();
     if sample.lobe == LobeSet::DELTA {
         return mis.scatter_delta(cos);
     }
-    mis.scatter(cos, sample.pdf_w, vertex.shading.reverse_pdf(sample.wi, back, LobeSet::ALL), merges)
+    mis.scatter(cos, sample.pdf_w, vertex.shading.reverse_pdf(sample.wi, back, LobeSet::ALL), joins, merges)
 }
 
 impl<'s> Bidirectional<'s> {

@@ -26,6 +26,12 @@
 //!
 //! Sums are in f64: densities are f32, but with tiny lights and sharp lobes products of a few of them exceed its range.
 //!
+//! Techniques may differ in their number of samples: `n` light paths, `c` light paths whose vertices each camera vertex
+//! connects to, merges with some probability. With the balance heuristic every density is multiplied by its number of
+//! samples. `n` enters the camera's dVCM and eta; the callers give `c` with the densities of connections, as `joins`:
+//! how often the two last vertices of a subpath are joined by a technique. `d_vcm` does not contain it, because at the
+//! last vertex of a subpath next-event estimation, which has one sample, may take the place of the connection.
+//!
 //! Densities do not contain roulette: weights only have to sum to one. Delta lobes count as if their forward and
 //! reverse densities were equal \[(53) to (55)\]; this neglects factors of n^2, which are equal for all techniques.
 
@@ -180,15 +186,16 @@ impl MisState {
     }
 
     /// State after scattering by a lobe that is not delta \[(34), (35)\], from the cosine, and the densities per solid
-    /// angle of the direction and of its reverse. `merges` is the [`one_merge`] of this vertex, or zero.
+    /// angle of the direction and of its reverse. `joins` is the number of samples of the technique that joins this
+    /// vertex and the previous one. `merges` is the [`one_merge`] of this vertex, or zero.
     #[must_use]
     #[inline]
-    pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, merges: Merges) -> MisState {
+    pub fn scatter(self, cos: f32, pdf_w: f32, reverse_pdf_w: f32, joins: f64, merges: Merges) -> MisState {
         let [cos, pdf_w, reverse_pdf_w] = [cos, pdf_w, reverse_pdf_w].map(f64::from);
         let ratio = cos / pdf_w;
         MisState {
             d_vcm: 1.0 / pdf_w,
-            plain: ratio * (self.plain * reverse_pdf_w + self.d_vcm),
+            plain: ratio * (self.plain * reverse_pdf_w + self.d_vcm * joins),
             merged: (self.merged + self.last) * (ratio * reverse_pdf_w),
             last: merges * ratio,
         }
@@ -203,11 +210,15 @@ impl MisState {
     }
 
     /// Densities of all techniques that end this subpath earlier, over the density of ending here. `reverse_pdf_w` is
-    /// the density of scattering back along the subpath.
+    /// the density of scattering back along the subpath, `joins` the number of samples of the technique that joins the
+    /// last two vertices.
     #[inline]
-    fn earlier(&self, reverse_pdf_w: f32) -> Side {
+    fn earlier(&self, reverse_pdf_w: f32, joins: f64) -> Side {
         let reverse_pdf_w = f64::from(reverse_pdf_w);
-        Side { plain: self.d_vcm + self.plain * reverse_pdf_w, merged: (self.merged + self.last) * reverse_pdf_w }
+        Side {
+            plain: self.d_vcm * joins + self.plain * reverse_pdf_w,
+            merged: (self.merged + self.last) * reverse_pdf_w,
+        }
     }
 }
 
@@ -243,21 +254,23 @@ pub struct NextEventPdfs {
     pub delta: bool,
 }
 
-/// Ratios of next-event estimation \[(44), (45)\]. Direct light is never merged.
+/// Ratios of next-event estimation \[(44), (45)\]. Direct light is never merged. `joins` is the number of samples of the
+/// technique that joins the last two vertices of the camera path.
 #[inline]
-pub fn next_event(camera: &MisState, pdfs: &NextEventPdfs) -> Ratios {
+pub fn next_event(camera: &MisState, joins: f64, pdfs: &NextEventPdfs) -> Ratios {
     let hit = if pdfs.delta { 0.0 } else { f64::from(pdfs.pdf_w) / f64::from(pdfs.light_pdf_w) };
     let arrival_pdf_a = f64::from(pdfs.arrival_pdf_a);
-    let camera = camera.earlier(pdfs.reverse_pdf_w);
+    let camera = camera.earlier(pdfs.reverse_pdf_w, joins);
     Ratios { plain: hit + 1.0 + arrival_pdf_a * camera.plain, merged: camera.merged * arrival_pdf_a, own: DVec2::ZERO }
 }
 
 /// Ratios if a light vertex is connected to the camera \[(46), (47)\]. `camera_pdf_a` is the density of a camera path's
 /// arrival per area at the vertex, `light_paths` the number of connected light paths, `reverse_pdf_w` the density of
-/// scattering back along the light path. Vertices that the camera sees directly are not merged.
+/// scattering back along the light path, `joins` the number of samples of the technique that joins its last two
+/// vertices. Vertices that the camera sees directly are not merged.
 #[inline]
-pub fn camera(light: &MisState, camera_pdf_a: f32, light_paths: f32, reverse_pdf_w: f32) -> Ratios {
-    let light = light.earlier(reverse_pdf_w);
+pub fn camera(light: &MisState, joins: f64, camera_pdf_a: f32, light_paths: f32, reverse_pdf_w: f32) -> Ratios {
+    let light = light.earlier(reverse_pdf_w, joins);
     let scale = f64::from(camera_pdf_a) / f64::from(light_paths);
     Ratios { plain: 1.0 + scale * light.plain, merged: light.merged * scale, own: DVec2::ZERO }
 }
@@ -271,15 +284,18 @@ pub struct End<'a> {
     pub reverse_pdf_w: f32,
     /// Density per area at which the other end's subpath would arrive here.
     pub arrival_pdf_a: f32,
+    /// Number of samples of the technique that joins the last two vertices of the subpath.
+    pub joins: f64,
     /// Coefficients of a merge at the vertex ([`one_merge`]), or zero if nothing is merged there.
     pub merges: Merges,
 }
 
-/// Ratios if a light vertex and a camera vertex are connected \[(40), (41)\].
+/// Ratios if a light vertex and a camera vertex are connected \[(40), (41)\], where the camera vertex connects to
+/// `connections` light paths.
 #[inline]
-pub fn connect(light: &End<'_>, camera: &End<'_>) -> Ratios {
-    let (l, e) = (light.mis.earlier(light.reverse_pdf_w), camera.mis.earlier(camera.reverse_pdf_w));
-    let (by_camera, by_light) = (f64::from(light.arrival_pdf_a), f64::from(camera.arrival_pdf_a));
+pub fn connect(light: &End<'_>, camera: &End<'_>, connections: f64) -> Ratios {
+    let [l, e] = [light, camera].map(|end| end.mis.earlier(end.reverse_pdf_w, end.joins));
+    let [by_camera, by_light] = [light, camera].map(|end| f64::from(end.arrival_pdf_a) / connections);
     Ratios {
         plain: by_camera * l.plain + 1.0 + by_light * e.plain,
         merged: (l.merged + light.merges) * by_camera + (e.merged + camera.merges) * by_light,
@@ -288,10 +304,17 @@ pub fn connect(light: &End<'_>, camera: &End<'_>) -> Ratios {
 }
 
 /// Ratios if a photon is merged with a camera vertex \[(38), (39)\], for [`Ratios::merge_weight`]. `pdf_w` and
-/// `reverse_pdf_w` are the densities of scattering along the light path and back along the camera path; `own` is the
+/// `reverse_pdf_w` are the densities of scattering along the light path and back along the camera path; `joins` are the
+/// numbers of samples of the techniques that join the last two vertices of light path and camera path; `own` is the
 /// vertex's [`one_merge`].
 #[inline]
-pub fn merge(light: &MisState, camera: &MisState, pdf_w: f32, reverse_pdf_w: f32, own: Merges) -> Ratios {
-    let (l, e) = (light.earlier(pdf_w), camera.earlier(reverse_pdf_w));
+pub fn merge(
+    (light, camera): (&MisState, &MisState),
+    joins: [f64; 2],
+    pdf_w: f32,
+    reverse_pdf_w: f32,
+    own: Merges,
+) -> Ratios {
+    let (l, e) = (light.earlier(pdf_w, joins[0]), camera.earlier(reverse_pdf_w, joins[1]));
     Ratios { plain: l.plain + e.plain, merged: own + l.merged + e.merged, own }
 }

@@ -45,7 +45,7 @@ pub use interior::{Crossing, Interior};
 pub use light::{Emitted, EqualFlux, LightPaths, Photons, emitted_flux, light_path};
 pub use light_vertex::{LightVertex, Scatterer};
 pub use pass_through::PassThroughHit;
-pub use path::{path_radiance, path_sample};
+pub use path::{SPARED_BY_ROULETTE, path_radiance, path_sample};
 pub use photon_batch::Scratch;
 pub use photon_merge::MergePhoton;
 pub use pixel_sample::{Features, PixelSample};

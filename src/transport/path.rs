@@ -24,6 +24,11 @@ use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
 
+/// Fraction of the initial throughput down to which roulette does not end a path. Roulette increases the weight of
+/// surviving paths. From the first bounce on, it would save nearly half of the time but more than double squared errors;
+/// this value is about optimal.
+pub const SPARED_BY_ROULETTE: f32 = 0.25;
+
 struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
@@ -108,10 +113,10 @@ impl<R: PathRecorder> PathTracer<'_, R> {
 }
 
 impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
-    /// Fraction of the initial throughput down to which roulette does not end a path. Roulette increases the weight of
-    /// surviving paths. From the first bounce on, it would save nearly half of the time but more than double squared
-    /// errors; this value is about optimal.
-    const SPARED: f32 = 0.25;
+    #[inline]
+    fn spared(&self) -> f32 {
+        SPARED_BY_ROULETTE
+    }
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         record_surface(&mut self.history, vertex, scattered, self.sample);

@@ -23,7 +23,7 @@ pub struct MergePhoton {
     pub ng: Vec3,
     /// Flux (W), already divided by the number of merged light paths of the iteration.
     pub flux: Rgb,
-    /// Partial sums of MIS weights: dVCM, and the coefficients of dVC. On light paths all merges count with one
+    /// Partial sums of MIS weights: dVCM times its number of samples, and the coefficients of dVC. On light paths all merges count with one
     /// coefficient.
     d_vcm: f32,
     plain: f32,
@@ -63,15 +63,23 @@ fn single(sum: f64) -> f32 {
 }
 
 impl MergePhoton {
-    /// The photon that a light path leaves at `vertex`.
+    /// The photon that a light path leaves at `vertex`. `joins` is the number of samples of the technique that joins the
+    /// last two vertices of the light path.
     #[inline]
-    pub fn new(vertex: &Vertex<'_, '_>, flux: Rgb, prefix: LightPrefix, group: Group, mis: &MisState) -> MergePhoton {
+    pub fn new(
+        vertex: &Vertex<'_, '_>,
+        flux: Rgb,
+        prefix: LightPrefix,
+        group: Group,
+        mis: &MisState,
+        joins: f64,
+    ) -> MergePhoton {
         MergePhoton {
             p: vertex.surface.p,
             wi: vertex.wo,
             ng: vertex.surface.ng,
             flux,
-            d_vcm: single(mis.d_vcm),
+            d_vcm: single(mis.d_vcm * joins),
             plain: single(mis.plain),
             merged: single(mis.merged.y + mis.last.y),
             depth: vertex.depth.min(u32::from(u16::MAX)) as u16,
@@ -81,7 +89,7 @@ impl MergePhoton {
         }
     }
 
-    /// Partial sums of MIS weights of the light path at the photon.
+    /// Partial sums of MIS weights of the light path at the photon, whose dVCM contains its number of samples.
     #[inline]
     pub fn mis(&self) -> MisState {
         let [d_vcm, plain, merged] = [self.d_vcm, self.plain, self.merged].map(f64::from);
@@ -95,6 +103,8 @@ pub(super) struct Merge<'a> {
     pub levels: &'a MergeLevels,
     /// Partial sums of MIS weights of the camera path at the vertex.
     pub mis: &'a MisState,
+    /// Number of samples of the technique that joins the last two vertices of the camera path.
+    pub joins: f64,
     /// Coefficients with which a merge at this vertex counts in MIS weights ([`mis::one_merge`]).
     pub own: Merges,
     /// Class of the camera path up to the vertex: the kinds of its bounces.
@@ -139,16 +149,17 @@ impl Merge<'_> {
             finite &= value.is_finite();
             let shares = photon_shares.shares(photon.prefix, photon.wi, f);
             let reverse = shading.reverse_pdf(photon.wi, Transport::Importance, LobeSet::ALL);
-            let ratios = mis::merge(&photon.mis(), self.mis, pdf, reverse, self.own);
+            let ratios = mis::merge((&photon.mis(), self.mis), [1.0, self.joins], pdf, reverse, self.own);
             let technique = Technique::Merge { light: u32::from(photon.depth), camera: vertex.depth };
             record.contribution(technique, value, photon.p, ratios);
             for (level, (&radius2, &eta)) in radii.iter().zip(self.levels.eta()).enumerate() {
                 if distance2 < radius2 {
                     let weight = ratios.merge_weight(eta);
+                    let area = radius2 * self.levels.probability();
                     for (class, share) in shares.iter() {
-                        let light = value * share * (FRAC_1_PI / radius2);
+                        let light = value * share * (FRAC_1_PI / area);
                         record.arrival(technique, (class, photon.group), level, light, weight);
-                        add(class, level, value * share * (weight * FRAC_1_PI / radius2));
+                        add(class, level, value * share * (weight * FRAC_1_PI / area));
                     }
                 }
             }

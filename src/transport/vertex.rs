@@ -132,12 +132,15 @@ pub enum Next {
 /// Receives the vertices of a walk, which traces one path, and decides how the path continues. Each rendering algorithm
 /// is a visitor.
 pub trait Visitor<'a> {
-    /// Fraction of the initial throughput down to which roulette does not end a path (except trapped light). Below it,
-    /// a path survives with probability throughput over that fraction.
-    const SPARED: f32 = 1.0;
     /// Whether the walk splits at media (`flight.rs`): it shows one vertex in every medium and continues to the surface
     /// behind without scattering there.
     const SPLITS: bool = false;
+    /// Fraction of the initial throughput down to which roulette does not end a path (except trapped light). Below it,
+    /// a path survives with probability throughput over that fraction.
+    #[inline]
+    fn spared(&self) -> f32 {
+        1.0
+    }
     /// The path arrives at a surface vertex; the result decides how it continues. `scattered` describes the scattering
     /// at the previous vertex; `None` at the first.
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next;

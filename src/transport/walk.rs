@@ -101,7 +101,7 @@ fn walk_in<'a, V: Visitor<'a>, const BESIDES: u8>(
 ) {
     let PathStart { origin, direction, throughput, interior, leaving, ref first, far, channel, wavelength_sample } =
         *start;
-    let survival_scale = 1.0 / (V::SPARED * throughput.max_element());
+    let survival_scale = 1.0 / (visitor.spared() * throughput.max_element());
     if !(survival_scale.is_finite() && throughput.is_finite()) {
         end(throughput, visitor);
         return;

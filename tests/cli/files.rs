@@ -248,6 +248,36 @@ fn small_pictures_have_few_guided_light_paths() {
     }
 }
 
+/// The number of light paths per pixel is a multiple of a sixteenth. Without light paths the method is `path`, without
+/// merging `bdpt`; options that would have no effect are refused.
+#[test]
+fn numbers_of_light_paths_connections_and_merges_are_options() {
+    let folder = Folder::new();
+    let vcm = "render scene.glb --width 48 --height 36 --iterations 1 --no-finish --progress none --method vcm";
+    for (options, method, paths) in [
+        ("--light-paths 2", "vcm", 2 * 48 * 36),
+        ("--light-paths 0.0625 --connections 0 --merging 0.5", "vcm", 48 * 36 / 16),
+        ("--light-paths 0.25 --merging 0", "bdpt", 48 * 36 / 4),
+        ("--light-paths 0", "path", 0),
+    ] {
+        let outcome = folder.run(&format!("{vcm} {options} -o out.exr"));
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        let header = folder.read("out.exr").1;
+        assert_eq!((&header["plan"]["method"], &header["light_paths"]), (&method.into(), &paths.into()), "{options}");
+    }
+    for (options, cause) in [
+        ("--light-paths 0.3", "--light-paths must be a multiple of 1/16"),
+        ("--light-paths 0 --connections 1", "--connections needs light paths, and --light-paths 0 traces none"),
+        ("--light-paths 0 --merging 1", "--merging needs light paths, and --light-paths 0 traces none"),
+        ("--method path --light-paths 1", "--light-paths has no effect with --method path"),
+        ("--method bdpt --merging 1", "--merging has no effect with --method bdpt"),
+    ] {
+        let refused = folder.run(&format!("{vcm} {options} -o out.exr"));
+        let expected = format!("command line: {cause}\nhint: ");
+        assert!(refused.code == Some(2) && refused.stderr.starts_with(&expected), "{}", refused.stderr);
+    }
+}
+
 /// A photon map that is full ends tracing early with a warning, and the picture is not darker.
 #[test]
 fn a_full_photon_map_gives_a_warning_and_loses_no_light() {

@@ -10,7 +10,7 @@ use crate::support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::render::{Control, Levels, Method, Rendered, Settings, Shard};
+use caustique::render::{Control, Counts, Levels, Method, Rendered, Settings, Shard};
 use caustique::scene::description::{
     EnvironmentDescription, EnvironmentSource, Projection, PunctualKind, PunctualLight,
 };
@@ -396,6 +396,104 @@ fn one_large_photon_map() {
     println!("one map: {:.5}, paths {:.5}", average(&images), average(&reference));
     let found = disagreeing(&images, &reference, TILES, 0.03);
     assert!(found.is_empty(), "{found:#?}");
+}
+
+// ---------------------------------------------------------------- numbers of samples
+
+/// Light paths per pixel in sixteenths, connections, probability of merging: the ends of all ranges, and shared light
+/// paths.
+const COUNTS: [(u32, u32, f32); 7] =
+    [(1, 0, 0.1), (1, 4, 1.0), (3, 1, 0.0), (4, 0, 1.0), (16, 4, 0.5), (32, 0, 0.0), (64, 2, 0.25)];
+
+fn with_counts((light_paths, connections, merging): (u32, u32, f32), settings: Settings) -> Settings {
+    let counts = Counts { light_paths, connections, merging };
+    Settings { method: Method::Vcm, counts, ..settings }.without_unused_techniques()
+}
+
+/// In a closed box whose walls emit and reflect, radiance is known; any numbers of samples find it.
+#[test]
+fn furnace_box_with_any_numbers_of_samples() {
+    let (rho, e) = (0.5, 0.5);
+    let mut description = Description::default();
+    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(rho, e));
+    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
+    let scene = build(description);
+    let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 };
+    for counts in COUNTS {
+        let mean = |seed| {
+            let settings = with_counts(counts, settings(400, 0.1, seed));
+            let rendered = render(&scene, settings.method, 8, &settings);
+            (0..64).map(|i| value(&rendered, 0, i)).sum::<f64>() / 64.0
+        };
+        let values: Vec<f64> = (0..12).map(mean).collect();
+        check.run(COUNTS.len(), &format!("furnace, {counts:?}"), &values);
+    }
+}
+
+/// Any numbers of samples give the picture of path tracing, tile by tile. A tile brighter by a fifth is rejected.
+#[test]
+fn any_numbers_of_samples_agree_with_path_tracing() {
+    let scene = small_room();
+    let reference = by(&scene, (Method::Path, 24), 0.06, u32::MAX);
+    let images = |counts: (u32, u32, f32)| -> Vec<Vec<f64>> {
+        let of_seed = |seed| {
+            let settings = with_counts(counts, settings(24, 0.06, seed));
+            tiles(&render(&scene, settings.method, SIZE, &settings), 0)
+        };
+        (0..SEEDS).map(of_seed).collect()
+    };
+    let tests = TILES * COUNTS.len();
+    for counts in COUNTS {
+        let mut images = images(counts);
+        println!("{counts:?}: {:.5}, paths {:.5}", average(&images), average(&reference));
+        let found = disagreeing(&images, &reference, tests, 0.02);
+        assert!(found.is_empty(), "{counts:?}: {found:#?}");
+        images.iter_mut().for_each(|seed| seed[5] *= 1.2);
+        assert!(!disagreeing(&images, &reference, tests, 0.02).is_empty(), "{counts:?}: a bright tile is not detected");
+    }
+}
+
+/// Without light paths vcm is path tracing, and without merging bdpt, to the last bit.
+#[test]
+fn techniques_without_samples_leave_the_other_methods() {
+    let scene = small_room();
+    let settings = settings(3, 0.06, 5);
+    let pixels = |settings: &Settings| -> Vec<[f64; 3]> {
+        let rendered = render(&scene, settings.method, 24, settings);
+        rendered.pixels.iter().map(|pixel| pixel.mean(0).to_array()).collect()
+    };
+    for (counts, method) in [((0, 0, 0.0), Method::Path), ((16, 1, 0.0), Method::Bdpt)] {
+        let reduced = with_counts(counts, settings.clone());
+        assert_eq!(reduced.method, method);
+        assert!(pixels(&reduced) == pixels(&Settings { method, ..settings.clone() }), "{counts:?}");
+    }
+}
+
+/// Shards, threads and windows of renders that share light paths among pixels give the bits of the whole.
+#[test]
+fn shared_light_paths_do_not_depend_on_threads_and_shards() {
+    let scene = small_room();
+    for counts in COUNTS {
+        let base = with_counts(counts, settings(4, 0.08, 7));
+        let all = |rendered: &Rendered| -> Vec<[f64; 3]> {
+            rendered.pixels.iter().map(|pixel| pixel.mean(0).to_array()).collect()
+        };
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            all(&pool.install(|| render(&scene, base.method, 40, &base)))
+        };
+        let whole = with(1);
+        assert!(whole == with(3), "{counts:?}: threads change the picture");
+        let shard = |index| {
+            let settings = Settings { shard: Shard { index, count: 2 }, ..base.clone() };
+            render(&scene, base.method, 40, &settings)
+        };
+        let mut joined = shard(1);
+        for (pixel, other) in joined.pixels.iter_mut().zip(shard(0).pixels) {
+            pixel.join(other);
+        }
+        assert!(whole == all(&joined), "{counts:?}: shards make another picture");
+    }
 }
 
 // ---------------------------------------------------------------- levels, shards, threads

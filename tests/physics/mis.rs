@@ -5,6 +5,7 @@
 //! sample the path, and must reproduce the weight of the recursion. Then the recursion is run over the same vertices
 //! for all techniques of a path. The weights must sum to one, and must not if a bug is planted.
 
+mod counts;
 mod sums;
 
 use crate::support;
@@ -24,8 +25,8 @@ use caustique::scene::{Description, Scene};
 use caustique::transport::mis::{self, Eta, Merges, MisState, Ratios, one_merge};
 use caustique::transport::{
     Bidirectional, CameraPaths, CameraWalkContext, Deposits, Indirect, InitialMedia, LightPaths, LightVertices,
-    MediumVertex, MergeLevels, Next, PathRecorder, PathStart, PixelSample, Scattered, Technique, TechniqueSet, Vertex,
-    Visitor, lit_side, walk,
+    MediumVertex, MergeLevels, Next, PathRecorder, PathStart, PixelSample, SPARED_BY_ROULETTE, Scattered, Technique,
+    TechniqueSet, Vertex, Visitor, lit_side, walk,
 };
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 
@@ -78,11 +79,17 @@ impl Met<'_> {
 /// Records a walk.
 struct Notes<'a> {
     scene: &'a Scene,
+    /// Fraction of the initial throughput down to which roulette does not end the path.
+    spared: f32,
     met: Vec<Met<'a>>,
     escaped: Option<Vec3>,
 }
 
 impl<'a> Visitor<'a> for Notes<'a> {
+    fn spared(&self) -> f32 {
+        self.spared
+    }
+
     fn surface(&mut self, v: &Vertex<'_, 'a>, _: Option<Scattered>) -> Next {
         let from = self.met.last().map_or(Receiver::anywhere(v.from), Met::receiver);
         let emitted = self.scene.lights.emitted(&self.scene.materials, &from, v.surface, v.wo).map(|e| e.1);
@@ -130,8 +137,14 @@ impl<'a> Visitor<'a> for Notes<'a> {
     }
 }
 
-fn notes<'a>(scene: &'a Scene, arena: &'a Bump, start: PathStart, stream: Stream, transport: Transport) -> Notes<'a> {
-    let mut notes = Notes { scene, met: Vec::new(), escaped: None };
+fn notes<'a>(
+    scene: &'a Scene,
+    arena: &'a Bump,
+    start: PathStart,
+    stream: Stream,
+    (transport, spared): (Transport, f32),
+) -> Notes<'a> {
+    let mut notes = Notes { scene, spared, met: Vec::new(), escaped: None };
     walk(scene, arena, &start, stream, transport, 12, &mut notes);
     notes
 }
@@ -160,6 +173,8 @@ struct Whole<'s> {
     media: Vec<Option<MediumParameters>>,
     /// Density per solid angle of the rays of one pixel.
     camera_pdf_w: f64,
+    /// Number of light paths that a camera path connects to.
+    connections: f64,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -278,7 +293,7 @@ impl<'s> Whole<'s> {
                 self.scatters(0, true) * measure * self.flies(0, false) * eye(0)
             }
             Candidate::NextEvent if smooth(0) => f64::from(self.light.direct) * eye(0),
-            Candidate::Connect(s) if smooth(s - 1) && smooth(s) => light(s) * eye(s),
+            Candidate::Connect(s) if smooth(s - 1) && smooth(s) => self.connections * light(s) * eye(s),
             Candidate::Camera if smooth(k - 1) => light_paths * light(k),
             Candidate::Merge(m) => {
                 let (from_light, from_camera) = (m as u32 + 1, (k - m) as u32);
@@ -316,6 +331,8 @@ impl<'s> Whole<'s> {
         let by_light = |j: usize, merges: bool| one(merges && !self.in_medium(j), bug == Some(Bug::NothingShared));
         let by_camera =
             |j: usize| one(which.camera_vertex_merges((k - j) as u32) && !self.in_medium(j), self.is_clear(j));
+        // The number of samples of the technique that joins the last two vertices of a subpath of `length` vertices.
+        let joins = |length: usize| if length == 1 || bug == Some(Bug::OneConnection) { 1.0 } else { self.connections };
         let cosine = |c: f64| if bug == Some(Bug::Cosine) { 1.0 } else { c as f32 };
         let flight = |j: usize, eye_side: bool| {
             let FlightDensity { forward, reverse } =
@@ -336,7 +353,7 @@ impl<'s> Whole<'s> {
             if bug == Some(Bug::Reverse) {
                 (forward, reverse) = (reverse, forward);
             }
-            mis.scatter(cos, forward, reverse, merges)
+            mis.scatter(cos, forward, reverse, joins(if to_light { k - j } else { j + 1 }), merges)
         };
         let (mut lights, mut eyes) = (Vec::new(), vec![MisState::default(); k]);
         let chosen = if bug == Some(Bug::Chosen) { 1.0 } else { self.light.direct / self.light.start };
@@ -386,30 +403,33 @@ impl<'s> Whole<'s> {
                         arrival_pdf_a: arrival,
                         delta: self.light.delta,
                     };
-                    mis::next_event(&eyes[0], &pdfs).weight(eta)
+                    mis::next_event(&eyes[0], joins(k), &pdfs).weight(eta)
                 }
                 Candidate::Connect(s) => {
                     let light = mis::End {
                         mis: &lights[s - 1],
                         reverse_pdf_w: reverse(s - 1, true),
                         arrival_pdf_a: self.eye_pdf_a(s - 1) as f32,
+                        joins: joins(s),
                         merges: by_light(s - 1, which.light_vertex_merges(s as u32)),
                     };
                     let eye = mis::End {
                         mis: &eyes[s],
                         reverse_pdf_w: reverse(s, false),
                         arrival_pdf_a: self.light_pdf_a(s) as f32,
+                        joins: joins(k - s),
                         merges: by_camera(s),
                     };
-                    mis::connect(&light, &eye).weight(eta)
+                    mis::connect(&light, &eye, self.connections).weight(eta)
                 }
                 Candidate::Camera => {
                     let (pdf_a, back) = (self.eye_pdf_a(k - 1) as f32, reverse(k - 1, true));
-                    mis::camera(&lights[k - 1], pdf_a, light_paths as f32, back).weight(eta)
+                    mis::camera(&lights[k - 1], joins(k), pdf_a, light_paths as f32, back).weight(eta)
                 }
                 Candidate::Merge(m) => {
-                    mis::merge(&lights[m], &eyes[m], reverse(m, true), reverse(m, false), by_camera(m))
-                        .merge_weight(eta)
+                    let subpaths = (&lights[m], &eyes[m]);
+                    let joins = [joins(m + 1), joins(k - m)];
+                    mis::merge(subpaths, joins, reverse(m, true), reverse(m, false), by_camera(m)).merge_weight(eta)
                 }
             })
         };
@@ -431,10 +451,19 @@ enum Bug {
     Chosen,
     /// Merges at the vertices of light paths count as independent; those of camera paths do not.
     NothingShared,
+    /// Subpaths count one connection, whatever their number is.
+    OneConnection,
 }
 
-const BUGS: [Bug; 6] =
-    [Bug::Cosine, Bug::Reverse, Bug::DirectMerged, Bug::FlightDensity, Bug::Chosen, Bug::NothingShared];
+const BUGS: [Bug; 7] = [
+    Bug::Cosine,
+    Bug::Reverse,
+    Bug::DirectMerged,
+    Bug::FlightDensity,
+    Bug::Chosen,
+    Bug::NothingShared,
+    Bug::OneConnection,
+];
 
 /// The contributions that the library has reported.
 #[derive(Default)]
@@ -475,6 +504,18 @@ struct Tally {
     in_media: usize,
 }
 
+/// Numbers of samples of the techniques.
+#[derive(Clone, Copy, Debug)]
+struct Samples {
+    /// Light paths per pixel.
+    light_paths: f32,
+    connections: f32,
+    /// Probability that a camera path merges.
+    merging: f32,
+}
+
+const ONE_OF_EACH: Samples = Samples { light_paths: 1.0, connections: 1.0, merging: 1.0 };
+
 /// A scene and the data that weights need.
 struct Lab<'a> {
     scene: &'a Scene,
@@ -488,7 +529,13 @@ struct Lab<'a> {
 }
 
 impl<'a> Lab<'a> {
-    fn new(scene: &'a Scene, camera: &'a Camera, initial_media: &'a InitialMedia, radius: f32) -> Lab<'a> {
+    fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        initial_media: &'a InitialMedia,
+        radius: f32,
+        samples: Samples,
+    ) -> Lab<'a> {
         let camera_paths = CameraPaths {
             scene,
             camera,
@@ -498,18 +545,20 @@ impl<'a> Lab<'a> {
             classes: ClassSet::ALL,
             stop: None,
         };
-        let pixels = (SIZE * SIZE) as f32;
+        let light_paths = (SIZE * SIZE) as f32 * samples.light_paths;
         let techniques = TechniqueSet::VCM;
         let shared = Bidirectional {
             camera_paths,
             initial_media,
             techniques,
-            light_paths: pixels,
-            merged_paths: 2.0 * pixels,
+            light_paths,
+            connections: samples.connections,
+            merged_paths: 2.0 * light_paths,
             only: None,
         };
-        let eta = Eta::new(radius * radius, 2.0 * pixels).sharing_camera_path(SHARING);
-        let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(2.0 * pixels);
+        let merged = 2.0 * light_paths * samples.merging;
+        let eta = Eta::new(radius * radius, merged).sharing_camera_path(SHARING);
+        let oracle = std::f64::consts::PI * f64::from(radius * radius) * f64::from(merged);
         // Wider than eta implies, so that many photons are merged. Weights do not depend on distances.
         let levels = MergeLevels::new(std::iter::once((36.0 * radius * radius, eta)));
         Lab { scene, camera, initial_media, shared, levels, eta, oracle }
@@ -524,7 +573,7 @@ impl<'a> Lab<'a> {
     /// All whole paths that a random pair of subpaths is combined to.
     fn paths(&self, path: u32, mut each: impl FnMut(Technique, Candidate, &Whole<'_>, Ratios)) {
         let Lab { scene, camera, initial_media, shared, ref levels, .. } = *self;
-        let (camera_paths, pixels) = (shared.camera_paths, shared.light_paths);
+        let (camera_paths, pixels) = (shared.camera_paths, (SIZE * SIZE) as f32);
         let (pass, index) = (u64::from(path / (SIZE * SIZE)), path % (SIZE * SIZE));
         let lights = LightPaths::new(1, pass, Domain::Light, SIZE * SIZE, 12);
         let stream = Stream::new(1, pass, Domain::CameraIndependent, u64::from(index));
@@ -545,9 +594,12 @@ impl<'a> Lab<'a> {
         );
 
         let start = camera_paths.start(pixel, stream);
-        let eye_notes = notes(scene, &arena, start, stream, Transport::Radiance);
+        // Without connections, roulette of camera paths is that of path tracing.
+        let spared = if shared.connections > 0.0 { 1.0 } else { SPARED_BY_ROULETTE };
+        let eye_notes = notes(scene, &arena, start, stream, (Transport::Radiance, spared));
         let emitted = lights.emit(scene, initial_media, index);
-        let light_notes = emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, Transport::Importance));
+        let light_notes =
+            emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, (Transport::Importance, 1.0)));
         let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);
         let from_camera = &eye_notes.met[..];
         let camera_pdf_w = f64::from(camera.pdf_w(start.direction) * pixels);
@@ -565,6 +617,7 @@ impl<'a> Lab<'a> {
                 distance2: vec![],
                 media: vec![],
                 camera_pdf_w,
+                connections: f64::from(shared.connections),
             };
             let strategy = match technique {
                 Technique::Hit { camera: 1 } => continue,
@@ -690,11 +743,16 @@ fn name(strategy: Candidate) -> &'static str {
     }
 }
 
-/// Compares all contributions of `paths` random pairs of subpaths.
+/// Compares all contributions of `paths` random pairs of subpaths, with one sample of each technique.
 fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
+    check_samples(what, scene, radius, paths, ONE_OF_EACH, &BUGS);
+}
+
+/// Compares all contributions of `paths` random pairs of subpaths. The weights must not sum to one with any of `bugs`.
+fn check_samples(what: &str, scene: &Scene, radius: f32, paths: u32, samples: Samples, bugs: &[Bug]) {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
-    let lab = Lab::new(scene, &camera, &initial_media, radius);
+    let lab = Lab::new(scene, &camera, &initial_media, radius, samples);
     let Bidirectional { techniques, light_paths, .. } = lab.shared;
     let mut tally = Tally { weights: 0, techniques: Default::default(), sums: 0, bugs: [0.0; BUGS.len()], in_media: 0 };
     for path in 0..paths {
@@ -726,13 +784,17 @@ fn check(what: &str, scene: &Scene, radius: f32, paths: u32) {
         "{what}: {} weights, {} with media, {} sums, {:?}; planted bugs {:?}",
         tally.weights, tally.in_media, tally.sums, tally.techniques, tally.bugs
     );
-    assert!(tally.techniques.len() >= 4 && tally.weights > 1000, "{what}: too little happened");
+    assert!(
+        tally.techniques.len() >= 4 - usize::from(samples.connections == 0.0) && tally.weights > 1000,
+        "{what}: too little happened"
+    );
     let media = scene.survey.scattering;
     assert_eq!(tally.in_media > tally.weights / 4, media, "{what}: {} paths through media", tally.in_media);
-    for (bug, worst) in BUGS.into_iter().zip(tally.bugs) {
+    for (bug, worst) in BUGS.into_iter().zip(tally.bugs).filter(|(bug, _)| bugs.contains(bug)) {
         // Some bugs need a scene with the feature that they ignore.
         let possible = match bug {
             Bug::FlightDensity => media,
+            Bug::OneConnection => samples.connections != 1.0,
             // The triangles of a lamp have equal probabilities for emission and for next-event estimation.
             Bug::Chosen => {
                 let emitters = scene.lights.emitters();

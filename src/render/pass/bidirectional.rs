@@ -1,10 +1,11 @@
 //! The methods that walk pairs of paths: light tracing, bidirectional path tracing, bidirectional photon mapping, and
 //! vertex connection and merging.
 //!
-//! The unit of work is a tile of constant size. For each of its pixels a tile walks a light path and then a camera
-//! path. If the film is a window and nothing is merged, the light paths of all other pixels are walked, too, so that
-//! the window has the bits of the whole picture. Each tile lists the light that its light paths send to other pixels;
-//! the receiving tiles add it in the order of the sending tiles, so sums do not depend on threads. Photons are
+//! The unit of work is a tile of constant size. For each of its pixels a tile walks light paths and then a camera path.
+//! Neighbouring pixels share light paths if there are fewer of them than pixels, or if a camera path connects to more
+//! than its own. If the film is a window and nothing is merged, the light paths of all other pixels are walked, too, so
+//! that the window has the bits of the whole picture. Each tile lists the light that its light paths send to other
+//! pixels; the receiving tiles add it in the order of the sending tiles, so sums do not depend on threads. Photons are
 //! concatenated likewise, for the next iteration.
 //!
 //! With bandwidth levels every pixel has two pairs of paths. Level 1 comes from the first pair, the other levels from
@@ -12,27 +13,28 @@
 
 use super::guiding::learn_guide;
 use super::integrator::{Integrator, Work};
+use super::light_cells::{LightCells, TracedPaths};
 use super::photon_counts::PhotonCounts;
 use super::sample_buffer::{self, SampleBuffer, SampleBufferPart};
 use super::techniques::{FilmRecorder, TechniquePicture, TileRecorder};
-use super::tiles::{PixelBlock, TILE_PIXELS, Tiles, WholeTile};
-use crate::camera::{Camera, GROUP_SIZE};
+use super::tiles::{BLOCK, PixelBlock, SlotPixel, TILE_PIXELS, Tiles, WholeTile};
+use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, PixelAccumulator, Schedule, level_factor2};
 use crate::light::Guide;
 use crate::photon::{ByKind, PhotonMap};
 use crate::plan::{CameraSuffix, Event, Part};
-use crate::random::{Domain, Streams};
+use crate::random::{Domain, Purpose, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::spectrum::IterationWavelengths;
+use crate::spectrum::{IterationWavelengths, WavelengthSample};
 use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraPaths, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertices, MergeLevels,
-    MergePhoton, PixelSample, Splat, TechniqueSet,
+    Bidirectional, CameraPathStart, CameraPaths, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertex,
+    LightVertices, MergeLevels, MergePhoton, PixelSample, Splat, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -64,6 +66,7 @@ pub struct Passes<'a> {
     guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
     tiles: Tiles,
+    cells: LightCells,
     /// Tiles whose light paths are traced, and, in `left`, the photons and splats of these paths. The lists keep their
     /// capacity over iterations.
     sources: Vec<WholeTile>,
@@ -73,8 +76,8 @@ pub struct Passes<'a> {
     /// Number of the iteration that traced the photons, and their map; `None` before the first one.
     photons: Option<(u64, PhotonMap<MergePhoton>)>,
     recorder: FilmRecorder,
-    /// Expected number of photons within the largest initial bandwidth: one light path starts per pixel, so it is the
-    /// number of pixels that the bandwidth covers.
+    /// Number of pixels that the largest initial bandwidth covers: the expected number of photons within it if one light
+    /// path starts per pixel.
     covered: f32,
     /// Initial radii of the largest bandwidth level of all pixels (scene units), apart from the accumulators: every
     /// iteration reads them before its camera paths, and the accumulators, a kilobyte each, would miss the cache.
@@ -101,11 +104,20 @@ impl<'a> Passes<'a> {
         let tiles = Tiles::new(camera);
         let sources: Vec<WholeTile> =
             if techniques.merge { tiles.film_tiles().collect() } else { tiles.whole_tiles().collect() };
-        let pixels = light_paths(camera, techniques) as f32;
+        let [film, whole] = [(camera.whole()[1], camera.size()), ((0, 0), camera.whole()[0])];
+        let (at, size) = if techniques.merge { film } else { whole };
+        let cells = LightCells::new(settings.counts, at, size);
+        let light_paths = cells.count() as f32;
         let camera_paths = settings.camera_paths(scene, camera, initial_media);
-        let merged_paths = pixels * pairs.len() as f32;
-        let shared =
-            Bidirectional { camera_paths, initial_media, techniques, light_paths: pixels, merged_paths, only: None };
+        let shared = Bidirectional {
+            camera_paths,
+            initial_media,
+            techniques,
+            light_paths,
+            connections: settings.counts.connections as f32,
+            merged_paths: light_paths * pairs.len() as f32,
+            only: None,
+        };
         let guide =
             settings.guided.then(|| learn_guide(&camera_paths, initial_media, settings, None)).flatten().map(Arc::new);
         let samples = pairs.iter().map(|pair| SampleBuffer::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
@@ -118,6 +130,7 @@ impl<'a> Passes<'a> {
             guide,
             pairs,
             tiles,
+            cells,
             left: sources.iter().map(|_| Deposits::default()).collect(),
             sources,
             samples,
@@ -134,8 +147,7 @@ impl<'a> Passes<'a> {
 
     fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPaths<'g> {
         let Settings { seed, max_depth, .. } = *self.settings;
-        let paths = light_paths(self.camera, self.shared.techniques);
-        let pass = LightPaths::new(seed, i, pair.light, paths, max_depth).guided(guide);
+        let pass = LightPaths::new(seed, i, pair.light, self.cells.count(), max_depth).guided(guide);
         // Methods without merging connect paths of one pixel only, so any wavelength will do, and light paths of a
         // pixel can follow a low-discrepancy sequence over iterations. Photons serve all pixels and gain nothing from
         // that.
@@ -148,24 +160,25 @@ impl<'a> Passes<'a> {
 
     /// Traces the photons of iteration `i`, if it was not rendered in this process.
     fn photons_of(&self, i: u64) -> PhotonMap<MergePhoton> {
-        let (shared, tiles) = (self.shared, self.tiles);
+        let Passes { shared, tiles, cells, .. } = *self;
         let mut parts = Vec::new();
         // In the order of an iteration, so that sums over coincident photons have equal bits.
         for pair in &self.pairs {
             let pass = self.light_pass(i, pair, self.guide.as_deref());
-            let walk = |tile| {
-                let (mut left, mut arena) = (Deposits::default(), Bump::new());
-                for place in tiles.pixels(tile) {
+            let walk = |tile: &WholeTile| {
+                let (mut left, mut arena, mut traced) = (Deposits::default(), Bump::new(), TracedPaths::new());
+                for pixel in tiles.blocks(*tile).flat_map(|block| block.pixels) {
                     if shared.camera_paths.is_given_up() {
                         break;
                     }
                     arena.reset();
                     let mut vertices = LightVertices::new_in(&arena);
-                    shared.light_path(&pass, place.index as u32, true, &mut vertices, &mut left, &mut ());
+                    let tracer = LightTracer { shared: &shared, cells: &cells, paths: &pass, photons_only: true };
+                    tracer.trace_cell_at(pixel, &mut vertices, &mut traced, &mut left);
                 }
                 left.photons
             };
-            parts.par_extend((0..tiles.count()).into_par_iter().map(walk));
+            parts.par_extend(self.sources.par_iter().map(walk));
         }
         PhotonMap::build(parts.concat())
     }
@@ -191,9 +204,11 @@ impl<'a> Passes<'a> {
         let iteration = Iteration {
             shared,
             tiles: self.tiles,
+            cells: self.cells,
             map,
+            merging: self.settings.counts.merging,
             schedule: self.settings.schedule(i),
-            expected: self.covered * self.pairs.len() as f32,
+            expected: self.covered * (self.pairs.len() as f64 * self.settings.counts.light_paths_per_pixel()) as f32,
             initial: &self.initial,
         };
         for ((pair, light_paths), samples) in self.pairs.iter().zip(&light).zip(&mut self.samples) {
@@ -236,8 +251,11 @@ impl<'a> Passes<'a> {
 struct Iteration<'i, 'a> {
     shared: Bidirectional<'a>,
     tiles: Tiles,
+    cells: LightCells,
     /// Map of the photons of the previous iteration; `None` without merging.
     map: Option<&'i PhotonMap<MergePhoton>>,
+    /// Probability that a camera path merges with photons.
+    merging: f32,
     schedule: Schedule,
     /// Expected number of photons within the largest initial bandwidth.
     expected: f32,
@@ -255,6 +273,46 @@ struct PairWalks<'i> {
     streams: Streams,
 }
 
+/// Traces the light paths of cells of pixels in one iteration.
+struct LightTracer<'t, 'a> {
+    shared: &'t Bidirectional<'a>,
+    cells: &'t LightCells,
+    paths: &'t LightPaths<'t>,
+    photons_only: bool,
+}
+
+impl<'a> LightTracer<'_, 'a> {
+    /// Traces the light paths of the cell whose first pixel this is, if it is one.
+    #[inline]
+    fn trace_cell_at<'s>(
+        &self,
+        pixel: SlotPixel,
+        vertices: &mut LightVertices<'s>,
+        traced: &mut TracedPaths,
+        left: &mut Deposits,
+    ) where
+        'a: 's,
+    {
+        let Some(cell) = self.cells.starting_at(pixel) else { return };
+        traced.start_cell(cell);
+        let wavelength = self.paths.wavelength(cell.first);
+        for index in self.cells.paths(cell) {
+            if let Some(mut emitted) = self.paths.emit(self.shared.camera_paths.scene, self.shared.initial_media, index)
+            {
+                emitted.start.wavelength_sample = wavelength;
+                self.shared.light_path_of(self.paths, &emitted, self.photons_only, vertices, left, &mut ());
+            }
+            traced.end_path(vertices.len());
+        }
+    }
+
+    /// The wavelength of all paths of the cell of a pixel.
+    #[inline]
+    fn wavelength(&self, pixel: SlotPixel) -> WavelengthSample {
+        self.paths.wavelength(self.cells.cell(pixel).first)
+    }
+}
+
 impl Iteration<'_, '_> {
     /// Merging radii of a pixel at the bandwidth levels that a pair of paths samples.
     #[inline]
@@ -266,11 +324,20 @@ impl Iteration<'_, '_> {
             let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
             let eta = match (self.map.is_some(), shared.techniques.connect) {
                 (false, _) => Eta::NONE,
-                (true, true) => Eta::new(radius2, shared.merged_paths).sharing_camera_path(self.expected * shrunk),
+                (true, true) => {
+                    let merges = shared.merged_paths * self.merging;
+                    Eta::new(radius2, merges).sharing_camera_path(self.expected * shrunk)
+                }
                 (true, false) => Eta::MERGE_ONLY,
             };
             (radius2, eta)
         }))
+        .with_probability(self.merging)
+    }
+
+    /// The photons that a camera path merges with: all, or none if the random number `u` is above the probability.
+    fn photons_of_path(&self, u: impl FnOnce() -> f32) -> Option<&PhotonMap<MergePhoton>> {
+        self.map.filter(|_| self.merging >= 1.0 || u() < self.merging)
     }
 
     /// Traces the light paths of a tile, and its camera paths if the tile is on the film.
@@ -281,35 +348,68 @@ impl Iteration<'_, '_> {
         mut film: Option<(SampleBufferPart<'_>, &mut W)>,
         left: &mut Deposits,
     ) {
-        let shared = self.shared;
+        let Iteration { shared, cells, tiles, .. } = self;
         left.clear();
-        let (mut arena, mut sample) = (Bump::new(), PixelSample::default());
-        for PixelBlock { keys, places } in self.tiles.blocks(tile) {
+        let tracer = LightTracer { shared, cells, paths: walks.light_paths, photons_only: false };
+        let (mut arenas, mut traced) = ([Bump::new(), Bump::new()], TracedPaths::new());
+        let together = cells.slots_together(BLOCK);
+        let whole_tile = Bump::new();
+        let mut of_tile = LightVertices::new_in(&whole_tile);
+        if together.is_none() {
+            for pixel in tiles.blocks(tile).flat_map(|block| block.pixels) {
+                tracer.trace_cell_at(pixel, &mut of_tile, &mut traced, left);
+            }
+        }
+        for PixelBlock { pixels, places } in tiles.blocks(tile) {
             if shared.camera_paths.is_given_up() {
                 return;
             }
             let mut starts =
                 film.as_ref().map(|_| shared.camera_paths.starts(&places, walks.streams)).unwrap_or_default();
-            for k in 0..GROUP_SIZE {
-                let of_film = places[k].map(|place| place.index);
-                let Some(index) = (if shared.techniques.merge { of_film } else { keys[k] }) else { continue };
-                let index = index as u32;
-                arena.reset();
-                let mut vertices = LightVertices::new_in(&arena);
-                shared.light_path(walks.light_paths, index, false, &mut vertices, left, &mut ());
-                let (Some((samples, recorder)), Some(place), Some(start)) = (&mut film, &places[k], &mut starts[k])
-                else {
-                    continue;
-                };
-                // Both paths take one wavelength, so that they can be connected.
-                start.0.wavelength_sample = walks.light_paths.wavelength(index);
-                let levels = self.levels(place.index as u32, walks.pair);
-                let context = CameraWalkContext { vertices: &vertices, photons: self.map, levels: &levels };
-                recorder.select_pixel(place.at, walks.own);
-                shared.camera_path(&arena, start, &context, *recorder, &mut sample);
-                samples.set(place.at, &sample);
+            let step = together.unwrap_or(GROUP_SIZE);
+            for first in (0..GROUP_SIZE).step_by(step) {
+                let [light_arena, camera_arena] = &mut arenas;
+                light_arena.reset();
+                let mut vertices = LightVertices::new_in(light_arena);
+                if together.is_some() {
+                    traced.clear();
+                    for pixel in &pixels[first..first + step] {
+                        tracer.trace_cell_at(*pixel, &mut vertices, &mut traced, left);
+                    }
+                }
+                let vertices = if together.is_some() { &vertices } else { &of_tile };
+                for k in first..first + step {
+                    let (Some((samples, recorder)), Some(place), Some(start)) = (&mut film, &places[k], &mut starts[k])
+                    else {
+                        continue;
+                    };
+                    camera_arena.reset();
+                    let connected = &vertices[traced.connected(cells, pixels[k])];
+                    // All paths of a cell take one wavelength, so that they can be connected.
+                    start.0.wavelength_sample = tracer.wavelength(pixels[k]);
+                    self.camera_path(walks, camera_arena, (place, start), connected, (samples, *recorder));
+                }
             }
         }
+    }
+
+    /// Traces the camera path of a pixel, connected to `vertices` of light paths.
+    #[inline]
+    fn camera_path<W: TileRecorder>(
+        &self,
+        walks: &PairWalks<'_>,
+        arena: &Bump,
+        (place, start): (&TilePixel, &CameraPathStart),
+        vertices: &[LightVertex<'_>],
+        (samples, recorder): (&mut SampleBufferPart<'_>, &mut W),
+    ) {
+        let levels = self.levels(place.index as u32, walks.pair);
+        let photons = self.photons_of_path(|| start.1.vertex(0).one(Purpose::Merging));
+        let context = CameraWalkContext { vertices, photons, levels: &levels };
+        recorder.select_pixel(place.at, walks.own);
+        let mut sample = PixelSample::default();
+        self.shared.camera_path(arena, start, &context, recorder, &mut sample);
+        samples.set(place.at, &sample);
     }
 
     /// Adds to the samples of a tile the splats that it receives: light that light paths send to the film.
@@ -336,12 +436,6 @@ fn count_by_kind(map: &PhotonMap<MergePhoton>) -> ByKind<u64> {
     let caustics =
         map.photons().par_iter().filter(|photon| suffix.class_with(photon.prefix).part() == Part::Caustic).count();
     [map.photons().len() - caustics, caustics].map(|count| count as u64)
-}
-
-/// Number of light paths of an iteration: one per pixel of the film, or of the whole picture if nothing is merged.
-fn light_paths(camera: &Camera, techniques: TechniqueSet) -> u32 {
-    let (width, height) = if techniques.merge { camera.size() } else { camera.whole()[0] };
-    width * height
 }
 
 /// Bytes that each tile of the whole picture takes while its light paths are traced, without splats and photons.

@@ -27,6 +27,9 @@ const GUIDE: f64 = 0.11e-6;
 const LIGHT_VERTEX: f64 = 0.7e-6;
 /// Core-seconds for a vertex of a camera or light path in methods that store both with their MIS weights.
 const TWO_WAY_VERTEX: f64 = 0.78e-6;
+/// Core-seconds for a vertex of a camera path with MIS weights and no connections. Roulette spares such paths longer than
+/// the counted ones, as in path tracing; their vertices count here.
+const UNCONNECTED_VERTEX: f64 = 0.92e-6;
 /// Core-seconds for the connection of two vertices.
 const CONNECTION: f64 = 0.51e-6;
 /// Core-seconds for the query for photons to merge with at a vertex.
@@ -101,6 +104,7 @@ impl Cost {
     pub fn film_seconds(&self, candidate: Candidate, settings: &Settings, camera: &Camera) -> f64 {
         let [film, whole] = camera.sizes().map(|(width, height)| f64::from(width) * f64::from(height));
         let outside = if candidate.method.walks_whole_picture() { whole - film } else { 0.0 };
+        let outside = outside * settings.counts.light_paths_per_pixel();
         let VertexCounts { light, light_media, textured, .. } = self.counts;
         let path = light_start_seconds(candidate)
             + light * TWO_WAY_VERTEX * (1.0 + TEXTURED * textured)
@@ -185,8 +189,8 @@ impl Cost {
         }
     }
 
-    /// Core-seconds of a camera path and a light path with all their connections and merges. Without scattered light
-    /// few pairs of vertices are connected.
+    /// Core-seconds of a camera path with its connections, its merges and its share of the light paths. Without
+    /// scattered light few pairs of vertices are connected.
     fn two_way_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
         let VertexCounts { camera, camera_media, camera_to_broad, light, light_media, light_to_broad, .. } =
             self.counts;
@@ -196,10 +200,17 @@ impl Cost {
         } else {
             (camera_to_broad, light_to_broad)
         };
-        let merges = if candidate.method.has_bandwidths() { from_camera * MERGE_QUERY + merged * MERGE } else { 0.0 };
-        let vertices =
-            (camera + light) * self.textured(TWO_WAY_VERTEX) + (camera_media + light_media) * TWO_WAY_MEDIUM_VERTEX;
-        let start = light_start_seconds(candidate);
-        CAMERA_PATH + start + vertices + from_camera * from_light * CONNECTION + merges
+        let light_paths = settings.counts.light_paths_per_pixel();
+        let merges = if candidate.method.has_bandwidths() {
+            f64::from(settings.counts.merging) * (from_camera * MERGE_QUERY + light_paths * merged * MERGE)
+        } else {
+            0.0
+        };
+        let light_vertices = light * self.textured(TWO_WAY_VERTEX) + light_media * TWO_WAY_MEDIUM_VERTEX;
+        let light_path = light_start_seconds(candidate) + light_vertices;
+        let vertex = if settings.counts.connections == 0 { UNCONNECTED_VERTEX } else { TWO_WAY_VERTEX };
+        let camera_vertices = camera * self.textured(vertex) + camera_media * TWO_WAY_MEDIUM_VERTEX;
+        let connections = f64::from(settings.counts.connections) * from_camera * from_light * CONNECTION;
+        CAMERA_PATH + camera_vertices + light_paths * light_path + connections + merges
     }
 }

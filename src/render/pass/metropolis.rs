@@ -303,6 +303,7 @@ impl<'a> Metropolis<'a> {
             initial_media,
             techniques,
             light_paths: pixels,
+            connections: 1.0,
             merged_paths: pixels,
             only: None,
         };

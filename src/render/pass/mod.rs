@@ -7,6 +7,7 @@ mod forecast;
 mod groups;
 mod guiding;
 mod integrator;
+mod light_cells;
 mod light_path_ranges;
 mod metropolis;
 mod path;

@@ -29,10 +29,20 @@ pub(super) struct WholeTile {
     corner: (u32, u32),
 }
 
+/// Width and height of a block of pixels.
+pub(super) const BLOCK: (u32, u32) = (GROUP_SIZE as u32 / 2, 2);
+
+/// Column and row of a slot of a tile in the whole picture. It may lie outside the picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SlotPixel {
+    pub x: u32,
+    pub y: u32,
+}
+
 /// A block of neighbouring pixels in a tile of the whole picture.
 pub(super) struct PixelBlock {
-    /// Index of each pixel in the whole picture, row by row; `None` for pixels outside it.
-    pub keys: [Option<u64>; GROUP_SIZE],
+    /// Place of each pixel in the whole picture, or beyond its edges.
+    pub pixels: [SlotPixel; GROUP_SIZE],
     /// Place of each pixel on the film; `None` for pixels outside it.
     pub places: [Option<TilePixel>; GROUP_SIZE],
 }
@@ -93,17 +103,14 @@ impl Tiles {
     /// All pixels of a tile of the whole picture, in blocks of two rows. [`TilePixel::at`] is the pixel's index in the
     /// tile.
     pub fn blocks(self, tile: WholeTile) -> impl Iterator<Item = PixelBlock> {
-        let [size, at] = self.whole;
-        let columns = GROUP_SIZE as u32 / 2;
+        let at = self.whole[1];
+        let (columns, rows) = BLOCK;
         let per_row = TILE / columns;
         (0..TILE * TILE / GROUP_SIZE as u32).map(move |group| {
-            let (dx, dy) = (group % per_row * columns, group / per_row * 2);
+            let (dx, dy) = (group % per_row * columns, group / per_row * rows);
             let slots: [(u32, u32); GROUP_SIZE] =
                 std::array::from_fn(|k| (dx + k as u32 % columns, dy + k as u32 / columns));
             let pixels = slots.map(|(dx, dy)| (tile.corner.0 + dx, tile.corner.1 + dy));
-            let key = |(x, y): (u32, u32)| {
-                (x < size.0 && y < size.1).then(|| u64::from(y) * u64::from(size.0) + u64::from(x))
-            };
             let place = |k: usize| {
                 let ((dx, dy), (x, y)) = (slots[k], pixels[k]);
                 let (x, y) = (x.checked_sub(at.0)?, y.checked_sub(at.1)?);
@@ -113,7 +120,7 @@ impl Tiles {
                     at: (dy * TILE + dx) as usize,
                 })
             };
-            PixelBlock { keys: pixels.map(key), places: std::array::from_fn(place) }
+            PixelBlock { pixels: pixels.map(|(x, y)| SlotPixel { x, y }), places: std::array::from_fn(place) }
         })
     }
 
@@ -146,14 +153,15 @@ mod tests {
         for [x, y, width, height] in [[0, 0, 70, 50], [16, 32, 16, 16], [13, 7, 40, 43], [69, 49, 1, 1]] {
             let camera = whole.crop([x, y, width, height]);
             let tiles = Tiles::new(&camera);
-            let (mut on_film, mut keys, mut numbers) = (Vec::new(), Vec::<u64>::new(), Vec::<usize>::new());
+            let (mut on_film, mut all, mut numbers) = (Vec::new(), Vec::<(u32, u32)>::new(), Vec::<usize>::new());
             for tile in tiles.whole_tiles() {
                 numbers.extend(tile.tile);
                 for block in tiles.blocks(tile) {
-                    keys.extend(block.keys.iter().flatten());
-                    for (key, place) in block.keys.iter().zip(&block.places) {
+                    let on_picture = |pixel: &&SlotPixel| pixel.x < 70 && pixel.y < 50;
+                    all.extend(block.pixels.iter().filter(on_picture).map(|pixel| (pixel.y, pixel.x)));
+                    for (pixel, place) in block.pixels.iter().zip(&block.places) {
                         let Some(place) = place else { continue };
-                        assert_eq!(*key, Some(camera.pixel_key(place.pixel)));
+                        assert_eq!((pixel.x, pixel.y), (place.pixel.0 + x, place.pixel.1 + y));
                         assert_eq!(tiles.place(place.index as u32), (tile.tile.unwrap(), place.at));
                         on_film.push(place.index);
                     }
@@ -164,8 +172,9 @@ mod tests {
             assert_eq!(on_film, by_tile);
             assert!(numbers.iter().copied().eq(0..tiles.count()));
             on_film.sort_unstable();
-            keys.sort_unstable();
-            assert!(on_film.into_iter().eq(0..u64::from(width * height)) && keys.into_iter().eq(0..70 * 50));
+            all.sort_unstable();
+            assert!(on_film.into_iter().eq(0..u64::from(width * height)));
+            assert!(all.into_iter().eq((0..50).flat_map(|y| (0..70).map(move |x| (y, x)))));
         }
     }
 }

@@ -303,6 +303,11 @@ impl Method {
         self.row().photons.is_some()
     }
 
+    /// Whether numbers of light paths and connections are settings ([`Counts`](super::Counts)).
+    pub fn takes_counts(self) -> bool {
+        matches!(self.search(), Search::Connections | Search::ConnectionsAndMerging) && !self.has_chains()
+    }
+
     /// Whether light paths can be guided: started preferably toward objects that focus light.
     pub fn supports_guiding(self) -> bool {
         self.row().guides

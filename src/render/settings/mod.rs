@@ -1,11 +1,13 @@
 //! Settings of a render: the method and its parameters, stop conditions, and the shard.
 
 mod candidate;
+mod counts;
 mod levels;
 mod method;
 mod shard;
 
 pub use candidate::Candidate;
+pub use counts::{Counts, LIGHT_PATH_STEPS, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL};
 pub use levels::Levels;
 pub use method::{BandwidthRule, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, Method};
 pub use shard::{MAX_SHARDS, Shard};
@@ -83,6 +85,8 @@ pub struct Settings {
     pub seed: u64,
     /// Number of light paths per iteration; for [`Method::Pm`], of the whole render.
     pub photons: u32,
+    /// Numbers of samples of the techniques of [`Method::Bdpt`] and [`Method::Vcm`].
+    pub counts: Counts,
     /// Most bytes that the photon map of [`Method::Pm`] may take while it is built.
     pub photon_memory: u64,
     /// Light that photons of [`Method::Sppm`] carry: all indirect light, or caustics alone.
@@ -132,6 +136,7 @@ impl Default for Settings {
             method: Method::default(),
             seed: 0,
             photons: DEFAULT_PHOTONS,
+            counts: Counts::default(),
             photon_memory: DEFAULT_MAP_MEMORY,
             indirect: Indirect::Photons,
             classes: ClassSet::ALL,
@@ -174,6 +179,20 @@ impl Settings {
             alpha: method.default_alpha(),
             ..Settings::default()
         }
+    }
+
+    /// The settings with the method that remains if some techniques have no samples: path tracing without light paths,
+    /// bidirectional path tracing without merging.
+    #[must_use]
+    pub fn without_unused_techniques(self) -> Settings {
+        let method = match self.method {
+            method if !method.takes_counts() => return self,
+            _ if self.counts.light_paths == 0 => Method::Path,
+            _ if self.counts.merging <= 0.0 => Method::Bdpt,
+            method => method,
+        };
+        let levels = if method.has_levels() { self.levels } else { Levels::new(1) };
+        Settings { method, levels, guided: self.guided && method.supports_guiding(), ..self }
     }
 
     /// Default number of light paths per iteration for a picture of this size. If photons carry caustics alone, most of

@@ -16,7 +16,7 @@ const BATCH: u32 = 512;
 fn worst(what: &str, scene: &Scene, radius: f32, bug: Bug) -> [f64; 2] {
     let camera: Camera = scene.camera(&square(SIZE)).expect("a camera");
     let initial_media = InitialMedia::new(scene, camera.position());
-    let lab = Lab::new(scene, &camera, &initial_media, radius);
+    let lab = Lab::new(scene, &camera, &initial_media, radius, ONE_OF_EACH);
     let (mut paths, mut worst, mut begun) = (0, [0.0f64; 2], 0);
     while paths < EACH {
         let batch: Vec<(usize, [f64; 2])> = (begun..begun + BATCH)

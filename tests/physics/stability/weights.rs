@@ -23,6 +23,8 @@ struct Chain {
     /// Squared lengths of segments, one more than vertices.
     distance2: Vec<f32>,
     camera: f32,
+    /// Number of light paths that a camera path connects to, 0 to 4.
+    connections: f64,
 }
 
 impl Chain {
@@ -39,7 +41,7 @@ impl Chain {
         let distance2 = (0..=count).map(|_| draw(-10.0, 10.0)).collect();
         let (start, onward, cos) = (draw(-20.0, 20.0), draw(-15.0, 20.0), draw(-5.0, 0.0));
         let light = EmissionDensity { direct: start, start, onward, cos, infinite: false, delta: false };
-        Chain { light, vertices, distance2, camera: draw(-10.0, 15.0) }
+        Chain { light, vertices, distance2, camera: draw(-10.0, 15.0), connections: (index % 5) as f64 }
     }
 
     /// Weights of all techniques. The planted bug ignores the cosines at which light paths arrive.
@@ -52,18 +54,19 @@ impl Chain {
         let from_light = |j: usize| if j == 0 { light.onward } else { to_eye(j - 1) } * (cos(j) / self.distance2[j]);
         let from_camera =
             |j: usize| if j + 1 == k { self.camera } else { to_light(j + 1) } * (cos(j) / self.distance2[j + 1]);
+        let joins = |length: usize| if length == 1 { 1.0 } else { self.connections };
         let (mut lights, mut eyes) = (Vec::new(), vec![MisState::default(); k]);
         let mut mis = MisState::light(light);
         for j in 0..k {
             mis = mis.arrive(self.distance2[j], if bug { 1.0 } else { cos(j) });
             lights.push(mis);
-            mis = mis.scatter(cos(j), to_eye(j), to_light(j), by_light(j));
+            mis = mis.scatter(cos(j), to_eye(j), to_light(j), joins(j + 1), by_light(j));
         }
         let mut mis = MisState::camera(LIGHT_PATHS, self.camera);
         for j in (0..k).rev() {
             mis = mis.arrive(self.distance2[j + 1], cos(j));
             eyes[j] = mis;
-            mis = mis.scatter(cos(j), to_light(j), to_eye(j), by_camera(j));
+            mis = mis.scatter(cos(j), to_light(j), to_eye(j), joins(k - j), by_camera(j));
         }
         let solid = self.distance2[0] / light.cos;
         let arrival = light.onward * (cos(0) / self.distance2[0]);
@@ -76,25 +79,35 @@ impl Chain {
         };
         let mut all = vec![
             mis::hit(&mis.arrive(self.distance2[0], light.cos), light).weight(eta),
-            mis::next_event(&eyes[0], &pdfs).weight(eta),
-            mis::camera(&lights[k - 1], from_camera(k - 1), LIGHT_PATHS, to_light(k - 1)).weight(eta),
+            mis::next_event(&eyes[0], joins(k), &pdfs).weight(eta),
+            mis::camera(&lights[k - 1], joins(k), from_camera(k - 1), LIGHT_PATHS, to_light(k - 1)).weight(eta),
         ];
-        for s in 1..k {
-            let end = |mis, reverse_pdf_w, arrival_pdf_a, merges| End { mis, reverse_pdf_w, arrival_pdf_a, merges };
-            let light = end(&lights[s - 1], to_light(s - 1), from_camera(s - 1), by_light(s - 1));
-            all.push(mis::connect(&light, &end(&eyes[s], to_eye(s), from_light(s), by_camera(s))).weight(eta));
+        for s in (1..k).filter(|_| self.connections > 0.0) {
+            let end = |mis, length, reverse_pdf_w, arrival_pdf_a, merges| End {
+                mis,
+                reverse_pdf_w,
+                arrival_pdf_a,
+                joins: joins(length),
+                merges,
+            };
+            let light = end(&lights[s - 1], s, to_light(s - 1), from_camera(s - 1), by_light(s - 1));
+            let camera = end(&eyes[s], k - s, to_eye(s), from_light(s), by_camera(s));
+            all.push(mis::connect(&light, &camera, self.connections).weight(eta));
         }
         for m in 0..k {
             if by_light(m) != Merges::ZERO && by_camera(m) != Merges::ZERO {
                 let own = one_merge(m + 1 == k);
-                all.push(mis::merge(&lights[m], &eyes[m], to_light(m), to_eye(m), own).merge_weight(eta));
+                all.push(
+                    mis::merge((&lights[m], &eyes[m]), [joins(m + 1), joins(k - m)], to_light(m), to_eye(m), own)
+                        .merge_weight(eta),
+                );
             }
         }
         all
     }
 }
 
-/// Each weight is from 0 to 1 and all sum to one, for any densities and bandwidth.
+/// Each weight is from 0 to 1 and all sum to one, for any densities, bandwidth and number of connections.
 #[test]
 fn weights_of_any_densities_sum_to_one() {
     let techniques = TechniqueSet::VCM;
