@@ -3,12 +3,10 @@ scattering of volume shaders, dispersion."""
 
 import math
 
-import bpy
-
 
 def nodes_of(block):
-    """The node tree of a material, light or world, or None. Blender 5 ignores `use_nodes`."""
-    return block.node_tree if bpy.app.version >= (5, 0, 0) or block.use_nodes else None
+    """The node tree of a material, light or world, or None. In Blender 5 the switch is always on, but for lights of 5.0."""
+    return block.node_tree if getattr(block, "use_nodes", True) else None
 
 
 def output_of(tree, target="CYCLES"):

@@ -27,7 +27,7 @@ class Panels(Installed):
         self.stage()
         light = bpy.data.lights.new("panel", "AREA")
         self.put("panel", light)
-        if bpy.app.version < (5, 0, 0):
+        if bpy.app.version < (5, 1, 0):
             light.use_nodes = True
         world = self.scene.world = bpy.data.worlds.new("world")
         ball = bpy.data.objects["ball"]

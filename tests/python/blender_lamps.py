@@ -108,7 +108,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         eye((0, -3, 3), (0, 0, 0), lens=35)
         body = lamp("POINT", (0, 0, 2), 50, shadow_soft_size=0.1, use_soft_falloff=False)
         light = body.data
-        if bpy.app.version < (5, 0, 0):
+        if bpy.app.version < (5, 1, 0):
             light.use_nodes = True
         tree = light.node_tree
         node = next((n for n in tree.nodes if n.type == "EMISSION"), None)
@@ -127,10 +127,20 @@ class Lamps(cycles_comparison.CyclesComparison):
 
     def nodes(self, body):
         """The node tree of a lamp, and its Emission node."""
-        if bpy.app.version < (5, 0, 0):
+        if bpy.app.version < (5, 1, 0):
             body.data.use_nodes = True
         tree = body.data.node_tree
         return tree, next(n for n in tree.nodes if n.type == "EMISSION")
+
+    def test_nodes_that_are_switched_off(self):
+        """Lamps keep their nodes while these are switched off, before Blender 5.1."""
+        body = lamp("POINT", (0, 0, 2), 4 * math.pi)
+        body.data.use_nodes = True
+        next(n for n in body.data.node_tree.nodes if n.type == "EMISSION").inputs["Strength"].default_value = 3
+        body.data.use_nodes = False
+        export.write(self.path)
+        written = glb.read(self.path)[0]["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"]
+        self.assertAlmostEqual(written / 683, 3 if body.data.use_nodes else 1, 4)
 
     def test_nodes_of_lamps_are_measured(self):
         """Strengths that nodes compute, light falloff, and textures shine with their mean strength."""
@@ -206,7 +216,7 @@ class Lamps(cycles_comparison.CyclesComparison):
         lamp("AREA", (1, 0, 1), 10).visible_glossy = False
         spot = lamp("SPOT", (0, 1, 9), 10, shadow_soft_size=0.0)
         spot.scale = (2, 1, 1)
-        if bpy.app.version < (5, 0, 0):
+        if bpy.app.version < (5, 1, 0):
             spot.data.use_nodes = True
         tree = spot.data.node_tree
         profile = tree.nodes.new("ShaderNodeTexIES")

@@ -116,9 +116,9 @@ class LightNodesPanel(Panel, bpy.types.Panel):
 
     def draw(self, context):
         light = context.light
-        if bpy.app.version < (5, 0, 0):
+        if bpy.app.version < (5, 1, 0):  # later, lights always have nodes
             self.layout.prop(light, "use_nodes", toggle=True)
-        if bpy.app.version >= (5, 0, 0) or light.use_nodes:
+        if bpy.app.version >= (5, 1, 0) or light.use_nodes:
             _draw_input(self.layout, light, "light", "Surface")
 
 
