@@ -4,6 +4,17 @@ use crate::{Folder, support, values};
 use caustique::image::exr;
 use serde_json::Value;
 
+/// Without `-o`, an EXR and a PNG with the scene's name are written beside it, also by frame, and a line says so.
+#[test]
+fn without_output_the_picture_is_beside_the_scene() {
+    let folder = Folder::new();
+    let outcome = folder.render("--iterations 2 --no-finish");
+    assert!(outcome.stderr.starts_with("no --output: writing scene.exr and scene.png\n"), "{}", outcome.stderr);
+    assert_eq!(folder.files(), ["scene.exr", "scene.png"]);
+    folder.render("--iterations 2 --no-finish --frames 3 --png look.####.png");
+    assert_eq!(folder.files(), ["look.0003.png", "scene.0003.exr", "scene.exr", "scene.png"]);
+}
+
 #[test]
 fn a_render_writes_all_layers_and_a_complete_header() {
     let folder = Folder::new();

@@ -211,14 +211,21 @@ def RenderVar "Var" {
         for file, code, said in (
             ("no/such.exr", 1, "no/such.exr: its folder does not exist"),
             ("picture.png", 2, "picture.png: the name does not end in .exr"),
-            ("", 2, "the following required arguments were not provided: --output <OUT.exr>"),
-            (None, 2, "the following required arguments were not provided: --output <OUT.exr>"),
         ):
             with self.subTest(file):
                 self.stage.RemovePrim("/Product")
                 self.products(("Product", file))
                 self.assertIn(said, self.in_the_folder(check=code).stderr)
         self.assertEqual(list(self.dir.glob("**/*.exr")), [])
+
+    def test_without_a_product_the_picture_is_beside_the_stage(self):
+        for file in ("", None):
+            with self.subTest(file):
+                self.stage.RemovePrim("/Product")
+                self.products(("Product", file))
+                self.in_the_folder()
+                for kind in ("exr", "png"):
+                    (self.dir / f"stage.{kind}").unlink()
 
     def test_several_products_need_a_name_for_the_one_that_is_rendered(self):
         self.products(("A", "a.exr"), ("B", "b.exr"))

@@ -30,10 +30,11 @@ pub use summary::{Summary, place, print_finish, print_picture, warn_unseen};
 
 /// Renders a scene, or frames of its animation, as `caustique render`.
 pub fn run(args: &RenderArgs) -> Result<()> {
-    if !args.has_output() {
-        let cause = "the following required arguments were not provided: --output <OUT.exr>";
-        return Err(Error::usage(cause).hint("'--help' explains every option"));
+    let named = args.with_outputs();
+    if let (false, true, Some(png)) = (args.has_output(), args.progress.for_people(), &named.picture.png) {
+        say(&format!("no --output: writing {} and {}", named.output.display(), png.display()));
     }
+    let args = &named;
     super::pool(args.run.threads)?.install(|| match args.options.scene.frames {
         Some(frames) => sequence::run(args, frames),
         None => {

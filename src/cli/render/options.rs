@@ -4,7 +4,7 @@ use super::preview::Target;
 use crate::cli::output::PictureArgs;
 use crate::cli::progress::Form;
 use caustique::error::{Error, Result};
-use caustique::options::{RenderOptions, RunOptions, path_of_frame, takes};
+use caustique::options::{RenderOptions, RunOptions, is_pattern, path_of_frame, takes};
 use caustique::pipeline::{MethodRequest, PictureRequest, Saving};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
@@ -23,8 +23,8 @@ use std::path::PathBuf;
 pub struct RenderArgs {
     /// EXR to write: the picture and its layers; '-' is standard output
     ///
-    /// With --frames, '####' in its name stands for the number of the frame. Needed unless the RenderProduct of a stage
-    /// of USD has a productName
+    /// With --frames, '####' in its name stands for the number of the frame. Default: the productName of a USD stage's
+    /// RenderProduct, else an EXR and a PNG beside the scene, with its name
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     #[arg(default_value = "", hide_default_value = true, value_parser = OsStringValueParser::new().map(PathBuf::from))]
     #[serde(skip)]
@@ -96,6 +96,19 @@ impl RenderArgs {
     /// Whether the command line or the USD stage names the EXR.
     pub fn has_output(&self) -> bool {
         !self.output.as_os_str().is_empty()
+    }
+
+    /// These options, with the default outputs if no output is named: an EXR and a PNG beside the scene.
+    pub fn with_outputs(&self) -> RenderArgs {
+        let mut args = self.clone();
+        if !self.has_output() {
+            let scene = &self.options.scene;
+            let number = if scene.frames.is_some() && !is_pattern(&scene.path) { "####." } else { "" };
+            let beside = |kind| scene.path.with_extension(format!("{number}{kind}"));
+            args.output = beside("exr");
+            args.picture.png.get_or_insert_with(|| beside("png"));
+        }
+        args
     }
 
     /// The options for one frame, with its number in the names of files.
