@@ -148,6 +148,12 @@ impl<'a> Bsdf<'a> {
         }
     }
 
+    /// Whether the BSDF may have several lobes, among which [`Bsdf::sample`] chooses by its random number.
+    #[inline]
+    pub fn has_several_lobes(&self) -> bool {
+        matches!(self, Bsdf::Layered(_))
+    }
+
     /// The terms of the BSDF that depend only on the viewing direction `wo`.
     #[inline(always)]
     fn view_terms(&self, wo: Vec3) -> ViewTerms {

@@ -300,14 +300,17 @@ impl PixelAccumulator {
             sample.volume + sample.volume_photons[level],
         ];
         let difference = if count > 1 { self.difference_of(&values, independent, correlated) } else { Rgb::ZERO };
-        let all =
-            || values[..count].iter().chain(&parts).chain(std::iter::once(&difference)).chain(groups.as_flattened());
+        let (mut most, mut finite) = (Rgb::ZERO, true);
+        for list in [&values[..count], &parts, &[difference], groups.as_flattened()] {
+            for value in list {
+                (most, finite) = (most.max(value.abs()), finite & value.is_finite());
+            }
+        }
         let rejection = independent.rejection.or_else(|| correlated.and_then(|sample| sample.rejection));
-        if let Some(cause) = rejection.or_else(|| (!all().all(|value| value.is_finite())).then_some(Cause::Sum)) {
+        if let Some(cause) = rejection.or_else(|| (!finite).then_some(Cause::Sum)) {
             return self.rejected.count(cause);
         }
         self.iterations += 1;
-        let most = all().fold(Rgb::ZERO, |most, value| most.max(value.abs()));
         self.coarsen_grids(self.grids.with_room_for(f64::from(most.max_element())));
         let rounding = self.grids.rounding();
         let quarter = &mut self.quarters[random::quarter(i) as usize];
@@ -322,7 +325,10 @@ impl PixelAccumulator {
             last.add(difference, rounding);
         }
         for (sum, part) in self.parts.iter_mut().zip(parts) {
-            sum.add(part.as_dvec3(), rounding[0]);
+            // Most parts of a sample are black.
+            if part != Rgb::ZERO {
+                sum.add(part.as_dvec3(), rounding[0]);
+            }
         }
         for (sum, light) in self.groups.as_flattened_mut().iter_mut().zip(groups.as_flattened()) {
             sum.add(light.as_dvec3(), rounding[0]);

@@ -38,8 +38,7 @@ pub(super) struct Corner {
 }
 
 impl Corner {
-    /// Packs the vertices of a mesh for surface lookups. Moves normals and texture coordinate set 0 out of `mesh`.
-    pub fn pack(mesh: &mut Mesh) -> Vec<Corner> {
+    fn pack(mesh: &mut Mesh) -> Vec<Corner> {
         let (normals, uvs) = (std::mem::take(&mut mesh.normals), std::mem::take(&mut mesh.uvs[0]));
         let corner = |(i, &p): (usize, &Vec3)| Corner {
             p,
@@ -47,6 +46,44 @@ impl Corner {
             uv: uvs.get(i).copied().unwrap_or_default(),
         };
         mesh.positions.iter().enumerate().map(corner).collect()
+    }
+}
+
+/// The data of a triangle that every hit reads, in a quarter of a cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
+pub(super) struct Face {
+    /// Indices of the corners.
+    pub corners: [u32; 3],
+    /// Bound (m) on the distance of positions from the plane of the triangle, in the space of the mesh, without the
+    /// rounding of their coordinates ([`Extent::plane_error`]).
+    pub plane_error: f32,
+}
+
+impl Face {
+    fn pack(mesh: &Mesh) -> Vec<Face> {
+        let face = |&corners: &[u32; 3]| Face {
+            corners,
+            plane_error: Extent::from_corners(corners.map(|i| mesh.positions[i as usize])).plane_error(),
+        };
+        mesh.triangles.iter().map(face).collect()
+    }
+}
+
+/// The data of a mesh that surface lookups read.
+#[derive(Clone, Debug)]
+pub(super) struct PackedMesh {
+    pub faces: Vec<Face>,
+    pub corners: Vec<Corner>,
+    /// Whether the mesh has other attributes: texture coordinate set 1, vertex colours or tangents.
+    pub has_more: bool,
+}
+
+impl PackedMesh {
+    /// Packs a mesh for surface lookups. Moves normals and texture coordinate set 0 out of `mesh`.
+    pub fn new(mesh: &mut Mesh) -> PackedMesh {
+        let has_more = !(mesh.uvs[1].is_empty() && mesh.colors.is_empty() && mesh.tangents.is_empty());
+        PackedMesh { faces: Face::pack(mesh), corners: Corner::pack(mesh), has_more }
     }
 }
 
@@ -89,6 +126,15 @@ impl Placement {
         let handedness = points.matrix3.determinant().signum();
         Placement { points, normals, absolute, handedness }
     }
+
+    /// Bound (m) on the distance of positions from the plane of a triangle with these local corners, after the
+    /// transform ([`Extent::plane_error`]). Not inlined, so that the code for meshes in world space stays small.
+    #[inline(never)]
+    fn plane_error(&self, corners: [Vec3; 3]) -> f32 {
+        let local = Extent::from_corners(corners);
+        let edges = local.edges.map(|edge| self.points.transform_vector3(edge));
+        Extent { largest: self.absolute.transform_point3(local.largest), edges }.plane_error()
+    }
 }
 
 impl Instance {
@@ -102,17 +148,14 @@ impl Instance {
     }
 
     /// Bound (m) on the distance of the computed world position `p` from the plane of its triangle. `local` is the
-    /// extent of the triangle in the space of the mesh.
+    /// bound in the space of the mesh, `corners` are its corners there.
     #[inline]
-    pub(super) fn position_error(&self, local: Extent, p: Vec3) -> f32 {
-        let extent = match &self.to_world {
+    pub(super) fn position_error(&self, local: f32, corners: [Vec3; 3], p: Vec3) -> f32 {
+        let plane_error = match &self.to_world {
             None => local,
-            Some(placement) => Extent {
-                largest: placement.absolute.transform_point3(local.largest),
-                edges: local.edges.map(|edge| placement.points.transform_vector3(edge)),
-            },
+            Some(placement) => placement.plane_error(corners),
         };
-        extent.plane_error() + coordinate_error(p)
+        plane_error + coordinate_error(p)
     }
 
     /// Transforms a normal of the mesh to world space, without normalizing it.

@@ -1,6 +1,6 @@
 //! All meshes and instances of a scene.
 
-use super::mesh::Corner;
+use super::mesh::PackedMesh;
 use super::{Instance, Mesh, Surface};
 use crate::processor::prefetch;
 
@@ -11,15 +11,15 @@ pub struct Shapes {
     pub meshes: Vec<Mesh>,
     /// Instances of the meshes. All their indices are valid.
     pub instances: Vec<Instance>,
-    /// Packed vertices of each mesh, by the index of the mesh.
-    corners: Vec<Vec<Corner>>,
+    /// Packed triangles and vertices of each mesh, by the index of the mesh.
+    packed: Vec<PackedMesh>,
 }
 
 impl Shapes {
     /// The geometry of these meshes and instances. Indices in the instances must be valid.
     pub fn new(mut meshes: Vec<Mesh>, instances: Vec<Instance>) -> Shapes {
-        let corners = meshes.iter_mut().map(Corner::pack).collect();
-        Shapes { meshes, instances, corners }
+        let packed = meshes.iter_mut().map(PackedMesh::new).collect();
+        Shapes { meshes, instances, packed }
     }
 
     /// Number of triangles of all instances.
@@ -32,13 +32,13 @@ impl Shapes {
     pub fn prefetch(&self, triangles: impl Iterator<Item = (u32, u32)> + Clone) {
         let corners = |(instance, primitive): (u32, u32)| {
             let mesh = self.instances[instance as usize].mesh as usize;
-            (mesh, self.meshes[mesh].triangles[primitive as usize])
+            (mesh, self.packed[mesh].faces[primitive as usize].corners)
         };
         // All indices are read before the first corner, because the address of a corner depends on its index.
         prefetch(triangles.clone().map(|triangle| corners(triangle).1[0]));
         prefetch(triangles.flat_map(|triangle| {
             let (mesh, corners) = corners(triangle);
-            corners.map(|corner| self.corners[mesh][corner as usize].p.x)
+            corners.map(|corner| self.packed[mesh].corners[corner as usize].p.x)
         }));
     }
 
@@ -46,7 +46,7 @@ impl Shapes {
     #[inline(always)]
     pub fn surface(&self, instance: u32, primitive: u32, barycentric: [f32; 2]) -> Option<Surface> {
         let placed = &self.instances[instance as usize];
-        let (mesh, corners) = (&self.meshes[placed.mesh as usize], &self.corners[placed.mesh as usize]);
-        Surface::at(instance, placed, mesh, corners, primitive, barycentric)
+        let mesh = placed.mesh as usize;
+        Surface::at((instance, placed), &self.packed[mesh], &self.meshes[mesh], primitive, barycentric)
     }
 }

@@ -1,7 +1,7 @@
 //! The surface point of a ray hit, with the attributes that shading needs.
 
-use super::mesh::Corner;
-use super::precision::{Extent, offset_origin, shadow_end};
+use super::mesh::{Face, PackedMesh};
+use super::precision::{offset_origin, shadow_end};
 use super::{Instance, Mesh};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -37,16 +37,14 @@ impl Surface {
     /// The surface at barycentric coordinates (`b1`, `b2`) of triangle `primitive`. `None` for a triangle without area.
     #[inline(always)]
     pub(super) fn at(
-        instance_index: u32,
-        instance: &Instance,
+        (instance_index, instance): (u32, &Instance),
+        packed: &PackedMesh,
         mesh: &Mesh,
-        corners: &[Corner],
         primitive: u32,
         [b1, b2]: [f32; 2],
     ) -> Option<Surface> {
-        let [i0, i1, i2] = mesh.triangles[primitive as usize];
-        let (i0, i1, i2) = (i0 as usize, i1 as usize, i2 as usize);
-        let (c0, c1, c2) = (&corners[i0], &corners[i1], &corners[i2]);
+        let Face { corners: indices, plane_error } = packed.faces[primitive as usize];
+        let [c0, c1, c2] = indices.map(|i| &packed.corners[i as usize]);
         let b0 = 1.0 - b1 - b2;
         let e1 = c1.p - c0.p;
         let e2 = c2.p - c0.p;
@@ -58,34 +56,41 @@ impl Surface {
             Some(n) => n,
             None => ng,
         };
-        let mut uv = [c0.uv * b0 + c1.uv * b1 + c2.uv * b2, Vec2::ZERO];
-        let second = &mesh.uvs[1];
-        if !second.is_empty() {
-            uv[1] = second[i0] * b0 + second[i1] * b1 + second[i2] * b2;
-        }
-        let mut color = Vec4::ONE;
-        if !mesh.colors.is_empty() {
-            color = mesh.colors[i0] * b0 + mesh.colors[i1] * b1 + mesh.colors[i2] * b2;
-        }
-        let mut tangent = Vec4::ZERO;
-        if !mesh.tangents.is_empty() {
-            let t = mesh.tangents[i0] * b0 + mesh.tangents[i1] * b1 + mesh.tangents[i2] * b2;
-            tangent = instance.tangent(t.truncate().extend(if t.w < 0.0 { -1.0 } else { 1.0 }));
-        }
-        let largest = c0.p.abs().max(c1.p.abs()).max(c2.p.abs());
-        Some(Surface {
+        let mut surface = Surface {
             p,
             ng,
             ns,
-            tangent,
-            uv,
-            color,
+            tangent: Vec4::ZERO,
+            uv: [c0.uv * b0 + c1.uv * b1 + c2.uv * b2, Vec2::ZERO],
+            color: Vec4::ONE,
             instance: instance_index,
             primitive,
             material: instance.material,
-            error: instance.position_error(Extent { largest, edges: [e1, e2] }, p),
+            error: instance.position_error(plane_error, [c0.p, c1.p, c2.p], p),
             touching: false,
-        })
+        };
+        if packed.has_more {
+            surface.interpolate_more(instance, mesh, indices, [b0, b1, b2]);
+        }
+        Some(surface)
+    }
+
+    /// Sets the attributes that few meshes have, from the corners with these indices and barycentric weights: texture
+    /// coordinate set 1, vertex colour and tangent.
+    #[inline(never)]
+    fn interpolate_more(&mut self, instance: &Instance, mesh: &Mesh, indices: [u32; 3], [b0, b1, b2]: [f32; 3]) {
+        let [i0, i1, i2] = indices.map(|i| i as usize);
+        let second = &mesh.uvs[1];
+        if !second.is_empty() {
+            self.uv[1] = second[i0] * b0 + second[i1] * b1 + second[i2] * b2;
+        }
+        if !mesh.colors.is_empty() {
+            self.color = mesh.colors[i0] * b0 + mesh.colors[i1] * b1 + mesh.colors[i2] * b2;
+        }
+        if !mesh.tangents.is_empty() {
+            let t = mesh.tangents[i0] * b0 + mesh.tangents[i1] * b1 + mesh.tangents[i2] * b2;
+            self.tangent = instance.tangent(t.truncate().extend(if t.w < 0.0 { -1.0 } else { 1.0 }));
+        }
     }
 
     /// Origin of a ray that leaves the surface along `direction`: the position, moved by the error bound to the side

@@ -18,10 +18,9 @@ pub struct DirectSample {
     pub pdf_w: f32,
     /// Whether the light is a delta light: no ray can hit it.
     pub delta: bool,
-    /// Density per area (1/m2) with which light paths from this point or direction of the light arrive on a surface at
-    /// the receiver that faces `wi`. It is multiplied by the probability of selecting the light for emission over the
-    /// probability of selecting it here.
-    pub arrival_pdf_a: f32,
+    /// The part of [`Lights::arrival_pdf_a`](super::Lights::arrival_pdf_a) that is known from sampling: all of it, except
+    /// for light from infinity the density of the point of entry into the scene.
+    pub arrival_factor: f32,
     /// Index of the sampled light in [`Lights::emitters`](super::Lights::emitters).
     pub light: u32,
 }

@@ -33,6 +33,8 @@ pub enum Emitter {
         plane: Vec4,
         /// One corner, and the edges from it to the other two (m).
         corners: [Vec3; 3],
+        /// Bound on the rounding error of points on the triangle (m).
+        error: f32,
         /// Whether every point of the triangle emits `radiance`; false if a texture, for example, varies it.
         uniform: bool,
     },

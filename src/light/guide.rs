@@ -12,7 +12,6 @@
 //! [`Guide::learn`] sets the probabilities of the cells from the error that their photons leave in the picture.
 
 use super::emission::{EmissionSample, EntryDisc};
-use super::emitter::position_error;
 use super::lights::Lights;
 use super::{Cdf, Emitter, Region};
 use crate::geometry::{Shapes, offset_origin};
@@ -238,10 +237,10 @@ impl Guide {
         }
         let Some((axis, one_minus_cos)) = cone(emission.origin, center, radius) else { return Some(emission) };
         let d = Frame::from_normal(axis).to_world(warp::cone_uniform(direction, one_minus_cos));
-        if let Emitter::Triangle { plane, corners, .. } = &lights.emitters()[emission.light as usize] {
+        if let Emitter::Triangle { plane, corners, error, .. } = &lights.emitters()[emission.light as usize] {
             let b = warp::triangle_uniform(point);
             let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
-            emission.origin = offset_origin(at, plane.truncate(), d, position_error(corners));
+            emission.origin = offset_origin(at, plane.truncate(), d, *error);
         }
         emission.direction = d;
         (emission.density.onward, emission.density.cos) = lights.direction_density(emission.light as usize, d)?;

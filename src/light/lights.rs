@@ -87,6 +87,7 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
     if !(area > 0.0 && area.is_finite()) || radiance.max_element() <= 0.0 {
         return None;
     }
+    let corners = [a, b - a, c - a];
     Some(Emitter::Triangle {
         instance,
         primitive,
@@ -95,7 +96,8 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
         radiance,
         spread: Spread::new(material.spread).below_coat(coat),
         plane,
-        corners: [a, b - a, c - a],
+        corners,
+        error: position_error(&corners),
         uniform,
     })
 }
@@ -281,8 +283,18 @@ impl Lights {
     ) -> Option<DirectSample> {
         let (index, probability) = self.choice.as_ref()?.sample(receiver, choice)?;
         let mut sample = self.sample_light(shapes, materials, receiver.p, (index, probability), u)?;
-        sample.arrival_pdf_a *= self.choice()?.pdf(index) / probability;
+        sample.arrival_factor *= self.choice()?.pdf(index) / probability;
         Some(sample)
+    }
+
+    /// Density per area (1/m2) with which light paths from the sampled point or direction of a light arrive on a surface
+    /// at the receiver `p` that faces `sample.wi`, times the probability of selecting the light for emission over the
+    /// probability of selecting it in [`Lights::sample_direct`]. Separate from sampling, because only methods with light
+    /// paths need it.
+    #[inline]
+    pub fn arrival_pdf_a(&self, sample: &DirectSample, p: Vec3) -> f32 {
+        let entry = if sample.target.is_none() { self.entry_pdf_a(p, sample.wi) } else { 1.0 };
+        sample.arrival_factor * entry
     }
 
     /// Samples a point of the light `index`, which was selected with `probability`, as seen from `p`. `None` if the
@@ -305,8 +317,8 @@ impl Lights {
                 let to = *at - p;
                 let (wi, target, pdf_w) = (to.try_normalize()?, Some(*at), probability);
                 let radiance = *intensity / to.length_squared();
-                let arrival_pdf_a = 0.5 / TAU / to.length_squared();
-                Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_pdf_a, light })
+                let arrival_factor = 0.5 / TAU / to.length_squared();
+                Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_factor, light })
             }
             Emitter::Spot { p: middle, radius, frame, intensity, inner, outer, edge } => {
                 let at = spot_point(*middle, *radius, frame, u);
@@ -317,28 +329,36 @@ impl Lights {
                     return None;
                 }
                 let radiance = *intensity * (falloff / to.length_squared());
-                let arrival_pdf_a = falloff / (spot_solid_angle(*inner, *outer, *edge) * to.length_squared());
-                Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_pdf_a, light })
+                let arrival_factor = falloff / (spot_solid_angle(*inner, *outer, *edge) * to.length_squared());
+                Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_factor, light })
             }
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
                     let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
-                    let arrival_pdf_a = self.entry_pdf_a(p, wi);
-                    return Some(DirectSample { wi, target: None, radiance, pdf_w, delta: true, arrival_pdf_a, light });
+                    let arrival_factor = 1.0;
+                    return Some(DirectSample {
+                        wi,
+                        target: None,
+                        radiance,
+                        pdf_w,
+                        delta: true,
+                        arrival_factor,
+                        light,
+                    });
                 }
                 let wi = frame.to_world(warp::cone_uniform(u, *one_minus_cos));
                 let radiance = Emitter::sun_radiance(*irradiance, *one_minus_cos);
                 let pdf_w = probability * warp::cone_uniform_pdf_w(*one_minus_cos);
-                let arrival_pdf_a = self.entry_pdf_a(p, wi);
-                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_pdf_a, light })
+                let arrival_factor = 1.0;
+                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_factor, light })
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
                 let (wi, pdf) = environment.sample(u);
                 let pdf_w = probability * pdf;
                 (pdf_w > 0.0).then(|| {
-                    let (radiance, arrival_pdf_a) = (environment.radiance(wi), self.entry_pdf_a(p, wi));
-                    DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_pdf_a, light }
+                    let (radiance, arrival_factor) = (environment.radiance(wi), 1.0);
+                    DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_factor, light }
                 })
             }
         }
@@ -353,15 +373,25 @@ impl Lights {
         (light, probability): (u32, f32),
         u: Vec2,
     ) -> Option<DirectSample> {
-        let Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, uniform } =
-            triangle
+        let &Emitter::Triangle {
+            instance,
+            primitive,
+            area,
+            two_sided,
+            radiance,
+            ref spread,
+            plane,
+            ref corners,
+            error,
+            uniform,
+        } = triangle
         else {
             return None;
         };
         // Most receivers are behind some one-sided light, so this cheap test comes first. Near the plane, rounding
         // decides.
         let ng = plane.truncate();
-        if !*two_sided && ng.dot(p) <= plane.w {
+        if !two_sided && ng.dot(p) <= plane.w {
             return None;
         }
         let b = warp::triangle_uniform(u);
@@ -377,13 +407,12 @@ impl Lights {
         if relative == 0.0 {
             return None;
         }
-        let radiance =
-            if *uniform { *radiance } else { textured_radiance(shapes, materials, (*instance, *primitive), b)? };
+        let radiance = if uniform { radiance } else { textured_radiance(shapes, materials, (instance, primitive), b)? };
         let radiance = radiance * relative;
         let pdf_w = probability * distance2 / (area * cos.abs());
-        let arrival_pdf_a = Self::cosine_density(cos.abs(), *two_sided, spread) / distance2;
-        let target = Some(shadow_end(at, ng, -wi, position_error(corners), distance2.sqrt()));
-        Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_pdf_a, light })
+        let arrival_factor = Self::cosine_density(cos.abs(), two_sided, spread) / distance2;
+        let target = Some(shadow_end(at, ng, -wi, error, distance2.sqrt()));
+        Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_factor, light })
     }
 
     /// The point on a light that [`Lights::sample_direct`] samples for any receiver in a medium with these random
@@ -570,25 +599,34 @@ impl Lights {
         point: Vec2,
         direction: Vec2,
     ) -> Option<LightRay> {
-        let Emitter::Triangle { instance, primitive, area, two_sided, radiance, spread, plane, corners, uniform } =
-            triangle
+        let &Emitter::Triangle {
+            instance,
+            primitive,
+            area,
+            two_sided,
+            radiance,
+            ref spread,
+            plane,
+            ref corners,
+            error,
+            uniform,
+        } = triangle
         else {
             return None;
         };
         let b = warp::triangle_uniform(point);
         let (at, ng) = (corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate());
-        let frame = Frame::from_normal(if *two_sided && back { -ng } else { ng });
+        let frame = Frame::from_normal(if two_sided && back { -ng } else { ng });
         let (d, weight) = spread.sample(direction);
         let d = frame.to_world(d);
-        let radiance =
-            if *uniform { *radiance } else { textured_radiance(shapes, materials, (*instance, *primitive), b)? };
+        let radiance = if uniform { radiance } else { textured_radiance(shapes, materials, (instance, primitive), b)? };
         let cos = ng.dot(d).abs();
         if cos < MIN_COSINE {
             return None;
         }
-        let flux = radiance * (PI * area * weight * if *two_sided { 2.0 } else { 1.0 });
-        let origin = offset_origin(at, ng, d, position_error(corners));
-        let onward = Self::cosine_density(cos, *two_sided, spread);
+        let flux = radiance * (PI * area * weight * if two_sided { 2.0 } else { 1.0 });
+        let origin = offset_origin(at, ng, d, error);
+        let onward = Self::cosine_density(cos, two_sided, spread);
         Some(LightRay { origin, direction: d, flux, start: 1.0 / area, onward, cos })
     }
 

@@ -297,6 +297,7 @@ mod tests {
                         spread: Spread::LAMBERTIAN,
                         plane: Vec4::new(n.x, n.y, n.z, n.dot(p)),
                         corners,
+                        error: 0.0,
                         uniform: true,
                     }
                 }

@@ -304,6 +304,20 @@ impl Draws {
         }
     }
 
+    /// The number of [`Draws::one`] if it is `needed`, otherwise any number in `[0, 1)`. A Markov chain draws it always,
+    /// so that its state does not depend on who needs it.
+    #[inline]
+    pub fn one_if(self, needed: bool, purpose: Purpose) -> f32 {
+        if needed || self.generator == Generator::Chain { self.one(purpose) } else { 0.0 }
+    }
+
+    /// Whether an event of this probability happens, decided by the number of [`Draws::one`]. An event of probability 1
+    /// costs no random number.
+    #[inline]
+    pub fn happens(self, probability: f32, purpose: Purpose) -> bool {
+        self.one_if(probability < 1.0, purpose) < probability
+    }
+
     /// The number of [`Draws::one`] with all of its 32 bits, for choices among more than 2^24.
     #[inline]
     pub fn one_fine(self, purpose: Purpose) -> f64 {
@@ -453,6 +467,23 @@ mod tests {
         let key = mix(mix(key.wrapping_add(5u64.wrapping_mul(GOLDEN))) ^ 3u64.wrapping_mul(0xd1b5_4a32_d192_ed03));
         let bits = mix(key.wrapping_add((Purpose::Lobe as u64).wrapping_mul(GOLDEN)));
         assert_eq!((hashed.bits(Purpose::Lobe), hashed.one(Purpose::Lobe)), (bits, unit((bits >> 32) as u32)));
+    }
+
+    /// Events happen if the number of [`Draws::one`] is below their probability. A Markov chain draws a number also where
+    /// none is needed, so its coordinates exist afterwards.
+    #[test]
+    fn numbers_that_nobody_needs_are_drawn_only_in_a_chain() {
+        for i in 0..1000 {
+            let draws = Stream::new(3, 1, Domain::Test, i).vertex(0);
+            let (u, probability) = (draws.one(Purpose::Roulette), i as f32 / 999.0);
+            assert_eq!(draws.happens(probability, Purpose::Roulette), u < probability);
+            let [needed, other] = [true, false].map(|needed| draws.one_if(needed, Purpose::Roulette));
+            assert_eq!((needed, (0.0..1.0).contains(&other)), (u, true));
+        }
+        let draws = Streams::new(3, 1, Domain::Test).path(0).chained().vertex(0);
+        let mut chain = Chain::new(5);
+        chain.set_initial(draws.id(Purpose::Roulette), Vec2::new(0.625, 0.5));
+        assert_eq!(chain.run(|| draws.one_if(false, Purpose::Roulette)), 0.625);
     }
 
     /// Iteration 0 and iterations beyond the 2^32 points of a sequence have their own draws.

@@ -170,12 +170,6 @@ fn surfaces<'a>(scene: &'a Scene, stack: &'a Stack) -> impl Iterator<Item = Surf
     stack.iter().filter_map(|(_, hit)| scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric))
 }
 
-#[cold]
-#[inline(never)]
-fn next(scene: &Scene, point: &ContactPoint, direction: Vec3, token: u32) -> Option<Hit> {
-    following(scene, point, direction, token).first().map(|(_, hit)| *hit)
-}
-
 /// The surfaces touching the one at `point` that a ray along `direction` crosses after it, in order.
 #[cold]
 #[inline(never)]
@@ -226,25 +220,50 @@ impl RaySurfaces {
     /// a solid, which it may leave before it hits an opaque surface.
     #[inline(always)]
     pub fn next(&mut self, scene: &Scene, inside: bool) -> Option<(Surface, f32)> {
-        if let Some(point) = self.here.take()
-            && let Some(hit) = next(scene, &point, self.ray.direction, self.ray.token)
-        {
-            let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
-            return Some((Surface { touching: true, error: point.error, ..surface }, 0.0));
-        }
-        let hit = scene.tracer.intersect(&self.ray)?;
-        self.surface_at(scene, &hit, inside)
+        self.next_traced(scene, None, inside)
+    }
+
+    /// Does the work of [`RaySurfaces::next`]. `traced` is the nearest hit of the ray, if the ray has been traced.
+    #[inline(always)]
+    pub fn next_traced(&mut self, scene: &Scene, traced: Option<Option<Hit>>, inside: bool) -> Option<(Surface, f32)> {
+        let hit = match traced {
+            Some(hit) => hit,
+            None => {
+                if self.here.is_some()
+                    && let Some(next) = self.next_touching(scene)
+                {
+                    return next;
+                }
+                scene.tracer.intersect(&self.ray)
+            }
+        };
+        self.surface_at(scene, &hit?, inside)
+    }
+
+    /// The next surface at the current point of the ray, as [`RaySurfaces::next`] returns it; `None` if no more
+    /// surfaces touch there.
+    #[cold]
+    #[inline(never)]
+    fn next_touching(&mut self, scene: &Scene) -> Option<Option<(Surface, f32)>> {
+        let point = self.here.take()?;
+        let (_, hit) = *following(scene, &point, self.ray.direction, self.ray.token).first()?;
+        let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric);
+        Some(surface.map(|surface| (Surface { touching: true, error: point.error, ..surface }, 0.0)))
     }
 
     /// Does the work of [`RaySurfaces::next`] for a ray whose nearest hit is known.
     #[inline(always)]
     pub fn surface_at(&self, scene: &Scene, hit: &Hit, inside: bool) -> Option<(Surface, f32)> {
-        let surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
+        let mut surface = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric)?;
         // Outside all solids, an opaque surface comes first, unless a sheet touches it.
         let alone = !passes(scene, &surface) && !inside && !scene.contacts.sheets;
-        let reach = if alone { None } else { scene.contacts.reach(hit.instance, hit.primitive, surface.error) };
-        let first = reach.and_then(|error| first(scene, &Surface { error, ..surface }, *hit, &self.ray));
-        Some((first.unwrap_or(surface), hit.t))
+        if !alone
+            && let Some(reach) = scene.contacts.reach(hit.instance, hit.primitive, surface.error)
+            && let Some(first) = first(scene, &surface, reach, *hit, &self.ray)
+        {
+            surface = first;
+        }
+        Some((surface, hit.t))
     }
 
     /// Continues the ray behind `surface`, which it has just crossed.
@@ -257,11 +276,13 @@ impl RaySurfaces {
     }
 }
 
-/// The surface that a ray crosses first among those that touch the surface that it hit; `None` if no other touches it.
+/// The surface that a ray crosses first among those within the distance `reach` of the surface that it hit; `None` if
+/// there are no others.
 #[inline(never)]
-fn first(scene: &Scene, surface: &Surface, hit: Hit, ray: &Ray) -> Option<Surface> {
-    let stack = stack(scene, ContactPoint::of(surface), hit, ray.direction, ray.token);
+fn first(scene: &Scene, surface: &Surface, reach: f32, hit: Hit, ray: &Ray) -> Option<Surface> {
+    let point = ContactPoint { error: reach, ..ContactPoint::of(surface) };
+    let stack = stack(scene, point, hit, ray.direction, ray.token);
     let (_, first) = stack.first()?;
     let first = scene.shapes.surface(first.instance, first.primitive, first.barycentric)?;
-    Some(Surface { touching: stack.len() > 1, error: surface.error, ..first })
+    Some(Surface { touching: stack.len() > 1, error: reach, ..first })
 }

@@ -39,6 +39,13 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// Whether the first surface on a shadow ray always blocks it, and media do not attenuate it, unless surfaces touch
+    /// at one of its ends.
+    #[inline]
+    pub fn shadow_rays_end_at_surfaces(&self) -> bool {
+        !(self.media || self.null_boundaries || self.culled)
+    }
+
     /// Finds out which kinds of things a scene contains.
     pub fn new(shapes: &Shapes, materials: &Materials, lights: &Lights, medium: Option<MediumParameters>) -> Survey {
         let scatters = |medium: &Option<MediumParameters>| medium.is_some_and(|medium| medium.scatters());

@@ -171,7 +171,9 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
             pdf_w: pdf * visibility.flight.forward,
             reverse_pdf_w: vertex.reverse_pdf(light.wi, Transport::Importance),
             light_pdf_w: light.pdf_w,
-            arrival_pdf_a: light.arrival_pdf_a * vertex.cos(light.wi) * visibility.flight.reverse,
+            arrival_pdf_a: scene.lights.arrival_pdf_a(&light, vertex.p())
+                * vertex.cos(light.wi)
+                * visibility.flight.reverse,
             delta: light.delta,
         };
         let ratios = mis::next_event(&self.mis, self.shared.joins(vertex.depth()), &pdfs);

@@ -177,11 +177,14 @@ impl Interior {
     /// Index of the material that fills the space around the path; `None` is the open space.
     #[inline]
     pub fn material(&self, scene: &Scene) -> Option<u32> {
+        if self.is_open() {
+            return None;
+        }
         self.host(scene).map(|instance| scene.shapes.instances[instance as usize].material)
     }
 
     /// Index of the instance whose material fills the space around the path; `None` is the open space.
-    #[inline]
+    #[inline(never)]
     pub fn host(&self, scene: &Scene) -> Option<u32> {
         // `max_by_key` returns the last of equal ones, which belong to one object.
         let inner = self.entries().iter().copied().max_by_key(|&instance| strength(scene, instance));

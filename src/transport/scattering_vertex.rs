@@ -12,6 +12,7 @@ use crate::random::Draws;
 use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint};
 use crate::spectrum::Wavelength;
+use crate::trace::Ray;
 
 /// A vertex of a walk, on a surface or in a medium. In a medium the cosine is 1, and the phase function counts as a
 /// broad lobe.
@@ -99,8 +100,13 @@ pub trait ScatterPoint {
                 (to / distance, distance)
             }
         };
+        let leaving = self.touching();
+        if leaving.is_none() && reaching.is_none() && scene.survey.shadow_rays_end_at_surfaces() {
+            let blocked = scene.tracer.occluded(&Ray { origin, direction, tmax, token });
+            return if blocked { Visibility::BLOCKED } else { Visibility::CLEAR };
+        }
         let interior = *self.interiors()[usize::from(self.crosses(wi))];
-        let start = Start { origin, direction, interior, leaving: self.touching(), token };
+        let start = Start { origin, direction, interior, leaving, token };
         shadow_ray(scene, &ShadowRay { start, tmax, reaching, in_medium: [Self::IN_MEDIUM, to_medium] })
     }
 }

@@ -253,11 +253,12 @@ pub(super) fn next_vertex<T: Through>(scene: &Scene, start: Start, known: &Preco
     let mut transmittance = Rgb::ONE;
     let mut distance = 0.0;
     for crossed in 0..MAX_NULL_CROSSINGS {
-        let met = match known {
-            PrecomputedHit::Nothing if crossed == 0 => None,
-            PrecomputedHit::Hit(hit) if crossed == 0 => along.surface_at(scene, hit, !interior.is_open()),
-            _ => along.next(scene, !interior.is_open()),
+        let traced = match known {
+            PrecomputedHit::Nothing if crossed == 0 => Some(None),
+            PrecomputedHit::Hit(hit) if crossed == 0 => Some(Some(*hit)),
+            _ => None,
         };
+        let met = along.next_traced(scene, traced, !interior.is_open());
         let (origin, before, left) = (along.ray().origin, distance, transmittance);
         let medium = if T::MEDIA && scene.survey.media { interior.medium(scene) } else { None };
         let Some((mut surface, t)) = met else {
@@ -313,7 +314,10 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    const BLOCKED: Visibility = Visibility { transmittance: Rgb::ZERO, flight: FlightDensity::ONE };
+    /// A surface blocks the ray.
+    pub(super) const BLOCKED: Visibility = Visibility { transmittance: Rgb::ZERO, flight: FlightDensity::ONE };
+    /// Nothing is in the way of the ray.
+    pub(super) const CLEAR: Visibility = Visibility { transmittance: Rgb::ONE, flight: FlightDensity::ONE };
 
     /// Crosses `distance` of the medium inside `interior`. `starts` and `ends`: a path vertex in the medium lies at the
     /// start or at the end.
@@ -361,7 +365,7 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
     if scene.tracer.occluded(&Ray { origin, direction, tmax, token }) {
         return Visibility::BLOCKED;
     }
-    let mut visibility = Visibility { transmittance: Rgb::ONE, flight: FlightDensity::ONE };
+    let mut visibility = Visibility::CLEAR;
     visibility.pass(scene, interior, tmax, starts, ends);
     visibility
 }
@@ -370,7 +374,7 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
 fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
     let ShadowRay { start: Start { origin, direction, mut interior, leaving, token }, tmax, reaching, .. } = *between;
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);
-    let mut visibility = Visibility { transmittance: Rgb::ONE, flight: FlightDensity::ONE };
+    let mut visibility = Visibility::CLEAR;
     let [mut starts, ends] = between.in_medium;
     for _ in 0..MAX_NULL_CROSSINGS {
         let Some((mut surface, t)) = along.next(scene, !interior.is_open()) else {

@@ -40,7 +40,7 @@ impl Shares {
     /// Path classes of the light that the picture shows, each with its fraction of the light by channel.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (PathClass, Rgb)> {
-        self.list.into_iter().take(self.count)
+        self.list[..self.count].iter().copied()
     }
 }
 

@@ -265,7 +265,7 @@ impl<'a> Path<'a> {
         if set.is_empty() || depth == self.max_depth {
             return None;
         }
-        if draws.one(Purpose::Roulette) >= survival {
+        if !draws.happens(survival, Purpose::Roulette) {
             return end(vertex.throughput, visitor);
         }
         let sample = vertex.sample(self.transport, set, 0.0, draws.two(Purpose::Phase))?;
@@ -331,10 +331,11 @@ impl<'a> Path<'a> {
             // Its roulette takes place on arrival. This one only ends trapped light.
             Some(_) => late_survival(depth, || set == LobeSet::DELTA),
         };
-        if draws.one(Purpose::Roulette) >= survival {
+        if !draws.happens(survival, Purpose::Roulette) {
             return end(self.throughput, visitor);
         }
-        let sample = shading.sample(transport, set, draws.one(Purpose::Lobe), draws.two(Purpose::Direction))?;
+        let lobe = draws.one_if(shading.bsdf.has_several_lobes(), Purpose::Lobe);
+        let sample = shading.sample(transport, set, lobe, draws.two(Purpose::Direction))?;
         visitor.scatter(&vertex, &sample);
         let going = survival * chance;
         self.throughput *= sample.weight / going;
