@@ -332,8 +332,9 @@ impl RenderOptions {
             let cause = format!("--light-paths must be a multiple of 1/{LIGHT_PATH_STEPS}");
             return Err(Error::usage(cause).hint("0.0625, 0.125, 0.25, 0.5, 1, 2 and 4 are common numbers"));
         }
-        let without = [("connections", self.connections.map(f64::from)), ("merging", self.merging)];
-        for (option, _) in without.into_iter().filter(|(_, value)| steps == 0.0 && value.is_some_and(|x| x > 0.0)) {
+        let needing = [("connections", self.connections.map(f64::from)), ("merging", self.merging)];
+        let refused = needing.into_iter().find(|(_, value)| steps == 0.0 && value.is_some_and(|x| x > 0.0));
+        if let Some((option, _)) = refused {
             let error = Error::usage(format!("--{option} needs light paths, and --light-paths 0 traces none"));
             return Err(error.hint(format!("leave --{option} out, or ask for more light paths")));
         }
