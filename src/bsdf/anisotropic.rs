@@ -2,9 +2,9 @@
 //! too inaccurate.
 
 use super::profile::{NODES, Position, Profile, node};
-use crate::math::{Vec2, Vec3, Vec4};
+use crate::math::{Vec2, Vec3, Vec4, atan2_turns, sin_cos_turns};
 use std::array::from_fn;
-use std::f32::consts::{FRAC_2_PI, FRAC_PI_2};
+use std::f32::consts::FRAC_PI_2;
 use std::sync::OnceLock;
 
 /// Number of nodes of the azimuth in a quarter of the circle. The other quarters are mirror images.
@@ -97,7 +97,7 @@ impl AnisotropicProfile {
     #[inline]
     fn azimuth_position(&self, w: Vec3) -> (usize, f32) {
         let (x, y) = (w.x.abs(), w.y.abs());
-        let azimuth = if self.swapped { x.atan2(y) } else { y.atan2(x) } * (FRAC_2_PI * LAST);
+        let azimuth = if self.swapped { atan2_turns(x, y) } else { atan2_turns(y, x) } * (4.0 * LAST);
         let k = (azimuth as usize).min(AZIMUTHS - 2);
         (k, azimuth - k as f32)
     }
@@ -137,7 +137,7 @@ impl AnisotropicProfile {
         let quarter = (4.0 * u.y) as u32;
         let v = 2.0 * (4.0 * u.y - quarter as f32) - 1.0;
         let hat = v.signum() * (1.0 - (1.0 - v.abs()).max(0.0).sqrt());
-        let (sin, cos) = ((chosen as f32 + hat) * FRAC_PI_2 / LAST).sin_cos();
+        let (sin, cos) = sin_cos_turns((chosen as f32 + hat) * (0.25 / LAST));
         let r = (1.0 - mu * mu).max(0.0).sqrt();
         let (x, y) = if self.swapped { (sin, cos) } else { (cos, sin) };
         let sign = |bit: u32| if quarter & bit == 0 { r } else { -r };

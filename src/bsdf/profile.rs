@@ -4,8 +4,8 @@
 //! curvature: at cosines near alpha, down to nearly smooth surfaces. Interpolation is linear. Averages integrate the
 //! interpolated function exactly, so that a compensation lobe normalized by them has exactly the tabulated albedo.
 
-use crate::math::{Vec2, Vec3, Vec4};
-use std::f32::consts::{FRAC_1_PI, TAU};
+use crate::math::{Vec2, Vec3, Vec4, sin_cos_turns};
+use std::f32::consts::FRAC_1_PI;
 use std::sync::OnceLock;
 
 /// Number of nodes of a table along each axis: the cosine, and alpha.
@@ -243,8 +243,8 @@ impl Profile {
             if left < mass {
                 let square = SQUARES[i] + left / value;
                 let r = (1.0 - square).max(0.0).sqrt();
-                let phi = TAU * u.y;
-                return Some(Vec3::new(r * phi.cos(), r * phi.sin(), square.sqrt()));
+                let (sin, cos) = sin_cos_turns(u.y);
+                return Some(Vec3::new(r * cos, r * sin, square.sqrt()));
             }
             left -= mass;
         }

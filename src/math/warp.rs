@@ -1,8 +1,9 @@
 //! Warps of uniform points `u` of the unit square `[0, 1)^2` to other distributions, and their densities. The suffix
 //! `_pdf_w` means a density per solid angle.
 
+use super::{sin_cos_octant, sin_cos_turns};
 use glam::{Vec2, Vec3};
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
+use std::f32::consts::{FRAC_PI_4, TAU};
 
 /// Maps a point of the unit square to a uniform point of the unit disc (density 1/pi), area-preserving and continuous
 /// \[Shirley and Chiu 1997, "A Low Distortion Map Between Disk and Square"\].
@@ -13,8 +14,9 @@ pub fn disc_concentric(u: Vec2) -> Vec2 {
     if a == 0.0 && b == 0.0 {
         return Vec2::ZERO;
     }
-    let (r, phi) = if a.abs() > b.abs() { (a, FRAC_PI_4 * (b / a)) } else { (b, FRAC_PI_2 - FRAC_PI_4 * (a / b)) };
-    Vec2::new(r * phi.cos(), r * phi.sin())
+    let (r, ratio) = if a.abs() > b.abs() { (a, b / a) } else { (b, a / b) };
+    let (sin, cos) = sin_cos_octant(FRAC_PI_4 * ratio);
+    if a.abs() > b.abs() { Vec2::new(r * cos, r * sin) } else { Vec2::new(r * sin, r * cos) }
 }
 
 /// Maps a point of the unit square to a unit direction of the upper hemisphere (local z up), with density cos / pi.
@@ -29,8 +31,8 @@ pub fn hemisphere_cosine(u: Vec2) -> Vec3 {
 pub fn sphere_uniform(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
     let r = (1.0 - z * z).max(0.0).sqrt();
-    let phi = TAU * u.y;
-    Vec3::new(r * phi.cos(), r * phi.sin(), z)
+    let (sin, cos) = sin_cos_turns(u.y);
+    Vec3::new(r * cos, r * sin, z)
 }
 
 /// Maps a point of the unit square to a uniform direction of the cone of half angle `acos(1 - one_minus_cos)` around
@@ -39,8 +41,8 @@ pub fn sphere_uniform(u: Vec2) -> Vec3 {
 pub fn cone_uniform(u: Vec2, one_minus_cos: f32) -> Vec3 {
     let h = u.x * one_minus_cos;
     let r = (h * (2.0 - h)).max(0.0).sqrt();
-    let phi = TAU * u.y;
-    Vec3::new(r * phi.cos(), r * phi.sin(), 1.0 - h)
+    let (sin, cos) = sin_cos_turns(u.y);
+    Vec3::new(r * cos, r * sin, 1.0 - h)
 }
 
 /// Density per solid angle of [`cone_uniform`] for directions inside the cone.

@@ -12,13 +12,12 @@ use super::segment::token;
 use super::vertex::MediumVertex;
 use super::volume::Volume;
 use crate::geometry::Surface;
-use crate::math::{Frame, Vec3, warp};
+use crate::math::{Frame, Vec3, sin_cos_turns, warp};
 use crate::photon::Kernel;
 use crate::random::Purpose;
 use crate::scene::Scene;
 use crate::scene::contact::RaySurfaces;
 use crate::trace::{Hit, Ray};
-use std::f32::consts::TAU;
 
 /// Number of rays that look for the boundaries of a medium around a vertex. They point to the corners of a randomly
 /// rotated cube. Each has an opposite one, so that planes through the centre are exact.
@@ -42,7 +41,7 @@ impl Volume<'_> {
         let reach = radius2.iter().fold(0.0, |largest: f32, &radius2| largest.max(radius2)).sqrt();
         let draws = vertex.draws;
         let frame = Frame::from_normal(warp::sphere_uniform(draws.two(Purpose::Border)));
-        let (sin, cos) = (TAU * draws.one(Purpose::BorderTurn)).sin_cos();
+        let (sin, cos) = sin_cos_turns(draws.one(Purpose::BorderTurn));
         let direction = |k: usize| {
             let side = |bit: usize| if k & bit == 0 { -1.0f32 } else { 1.0 };
             let corner = Vec3::new(side(1), side(2), side(4)) / 3f32.sqrt();
