@@ -6,13 +6,14 @@ use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
 use super::emitter::{Emitter, Sky, position_error, spot_falloff, spot_point, spot_solid_angle};
+use super::environment::EnvironmentSample;
 use super::group::{Group, Groups};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
 use super::spread::Spread;
 use crate::geometry::{Shapes, Surface, offset_origin, shadow_end};
 use crate::material::{Alpha, Materials};
-use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, sin_cos_turns, warp};
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
@@ -354,12 +355,10 @@ impl Lights {
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
-                let (wi, pdf) = environment.sample(u);
-                let pdf_w = probability * pdf;
-                (pdf_w > 0.0).then(|| {
-                    let (radiance, arrival_factor) = (environment.radiance(wi), 1.0);
-                    DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_factor, light }
-                })
+                let EnvironmentSample { wi, pdf_w, radiance } = environment.sample(u)?;
+                let (pdf_w, arrival_factor) = (probability * pdf_w, 1.0);
+                let sample = DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_factor, light };
+                (pdf_w > 0.0).then_some(sample)
             }
         }
     }
@@ -514,7 +513,8 @@ impl Lights {
         if let (Some(index), Some(environment)) = (self.environment, &self.sky.environment)
             && !(camera && self.sky.hidden_from_camera)
         {
-            met(environment.radiance(d), index, environment.pdf_w(d));
+            let (radiance, pdf_w) = environment.radiance_and_pdf_w(d);
+            met(radiance, index, pdf_w);
         }
         for &index in &self.suns {
             if let Emitter::Sun { frame, irradiance, one_minus_cos: size, hidden_from_camera } =
@@ -562,12 +562,9 @@ impl Lights {
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
-                let (wi, start) = environment.sample(direction);
-                if start <= 0.0 {
-                    return None;
-                }
+                let EnvironmentSample { wi, pdf_w: start, radiance } = environment.sample(direction)?;
                 let onward = 1.0 / (PI * self.sky.radius * self.sky.radius);
-                let (origin, flux) = (self.sample_scene_disc(point, -wi), environment.radiance(wi) / (start * onward));
+                let (origin, flux) = (self.sample_scene_disc(point, -wi), radiance / (start * onward));
                 LightRay { origin, direction: -wi, flux, start, onward, cos: 1.0 }
             }
         };
@@ -640,7 +637,7 @@ impl Lights {
         let x = direction.x * (inner + penumbra);
         let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
         let sin = (h * (2.0 - h)).max(0.0).sqrt();
-        let (s, c) = (TAU * direction.y).sin_cos();
+        let (s, c) = sin_cos_turns(direction.y);
         let filled = spot_solid_angle(*inner, *outer, *edge);
         let falloff = spot_falloff(h, *inner, *outer, *edge);
         let direction = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));

@@ -377,7 +377,7 @@ fn environment(described: Option<description::EnvironmentDescription>) -> Option
             for texel in &mut texels {
                 *texel = texel.map(|x| x * described.strength);
             }
-            ImageEnvironment::new(width as usize, height as usize, texels, described.rotation_deg.to_radians())
+            ImageEnvironment::new(width as usize, height as usize, &texels, described.rotation_deg.to_radians())
                 .map(|image| Environment::Image(Arc::new(image)))
         }
     }
