@@ -126,29 +126,38 @@ fn rgba<T: Copy>(texel: &[T], opaque: T) -> [T; 4] {
 }
 
 impl Integers {
-    /// Linear RGBA of the texel at a row-major index.
+    /// Linear RGBA of the texels at row-major indices. All are decoded alike, so the format is looked at once.
     #[inline]
-    fn decode(&self, index: usize, channels: u8, encoding: Encoding) -> Vec4 {
-        let range = index * usize::from(channels)..(index + 1) * usize::from(channels);
+    fn decode<const N: usize>(&self, indices: [usize; N], channels: u8, encoding: Encoding) -> [Vec4; N] {
+        let range = |index: usize| index * usize::from(channels)..(index + 1) * usize::from(channels);
         match (self, encoding) {
             (Integers::Bytes(data), Encoding::Srgb) => {
-                let ([r, g, b, a], table) = (rgba(&data[range], 255), &*SRGB_BYTES);
-                Vec4::new(table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0)
+                let table = &*SRGB_BYTES;
+                indices.map(|index| {
+                    let [r, g, b, a] = rgba(&data[range(index)], 255);
+                    Vec4::new(table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0)
+                })
             }
-            (Integers::Bytes(data), Encoding::Linear) => Vec4::from(rgba(&data[range], 255).map(f32::from)) / 255.0,
-            (Integers::Bytes(data), Encoding::Glossiness(factor)) => roughness(rgba(&data[range], 255)[3], factor),
+            (Integers::Bytes(data), Encoding::Linear) => {
+                indices.map(|index| Vec4::from(rgba(&data[range(index)], 255).map(f32::from)) / 255.0)
+            }
+            (Integers::Bytes(data), Encoding::Glossiness(factor)) => {
+                indices.map(|index| roughness(rgba(&data[range(index)], 255)[3], factor))
+            }
             (Integers::Words(data), Encoding::Srgb) => {
-                let grey = channels < 3;
-                let ([r, g, b, a], table) = (rgba(&data[range], u16::MAX), &SRGB_WORDS[usize::from(grey)]);
-                Vec4::new(table[r as usize], table[g as usize], table[b as usize], unit_word(a, grey))
+                let (grey, table) = (channels < 3, &SRGB_WORDS[usize::from(channels < 3)]);
+                indices.map(|index| {
+                    let [r, g, b, a] = rgba(&data[range(index)], u16::MAX);
+                    Vec4::new(table[r as usize], table[g as usize], table[b as usize], unit_word(a, grey))
+                })
             }
             (Integers::Words(data), Encoding::Linear) => {
-                Vec4::from(rgba(&data[range], u16::MAX).map(|x| unit_word(x, channels < 3)))
+                indices.map(|index| Vec4::from(rgba(&data[range(index)], u16::MAX).map(|x| unit_word(x, channels < 3))))
             }
-            (Integers::Words(data), Encoding::Glossiness(factor)) => {
-                let gloss = (u32::from(rgba(&data[range], u16::MAX)[3]) + 128) / 257;
+            (Integers::Words(data), Encoding::Glossiness(factor)) => indices.map(|index| {
+                let gloss = (u32::from(rgba(&data[range(index)], u16::MAX)[3]) + 128) / 257;
                 roughness(gloss as u8, factor)
-            }
+            }),
         }
     }
 }
@@ -162,17 +171,28 @@ impl Texels {
     /// Linear RGBA of the texel at a row-major index.
     #[inline]
     pub fn at(&self, index: usize) -> Vec4 {
+        let [texel] = self.all([index]);
+        texel
+    }
+
+    /// Linear RGBA of the texels at row-major indices.
+    #[inline]
+    fn all<const N: usize>(&self, indices: [usize; N]) -> [Vec4; N] {
         match self {
-            Texels::Floats(data) => Vec4::from_array(data[index]),
-            Texels::Integers { data, channels, encoding } => data.decode(index, *channels, *encoding),
+            Texels::Floats(data) => indices.map(|index| Vec4::from_array(data[index])),
+            Texels::Integers { data, channels, encoding } => data.decode(indices, *channels, *encoding),
         }
     }
 }
 
 impl Wrap {
-    /// The texel index in `0..size` for an index outside of the image.
+    /// The texel index in `0..size` for any index. Divisions are slow, and most indices are inside the image.
     #[inline]
     fn fold(self, i: i64, size: i64) -> usize {
+        if (0..size).contains(&i) { i as usize } else { self.fold_outside(i, size) }
+    }
+
+    fn fold_outside(self, i: i64, size: i64) -> usize {
         (match self {
             Wrap::Repeat => i.rem_euclid(size),
             Wrap::Clamp => i.clamp(0, size - 1),
@@ -221,8 +241,54 @@ impl Texture {
         let (fx, fy) = (x.floor(), y.floor());
         let (ix, iy) = (fx as i64, fy as i64);
         let (tx, ty) = (x - fx, y - fy);
-        let top = self.texel(ix, iy).lerp(self.texel(ix + 1, iy), tx);
-        let bottom = self.texel(ix, iy + 1).lerp(self.texel(ix + 1, iy + 1), tx);
-        top.lerp(bottom, ty)
+        let [left, right] = [ix, ix + 1].map(|x| self.wrap[0].fold(x, i64::from(self.width)));
+        let [top, bottom] = [iy, iy + 1].map(|y| self.wrap[1].fold(y, i64::from(self.height)) * self.width as usize);
+        let texels = self.texels.all([top + left, top + right, bottom + left, bottom + right]);
+        let [top_left, top_right, bottom_left, bottom_right] = texels;
+        top_left.lerp(top_right, tx).lerp(bottom_left.lerp(bottom_right, tx), ty)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The index of an image, of the image and its mirror image, or of the nearest edge.
+    #[test]
+    fn indices_outside_of_the_image_are_folded() {
+        for size in [1i64, 2, 5] {
+            for i in -3 * size..4 * size {
+                let (repeated, doubled) = ((i + 12 * size) % size, (i + 12 * size) % (2 * size));
+                let fold = |wrap: Wrap| wrap.fold(i, size) as i64;
+                assert_eq!(fold(Wrap::Repeat), repeated);
+                assert_eq!(fold(Wrap::Mirror), if doubled < size { doubled } else { 2 * size - 1 - doubled });
+                assert_eq!(fold(Wrap::Clamp), i.max(0).min(size - 1));
+            }
+        }
+    }
+
+    /// A lookup at every format and position between texels is the bilinear mean of the four texels around.
+    #[test]
+    fn lookups_interpolate_the_texels_around() {
+        let (width, height, count) = (5u32, 3u32, 60);
+        let bytes = Integers::Bytes((0..count).map(|i| (i * 37 % 256) as u8).collect());
+        let words = Integers::Words((0..count).map(|i| (i * 7919 % 65536) as u16).collect());
+        let encodings = [Encoding::Linear, Encoding::Srgb, Encoding::Glossiness(0.8)];
+        let formats = [bytes, words].into_iter().flat_map(|data| {
+            let data = Arc::new(data);
+            encodings.map(|encoding| Texels::Integers { data: Arc::clone(&data), channels: 4, encoding })
+        });
+        let floats = Texels::Floats((0..15).map(|i| [i as f32, 1.0, 0.5 * i as f32, 1.0]).collect());
+        for texels in formats.chain([floats]) {
+            let wrap = [Wrap::Repeat, Wrap::Mirror];
+            let texture = Texture { name: String::new(), width, height, texels, wrap, linear: true };
+            for (x, y) in (-11..20).flat_map(|x| (-7..13).map(move |y| (x, y))) {
+                let (tx, ty) = (0.25, 0.5);
+                let centre = Vec2::new((x as f32 + 0.5 + tx) / width as f32, (y as f32 + 0.5 + ty) / height as f32);
+                let row = |y: i64| texture.texel(x, y) * (1.0 - tx) + texture.texel(x + 1, y) * tx;
+                let expected = row(y) * (1.0 - ty) + row(y + 1) * ty;
+                assert!((texture.sample(centre) - expected).abs().max_element() < 1e-4, "{x} {y} {:?}", texture.texels);
+            }
+        }
     }
 }
