@@ -5,6 +5,7 @@
 
 use super::picture::{Picture, Size};
 use crate::error::{Error, ErrorKind, Result};
+use rayon::prelude::*;
 
 /// Number format in which a file stores a plane, one component of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,7 +100,7 @@ impl Layer {
             let index = if self.planes.len() < 3 { 0 } else { i };
             self.planes.get(index).map_or(&[][..], |plane| &plane.values)
         });
-        r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect()
+        r.par_iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect()
     }
 }
 

@@ -13,7 +13,7 @@ use exr::meta::header::Header;
 use exr::prelude::f16;
 use rayon::prelude::*;
 
-use super::Attributes;
+use super::{Attributes, zip};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Plane, Sample};
 use crate::memory;
@@ -62,20 +62,21 @@ fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)>
     let meta = exr::block::reader::ChunksReader::meta_data(&chunks).clone();
     let display = meta.headers[0].shared_attributes.display_window;
     let mut canvas = Canvas::new(display, &meta.headers)?;
-    let mut batch: Vec<Chunk> = Vec::new();
-    let mut chunks = chunks.peekable();
-    while let Some(chunk) = chunks.next() {
-        batch.push(chunk?);
-        if batch.len() == 4 * rayon::current_num_threads() || chunks.peek().is_none() {
-            let decompress = |chunk| {
-                check_sections(&chunk, &meta.headers)?;
-                UncompressedBlock::decompress_chunk(chunk, &meta, false)
-            };
-            let blocks: Vec<Outcome<UncompressedBlock>> = batch.par_drain(..).map(decompress).collect();
-            for block in blocks {
-                canvas.paint(&block?, &meta.headers)?;
-            }
+    let decompress = |chunk| {
+        check_sections(&chunk, &meta.headers)?;
+        UncompressedBlock::decompress_chunk(zip::unpacked(chunk, &meta.headers), &meta, false)
+    };
+    let (mut chunks, mut blocks) = (chunks, Vec::<Outcome<UncompressedBlock>>::new());
+    loop {
+        let batch = chunks.by_ref().take(4 * rayon::current_num_threads()).collect::<Outcome<Vec<Chunk>>>()?;
+        // One thread copies the last batch while the others decompress the next.
+        let mut paint = || blocks.drain(..).try_for_each(|block| canvas.paint(&block?, &meta.headers));
+        let (painted, next) = rayon::join(&mut paint, || batch.into_par_iter().map(decompress).collect::<Vec<_>>());
+        painted?;
+        if next.is_empty() {
+            break;
         }
+        blocks = next;
     }
     Ok((canvas.into_layers(&meta.headers), attributes(&meta.headers)))
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use exr::block::chunk::Chunk;
 use exr::block::writer::ChunksWriter;
-use exr::block::{UncompressedBlock, enumerate_ordered_header_block_indices};
+use exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
 use exr::math::Vec2;
 use exr::meta::attribute::{
     AttributeValue, ChannelDescription, Chromaticities, Compression as Packing, IntegerBounds, LineOrder, SampleType,
@@ -186,26 +186,28 @@ fn write_chunks(
     let headers: exr::meta::Headers = std::iter::once(header).collect();
     exr::block::write(file, headers, true, |meta, chunks| {
         let blocks: Vec<_> = enumerate_ordered_header_block_indices(&meta.headers).collect();
-        // A few blocks per thread keep all threads busy with little memory.
-        for batch in blocks.chunks(4 * rayon::current_num_threads()) {
-            let compressed: Vec<_> = batch
-                .par_iter()
-                .map(|&(_, index)| {
-                    let channels = &meta.headers[0].channels;
-                    let block = UncompressedBlock::from_lines(channels, index, |line| {
-                        let at = line.location;
-                        let Source { plane, negated } = planes[at.channel];
-                        let start = at.position.y() * width + at.position.x();
-                        fill(line.value, &plane.values[start..start + at.sample_count], plane.sample, negated);
-                    });
-                    pack(block, &meta.headers)
-                })
-                .collect();
-            for (&(index, _), chunk) in batch.iter().zip(compressed) {
-                chunks.write_chunk(index, chunk?)?;
-            }
+        let compress = |&(number, index): &(usize, BlockIndex)| {
+            let block = UncompressedBlock::from_lines(&meta.headers[0].channels, index, |line| {
+                let at = line.location;
+                let Source { plane, negated } = planes[at.channel];
+                let start = at.position.y() * width + at.position.x();
+                fill(line.value, &plane.values[start..start + at.sample_count], plane.sample, negated);
+            });
+            (number, pack(block, &meta.headers))
+        };
+        let mut packed: Vec<(usize, exr::error::Result<Chunk>)> = Vec::new();
+        let mut write = |packed: Vec<(usize, exr::error::Result<Chunk>)>| {
+            packed.into_iter().try_for_each(|(number, chunk)| chunks.write_chunk(number, chunk?))
+        };
+        // A few blocks per thread keep all threads busy with little memory. One thread writes the last batch while the
+        // others compress the next.
+        for batch in blocks.chunks(2 * rayon::current_num_threads()) {
+            let last = std::mem::take(&mut packed);
+            let (written, next) = rayon::join(|| write(last), || batch.par_iter().map(compress).collect());
+            written?;
+            packed = next;
         }
-        Ok(())
+        write(packed)
     })
 }
 
