@@ -41,8 +41,8 @@ pub fn run(args: &FinishArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     super::pool(args.threads)?.install(|| {
-        let mut opened = open(&args.finish, None)?;
-        let (mut set, mut attributes) = exr::read(&args.input)?;
+        let (opened, read) = rayon::join(|| open(&args.finish, None), || exr::read(&args.input));
+        let (mut opened, (mut set, mut attributes)) = (opened?, read?);
         // Keep the naming style of the input, which its cryptomatte attributes also use.
         let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
         let naming = if blender { Naming::Blender } else { Naming::Plain };

@@ -12,8 +12,9 @@
 
 use super::Estimate;
 use super::window::window;
-use crate::film::Picture;
+use crate::film::{Picture, Size};
 use rayon::prelude::*;
+use wide::{CmpGt, f32x8};
 
 /// Maximum displacement of a pixel from its estimate by the finish, in standard errors: `c` of the finish.
 pub const LIMIT: f32 = 3.0;
@@ -30,32 +31,119 @@ const PERCENTILE: f32 = 0.8;
 /// errors: beside a bright light the pixel's own samples show that it does not see the light.
 pub fn spread(estimate: &Estimate) -> Picture {
     let Estimate { mean, deviation, .. } = estimate;
-    let known = |value: f32| if value.is_finite() { value.max(0.0) } else { f32::INFINITY };
-    let of_pixel = |ranked: &mut Vec<f32>, index: usize| {
-        if estimate.is_exact(index) {
-            return [0.0; 3];
+    let size = mean.size();
+    let planes: [Plane; 3] = std::array::from_fn(|c| Plane {
+        size,
+        mean: mean.par_iter().map(|rgb| rgb[c]).collect(),
+        error: deviation.par_iter().map(|rgb| known(rgb[c])).collect(),
+    });
+    let mut spread = vec![[0.0; 3]; size.pixels()];
+    spread.par_chunks_mut(size.width.max(1)).enumerate().for_each(|(y, row)| {
+        let inner = if (REACH..size.height.saturating_sub(REACH)).contains(&y) { REACH } else { size.width };
+        let mut ranked = Vec::new();
+        let mut x = 0;
+        while x < size.width {
+            let lanes = if x >= inner && x + LANES + REACH <= size.width { LANES } else { 1 };
+            for (c, plane) in planes.iter().enumerate() {
+                let index = y * size.width + x;
+                if lanes == LANES {
+                    let all = plane.inner_spreads(index).to_array();
+                    row[x..].iter_mut().zip(all).for_each(|(rgb, spread)| rgb[c] = spread);
+                } else {
+                    row[x][c] = plane.spread(index, &mut ranked);
+                }
+            }
+            x += lanes;
         }
-        std::array::from_fn(|c| {
-            let error_of = |other: usize| {
-                let error = known(deviation[other][c]);
-                let apart = mean[other][c] - mean[index][c];
-                if apart > LIMIT * error { 0.0 } else { error }
-            };
-            ranked.clear();
-            ranked.extend(window(mean.size(), index, REACH).map(error_of));
-            let rank = (PERCENTILE * (ranked.len() - 1) as f32).round() as usize;
-            let (_, around, _) = ranked.select_nth_unstable_by(rank, f32::total_cmp);
-            known(deviation[index][c]).max(*around)
-        })
-    };
-    Picture::new(mean.size(), (0..mean.len()).into_par_iter().map_init(Vec::new, of_pixel).collect())
+        let exact = |x: &usize| estimate.is_exact(y * size.width + x);
+        (0..size.width).filter(exact).for_each(|x| row[x] = [0.0; 3]);
+    });
+    Picture::new(size, spread)
 }
 
-/// The largest finite estimate in RGB within [`REACH`] pixels of pixel `index`, by channel; zero if there is none.
-pub fn brightest(mean: &Picture, index: usize) -> [f32; 3] {
-    window(mean.size(), index, REACH).fold([0.0; 3], |most, other| {
-        std::array::from_fn(|c| if mean[other][c].is_finite() { most[c].max(mean[other][c]) } else { most[c] })
-    })
+/// A standard error that is not negative; infinite if it is not finite.
+fn known(error: f32) -> f32 {
+    if error.is_finite() { error.max(0.0) } else { f32::INFINITY }
+}
+
+/// Number of pixels that [`Plane::inner_spreads`] processes at once.
+const LANES: usize = 8;
+/// Side of a window that the border of the picture does not cut off.
+const SIDE: usize = 2 * REACH + 1;
+
+/// Index, in ascending order, of the percentile [`PERCENTILE`] of `count` standard errors.
+const fn rank(count: usize) -> usize {
+    (PERCENTILE * (count - 1) as f32 + 0.5) as usize
+}
+
+/// One channel of an estimate and of its known standard errors.
+struct Plane {
+    size: Size,
+    mean: Vec<f32>,
+    error: Vec<f32>,
+}
+
+impl Plane {
+    /// The spread of a pixel that is not exact; `ranked` is a buffer.
+    fn spread(&self, index: usize, ranked: &mut Vec<f32>) -> f32 {
+        let error_of = |other: usize| {
+            let apart = self.mean[other] - self.mean[index];
+            if apart > LIMIT * self.error[other] { 0.0 } else { self.error[other] }
+        };
+        ranked.clear();
+        ranked.extend(window(self.size, index, REACH).map(error_of));
+        let rank = rank(ranked.len());
+        let (_, around, _) = ranked.select_nth_unstable_by(rank, f32::total_cmp);
+        self.error[index].max(*around)
+    }
+
+    /// [`Plane::spread`] of the pixel `index` and of the pixels after it, whose windows the border does not cut off.
+    fn inner_spreads(&self, index: usize) -> f32x8 {
+        let at = |plane: &[f32], index: usize| {
+            f32x8::from(<[f32; LANES]>::try_from(&plane[index..][..LANES]).unwrap_or([0.0; LANES]))
+        };
+        let mean = at(&self.mean, index);
+        // The largest errors, in descending order; the last of them is the percentile.
+        let mut largest = [f32x8::ZERO; SIDE * SIDE - rank(SIDE * SIDE)];
+        for y in 0..SIDE {
+            for x in 0..SIDE {
+                let other = index + y * self.size.width + x - REACH * self.size.width - REACH;
+                let error = at(&self.error, other);
+                let mut rest =
+                    (at(&self.mean, other) - mean).cmp_gt(error * f32x8::splat(LIMIT)).blend(f32x8::ZERO, error);
+                for kept in &mut largest {
+                    (*kept, rest) = (kept.fast_max(rest), kept.fast_min(rest));
+                }
+            }
+        }
+        at(&self.error, index).fast_max(largest[largest.len() - 1])
+    }
+}
+
+/// The largest finite estimate in RGB within [`REACH`] pixels of every pixel, by channel; zero if there is none.
+pub fn brightest(mean: &Picture) -> Picture {
+    let (size, width) = (mean.size(), mean.size().width);
+    let most = |a: &mut [[f32; 3]], b: &[[f32; 3]]| {
+        for (a, b) in a.iter_mut().zip(b) {
+            *a = std::array::from_fn(|c| if b[c] > a[c] { b[c] } else { a[c] });
+        }
+    };
+    let across = |row: &[[f32; 3]]| {
+        let finite: Vec<[f32; 3]> =
+            row.iter().map(|rgb| rgb.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })).collect();
+        let mut largest = finite.clone();
+        for reach in (1..=REACH).take_while(|reach| *reach < width) {
+            most(&mut largest, &finite[reach..]);
+            most(&mut largest[reach..], &finite);
+        }
+        largest
+    };
+    let rows: Vec<Vec<[f32; 3]>> = mean.par_chunks(width.max(1)).map(across).collect();
+    let mut largest = Picture::filled(size, [0.0; 3]);
+    largest.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, out)| {
+        rows[y.saturating_sub(REACH)..rows.len().min(y + REACH + 1)].iter().for_each(|row| most(out, row));
+    });
+    largest
 }
 
 /// The noise that limits the displacement of a picture or of its parts: an estimate and its [`spread`].
@@ -93,8 +181,9 @@ pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture) -> (Pictur
             (false, false) => 0.0,
         }
     };
+    let brightest = brightest(mean);
     let of_pixel = |index: usize| {
-        let brightest = brightest(mean, index);
+        let brightest = brightest[index];
         let free: [f32; 3] = std::array::from_fn(|c| displaced(index, c));
         let clamped = [(0..3).any(|c| free[c] < 0.0), (0..3).any(|c| free[c] > brightest[c])];
         (std::array::from_fn(|c| free[c].min(brightest[c]).max(0.0)), clamped)
@@ -107,7 +196,6 @@ pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture) -> (Pictur
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Size;
     use crate::random::{Domain, Purpose, Stream};
 
     const SIZE: Size = Size { width: 40, height: 30 };
@@ -126,6 +214,33 @@ mod tests {
 
     fn bounded(mean: &Picture, denoised: &Picture, spread: &Picture) -> Picture {
         displace(mean, denoised, spread).0
+    }
+
+    /// Spreads and brightest estimates are those of each window alone, in pictures with and without windows that the
+    /// border does not cut off, and with values that are not finite.
+    #[test]
+    fn windows_agree_with_their_definition() {
+        for (width, height) in [(40, 30), (15, 9), (14, 40), (6, 5), (1, 1)] {
+            let size = Size { width, height };
+            let value = |seed: u64, i: usize, c: usize| {
+                let u = noise(seed, 3 * i + c);
+                [f32::NAN, f32::INFINITY, -1.0, 0.0].get((64.0 * u) as usize).copied().unwrap_or(u)
+            };
+            let picture = |seed| Picture::from_fn(size, |i| std::array::from_fn(|c| value(seed, i, c)));
+            let estimate = estimate(&picture(7), picture(8).map(|error| 0.2 * error));
+            let (spread, brightest) = (spread(&estimate), brightest(&estimate.mean));
+            for (i, c) in (0..size.pixels()).flat_map(|i| [(i, 0), (i, 1), (i, 2)]) {
+                let (mean, error) = (|i: usize| estimate.mean[i][c], |i: usize| known(estimate.deviation[i][c]));
+                let reached =
+                    |other: usize| if mean(other) - mean(i) > LIMIT * error(other) { 0.0 } else { error(other) };
+                let mut errors: Vec<f32> = window(size, i, REACH).map(reached).collect();
+                errors.sort_by(f32::total_cmp);
+                let around = errors[(PERCENTILE * (errors.len() - 1) as f32).round() as usize];
+                assert_eq!(spread[i][c], if estimate.is_exact(i) { 0.0 } else { error(i).max(around) }, "{size:?} {i}");
+                let finite = window(size, i, REACH).map(mean).filter(|mean| mean.is_finite());
+                assert_eq!(brightest[i][c], finite.fold(0.0, f32::max), "{size:?} {i}");
+            }
+        }
     }
 
     /// A denoiser that returns nonsense moves no pixel by more than the bound, and its NaN and infinities are ignored.

@@ -31,6 +31,8 @@ struct Balance<'a> {
     mean: &'a Picture,
     denoised: &'a Picture,
     estimate: &'a Estimate,
+    /// Whether each pixel takes part in the balance: its values are finite, and it is not exact.
+    counts: Vec<bool>,
     /// Light to give back to all pixels together; negative if they have gained.
     owed: Light,
     /// [`LIMIT`] times the root mean square error of the pixels whose value is below their noise: light that any pixel may
@@ -49,11 +51,12 @@ pub fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, nois
     let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
     let owed = balance.owed;
     let first: Light = std::array::from_fn(|c| owed[c].abs().min(shortfall[c]).copysign(owed[c]));
+    let brightest = brightest(mean);
     let changed = |i: usize| -> [f32; 3] {
-        if !balance.counts(i) {
+        if !balance.counts[i] {
             return picture[i];
         }
-        let brightest = brightest(mean, i);
+        let brightest = brightest[i];
         std::array::from_fn(|c| {
             let by_shortfall = ratio(first[c], shortfall[c]) * balance.shortfall(i, c);
             let value = f64::from(picture[i][c]);
@@ -72,8 +75,11 @@ const CHUNK: usize = 4096;
 
 impl<'a> Balance<'a> {
     fn new(picture: &'a Picture, mean: &'a Picture, denoised: &'a Picture, estimate: &'a Estimate) -> Balance<'a> {
+        let finite = |plane: &Picture, i: usize| plane[i].iter().all(|value| value.is_finite());
+        let all_finite = |i: usize| finite(mean, i) && finite(denoised, i) && finite(&estimate.deviation, i);
+        let counts = (0..mean.len()).into_par_iter().map(|i| all_finite(i) && !estimate.is_exact(i)).collect();
         let [owed, missed] = [[0.0; 3]; 2];
-        let balance = Balance { picture, mean, denoised, estimate, owed, missed };
+        let balance = Balance { picture, mean, denoised, estimate, counts, owed, missed };
         let lost = balance.sum(|i, c| f64::from(mean[i][c]) - f64::from(picture[i][c]));
         let total = balance.sum(|i, c| f64::from(mean[i][c]));
         let variance = balance.sum(|i, c| balance.error(i, c).powi(2));
@@ -89,18 +95,12 @@ impl<'a> Balance<'a> {
         f64::from(self.estimate.deviation[i][c])
     }
 
-    /// Whether pixel `i` takes part in the balance: its values are finite, and it is not exact.
-    fn counts(&self, i: usize) -> bool {
-        let finite = |plane: &Picture| plane[i].iter().all(|value| value.is_finite());
-        finite(self.mean) && finite(self.denoised) && finite(&self.estimate.deviation) && !self.estimate.is_exact(i)
-    }
-
     /// Sum, by channel, of a function of (pixel, channel) over the pixels that take part, in chunks that do not depend
     /// on the number of threads.
     fn sum(&self, of: impl Fn(usize, usize) -> f64 + Sync) -> Light {
         let pixels = self.picture.len();
         let chunk = |start: usize| {
-            let counted = (start..(start + CHUNK).min(pixels)).filter(|i| self.counts(*i));
+            let counted = (start..(start + CHUNK).min(pixels)).filter(|i| self.counts[*i]);
             counted.fold([0.0; 3], |sum, i| std::array::from_fn(|c| sum[c] + of(i, c)))
         };
         let parts: Vec<Light> = (0..pixels).into_par_iter().step_by(CHUNK).map(chunk).collect();
