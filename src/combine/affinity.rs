@@ -7,9 +7,13 @@
 //! w_i^j = exp(source_i^j + centre_c^j - exp(falloff_c^j) |c - i|^2 - |phi_c^j - phi_i^j|^2)
 //! ```
 //!
-//! with |c - i| in pixels. Channels, of P pairs and D dimensions: phi (P D, pair by pair), source (P), centre (P),
-//! falloff (P). A network with tens of outputs so defines windows of hundreds of weights: two loops over eight
+//! with |c - i| in steps of the window. Channels, of P pairs and D dimensions: phi (P D, pair by pair), source (P),
+//! centre (P), falloff (P). A network with tens of outputs so defines windows of hundreds of weights: two loops over eight
 //! pixels at a time replace the paper's last layer (1444 filters).
+//!
+//! A network can have several windows, whose steps are its dilations; each has all these channels. After them, a channel
+//! for each of its identities holds the logarithm of the weight of z_c^j alone: level 1 is too noisy to correct the bias of
+//! a level whose bandwidth is as large as the window.
 
 use std::array::from_fn;
 
@@ -52,8 +56,7 @@ pub fn add_pair(
     sums: &mut [Sums],
 ) {
     let pairs = stack.levels.len() - 1;
-    let dimensions = (features.data.len() / (features.rect.width() * features.rect.height())) / pairs - SCALARS;
-    let add = match dimensions {
+    let add = match features.group_channels() / pairs - SCALARS {
         1 => add::<1>,
         2 => add::<2>,
         3 => add::<3>,
@@ -63,7 +66,35 @@ pub fn add_pair(
         7 => add::<7>,
         _ => add::<MAX_DIMENSIONS>,
     };
-    add(stack, valid, core, features, pair, sums);
+    for (group, dilation) in features.dilations.iter().enumerate() {
+        let window = Window { pair, dilation: *dilation, first: group * features.group_channels() };
+        add(stack, valid, core, features, window, sums);
+    }
+}
+
+/// Adds the terms of the identities to `sums`: z_c of some pairs, each with a weight of its own.
+pub fn add_identities(stack: &LevelStack, core: Rect, features: &NetworkOutput, sums: &mut [Sums]) {
+    let first = features.dilations.len() * features.group_channels();
+    for (k, pair) in features.identities.iter().enumerate() {
+        for (y, sums) in sums.chunks_mut(core.width()).enumerate() {
+            let image_y = core.y0 + y;
+            let weights = &features.row(first + k, image_y)[core.x0 - features.rect.x0..];
+            let correlated = &stack.levels[pair + 1][image_y * stack.size.width + core.x0..];
+            for ((sum, weight), z) in sums.iter_mut().zip(weights).zip(correlated) {
+                let weight = exp_bounded(*weight, LOG_WEIGHT);
+                sum.value = from_fn(|c| sum.value[c] + weight * z[c]);
+                sum.weight += weight;
+            }
+        }
+    }
+}
+
+/// The window of a pair of levels: the distance of its pixels, and its first channel in the network's output.
+#[derive(Clone, Copy)]
+struct Window {
+    pair: usize,
+    dilation: usize,
+    first: usize,
 }
 
 fn add<const D: usize>(
@@ -71,11 +102,12 @@ fn add<const D: usize>(
     valid: &[bool],
     core: Rect,
     features: &NetworkOutput,
-    pair: usize,
+    window: Window,
     sums: &mut [Sums],
 ) {
-    let neighbours = Neighbours::<D>::gather(stack, valid, core, features, pair);
-    let (_, centre, falloff) = scalar_channels::<D>(stack.levels.len() - 1, pair);
+    let pair = window.pair;
+    let neighbours = Neighbours::<D>::gather(stack, valid, core, features, window);
+    let (_, centre, falloff) = scalar_channels::<D>(stack.levels.len() - 1, window);
     sums.par_chunks_mut(core.width()).enumerate().for_each(|(y, sums)| {
         let image_y = core.y0 + y;
         let from = core.x0 - features.rect.x0;
@@ -101,6 +133,11 @@ fn add<const D: usize>(
 
 /// Inputs of equation (6) from every neighbour, in padded planes around the core, so that the loops test no bounds.
 struct Neighbours<const D: usize> {
+    /// Pixels along the side of the window.
+    side: usize,
+    /// Distance of these pixels in pixels of the image.
+    dilation: usize,
+    /// Distance of the outermost pixels from the centre in pixels of the image.
     radius: usize,
     pitch: usize,
     /// The network's features of each pixel, phi, scaled so that squared distances are exponents of two; one plane
@@ -113,11 +150,12 @@ struct Neighbours<const D: usize> {
 }
 
 impl<const D: usize> Neighbours<D> {
-    fn gather(stack: &LevelStack, valid: &[bool], core: Rect, features: &NetworkOutput, pair: usize) -> Self {
-        let radius = features.window / 2;
+    fn gather(stack: &LevelStack, valid: &[bool], core: Rect, features: &NetworkOutput, window: Window) -> Self {
+        let (pair, dilation) = (window.pair, window.dilation);
+        let radius = features.window / 2 * dilation;
         let pitch = core.width().next_multiple_of(LANES) + 2 * radius;
         let rows = core.height() + 2 * radius;
-        let (source, ..) = scalar_channels::<D>(stack.levels.len() - 1, pair);
+        let (source, ..) = scalar_channels::<D>(stack.levels.len() - 1, window);
         // Image columns in the planes, and their offset in a plane's row.
         let (x0, x1) = (core.x0.saturating_sub(radius), (core.x1 + radius).min(stack.size.width));
         let offset = x0 + radius - core.x0;
@@ -152,41 +190,43 @@ impl<const D: usize> Neighbours<D> {
             })
         };
         let scaled = |x: f32| if x.is_finite() { x * std::f32::consts::LOG2_E.sqrt() } else { 0.0 };
-        let phi = from_fn(|d| channel(pair * D + d, scaled));
-        Neighbours { radius, pitch, phi, weight, difference: from_fn(difference) }
+        let phi = from_fn(|d| channel(window.first + pair * D + d, scaled));
+        let side = features.window;
+        Neighbours { side, dilation, radius, pitch, phi, weight, difference: from_fn(difference) }
     }
 
     /// Sums of w (y_i - z_i) and of w over the windows of the pixels (x .. x + LANES, y) of the core, without the centre's
     /// own factor. `falloff` is in powers of two.
     #[inline]
     fn window_sums(&self, x: usize, y: usize, falloff: Lanes) -> ([Lanes; 3], Lanes) {
-        let side = 2 * self.radius + 1;
         let centre_at = (y + self.radius) * self.pitch + x + self.radius;
         let centre: [Lanes; D] = from_fn(|d| lanes(&self.phi[d], centre_at));
         let (mut sums, mut total) = ([[0.0; LANES]; 3], [0.0; LANES]);
-        for v in 0..side {
+        let middle = (self.side / 2) as f32;
+        for v in 0..self.side {
             // Slices of the length read, so that bounds are tested once per row.
-            let from = (y + v) * self.pitch + x;
-            let part = from..from + side - 1 + LANES;
+            let from = (y + v * self.dilation) * self.pitch + x;
+            let part = from..from + 2 * self.radius + LANES;
             let phi: [&[f32]; D] = from_fn(|d| &self.phi[d][part.clone()]);
             let difference: [&[f32]; 3] = from_fn(|c| &self.difference[c][part.clone()]);
             let weight = &self.weight[part.clone()];
-            let dy = v as f32 - self.radius as f32;
-            for u in 0..side {
-                let dx = u as f32 - self.radius as f32;
+            let dy = v as f32 - middle;
+            for u in 0..self.side {
+                let dx = u as f32 - middle;
+                let at = u * self.dilation;
                 let squared = dx * dx + dy * dy;
                 let mut distance: Lanes = from_fn(|l| falloff[l] * squared);
                 for (centre, row) in centre.iter().zip(phi) {
-                    let phi = lanes(row, u);
+                    let phi = lanes(row, at);
                     for l in 0..LANES {
                         let step = centre[l] - phi[l];
                         distance[l] = fma(step, step, distance[l]);
                     }
                 }
-                let source = lanes(weight, u);
+                let source = lanes(weight, at);
                 let w: Lanes = from_fn(|l| source[l] * exp2_minus(distance[l]));
                 for (sum, row) in sums.iter_mut().zip(difference) {
-                    let difference = lanes(row, u);
+                    let difference = lanes(row, at);
                     for l in 0..LANES {
                         sum[l] = fma(w[l], difference[l], sum[l]);
                     }
@@ -244,9 +284,9 @@ fn exp_bounded(x: f32, (least, most): (f32, f32)) -> f32 {
     if x.is_nan() { 1.0 } else { x.clamp(least, most).exp() }
 }
 
-/// Indices of the network's channels source, centre and falloff of pair `pair` among `pairs`.
-const fn scalar_channels<const D: usize>(pairs: usize, pair: usize) -> (usize, usize, usize) {
-    let first = pairs * D + pair;
+/// Indices of the network's channels source, centre and falloff of a window of one of `pairs` pairs.
+const fn scalar_channels<const D: usize>(pairs: usize, window: Window) -> (usize, usize, usize) {
+    let first = window.first + pairs * D + window.pair;
     (first, first + pairs, first + 2 * pairs)
 }
 

@@ -110,5 +110,8 @@ fn combine_tile(stack: &LevelStack, valid: &[bool], tile: &Tile, weights: &Weigh
             Weights::Kernel(output) => kernel::add_pair(stack, valid, tile.core, output, pair, &mut sums),
         }
     }
+    if let Weights::Features(output) = weights {
+        affinity::add_identities(stack, tile.core, output, &mut sums);
+    }
     sums.par_iter().map(|s| s.value.map(|v| v / s.weight)).collect()
 }

@@ -69,8 +69,12 @@ pub struct Metadata {
     pub form: WeightForm,
     /// Number of bandwidth levels in the network's input, m.
     pub levels: usize,
-    /// Side in pixels of the square window of equation (6), odd.
+    /// Pixels along the side of the square window of equation (6), odd.
     pub window: usize,
+    /// Distances of the window's pixels, in pixels of the image; the network has weights for each of them.
+    pub dilations: Vec<usize>,
+    /// Pairs of bandwidth levels whose correlated level also has a weight alone, without neighbours.
+    pub identities: Vec<usize>,
     /// Pixels per cell of the network's coarsest grid; input sizes are multiples of it.
     pub stride: usize,
     /// Radius in pixels of the input that one pixel of the output depends on.
@@ -81,6 +85,8 @@ pub struct Metadata {
 
 /// Maximum number of floats in the network's output for one tile of the picture: 128 MiB.
 const MAX_TILE_FLOATS: usize = 32 << 20;
+/// Maximum number of windows of a network.
+const MAX_DILATIONS: usize = 4;
 /// Maximum number of pixels in a tile of the picture. The halo of a tile of this size is already relatively small.
 const MAX_TILE_PIXELS: usize = 512 * 512;
 
@@ -106,10 +112,31 @@ impl Metadata {
         if window % 2 == 0 {
             return Err(format!("its window of {window} pixels has no centre"));
         }
+        let pairs = get("pairs").unwrap_or_else(|| "multi".into());
+        if pairs != "multi" {
+            return Err(format!("it combines the pictures {pairs:?}, this program those of \"multi\""));
+        }
+        let levels = number("levels", 2, 16)?;
+        // Networks of earlier versions have neither key.
+        let list = |key: &str, default: &str, least: usize, most: usize| {
+            let value = get(key).unwrap_or_else(|| default.into());
+            let one = |text: &str| text.parse().ok().filter(|n| (least..=most).contains(n));
+            let parsed: Option<Vec<usize>> = value.split(',').filter(|text| !text.is_empty()).map(one).collect();
+            parsed.ok_or_else(|| format!("its caustique.{key} is {value:?}, not numbers from {least} to {most}"))
+        };
+        let (dilations, identities) = (list("dilations", "1", 1, 16)?, list("identities", "", 0, levels - 2)?);
+        if dilations.is_empty() || dilations.len() > MAX_DILATIONS {
+            return Err(format!("it has {} dilations, not 1 to {MAX_DILATIONS}", dilations.len()));
+        }
+        if form == WeightForm::Weights && (dilations != [1] || !identities.is_empty()) {
+            return Err("it has dilations or identities, which need the kind features".into());
+        }
         Ok(Metadata {
             form,
-            levels: number("levels", 2, 16)?,
+            levels,
             window,
+            dilations,
+            identities,
             stride: number("stride", 1, 64)?,
             halo: number("halo", 0, 1024)?,
             training: get("training").unwrap_or_else(|| "not said".into()),
@@ -128,7 +155,9 @@ impl Metadata {
     pub fn output_channels(&self) -> usize {
         let pairs = self.levels - 1;
         match self.form {
-            WeightForm::Features { dimensions } => pairs * (dimensions + super::affinity::SCALARS),
+            WeightForm::Features { dimensions } => {
+                self.dilations.len() * pairs * (dimensions + super::affinity::SCALARS) + self.identities.len()
+            }
             WeightForm::Weights => pairs * self.window * self.window,
         }
     }
@@ -136,7 +165,7 @@ impl Metadata {
     /// Radius in pixels of the network output that the result at a pixel depends on.
     pub fn neighbour_radius(&self) -> usize {
         match self.form {
-            WeightForm::Features { .. } => self.window / 2,
+            WeightForm::Features { .. } => self.window / 2 * self.dilations.iter().copied().max().unwrap_or(1),
             WeightForm::Weights => 0,
         }
     }

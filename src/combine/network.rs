@@ -67,7 +67,8 @@ impl Network {
         if **shape != expected {
             return Err(fail(&format!("the output has shape {shape:?} instead of {expected:?}")));
         }
-        let output = NetworkOutput { rect, window: metadata.window, data: data.to_vec() };
+        let (dilations, identities) = (metadata.dilations.clone(), metadata.identities.clone());
+        let output = NetworkOutput { rect, window: metadata.window, dilations, identities, data: data.to_vec() };
         Ok(match metadata.form {
             WeightForm::Features { .. } => Weights::Features(output),
             WeightForm::Weights => Weights::Kernel(output),

@@ -46,7 +46,7 @@ fn input_and_equation_equal_the_training_codes() {
 
     let tile = Tile { core: rect, input: rect };
     let data = reader.floats((levels - 1) * (dimensions + affinity::SCALARS) * n);
-    let features = Weights::Features(NetworkOutput { rect, window: 15, data });
+    let features = Weights::Features(NetworkOutput::new(rect, 15, data));
     let got = combine_tile(&stack, &stack.valid(), &tile, &features);
     assert!(distance(&got, &reader.rgb(size), bright) < 1e-5);
 
@@ -59,7 +59,7 @@ fn input_and_equation_equal_the_training_codes() {
     let part = LevelStack { size, levels: stack.levels.iter().map(cut).collect(), ..LevelStack::default() };
     let n = size.pixels();
     let data = reader.floats((levels - 1) * side * side * n);
-    let weights = Weights::Kernel(NetworkOutput { rect: corner, window: side, data });
+    let weights = Weights::Kernel(NetworkOutput::new(corner, side, data));
     let got = combine_tile(&part, &part.valid(), &Tile { core: corner, input: corner }, &weights);
     assert!(distance(&got, &reader.rgb(size), bright) < 1e-5);
     assert!(reader.0.is_empty());
@@ -93,6 +93,10 @@ fn wrong_metadata_are_refused() {
     };
     assert_eq!(read(&[]).unwrap().output_channels(), 28);
     assert_eq!(read(&[("kind", "weights"), ("window", "3")]).unwrap().output_channels(), 36);
+    let wide = read(&[("dilations", "1,4"), ("identities", "0,1,2,3")]).unwrap();
+    assert_eq!((wide.output_channels(), wide.neighbour_radius()), (60, 36));
+    let refused = read(&[("kind", "weights"), ("identities", "0")]).unwrap_err();
+    assert_eq!(refused, "it has dilations or identities, which need the kind features");
     for (change, message) in [
         (("kind", ""), "its metadata lacks caustique.kind"),
         (("kind", "magic"), "its caustique.kind is \"magic\", neither features nor weights"),
@@ -101,6 +105,10 @@ fn wrong_metadata_are_refused() {
         (("features", "9"), "its caustique.features is \"9\", not a number from 1 to 8"),
         (("stride", "-4"), "its caustique.stride is \"-4\", not a number from 1 to 64"),
         (("normalisation", "2"), "it expects input version 2, this program makes 1"),
+        (("pairs", "dual3"), "it combines the pictures \"dual3\", this program those of \"multi\""),
+        (("dilations", "1,0"), "its caustique.dilations is \"1,0\", not numbers from 1 to 16"),
+        (("dilations", ","), "it has 0 dilations, not 1 to 4"),
+        (("identities", "4"), "its caustique.identities is \"4\", not numbers from 0 to 3"),
     ] {
         assert_eq!(read(&[change]).unwrap_err(), message);
     }

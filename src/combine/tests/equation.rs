@@ -1,5 +1,7 @@
 //! Equation (6) with arbitrary positive weights.
 
+use std::array::from_fn;
+
 use super::output::{NetworkOutput, Rect};
 use super::*;
 
@@ -13,10 +15,7 @@ fn random_weights(random: &mut Random, width: usize, height: usize, levels: usiz
     let (area, pairs) = (width * height, levels - 1);
     let features = random.fill(area * pairs * 6, -1.5, 1.5);
     let weights = random.fill(area * pairs * 25, -6.0, 3.0).into_iter().map(f32::exp).collect();
-    [
-        Weights::Features(NetworkOutput { rect, window: 7, data: features }),
-        Weights::Kernel(NetworkOutput { rect, window: 5, data: weights }),
-    ]
+    [Weights::Features(NetworkOutput::new(rect, 7, features)), Weights::Kernel(NetworkOutput::new(rect, 5, weights))]
 }
 
 fn combine(stack: &LevelStack, weights: &Weights) -> Vec<[f32; 3]> {
@@ -26,6 +25,18 @@ fn combine(stack: &LevelStack, weights: &Weights) -> Vec<[f32; 3]> {
 
 /// Equation (6) word for word, in f64, with w_i^j from a function of pair, centre and neighbour.
 fn oracle(stack: &LevelStack, radius: isize, weight: impl Fn(usize, [isize; 2], [isize; 2]) -> f64) -> Vec<[f32; 3]> {
+    oracle_of_windows(stack, radius, &[1], |_, j, c, i| weight(j, c, i), |_, _| 0.0)
+}
+
+/// [`oracle`] with several windows, whose pixels have the distances `dilations`: `weight` also gets the index of the window.
+/// `alone` is the weight of z_c^j itself.
+fn oracle_of_windows(
+    stack: &LevelStack,
+    radius: isize,
+    dilations: &[isize],
+    weight: impl Fn(usize, usize, [isize; 2], [isize; 2]) -> f64,
+    alone: impl Fn(usize, [isize; 2]) -> f64,
+) -> Vec<[f32; 3]> {
     let (width, height) = (stack.size.width as isize, stack.size.height as isize);
     let valid = stack.valid();
     let at = |[x, y]: [isize; 2]| (y * width + x) as usize;
@@ -33,20 +44,22 @@ fn oracle(stack: &LevelStack, radius: isize, weight: impl Fn(usize, [isize; 2], 
         let (mut sum, mut total) = ([0.0f64; 3], 0.0);
         for j in 0..stack.levels.len() - 1 {
             let (y, z) = (&stack.levels[0], &stack.levels[j + 1]);
-            for v in -radius..=radius {
-                for u in -radius..=radius {
-                    let i = [c[0] + u, c[1] + v];
-                    if i[0] < 0 || i[1] < 0 || i[0] >= width || i[1] >= height || !valid[at(i)] {
-                        continue;
-                    }
-                    let w = weight(j, c, i);
-                    for k in 0..3 {
-                        let (y_i, z_c, z_i) = (y[at(i)][k], z[at(c)][k], z[at(i)][k]);
-                        sum[k] += w * (f64::from(y_i) + f64::from(z_c) - f64::from(z_i));
-                    }
-                    total += w;
+            let steps = || (-radius..=radius).flat_map(|v| (-radius..=radius).map(move |u| [u, v]));
+            for (group, [u, v]) in (0..dilations.len()).flat_map(|group| steps().map(move |step| (group, step))) {
+                let i = [c[0] + dilations[group] * u, c[1] + dilations[group] * v];
+                if i[0] < 0 || i[1] < 0 || i[0] >= width || i[1] >= height || !valid[at(i)] {
+                    continue;
                 }
+                let w = weight(group, j, c, i);
+                for k in 0..3 {
+                    let (y_i, z_c, z_i) = (y[at(i)][k], z[at(c)][k], z[at(i)][k]);
+                    sum[k] += w * (f64::from(y_i) + f64::from(z_c) - f64::from(z_i));
+                }
+                total += w;
             }
+            let w = alone(j, c);
+            sum = from_fn(|k| sum[k] + w * f64::from(z[at(c)][k]));
+            total += w;
         }
         sum.map(|s| (s / total) as f32)
     };
@@ -92,6 +105,41 @@ fn both_forms_equal_the_equation_word_for_word() {
             }
         }
     }
+}
+
+#[test]
+fn several_windows_and_levels_alone_equal_the_equation_word_for_word() {
+    let mut random = Random(11);
+    let (width, height, pairs, dilations, identities) = (29, 21, 3, [1isize, 4], [0, 2]);
+    let mut stack = random.stack(width, height, pairs + 1);
+    stack.levels[1][5 * width + 4] = [f32::NAN, 0.0, f32::INFINITY];
+    let channels = dilations.len() * pairs * 6 + identities.len();
+    let data = random.fill(width * height * channels, -1.5, 1.5);
+    let map = NetworkOutput {
+        dilations: dilations.map(|d| d as usize).to_vec(),
+        identities: identities.to_vec(),
+        ..NetworkOutput::new(whole(width, height), 7, data)
+    };
+    let value = |channel: usize, [x, y]: [isize; 2]| f64::from(map.row(channel, y as usize)[x as usize]);
+    let weight = |group: usize, j: usize, c: [isize; 2], i: [isize; 2]| {
+        let (first, step) = (group * pairs * 6, dilations[group]);
+        let phi: f64 = (first + 3 * j..first + 3 * j + 3).map(|k| (value(k, c) - value(k, i)).powi(2)).sum();
+        let squared = (((c[0] - i[0]) / step).pow(2) + ((c[1] - i[1]) / step).pow(2)) as f64;
+        let [source, centre, falloff] = [3, 4, 5].map(|k| first + k * pairs + j);
+        (value(source, i) + value(centre, c) - value(falloff, c).min(0.0).exp() * squared - phi).exp()
+    };
+    let alone = |j: usize, c: [isize; 2]| {
+        identities.iter().position(|pair| *pair == j).map_or(0.0, |k| value(2 * pairs * 6 + k, c).exp())
+    };
+    let want = oracle_of_windows(&stack, 3, &dilations, weight, alone);
+    let wrong = oracle_of_windows(&stack, 3, &dilations, weight, |j, c| 1.01 * alone(j, c));
+    let valid = stack.valid();
+    let differs = |a: &[[f32; 3]], b: &[[f32; 3]]| {
+        (0..a.len()).filter(|i| valid[*i]).map(|i| distance(&a[i..=i], &b[i..=i], 1.0)).fold(0.0, f32::max)
+    };
+    let got = combine(&stack, &Weights::Features(map));
+    assert!(differs(&got, &want) < 1e-5);
+    assert!(differs(&got, &wrong) > 1e-5, "the test detects a weight that is wrong by a hundredth");
 }
 
 #[test]
