@@ -34,7 +34,7 @@ pub fn atan2_turns(y: f32, x: f32) -> f32 {
     let t = a.min(b) / a.max(b).max(f32::MIN_POSITIVE);
     let z = t * t;
     let coefficients =
-        [-0.016_165_737, 0.042_909_614, -0.075_289_64, 0.106_562_64, -0.142_088_99, 0.199_935_51, -0.333_331_45, 1.0];
+        [-0.016_165_737, 0.042_909_614, -0.075_289_64, 0.106_562_64, -0.142_089, 0.199_935_51, -0.333_331_45, 1.0];
     let ratio = coefficients.into_iter().fold(0.002_866_225_7f32, |sum, next| sum.mul_add(z, next));
     let octant = ratio * t * (0.5 * FRAC_1_PI);
     let quadrant = if a > b { 0.25 - octant } else { octant };
