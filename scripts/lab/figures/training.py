@@ -60,15 +60,17 @@ def trainable(run):
     if line and line["step"] >= steps(run):
         return False
     entries = [entry for entry in data.manifest(options.folder).values() if not entry["held_out"]]
-    wanted = "sppm-bdpt1.npz" if run.startswith("deep") else "sppm-seed1.npz"
+    seed = next(seed for seed, paths in data.PATHS.items() if paths == (1 if "--paths" in RUNS[run] else 2))
+    wanted = f"sppm-bdpt{seed}.npz" if run.startswith("deep") else f"sppm-seed{seed}.npz"
     return any(wanted in entry["files"] for entry in entries)
 
 
 def train(run, minutes):
-    """Trains a run for at most some minutes."""
+    """Trains a run for at most some minutes; returns whether that succeeded."""
     words = ["--data", options.folder, "--out", options.folder / "runs" / run, "--threads", options.threads]
     words += ["--minutes", f"{minutes:.1f}", *RUNS[run]]
-    subprocess.run(list(map(str, [installed(".venv-train"), "-m", "lab.train.train", *words])), check=True)
+    line = [installed(".venv-train"), "-m", "lab.train.train", *words]
+    return subprocess.run(list(map(str, line))).returncode == 0
 
 
 def main():
@@ -78,12 +80,14 @@ def main():
     unknown = [run for run in options.runs if run not in RUNS]
     if unknown:
         raise SystemExit(f"--runs {unknown[0]} is not one of {', '.join(RUNS)}")
-    end = time.monotonic() + 3600 * options.hours
+    end, failed = time.monotonic() + 3600 * options.hours, set()
     while time.monotonic() < end:
-        runs = [run for run in options.runs if trainable(run)]
+        runs = [run for run in options.runs if run not in failed and trainable(run)]
         for run in runs:
-            train(run, max(min(TURN, (end - time.monotonic()) / 60), 0.1))
+            if not train(run, max(min(TURN, (end - time.monotonic()) / 60), 0.1)):
+                failed.add(run)
         if not runs:
             break
     for run in options.runs:
-        print(f"{run:14}{json.dumps(last_line(run))}")
+        print(f"{run:14}{'failed; ' if run in failed else ''}{json.dumps(last_line(run))}")
+    return 1 if failed else 0
