@@ -45,11 +45,12 @@ pub use interior::{Crossing, Interior};
 pub use light::{Emitted, EqualFlux, LightPaths, Photons, emitted_flux, light_path};
 pub use light_vertex::{LightVertex, Scatterer};
 pub use pass_through::PassThroughHit;
-pub use path::{SPARED_BY_ROULETTE, path_radiance, path_sample};
+pub use path::{path_radiance, path_sample};
 pub use photon_batch::Scratch;
 pub use photon_merge::MergePhoton;
 pub use pixel_sample::{Features, PixelSample};
 pub use probe::{GatherPoint, Probe};
+pub use roulette::SPARED_BY_ROULETTE;
 pub use scattering_vertex::{ScatterPoint, lit_side};
 pub use segment::{
     Arrival, End, FirstHit, MediumArrival, PrecomputedHit, ShadowRay, Start, Visibility, next_surface, shadow_ray,

@@ -10,6 +10,7 @@ use super::cause::Cause;
 use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
 use super::pixel_sample::PixelSample;
+use super::roulette::SPARED_BY_ROULETTE;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::token;
 use super::shares::{Incident, PathHalves, shares, wanted};
@@ -23,11 +24,6 @@ use crate::plan::{ClassSet, LightPrefix, Part, PathClass};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
-
-/// Fraction of the initial throughput down to which roulette does not end a path. Roulette increases the weight of
-/// surviving paths. From the first bounce on, it would save nearly half of the time but more than double squared errors;
-/// this value is about optimal.
-pub const SPARED_BY_ROULETTE: f32 = 0.25;
 
 struct PathTracer<'a, R> {
     scene: &'a Scene,

@@ -308,6 +308,17 @@ impl Method {
         matches!(self.search(), Search::Connections | Search::ConnectionsAndMerging) && !self.has_chains()
     }
 
+    /// The method that remains if some of its techniques have no samples: path tracing without light paths, bidirectional
+    /// path tracing without merging.
+    pub(super) fn with_counts(self, counts: &super::Counts) -> Method {
+        match self {
+            method if !method.takes_counts() => method,
+            _ if counts.light_paths == 0 => Method::Path,
+            _ if counts.merging <= 0.0 => Method::Bdpt,
+            method => method,
+        }
+    }
+
     /// Whether light paths can be guided: started preferably toward objects that focus light.
     pub fn supports_guiding(self) -> bool {
         self.row().guides

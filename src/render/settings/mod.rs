@@ -185,12 +185,10 @@ impl Settings {
     /// bidirectional path tracing without merging.
     #[must_use]
     pub fn without_unused_techniques(self) -> Settings {
-        let method = match self.method {
-            method if !method.takes_counts() => return self,
-            _ if self.counts.light_paths == 0 => Method::Path,
-            _ if self.counts.merging <= 0.0 => Method::Bdpt,
-            method => method,
-        };
+        let method = self.method.with_counts(&self.counts);
+        if method == self.method {
+            return self;
+        }
         let levels = if method.has_levels() { self.levels } else { Levels::new(1) };
         Settings { method, levels, guided: self.guided && method.supports_guiding(), ..self }
     }

@@ -35,9 +35,13 @@ fn networks(said: &mut Said, folder: &Path) {
         ("a network of another kind", "kind", "odd"),
         ("a network without a centre", "window", "4"),
         ("a network of more levels than its tensors", "levels", "3"),
+        ("a network of other pictures", "pairs", "finished"),
+        ("a network of a wide dilation", "dilations", "99"),
+        ("a network of many dilations", "dilations", "1,1,1,1,1,1,1,1,1,1"),
     ] {
         load(what, &onnx::network("features", &[(key, value)]));
     }
+    load("a network of weights with dilations", &onnx::network("weights", &[("dilations", "2")]));
     let right = onnx::network("features", &[]);
     load("a network without an input", &replaced(right, b"input", b"other"));
     load("a network of a flat tensor", &onnx::flat());
