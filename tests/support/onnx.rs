@@ -42,6 +42,9 @@ fn metadata(kind: &str, others: &[(&str, &str)]) -> Vec<u8> {
         ("window", "3"),
         ("stride", "1"),
         ("halo", "0"),
+        // Keys that a network may lack.
+        ("pairs", ""),
+        ("dilations", ""),
     ];
     let mut metadata: Vec<u8> = Vec::new();
     for (key, value) in right {
