@@ -5,7 +5,7 @@
 //! \[Dupuy and Benyoub 2023\]: "Sampling Visible GGX Normals with Spherical Caps".
 
 use super::{DELTA_ALPHA, LobeSet, SHARP_ALPHA};
-use crate::math::{Vec2, Vec3, sin_cos_turns, sqr};
+use crate::math::{Vec2, Vec3, sqr, warp};
 use std::f32::consts::FRAC_1_PI;
 
 /// Lobe class (delta, sharp or broad) of a GGX lobe with these alphas.
@@ -78,10 +78,8 @@ impl Ggx {
     #[inline]
     pub fn sample_visible(&self, w: Vec3, u: Vec2) -> Vec3 {
         let stretched = Vec3::new(w.x * self.alpha_x, w.y * self.alpha_y, w.z).normalize();
-        let (sin, cos) = sin_cos_turns(u.x);
         let z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        let cap = Vec3::new(r * cos, r * sin, z);
+        let cap = warp::around_z((1.0 - z * z).max(0.0).sqrt(), z, u.x);
         let h = cap + stretched;
         Vec3::new(h.x * self.alpha_x, h.y * self.alpha_y, h.z.max(1e-9)).normalize()
     }

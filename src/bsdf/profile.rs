@@ -4,7 +4,7 @@
 //! curvature: at cosines near alpha, down to nearly smooth surfaces. Interpolation is linear. Averages integrate the
 //! interpolated function exactly, so that a compensation lobe normalized by them has exactly the tabulated albedo.
 
-use crate::math::{Vec2, Vec3, Vec4, sin_cos_turns};
+use crate::math::{Vec2, Vec3, Vec4, warp};
 use std::f32::consts::FRAC_1_PI;
 use std::sync::OnceLock;
 
@@ -242,9 +242,7 @@ impl Profile {
             let mass = value * (SQUARES[i + 1] - SQUARES[i]);
             if left < mass {
                 let square = SQUARES[i] + left / value;
-                let r = (1.0 - square).max(0.0).sqrt();
-                let (sin, cos) = sin_cos_turns(u.y);
-                return Some(Vec3::new(r * cos, r * sin, square.sqrt()));
+                return Some(warp::around_z((1.0 - square).max(0.0).sqrt(), square.sqrt(), u.y));
             }
             left -= mass;
         }

@@ -165,10 +165,10 @@ pub struct Clamped {
 }
 
 /// Moves every pixel of the estimate `mean` towards `denoised` by at most [`LIMIT`] times `spread`, clamped between
-/// zero and [`brightest`]. Also counts the clamped pixels.
+/// zero and `brightest`, the [`brightest`] estimates of `mean`. Also counts the clamped pixels.
 ///
 /// Values of `denoised` that are not finite are ignored; they replace values of `mean` that are not finite.
-pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture) -> (Picture, Clamped) {
+pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture, brightest: &Picture) -> (Picture, Clamped) {
     let displaced = |index: usize, c: usize| {
         let (m, d) = (mean[index][c], denoised[index][c]);
         match (m.is_finite(), d.is_finite()) {
@@ -181,7 +181,6 @@ pub fn displace(mean: &Picture, denoised: &Picture, spread: &Picture) -> (Pictur
             (false, false) => 0.0,
         }
     };
-    let brightest = brightest(mean);
     let of_pixel = |index: usize| {
         let brightest = brightest[index];
         let free: [f32; 3] = std::array::from_fn(|c| displaced(index, c));
@@ -213,7 +212,7 @@ mod tests {
     }
 
     fn bounded(mean: &Picture, denoised: &Picture, spread: &Picture) -> Picture {
-        displace(mean, denoised, spread).0
+        displace(mean, denoised, spread, &brightest(mean)).0
     }
 
     /// Spreads and brightest estimates are those of each window alone, in pictures with and without windows that the
@@ -292,7 +291,7 @@ mod tests {
         assert!(far.iter().all(|out| out[0] <= 100.0) && far[0][0] == 1.0);
         let dark = bounded(&mean, &plane(|_| -1e6), &plane(|_| 1e6));
         assert!(dark.iter().flatten().all(|value| *value == 0.0));
-        let count = |value: f32| displace(&mean, &plane(|_| value), &plane(|_| 1e6)).1;
+        let count = |value: f32| displace(&mean, &plane(|_| value), &plane(|_| 1e6), &brightest(&mean)).1;
         let pixels = SIZE.pixels() as u64;
         assert_eq!(count(-1e6), Clamped { below_zero: pixels, too_bright: 0 });
         assert_eq!(count(1e6), Clamped { below_zero: 0, too_bright: pixels });
@@ -303,7 +302,7 @@ mod tests {
     #[test]
     fn negative_estimates_are_clamped() {
         let mean = plane(|index| if index % 7 == 0 { -0.25 } else { 1.0 });
-        let (out, clamped) = displace(&mean, &mean, &plane(|_| 0.0));
+        let (out, clamped) = displace(&mean, &mean, &plane(|_| 0.0), &brightest(&mean));
         assert!(out.iter().flatten().all(|value| *value >= 0.0));
         assert_eq!(clamped.below_zero, (SIZE.pixels() as u64).div_ceil(7));
     }

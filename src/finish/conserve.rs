@@ -7,7 +7,7 @@
 //! light of each pixel.
 
 use super::Estimate;
-use super::bound::{LIMIT, Noise, brightest};
+use super::bound::{Clamped, LIMIT, Noise, brightest, displace};
 use crate::film::Picture;
 use rayon::prelude::*;
 
@@ -40,10 +40,19 @@ struct Balance<'a> {
     missed: Light,
 }
 
-/// Gives back the significant light that `picture` has lost, or takes away what it has gained, against its estimate `mean`:
-/// that of the whole picture or of a part. `noise` belongs to the whole picture. A pixel stays within
-/// [`LIMIT`] times its spread, or within the light that any pixel may have missed, of its estimate.
-pub fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, noise: Noise<'_>) {
+/// Moves the estimate `mean` of the whole picture or of a part towards `denoised` within the bound ([`displace`]), and gives
+/// back the light that this loses. `noise` belongs to the whole picture. Also counts the pixels that the bound has clamped.
+pub fn bounded(mean: &Picture, denoised: &Picture, noise: Noise<'_>) -> (Picture, Clamped) {
+    let brightest = brightest(mean);
+    let (mut picture, clamped) = displace(mean, denoised, noise.spread, &brightest);
+    give_back(&mut picture, mean, denoised, noise, &brightest);
+    (picture, clamped)
+}
+
+/// Gives back the significant light that `picture` has lost, or takes away what it has gained, against its estimate `mean`.
+/// `brightest` are the [`brightest`] estimates of `mean`. A pixel stays within [`LIMIT`] times its spread, or within the
+/// light that any pixel may have missed, of its estimate.
+fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, noise: Noise<'_>, brightest: &Picture) {
     let Noise { estimate, spread } = noise;
     let balance = Balance::new(picture, mean, denoised, estimate);
     let shortfall = balance.sum(|i, c| balance.shortfall(i, c));
@@ -51,7 +60,6 @@ pub fn give_back(picture: &mut Picture, mean: &Picture, denoised: &Picture, nois
     let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
     let owed = balance.owed;
     let first: Light = std::array::from_fn(|c| owed[c].abs().min(shortfall[c]).copysign(owed[c]));
-    let brightest = brightest(mean);
     let changed = |i: usize| -> [f32; 3] {
         if !balance.counts[i] {
             return picture[i];
@@ -147,9 +155,8 @@ mod tests {
     /// The picture after the bounded displacement towards `constant`, and after its light has been given back.
     fn finished(estimate: &Estimate, constant: f32) -> [Picture; 2] {
         let (denoised, spread) = (Picture::filled(SIZE, [constant; 3]), spread(estimate));
-        let (within, _) = displace(&estimate.mean, &denoised, &spread);
-        let mut whole = within.clone();
-        give_back(&mut whole, &estimate.mean, &denoised, Noise { estimate, spread: &spread });
+        let (within, _) = displace(&estimate.mean, &denoised, &spread, &brightest(&estimate.mean));
+        let (whole, _) = bounded(&estimate.mean, &denoised, Noise { estimate, spread: &spread });
         [within, whole]
     }
 

@@ -134,8 +134,7 @@ impl Finish {
     fn with_spread(&mut self, estimate: &Estimate) -> Result<([Picture; 2], Clamped)> {
         let denoised = self.denoiser.run(estimate, self.quality)?;
         let spread = bound::spread(estimate);
-        let (mut picture, clamped) = bound::displace(&estimate.mean, &denoised, &spread);
-        conserve::give_back(&mut picture, &estimate.mean, &denoised, Noise { estimate, spread: &spread });
+        let (picture, clamped) = conserve::bounded(&estimate.mean, &denoised, Noise { estimate, spread: &spread });
         Ok(([picture, spread], clamped))
     }
 

@@ -4,8 +4,8 @@
 //! per pixel so that they sum to the finished picture. A part is never negative, and converges to the limit of its
 //! estimate.
 
-use super::bound::{Noise, displace};
-use super::conserve::give_back;
+use super::bound::Noise;
+use super::conserve::bounded;
 use crate::film::Picture;
 use rayon::prelude::*;
 
@@ -23,12 +23,7 @@ pub struct Part {
 /// Light of the whole picture at a pixel where no part has any, which the denoiser has brought from around, goes to the
 /// last part.
 pub fn split(parts: &[Part], whole: &Picture, noise: Noise<'_>) -> Vec<Picture> {
-    let finish = |part: &Part| {
-        let (mut picture, _) = displace(&part.mean, &part.denoised, noise.spread);
-        give_back(&mut picture, &part.mean, &part.denoised, noise);
-        picture
-    };
-    let mut finished: Vec<Picture> = parts.iter().map(finish).collect();
+    let mut finished: Vec<Picture> = parts.iter().map(|part| bounded(&part.mean, &part.denoised, noise).0).collect();
     let Some((last, others)) = finished.split_last_mut() else { return finished };
     let scale = |index: usize, c: usize, last: &[f32; 3], others: &[Picture]| {
         let sum = f64::from(last[c]) + others.iter().map(|part| f64::from(part[index][c])).sum::<f64>();

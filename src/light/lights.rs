@@ -13,7 +13,7 @@ use super::sampler::LightSampler;
 use super::spread::Spread;
 use crate::geometry::{Shapes, Surface, offset_origin, shadow_end};
 use crate::material::{Alpha, Materials};
-use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, sin_cos_turns, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
@@ -336,22 +336,20 @@ impl Lights {
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
                     let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
-                    let arrival_factor = 1.0;
                     return Some(DirectSample {
                         wi,
                         target: None,
                         radiance,
                         pdf_w,
                         delta: true,
-                        arrival_factor,
+                        arrival_factor: 1.0,
                         light,
                     });
                 }
                 let wi = frame.to_world(warp::cone_uniform(u, *one_minus_cos));
                 let radiance = Emitter::sun_radiance(*irradiance, *one_minus_cos);
                 let pdf_w = probability * warp::cone_uniform_pdf_w(*one_minus_cos);
-                let arrival_factor = 1.0;
-                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_factor, light })
+                Some(DirectSample { wi, target: None, radiance, pdf_w, delta: false, arrival_factor: 1.0, light })
             }
             Emitter::Environment => {
                 let environment = self.sky.environment.as_ref()?;
@@ -637,10 +635,9 @@ impl Lights {
         let x = direction.x * (inner + penumbra);
         let h = if x < *inner { x } else { outer - (outer - inner) * edge.ramp((x - inner) / penumbra) };
         let sin = (h * (2.0 - h)).max(0.0).sqrt();
-        let (s, c) = sin_cos_turns(direction.y);
         let filled = spot_solid_angle(*inner, *outer, *edge);
         let falloff = spot_falloff(h, *inner, *outer, *edge);
-        let direction = frame.to_world(Vec3::new(sin * c, sin * s, 1.0 - h));
+        let direction = frame.to_world(warp::around_z(sin, 1.0 - h, direction.y));
         let (origin, flux) = (spot_point(*p, *radius, frame, point), *intensity * filled);
         Some(LightRay { origin, direction, flux, start: 1.0, onward: falloff / filled, cos: 1.0 })
     }

@@ -26,13 +26,18 @@ pub fn hemisphere_cosine(u: Vec2) -> Vec3 {
     Vec3::new(d.x, d.y, (1.0 - d.length_squared()).max(0.0).sqrt())
 }
 
+/// The point at height `z` and at the distance `r` from the z axis, whose azimuth is in turns (one turn is 2 pi).
+#[inline]
+pub fn around_z(r: f32, z: f32, azimuth: f32) -> Vec3 {
+    let (sin, cos) = sin_cos_turns(azimuth);
+    Vec3::new(r * cos, r * sin, z)
+}
+
 /// Maps a point of the unit square to a uniform unit direction of the sphere, with density 1 / (4 pi).
 #[inline]
 pub fn sphere_uniform(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    let (sin, cos) = sin_cos_turns(u.y);
-    Vec3::new(r * cos, r * sin, z)
+    around_z((1.0 - z * z).max(0.0).sqrt(), z, u.y)
 }
 
 /// Maps a point of the unit square to a uniform direction of the cone of half angle `acos(1 - one_minus_cos)` around
@@ -40,9 +45,7 @@ pub fn sphere_uniform(u: Vec2) -> Vec3 {
 #[inline]
 pub fn cone_uniform(u: Vec2, one_minus_cos: f32) -> Vec3 {
     let h = u.x * one_minus_cos;
-    let r = (h * (2.0 - h)).max(0.0).sqrt();
-    let (sin, cos) = sin_cos_turns(u.y);
-    Vec3::new(r * cos, r * sin, 1.0 - h)
+    around_z((h * (2.0 - h)).max(0.0).sqrt(), 1.0 - h, u.y)
 }
 
 /// Density per solid angle of [`cone_uniform`] for directions inside the cone.

@@ -4,7 +4,7 @@
 //! The function is normalized and symmetric. So sampling it has weight 1, densities are equal in both directions, and
 //! radiance and importance scatter alike.
 
-use crate::math::{Frame, Vec2, Vec3, one_minus_cos, sin_cos_turns};
+use crate::math::{Frame, Vec2, Vec3, one_minus_cos, warp};
 use std::f32::consts::FRAC_1_PI;
 
 /// The Henyey-Greenstein phase function.
@@ -34,8 +34,7 @@ impl HenyeyGreenstein {
         let rest = (1.0 - g) + 2.0 * g * (1.0 - u.x);
         let h = (u.x * (1.0 - g) * (1.0 - g) * (1.0 + (1.0 + g) / rest) / rest).min(2.0);
         let sin = (h * (2.0 - h)).sqrt();
-        let (s, c) = sin_cos_turns(u.y);
-        Frame::from_normal(ahead).to_world(Vec3::new(sin * c, sin * s, 1.0 - h)).normalize()
+        Frame::from_normal(ahead).to_world(warp::around_z(sin, 1.0 - h, u.y)).normalize()
     }
 
     /// The phase function rewritten with an asymmetry that is not negative: the absolute asymmetry, and the direction

@@ -284,25 +284,10 @@ pub(super) fn scatter(
 }
 
 impl<'s> Bidirectional<'s> {
-    /// Traces light path `index`, which leaves vertices, splats and photons; with `photons_only` it leaves photons
-    /// only.
+    /// Traces the light path that starts with `emitted`, which leaves vertices, splats and photons; with `photons_only` it
+    /// leaves photons only.
     #[inline]
     pub fn light_path<R: PathRecorder>(
-        &self,
-        paths: &LightPaths,
-        index: u32,
-        photons_only: bool,
-        vertices: &mut LightVertices<'s>,
-        left: &mut Deposits,
-        record: &mut R,
-    ) {
-        let Some(emitted) = paths.emit(self.camera_paths.scene, self.initial_media, index) else { return };
-        self.light_path_of(paths, &emitted, photons_only, vertices, left, record);
-    }
-
-    /// Traces the light path that starts with `emitted`.
-    #[inline]
-    pub fn light_path_of<R: PathRecorder>(
         &self,
         paths: &LightPaths,
         emitted: &Emitted,

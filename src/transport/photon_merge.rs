@@ -23,8 +23,8 @@ pub struct MergePhoton {
     pub ng: Vec3,
     /// Flux (W), already divided by the number of merged light paths of the iteration.
     pub flux: Rgb,
-    /// Partial sums of MIS weights: dVCM times its number of samples, and the coefficients of dVC. On light paths all merges count with one
-    /// coefficient.
+    /// Partial sums of MIS weights: dVCM times its number of samples, and the coefficients of dVC. On light paths all
+    /// merges count with one coefficient.
     d_vcm: f32,
     plain: f32,
     merged: f32,

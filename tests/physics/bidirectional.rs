@@ -89,15 +89,19 @@ fn sun(intensity: f32) -> PunctualLight {
     }
 }
 
-/// In a closed box whose walls emit e and reflect rho, radiance is e / (1 - rho) everywhere and in every direction.
-#[test]
-fn furnace_box() {
+/// A closed box whose walls emit e and reflect rho: radiance is e / (1 - rho) everywhere and in every direction.
+fn furnace() -> (Scene, Check) {
     let (rho, e) = (0.5, 0.5);
     let mut description = Description::default();
     add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(rho, e));
     description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
-    let scene = build(description);
-    let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 };
+    (build(description), Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 })
+}
+
+/// Radiance in the furnace is found by all methods.
+#[test]
+fn furnace_box() {
+    let (scene, check) = furnace();
     check_all(check, "furnace", &scene, &all(), 400, 0.1);
     check_all(check, "furnace", &scene, &[Method::Mlt], 100, 0.1);
 }
@@ -413,12 +417,7 @@ fn with_counts((light_paths, connections, merging): (u32, u32, f32), settings: S
 /// In a closed box whose walls emit and reflect, radiance is known; any numbers of samples find it.
 #[test]
 fn furnace_box_with_any_numbers_of_samples() {
-    let (rho, e) = (0.5, 0.5);
-    let mut description = Description::default();
-    add(&mut description, "box", cuboid(Vec3::splat(-1.0), Vec3::ONE, true), matte(rho, e));
-    description.cameras.push(look_at(DVec3::new(0.1, 0.2, -0.3), DVec3::new(0.0, 0.0, 1.0), 40.0));
-    let scene = build(description);
-    let check = Check { expected: f64::from(e / (1.0 - rho)), bias: 2e-3, detects: 0.03 };
+    let (scene, check) = furnace();
     for counts in COUNTS {
         let mean = |seed| {
             let settings = with_counts(counts, settings(400, 0.1, seed));

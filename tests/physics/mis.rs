@@ -581,7 +581,10 @@ impl<'a> Lab<'a> {
         let arena = Bump::new();
         let mut vertices = LightVertices::new_in(&arena);
         let (mut left, mut by_light, mut by_camera) = (Deposits::default(), Said::default(), Said::default());
-        shared.light_path(&lights, index, false, &mut vertices, &mut left, &mut by_light);
+        let emitted = lights.emit(scene, initial_media, index);
+        if let Some(emitted) = &emitted {
+            shared.light_path(&lights, emitted, false, &mut vertices, &mut left, &mut by_light);
+        }
         let map = PhotonMap::build(left.photons.clone());
         let meets = CameraWalkContext { vertices: &vertices, photons: Some(&map), levels };
         let mut measure = PixelSample::default();
@@ -597,7 +600,6 @@ impl<'a> Lab<'a> {
         // Without connections, roulette of camera paths is that of path tracing.
         let spared = if shared.connections > 0.0 { 1.0 } else { SPARED_BY_ROULETTE };
         let eye_notes = notes(scene, &arena, start, stream, (Transport::Radiance, spared));
-        let emitted = lights.emit(scene, initial_media, index);
         let light_notes =
             emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, (Transport::Importance, 1.0)));
         let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);

@@ -300,7 +300,7 @@ impl<'a> LightTracer<'_, 'a> {
             if let Some(mut emitted) = self.paths.emit(self.shared.camera_paths.scene, self.shared.initial_media, index)
             {
                 emitted.start.wavelength_sample = wavelength;
-                self.shared.light_path_of(self.paths, &emitted, self.photons_only, vertices, left, &mut ());
+                self.shared.light_path(self.paths, &emitted, self.photons_only, vertices, left, &mut ());
             }
             traced.end_path(vertices.len());
         }

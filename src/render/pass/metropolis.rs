@@ -165,7 +165,7 @@ impl Walks<'_, '_> {
         if shared.only.is_none_or(|only| only.light().is_some_and(|depth| depth > 0))
             && let Some(emitted) = self.light_paths.emit_from(shared.camera_paths.scene, shared.initial_media, light)
         {
-            shared.light_path_of(&self.light_paths, &emitted, false, &mut vertices, left, &mut ());
+            shared.light_path(&self.light_paths, &emitted, false, &mut vertices, left, &mut ());
         }
         if shared.only.is_none_or(|only| only.camera > 0) {
             let mut start = shared.camera_paths.start_at((pixel.x, pixel.y), within, camera);
