@@ -2,6 +2,7 @@
 
 use super::{Environment, Spread};
 use crate::geometry::{Shapes, triangle_error};
+use crate::material::Materials;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
 use std::f32::consts::{PI, TAU};
 
@@ -11,33 +12,70 @@ pub(super) fn position_error(&[corner, a, b]: &[Vec3; 3]) -> f32 {
     triangle_error([corner, corner + a, corner + b])
 }
 
+/// A triangle of an emissive material, which emits light from one side or from both.
+#[derive(Clone, Debug)]
+pub struct TriangleLight {
+    /// Index of the instance (the object) that the triangle belongs to.
+    pub instance: u32,
+    /// Index of the triangle in the instance's mesh.
+    pub primitive: u32,
+    /// Area (m2).
+    pub area: f32,
+    /// Whether both sides emit.
+    pub two_sided: bool,
+    /// Emitted radiance (W/m2/sr), averaged over the triangle and over directions.
+    pub radiance: Rgb,
+    /// How the radiance depends on the direction.
+    pub spread: Spread,
+    /// Unit normal of the front side (xyz), and distance of the triangle's plane from the origin along it (w).
+    /// `plane` and `corners` are copies, so that light sampling finds all data in one place.
+    pub plane: Vec4,
+    /// One corner, and the edges from it to the other two (m).
+    pub corners: [Vec3; 3],
+    /// Bound on the rounding error of points on the triangle (m).
+    pub error: f32,
+    /// Whether every point of the triangle emits `radiance`; false if a texture, for example, varies it.
+    pub uniform: bool,
+}
+
+impl TriangleLight {
+    /// Unit normal of the front side.
+    #[inline]
+    pub(super) fn normal(&self) -> Vec3 {
+        self.plane.truncate()
+    }
+
+    /// The point with barycentric coordinates `b` of the second and the third corner (m).
+    #[inline]
+    pub(super) fn point(&self, b: Vec2) -> Vec3 {
+        let [corner, first, second] = self.corners;
+        corner + first * b.x + second * b.y
+    }
+
+    /// Radiance (W/m2/sr), averaged over directions, at the point with barycentric coordinates `b`. `None` if the triangle
+    /// has no area.
+    #[inline(always)]
+    pub(super) fn radiance_at(&self, shapes: &Shapes, materials: &Materials, b: Vec2) -> Option<Rgb> {
+        if self.uniform { Some(self.radiance) } else { self.textured_radiance(shapes, materials, b) }
+    }
+
+    /// [`TriangleLight::radiance_at`] a point of a triangle whose emission varies. Not inlined, so that the common case,
+    /// uniform emission, stays small.
+    #[cold]
+    #[inline(never)]
+    fn textured_radiance(&self, shapes: &Shapes, materials: &Materials, b: Vec2) -> Option<Rgb> {
+        let light = shapes.surface(self.instance, self.primitive, [b.x, b.y])?;
+        let material = &materials.list[light.material as usize];
+        // Rays pass through cut-outs, so light samples must do so, too.
+        Some(material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures))
+    }
+}
+
 /// A light source. The scene has one flat list of them.
 #[derive(Clone, Debug)]
 pub enum Emitter {
     /// A triangle of an emissive material.
-    Triangle {
-        /// Index of the instance (the object) that the triangle belongs to.
-        instance: u32,
-        /// Index of the triangle in the instance's mesh.
-        primitive: u32,
-        /// Area (m2).
-        area: f32,
-        /// Whether both sides emit.
-        two_sided: bool,
-        /// Emitted radiance (W/m2/sr), averaged over the triangle and over directions.
-        radiance: Rgb,
-        /// How the radiance depends on the direction.
-        spread: Spread,
-        /// Unit normal of the front side (xyz), and distance of the triangle's plane from the origin along it (w).
-        /// `plane` and `corners` are copies, so that light sampling finds all data in one place.
-        plane: Vec4,
-        /// One corner, and the edges from it to the other two (m).
-        corners: [Vec3; 3],
-        /// Bound on the rounding error of points on the triangle (m).
-        error: f32,
-        /// Whether every point of the triangle emits `radiance`; false if a texture, for example, varies it.
-        uniform: bool,
-    },
+    Triangle(TriangleLight),
     /// A point light, of no size, that shines equally in all directions.
     Point {
         /// Position (m).
@@ -181,7 +219,7 @@ impl Emitter {
         let (sphere, disc) = (4.0 * PI, PI * radius * radius);
         let light = |rgb: Rgb| f64::from(luminance(rgb));
         match self {
-            Emitter::Triangle { area, two_sided, radiance, .. } => {
+            Emitter::Triangle(TriangleLight { area, two_sided, radiance, .. }) => {
                 light(*radiance) * f64::from(*area) * PI * if *two_sided { 2.0 } else { 1.0 }
             }
             Emitter::Point { intensity, .. } => light(*intensity) * sphere,
@@ -197,7 +235,7 @@ impl Emitter {
     /// infinity.
     pub fn any_point(&self, shapes: &Shapes) -> Option<Vec3> {
         match self {
-            Emitter::Triangle { instance, primitive, .. } => {
+            Emitter::Triangle(TriangleLight { instance, primitive, .. }) => {
                 shapes.surface(*instance, *primitive, [1.0 / 3.0, 1.0 / 3.0]).map(|s| s.ray_origin(s.ng))
             }
             Emitter::Point { p, .. } | Emitter::Spot { p, .. } => Some(*p),
@@ -210,7 +248,7 @@ impl Emitter {
         match self {
             Emitter::Point { .. } | Emitter::Spot { .. } => true,
             Emitter::Sun { one_minus_cos, .. } => *one_minus_cos == 0.0,
-            Emitter::Triangle { .. } | Emitter::Environment => false,
+            Emitter::Triangle(_) | Emitter::Environment => false,
         }
     }
 

@@ -237,10 +237,9 @@ impl Guide {
         }
         let Some((axis, one_minus_cos)) = cone(emission.origin, center, radius) else { return Some(emission) };
         let d = Frame::from_normal(axis).to_world(warp::cone_uniform(direction, one_minus_cos));
-        if let Emitter::Triangle { plane, corners, error, .. } = &lights.emitters()[emission.light as usize] {
-            let b = warp::triangle_uniform(point);
-            let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
-            emission.origin = offset_origin(at, plane.truncate(), d, *error);
+        if let Emitter::Triangle(triangle) = &lights.emitters()[emission.light as usize] {
+            let at = triangle.point(warp::triangle_uniform(point));
+            emission.origin = offset_origin(at, triangle.normal(), d, triangle.error);
         }
         emission.direction = d;
         (emission.density.onward, emission.density.cos) = lights.direction_density(emission.light as usize, d)?;

@@ -5,7 +5,7 @@ use super::aim::CausticTargets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
-use super::emitter::{Emitter, Sky, position_error, spot_falloff, spot_point, spot_solid_angle};
+use super::emitter::{Emitter, Sky, TriangleLight, position_error, spot_falloff, spot_point, spot_solid_angle};
 use super::environment::EnvironmentSample;
 use super::group::{Group, Groups};
 use super::receiver::Receiver;
@@ -38,22 +38,6 @@ pub struct Lights {
     sky: Sky,
     targets: CausticTargets,
     groups: Groups,
-}
-
-/// Radiance that a triangle with a texture or cut-out emits at the barycentric coordinates `b`. Not inlined, so that
-/// the common case, uniform emission, stays small.
-#[cold]
-#[inline(never)]
-fn textured_radiance(
-    shapes: &Shapes,
-    materials: &Materials,
-    (instance, primitive): (u32, u32),
-    b: Vec2,
-) -> Option<Rgb> {
-    let light = shapes.surface(instance, primitive, [b.x, b.y])?;
-    let material = &materials.list[light.material as usize];
-    // Rays pass through cut-outs, so light samples must do so, too.
-    Some(material.emitted(&light, &materials.textures) * material.coverage(&light, &materials.textures))
 }
 
 /// The emitter of a triangle of an emissive material; `None` if the triangle has no area or does not emit.
@@ -89,7 +73,7 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
         return None;
     }
     let corners = [a, b - a, c - a];
-    Some(Emitter::Triangle {
+    Some(Emitter::Triangle(TriangleLight {
         instance,
         primitive,
         area,
@@ -100,7 +84,7 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
         corners,
         error: position_error(&corners),
         uniform,
-    })
+    }))
 }
 
 /// A sampled ray that leaves a given light; its densities do not include the selection of the light.
@@ -174,7 +158,9 @@ impl Lights {
             return Group::NONE;
         }
         match &self.emitters[light as usize] {
-            Emitter::Triangle { instance, .. } => instances.get(*instance as usize).copied().unwrap_or_default(),
+            Emitter::Triangle(TriangleLight { instance, .. }) => {
+                instances.get(*instance as usize).copied().unwrap_or_default()
+            }
             Emitter::Environment => *environment,
             _ => {
                 // `others` are the emitters between the triangles and the environment.
@@ -237,7 +223,10 @@ impl Lights {
     /// each with the probability that selection by power gives an emitter in the range.
     pub(super) fn emitters_by_object(&self) -> impl Iterator<Item = (Range<usize>, f64)> {
         let same = |a: &Emitter, b: &Emitter| match (a, b) {
-            (Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }) => a == b,
+            (
+                Emitter::Triangle(TriangleLight { instance: a, .. }),
+                Emitter::Triangle(TriangleLight { instance: b, .. }),
+            ) => a == b,
             _ => false,
         };
         let below = |end: usize| {
@@ -256,7 +245,7 @@ impl Lights {
     #[inline]
     pub(super) fn direction_density(&self, index: usize, d: Vec3) -> Option<(f32, f32)> {
         match &self.emitters[index] {
-            Emitter::Triangle { two_sided, spread, plane, .. } => {
+            Emitter::Triangle(TriangleLight { two_sided, spread, plane, .. }) => {
                 let cos = plane.truncate().dot(d);
                 let cos = if *two_sided { cos.abs() } else { cos };
                 let density = if cos >= MIN_COSINE { Self::cosine_density(cos, *two_sided, spread) } else { 0.0 };
@@ -311,7 +300,7 @@ impl Lights {
     ) -> Option<DirectSample> {
         let light = index as u32;
         match &self.emitters[index] {
-            triangle @ Emitter::Triangle { .. } => {
+            Emitter::Triangle(triangle) => {
                 Self::sample_triangle(triangle, (shapes, materials), p, (light, probability), u)
             }
             Emitter::Point { p: at, intensity } => {
@@ -364,51 +353,35 @@ impl Lights {
     /// Does the work of [`Lights::sample_light`] for a triangle.
     #[inline(always)]
     fn sample_triangle(
-        triangle: &Emitter,
+        triangle: &TriangleLight,
         (shapes, materials): (&Shapes, &Materials),
         p: Vec3,
         (light, probability): (u32, f32),
         u: Vec2,
     ) -> Option<DirectSample> {
-        let &Emitter::Triangle {
-            instance,
-            primitive,
-            area,
-            two_sided,
-            radiance,
-            ref spread,
-            plane,
-            ref corners,
-            error,
-            uniform,
-        } = triangle
-        else {
-            return None;
-        };
         // Most receivers are behind some one-sided light, so this cheap test comes first. Near the plane, rounding
         // decides.
-        let ng = plane.truncate();
-        if !two_sided && ng.dot(p) <= plane.w {
+        let ng = triangle.normal();
+        if !triangle.two_sided && ng.dot(p) <= triangle.plane.w {
             return None;
         }
         let b = warp::triangle_uniform(u);
-        let at = corners[0] + corners[1] * b.x + corners[2] * b.y;
+        let at = triangle.point(b);
         let to = at - p;
         let distance2 = to.length_squared();
         let wi = to.try_normalize()?;
         let cos = -ng.dot(wi);
-        if cos == 0.0 || (cos < 0.0 && !two_sided) {
+        if cos == 0.0 || (cos < 0.0 && !triangle.two_sided) {
             return None;
         }
-        let relative = spread.relative_radiance(cos.abs());
+        let relative = triangle.spread.relative_radiance(cos.abs());
         if relative == 0.0 {
             return None;
         }
-        let radiance = if uniform { radiance } else { textured_radiance(shapes, materials, (instance, primitive), b)? };
-        let radiance = radiance * relative;
-        let pdf_w = probability * distance2 / (area * cos.abs());
-        let arrival_factor = Self::cosine_density(cos.abs(), two_sided, spread) / distance2;
-        let target = Some(shadow_end(at, ng, -wi, error, distance2.sqrt()));
+        let radiance = triangle.radiance_at(shapes, materials, b)? * relative;
+        let pdf_w = probability * distance2 / (triangle.area * cos.abs());
+        let arrival_factor = Self::cosine_density(cos.abs(), triangle.two_sided, &triangle.spread) / distance2;
+        let target = Some(shadow_end(at, ng, -wi, triangle.error, distance2.sqrt()));
         Some(DirectSample { wi, target, radiance, pdf_w, delta: false, arrival_factor, light })
     }
 
@@ -418,10 +391,7 @@ impl Lights {
     pub fn sample_point(&self, choice: f64, u: Vec2) -> Option<(Vec3, Option<Cone>)> {
         let (index, ..) = self.choice()?.sample(choice);
         match &self.emitters[index] {
-            Emitter::Triangle { corners, .. } => {
-                let b = warp::triangle_uniform(u);
-                Some((corners[0] + corners[1] * b.x + corners[2] * b.y, None))
-            }
+            Emitter::Triangle(triangle) => Some((triangle.point(warp::triangle_uniform(u)), None)),
             Emitter::Point { p, .. } => Some((*p, None)),
             Emitter::Spot { p, radius, frame, outer, .. } => {
                 let at = spot_point(*p, *radius, frame, u);
@@ -478,7 +448,9 @@ impl Lights {
             return None;
         }
         let index = (first + relative) as usize;
-        let Emitter::Triangle { area, two_sided, spread, .. } = &self.emitters[index] else { return None };
+        let Emitter::Triangle(TriangleLight { area, two_sided, spread, .. }) = &self.emitters[index] else {
+            return None;
+        };
         let cos = surface.ng.dot(wo);
         if !(cos > 0.0 || (*two_sided && cos < 0.0)) {
             return None;
@@ -540,8 +512,8 @@ impl Lights {
         let (index, probability, rest) = self.choice()?.sample(choice);
         let emitter = &self.emitters[index];
         let ray = match emitter {
-            Emitter::Triangle { .. } => {
-                Self::emit_from_triangle(emitter, (shapes, materials), rest < 0.5, point, direction)?
+            Emitter::Triangle(triangle) => {
+                Self::emit_from_triangle(triangle, (shapes, materials), rest < 0.5, point, direction)?
             }
             Emitter::Point { p, intensity } => {
                 let (direction, flux) = (warp::sphere_uniform(direction), *intensity * (2.0 * TAU));
@@ -588,41 +560,26 @@ impl Lights {
     /// Samples a ray that leaves a triangle; `back` selects its back side, if it emits from both sides.
     #[inline(always)]
     fn emit_from_triangle(
-        triangle: &Emitter,
+        triangle: &TriangleLight,
         (shapes, materials): (&Shapes, &Materials),
         back: bool,
         point: Vec2,
         direction: Vec2,
     ) -> Option<LightRay> {
-        let &Emitter::Triangle {
-            instance,
-            primitive,
-            area,
-            two_sided,
-            radiance,
-            ref spread,
-            plane,
-            ref corners,
-            error,
-            uniform,
-        } = triangle
-        else {
-            return None;
-        };
         let b = warp::triangle_uniform(point);
-        let (at, ng) = (corners[0] + corners[1] * b.x + corners[2] * b.y, plane.truncate());
+        let (ng, two_sided) = (triangle.normal(), triangle.two_sided);
         let frame = Frame::from_normal(if two_sided && back { -ng } else { ng });
-        let (d, weight) = spread.sample(direction);
+        let (d, weight) = triangle.spread.sample(direction);
         let d = frame.to_world(d);
-        let radiance = if uniform { radiance } else { textured_radiance(shapes, materials, (instance, primitive), b)? };
+        let radiance = triangle.radiance_at(shapes, materials, b)?;
         let cos = ng.dot(d).abs();
         if cos < MIN_COSINE {
             return None;
         }
-        let flux = radiance * (PI * area * weight * if two_sided { 2.0 } else { 1.0 });
-        let origin = offset_origin(at, ng, d, error);
-        let onward = Self::cosine_density(cos, two_sided, spread);
-        Some(LightRay { origin, direction: d, flux, start: 1.0 / area, onward, cos })
+        let flux = radiance * (PI * triangle.area * weight * if two_sided { 2.0 } else { 1.0 });
+        let origin = offset_origin(triangle.point(b), ng, d, triangle.error);
+        let onward = Self::cosine_density(cos, two_sided, &triangle.spread);
+        Some(LightRay { origin, direction: d, flux, start: 1.0 / triangle.area, onward, cos })
     }
 
     /// Samples a ray that leaves a spot.

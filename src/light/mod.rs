@@ -19,7 +19,7 @@ pub use aim::CausticTargets;
 pub use cdf::Cdf;
 pub use cone::Cone;
 pub use emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
-pub use emitter::{Emitter, Sky, SpotEdge};
+pub use emitter::{Emitter, Sky, SpotEdge, TriangleLight};
 pub use environment::{Environment, ImageEnvironment};
 pub use group::{Group, Groups, MAX_GROUP_NAME, MAX_GROUPS};
 pub use guide::Guide;

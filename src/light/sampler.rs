@@ -1,7 +1,7 @@
 //! Selection of a light for next-event estimation at a receiver.
 
 use super::cdf::Cdf;
-use super::emitter::{Emitter, Sky};
+use super::emitter::{Emitter, Sky, TriangleLight};
 use super::receiver::Receiver;
 use super::tree::LightTree;
 use crate::math::luminance;
@@ -95,7 +95,10 @@ impl LightSampler {
 /// the receiver.
 fn has_several_lights(emitters: &[Emitter]) -> bool {
     match emitters {
-        [Emitter::Triangle { instance: a, .. }, Emitter::Triangle { instance: b, .. }] => a != b,
+        [
+            Emitter::Triangle(TriangleLight { instance: a, .. }),
+            Emitter::Triangle(TriangleLight { instance: b, .. }),
+        ] => a != b,
         _ => emitters.len() > 1,
     }
 }

@@ -258,8 +258,8 @@ impl LightTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::Spread;
     use crate::light::emitter::{SpotEdge, spot_point};
+    use crate::light::{Spread, TriangleLight};
     use crate::math::{Rgb, Vec2, Vec4, warp};
     use crate::random::{Domain, Purpose, Stream};
 
@@ -288,7 +288,7 @@ mod tests {
                     let corners = [p, vector(4) - 0.5, vector(5) - 0.5];
                     let normal = corners[1].cross(corners[2]);
                     let n = normal.normalize();
-                    Emitter::Triangle {
+                    Emitter::Triangle(TriangleLight {
                         instance: 0,
                         primitive: i as u32,
                         area: 0.5 * normal.length(),
@@ -299,7 +299,7 @@ mod tests {
                         corners,
                         error: 0.0,
                         uniform: true,
-                    }
+                    })
                 }
             }
         };
@@ -309,7 +309,9 @@ mod tests {
     /// Whether some point of the light shines on `p`.
     fn shines(emitter: &Emitter, p: Vec3) -> bool {
         match emitter {
-            Emitter::Triangle { two_sided, plane, .. } => *two_sided || plane.truncate().dot(p) - plane.w > 1e-4,
+            Emitter::Triangle(TriangleLight { two_sided, plane, .. }) => {
+                *two_sided || plane.truncate().dot(p) - plane.w > 1e-4
+            }
             Emitter::Spot { p: at, radius, frame, outer, .. } => (0..16).any(|k| {
                 let u = Vec2::new((0.5 + k as f32) / 16.0, 0.99);
                 let at = spot_point(*at, *radius, frame, u);

@@ -218,7 +218,7 @@ pub(super) fn rebuild_with_materials(
         false => tracers(&shapes, &materials, rayon::current_num_threads())?,
     };
     let others = scene.lights.emitters().iter();
-    let others = others.filter(|light| !matches!(light, Emitter::Triangle { .. } | Emitter::Environment)).cloned();
+    let others = others.filter(|light| !matches!(light, Emitter::Triangle(_) | Emitter::Environment)).cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
     let lights = Lights::new(&shapes, &materials, others.collect(), sky).with_groups(scene.lights.groups().clone());
     Ok(Scene {

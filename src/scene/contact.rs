@@ -25,7 +25,7 @@
 use super::Scene;
 use super::contacts::face_each_other;
 use crate::geometry::{Surface, triangle_error};
-use crate::light::Emitter;
+use crate::light::{Emitter, TriangleLight};
 use crate::math::Vec3;
 use crate::trace::{Hit, Ray};
 use smallvec::SmallVec;
@@ -69,7 +69,7 @@ impl ContactPoint {
 
     #[inline(never)]
     fn on_touched_light(scene: &Scene, index: u32, near: Vec3) -> Option<ContactPoint> {
-        let Emitter::Triangle { instance, primitive, plane, corners: [corner, a, b], .. } =
+        let Emitter::Triangle(TriangleLight { instance, primitive, plane, corners: [corner, a, b], .. }) =
             scene.lights.emitters()[index as usize]
         else {
             return None;

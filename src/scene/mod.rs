@@ -23,7 +23,7 @@ pub use view::View;
 
 use crate::error::Result;
 use crate::geometry::{Shapes, Surface};
-use crate::light::{Emitter, Environment, Lights};
+use crate::light::{Emitter, Environment, Lights, TriangleLight};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
@@ -131,7 +131,7 @@ impl Scene {
     /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle of the object.
     pub fn light_name(&self, index: usize) -> String {
         match &self.lights.emitters()[index] {
-            Emitter::Triangle { instance, .. } => {
+            Emitter::Triangle(TriangleLight { instance, .. }) => {
                 let instance = &self.shapes.instances[*instance as usize];
                 let kind = if instance.object < self.first_light_sphere { "object" } else { "light" };
                 format!("{kind} \"{}\"", instance.name)

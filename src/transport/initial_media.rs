@@ -2,7 +2,7 @@
 
 use super::interior::Interior;
 use crate::camera::Camera;
-use crate::light::Emitter;
+use crate::light::{Emitter, TriangleLight};
 use crate::math::Vec3;
 use crate::scene::Scene;
 use std::collections::HashMap;
@@ -111,7 +111,7 @@ fn around_lights(scene: &Scene) -> Vec<InitialMedium> {
     let solids = Solid::all(scene);
     let mut crossed: HashMap<u32, Vec<&Solid>> = HashMap::new();
     let mut around = |emitter: &Emitter| {
-        if let Emitter::Triangle { instance, two_sided, corners: [a, b, c], .. } = emitter {
+        if let Emitter::Triangle(TriangleLight { instance, two_sided, corners: [a, b, c], .. }) = emitter {
             let crossed = crossed.entry(*instance).or_insert_with(|| {
                 let light = extent(scene, *instance);
                 // A one-sided light emits on one side of its own surface only.

@@ -13,7 +13,7 @@ use crate::support;
 use bumpalo::Bump;
 use caustique::bsdf::{BsdfSample, LobeSet, Shading, Transport};
 use caustique::camera::Camera;
-use caustique::light::{EmissionDensity, Emitter, Receiver};
+use caustique::light::{EmissionDensity, Emitter, Receiver, TriangleLight};
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::medium::{FlightDensity, HenyeyGreenstein};
@@ -673,7 +673,9 @@ impl<'a> Lab<'a> {
                             // The lamp is flat and has uniform radiance, but each of its triangles has its own
                             // probability.
                             let lamp = emitters.iter().find_map(|emitter| match emitter {
-                                Emitter::Triangle { instance, primitive, corners: [a, b, c], .. } => {
+                                Emitter::Triangle(TriangleLight {
+                                    instance, primitive, corners: [a, b, c], ..
+                                }) => {
                                     let (n, to) = (b.cross(*c), target - *a);
                                     let x = to.cross(*c).dot(n) / n.length_squared();
                                     let y = b.cross(to).dot(n) / n.length_squared();

@@ -1,6 +1,6 @@
 //! Bounds on the positions and directions of lights, and the best split of a cluster into halves.
 
-use crate::light::emitter::Emitter;
+use crate::light::emitter::{Emitter, TriangleLight};
 use crate::math::{Vec3, luminance};
 use std::f32::consts::PI;
 
@@ -41,7 +41,7 @@ impl Bounds {
             intensity,
         };
         let bounds = match emitter {
-            Emitter::Triangle { area, two_sided, radiance, spread, plane, corners, .. } => {
+            Emitter::Triangle(TriangleLight { area, two_sided, radiance, spread, plane, corners, .. }) => {
                 let [a, b, c] = [corners[0], corners[0] + corners[1], corners[0] + corners[2]];
                 let intensity = luminance(*radiance) * area * spread.relative_radiance(1.0);
                 let bounds = at(a, plane.truncate(), 0.0, 0.5 * PI, intensity);

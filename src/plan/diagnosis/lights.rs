@@ -3,7 +3,7 @@
 use super::super::names::truncate_names;
 use super::super::{Effect, PlanRequest};
 use super::rays;
-use crate::light::Emitter;
+use crate::light::{Emitter, TriangleLight};
 use crate::math::{Vec3, luminance, one_minus_cos};
 use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,7 +33,7 @@ pub(super) fn wrong_units(scene: &Scene) -> Option<String> {
     let (mut points, mut surfaces, mut suns) = (0.0, 0.0, 0.0);
     for emitter in scene.lights.emitters() {
         match emitter {
-            Emitter::Triangle { instance, .. } => {
+            Emitter::Triangle(TriangleLight { instance, .. }) => {
                 let own = scene.shapes.instances[*instance as usize].object < scene.first_light_sphere;
                 *if own { &mut surfaces } else { &mut points } += emitter.power(sky) as f32;
             }
@@ -100,7 +100,7 @@ fn light_rays(scene: &Scene) -> Vec<LightRays> {
             Emitter::Spot { p, frame, outer, .. } => {
                 sources.push(from(*p, &|d| one_minus_cos(*d, frame.n) < *outer));
             }
-            Emitter::Triangle { instance, .. } => glowing.entry(*instance).or_default().push(index),
+            Emitter::Triangle(TriangleLight { instance, .. }) => glowing.entry(*instance).or_default().push(index),
             Emitter::Sun { .. } | Emitter::Environment => {}
         }
         if sources.len() >= MAX_LIGHTS {
@@ -110,7 +110,8 @@ fn light_rays(scene: &Scene) -> Vec<LightRays> {
     for (instance, triangles) in glowing.into_iter().take(MAX_LIGHTS) {
         let mut rays = Vec::new();
         for at in rays::spread_indices(triangles.len(), MAX_EMITTING_TRIANGLES) {
-            let Emitter::Triangle { primitive, two_sided, .. } = &scene.lights.emitters()[triangles[at]] else {
+            let Emitter::Triangle(TriangleLight { primitive, two_sided, .. }) = &scene.lights.emitters()[triangles[at]]
+            else {
                 continue;
             };
             let Some(place) = scene.shapes.surface(instance, *primitive, [1.0 / 3.0; 2]) else { continue };
