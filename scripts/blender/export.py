@@ -270,7 +270,7 @@ def _warn_of_stretched_normals(document, warn):
     for node in document.get("nodes", []):
         scale = [abs(s) for s in node.get("scale", (1, 1, 1))]
         parts = document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ()
-        if max(scale) > objects.MAX_EVEN_RATIO * min(scale) and any(part.get("material") in mapped for part in parts):
+        if objects.is_uneven(scale) and any(part.get("material") in mapped for part in parts):
             warn(f'object "{node["name"]}"', objects.STRETCHED)
 
 

@@ -26,7 +26,7 @@ _OUT = "it is left out"
 # Most copies of a mesh with bumps, one for each scale of its instances.
 _MAX_SCALES = 16
 # Largest ratio of two scale factors that counts as uniform.
-MAX_EVEN_RATIO = 1.001
+_MAX_EVEN_RATIO = 1.001
 STRETCHED = ("its scale is uneven, with which Cycles stretches normal maps: here they keep their slopes; apply the scale "
              "(Object > Apply > Scale) to see the same in both")
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
@@ -175,10 +175,10 @@ class FlatScene:
         evaluates bumps in world space and bakes them in object space.
         """
         relief, (place, turn, scale) = _relief(mesh), matrix.decompose()
-        uneven = max(map(abs, scale)) > MAX_EVEN_RATIO * min(map(abs, scale))
+        uneven = is_uneven(scale)
         if not _has_no_shear(matrix):
             applied, rest = matrix, Matrix()
-        elif "BUMP" in relief and any(abs(abs(s) - 1) > MAX_EVEN_RATIO - 1 for s in scale):
+        elif "BUMP" in relief and any(abs(abs(s) - 1) > _MAX_EVEN_RATIO - 1 for s in scale):
             applied, rest = Matrix.Diagonal((*scale, 1)), Matrix.LocRotScale(place, turn, None)
         else:
             return mesh, matrix
@@ -262,6 +262,11 @@ def _remove_points_that_are_no_numbers(mesh):
         shape.to_mesh(mesh)
         shape.free()
     return len(odd)
+
+
+def is_uneven(scale):
+    """Whether the three factors of a scale differ."""
+    return max(map(abs, scale)) > _MAX_EVEN_RATIO * min(map(abs, scale))
 
 
 def _relief(mesh):

@@ -125,13 +125,4 @@ def _select(context, things):
         context.view_layer.objects.active = here[0]
 
 
-def register():
-    """Register the operators."""
-    for kind in (Diagnose, Select):
-        bpy.utils.register_class(kind)
-
-
-def unregister():
-    """Unregister the operators."""
-    for kind in (Select, Diagnose):
-        bpy.utils.unregister_class(kind)
+register, unregister = bpy.utils.register_classes_factory((Diagnose, Select))

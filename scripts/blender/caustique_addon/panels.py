@@ -192,16 +192,6 @@ class LightPanel(Panel, bpy.types.Panel):
                 column.prop(light, name)
 
 
-_KINDS = (MethodPanel, StopPanel, FinishPanel, DiagnosisPanel, MessagesPanel, EffectsPanel, PassesPanel, LightPanel)
-
-
-def register():
-    """Register the panels."""
-    for kind in _KINDS:
-        bpy.utils.register_class(kind)
-
-
-def unregister():
-    """Unregister the panels."""
-    for kind in reversed(_KINDS):
-        bpy.utils.unregister_class(kind)
+register, unregister = bpy.utils.register_classes_factory((
+    MethodPanel, StopPanel, FinishPanel, DiagnosisPanel, MessagesPanel, EffectsPanel, PassesPanel, LightPanel,
+))

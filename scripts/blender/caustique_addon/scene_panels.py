@@ -159,16 +159,7 @@ class WorldPanel(Panel, bpy.types.Panel):
         _draw_light_group(column, context, world)
 
 
-_KINDS = (FilmPanel, PerformancePanel, SimplifyPanel, LayerPanel, ObjectPanel, LightNodesPanel, DisplacementPanel, WorldPanel)
-
-
-def register():
-    """Register the panels."""
-    for kind in _KINDS:
-        bpy.utils.register_class(kind)
-
-
-def unregister():
-    """Unregister the panels."""
-    for kind in reversed(_KINDS):
-        bpy.utils.unregister_class(kind)
+register, unregister = bpy.utils.register_classes_factory((
+    FilmPanel, PerformancePanel, SimplifyPanel, LayerPanel, ObjectPanel, LightNodesPanel, DisplacementPanel,
+    WorldPanel,
+))
