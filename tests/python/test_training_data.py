@@ -69,6 +69,7 @@ class Data(unittest.TestCase):
             self.assertEqual(views.files(folder, True), [(stem("b-0"), "vcm", 1)])
             self.assertEqual(views.files(folder, False, ["vcm"]), [(stem("a-0"), "vcm", 2)])
             self.assertEqual(views.files(folder, False, paths=[2]), [(stem("a-0"), "sppm", 1)])
+            self.assertEqual(views.files(folder, False, pairs="deep-single"), [(stem("a-0"), "sppm", 1)])
 
 
 class Samples(unittest.TestCase):

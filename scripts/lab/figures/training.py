@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ..cache import installed
 from ..options import names, options
-from ..train import data
+from ..train import views
 from .training_data import FOLDER
 
 # Options of each run. All but `paper`, whose steps take forty times as long, have the same number of steps.
@@ -59,10 +59,8 @@ def trainable(run):
     line = last_line(run)
     if line and line["step"] >= steps(run):
         return False
-    entries = [entry for entry in data.manifest(options.folder).values() if not entry["held_out"]]
-    seed = next(seed for seed, paths in data.PATHS.items() if paths == (1 if "--paths" in RUNS[run] else 2))
-    wanted = f"sppm-bdpt{seed}.npz" if run.startswith("deep") else f"sppm-seed{seed}.npz"
-    return any(wanted in entry["files"] for entry in entries)
+    paths, pairs = 1 if "--paths" in RUNS[run] else 2, run if run.startswith("deep") else "multi"
+    return bool(views.files(options.folder, False, ["sppm"], [paths], pairs))
 
 
 def train(run, minutes):

@@ -75,6 +75,11 @@ def views(folder, count):
     return found
 
 
+def independent_file(method, seed):
+    """The name of the file with the pictures by bdpt that the deep combiner reads beside a noisy stack."""
+    return f"{method}-bdpt{seed}.npz"
+
+
 class Maker:
     """Renders views with one program, which a copy in the folder of the data keeps."""
 
@@ -119,7 +124,7 @@ class Maker:
 
     def add_independent(self, view):
         """Renders the pictures of bdpt that are missing of a finished view."""
-        wanted = [(seed, view.folder / f"sppm-bdpt{seed}.npz") for seed in PATHS]
+        wanted = [(seed, view.folder / independent_file("sppm", seed)) for seed in PATHS]
         if all(file.exists() for _, file in wanted):
             return
         work, note = view.folder / "work", load(view.folder / "view.json")

@@ -54,9 +54,7 @@ def validate(net, folder, methods, paths, device="cpu", most=60):
     net.eval()
     found = {}
     for method in methods:
-        items = views.files(folder, True, [method], paths)
-        if net.pairs.startswith("deep"):
-            items = [item for item in items if (item[0] / f"{method}-bdpt{item[2]}.npz").exists()]
+        items = views.files(folder, True, [method], paths, net.pairs)
         items = items[:: max(1, len(items) * len(SNAPSHOTS) // most)]
         rows = []
         for item in items:
@@ -82,7 +80,7 @@ def main():
     net.eval()
     print(f"{'view':28}{'method':8}{'iterations':>10}{'combined':>12}{'Level4':>12}{'finished':>12}")
     ratios = []
-    for item in views.files(args.data, True, args.methods, args.paths):
+    for item in views.files(args.data, True, args.methods, args.paths, net.pairs):
         arrays = views.read(item)
         for k in SNAPSHOTS:
             row = errors(net, arrays, k)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from . import normalise
-from .data import PATHS, manifest
+from .data import PATHS, independent_file, manifest
 from .pairs import PAIRS
 
 # Arrays without a last axis of colour or direction; others have one.
@@ -16,18 +16,17 @@ DIMENSIONLESS = ("radius", "depth", "albedo", "normal", "iterations")
 EXPOSURE_SPREAD = 0.35
 
 
-def files(folder, held_out, methods=("sppm", "vcm"), paths=(1, 2)):
+def files(folder, held_out, methods=("sppm", "vcm"), paths=(1, 2), pairs="multi"):
     """Stems (folder of a view, method, seed) of the finished noisy stacks with some numbers of camera paths, of
-    held-out views or of all others."""
-    views = manifest(folder).values()
-    found = [(view["view"], file) for view in views if view["held_out"] == held_out for file in view["files"]]
-    parts = [
-        (Path(folder) / "views" / view, *file.removesuffix(".npz").split("-seed"))
-        for view, file in found
-        if "-seed" in file
-    ]
-    found = [(path, method, int(seed)) for path, method, seed in parts if method in methods]
-    return [item for item in found if PATHS[item[2]] in paths]
+    held-out views or of all others, that have the pictures of `pairs`."""
+    found = []
+    for view in manifest(folder).values():
+        for file in view["files"] if view["held_out"] == held_out else ():
+            method, _, seed = file.removesuffix(".npz").partition("-seed")
+            complete = not pairs.startswith("deep") or independent_file(method, seed) in view["files"]
+            if seed and complete and method in methods and PATHS[int(seed)] in paths:
+                found.append((Path(folder) / "views" / view["view"], method, int(seed)))
+    return found
 
 
 def read(item):
@@ -37,7 +36,7 @@ def read(item):
         arrays = dict(stored)
     with np.load(folder / f"{method}-target.npz") as stored:
         arrays["halves"] = stored["halves"]
-    independent = folder / f"{method}-bdpt{seed}.npz"
+    independent = folder / independent_file(method, seed)
     if independent.exists():
         with np.load(independent) as stored:
             arrays |= {f"bdpt_{key}": value for key, value in stored.items()}
@@ -96,9 +95,7 @@ class Pool:
 
     def batch(self, rng, count, side, version):
         """Arrays of `count` random samples."""
-        known = files(self.folder, False, self.methods, self.paths)
-        if self.pairs.startswith("deep"):
-            known = [item for item in known if (item[0] / f"{item[1]}-bdpt{item[2]}.npz").exists()]
+        known = files(self.folder, False, self.methods, self.paths, self.pairs)
         if not known:
             raise SystemExit(f"{self.folder}: no views to train with; render some with scripts/lab.sh training_data")
         wanted = 1 if len(self.loaded) >= min(self.size, len(known)) else 4
