@@ -23,7 +23,8 @@ class Baker:
     """Bakes images of `size` texels per side. `undo` removes the scene and materials that it makes in Blender."""
 
     def __init__(self, size, undo):
-        self.size, self.undo, self.frame = size, undo, bpy.context.scene.frame_current
+        scene = bpy.context.scene
+        self.size, self.undo, self.frame = size, undo, (scene.frame_current, scene.frame_subframe)
         self._made = None
 
     @property
@@ -34,7 +35,7 @@ class Baker:
             self.undo.callback(bpy.data.scenes.remove, self._made)
             self._made.render.engine = "CYCLES"
             # Drivers and image sequences are baked at the frame of the export.
-            self._made.frame_set(self.frame)
+            self._made.frame_set(self.frame[0], subframe=self.frame[1])
             self._made.cycles.device = "CPU"
             self._made.cycles.use_denoising = False
             self._made.cycles.use_adaptive_sampling = False
@@ -61,23 +62,34 @@ class Baker:
             bpy.context.window.view_layer = kept
 
     def constants(self, graph, values):
-        """Colours or numbers of `values` that are equal everywhere, evaluated by baking a few texels of a square."""
+        """Colours or numbers of `values` that are equal everywhere."""
+        found = []
+        for value in values:
+            shader = _connect_emission(graph, value)
+            colour = bake_cache.recall(self._key(graph, "constant"), lambda: self._constant(graph))
+            found.append(tuple(map(float, colour)) if _has_three(value) else float(colour[0]))
+            graph.tree.nodes.remove(shader)
+        return found
+
+    def _constant(self, graph):
+        """The constant colour that a graph emits, evaluated by baking a few texels of a square."""
         mesh = bpy.data.meshes.new("square")
         mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
         body = bpy.data.objects.new("square", mesh)
         try:
             mesh.uv_layers.new(name=standin.UV)
             mesh.materials.append(graph.material)
-            found = []
             with self.on_stage(body):
-                for value in values:
-                    shader = _connect_emission(graph, value)
-                    found.append(self._texels(body, {0: graph}, "EMIT", 4)[0][..., :3].mean((0, 1)))
-                    graph.tree.nodes.remove(shader)
-            return [tuple(map(float, f)) if g else float(f[0]) for f, g in zip(found, map(_has_three, values))]
+                return self._texels(body, {0: graph}, "EMIT", 4)[0][..., :3].mean((0, 1))
         finally:
             bpy.data.objects.remove(body)
             bpy.data.meshes.remove(mesh)
+
+    def _key(self, graph, *parts):
+        """The key in the cache of what a graph emits; None as for `bake_cache.nodes_key`."""
+        material = graph.material
+        return bake_cache.nodes_key(graph.tree, self.frame, material.pass_index,
+                                    getattr(material, "displacement_method", None), *parts)
 
     def passes(self, body, wanted, of_object):
         """Bake on `body`, whose mesh has the UV map. Returns {(slot, pass): texels (size, size, 4)}, alpha 0 where
@@ -96,19 +108,18 @@ class Baker:
                     continue
                 connect = _connect_normal if name == "normal" else _connect_emission
                 shaders.append((graph, connect(graph, values[name])))
-                keys[slot] = bake_cache.digest(shape, slot, bake_cache.tree_digest(graph.tree), self.size, name,
-                                              place if of_object else None,
-                                              self.frame if _depends_on_frame(graph) else None)
+                keys[slot] = self._key(graph, shape, slot, self.size, name, place if of_object else None)
                 texels = bake_cache.load(keys[slot])
                 if texels is None:
                     now[slot] = graph
                 else:
-                    found[slot, name] = texels
+                    found[slot, name] = texels.astype(numpy.float32)
             if now:
                 made = self._texels(body, now, "NORMAL" if name == "normal" else "EMIT", self.size)
                 for slot, texels in made.items():
-                    bake_cache.store(keys[slot], texels)
-                    found[slot, name] = texels
+                    stored = _rounded(texels)  # used by this export, too, so that the next one writes equal bytes
+                    bake_cache.store(keys[slot], stored)
+                    found[slot, name] = stored.astype(numpy.float32)
             for graph, shader in shaders:
                 graph.tree.nodes.remove(shader)
         return found
@@ -154,11 +165,9 @@ class Baker:
         return found
 
 
-def _depends_on_frame(graph):
-    """Whether a graph has image sequences, movies or animated values."""
-    trees = graph.trees()
-    images = (n.image for tree in trees for n in tree.nodes if n.type == "TEX_IMAGE" and n.image is not None)
-    return any(tree.animation_data for tree in trees) or any(i.source in {"SEQUENCE", "MOVIE"} for i in images)
+def _rounded(texels):
+    """Texels as halves, if their range allows it."""
+    return texels.astype(numpy.float16) if 1e-3 < numpy.abs(texels[..., :3]).max() < 6e4 else texels
 
 
 def _has_three(value):

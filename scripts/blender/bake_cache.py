@@ -1,7 +1,12 @@
-"""A cache of baked images in the user's cache folder, by a hash of all inputs of the bake."""
+"""A cache of baked images and measured values in the user's cache folder, by a hash of all inputs of the bake.
 
+Frames of an animation share it, as do renders of one scene: only what has changed is baked again.
+"""
+
+import glob
 import hashlib
 import os
+import re
 import time
 
 import bpy
@@ -17,6 +22,10 @@ _IGNORED_PROPERTIES = {  # layout of a node in the editor, or hashed separately
 }
 
 
+# Nodes that read files or properties of other data, which the keys do not hold.
+_UNKNOWN_INPUTS = {"SCRIPT", "TEX_IES"}
+
+
 def folder():
     """The cache's folder: caustique/bake in $XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
@@ -24,26 +33,30 @@ def folder():
 
 
 def load(key):
-    """The texels of a baked texture, the array stored under `key`. None if it is missing or unreadable."""
+    """The array stored under `key`. None if it is missing or unreadable, or if `key` is None."""
+    if key is None:
+        return None
     path = os.path.join(folder(), key + ".npy")
     try:
-        texels = numpy.load(path, allow_pickle=False)
+        values = numpy.load(path, allow_pickle=False)
         os.utime(path)
-    except (OSError, ValueError):
+    except (OSError, ValueError, EOFError):
         return None
-    return texels.astype(numpy.float32)
+    return values
 
 
-def store(key, texels):
-    """Store an array of halves under `key`, and delete files that were not read for a month.
+def store(key, values):
+    """Store an array under `key` unless it is None, and delete files that were not read for a month.
 
     An unwritable folder is no error: the next export bakes again.
     """
+    if key is None:
+        return
     try:
         os.makedirs(folder(), exist_ok=True)
         path = os.path.join(folder(), key + ".npy")
         with open(f"{path}.{os.getpid()}", "wb") as file:
-            numpy.save(file, texels.astype(numpy.float16))
+            numpy.save(file, values)
         os.replace(file.name, path)
         for entry in os.scandir(folder()):
             if time.time() - entry.stat().st_mtime > _MAX_AGE_DAYS * 86400:
@@ -52,9 +65,18 @@ def store(key, texels):
         pass
 
 
+def recall(key, bake):
+    """The array stored under `key`; if there is none, the result of `bake()`, which is stored."""
+    values = load(key)
+    if values is None:
+        values = bake()
+        store(key, values)
+    return values
+
+
 def digest(*parts):
-    """A key of the bake cache: a digest of the given texts, numbers, bytes and arrays."""
-    total = hashlib.sha256()
+    """A key of the bake cache: a digest of Blender's version and the given texts, numbers, bytes and arrays."""
+    total = hashlib.sha256(bpy.app.version_string.encode())
     for part in parts:
         part = part.tobytes() if isinstance(part, numpy.ndarray) else part
         part = part if isinstance(part, bytes) else repr(part).encode()
@@ -64,7 +86,7 @@ def digest(*parts):
 
 def mesh_digest(mesh):
     """A digest of a mesh: shape, normals, material of each face, and all attributes."""
-    parts = [bpy.app.version_string]
+    parts = [[uv.name for uv in mesh.uv_layers if uv.active_render], mesh.color_attributes.render_color_index]
     for attribute in mesh.attributes:
         if len(attribute.data) == 0:
             continue
@@ -84,14 +106,42 @@ def mesh_digest(mesh):
     return digest(*parts, corners, starts, tuple(mesh.texspace_location), tuple(mesh.texspace_size))
 
 
+def trees_of(tree):
+    """A node tree and the trees of its groups."""
+    yield tree
+    for node in tree.nodes:
+        if node.type == "GROUP" and node.node_tree is not None:
+            yield from trees_of(node.node_tree)
+
+
+def nodes_key(tree, frame, *parts):
+    """A key of values that Cycles evaluates from a node tree, or None if they may depend on more than can be hashed.
+
+    `frame`: the number and the fraction, which count if the tree has animated values, image sequences or movies.
+    """
+    trees = list(trees_of(tree))
+    nodes = [node for one in trees for node in one.nodes]
+    if any(n.type in _UNKNOWN_INPUTS or getattr(n, "attribute_type", "GEOMETRY") != "GEOMETRY" for n in nodes):
+        return None
+    images = [node.image for node in nodes if isinstance(getattr(node, "image", None), bpy.types.Image)]
+    moves = any(one.animation_data for one in trees) or any(i.source in {"SEQUENCE", "MOVIE"} for i in images)
+    return digest(tree_digest(tree), frame if moves else None, *parts)
+
+
+def world_key(scene, *parts):
+    """A key of values that Cycles evaluates from the world of a scene at its frame; None as for `nodes_key`."""
+    world = scene.world
+    settings = [_properties(getattr(world, name), 1) for name in ("cycles", "cycles_visibility") if hasattr(world, name)]
+    return nodes_key(world.node_tree, (scene.frame_current, scene.frame_subframe), "world", settings, *parts)
+
+
 def tree_digest(tree):
     """A digest of a node tree: nodes, values, links, images, groups."""
     parts = []
     for node in tree.nodes:
         parts += [node.name, node.bl_idname, _properties(node)]
         parts += [_plain(s.default_value) for s in node.inputs if hasattr(s, "default_value")]
-        if not node.inputs:
-            parts += [_plain(s.default_value) for s in node.outputs if hasattr(s, "default_value")]
+        parts += [_plain(s.default_value) for s in node.outputs if hasattr(s, "default_value")]
         if node.type == "GROUP" and node.node_tree is not None:
             parts.append(tree_digest(node.node_tree))
     parts += sorted((k.from_node.name, k.from_socket.identifier, k.to_node.name, k.to_socket.identifier, k.is_muted)
@@ -127,15 +177,24 @@ def _properties(struct, depth=0):
 
 
 def _image(image):
-    """The identity of an image: its texels if changed in memory, else the file's path, size and time."""
-    settings = (image.colorspace_settings.name, image.alpha_mode, tuple(image.size))
-    if image.source == "FILE" and image.packed_file is None and not image.is_dirty:
-        path = bpy.path.abspath(image.filepath, library=image.library)
-        if os.path.isfile(path):
-            state = os.stat(path)
-            return settings, path, state.st_size, state.st_mtime_ns
+    """The identity of an image: its texels if changed in memory, else path, size and time of its files.
+
+    A sequence and an image of several tiles have all files whose names differ in numbers.
+    """
+    settings = (image.source, image.colorspace_settings.name, image.alpha_mode, tuple(image.size),
+                [tile.number for tile in image.tiles])
     if image.packed_file is not None and not image.is_dirty:
-        return settings, digest(image.packed_file.data)
+        return settings, digest(*(one.packed_file.data for one in image.packed_files))
+    if image.source in {"FILE", "MOVIE", "SEQUENCE", "TILED"} and not image.is_dirty:
+        path = bpy.path.abspath(image.filepath, library=image.library)
+        files = [path]
+        if image.source in {"SEQUENCE", "TILED"}:
+            base, name = os.path.split(path)
+            files = sorted(glob.glob(os.path.join(glob.escape(base), re.sub(r"<\w+>|\d+", "*", glob.escape(name)))))
+        if files and all(map(os.path.isfile, files)):
+            return settings, [(f, os.stat(f).st_size, os.stat(f).st_mtime_ns) for f in files]
+    if image.source == "TILED":  # changed in memory, where only the first tile can be read
+        return settings, time.time_ns()
     texels = numpy.empty(len(image.pixels), numpy.float32)
     image.pixels.foreach_get(texels)
     return settings, digest(texels)

@@ -9,6 +9,7 @@ import bpy
 import numpy
 from mathutils import Vector
 
+import bake_cache
 import panorama
 from shading import nodes_of
 
@@ -56,6 +57,11 @@ def add_sun(found, flat, hidden, group):
 
 def _irradiance(scene, toward, angle):
     """Irradiance (numpy, per channel) on a perpendicular surface from a square of the sky around the sun's disc."""
+    key = bake_cache.world_key(scene, "sun", tuple(toward), angle)
+    return bake_cache.recall(key, lambda: _measure_irradiance(scene, toward, angle))
+
+
+def _measure_irradiance(scene, toward, angle):
     width = 2 * math.tan(0.6 * angle)
     with tempfile.TemporaryDirectory() as folder, _stage(scene) as (stage, observer):
         observer.matrix_world = toward.to_track_quat("-Z", "Y").to_matrix().to_4x4()
@@ -69,9 +75,15 @@ def _irradiance(scene, toward, angle):
 def bake_world(scene, path, width=1024):
     """Render the world with a panoramic Cycles camera to an .exr beside the .glb. Returns the key `environment`."""
     name = os.path.splitext(os.path.basename(path))[0] + ".environment.exr"
-    with _stage(scene) as (stage, observer):
-        panorama.look_around(observer)
-        panorama.render(stage, os.path.join(os.path.dirname(path), name), width, width // 2)
+    file = os.path.join(os.path.dirname(path), name)
+
+    def bake():
+        with _stage(scene) as (stage, observer):
+            panorama.look_around(observer)
+            panorama.render(stage, file, width, width // 2)
+        return numpy.fromfile(file, numpy.uint8)
+
+    bake_cache.recall(bake_cache.world_key(scene, "panorama", width), bake).tofile(file)
     return {"file": name, "rotation_deg": 0, "strength": 1}
 
 

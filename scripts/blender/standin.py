@@ -9,6 +9,10 @@ UV, GENERATED, OBJECT = "caustique bake", "caustique generated", "caustique obje
 # Textures that use Generated coordinates if Vector is not linked.
 _BY_GENERATED = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
                  "TEX_GABOR", "TEX_MUSGRAVE"}
+# Nodes that read the object's transform, lengths in world space, or the object's properties.
+_BY_OBJECT = {"OBJECT_INFO", "NEW_GEOMETRY", "PARTICLE_INFO", "HAIR_INFO", "CAMERA", "VECT_TRANSFORM", "AMBIENT_OCCLUSION",
+              "BEVEL", "WIREFRAME", "TEX_ENVIRONMENT", "TEX_SKY"}
+_BY_CAMERA = ("Camera", "Window", "Reflection")  # outputs of Texture Coordinate
 _DEFORM = {
     "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP",
     "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH", "SURFACE_DEFORM", "WARP", "WAVE", "CLOTH",
@@ -17,14 +21,18 @@ _DEFORM = {
 
 
 def depends_on_object(graph):
-    """Whether a material depends on its object: on the object's position, index, colour or random number."""
+    """Whether a material depends on its object: on the object's transform, index, colour or random number."""
     for tree in graph.trees():
         for node in tree.nodes:
-            if node.type in {"OBJECT_INFO", "NEW_GEOMETRY", "PARTICLE_INFO"} or (
+            if node.type in _BY_OBJECT or (
                     node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY"):
                 return True
             if node.type in {"TEX_COORD", "BUMP", "NORMAL_MAP", "TANGENT"} and (
                     getattr(node, "object", None) is not None or getattr(node, "space", "") in {"WORLD", "OBJECT"}):
+                return True
+            if node.type in {"DISPLACEMENT", "VECTOR_DISPLACEMENT"} and node.space == "WORLD":
+                return True
+            if node.type == "TEX_COORD" and any(node.outputs[name].is_linked for name in _BY_CAMERA):
                 return True
     return False
 
