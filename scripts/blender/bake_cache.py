@@ -131,7 +131,8 @@ def nodes_key(tree, frame, *parts):
 def world_key(scene, *parts):
     """A key of values that Cycles evaluates from the world of a scene at its frame; None as for `nodes_key`."""
     world = scene.world
-    settings = [_properties(getattr(world, name), 1) for name in ("cycles", "cycles_visibility") if hasattr(world, name)]
+    settings = [_properties(getattr(world, name), 1) for name in ("cycles", "cycles_visibility")
+                if hasattr(world, name)]
     return nodes_key(world.node_tree, (scene.frame_current, scene.frame_subframe), "world", settings, *parts)
 
 

@@ -10,8 +10,10 @@ UV, GENERATED, OBJECT = "caustique bake", "caustique generated", "caustique obje
 _BY_GENERATED = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
                  "TEX_GABOR", "TEX_MUSGRAVE"}
 # Nodes that read the object's transform, lengths in world space, or the object's properties.
-_BY_OBJECT = {"OBJECT_INFO", "NEW_GEOMETRY", "PARTICLE_INFO", "HAIR_INFO", "CAMERA", "VECT_TRANSFORM", "AMBIENT_OCCLUSION",
-              "BEVEL", "WIREFRAME", "TEX_ENVIRONMENT", "TEX_SKY"}
+_BY_OBJECT = {
+    "OBJECT_INFO", "NEW_GEOMETRY", "PARTICLE_INFO", "HAIR_INFO", "CAMERA", "VECT_TRANSFORM", "AMBIENT_OCCLUSION",
+    "BEVEL", "WIREFRAME", "TEX_ENVIRONMENT", "TEX_SKY",
+}
 _BY_CAMERA = ("Camera", "Window", "Reflection")  # outputs of Texture Coordinate
 _DEFORM = {
     "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP",
