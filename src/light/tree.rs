@@ -2,9 +2,9 @@
 //! Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018].
 //!
 //! A cluster has a bounding sphere of its lights and a bounding cone of their axes. Selection descends from the root to
-//! a leaf. At each node, the probability of a child is proportional to a bound on its irradiance at the receiver:
-//! intensity at the smallest possible angle to an axis, over the squared distance. A cluster that cannot light the
-//! receiver is never selected. In a small and distant cluster whose lights have similar axes, all lights are seen
+//! a leaf. Of the up to four children of a cluster, which are evaluated at once, the probability of each is proportional
+//! to a bound on its irradiance at the receiver: intensity at the smallest possible angle to an axis, over the squared
+//! distance. A cluster that cannot light the receiver is never selected. In a small and distant cluster whose lights have similar axes, all lights are seen
 //! alike, so selection there is by power.
 
 mod bounds;
@@ -15,6 +15,7 @@ use crate::math::Vec3;
 use bounds::{Bounds, split, union};
 use std::f32::consts::PI;
 use std::ops::Range;
+use wide::{CmpGe, CmpGt, CmpLe, CmpLt, f32x4};
 
 /// Minimum squared distance (m2) in the estimated irradiance, which keeps sums finite.
 const MIN_DISTANCE2: f32 = 1e-12;
@@ -28,106 +29,163 @@ const BEHIND: f32 = 0.01;
 const COMPACT_RADIUS2: f32 = 1.0 / 64.0;
 /// Cosine of the largest half angle of the cone around the lights' axes in a compact cluster.
 const COMPACT_COSINE: f32 = 0.7;
-/// Index of a parent or a leaf that does not exist.
+/// Index of a leaf that does not exist.
 const NONE: u32 = u32::MAX;
+/// Number of children of a cluster.
+const WIDTH: usize = 4;
 
-/// A cluster of lights in the tree, with the data that selection needs, in one cache line.
+/// Up to four clusters of lights with a common parent, side by side for vector instructions. Absent ones have no
+/// intensity.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-struct Node {
-    center: Vec3,
-    radius2: f32,
-    axis: Vec3,
-    intensity: f32,
-    cos_spread: f32,
-    sin_spread: f32,
-    cos_reach: f32,
-    two_sided: bool,
-    cosine: bool,
-    /// Index in [`LightTree::order`] of the first light of the cluster; the others follow.
-    first: u32,
-    /// Number of lights in the cluster.
-    count: u32,
-    /// Index of the node of the first child; the second child follows it. 0 for a leaf.
-    children: u32,
+struct Siblings {
+    center: [f32x4; 3],
+    radius2: f32x4,
+    axis: [f32x4; 3],
+    intensity: f32x4,
+    cos_spread: f32x4,
+    sin_spread: f32x4,
+    cos_reach: f32x4,
+    /// Mask of clusters with two-sided lights.
+    two_sided: f32x4,
+    /// Mask of clusters whose intensity falls off with the cosine.
+    cosine: f32x4,
+    /// Index in [`LightTree::order`] of the first light of each cluster; the others follow.
+    first: [u32; WIDTH],
+    /// Number of lights in each cluster.
+    count: [u32; WIDTH],
+    /// Index of the siblings that are the children of each cluster; 0 for a leaf.
+    children: [u32; WIDTH],
+    /// Index of the parent, a cluster.
     parent: u32,
 }
 
-impl Node {
-    fn new(bounds: &Bounds, lights: &Range<usize>, parent: u32) -> Node {
-        let (sin_spread, cos_spread) = bounds.spread.sin_cos();
-        Node {
-            center: bounds.center(),
-            radius2: 0.25 * bounds.low.distance_squared(bounds.high),
-            axis: bounds.axis,
-            intensity: bounds.intensity,
-            cos_spread,
-            sin_spread: if bounds.spread >= PI { 0.0 } else { sin_spread },
-            cos_reach: bounds.reach.cos(),
-            two_sided: bounds.two_sided,
-            cosine: bounds.cosine,
-            first: lights.start as u32,
-            count: lights.len() as u32,
-            children: 0,
+/// Importance of four clusters at a receiver.
+struct Importance {
+    /// Approximate upper bounds on the irradiance (W/m2, luminance).
+    values: [f32; WIDTH],
+    /// Sums of the values up to each cluster.
+    sums: [f64; WIDTH],
+    /// For each cluster, a bit that says whether it is compact: whether the receiver sees all its lights at about the same
+    /// distance and angle.
+    compact: u32,
+}
+
+impl Importance {
+    /// Sum of all values.
+    #[inline]
+    fn total(&self) -> f64 {
+        self.sums[WIDTH - 1]
+    }
+
+    /// Probability of selecting a cluster in proportion to its value.
+    #[inline]
+    fn probability(&self, lane: usize) -> f32 {
+        if self.total() > 0.0 { (f64::from(self.values[lane]) / self.total()) as f32 } else { 0.0 }
+    }
+
+    #[inline]
+    fn is_compact(&self, lane: usize) -> bool {
+        self.compact >> lane & 1 != 0
+    }
+
+    /// Selects a cluster in proportion to its value by the uniform number `u`, and returns a new uniform number with it.
+    /// The total must be positive.
+    #[inline]
+    fn select(&self, u: f64) -> (usize, f64) {
+        let target = (u * self.total()).min(self.total().next_down());
+        // Clusters without importance end where they begin, so none is selected.
+        let lane = self.sums[..WIDTH - 1].iter().map(|&sum| usize::from(target >= sum)).sum::<usize>();
+        let before = if lane == 0 { 0.0 } else { self.sums[lane - 1] };
+        (lane, ((target - before) / (self.sums[lane] - before)).min(1.0f64.next_down()))
+    }
+}
+
+#[inline]
+fn dot(a: &[f32x4; 3], b: &[f32x4; 3]) -> f32x4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl Siblings {
+    /// Siblings from the bounds and ranges of lights of at most four clusters.
+    fn new(clusters: &[(Bounds, Range<usize>)], parent: u32) -> Siblings {
+        let each = |of: &dyn Fn(&Bounds) -> f32| {
+            f32x4::from(std::array::from_fn::<f32, WIDTH, _>(|k| clusters.get(k).map_or(0.0, |(bounds, _)| of(bounds))))
+        };
+        let mask = |of: &dyn Fn(&Bounds) -> bool| each(&|b| f32::from_bits(if of(b) { u32::MAX } else { 0 }));
+        let lights = |of: &dyn Fn(&Range<usize>) -> usize| {
+            std::array::from_fn(|k| clusters.get(k).map_or(0, |(_, range)| of(range) as u32))
+        };
+        Siblings {
+            center: std::array::from_fn(|axis| each(&|b| b.center()[axis])),
+            radius2: each(&|b| 0.25 * b.low.distance_squared(b.high)),
+            axis: std::array::from_fn(|axis| each(&|b| b.axis[axis])),
+            intensity: each(&|b| b.intensity),
+            cos_spread: each(&|b| b.spread.cos()),
+            sin_spread: each(&|b| if b.spread >= PI { 0.0 } else { b.spread.sin() }),
+            cos_reach: each(&|b| b.reach.cos()),
+            two_sided: mask(&|b| b.two_sided),
+            cosine: mask(&|b| b.cosine),
+            first: lights(&|range| range.start),
+            count: lights(&|range| range.len()),
+            children: [0; WIDTH],
             parent,
         }
     }
 
-    /// Whether a receiver (a point that receives light) sees all lights of the cluster at about the same distance and
-    /// angle.
+    /// Importance of the clusters at a receiver (a point that receives light). A value is 0 only if the cluster certainly
+    /// does not light the receiver.
     #[inline]
-    fn is_compact(&self, at: &Receiver) -> bool {
-        self.cos_spread > COMPACT_COSINE && self.radius2 < COMPACT_RADIUS2 * at.p.distance_squared(self.center)
-    }
-
-    /// Approximate upper bound on the irradiance of the cluster at a receiver (W/m2, luminance); 0 only if the cluster
-    /// certainly does not light the receiver.
-    #[inline]
-    fn importance(&self, at: &Receiver) -> f32 {
-        let to = at.p - self.center;
-        let distance2 = to.length_squared();
-        let inverse = 1.0 / distance2.max(self.radius2).max(MIN_DISTANCE2);
-        if distance2 <= self.radius2 {
-            return self.intensity * inverse;
-        }
+    fn importance(&self, at: &Receiver) -> Importance {
+        let (zero, one) = (f32x4::ZERO, f32x4::ONE);
+        let to = std::array::from_fn(|axis| f32x4::splat(at.p[axis]) - self.center[axis]);
+        let distance2 = dot(&to, &to);
+        let inverse = one / distance2.fast_max(self.radius2).fast_max(f32x4::splat(MIN_DISTANCE2));
         let inverse_distance = inverse.sqrt();
-        let cos = self.axis.dot(to) * inverse_distance;
-        let cos = if self.two_sided { cos.abs() } else { cos };
-        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let sine = |cos: f32x4| (one - cos * cos).fast_max(zero).sqrt();
+        let cos = dot(&self.axis, &to) * inverse_distance;
+        let cos = self.two_sided.blend(cos.abs(), cos);
         // Subtracts the half angle of the axes, then the half angle that the bounding sphere subtends.
-        let (cos, sin) = subtract_angle(cos, sin, self.cos_spread, self.sin_spread);
+        let (cos, sin) = subtract_angle(cos, sine(cos), self.cos_spread, self.sin_spread);
         let sin2_sphere = self.radius2 * inverse;
-        let (cos_sphere, sin_sphere) = ((1.0 - sin2_sphere).max(0.0).sqrt(), sin2_sphere.sqrt());
+        let (cos_sphere, sin_sphere) = ((one - sin2_sphere).fast_max(zero).sqrt(), sin2_sphere.sqrt());
         let (cos, _) = subtract_angle(cos, sin, cos_sphere, sin_sphere);
-        if cos <= self.cos_reach {
-            return 0.0;
+        let near = self.intensity * inverse;
+        let mut far = cos.cmp_gt(self.cos_reach) & (near * self.cosine.blend(cos, one));
+        if at.n != Vec3::ZERO {
+            let cos = dot(&at.n.to_array().map(|n| f32x4::splat(-n)), &to) * inverse_distance;
+            let (cos, _) = subtract_angle(cos, sine(cos), cos_sphere, sin_sphere);
+            far *= cos.cmp_gt(zero).blend(cos * (1.0 - GRAZING) + GRAZING, f32x4::splat(BEHIND));
         }
-        let intensity = self.intensity * inverse * if self.cosine { cos } else { 1.0 };
-        if at.n == Vec3::ZERO {
-            return intensity;
-        }
-        let cos = -at.n.dot(to) * inverse_distance;
-        let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let (cos, _) = subtract_angle(cos, sin, cos_sphere, sin_sphere);
-        intensity * if cos > 0.0 { GRAZING + (1.0 - GRAZING) * cos } else { BEHIND }
+        let values = distance2.cmp_le(self.radius2).blend(near, far).to_array();
+        let mut sum = 0.0;
+        let sums = values.map(|value| {
+            sum += f64::from(value);
+            sum
+        });
+        let compact = self.cos_spread.cmp_gt(f32x4::splat(COMPACT_COSINE))
+            & self.radius2.cmp_lt(distance2 * f32x4::splat(COMPACT_RADIUS2));
+        Importance { values, sums, compact: compact.move_mask() as u32 }
     }
 }
 
-/// Cosine and sine of the difference of two angles in [0, pi], clamped at zero.
+/// Cosines and sines of the differences of angles in [0, pi], clamped at zero.
 #[inline]
-fn subtract_angle(cos: f32, sin: f32, cos_by: f32, sin_by: f32) -> (f32, f32) {
-    if cos >= cos_by { (1.0, 0.0) } else { (cos * cos_by + sin * sin_by, sin * cos_by - cos * sin_by) }
+fn subtract_angle(cos: f32x4, sin: f32x4, cos_by: f32x4, sin_by: f32x4) -> (f32x4, f32x4) {
+    let smaller = cos.cmp_ge(cos_by);
+    (smaller.blend(f32x4::ONE, cos * cos_by + sin * sin_by), smaller.blend(f32x4::ZERO, sin * cos_by - cos * sin_by))
 }
 
-/// A tree of clusters over all lights at finite positions.
+/// A tree of clusters over all lights at finite positions. The index of a cluster is four times that of its siblings plus
+/// its place among them; cluster 0 has all lights and no siblings.
 pub(super) struct LightTree {
-    nodes: Vec<Node>,
+    siblings: Vec<Siblings>,
     /// Indices of emitters, in the order of the leaves.
     order: Vec<u32>,
     /// Cumulative intensity of the lights (W/sr): for each index in `order`, the sum over the lights before; the last
     /// entry is the total.
     below: Vec<f64>,
-    /// Index of the leaf of each emitter; [`NONE`] for emitters outside the tree.
+    /// Index of the leaf of each emitter, a cluster; [`NONE`] for emitters outside the tree.
     leaves: Vec<u32>,
 }
 
@@ -136,89 +194,84 @@ impl LightTree {
     pub fn new(emitters: &[Emitter]) -> Option<LightTree> {
         let mut lights: Vec<(u32, Bounds)> =
             (0..).zip(emitters).filter_map(|(i, emitter)| Some((i, Bounds::of(emitter)?))).collect();
-        let all = union(&lights)?;
-        let root = Node::new(&all, &(0..lights.len()), NONE);
-        let (leaves, order, below) = (vec![NONE; emitters.len()], Vec::new(), Vec::new());
-        let mut tree = LightTree { nodes: vec![root], order, below, leaves };
-        tree.nodes.reserve(2 * lights.len());
-        // A stack of nodes to split: index, range of `lights`, depth.
+        let all = (union(&lights)?, 0..lights.len());
+        let mut siblings = vec![Siblings::new(&[all], NONE)];
+        let mut leaves = vec![NONE; emitters.len()];
+        // A stack of clusters to split: index, range of `lights`, depth.
         let mut open = vec![(0u32, 0..lights.len(), 0u32)];
-        while let Some((node, range, depth)) = open.pop() {
+        while let Some((cluster, range, depth)) = open.pop() {
             if range.len() == 1 {
-                tree.leaves[lights[range.start].0 as usize] = node;
+                leaves[lights[range.start].0 as usize] = cluster;
                 continue;
             }
-            let middle = range.start + split(&mut lights[range.clone()], depth);
-            let first = tree.nodes.len() as u32;
-            tree.nodes[node as usize].children = first;
-            for (child, half) in (first..).zip([range.start..middle, middle..range.end]) {
-                let Some(bounds) = union(&lights[half.clone()]) else { continue };
-                tree.nodes.push(Node::new(&bounds, &half, node));
-                open.push((child, half, depth + 1));
-            }
+            let parts = parts(&mut lights, range, depth);
+            let index = siblings.len() as u32;
+            siblings[cluster as usize / WIDTH].children[cluster as usize % WIDTH] = index;
+            let bounds = |(range, _): &(Range<usize>, u32)| Some((union(&lights[range.clone()])?, range.clone()));
+            siblings.push(Siblings::new(&parts.iter().filter_map(bounds).collect::<Vec<_>>(), cluster));
+            open.extend((index * WIDTH as u32..).zip(parts).map(|(child, (range, depth))| (child, range, depth)));
         }
-        tree.order = lights.iter().map(|light| light.0).collect();
-        let mut sum = 0.0f64;
-        tree.below.push(0.0);
-        tree.below.extend(lights.iter().map(|light| {
-            sum += f64::from(light.1.intensity);
-            sum
+        let order = lights.iter().map(|light| light.0).collect();
+        let intensities = lights.iter().map(|light| f64::from(light.1.intensity));
+        let below = std::iter::once(0.0).chain(intensities.scan(0.0, |sum, intensity| {
+            *sum += intensity;
+            Some(*sum)
         }));
-        Some(tree)
+        Some(LightTree { siblings, order, below: below.collect(), leaves })
+    }
+
+    #[inline]
+    fn place(&self, cluster: u32) -> (&Siblings, usize) {
+        (&self.siblings[cluster as usize / WIDTH], cluster as usize % WIDTH)
     }
 
     /// Intensity of the light at index `k` of `order` over the intensity of the cluster that contains it, 0 to 1.
     #[inline]
-    fn intensity_share(&self, k: usize, node: &Node) -> f32 {
+    fn intensity_share(&self, k: usize, (siblings, lane): (&Siblings, usize)) -> f32 {
         let sum = |first: usize, count: usize| self.below[first + count] - self.below[first];
-        let all = sum(node.first as usize, node.count as usize);
-        // The difference may round to zero if far stronger lights precede the node.
+        let all = sum(siblings.first[lane] as usize, siblings.count[lane] as usize);
+        // The difference may round to zero if far stronger lights precede the cluster.
         if all > 0.0 { (sum(k, 1) / all) as f32 } else { 0.0 }
     }
 
     /// Selects a light of a cluster in proportion to intensity, by the uniform number `u`. Returns the index of its
     /// emitter and its probability.
     #[inline]
-    fn sample_by_intensity(&self, node: &Node, u: f64) -> (u32, f32) {
-        let (start, end) = (node.first as usize, (node.first + node.count) as usize);
+    fn sample_by_intensity(&self, (siblings, lane): (&Siblings, usize), u: f64) -> (u32, f32) {
+        let start = siblings.first[lane] as usize;
+        let end = start + siblings.count[lane] as usize;
         let target = self.below[start] + u * (self.below[end] - self.below[start]);
         let k = start + self.below[start + 1..end].partition_point(|&below| below <= target);
-        (self.order[k], self.intensity_share(k, node))
+        (self.order[k], self.intensity_share(k, (siblings, lane)))
     }
 
     /// Approximate upper bound on the irradiance of all lights of the tree at a receiver (W/m2, luminance).
     #[inline]
     pub fn importance(&self, at: &Receiver) -> f32 {
-        self.nodes[0].importance(at)
+        self.siblings[0].importance(at).values[0]
     }
 
     /// Selects an emitter for a receiver by the uniform number `u`. Returns its index and its probability; `None` if no
     /// light of the tree can reach the receiver.
     #[inline]
     pub fn sample(&self, at: &Receiver, mut u: f64) -> Option<(usize, f32)> {
-        let (mut node, mut pdf) = (&self.nodes[0], 1.0);
-        while node.children != 0 && !node.is_compact(at) {
-            let [a, b] = self.children(node.children);
-            let (first, second) = (a.importance(at), b.importance(at));
-            let sum = first + second;
-            if sum <= 0.0 {
+        let (mut siblings, mut lane, mut pdf) = (&self.siblings[0], 0, 1.0);
+        let mut compact = siblings.importance(at).is_compact(0);
+        while siblings.children[lane] != 0 && !compact {
+            siblings = &self.siblings[siblings.children[lane] as usize];
+            let importance = siblings.importance(at);
+            if importance.total() <= 0.0 {
                 return None;
             }
-            let share = first / sum;
-            let split = f64::from(share);
-            if u < split {
-                u /= split;
-                pdf *= share;
-                node = a;
-            } else {
-                u = (u - split) / (1.0 - split);
-                pdf *= second / sum;
-                node = b;
-            }
-            u = u.min(1.0f64.next_down());
+            (lane, u) = importance.select(u);
+            pdf *= importance.probability(lane);
+            compact = importance.is_compact(lane);
         }
-        let (emitter, share) =
-            if node.children == 0 { (self.order[node.first as usize], 1.0) } else { self.sample_by_intensity(node, u) };
+        let (emitter, share) = if siblings.children[lane] == 0 {
+            (self.order[siblings.first[lane] as usize], 1.0)
+        } else {
+            self.sample_by_intensity((siblings, lane), u)
+        };
         pdf *= share;
         (pdf > 0.0).then_some((emitter as usize, pdf))
     }
@@ -226,33 +279,44 @@ impl LightTree {
     /// Probability with which [`LightTree::sample`] selects the emitter of this index at a receiver.
     #[inline]
     pub fn pdf(&self, at: &Receiver, emitter: usize) -> f32 {
-        let mut node = self.leaves[emitter];
-        if node == NONE {
+        let mut cluster = self.leaves[emitter];
+        if cluster == NONE {
             return 0.0;
         }
-        let own = self.nodes[node as usize].first as usize;
+        let (leaf, lane) = self.place(cluster);
+        let own = leaf.first[lane] as usize;
         let mut pdf = 1.0;
-        while node != 0 {
-            let parent = self.nodes[node as usize].parent;
-            let first = self.nodes[parent as usize].children;
-            let importance = self.children(first).map(|child| child.importance(at));
-            let sum = importance[0] + importance[1];
-            pdf *= if sum > 0.0 { importance[(node - first) as usize] / sum } else { 0.0 };
-            node = parent;
+        loop {
+            let (siblings, lane) = self.place(cluster);
+            let importance = siblings.importance(at);
             // Below a compact cluster, selection is by intensity.
-            let cluster = &self.nodes[node as usize];
-            if cluster.is_compact(at) {
-                pdf = self.intensity_share(own, cluster);
+            if importance.is_compact(lane) && siblings.children[lane] != 0 {
+                pdf = self.intensity_share(own, (siblings, lane));
             }
+            if cluster == 0 {
+                return pdf;
+            }
+            pdf *= importance.probability(lane);
+            cluster = siblings.parent;
         }
-        pdf
     }
+}
 
-    #[inline]
-    fn children(&self, first: u32) -> [&Node; 2] {
-        let first = first as usize;
-        [&self.nodes[first], &self.nodes[first + 1]]
+/// Splits a range of at least two `lights` into at most four parts of small cost, and returns them with their depth in
+/// the tree of splits. `depth` is that of the range.
+fn parts(lights: &mut [(u32, Bounds)], range: Range<usize>, depth: u32) -> Vec<(Range<usize>, u32)> {
+    let mut parts = vec![(range, depth)];
+    while parts.len() < WIDTH {
+        let largest = (0..parts.len()).max_by_key(|&k| parts[k].0.len()).unwrap_or(0);
+        let (range, depth) = parts[largest].clone();
+        if range.len() < 2 {
+            break;
+        }
+        let middle = range.start + split(&mut lights[range.clone()], depth);
+        parts[largest] = (range.start..middle, depth + 1);
+        parts.push((middle..range.end, depth + 1));
     }
+    parts
 }
 
 #[cfg(test)]
