@@ -2,10 +2,10 @@
 //! Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018].
 //!
 //! A cluster has a bounding sphere of its lights and a bounding cone of their axes. Selection descends from the root to
-//! a leaf. Of the up to four children of a cluster, which are evaluated at once, the probability of each is proportional
-//! to a bound on its irradiance at the receiver: intensity at the smallest possible angle to an axis, over the squared
-//! distance. A cluster that cannot light the receiver is never selected. In a small and distant cluster whose lights have similar axes, all lights are seen
-//! alike, so selection there is by power.
+//! a leaf. Of the up to four children of a cluster, which are evaluated at once, the probability of each is
+//! proportional to a bound on its irradiance at the receiver: intensity at the smallest possible angle to an axis, over
+//! the squared distance. A cluster that cannot light the receiver is never selected. In a small and distant cluster
+//! whose lights have similar axes, all lights are seen alike, so selection there is by power.
 
 mod bounds;
 
@@ -66,8 +66,8 @@ struct Importance {
     values: [f32; WIDTH],
     /// Sums of the values up to each cluster.
     sums: [f64; WIDTH],
-    /// For each cluster, a bit that says whether it is compact: whether the receiver sees all its lights at about the same
-    /// distance and angle.
+    /// For each cluster, a bit that says whether it is compact: whether the receiver sees all its lights at about the
+    /// same distance and angle.
     compact: u32,
 }
 
@@ -89,8 +89,8 @@ impl Importance {
         self.compact >> lane & 1 != 0
     }
 
-    /// Selects a cluster in proportion to its value by the uniform number `u`, and returns a new uniform number with it.
-    /// The total must be positive.
+    /// Selects a cluster in proportion to its value by the uniform number `u`, and returns a new uniform number with
+    /// it. The total must be positive.
     #[inline]
     fn select(&self, u: f64) -> (usize, f64) {
         let target = (u * self.total()).min(self.total().next_down());
@@ -133,8 +133,8 @@ impl Siblings {
         }
     }
 
-    /// Importance of the clusters at a receiver (a point that receives light). A value is 0 only if the cluster certainly
-    /// does not light the receiver.
+    /// Importance of the clusters at a receiver (a point that receives light). A value is 0 only if the cluster
+    /// certainly does not light the receiver.
     #[inline]
     fn importance(&self, at: &Receiver) -> Importance {
         let (zero, one) = (f32x4::ZERO, f32x4::ONE);
@@ -176,8 +176,8 @@ fn subtract_angle(cos: f32x4, sin: f32x4, cos_by: f32x4, sin_by: f32x4) -> (f32x
     (smaller.blend(f32x4::ONE, cos * cos_by + sin * sin_by), smaller.blend(f32x4::ZERO, sin * cos_by - cos * sin_by))
 }
 
-/// A tree of clusters over all lights at finite positions. The index of a cluster is four times that of its siblings plus
-/// its place among them; cluster 0 has all lights and no siblings.
+/// A tree of clusters over all lights at finite positions. The index of a cluster is four times that of its siblings
+/// plus its place among them; cluster 0 has all lights and no siblings.
 pub(super) struct LightTree {
     siblings: Vec<Siblings>,
     /// Indices of emitters, in the order of the leaves.
