@@ -185,10 +185,12 @@ impl Lights {
         self.choice.is_none()
     }
 
-    /// Exponent to base 2 of the total power of all lights (W); 0 without lights.
-    pub fn power_exponent(&self) -> i32 {
+    /// Exponent to base 2 of the total power of all lights over the squared radius of the scene (W/m2); 0 without lights.
+    /// Unlike power, it does not depend on the unit of length in which the scene is modelled.
+    pub fn irradiance_exponent(&self) -> i32 {
         let power: f64 = self.emitters.iter().map(|emitter| emitter.power(&self.sky)).sum();
-        if power.is_normal() { ((power.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
+        let irradiance = power / f64::from(self.sky.radius).powi(2);
+        if irradiance.is_normal() { ((irradiance.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
     }
 
     /// The lights, indexed by [`EmissionSample::light`].

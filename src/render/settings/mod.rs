@@ -221,7 +221,7 @@ impl Settings {
     /// Returns a function that makes a pixel before the first iteration, from its largest initial bandwidths by kind of
     /// photons.
     pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
-        let (levels, exponent) = (self.levels.count, scene.lights.power_exponent());
+        let (levels, exponent) = (self.levels.count, scene.lights.irradiance_exponent());
         let groups = self.light_groups(scene);
         move |bandwidths| PixelAccumulator::new(levels, exponent, bandwidths).with_groups(groups)
     }
