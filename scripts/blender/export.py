@@ -75,7 +75,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
         said.update(guard.attempt(warn, f'scene "{scene.name}"', {}, "the picture has the program's own settings",
                                   camera_export.picture, scene, warn))
         progress("Exporting the objects")
-        flat = objects.FlatScene(scene, undo, warn)
+        flat = objects.FlatScene(scene, undo, warn, bool(bake_size))
         _open_scene(flat.scene, undo)
         bpy.context.view_layer.update()
         camera_export.add_cameras(flat, warn)

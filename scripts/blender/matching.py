@@ -4,6 +4,7 @@ mix, and otherwise averaged, with a warning."""
 from dataclasses import dataclass, fields, replace
 
 import closures
+import standin
 from graph import Graph, is_constant
 from lobes import BLACK, WHITE, Lobe, Reader
 
@@ -17,12 +18,15 @@ class Matched(Lobe):
     alpha: object = 1.0
 
 
-def match(material, undo, say):
+def match(material, undo, say, stretched=False):
     """The graph of `material` and its matched surface. `say` receives a warning for each loss.
 
-    A material without a surface shader is black, or the boundary of its medium.
+    `stretched`: its normal maps read their axes from attributes. A material without a surface shader is black, or the
+    boundary of its medium.
     """
     graph = Graph(material, undo)
+    if stretched:
+        standin.read_normal_map_axes(graph)
     socket, inside = graph.output.inputs["Surface"], graph.output.inputs["Volume"].is_linked
     tree = closures.read(socket)
     if tree is None:

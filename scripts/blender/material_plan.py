@@ -45,13 +45,14 @@ class Plan:
     """How one material is exported: `channels` for gltfmaterial.write, and `passes`, {name: value to bake}.
 
     `unbaked`: the channels for objects that cannot be baked. Without `may_bake` nothing is baked, and a warning names
-    each loss.
+    each loss. `stretched`: some object with the material stretches its normal maps.
     """
 
-    def __init__(self, material, baker, may_bake, undo, warn):
+    def __init__(self, material, baker, may_bake, undo, warn, stretched=False):
         self.material, self.baker, self.may_bake, self.undo, self.warn = material, baker, may_bake, undo, warn
+        self.stretched = stretched
         self.passes, self.channels, self.unbaked, self.of_object = {}, {}, {}, False
-        self.graph, self.matched = match(material, undo, self.say)
+        self.graph, self.matched = match(material, undo, self.say, stretched)
         direct_images.warn_of_missing(self.graph.trees(), f'material "{material.name}"', warn)
         self.links = {}
         self._plan()

@@ -28,7 +28,7 @@ _MAX_SCALES = 16
 # Largest ratio of two scale factors that counts as uniform.
 _MAX_EVEN_RATIO = 1.001
 STRETCHED = ("its scale is uneven, with which Cycles stretches normal maps: here they keep their slopes; apply the scale "
-             "(Object > Apply > Scale) to see the same in both")
+             "(Object > Apply > Scale) to see the same in both, or leave out --no-bake")
 _PATHS = "convert them to meshes (in the object's menu, or a Curve to Mesh node)"
 _LOST = {"CURVES": "hair curves are not carried: " + _PATHS, "VOLUME": "volumes that vary in space are not carried",
          "POINTCLOUD": "point clouds are not carried: convert them to meshes",
@@ -41,14 +41,16 @@ class FlatScene:
 
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
     of rays that do not hit it. `groups`: the light group of each, or None. `lamp_factors`: for each measured lamp, the
-    factors per channel of its nodes.
+    factors per channel of its nodes. `stretched`: names of materials with normal maps that uneven scale stretches, found
+    if the materials may be baked (`bakes`).
     """
 
-    def __init__(self, scene, undo, warn):
+    def __init__(self, scene, undo, warn, bakes=True):
         visibility.as_rendered(scene, undo, warn)
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
+        self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
         self._indirect, self._layer = visibility.indirect_only(layer), layer
         self.scene = bpy.data.scenes.new(scene.name)
@@ -171,32 +173,37 @@ class FlatScene:
     def _transformed(self, original, mesh, matrix):
         """The mesh and matrix of an object, with parts of the matrix applied to a copy of the mesh.
 
-        These are shear, which location, rotation and scale cannot express, and scale below bumps, because Cycles
-        evaluates bumps in world space and bakes them in object space.
+        These are shear, which location, rotation and scale cannot express, scale below bumps, because Cycles evaluates
+        bumps in world space and bakes them in object space, and uneven scale below normal maps, which it stretches.
         """
         relief, (place, turn, scale) = _relief(mesh), matrix.decompose()
-        uneven = is_uneven(scale)
-        if not _has_no_shear(matrix):
+        sheared = not _has_no_shear(matrix)
+        stretched = "NORMAL_MAP" in relief and (sheared or is_uneven(scale))
+        if sheared:
             applied, rest = matrix, Matrix()
-        elif "BUMP" in relief and any(abs(abs(s) - 1) > _MAX_EVEN_RATIO - 1 for s in scale):
+        elif stretched and self._bakes or "BUMP" in relief and any(
+                abs(abs(s) - 1) > _MAX_EVEN_RATIO - 1 for s in scale):
             applied, rest = Matrix.Diagonal((*scale, 1)), Matrix.LocRotScale(place, turn, None)
         else:
             return mesh, matrix
         where, made = f'object "{original.name}"', self._applied.setdefault(mesh.name, {})
         key = tuple(round(x, 5) for row in applied for x in row)
         if key not in made and rest != Matrix() and len(made) >= _MAX_SCALES:
-            self._warn(where, "its mesh has instances of many scales, and bumps of one: they are as steep as without scale")
+            self._warn(where, "its mesh has instances of many scales, and relief of one: it is as steep as without scale")
             return mesh, matrix
-        if uneven and "NORMAL_MAP" in relief:
+        if stretched and not self._bakes:
             self._warn(where, STRETCHED)
         if key not in made:
-            made[key] = self._apply(mesh, applied)
+            made[key] = self._apply(mesh, applied, stretched and self._bakes)
         return made[key], rest
 
-    def _apply(self, mesh, matrix):
+    def _apply(self, mesh, matrix, stretched):
         made = mesh.copy()
         self.names[self.remove_later(made).name] = self.names[mesh.name]
         standin.add_object_coordinates(made)
+        if stretched:
+            standin.add_normal_map_axes(made, matrix.to_3x3())
+            self.stretched |= {material.name for material in made.materials if material is not None}
         made.transform(matrix)
         if matrix.determinant() < 0:
             made.flip_normals()

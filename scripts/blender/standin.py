@@ -3,9 +3,12 @@
 import contextlib
 
 import bpy
+import bmesh
 import numpy
 
 UV, GENERATED, OBJECT = "caustique bake", "caustique generated", "caustique object"
+# Attributes with the axes of normal maps end in a letter and the UV map's name; nodes that read them have this name, too.
+_AXES = "caustique normal map"
 # Textures that use Generated coordinates if Vector is not linked.
 _BY_GENERATED = {"TEX_NOISE", "TEX_VORONOI", "TEX_WAVE", "TEX_MAGIC", "TEX_BRICK", "TEX_CHECKER", "TEX_GRADIENT",
                  "TEX_GABOR", "TEX_MUSGRAVE"}
@@ -26,6 +29,8 @@ def depends_on_object(graph):
     """Whether a material depends on its object: on the object's transform, index, colour or random number."""
     for tree in graph.trees():
         for node in tree.nodes:
+            if node.name.startswith(_AXES):  # as steep on every object with this mesh
+                continue
             if node.type in _BY_OBJECT or (
                     node.type == "ATTRIBUTE" and node.attribute_type != "GEOMETRY"):
                 return True
@@ -55,6 +60,90 @@ def read_coordinates(graph):
                 node.attribute_name = name
                 for socket in wanting:
                     tree.links.new(node.outputs["Vector"], socket)
+
+
+def read_normal_map_axes(graph):
+    """Make a graph's tangent-space normal maps read their axes from the attributes of `add_normal_map_axes`."""
+    for tree in graph.trees():
+        for node in [n for n in tree.nodes if n.type == "NORMAL_MAP" and n.space == "TANGENT" and not n.mute]:
+            bent = _on_axes(tree, node)
+            for link in list(node.outputs["Normal"].links):
+                tree.links.new(bent, link.to_socket)
+
+
+def _on_axes(tree, node):
+    """The normal (world space) of a Normal Map node, with the axes from attributes: its weights are Cycles'."""
+    def new(kind, operation, *values, output=0):
+        made = tree.nodes.new("ShaderNode" + kind)
+        made.operation = operation
+        for socket, value in zip(made.inputs, values):
+            if isinstance(value, bpy.types.NodeSocket):
+                tree.links.new(value, socket)
+            elif value is not None:
+                socket.default_value = value
+        return made.outputs[output]
+
+    colour, strength = (
+        node.inputs[n].links[0].from_socket if node.inputs[n].is_linked else node.inputs[n].default_value
+        for n in ("Color", "Strength"))
+    colour = colour if isinstance(colour, bpy.types.NodeSocket) else tuple(colour)[:3]
+    strength = new("Math", "MAXIMUM", strength, 0.0)
+    split = tree.nodes.new("ShaderNodeSeparateXYZ")
+    tree.links.new(new("VectorMath", "MULTIPLY_ADD", colour, (2, 2, 2), (-1, -1, -1)), split.inputs[0])
+    x, y = (new("Math", "MULTIPLY", part, strength) for part in split.outputs[:2])
+    z = new("Math", "MULTIPLY_ADD", new("Math", "SUBTRACT", split.outputs[2], 1.0),
+            new("Math", "MINIMUM", strength, 1.0), 1.0)
+    total = (0.0, 0.0, 0.0)
+    for letter, weight in zip("tbn", (x, y, z)):
+        axis = tree.nodes.new("ShaderNodeAttribute")
+        axis.attribute_name = f"{_AXES} {letter} {node.uv_map}"
+        scaled = new("VectorMath", "SCALE", axis.outputs["Vector"], None, None, weight)
+        total = new("VectorMath", "ADD", total, scaled)
+    turn = tree.nodes.new("ShaderNodeVectorTransform")
+    turn.name, turn.vector_type, turn.convert_from, turn.convert_to = _AXES, "NORMAL", "OBJECT", "WORLD"
+    tree.links.new(total, turn.inputs[0])
+    return turn.outputs[0]
+
+
+def add_normal_map_axes(mesh, matrix=None):
+    """Add the axes of normal maps to the corners of a mesh that `matrix` (3 x 3) will transform, unless it has them.
+
+    Cycles evaluates a map in object space and transforms the normal as a normal, by the inverse transpose; so do the
+    axes: tangent, bitangent and normal. They are added for each UV map, and without name for the active one.
+    """
+    if any(name.startswith(_AXES) for name in mesh.attributes.keys()) or not mesh.polygons:
+        return
+    if max(len(face.vertices) for face in mesh.polygons) > 4:  # for which Blender computes no tangents
+        _split_polygons(mesh)
+    shown = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
+    turn = numpy.array(matrix.inverted_safe() if matrix is not None else numpy.eye(3))  # on rows: times the inverse
+    for name in ["", *(layer.name for layer in mesh.uv_layers)]:
+        for letter, axis in zip("tbn", _axes(mesh, name or shown)):
+            layer = mesh.attributes.new(f"{_AXES} {letter} {name}", "FLOAT_VECTOR", "CORNER")
+            layer.data.foreach_set("vector", (axis @ turn).astype(numpy.float32).ravel())
+
+
+def _split_polygons(mesh):
+    shape = bmesh.new()
+    shape.from_mesh(mesh)
+    bmesh.ops.triangulate(shape, faces=[face for face in shape.faces if len(face.verts) > 4])
+    shape.to_mesh(mesh)
+    shape.free()
+
+
+def _axes(mesh, uv_map):
+    """Tangent, bitangent and normal of each corner of a mesh, (count, 3) each. Without a UV map the normal alone."""
+    count = len(mesh.loops)
+    normals, tangents = numpy.empty(count * 3, numpy.float32), numpy.zeros(count * 3, numpy.float32)
+    signs = numpy.zeros(count, numpy.float32)
+    if uv_map is not None:
+        mesh.calc_tangents(uvmap=uv_map)
+        mesh.loops.foreach_get("tangent", tangents)
+        mesh.loops.foreach_get("bitangent_sign", signs)
+        mesh.free_tangents()
+    mesh.corner_normals.foreach_get("vector", normals)
+    normals, tangents = normals.reshape(-1, 3), tangents.reshape(-1, 3)
+    return tangents, signs[:, None] * numpy.cross(normals, tangents), normals
 
 
 def _positions(thing):

@@ -54,7 +54,8 @@ class Surfaces:
         if shading.nodes_of(material) is None:
             self.found[material.name] = Surface(material, matt(material.diffuse_color[:3]))
             return
-        plan = self._attempt(material, Plan, material, self.baker, bool(self.size), self.undo, self.warn)
+        plan = self._attempt(material, Plan, material, self.baker, bool(self.size), self.undo, self.warn,
+                             material.name in self.flat.stretched)
         if isinstance(plan, Plan):
             self.plans[material.name] = plan
         else:
@@ -149,6 +150,8 @@ class Surfaces:
         mesh = body.data
         if not mesh.polygons:
             return mesh
+        if any(plan.stretched for plan in plans.values()):
+            standin.add_normal_map_axes(mesh)
         wanted = {slot: (plan.graph, plan.passes) for slot, plan in plans.items()}
         with self.baker.on_stage(body):
             standin.unwrap(body, self.size)

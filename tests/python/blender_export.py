@@ -85,8 +85,8 @@ class Export(unittest.TestCase):
         self.addCleanup(self.folder.cleanup)
         self.path = os.path.join(self.folder.name, "scene.glb")
 
-    def write(self):
-        warnings = export.write(self.path)
+    def write(self, **options):
+        warnings = export.write(self.path, **options)
         return glb.read(self.path)[0], warnings
 
     def material(self, material, sides=6):
@@ -116,7 +116,7 @@ class Export(unittest.TestCase):
         numpy.testing.assert_allclose(entry["pbrMetallicRoughness"]["baseColorFactor"], (0.9, 0.8, 0.7, 1), rtol=1e-5)
 
     def test_normal_maps_on_uneven_scales_are_named(self):
-        """Cycles reads a normal map in object space, and stretches it with the object."""
+        """Cycles reads a normal map in object space, and stretches it with the object. Baking does so, too."""
         for mapped, scale, named in ((True, (1, 1, 0.2), True), (True, (-2, 2, 2), False), (False, (3, 1, 1), False)):
             with self.subTest(mapped=mapped, scale=scale):
                 bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -133,8 +133,12 @@ class Export(unittest.TestCase):
                 body = cube(material)
                 body.data.uv_layers.new()
                 body.scale = scale
-                _, warnings = self.write()
+                _, warnings = self.write(bake_size=0)
                 self.assertEqual(any('object "cube": its scale is uneven' in w for w in warnings), named, warnings)
+                document, warnings = self.write(bake_size=16)
+                self.assertNotIn("uneven", "".join(warnings))
+                node = next(node for node in document["nodes"] if node["name"] == "cube")
+                self.assertEqual(node.get("scale", [1, 1, 1]) == [1, 1, 1], named)
 
     def test_principled_glass_tints_once(self):
         entry, _ = self.material(node_material("g", "ShaderNodeBsdfPrincipled", Base_Color=(0.81, 0.64, 0.25, 1), Transmission_Weight=1.0))

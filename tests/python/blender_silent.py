@@ -1,11 +1,13 @@
 """Features that had differed from Cycles without a word: each agrees now, or a warning names it."""
 
+import math
 import unittest
 
 import cycles_comparison  # first: it sets the search path
 import bpy
 import export
 import glb
+import numpy
 from cycles_comparison import eye, glow, lamp, shared, square
 
 
@@ -55,6 +57,45 @@ class Agrees(cycles_comparison.CyclesComparison):
         for scale in ((1, 3, 0.2), (2, 2, 2), (1.5, 2, -1)):
             body.scale = scale
             self.alike(self.caustique(32), self.cycles(64), parts=2, tolerance=0.03)
+
+    def waves(self):
+        """A normal map of waves along u and v, of slopes up to 1.2 and 0.6."""
+        image = bpy.data.images.new("waves", 64, 64, is_data=True)
+        rows, columns = numpy.mgrid[0:64, 0:64] / 64 * 2 * math.pi
+        bent = numpy.stack([1.2 * numpy.cos(3 * columns), 0.6 * numpy.cos(2 * rows), numpy.ones((64, 64))], axis=-1)
+        bent = bent / numpy.linalg.norm(bent, axis=-1, keepdims=True) * 0.5 + 0.5
+        image.pixels.foreach_set(numpy.dstack([bent, numpy.ones((64, 64))]).astype(numpy.float32).ravel())
+        image.pack()
+        return image
+
+    def test_normal_maps_on_scaled_bodies(self):
+        """Uneven scale stretches the slopes of a normal map; bodies that share the mesh have each their own scale."""
+        material = self.material("Diffuse", Color=(0.8, 0.8, 0.8, 1))
+        tree = material.node_tree
+        picture, bend = (tree.nodes.new("ShaderNode" + kind) for kind in ("TexImage", "NormalMap"))
+        picture.image = self.waves()
+        tree.links.new(picture.outputs["Color"], bend.inputs["Color"])
+        tree.links.new(bend.outputs[0], self.shader(material).inputs["Normal"])
+        mesh = bpy.data.meshes.new("square")
+        mesh.materials.append(material)
+        mesh.from_pydata([(x, y, 0) for x, y in ((-0.4, -0.4), (0.4, -0.4), (0.5, 0), (0.4, 0.4), (-0.4, 0.4))],
+                         [], [range(5)])
+        layer = mesh.uv_layers.new()
+        for corner, loop in zip(layer.data, mesh.loops):
+            x, y, _ = mesh.vertices[loop.vertex_index].co
+            corner.uv = 0.5 + 0.9 * x - 0.5 * y, 0.5 + 0.5 * x + 0.9 * y
+        for at, turn, scale in (((-1, 0.5, 0), 0.4, (0.8, 1, 0.25)), ((0, 0.5, 0), 0.0, (1, 1, 1)),
+                                ((1, 0.5, 0), -0.7, (0.5, 1.2, 3)), ((-0.5, -0.5, 0), 2.0, (1, 0.7, -0.5))):
+            body = shared.place("wall", mesh, at)
+            body.rotation_euler, body.scale = (0.3, 0, turn), scale
+        sun = lamp("SUN", (0, 0, 3), 3.0, angle=0.1)
+        sun.rotation_euler = (0, 0.8, 0)
+        eye((0, 0, 3), (0, 0, 0), type="ORTHO", ortho_scale=2.6)
+        for strength in (1.5, 1.0):
+            bend.inputs["Strength"].default_value = strength
+            self.alike(self.caustique(64), self.cycles(64), parts=2, tolerance=0.02)
+            self.assertEqual([w for w in self.warnings if "baked" not in w and "40 degrees" not in w], [])
+        self.assertIn("stretches normal maps", "".join(export.write(self.path, bake_size=0)))
 
     def test_single_scattering_metal(self):
         self.world((1, 1, 1))

@@ -1,11 +1,10 @@
 """Tests that a later frame or export bakes again only what has changed, and writes the bytes of a fresh export."""
 
 import os
-import tempfile
 import unittest
 from unittest import mock
 
-import support  # first: it sets the search path
+import support
 
 import bpy
 import numpy
@@ -16,13 +15,12 @@ import panorama
 from lab.features import torture_stage
 
 
-class Unchanged(unittest.TestCase):
+class Unchanged(support.Scratch):
     """A body with a baked material, in a world that is baked too."""
 
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder, self.fresh, self.bakes = folder.name, 0, 0
+        super().setUp()
+        self.folder, self.fresh, self.bakes = str(self.dir), 0, 0
         self.stage = torture_stage.Stage("plane")
         self.noise = self.stage.node("TexNoise", Scale=3.0)
         self.direction = self.stage.node("Normal", self.stage.node("NewGeometry").outputs["Normal"])
