@@ -1,8 +1,10 @@
 """Compares renders of the add-on's engine with the command line and with closed forms. Needs bpy."""
 
+import concurrent.futures
 import math
 import os
 import re
+import threading
 import time
 import unittest
 from unittest import mock
@@ -311,6 +313,36 @@ class Stops(Installed):
         _, seconds = self.stop_when(lambda run: not run)
         self.assertLess(seconds, 2)
         self.assertEqual(self.temporary(), [])
+
+
+class MainThread(Installed):
+    """Renders run in a thread, and Blender's list of timers has no lock: only the main thread may add a timer."""
+
+    def test_tasks_of_a_render_run_in_the_main_thread(self):
+        handoff = part_of_addon("handoff")
+        self.assertTrue(bpy.app.timers.is_registered(handoff.run_tasks))
+        threads = []
+
+        def fails():
+            raise ValueError("planted fault")
+
+        with mock.patch.object(bpy.app.timers, "register", side_effect=AssertionError("in a thread")), \
+                concurrent.futures.ThreadPoolExecutor() as pool:
+            works = [lambda: threads.append(threading.current_thread()), fails]
+            results = [pool.submit(handoff.in_main_thread, work, lambda: False) for work in works]
+            while not all(result.done() for result in results):
+                self.assertGreater(handoff.run_tasks(), 0)
+            self.assertIsNone(results[0].result())
+            self.assertRaisesRegex(ValueError, "planted fault", results[1].result)
+        self.assertEqual(threads, [threading.main_thread()])
+
+    def test_cancelled_tasks_do_not_run(self):
+        handoff, ran = part_of_addon("handoff"), []
+        with concurrent.futures.ThreadPoolExecutor() as pool:
+            result = pool.submit(handoff.in_main_thread, lambda: ran.append(1), lambda: True)
+            self.assertRaises(part_of_addon("fault").Cancelled, result.result)
+        handoff.run_tasks()
+        self.assertEqual(ran, [])
 
 
 if __name__ == "__main__":

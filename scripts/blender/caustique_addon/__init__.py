@@ -5,7 +5,7 @@ A render writes a copy of the scene, exports it in a second Blender process (`ha
 show its messages unchanged (`session`, `panels`).
 """
 
-from . import blender_panels, diagnosis, engine, material_panel, panels, preferences, properties, scene_panels
+from . import blender_panels, diagnosis, engine, handoff, material_panel, panels, preferences, properties, scene_panels
 
 # Blender before 4.2 reads this dictionary, later versions blender_manifest.toml.
 bl_info = {
@@ -19,7 +19,7 @@ bl_info = {
 }
 
 # Order matters: the engine and the panels use the properties.
-_PARTS = (preferences, properties, engine, diagnosis, panels, scene_panels, material_panel, blender_panels)
+_PARTS = (preferences, properties, handoff, engine, diagnosis, panels, scene_panels, material_panel, blender_panels)
 
 
 def register():

@@ -8,6 +8,7 @@ and starts in a second; the first Blender stays responsive, and an export can be
 import fnmatch
 import json
 import os
+import queue
 import subprocess
 import sys
 import threading
@@ -22,6 +23,8 @@ _HERE = os.path.dirname(os.path.abspath(__file__))
 _OLDEST = (4, 2, 0)  # export.py needs the materials and the glTF exporter of this version
 _AUTOEXEC = {"-y": True, "--enable-autoexec": True, "-Y": False, "--disable-autoexec": False}
 _POLL_SECONDS = 0.02  # between two checks of the second Blender
+_TASK_SECONDS = 0.05  # between two looks of the main thread for tasks
+_tasks = queue.SimpleQueue()  # for the main thread, from the threads of renders
 
 
 class Job:
@@ -145,23 +148,44 @@ def in_main_thread(work, stopped):
     """Call `work` in Blender's main thread, from the thread of a render. Returns its result."""
     if threading.current_thread() is threading.main_thread():
         return work()
-    done, outcome = threading.Event(), {}
+    done, cancelled, outcome = threading.Event(), threading.Event(), {}
 
     def task():
-        if not stopped():
+        if not cancelled.is_set():
             try:
                 outcome["value"] = work()
             except Exception as error:  # the waiting thread raises it
                 outcome["error"] = error
         done.set()
 
-    bpy.app.timers.register(task)
+    _tasks.put(task)
     # While Blender waits for a cancelled render, its timers do not run.
     while not done.wait(_POLL_SECONDS):
         if stopped():
+            cancelled.set()
             raise Cancelled()
     if "error" in outcome:
         raise outcome["error"]
-    if "value" not in outcome:
-        raise Cancelled()
     return outcome["value"]
+
+
+def run_tasks():
+    """Run the tasks that `in_main_thread` has left, in the main thread. Returns the seconds until the next call."""
+    while not _tasks.empty():
+        _tasks.get()()
+    return _TASK_SECONDS
+
+
+def register():
+    """Start the timer of `run_tasks`.
+
+    It runs all the time, because only the main thread may add a timer: Blender's list of timers has no lock, and an
+    addition while the main thread removes another timer loses timers, also those of other add-ons.
+    """
+    bpy.app.timers.register(run_tasks, persistent=True)
+
+
+def unregister():
+    """Stop the timer."""
+    if bpy.app.timers.is_registered(run_tasks):
+        bpy.app.timers.unregister(run_tasks)
