@@ -99,7 +99,8 @@ class Baker:
         """
         found = {}
         shape = bake_cache.mesh_digest(body.data)
-        place = (body.name, [tuple(row) for row in body.matrix_world], tuple(body.color), body.pass_index)
+        place = (body.name, [tuple(row) for row in body.matrix_world], tuple(body.color), body.pass_index,
+                 body.get(standin.RANDOM))
         names = sorted({name for _, values in wanted.values() for name in values})
         for name in names:
             now, keys, shaders = {}, {}, []

@@ -48,21 +48,22 @@ def is_opaque(image):
     """Whether no texel is transparent. Cycles multiplies colours by alpha, glTF does not."""
     if image.channels < 4 or image.alpha_mode in {"NONE", "CHANNEL_PACKED"}:
         return True
-    return bool(_pixels(image)[..., 3].min() >= 1)
+    return bool(texels(image)[..., 3].min() >= 1)
 
 
 def is_grey(image):
     """Whether red, green and blue are equal in all texels."""
     if image.channels < 3:
         return True
-    texels = _pixels(image)
-    return bool(numpy.abs(texels[..., :3] - texels[..., :1]).max() < 1e-3)
+    found = texels(image)
+    return bool(numpy.abs(found[..., :3] - found[..., :1]).max() < 1e-3)
 
 
-def _pixels(image):
-    texels = numpy.empty(len(image.pixels), numpy.float32)
-    image.pixels.foreach_get(texels)
-    return texels.reshape(-1, image.channels)
+def texels(image):
+    """The texels of an image: (count, channels)."""
+    values = numpy.empty(len(image.pixels), numpy.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(-1, image.channels)
 
 
 def normal_map(value):
@@ -78,10 +79,10 @@ def normal_map(value):
     return node if plain else None
 
 
-def leaning_share(node, cosine):
-    """The share of texels whose normal leans from the surface normal by more than the angle with this cosine."""
+def cosines(node):
+    """The cosines between the normals of a Normal Map node's image and the surface normal, by texel."""
     output, _ = source_socket(node.inputs["Color"])
-    return float(numpy.mean(_pixels(output.node.image)[:, 2] * 2 - 1 < cosine))
+    return texels(output.node.image)[:, 2] * 2 - 1
 
 
 def _uses_render_uv(socket):

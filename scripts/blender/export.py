@@ -44,11 +44,13 @@ import lighting
 import objects
 import shading
 import sky
+import standin
 import surfaces
 import world
 
-# Angle between the shading normal of glass and its face, and the share of its area, above which it looks darker.
-_LEANING_DEGREES, _MAX_LEANING_SHARE = 30, 0.02
+# Angle between the shading normal and the face, and the share of a mesh's area, above which the picture differs visibly
+# from Cycles, which softens such normals.
+_LEANING_DEGREES, _MAX_LEANING_SHARE = 25, 0.02
 
 
 def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
@@ -86,7 +88,9 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
             environment = said["environment"]
             sky.add_sun(sun, flat, ["camera"] if "visible" in environment else [], environment.get("light_group"))
         bodies = _solidity(flat.things)
-        _warn_of_bent_glass(flat, warn)
+        _warn_of_leaning_normals(flat, warn)
+        guard.attempt(warn, f'scene "{scene.name}"', None, "a camera within glass is not named",
+                      _warn_of_immersed_camera, flat, bodies, warn)
         bpy.context.view_layer.update()
         progress("Writing the exported scene")
         _export_all_it_can(path, flat, warn)
@@ -188,18 +192,37 @@ def _solidity(things):
     return bodies
 
 
-def _warn_of_bent_glass(flat, warn):
-    """Warn of glass whose shading normals lean far from its faces, which Cycles softens."""
+def _warn_of_leaning_normals(flat, warn):
+    """Warn of meshes whose shading normals lean far from their faces."""
     shares = {}
     for thing in flat.things:
-        if thing.type == "MESH" and any(slot.material and may_transmit(slot.material) for slot in thing.material_slots):
-            if thing.data not in shares:
-                shares[thing.data] = guard.attempt(warn, flat.where(thing), 0.0, "its normals are not checked",
+        if thing.type != "MESH" or thing.data in shares:
+            continue
+        share = shares[thing.data] = guard.attempt(warn, flat.where(thing), 0.0, "its normals are not checked",
                                                    _leaning_share, thing.data)
-            if shares[thing.data] > _MAX_LEANING_SHARE:
-                warn(flat.where(thing), f"the smooth shading of its glass leans by more than {_LEANING_DEGREES} degrees on "
-                     f"{shares[thing.data]:.0%} of its faces: it is darker there than in Cycles; mark these edges sharp, or "
-                     "bevel them with more segments")
+        if share <= _MAX_LEANING_SHARE:
+            continue
+        glass = any(slot.material and may_transmit(slot.material) for slot in thing.material_slots)
+        warn(flat.where(thing), f"its smooth shading leans by more than {_LEANING_DEGREES} degrees from its faces on "
+             f"{share:.0%} of its area: there it is {'darker' if glass else 'brighter or darker'} than in Cycles; mark "
+             "these edges sharp, or bevel them with more segments")
+
+
+def _warn_of_immersed_camera(flat, bodies, warn):
+    """Warn if the active camera is in water or glass, whose radiance is n^2 times that outside; Cycles leaves it out."""
+    camera = flat.scene.camera
+    if camera is None:
+        return
+    depsgraph, eye = bpy.context.evaluated_depsgraph_get(), camera.matrix_world.translation
+    for thing in flat.things:
+        closed = any(bodies.get(slot.material.name, (False,))[0] for slot in thing.material_slots if slot.material)
+        if thing.type != "MESH" or not closed:
+            continue
+        inside = thing.matrix_world.inverted_safe() @ eye
+        found, at, normal, _ = thing.closest_point_on_mesh(inside, depsgraph=depsgraph)
+        if found and (inside - at).dot(normal) < 0:
+            warn(flat.where(camera), f"it is inside {flat.where(thing)}: if that has an index n, the picture is n^2 times "
+                 "as bright as in Cycles (1.77 times in water), as radiance is; lower the exposure to see the same")
 
 
 def _leaning_share(mesh):
@@ -249,7 +272,12 @@ def _closed(mesh):
 
 
 def _restore_names(document, names):
-    """Restore the names of the original objects and meshes, which Blender reserves while the originals exist."""
+    """Restore the names of the original objects and meshes, which Blender reserves while the originals exist. Removes the
+    random numbers of objects, which only baking needs."""
+    for node in document.get("nodes", []):
+        node.get("extras", {}).pop(standin.RANDOM, None)
+        if node.get("extras") == {}:
+            del node["extras"]
     for part in ("scenes", "nodes", "meshes"):
         for entry in document.get(part, []):
             entry["name"] = names.get(entry.get("name", ""), entry.get("name", ""))

@@ -5,6 +5,12 @@ from dataclasses import dataclass
 from graph import is_constant
 
 WHITE, BLACK = (1.0,) * 3, (0.0,) * 3
+# Roughness and share of metal above which the shape of highlights differs visibly from Cycles.
+ROUGH, METALLIC = 0.42, 0.5
+_BRIGHT = 0.5  # largest component of the colour, below which little light scatters between facets
+ROUGH_METAL_WARNING = (
+    "the light that its rough metal scatters between facets leaves in all directions: in Cycles it stays in the highlight, "
+    "which is up to a quarter brighter there")
 
 
 @dataclass
@@ -148,11 +154,15 @@ class Reader:
         if lobe.roughness != 0.0 and getattr(leaf.node, "distribution", "GGX") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"}:
             self.say(f"its {leaf.node.distribution.title()} facets are taken for GGX")
         # Blender's MULTI_GGX keeps the light that scatters between facets, as caustique does; its GGX loses it.
+        known = is_constant(lobe.roughness) and is_constant(lobe.metallic)
+        bright = not is_constant(lobe.base) or max(lobe.base) > _BRIGHT
         if getattr(leaf.node, "distribution", "") != "GGX" or lobe.roughness == 0.0:
+            if known and bright and lobe.roughness > ROUGH and lobe.metallic > METALLIC:
+                self.say(ROUGH_METAL_WARNING)
             return
         if lobe.metallic != 0.0:
             lobe.base = self._darkened(lobe)
-        if (lobe.metallic, lobe.transmission) != (0.0, 0.0) and not (is_constant(lobe.roughness) and lobe.roughness < 0.5):
+        if (lobe.metallic, lobe.transmission) != (0.0, 0.0) and not (is_constant(lobe.roughness) and lobe.roughness < ROUGH):
             what = "approximated by a darker metal" if lobe.transmission == 0.0 else "not carried for glass"
             self.say(f"its distribution GGX loses light between rough facets, which is {what}: choose Multiscatter GGX "
                      "to see the same in both")

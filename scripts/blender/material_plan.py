@@ -11,6 +11,7 @@ import direct_images
 import standin
 from gltfmaterial import PLAIN
 from graph import is_constant, source_socket
+from lobes import METALLIC, ROUGH, ROUGH_METAL_WARNING
 from matching import Matched, match
 
 _PASSES = {
@@ -30,10 +31,15 @@ _UNBAKED_DEFAULTS = {  # values of varying quantities if nothing may be baked
     "ior": 1.5, "specular": 1.0, "specular_colour": (1.0,) * 3, "coat": 0.0, "coat_roughness": 0.0,
     "sheen": (0.0,) * 3, "sheen_roughness": 0.5, "anisotropy": 0.0, "normal": None,
 }
-_STEEP_COSINE = 0.75  # between the shading and the surface normal
+_MIN_ROUGH_METAL = 0.05  # share of texels that is worth a warning
+_STEEP_COSINE, _OLD_STEEP_COSINE = 0.75, 0.97  # between the shading and the surface normal; the latter before Blender 4.5
+_MIN_STEEP = 0.01  # share of texels that is worth a warning
 _STEEP_WARNING = (
     "its normals lean by more than 40 degrees from the surface: its shine is brighter there than in Cycles, "
     "which loses part of it; use a Displace modifier for relief that steep")
+_OLD_STEEP_WARNING = (
+    "its normals lean by more than 14 degrees from the surface: Cycles of this version of Blender turns them towards the "
+    "viewer, which Blender 4.5 and caustique do not; use a Displace modifier to see the same in both")
 
 
 def matt(colour):
@@ -87,7 +93,9 @@ class Plan:
         if self.passes:
             if any(n.type == "AMBIENT_OCCLUSION" and not n.only_local for t in self.graph.trees() for n in t.nodes):
                 self.say("its Ambient Occlusion node sees the object alone, without what stands around it")
-            standin.read_coordinates(self.graph)
+            made = standin.read_coordinates(self.graph)
+            self.passes = {name: value if value is None or is_constant(value) else made.get(value, value)
+                           for name, value in self.passes.items()}
             self.of_object = standin.depends_on_object(self.graph)
             names = [_DISPLAY_NAMES[n] for n in varying if n not in {"direction"}]
             self.say(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} baked to images of {self.baker.size} x "
@@ -141,6 +149,10 @@ class Plan:
         if found and all(found.values()) and is_constant(values["transmission"]):
             if len({node.name for node, _ in found.values()}) == 1:
                 links.update({name: socket for name, (_, socket) in found.items()})
+                texels = direct_images.texels(next(iter(found.values()))[0].image)
+                green, blue = texels[:, 1:3].T if texels.shape[1] > 2 else (texels[:, 0],) * 2
+                self._warn_of_rough_metal(green if "roughness" in found else values["roughness"],
+                                          blue if "metallic" in found else values["metallic"])
         emission = values["emission"]
         if not is_constant(emission) and is_constant(values["strength"]):
             image = direct_images.image_of(emission, data=False)
@@ -150,8 +162,7 @@ class Plan:
         stretched = not is_constant(values["direction"])
         if normal is not None and not self.bumped and not stretched and direct_images.normal_map(normal) is not None:
             links["normal"] = normal
-            if direct_images.leaning_share(normal.node, _STEEP_COSINE) > 0.01:
-                self.say(_STEEP_WARNING)
+            self._warn_of_steep_normals(direct_images.cosines(normal.node))
 
     def _data_image(self, value, part):
         """The Image Texture node whose channel `part` or grey value is `value`, and the socket to export; or None."""
@@ -199,8 +210,8 @@ class Plan:
             if name == "normal":
                 channels["normal"] = _normals(texels, covered)
                 normals = channels["normal"]
-                if normals is not None and numpy.mean(normals[covered][:, 2] < _STEEP_COSINE) > 0.01:
-                    self.say(_STEEP_WARNING)
+                if normals is not None:
+                    self._warn_of_steep_normals(normals[covered][:, 2])
                 continue
             if name == "stretch":
                 channels["direction"] = texels[..., :2] * 2 - 1
@@ -213,7 +224,24 @@ class Plan:
                 channels[part] = one if same is None else same
                 if part == "ior" and same is None:
                     channels[part] = float(one[covered].mean())
+        if "surface" in baked:
+            covered = baked["surface"][..., 3] > 0
+            self._warn_of_rough_metal(*(value[covered] if isinstance(value, numpy.ndarray) else value
+                                        for value in (channels["roughness"], channels["metallic"])))
         return channels
+
+    def _warn_of_steep_normals(self, cosines):
+        """Warn of normals from the cosines between them and the surface normal."""
+        if numpy.mean(cosines < _STEEP_COSINE) > _MIN_STEEP:
+            self.say(_STEEP_WARNING)
+        elif bpy.app.version < (4, 5, 0) and numpy.mean(cosines < _OLD_STEEP_COSINE) > _MIN_STEEP:
+            self.say(_OLD_STEEP_WARNING)
+
+    def _warn_of_rough_metal(self, rough, metal):
+        """Warn of rough metal from texels or numbers, of which at least one is an array. Other values are unknown."""
+        if all(isinstance(value, (float, numpy.ndarray)) for value in (rough, metal)):
+            if numpy.mean((rough > ROUGH) & (metal > METALLIC)) > _MIN_ROUGH_METAL:
+                self.say(ROUGH_METAL_WARNING)
 
     def make_principled(self):
         """A copy of the material with one Principled shader, linked to the images that the exporter writes."""

@@ -76,7 +76,7 @@ class FlatScene:
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
             # The camera counts even if it is hidden.
             place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()
-            found.append((scene.camera, scene.camera.data, place, [], None))
+            found.append((scene.camera, scene.camera.data, place, [], None, 0.0))
         for mesh, original in self._shapes:
             self._add_generated_coordinates(original, mesh)
         for taken in filter(None, found):
@@ -105,7 +105,8 @@ class FlatScene:
         return block
 
     def _take(self, instance, depsgraph):
-        """Object, data, world matrix, hidden rays and light group of an instance, or None if it is invisible."""
+        """Object, data, world matrix, hidden rays, light group and random number (0 to 1) of an instance, or None if it
+        is invisible."""
         thing = instance.object
         if not (instance.is_instance or instance.show_self) or thing.type in _INVISIBLE or _is_pattern(instance):
             return None
@@ -113,6 +114,7 @@ class FlatScene:
             self._warn(f'object "{thing.name}"', _LOST[thing.type])
             return None
         data = thing.original.data
+        random = instance.random_id & 0xFFFFFFFF if instance.is_instance else _random_of_name(thing.name)
         if thing.type in _SOLID:
             data = self._mesh(instance, depsgraph)
         elif thing.type not in {"LIGHT", "CAMERA"}:
@@ -122,7 +124,7 @@ class FlatScene:
         if (instance.parent or thing).name in self._indirect and "camera" not in hidden:
             hidden.append("camera")
         group = visibility.light_group(thing, instance.parent if instance.is_instance else None, self._layer)
-        return data and (thing.original, data, instance.matrix_world.copy(), hidden, group)
+        return data and (thing.original, data, instance.matrix_world.copy(), hidden, group, random / 0xFFFFFFFF)
 
     def _mesh(self, instance, depsgraph):
         """The evaluated mesh of an instance, shared with equal instances; None without faces."""
@@ -149,7 +151,7 @@ class FlatScene:
         self._meshes[key] = mesh if mesh.polygons else None
         return self._meshes[key]
 
-    def _put(self, original, data, matrix, hidden, group):
+    def _put(self, original, data, matrix, hidden, group, random):
         if not all(math.isfinite(x) for row in matrix for x in row):
             self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}")
             return
@@ -161,7 +163,7 @@ class FlatScene:
         if isinstance(data, bpy.types.Camera):
             matrix = _without_scale(matrix)
         body = self.add(original.name, data, matrix, hidden, group)
-        body.color, body.pass_index = original.color, original.pass_index
+        body.color, body.pass_index, body[standin.RANDOM] = original.color, original.pass_index, random
         if "caustique" in original:
             self.add_extras(body, **original["caustique"].to_dict())
         if original == bpy.context.scene.camera and self.scene.camera is None:
@@ -254,6 +256,20 @@ class FlatScene:
             self._warn(where, "light linking is not carried: every light shines on every object")
         if getattr(thing.cycles, "use_adaptive_subdivision", False):
             self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken")
+
+
+def _random_of_name(name):
+    """The random number (32 bits) of an object that is no instance: Blender gives it to instances alone."""
+    text = 0
+    for byte in name.encode():
+        text = (text * 37 + byte) & 0xFFFFFFFF
+    # The final mixing of lookup3 [Jenkins 2006] of two words, the second one 0.
+    words = {"a": 0xDEADBEEF + 21 + text & 0xFFFFFFFF, "b": 0xDEADBEEF + 21, "c": 0xDEADBEEF + 21}
+    for to, other, turn in (("c", "b", 14), ("a", "c", 11), ("b", "a", 25), ("c", "b", 16), ("a", "c", 4),
+                            ("b", "a", 14), ("c", "b", 24)):
+        turned = words[other] << turn | words[other] >> 32 - turn
+        words[to] = ((words[to] ^ words[other]) - turned) & 0xFFFFFFFF
+    return words["c"]
 
 
 def _remove_points_that_are_no_numbers(mesh):

@@ -7,6 +7,8 @@ import bmesh
 import numpy
 
 UV, GENERATED, OBJECT = "caustique bake", "caustique generated", "caustique object"
+# The custom property of an object with Object Info's random number: it depends on the names of the original objects.
+RANDOM = "caustique_random"
 # Attributes with the axes of normal maps end in a letter and the UV map's name; nodes that read them have this name, too.
 _AXES = "caustique normal map"
 # Textures that use Generated coordinates if Vector is not linked.
@@ -46,20 +48,26 @@ def depends_on_object(graph):
 
 def read_coordinates(graph):
     """Make a graph read coordinates from the attributes that `swap` adds: Generated ones are those of the undeformed
-    shape, and Object ones those before a transform of the mesh."""
+    shape, and Object ones those before a transform of the mesh. Random numbers are those of the original objects.
+
+    Returns {output socket: the socket that replaces it}, for values that are not linked yet.
+    """
+    made = {}
     for tree in graph.trees():
-        generated = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
-                     if s.name == "Vector" and not s.is_linked]
-        generated += [link.to_socket for n in tree.nodes if n.type == "TEX_COORD"
-                      for link in n.outputs["Generated"].links]
-        own = [link.to_socket for n in tree.nodes if n.type == "TEX_COORD" and n.object is None
-               for link in n.outputs["Object"].links]
-        for name, wanting in ((GENERATED, generated), (OBJECT, own)):
-            if wanting:
+        unlinked = [s for n in tree.nodes if n.type in _BY_GENERATED for s in n.inputs
+                    if s.name == "Vector" and not s.is_linked]
+        places = [n for n in tree.nodes if n.type == "TEX_COORD"]
+        for name, kind, output, sources, wanting in (
+                (GENERATED, "GEOMETRY", "Vector", [n.outputs["Generated"] for n in places], unlinked),
+                (OBJECT, "GEOMETRY", "Vector", [n.outputs["Object"] for n in places if n.object is None], []),
+                (RANDOM, "OBJECT", "Fac", [n.outputs["Random"] for n in tree.nodes if n.type == "OBJECT_INFO"], [])):
+            if sources or wanting:
                 node = tree.nodes.new("ShaderNodeAttribute")
-                node.attribute_name = name
-                for socket in wanting:
-                    tree.links.new(node.outputs["Vector"], socket)
+                node.attribute_name, node.attribute_type = name, kind
+                made |= {source: node.outputs[output] for source in sources}
+                for socket in wanting + [link.to_socket for source in sources for link in source.links]:
+                    tree.links.new(node.outputs[output], socket)
+    return made
 
 
 def read_normal_map_axes(graph):

@@ -7,6 +7,8 @@ import os
 import unittest
 from unittest import mock
 
+import bpy
+
 import support
 
 from lab.features import torture_stage
@@ -16,6 +18,8 @@ SHORT = (
     "principled_coat", "principled_glass_tinted", "image_alpha", "noise_roughness", "image_box", "bump",
     "group_of_textures", "diffuse_glossy_fresnel", "transparent_mask", "principled_mask",
 )
+# Cycles before Blender 4.5 turns leaning normals towards the viewer, which a warning says.
+WARNED_BEFORE_4_5 = {"bump_mirror", "normal_map", "normal_map_weak"}
 
 
 def exists(name):
@@ -40,7 +44,9 @@ class Torture(support.Scratch):
             with self.subTest(name):
                 result = torture.run(name)
                 self.assertNotEqual(result.verdict, torture.WRONG, result)
-                self.assertLessEqual(torture.RANK.index(result.verdict), torture.RANK.index(stored[name]), result)
+                turned = bpy.app.version < (4, 5, 0) and name in WARNED_BEFORE_4_5
+                allowed = torture.WARNED if turned else stored[name]
+                self.assertLessEqual(torture.RANK.index(result.verdict), torture.RANK.index(allowed), result)
 
     def test_a_wrong_material_is_found_out(self):
         """The comparison must detect a difference of 5 % in a sphere's colour."""
