@@ -71,6 +71,15 @@ def srgb(x):
     return numpy.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
+def remove_colours(document):
+    """Remove vertex colours, which Blender's exporter adds to meshes without material: Cycles reads them in nodes alone,
+    and glTF multiplies materials by them."""
+    for mesh in document.get("meshes", []):
+        for part in mesh["primitives"]:
+            for name in [name for name in part["attributes"] if name.startswith("COLOR_")]:
+                del part["attributes"][name]
+
+
 def give_default(document):
     """Give primitives without a material the grey default of Cycles; glTF's default is a rough white metal."""
     bare = [primitive for mesh in document.get("meshes", []) for primitive in mesh["primitives"]

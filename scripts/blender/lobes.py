@@ -261,6 +261,8 @@ class Reader:
     def _reflectance(self, leaf, lobe):
         """Set specular and index: Cycles scales the reflectance at normal incidence by twice the specular level."""
         g, level = self.graph, self.get(leaf, "Specular IOR Level")
+        if is_constant(lobe.ior) and lobe.ior < 1:
+            self.say(f"its IOR of {lobe.ior:.3g} is below 1, where it reflects more than in Cycles: use 1 or more")
         if lobe.transmission == 1.0:  # the level does not affect glass
             return
         if is_constant(level) and is_constant(lobe.ior) and 0 < level:

@@ -96,6 +96,7 @@ class Surfaces:
                               "it is what Blender's exporter made of it",
                               self._finish, entry, surface, writer, *solid)
         gltfmaterial.give_default(document)
+        gltfmaterial.remove_colours(document)
         return bytes(writer.buffer)
 
     def _finish(self, entry, surface, writer, closed, least):

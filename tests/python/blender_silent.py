@@ -116,6 +116,15 @@ class Agrees(cycles_comparison.CyclesComparison):
         self.scene.view_layers[0].use_sky = False
         self.alike(self.caustique(64), self.cycles(64), parts=1, tolerance=0.03)
 
+    def test_vertex_colours_without_material(self):
+        """Blender's exporter writes them, and glTF multiplies by them; Cycles reads them in nodes alone."""
+        self.world((0.5, 0.5, 0.5))
+        body = shared.place("wall", square(None, 1.0))
+        for corner in body.data.color_attributes.new("paint", "FLOAT_COLOR", "CORNER").data:
+            corner.color = (1, 0.1, 0.1, 1)
+        eye((0, 0, 2), (0, 0, 0), type="ORTHO", ortho_scale=1)
+        self.alike(self.caustique(16), self.cycles(16))
+
     def test_random_numbers_of_objects(self):
         """Object Info's Random depends on the names of objects, and on the instance."""
         material = glow("tested", (1, 1, 1))
@@ -191,6 +200,10 @@ class Named(cycles_comparison.CyclesComparison):
                    "there it is darker than in Cycles")
         body.data.materials[0] = self.floor().data.materials[0]
         self.named("brighter or darker than in Cycles")
+
+    def test_indices_below_one(self):
+        shared.place("wall", square(shared.node_material("tested", "ShaderNodeBsdfPrincipled", IOR=0.0), 1.0))
+        self.named("its IOR of 0 is below 1")
 
     def test_cameras_in_glass(self):
         body = shared.cube(shared.node_material("water", "ShaderNodeBsdfGlass", IOR=1.333))
