@@ -32,7 +32,7 @@ impl<'a> Shading<'a> {
     pub fn gathering(&'a self, set: LobeSet) -> Gathering<'a> {
         let kind = if self.cos_og == 0.0 {
             GatherCase::Nothing
-        } else if self.interpolated_normal.is_some() {
+        } else if self.has_normal_map() {
             GatherCase::Any
         } else if let Some((factor, through)) = self.bsdf.diffuse_only(&self.view, set) {
             GatherCase::Diffuse { factor, through }

@@ -59,7 +59,7 @@ pub struct Layered<'a> {
     /// Average reflectance of the facets; used only if there is a cover.
     pub(super) facet_average: Rgb,
     /// Normal of a clear coat over a normal map, which [`super::coat::Coat`] evaluates; otherwise `None`.
-    pub(super) coat_normal: Option<Vec3>,
+    pub(super) coat_normal: Option<&'a Vec3>,
 }
 
 /// One weight per lobe, for one `wo`: estimated albedos, or, normalized to sum to 1, sampling probabilities.
@@ -218,7 +218,7 @@ impl<'a> Layered<'a> {
     pub(super) fn angles(&self, side: usize, w: Vec3, base: Position) -> (f32, Angles) {
         let Some(n) = self.coat_normal else { return (w.z.abs(), base.into()) };
         let up = if side == 1 { -w.z } else { w.z };
-        let cos = Vec3::new(w.x, w.y, up).dot(n).abs();
+        let cos = Vec3::new(w.x, w.y, up).dot(*n).abs();
         (cos, Angles { coat: Position::new(cos), base })
     }
 

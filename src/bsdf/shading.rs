@@ -13,6 +13,7 @@ use super::layered::ViewTerms;
 use super::relief::{Relief, mirrored};
 use super::{Bsdf, BsdfSample, LobeSet, Transport};
 use crate::math::{Frame, Rgb, Vec2, Vec3};
+use bumpalo::Bump;
 
 /// The BSDF of a surface point in world space, seen along one direction.
 #[derive(Clone, Copy, Debug)]
@@ -28,9 +29,17 @@ pub struct Shading<'a> {
     pub(super) cos_og: f32,
     /// Whether the opposite of the viewing direction replaces it, see [`Facing`].
     flipped: bool,
-    /// The interpolated normal, if the shading frame is that of a normal map; otherwise `None`.
-    pub(super) interpolated_normal: Option<Vec3>,
-    /// The clear coat, if the surface has one over a normal map; otherwise `None`.
+    /// The surface below the normal map, if the shading frame is that of a normal map; otherwise `None`. It is a
+    /// reference, so that surfaces without a normal map stay small.
+    mapped: Option<&'a Mapped<'a>>,
+}
+
+/// The surface on which a normal map lies.
+#[derive(Clone, Copy, Debug)]
+struct Mapped<'a> {
+    /// The interpolated normal, without the map.
+    interpolated_normal: Vec3,
+    /// The clear coat over the map, if the surface has one; otherwise `None`.
     coat: Option<Coat<'a>>,
 }
 
@@ -40,27 +49,34 @@ impl<'a> Shading<'a> {
     #[inline(always)]
     pub fn new(frame: Frame, ng: Vec3, bsdf: Bsdf<'a>, wo: Vec3) -> Shading<'a> {
         let (Facing { cos_og, flipped, .. }, o) = Facing::new(frame, ng, wo);
-        Shading { frame, ng, bsdf, view: bsdf.view_terms(o), cos_og, flipped, interpolated_normal: None, coat: None }
+        Shading { frame, ng, bsdf, view: bsdf.view_terms(o), cos_og, flipped, mapped: None }
     }
 
     /// Marks the shading frame as that of a normal map. A clear coat keeps `interpolated_normal`, the normal without the
-    /// map.
+    /// map. `arena` holds both.
     #[inline]
-    pub fn with_normal_map(mut self, interpolated_normal: Vec3) -> Shading<'a> {
+    pub fn with_normal_map(mut self, interpolated_normal: Vec3, arena: &'a Bump) -> Shading<'a> {
         if interpolated_normal == self.frame.n {
             return self;
         }
-        self.interpolated_normal = Some(interpolated_normal);
+        let mut coat = None;
         if let Bsdf::Layered(layered) = &mut self.bsdf
             && let Some(covered) = layered.interface.cover.as_ref().filter(|covered| covered.cover.has_coat())
         {
-            layered.coat_normal = Some(self.frame.to_local(interpolated_normal));
+            layered.coat_normal = Some(arena.alloc(self.frame.to_local(interpolated_normal)));
             let o = self.view.wo();
             let wo = self.frame.to_world(if self.flipped { -o } else { o });
-            self.coat = Some(Coat::new(&covered.cover, interpolated_normal, self.ng, wo));
+            coat = Some(Coat::new(&covered.cover, interpolated_normal, self.ng, wo));
             self.view = layered.view_terms(o);
         }
+        self.mapped = Some(arena.alloc(Mapped { interpolated_normal, coat }));
         self
+    }
+
+    /// Whether the shading frame is that of a normal map.
+    #[inline]
+    pub(super) fn has_normal_map(&self) -> bool {
+        self.mapped.is_some()
     }
 
     #[inline]
@@ -72,7 +88,7 @@ impl<'a> Shading<'a> {
     /// from which specular light reaches the facet, if any. `None` without a normal map.
     #[inline]
     fn relief(&self, l: Vec3) -> Option<(Relief, Option<Vec3>)> {
-        let relief = Relief::new(l, self.frame.n, self.interpolated_normal?, self.ng);
+        let relief = Relief::new(l, self.frame.n, self.mapped?.interpolated_normal, self.ng);
         let second = self.frame.to_local(relief.mirrored);
         Some((relief, (self.may_be_specular() && second.z * l.dot(self.ng) > 0.0).then_some(second)))
     }
@@ -94,11 +110,16 @@ impl<'a> Shading<'a> {
         self.facing().local(w, transport)
     }
 
+    #[inline]
+    fn coat_over_map(&self) -> Option<&'a Coat<'a>> {
+        self.mapped?.coat.as_ref()
+    }
+
     /// The coat over a normal map, and the probability of sampling it among the lobes of `set`; `None` without such a
     /// coat.
     #[inline]
     fn coat(&self, view: &ViewTerms, set: LobeSet) -> Option<(&Coat<'a>, f32)> {
-        match (&self.coat, &self.bsdf) {
+        match (self.coat_over_map(), &self.bsdf) {
             (Some(coat), Bsdf::Layered(layered)) => Some((coat, layered.coat_probability(view, set))),
             _ => None,
         }
@@ -124,7 +145,7 @@ impl<'a> Shading<'a> {
     fn evaluate_base(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32) {
         let Some((i, cos_ig)) = self.local(wi, transport) else { return (Rgb::ZERO, 0.0) };
         let adjoint = cos_ig / self.cos_og;
-        if self.interpolated_normal.is_some() {
+        if self.has_normal_map() {
             let (value, pdf) = self.evaluate_relief(wi, i, transport, set);
             return (if transport == Transport::Importance { value * adjoint } else { value }, pdf);
         }
@@ -171,7 +192,7 @@ impl<'a> Shading<'a> {
     #[inline]
     pub fn reverse_pdf(&self, wi: Vec3, transport: Transport, set: LobeSet) -> f32 {
         let pdf = self.reverse_base_pdf(wi, transport, set);
-        if self.coat.is_none() {
+        if self.coat_over_map().is_none() {
             return pdf;
         }
         let (_, o) = Facing::new(self.frame, self.ng, wi);
@@ -202,7 +223,7 @@ impl<'a> Shading<'a> {
     /// by its small cosine here would make it too bright.
     #[inline]
     pub fn gather(&self, wi: Vec3, cosine: f32, set: LobeSet) -> Rgb {
-        if self.interpolated_normal.is_some() && cosine > 0.0 {
+        if self.has_normal_map() && cosine > 0.0 {
             return self.evaluate_cos(wi, Transport::Radiance, set).0 / cosine;
         }
         let (true, Some((i, _))) = (cosine > 0.0, self.local(wi, Transport::Radiance)) else {
@@ -288,7 +309,7 @@ impl<'a> Shading<'a> {
         if sample.wi.z * cos_ig < 0.0 {
             if importance {
                 (wi, cos_ig) = (-wi, -cos_ig);
-            } else if self.interpolated_normal.is_some() && self.may_be_specular() {
+            } else if self.has_normal_map() && self.may_be_specular() {
                 (wi, cos_ig) = (mirrored(wi, self.ng), -cos_ig);
             }
         }
@@ -296,7 +317,7 @@ impl<'a> Shading<'a> {
             return None;
         }
         let local = std::mem::replace(&mut sample.wi, wi);
-        if self.interpolated_normal.is_some() && sample.lobe != LobeSet::DELTA {
+        if self.has_normal_map() && sample.lobe != LobeSet::DELTA {
             let (value, pdf_w) = self.evaluate_base(wi, transport, set);
             (sample.weight, sample.pdf_w) = (value / pdf_w, pdf_w);
             return (pdf_w > 0.0).then_some(sample);

@@ -133,7 +133,7 @@ impl Scattering {
         if ready.plain_frame {
             return Shading::new(Frame::from_normal(surface.ns), surface.ng, bsdf, wo);
         }
-        Shading::new(materials.shading_frame(surface), surface.ng, bsdf, wo).with_normal_map(surface.ns)
+        Shading::new(materials.shading_frame(surface), surface.ng, bsdf, wo).with_normal_map(surface.ns, arena)
     }
 
     #[inline(always)]

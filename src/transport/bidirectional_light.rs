@@ -200,8 +200,9 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
         if connected && lobes.intersects(LobeSet::SMOOTH) && !self.photons_only && vertex.depth < camera_paths.max_depth
         {
             if self.shared.keeps_light_vertices() {
+                let arena = self.vertices.bump();
                 self.vertices.push(LightVertex {
-                    scatterer: Scatterer::Surface(*vertex.surface, *vertex.shading),
+                    scatterer: Scatterer::Surface(arena.alloc(*vertex.surface), arena.alloc(*vertex.shading)),
                     wo: vertex.wo,
                     throughput: vertex.throughput,
                     depth: vertex.depth,

@@ -10,12 +10,10 @@ use crate::plan::LightPrefix;
 use crate::scene::contact::ContactPoint;
 
 /// Scattering at a light vertex.
-// Boxing the large variant would allocate once per vertex.
-#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 pub enum Scatterer<'s> {
-    /// A surface point with its BSDF.
-    Surface(Surface, Shading<'s>),
+    /// A surface point with its BSDF. References keep light vertices small, which are moved as their number grows.
+    Surface(&'s Surface, &'s Shading<'s>),
     /// A point in a medium with its phase function.
     Medium(Vec3, HenyeyGreenstein),
 }

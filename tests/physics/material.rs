@@ -2,6 +2,7 @@
 
 use crate::support;
 
+use bumpalo::Bump;
 use caustique::bsdf::{EnergyTables, Interface, LobeSet, Parameters, Shading, Transport};
 use caustique::geometry::Surface;
 use caustique::material::Material;
@@ -207,8 +208,8 @@ fn tilted(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, Shade<'_>)
 fn tilted_and_mapped(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, Shade<'_>)) {
     tilted(p, tables, &check);
     let (n, smooth) = (Vec3::new(0.8, 0.1, 0.5).normalize(), Vec3::new(-0.1, 0.05, 1.0).normalize());
-    let bsdf = support::bsdf(p, tables);
-    check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo).with_normal_map(smooth));
+    let (bsdf, arena) = (support::bsdf(p, tables), Bump::new());
+    check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo).with_normal_map(smooth, &arena));
 }
 
 fn direction(k: u64) -> Vec3 {
@@ -256,7 +257,7 @@ fn steep_normals_are_not_black_from_the_side() {
 /// black. A mirror is symmetric between lamp and camera.
 #[test]
 fn steep_metal_is_not_black() {
-    let tables = EnergyTables::new([1.5]);
+    let (tables, arena) = (EnergyTables::new([1.5]), Bump::new());
     let metal = Parameters { base_color: Rgb::ONE, metallic: 1.0, alpha_x: 0.3, alpha_y: 0.3, ..Parameters::default() };
     let mirror = Parameters { alpha_x: 0.0, alpha_y: 0.0, ..metal };
     let n = Vec3::new(0.8, 0.0, 0.6);
@@ -268,7 +269,7 @@ fn steep_metal_is_not_black() {
         mean_and_error(&weights)
     };
     for wo in [Vec3::Z, Vec3::new(0.0, 0.8, 0.6), Vec3::new(-0.28, 0.0, 0.96), Vec3::new(-0.96, 0.0, 0.28)] {
-        let (mean, error) = seen(shading(&metal, wo).with_normal_map(Vec3::Z));
+        let (mean, error) = seen(shading(&metal, wo).with_normal_map(Vec3::Z, &arena));
         println!("{wo}: {mean} +- {error}");
         assert!((mean - 1.0).abs() < 5.0 * error + 5e-3, "{wo}: {mean} +- {error}");
     }
@@ -279,10 +280,10 @@ fn steep_metal_is_not_black() {
     let lamp = Vec3::new(below.x, below.y, -below.z);
     assert!(below.z < -0.2);
     let to_lamp =
-        shading(&mirror, wo).with_normal_map(Vec3::Z).sample(Transport::Radiance, LobeSet::ALL, 0.5, Vec2::splat(0.5));
+        shading(&mirror, wo).with_normal_map(Vec3::Z, &arena).sample(Transport::Radiance, LobeSet::ALL, 0.5, Vec2::splat(0.5));
     let to_lamp = to_lamp.expect("a mirror's direction");
     assert!((to_lamp.wi - lamp).length() < 1e-5 && (to_lamp.weight.x - 1.0).abs() < 1e-5, "{to_lamp:?}");
-    let lit = shading(&mirror, lamp).with_normal_map(Vec3::Z);
+    let lit = shading(&mirror, lamp).with_normal_map(Vec3::Z, &arena);
     let draw = |u| lit.sample(Transport::Importance, LobeSet::ALL, u, Vec2::splat(0.5));
     let to_eye = [0.25, 0.75].map(draw).into_iter().flatten().find(|s| (s.wi - wo).length() < 1e-5).expect("the eye");
     // One of two directions is sampled with the probability 1/2, and its weight is per geometric cosine.
@@ -294,7 +295,7 @@ fn steep_metal_is_not_black() {
 /// bright as in Cycles 4.5, which renders 0.943, 0.744, 0.565, 0.421 for tilts of 20, 45, 60 and 70 degrees.
 #[test]
 fn relief_shadows_its_own_diffuse_light() {
-    let tables = EnergyTables::new([1.5]);
+    let (tables, arena) = (EnergyTables::new([1.5]), Bump::new());
     let plain = Parameters { base_color: Rgb::ONE, specular: 0.0, ..Parameters::default() };
     let leaning = |degrees: f32| {
         let (sin, cos) = degrees.to_radians().sin_cos();
@@ -307,10 +308,10 @@ fn relief_shadows_its_own_diffuse_light() {
     let lit = |s: Shading<'_>| s.eval_cos(lamp, Transport::Radiance, LobeSet::ALL).x;
     assert!((lit(bare) - 0.5 / std::f32::consts::PI).abs() < 1e-5);
     let expected = 2.0 / (1.0 + (1.0 + 0.375 * 99.0f32).sqrt());
-    assert!((lit(bare.with_normal_map(Vec3::Z)) / lit(bare) - expected).abs() < 1e-4);
+    assert!((lit(bare.with_normal_map(Vec3::Z, &arena)) / lit(bare) - expected).abs() < 1e-4);
     let u = |k: u64, salt: u64| (mix(mix(k) ^ salt) >> 40) as f32 / 16_777_216.0;
     for (lean, cycles) in [(20.0, 0.943), (45.0, 0.744), (60.0, 0.565), (70.0, 0.421)] {
-        let shading = leaning(lean).with_normal_map(Vec3::Z);
+        let shading = leaning(lean).with_normal_map(Vec3::Z, &arena);
         let draw = |k| shading.sample(Transport::Radiance, LobeSet::ALL, u(k, 7), Vec2::new(u(k, 8), u(k, 9)));
         let drawn: Vec<f64> = (0..40_000).map(|k| draw(k).map_or(0.0, |s| f64::from(s.weight.x))).collect();
         let (mean, error) = mean_and_error(&drawn);
@@ -324,14 +325,14 @@ fn relief_shadows_its_own_diffuse_light() {
 /// both transport modes, and on white it adds no energy.
 #[test]
 fn a_clear_coat_keeps_its_own_normal() {
-    let tables = EnergyTables::new([1.5]);
+    let (tables, arena) = (EnergyTables::new([1.5]), Bump::new());
     let u = |k: u64, salt: u64| (mix(mix(k) ^ salt) >> 40) as f32 / 16_777_216.0;
     let upper = |k: u64| Vec3::new(direction(k).x, direction(k).y, direction(k).z.abs());
     for clearcoat_alpha in [0.0, 0.16] {
         let white = Parameters { clearcoat: 1.0, clearcoat_alpha, ..Parameters::default() };
         let black = Parameters { base_color: Rgb::ZERO, ..white };
         let shading = |p: &Parameters, n: Vec3, wo| {
-            Shading::new(Frame::from_normal(n), Vec3::Z, support::bsdf(p, &tables), wo).with_normal_map(Vec3::Z)
+            Shading::new(Frame::from_normal(n), Vec3::Z, support::bsdf(p, &tables), wo).with_normal_map(Vec3::Z, &arena)
         };
         for k in 0..200 {
             let (wo, wi, n) = (upper(3 * k), upper(3 * k + 1), upper(3 * k + 2));
