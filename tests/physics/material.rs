@@ -195,7 +195,7 @@ fn rows_are_computed_at_first_use() {
 }
 
 /// Creates the shading for a viewing direction.
-type Shade<'a> = &'a dyn Fn(Vec3) -> Shading<'static>;
+type Shade<'a> = &'a dyn Fn(Vec3) -> Shading<'a>;
 
 /// Calls `check` with a tilted shading normal and a function that creates the shading for a viewing direction.
 fn tilted(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, Shade<'_>)) {
@@ -279,8 +279,12 @@ fn steep_metal_is_not_black() {
     let below = n * (2.0 * n.dot(wo)) - wo;
     let lamp = Vec3::new(below.x, below.y, -below.z);
     assert!(below.z < -0.2);
-    let to_lamp =
-        shading(&mirror, wo).with_normal_map(Vec3::Z, &arena).sample(Transport::Radiance, LobeSet::ALL, 0.5, Vec2::splat(0.5));
+    let to_lamp = shading(&mirror, wo).with_normal_map(Vec3::Z, &arena).sample(
+        Transport::Radiance,
+        LobeSet::ALL,
+        0.5,
+        Vec2::splat(0.5),
+    );
     let to_lamp = to_lamp.expect("a mirror's direction");
     assert!((to_lamp.wi - lamp).length() < 1e-5 && (to_lamp.weight.x - 1.0).abs() < 1e-5, "{to_lamp:?}");
     let lit = shading(&mirror, lamp).with_normal_map(Vec3::Z, &arena);
