@@ -6,7 +6,8 @@ import os
 import tempfile
 
 import bpy
-from mathutils import Matrix
+import numpy
+from mathutils import Matrix, Vector
 
 import panorama
 
@@ -14,8 +15,11 @@ _PIXELS = 16  # per side of the picture below a sun; a picture around a lamp has
 _SAMPLES = 16
 
 
-def strength(light, distance):
-    """The factor per channel by which the nodes of a lamp change its light at `distance` (m), mean over directions."""
+def strength(light, distance, lights_scene):
+    """The factor per channel by which the nodes of a lamp change its light at `distance` (m).
+
+    It is the mean over the directions from the lamp, in its own axes, for which `lights_scene(direction)` is true.
+    """
     plain = light.copy()
     try:
         if hasattr(plain, "normalize"):
@@ -26,7 +30,21 @@ def strength(light, distance):
         reference = _received(plain, distance)
     finally:
         bpy.data.lights.remove(plain)
+    weights = numpy.ones(shaped.shape[:2])
+    if light.type != "SUN":
+        directions, weights = _directions(*shaped.shape[:2])
+        seen = weights * [[lights_scene(Vector(one)) for one in row] for row in directions]
+        weights = seen if (reference * seen[..., None]).any() else weights
+    shaped, reference = ((weights[..., None] * picture).sum((0, 1)) for picture in (shaped, reference))
     return [float(a / b) if b > 0 else 0.0 for a, b in zip(shaped, reference)]
+
+
+def _directions(rows, columns):
+    """The directions from a lamp to the pixels of `_received`, (rows, columns, 3), and their relative solid angles."""
+    up = math.pi * ((numpy.arange(rows)[:, None] + 0.5) / rows - 0.5) + numpy.zeros((1, columns))
+    turn = 2 * math.pi * (0.5 - (numpy.arange(columns)[None] + 0.5) / columns) + numpy.zeros((rows, 1))
+    around = numpy.cos(up)
+    return numpy.stack([around * numpy.cos(turn), around * numpy.sin(turn), numpy.sin(up)], -1), around
 
 
 def _switch_nodes_off(light):
@@ -40,7 +58,7 @@ def _switch_nodes_off(light):
 
 
 def _received(light, distance):
-    """Mean light per channel on a white sphere around a lamp, or on a white plane below a sun."""
+    """The light on a white sphere around a lamp by direction, or on a white plane below a sun: a picture."""
     sun = light.type == "SUN"
     with contextlib.ExitStack() as undo:
         stage, observer = undo.enter_context(panorama.stage(None, "lamp"))
@@ -60,11 +78,7 @@ def _received(light, distance):
             panorama.look_around(observer)
             size = 2 * _PIXELS, _PIXELS
         folder = undo.enter_context(tempfile.TemporaryDirectory())
-        pixels = panorama.render(stage, os.path.join(folder, "lamp.exr"), *size, _SAMPLES)
-    if sun:
-        return pixels.mean((0, 1))
-    weights = [math.cos(math.pi * ((row + 0.5) / _PIXELS - 0.5)) for row in range(_PIXELS)]
-    return sum(w * row for w, row in zip(weights, pixels.mean(1))) / sum(weights)
+        return panorama.render(stage, os.path.join(folder, "lamp.exr"), *size, _SAMPLES)
 
 
 def _plane(undo):

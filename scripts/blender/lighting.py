@@ -156,11 +156,18 @@ def _measure_nodes(thing, flat, warn):
     if node is not None and constant(node.inputs["Strength"]) is not None and _colour(node.inputs["Color"]):
         return
     distance = _usual_distance(thing, flat)
-    flat.lamp_factors[light.name] = lamp_nodes.strength(light, distance)
+    depsgraph, place = bpy.context.evaluated_depsgraph_get(), thing.matrix_world
+    axes = place.to_3x3().normalized()
+
+    def lights_scene(direction):
+        return flat.scene.ray_cast(depsgraph, place.translation, axes @ direction)[0]
+
+    flat.lamp_factors[light.name] = lamp_nodes.strength(light, distance, lights_scene)
     kinds = {n.type for n, _ in upstream(output.inputs["Surface"]).values()}
     if not kinds <= FUNCTIONS | {"EMISSION", "ADD_SHADER", "MIX_SHADER"}:
         what = "its IES profile is not carried" if profile else "its shader nodes are not carried"
-        warn(flat.where(thing), f"{what}: it shines alike in all directions, with their mean strength at {distance:.3g} m")
+        warn(flat.where(thing), f"{what}: it shines alike in all directions, with the mean strength of those that "
+             f"meet objects, at {distance:.3g} m")
 
 
 def _usual_distance(thing, flat):

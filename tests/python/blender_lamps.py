@@ -8,6 +8,7 @@ import bpy
 import export
 import glb
 from cycles_comparison import eye, glow, lamp, shared, square
+from mathutils import Vector
 
 
 class Lamps(cycles_comparison.CyclesComparison):
@@ -163,6 +164,28 @@ class Lamps(cycles_comparison.CyclesComparison):
         tree.links.new(falloff.outputs["Constant"], node.inputs["Strength"])
         self.alike(self.caustique(), self.cycles(), parts=1, tolerance=0.5)
         self.assertIn("its shader nodes are not carried: it shines alike", "".join(self.warnings))
+
+    def test_profiles_have_the_strength_of_directions_that_meet_objects(self):
+        """A lamp with an IES profile that varies around two axes lights a small square in different directions."""
+        profile = bpy.data.texts.new("profile")
+        profile.write("IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 3 5 1 2 0 0 0 1 1 100\n0 90 180\n0 90 180 270 360\n"
+                      "500 1000 100\n500 300 100\n500 50 100\n500 200 100\n500 1000 100\n")
+        body = lamp("POINT", (0, 0, 0), 300.0, shadow_soft_size=0.05, use_soft_falloff=False)
+        body.rotation_euler = (0.3, 0.5, 0.8)
+        tree, node = self.nodes(body)
+        source = tree.nodes.new("ShaderNodeTexIES")
+        source.ies = profile
+        tree.links.new(source.outputs[0], node.inputs["Strength"])
+        wall = shared.place("wall", square(shared.node_material("grey", "ShaderNodeBsdfDiffuse"), 0.5))
+        seen = []
+        for at in ((2, 0, 0), (-2, 0.5, 0), (0, 2, 1), (0, -2, 1), (0.3, 0, -2), (0, 0, 2)):
+            wall.location = at
+            wall.rotation_euler = Vector(at).to_track_quat("-Z", "Y").to_euler()
+            eye((0, 0, 0), at, lens=80)
+            theirs = self.cycles(64)
+            self.alike(self.caustique(32), theirs, parts=1, tolerance=0.12)
+            seen.append(theirs.mean())
+        self.assertGreater(max(seen), 3 * min(seen))
 
     def test_a_sun_in_the_sky_is_a_lamp(self):
         self.floor()
