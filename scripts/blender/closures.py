@@ -23,6 +23,11 @@ class Leaf:
     ior: object = None
     coat: object = None
 
+    @property
+    def type(self):
+        """The type of the node. Blender 4.4 gives the Diffuse shader another name."""
+        return "BSDF_DIFFUSE" if self.node.type == "DIFFUSE_BSDF" else self.node.type
+
 
 @dataclass
 class Mix:
@@ -59,9 +64,9 @@ def _faceted(mix):
     output, path = source_socket(mix.factor, mix.path)
     below, coat = mix.first, mix.second
     leaves = isinstance(below, Leaf) and isinstance(coat, Leaf) and below.coat is None
-    if output is None or not leaves or coat.node.type not in _GLOSSY or not output.is_output:
+    if output is None or not leaves or coat.type not in _GLOSSY or not output.is_output:
         return mix
-    if below.node.type not in {"BSDF_DIFFUSE", "BSDF_REFRACTION", "BSDF_TRANSPARENT"}:
+    if below.type not in {"BSDF_DIFFUSE", "BSDF_REFRACTION", "BSDF_TRANSPARENT"}:
         return mix
     node = output.node
     if node.type == "FRESNEL":

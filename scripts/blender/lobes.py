@@ -52,7 +52,7 @@ class Reader:
         node = leaf.node
         if leaf.coat is not None:
             return self._dielectric(leaf)
-        read = _READERS.get(node.type)
+        read = _READERS.get(leaf.type)
         if read is None:
             self.say(f"its {node.bl_label} shader is approximated by diffuse reflection of its colour")
             read = Reader._diffuse
@@ -75,9 +75,8 @@ class Reader:
         return None if value is None or is_constant(value) else value
 
     def _diffuse(self, leaf):
-        node = leaf.node
         colour = self.get(leaf, "Color") or self.get(leaf, "Base Color") or BLACK
-        if node.type == "BSDF_DIFFUSE":
+        if leaf.type == "BSDF_DIFFUSE":
             self._warn_unless_zero(
                 leaf, "Roughness", "the Roughness of its Diffuse shader is not carried: it is Lambertian")
         return Lobe(base=colour, normal=self.normal(leaf), faceted=False)
@@ -120,7 +119,7 @@ class Reader:
         colour = self.get(leaf, "Color")
         lobe = Lobe(base=colour, roughness=self.get(leaf, "Roughness"), transmission=1.0, ior=self.get(leaf, "IOR"),
                     normal=self.normal(leaf))
-        if leaf.node.type == "BSDF_GLASS":  # Cycles also tints its reflection
+        if leaf.type == "BSDF_GLASS":  # Cycles also tints its reflection
             lobe.specular = self.graph.minimum(self.graph.max_component(colour), 1.0)
             lobe.specular_colour = self.graph.divide(colour, self.graph.maximum(lobe.specular, 1e-6))
             if is_constant(colour) and max(colour) - min(colour) > 0.25:
@@ -137,8 +136,8 @@ class Reader:
         coat = leaf.coat
         lobe = Lobe(base=self.get(leaf, "Color"), ior=ior, specular=1.0, normal=self.normal(leaf),
                     specular_colour=self.get(coat, "Color"))
-        if leaf.node.type != "BSDF_DIFFUSE":
-            lobe.transmission, lobe.thin = 1.0, leaf.node.type == "BSDF_TRANSPARENT"
+        if leaf.type != "BSDF_DIFFUSE":
+            lobe.transmission, lobe.thin = 1.0, leaf.type == "BSDF_TRANSPARENT"
         return self._facets(coat, lobe)
 
     def _facets(self, leaf, lobe):
@@ -188,7 +187,7 @@ class Reader:
         """
         g, turn = self.graph, self.get(leaf, "Anisotropic Rotation")
         alpha = g.multiply(lobe.roughness, lobe.roughness)
-        if leaf.node.type == "BSDF_PRINCIPLED":
+        if leaf.type == "BSDF_PRINCIPLED":
             aspect = g.power(g.subtract(1.0, g.multiply(0.9, stretch)), 0.5)
         else:
             # The other shaders are smoother along the tangent where their anisotropy is positive.

@@ -49,17 +49,17 @@ class _Match:
     def surface(self, weighed, has_volume):
         """The matched surface of pairs of leaf and weight."""
         g, clear, lobes, shining, kinds = self.graph, [], [], [], []
-        self.adds_up &= all(leaf.node.type not in {"EMISSION", "HOLDOUT", "BSDF_RAY_PORTAL"} for leaf, _ in weighed)
+        self.adds_up &= all(leaf.type not in {"EMISSION", "HOLDOUT", "BSDF_RAY_PORTAL"} for leaf, _ in weighed)
         for leaf, weight in weighed:
-            if leaf.node.type == "BSDF_TRANSPARENT" and leaf.coat is None:
+            if leaf.type == "BSDF_TRANSPARENT" and leaf.coat is None:
                 clear.append((weight, self.reader.get(leaf, "Color")))
-            elif leaf.node.type == "EMISSION":
+            elif leaf.type == "EMISSION":
                 shining.append((weight, self.reader.get(leaf, "Color"), self.reader.get(leaf, "Strength")))
-            elif leaf.node.type in {"HOLDOUT", "BSDF_RAY_PORTAL"}:
+            elif leaf.type in {"HOLDOUT", "BSDF_RAY_PORTAL"}:
                 self.say(f"its {leaf.node.bl_label} shader is not carried: it is black")
             else:
                 lobe, part = self.reader.lobe(leaf), weight
-                if leaf.node.type == "BSDF_PRINCIPLED":
+                if leaf.type == "BSDF_PRINCIPLED":
                     alpha = g.clamp(self.reader.get(leaf, "Alpha"))
                     if alpha != 1.0:
                         part = g.multiply(weight, alpha)
@@ -67,7 +67,7 @@ class _Match:
                     if lobe.strength != 0.0 and lobe.emission != BLACK:
                         shining.append((part, lobe.emission, lobe.strength))
                 lobes.append((lobe, part))
-                kinds.append("fresnel" if leaf.coat is not None else leaf.node.type)
+                kinds.append("fresnel" if leaf.coat is not None else leaf.type)
         if not lobes:
             return self._through(clear, shining, has_volume)
         alpha, within = self._alpha(clear, lobes)

@@ -40,6 +40,9 @@ _STEEP_WARNING = (
 _OLD_STEEP_WARNING = (
     "its normals lean by more than 14 degrees from the surface: Cycles of this version of Blender turns them towards the "
     "viewer, which Blender 4.5 and caustique do not; use a Displace modifier to see the same in both")
+_OLD_BUMP_WARNING = (
+    "Cycles before Blender 4.4 smooths its bumps over a pixel of the picture, which Blender 4.4 and caustique do not: in "
+    "small pictures they are steeper here")
 
 
 def matt(colour):
@@ -232,6 +235,8 @@ class Plan:
 
     def _warn_of_steep_normals(self, cosines):
         """Warn of normals from the cosines between them and the surface normal."""
+        if bpy.app.version < (4, 4, 0) and (self.bumped or any(n.type == "BUMP" for t in self.graph.trees() for n in t.nodes)):
+            self.say(_OLD_BUMP_WARNING)
         if numpy.mean(cosines < _STEEP_COSINE) > _MIN_STEEP:
             self.say(_STEEP_WARNING)
         elif bpy.app.version < (4, 5, 0) and numpy.mean(cosines < _OLD_STEEP_COSINE) > _MIN_STEEP:

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 from unittest import mock
 
@@ -328,6 +329,10 @@ class Matched(Case):
     def test_diffuse_reflectance_of_glass(self):
         """Duntley's closed form for diffuse light from outside at an index of 1.5: 9.18 %."""
         self.assertAlmostEqual(closures.mean_reflectance(1.5), 0.0918, 4)
+
+    def test_blender_4_4_has_another_name_for_diffuse_shaders(self):
+        for name in ("BSDF_DIFFUSE", "DIFFUSE_BSDF"):
+            self.assertEqual(closures.Leaf(types.SimpleNamespace(type=name), ()).type, "BSDF_DIFFUSE")
 
     def test_losses_are_named(self):
         losses = {

@@ -4,7 +4,6 @@ import math
 
 import bpy  # First, because it brings the others.
 
-import bmesh
 import numpy
 from mathutils import Vector
 
@@ -224,20 +223,6 @@ def instances_by_nodes(stage):
     ):
         tree.links.new(output, socket)
     stage.body.modifiers.new("instances", "NODES").node_group = tree
-
-
-@feature
-def particles_of_objects(stage):
-    stage.principled(**GREY)
-    form, mesh = bmesh.new(), bpy.data.meshes.new("leaf")
-    bmesh.ops.create_cube(form, size=0.2)
-    form.to_mesh(mesh)
-    form.free()
-    mesh.materials.append(matt("leaf", (0.1, 0.7, 0.1)))
-    stage.body.modifiers.new("particles", "PARTICLE_SYSTEM")
-    settings = stage.body.particle_systems[0].settings
-    settings.type, settings.count, settings.use_advanced_hair, settings.particle_size = "HAIR", 60, True, 0.5
-    settings.render_type, settings.instance_object = "OBJECT", stage.place("leaf", mesh, (0, 0, -3))
 
 
 @feature

@@ -210,11 +210,19 @@ def _show(path, stage, theirs, ours):
     image.save(filepath=path)
 
 
+def _cells():
+    with open(TABLE, encoding="utf-8") as file:
+        return [[cell.strip() for cell in line.split("|")[1:-1]] for line in file if line.startswith("| `")]
+
+
 def rows():
     """The verdicts of the stored table, by feature."""
-    with open(TABLE, encoding="utf-8") as file:
-        cells = [[c.strip() for c in line.split("|")[1:-1]] for line in file if line.startswith("| `")]
-    return {row[0].strip("`"): row[1] for row in cells}
+    return {row[0].strip("`"): row[1] for row in _cells()}
+
+
+def named():
+    """The features of the stored table with warnings, also those whose pictures agree."""
+    return {row[0].strip("`") for row in _cells() if row[-1]}
 
 
 def _summary(title, results):
