@@ -95,8 +95,7 @@ def table(results):
         "<!-- Written by `scripts/lab.sh blend_files FOLDER`; do not edit. -->",
         "",
         "The files are the scenes of the tests of Blender's glTF exporter",
-        "([KhronosGroup/glTF-Blender-IO](https://github.com/KhronosGroup/glTF-Blender-IO), `tests/scenes`), rendered in "
-        "Blender",
+        "([KhronosGroup/glTF-Blender-IO](https://github.com/KhronosGroup/glTF-Blender-IO)), rendered in Blender",
         f"{bpy.app.version_string} at {torture.SIZE} x {torture.SIZE} pixels and compared as in the "
         "[table of features](blender-table.md). Files without a camera are",
         "seen from a corner; if they have no lamp either, a grey world lights them. Many have no images, which were not "
