@@ -34,13 +34,13 @@ def digest(*paths, length=8):
     return state.hexdigest()[:length]
 
 
-def program():
-    """A key of the program: the last commit that touched its sources, and a digest of its bytes, because the build may
+def program(binary=BIN):
+    """A key of a program: the last commit that touched its sources, and a digest of its bytes, because the build may
     be older than the sources."""
     command = ["git", "-C", ROOT, "log", "-1", "--format=%h", "--abbrev=10", "--"]
     command += ["src", "ffi", "Cargo.toml", "Cargo.lock"]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    return f"{done.stdout.strip() or 'unknown'}-{digest(BIN)}"
+    return f"{done.stdout.strip() or 'unknown'}-{digest(binary)}"
 
 
 def scene_key(path):

@@ -12,7 +12,6 @@ from .record import ROOT
 
 # The interpreter that has OIDN (scripts/compare/setup.sh peers).
 PYTHON = installed(".venv-peers")
-PLACE = CACHE / "renders" / program()
 # With --clock cpu, a render is repeated until its core-seconds are within this share of the budget, up to MAX_TRIES times.
 BUDGET_TOLERANCE, MAX_TRIES = 0.05, 4
 
@@ -24,28 +23,28 @@ def has_option(option):
     return f"{option} " in done.stdout
 
 
-def render(scene, method, denoise, budget, seed):
-    """Renders, unless the cache has the render; returns the folder. Raises Failed if the program refuses the render,
-    which the cache also stores."""
+def render(scene, method, denoise, budget, seed, binary=BIN):
+    """Renders by a program, unless the cache has the render; returns the folder. Raises Failed if the program refuses
+    the render, which the cache also stores."""
     name = f"{method}-{denoise or 'default'}-{budget:g}s-{options.clock}-{options.threads}-seed{seed}-{options.width}"
     if options.render_options:
         name += "".join(c if c.isalnum() else "_" for c in " ".join(options.render_options))
-    folder = PLACE / scene_key(scene) / name
+    folder = CACHE / "renders" / program(binary) / scene_key(scene) / name
     known = load(folder / "run.json")
     if known is None:
         with create(folder) as draft:
-            known = _render(scene, method, denoise, budget, seed, draft / "picture.exr")
+            known = _render(scene, method, denoise, budget, seed, draft / "picture.exr", binary)
             save(draft / "run.json", known)
     if "refused" in known:
         raise Failed(known["refused"])
     return folder
 
 
-def _render(scene, method, denoise, budget, seed, file):
+def _render(scene, method, denoise, budget, seed, file, binary):
     if denoise and not has_option("--denoise"):
         return {"refused": "not available: this program has no --denoise"}
     settings = {"method": method, "seed": seed, "width": options.width, "threads": options.threads}
-    line = command("render", scene, "-o", file, **settings, progress="none", denoise=denoise or None)
+    line = command("render", scene, "-o", file, **settings, progress="none", denoise=denoise or None, program=binary)
     line += options.render_options
     seconds, stop = budget, ["--time", f"{budget:.3f}"]
     for _ in range(MAX_TRIES if options.clock == "cpu" else 1):

@@ -1,29 +1,31 @@
-//! `auto`: chooses the method and settings of a render.
+//! `auto`: chooses the numbers of samples of a render.
 //!
-//! Where glass or mirrors focus light, the choice is vertex connection and merging, which weighs all techniques against
-//! each other for every path. Elsewhere each candidate renders a pilot: a short render of the same view in a small
-//! picture, finished as the render will be. A candidate other than [`Candidate::DEFAULT`] is chosen if the error of its
-//! picture is smaller by more than the noise of the pilots explains.
+//! The estimator is vertex connection and merging, which weighs all techniques against each other for every path. Its
+//! numbers of light paths, connections and merges decide where the work goes. A short proxy render of the same view in a
+//! small picture (the pilot) estimates the second moment of every choice, `crate::render::Proxy`. The choice with the
+//! least product of relative second moment and work of an iteration is taken. Path tracing and bidirectional path tracing
+//! are choices without light paths and without merging.
 //!
 //! The cost of an iteration is counted, not timed: mean numbers of vertices ([`crate::transport::VertexCounts`]) times
 //! constants (`crate::render::pass::cost`). So the same arguments give the same choice on any machine with any number of
-//! threads. All candidates get the same work, with about as much work per pixel as in the render. The errors of their
-//! pictures are estimated without a reference, from iterations that no picture contains (`compare`).
+//! threads, unless the render has a time limit: then the pilot ends after a tenth of it.
 
-mod compare;
 mod pilot;
 mod pilot_settings;
 mod weights;
 
-pub use compare::PilotResult;
+pub use pilot::PilotResult;
 pub use pilot_settings::pilot_settings;
 pub use weights::EffectWeight;
 
 use crate::camera::Camera;
-use crate::finish::Finish;
-use crate::render::{Candidate, Cost, RenderInput, Session, Settings, TimeSpent};
+use crate::render::{Candidate, Clock, Cost, RenderInput, Session, Settings, TimeSpent};
 use crate::scene::{Scene, View};
 use pilot::Pilot;
+
+/// Share of the time limit of a render after which the pilot ends. The clock matters on slow or busy machines only:
+/// otherwise counted work ends the pilot earlier.
+const MAX_PILOT_TIME_SHARE: f64 = 0.1;
 
 /// The candidate (method and settings) that `auto` has chosen, and why.
 pub struct Choice {
@@ -50,37 +52,39 @@ impl Choice {
     }
 }
 
-/// Chooses the candidate whose picture, finished by `finish`, has the smallest expected error. `settings_of` returns the
-/// settings of a candidate, `None` if the user's options exclude it. Once `stopped` returns true, pilots end as soon as
-/// they can, and the caller has to discard the choice.
+/// Chooses the candidate with the smallest expected error. `settings_of` returns the settings of a candidate, `None` if
+/// the user's options exclude it. Once `stopped` returns true, the pilot ends as soon as it can, and the caller has to
+/// discard the choice.
 pub fn choose(
     view: View<'_>,
-    finish: &mut Finish,
     settings_of: impl Fn(Candidate) -> Option<Settings>,
     stopped: impl Fn() -> bool,
 ) -> Option<Choice> {
     let mut spent = TimeSpent::default();
-    let choice = spent.measure(|| choose_untimed(view, finish, &settings_of, &stopped));
+    let choice = spent.measure(|| choose_untimed(view, &settings_of, &stopped));
     choice.map(|choice| Choice { spent, ..choice })
 }
 
 fn choose_untimed(
     view: View<'_>,
-    finish: &mut Finish,
     settings_of: &impl Fn(Candidate) -> Option<Settings>,
     stopped: &dyn Fn() -> bool,
 ) -> Option<Choice> {
     let gathering = settings_of(Candidate::GATHERING)?;
+    let clock = Clock::start();
     let pilot = Pilot::new(view, &gathering);
+    let limit = gathering.time.map(|seconds| MAX_PILOT_TIME_SHARE * seconds);
+    let stopped = || stopped() || limit.is_some_and(|limit| clock.seconds() > limit);
     let (effects, effects_seconds) = pilot.weigh_effects();
-    let (pilots, reason) = pilot.run(effects_seconds, finish, settings_of, stopped);
+    let (pilots, reason) = pilot.run(effects_seconds, settings_of, &stopped);
     let chosen = pilots.iter().find(|pilot| pilot.chosen);
     let candidate = chosen.map_or_else(|| candidate_without_pilot(view.scene, settings_of), |chosen| chosen.candidate);
     let settings = settings_of(candidate)?;
     let cost = &pilot.cost;
     let weights =
         effects.into_iter().map(|effect| effect.weight_for(cost, candidate, &settings, pilot.pixels)).collect();
-    let seconds_per_iteration = cost.film_seconds(candidate, &settings, view.camera);
+    let predicted = |chosen: &PilotResult| chosen.seconds_per_iteration;
+    let seconds_per_iteration = chosen.map_or_else(|| cost.film_seconds(candidate, &settings, view.camera), predicted);
     Some(Choice { settings, candidate, pilots, weights, reason, seconds_per_iteration, spent: TimeSpent::default() })
 }
 

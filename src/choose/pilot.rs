@@ -1,12 +1,10 @@
-//! Candidates of a scene, and the work that goes to their pilots: size of the picture, iterations, light paths.
+//! Candidates of a scene, and the pilot that estimates the noise of each: size of its picture, and iterations.
 
-use super::compare::{Budget, MIN_ITERATIONS, PilotResult, PilotRun, run_pilots};
 use super::pilot_settings::{EFFECTS_PHOTON_SHARE, pilot_settings};
 use super::weights::{self, WeighedEffect};
 use crate::camera::Camera;
-use crate::finish::Finish;
 use crate::plan::{Effect, Presence};
-use crate::render::{Candidate, Cost, Method, RenderInput, Settings};
+use crate::render::{Candidate, Cost, Counts, Method, Proxy, Settings};
 use crate::scene::{Scene, View};
 
 /// Share of the render's work that pilots (short renders by the compared methods) and the measurement of effects may
@@ -23,14 +21,56 @@ const MIN_PIXELS: f64 = 1024.0;
 const MAX_PIXELS: f64 = 16384.0;
 /// Number of pixels of the pictures that measure the effects of a scene.
 const EFFECTS_PIXELS: f64 = 768.0;
-/// Number of a pilot's iterations over that of the render. Close to 1, so that the pilot's error is like the render's,
-/// and small enough for a picture of some size.
-const ITERATION_SHARE: f64 = 0.25;
+/// Smallest number of iterations of a pilot.
+const MIN_ITERATIONS: u64 = 4;
+/// Largest number of iterations of a pilot.
+const MAX_ITERATIONS: u64 = 256;
+/// Number of iterations of a pilot whose picture has neither the smallest nor the largest size.
+const ITERATIONS: f64 = 16.0;
+/// Work of an iteration of a pilot, which finds three weights of every path, over that of a render's iteration.
+const PILOT_COST: f64 = 4.0;
+/// Numbers of light paths per pixel that are compared, in sixteenths.
+const LIGHT_PATHS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
+/// Numbers of connections that are compared.
+const CONNECTIONS: [u32; 4] = [0, 1, 2, 4];
 /// Core-seconds that one second of the time limit `--time` counts as, on every machine. It is small, so that on most
 /// machines pilots take less than their share; on one core they take twice their share.
 const ASSUMED_CORES: f64 = 2.0;
 /// Core-seconds that a render without limits of time and iterations counts as.
 const UNLIMITED_CORE_SECONDS: f64 = 1000.0;
+
+/// Numbers of samples that are compared: each number of light paths with each number of connections, with and without
+/// merging, and path tracing.
+fn all_counts() -> Vec<Counts> {
+    let mut all = vec![Counts::PATHS];
+    for light_paths in LIGHT_PATHS {
+        for connections in CONNECTIONS {
+            all.extend([1.0, 0.0].map(|merging| Counts { light_paths, connections, merging }));
+        }
+    }
+    all
+}
+
+/// Result of the pilot for a candidate.
+#[derive(Clone, Copy, Debug)]
+pub struct PilotResult {
+    /// The candidate (method and settings).
+    pub candidate: Candidate,
+    /// Expected squared relative noise of the render before the finish: the relative second moment of an iteration over
+    /// the number of iterations. Infinite if the candidate misses light.
+    pub squared_error: f64,
+    /// Core-seconds of an iteration of the whole picture, predicted from counted vertices.
+    pub seconds_per_iteration: f64,
+    /// Whether `auto` has chosen this candidate for the render.
+    pub chosen: bool,
+}
+
+impl PilotResult {
+    /// The expected relative noise: the root of [`PilotResult::squared_error`].
+    pub fn error(&self) -> f64 {
+        self.squared_error.sqrt()
+    }
+}
 
 /// Candidates (methods with settings) for a scene where glass or mirrors focus light, the best one first; empty for
 /// other scenes.
@@ -41,32 +81,6 @@ pub(super) fn candidates_for_focused_light(scene: &Scene) -> &'static [Candidate
         &[Candidate::GUIDED, Candidate::DEFAULT]
     } else {
         &[Candidate::GUIDED_GATHERING, Candidate::GATHERING, Candidate::GUIDED, Candidate::DEFAULT]
-    }
-}
-
-/// Candidates (methods with settings) to compare, as far as the user's options allow them. Where glass or mirrors focus
-/// light it is the best one only: a pilot is too short to miss the light that other candidates do not find, and would
-/// favour them for it.
-fn candidates(scene: &Scene, settings_of: &impl Fn(Candidate) -> Option<Settings>) -> Vec<(Candidate, Settings)> {
-    let with_settings = |candidate: &Candidate| settings_of(*candidate).map(|settings| (*candidate, settings));
-    let focused = candidates_for_focused_light(scene);
-    if !focused.is_empty() {
-        return focused.iter().find_map(with_settings).into_iter().collect();
-    }
-    [Candidate::DEFAULT, Candidate::unguided(Method::Path), Candidate::unguided(Method::Bdpt)]
-        .iter()
-        .filter_map(with_settings)
-        .collect()
-}
-
-/// Reason, for messages, why a single candidate is chosen without a pilot.
-fn reason_without_pilot(candidate: Option<Candidate>, focused: bool) -> &'static str {
-    match candidate.map(|candidate| candidate.method) {
-        Some(Method::Vcm) if focused => "light is focused here, which it finds by all techniques",
-        Some(Method::Sppm) if focused => {
-            "a lamp without size shines into cloudy glass, where vcm does not find all light"
-        }
-        _ => "the only candidate that these options leave",
     }
 }
 
@@ -88,20 +102,14 @@ pub(super) struct Pilot<'a> {
     budget: f64,
 }
 
-/// Size of the pilots' picture, and their work.
-struct PilotSize {
-    camera: Camera,
-    /// Core-seconds of all pilots together, as predicted from counted vertices.
-    seconds: f64,
-}
-
 impl<'a> Pilot<'a> {
     pub fn new(view: View<'a>, gathering: &'a Settings) -> Pilot<'a> {
         let pixels = pixel_count(view.camera);
         let cost = Cost::count(view.scene, view.camera, gathering, None);
         let budget = match (gathering.iterations, gathering.time) {
             (Some(n), time) => {
-                let work = n as f64 * cost.iteration_seconds(Candidate::GATHERING, gathering, pixels);
+                let vcm = Settings { method: Method::Vcm, ..gathering.clone() };
+                let work = n as f64 * cost.iteration_seconds(Candidate::DEFAULT, &vcm, pixels);
                 time.map_or(work, |seconds| work.min(seconds * ASSUMED_CORES))
             }
             (None, Some(seconds)) => seconds * ASSUMED_CORES,
@@ -136,64 +144,112 @@ impl<'a> Pilot<'a> {
         (weights::weigh(view, &settings, &presence, &scene_effects, count), seconds)
     }
 
-    /// Runs the pilots of all candidates, with the work that the measurement of effects (`effects_seconds`) has left.
-    /// Returns their results, or the reason why there are none.
+    /// Estimates the noise of all candidates of `vcm` with the work that the measurement of effects (`effects_seconds`)
+    /// has left. Returns the results of the chosen one and of those that a user would compare it with, or the reason why
+    /// there are none.
     pub fn run(
         &self,
         effects_seconds: f64,
-        finish: &mut Finish,
         settings_of: &impl Fn(Candidate) -> Option<Settings>,
         stopped: &dyn Fn() -> bool,
     ) -> (Vec<PilotResult>, Option<&'static str>) {
-        let View { scene, camera } = self.view;
-        let candidates = candidates(scene, settings_of);
-        if candidates.len() < 2 {
-            let focused = !candidates_for_focused_light(scene).is_empty();
-            let candidate = candidates.first().map(|(candidate, _)| *candidate);
-            return (Vec::new(), Some(reason_without_pilot(candidate, focused)));
+        let scene = self.view.scene;
+        let misses_light = !Method::Vcm.search().finds(Effect::Sds, &scene.survey);
+        let focused = !candidates_for_focused_light(scene).is_empty();
+        if misses_light && focused {
+            return (
+                Vec::new(),
+                Some("a lamp without size shines into cloudy glass, where vcm does not find all light"),
+            );
         }
-        let [wanted, most] =
-            [PILOT_WORK_SHARE, MAX_PILOT_WORK_SHARE].map(|share| share * self.budget - effects_seconds);
-        let Some(size) = self.size(&candidates, wanted, most) else {
+        // Without a guide a pilot may miss the focused light, and would prefer not to look for it.
+        let proxy = |guided| Some((guided, settings_of(Candidate::with_counts(Counts::DEFAULT, guided))?));
+        let Some((guided, settings)) = proxy(focused).or_else(|| proxy(false)) else {
+            return (Vec::new(), Some("the only candidate that these options leave"));
+        };
+        let Some(size) = self.size(&settings, effects_seconds) else {
             return (Vec::new(), Some("the render is too short to try others"));
         };
-        let pixels = pixel_count(&size.camera);
-        // Light paths per pixel are the same as in the render.
-        let inputs: Vec<RenderInput<'_>> = candidates
-            .iter()
-            .map(|(_, settings)| RenderInput::new(scene, &size.camera, &pilot_settings(settings, pixels / self.pixels)))
-            .collect();
-        let mut runs: Vec<PilotRun<'_>> = inputs
-            .iter()
-            .zip(&candidates)
-            .map(|(input, (candidate, settings))| {
-                let seconds = self.cost.iteration_seconds(*candidate, input.settings(), pixels);
-                PilotRun::new(input, *candidate, seconds, self.cost.film_seconds(*candidate, settings, camera))
-            })
-            .collect();
-        let budget = Budget { pilots: size.seconds, render: self.budget };
-        (run_pilots(&mut runs, finish, budget, stopped), None)
+        (chosen_and_usual(self.results(&size, guided, &settings, settings_of, stopped)), None)
     }
 
-    /// Size of the pilots: `wanted` core-seconds, or more if the smallest picture needs more. `None` if that needs more
-    /// than `most`.
-    fn size(&self, candidates: &[(Candidate, Settings)], wanted: f64, most: f64) -> Option<PilotSize> {
-        let count = candidates.len() as f64;
-        let iteration_seconds = |(candidate, settings): &(Candidate, Settings), pixels: f64| {
-            self.cost.iteration_seconds(*candidate, &pilot_settings(settings, pixels / self.pixels), pixels)
+    /// Expected noise of all candidates with or without guided light paths, from one proxy render by `settings`.
+    fn results(
+        &self,
+        size: &PilotSize,
+        guided: bool,
+        settings: &Settings,
+        settings_of: &impl Fn(Candidate) -> Option<Settings>,
+        stopped: &dyn Fn() -> bool,
+    ) -> Vec<PilotResult> {
+        let View { scene, camera } = self.view;
+        let counts = all_counts();
+        let of_pilot = pilot_settings(settings, pixel_count(&size.camera) / self.pixels);
+        let seconds = self.cost.film_seconds(Candidate::DEFAULT, settings, camera);
+        let proxy = Proxy {
+            scene,
+            camera: &size.camera,
+            settings: &of_pilot,
+            render_width: camera.size().0,
+            typical_iteration: ((0.5 * self.budget / seconds) as u64).max(1),
+            candidates: &counts,
         };
-        let needed = |pixels: f64| {
-            let dearest = candidates.iter().map(|one| iteration_seconds(one, pixels)).fold(0.0, f64::max);
-            count * MIN_ITERATIONS as f64 * dearest
+        let guide = proxy.learn_guide();
+        // Guided light paths are longer, because most of them meet glass.
+        let guided_cost = guide.as_ref().map(|guide| Cost::count(scene, camera, self.gathering, Some(guide)));
+        let moments = proxy.measure(guide.as_ref(), size.iterations, stopped).relative();
+        let result = |(counts, moment): (Counts, f64)| {
+            let candidate = Candidate::with_counts(counts, guided && counts.light_paths > 0);
+            let settings = settings_of(candidate)?;
+            let cost = guided_cost.as_ref().filter(|_| candidate.guided).unwrap_or(&self.cost);
+            let seconds_per_iteration = cost.film_seconds(candidate, &settings, camera);
+            let finds_all = self.finds_all(settings.method);
+            let squared_error = if finds_all { moment * seconds_per_iteration / self.budget } else { f64::INFINITY };
+            Some(PilotResult { candidate, squared_error, seconds_per_iteration, chosen: false })
         };
-        // Work per pixel is the same as in the render, so iterations and pixels share the budget.
-        let pixels = self.pixels * wanted / (count * ITERATION_SHARE * self.budget);
-        let least = MIN_PIXELS.min(self.pixels);
-        let pixels = pixels.clamp(least, MAX_PIXELS.max(least)).min(self.pixels);
-        let pixels = if needed(pixels) > wanted { least } else { pixels };
-        (needed(pixels) <= most).then(|| PilotSize {
-            camera: self.view.camera.downscale((pixels / self.pixels).sqrt()),
-            seconds: wanted.max(needed(pixels)),
-        })
+        counts.into_iter().zip(moments).filter_map(result).collect()
     }
+
+    /// Whether a method finds all light of the scene that `vcm` finds. A pilot may miss what is rare.
+    fn finds_all(&self, method: Method) -> bool {
+        let survey = &self.view.scene.survey;
+        let presence = Presence::of(self.view.scene, self.view.camera);
+        Effect::ALL
+            .into_iter()
+            .filter(|effect| presence.has(*effect))
+            .all(|effect| method.search().finds(effect, survey) || !Method::Vcm.search().finds(effect, survey))
+    }
+
+    /// Picture and iterations of the proxy; `None` if the smallest one takes too much of the render.
+    fn size(&self, settings: &Settings, effects_seconds: f64) -> Option<PilotSize> {
+        let [wanted, most] =
+            [PILOT_WORK_SHARE, MAX_PILOT_WORK_SHARE].map(|share| share * self.budget - effects_seconds);
+        let iteration = |pixels: f64| PILOT_COST * self.cost.iteration_seconds(Candidate::DEFAULT, settings, pixels);
+        let least = MIN_PIXELS.min(self.pixels);
+        let pixels = (self.pixels * wanted / (ITERATIONS * iteration(self.pixels))).clamp(least, MAX_PIXELS.max(least));
+        let pixels = pixels.min(self.pixels);
+        let iterations = ((wanted / iteration(pixels)) as u64).clamp(MIN_ITERATIONS, MAX_ITERATIONS);
+        ((iterations + 1) as f64 * iteration(pixels) <= most.max(wanted))
+            .then(|| PilotSize { camera: self.view.camera.downscale((pixels / self.pixels).sqrt()), iterations })
+    }
+}
+
+/// Picture and iterations of a proxy.
+struct PilotSize {
+    camera: Camera,
+    iterations: u64,
+}
+
+/// Marks the result with the least expected error as chosen, and returns it with the results of `vcm`, `path` and `bdpt`
+/// by default numbers.
+fn chosen_and_usual(mut results: Vec<PilotResult>) -> Vec<PilotResult> {
+    let best = (0..results.len()).min_by(|&a, &b| results[a].squared_error.total_cmp(&results[b].squared_error));
+    if let Some(best) = best {
+        results[best].chosen = true;
+    }
+    let without_merging = Counts { merging: 0.0, ..Counts::DEFAULT };
+    let usual = [Counts::DEFAULT, without_merging, Counts::PATHS];
+    let is_usual = |one: &PilotResult| usual.contains(&one.candidate.counts);
+    results.retain(|one| one.chosen || is_usual(one));
+    results
 }

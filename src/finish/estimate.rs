@@ -63,14 +63,8 @@ impl Estimate {
     /// The estimate by the first half of the iterations: the mean of the first two of the four quarters.
     #[must_use]
     pub fn first_half(&self, quarters: &[Picture; QUARTERS]) -> Estimate {
-        self.from_partial(quarters[0].average(&quarters[1]), 2.0)
-    }
-
-    /// The estimate by a part of the iterations, 1 / `divisor` of them, whose mean is given; standard errors grow
-    /// accordingly.
-    #[must_use]
-    pub fn from_partial(&self, mean: Picture, divisor: f32) -> Estimate {
-        let deviation = self.deviation.map(|error| error * divisor.sqrt());
+        let mean = quarters[0].average(&quarters[1]);
+        let deviation = self.deviation.map(|error| error * std::f32::consts::SQRT_2);
         let (albedo, normal, alpha) = (self.albedo.clone(), self.normal.clone(), self.alpha.clone());
         Estimate { mean, deviation, albedo, normal, alpha }
     }

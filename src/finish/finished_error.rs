@@ -1,7 +1,7 @@
 //! The error of a finished picture and its distribution over the pixels, estimated without a reference.
 //!
 //! A picture `F` is finished from quarters 1 and 2 of the iterations exactly as the whole render is, and compared with
-//! quarters 3 and 4 by the [cross product](super::cross_product)
+//! quarters 3 and 4 by the cross product
 //!
 //! ```text
 //! p = (F - Q3)(F - Q4)

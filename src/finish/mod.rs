@@ -12,7 +12,6 @@
 
 pub mod bound;
 mod conserve;
-pub mod cross_product;
 pub mod denoiser;
 mod estimate;
 mod finished_error;
@@ -87,13 +86,6 @@ impl Finish {
     /// A finish by a denoiser, and by the network that combines bandwidth levels with equation (6), if there is one.
     pub fn new(denoiser: Denoiser, network: Option<Combiner>) -> Finish {
         Finish { denoiser, quality: Quality::High, network }
-    }
-
-    /// The finish for pilots, the short test renders that `auto` compares: with our own denoiser if the render has any.
-    /// A whole render and each of its shards then choose alike, with and without the library of another denoiser.
-    pub fn for_pilots(choice: DenoiserChoice) -> Finish {
-        let none = choice == DenoiserChoice::None;
-        Finish::new(if none { Denoiser::None } else { Denoiser::Own }, None)
     }
 
     /// Name of the denoiser, with the version of Open Image Denoise.
@@ -280,18 +272,4 @@ fn with_rest(mut groups: Vec<Named>, whole: &Picture) -> Vec<Named> {
         groups.insert(0, (String::new(), rest));
     }
     groups
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Shards of one render do not communicate, and have to choose as one render does.
-    #[test]
-    fn pilots_are_finished_alike_by_every_denoiser() {
-        for choice in [DenoiserChoice::Auto, DenoiserChoice::Oidn, DenoiserChoice::Own] {
-            assert_eq!(Finish::for_pilots(choice).denoiser(), "own");
-        }
-        assert_eq!(Finish::for_pilots(DenoiserChoice::None).denoiser(), "none");
-    }
 }

@@ -233,7 +233,6 @@ impl RenderOptions {
             None => MethodRequest::Auto(AutoRequest {
                 fallback: settings,
                 settings_of: Box::new(|candidate, size| self.candidate_settings(candidate, size)),
-                finish: Box::new(self.pilot_finish()),
             }),
         })
     }
@@ -245,19 +244,18 @@ impl RenderOptions {
     pub fn settings(&self) -> Result<Settings> {
         // The default method has every option that any candidate of `auto` has, so this finds all contradictions.
         let method = self.method.0.unwrap_or_default();
-        let candidate =
-            Candidate { method, guided: self.guide == Some(OnOff::On), indirect: self.indirect.unwrap_or_default() };
+        let candidate = Candidate {
+            guided: self.guide == Some(OnOff::On),
+            indirect: self.indirect.unwrap_or_default(),
+            counts: self.counts()?,
+            ..Candidate::unguided(method)
+        };
         self.settings_of(candidate, self.method.0)
     }
 
     /// The denoiser of the picture; none with `--no-finish`.
     fn denoiser(&self) -> DenoiserChoice {
         if self.no_finish { DenoiserChoice::None } else { self.finish.denoise }
-    }
-
-    /// The denoiser for the pictures of the pilots, the short renders by which `auto` compares methods.
-    fn pilot_finish(&self) -> Finish {
-        Finish::for_pilots(self.denoiser())
     }
 
     /// The finish of a pilot (a small render) that predicts the error of the render: the denoiser of the render,
@@ -283,7 +281,11 @@ impl RenderOptions {
         let required = self.settings().ok()?.levels;
         let levels = |settings: &Settings| self.finish.model.is_none() || settings.levels == required;
         let settings = self.settings_of(candidate, Some(method)).ok();
-        let allowed = settings.filter(|settings| guide && indirect && levels(settings));
+        // Without some techniques another method remains, and the options must have an effect with it, too.
+        let fits = |settings: &Settings| {
+            settings.method == method || self.check_method(settings.method, None, settings.radius_rule).is_ok()
+        };
+        let allowed = settings.filter(|settings| guide && indirect && levels(settings) && fits(settings));
         allowed.map(|settings| with_light_paths(settings, self.photons, size))
     }
 
@@ -371,7 +373,7 @@ impl RenderOptions {
             method,
             seed: self.frame_seed(),
             photons: self.photons.unwrap_or(method.default_photons()),
-            counts: self.counts()?,
+            counts: candidate.counts,
             photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,
             techniques: false,

@@ -16,7 +16,7 @@ pub struct MethodChoice(pub Option<Method>);
 
 /// Help text of `--method auto`.
 const AUTO: &str =
-    "vcm, guided where light is focused; elsewhere path or bdpt where a short pilot shows them to be clearly better";
+    "vcm with the numbers of light paths, connections and merges that a pilot finds best; path or bdpt if some are 0";
 
 impl MethodChoice {
     /// The name of the method, or `auto`.

@@ -45,7 +45,7 @@ pub fn choose(
 ) -> Chosen {
     let MethodRequest::Auto(auto) = method else { return Chosen::named(checked) };
     let settings_of = |candidate| (auto.settings_of)(candidate, view.camera.size()).filter(&accepts);
-    match choose::choose(view, &mut auto.finish, settings_of, stop) {
+    match choose::choose(view, settings_of, stop) {
         Some(choice) => {
             Chosen { settings: choice.settings.clone(), candidate: Some(choice.candidate), choice: Some(choice) }
         }

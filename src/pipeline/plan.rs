@@ -126,7 +126,7 @@ pub fn reason(choice: &Choice) -> String {
         choice.pilots.iter().filter(|other| other.candidate != trial.candidate).collect();
     others.sort_by(|a, b| a.squared_error.total_cmp(&b.squared_error));
     let error = |trial: &PilotResult| match trial.squared_error {
-        squared if squared.is_infinite() => "nothing seen".into(),
+        squared if squared.is_infinite() => "light is missing".into(),
         // Smaller than the noise of the pilot resolves.
         squared if squared == f64::MIN_POSITIVE => "too little to tell".into(),
         _ => percent(trial.error()),
@@ -134,7 +134,7 @@ pub fn reason(choice: &Choice) -> String {
     let others: Vec<String> =
         others.iter().map(|other| format!("{} {}", other.candidate.name(), error(other))).collect();
     format!(
-        "auto: {}, whose finished picture is expected to have an error of {} ({})",
+        "auto: {}, whose noise before the finish is expected to be {} ({})",
         trial.candidate.name(),
         error(trial),
         others.join("; ")

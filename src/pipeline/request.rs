@@ -4,7 +4,6 @@ use super::finish::FinishRequest;
 use super::load::SceneRequest;
 use super::memory::MemoryLimit;
 use crate::film::{Naming, Selection};
-use crate::finish::Finish;
 use crate::plan::Switches;
 use crate::render::{Candidate, Settings};
 use crate::scene::CameraRequest;
@@ -23,14 +22,12 @@ pub enum MethodRequest<'a> {
     Auto(AutoRequest<'a>),
 }
 
-/// The candidates of `auto` (methods with settings), and the finish of its pilots.
+/// The candidates of `auto` (methods with settings).
 pub struct AutoRequest<'a> {
     /// Settings for the checks that precede the choice, and for the render if the options leave nothing to compare.
     pub fallback: Settings,
     /// Makes the settings of each candidate.
     pub settings_of: SettingsOf<'a>,
-    /// Denoiser for the pictures of the pilots, the short renders that `auto` compares.
-    pub finish: Box<Finish>,
 }
 
 impl<'a> MethodRequest<'a> {

@@ -14,8 +14,8 @@ pub use account::{
 pub use clock::{Clock, Phases, TimeSpent, cpu_seconds, peak_memory};
 pub(crate) use pass::Cost;
 pub use pass::{
-    MAX_TECHNIQUES, PHOTON_BYTES, PhotonCounts, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile, photons_per_path,
-    sample_bytes,
+    MAX_TECHNIQUES, Moments, PHOTON_BYTES, PhotonCounts, Proxy, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile,
+    photons_per_path, sample_bytes,
 };
 pub use session::{
     Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, RenderInput, Session, State, render, run_session,

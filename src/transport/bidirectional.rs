@@ -79,6 +79,8 @@ pub struct Bidirectional<'a> {
     pub connections: f32,
     /// Number of light paths whose photons are merged in one iteration.
     pub merged_paths: f32,
+    /// Fraction of the initial throughput down to which roulette does not end a camera path.
+    pub spared: f32,
     /// Limits paths to one division between camera and light subpath; `None` for no limit.
     pub only: Option<Division>,
 }

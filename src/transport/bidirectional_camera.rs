@@ -10,7 +10,6 @@ use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
 use super::photon_merge::{Merge, MergePhoton};
 use super::pixel_sample::{Features, PixelSample};
-use super::roulette::SPARED_BY_ROULETTE;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, token, with_camera_bit};
 use super::shares::{Connection, Incident, PathHalves, connection_shares, shares, wanted};
@@ -282,11 +281,9 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
 }
 
 impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
-    /// Connections make up for short walks, and long walks cause more of them. Without connections roulette is that of
-    /// path tracing.
     #[inline]
     fn spared(&self) -> f32 {
-        if self.shared.connections > 0.0 { 1.0 } else { SPARED_BY_ROULETTE }
+        self.shared.spared
     }
 
     #[inline]

@@ -18,8 +18,8 @@ fn main() {
     let number = |name: &str| arguments.iter().find_map(|a| a.strip_prefix(name)?.parse().ok());
     let width = number("width=").unwrap_or(320);
     let levels = number("levels=").map(|levels| Levels::new(levels as usize));
-    let plain = |method| Candidate { method, indirect: Indirect::Photons, guided: false };
-    let caustics = Candidate { method: Method::Sppm, indirect: Indirect::Paths, guided: true };
+    let plain = Candidate::unguided;
+    let caustics = Candidate { indirect: Indirect::Paths, guided: true, ..plain(Method::Sppm) };
     let candidates = [
         plain(Method::Path),
         plain(Method::Bdpt),

@@ -174,3 +174,13 @@ fn a_picture_that_cannot_be_written_leaves_the_checkpoint() {
     assert_eq!(folder.run(&resume).code, Some(0));
     assert!(!state.exists());
 }
+
+/// A checkpoint that was written before `auto` chose numbers of samples continues with one sample of each technique.
+#[test]
+fn candidates_without_numbers_of_samples_have_the_default_ones() {
+    use caustique::render::{Candidate, Counts};
+    let mut stored = serde_json::to_value(Candidate::GUIDED).expect("it is serialized");
+    assert!(stored.as_object_mut().is_some_and(|candidate| candidate.remove("counts").is_some()));
+    let read: Candidate = serde_json::from_value(stored).expect("it is read");
+    assert_eq!((read, read.counts), (Candidate::GUIDED, Counts::DEFAULT));
+}

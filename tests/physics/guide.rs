@@ -8,7 +8,6 @@ use crate::support;
 
 use caustique::choose::{Choice, EffectWeight, choose};
 use caustique::estimator::{InitialBandwidth, PixelAccumulator};
-use caustique::finish::{Denoiser, Finish};
 use caustique::light::{Guide, Region, SpotEdge};
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
@@ -318,8 +317,7 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(C
         |candidate| Settings { photons: 2000, iterations: Some(iterations), ..Settings::for_candidate(candidate) };
     let make = |candidate| allowed(candidate).then(|| settings(candidate));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    let mut finish = Finish::new(Denoiser::Own, None);
-    pool.install(|| choose(View::new(scene, &camera), &mut finish, make, || false)).expect("a choice")
+    pool.install(|| choose(View::new(scene, &camera), make, || false)).expect("a choice")
 }
 
 /// The choice and the predicted errors do not depend on the number of threads, to the bit.
@@ -327,7 +325,7 @@ fn auto_among(scene: &Scene, threads: usize, iterations: u64, allowed: impl Fn(C
 fn the_choice_does_not_depend_on_threads() {
     let scene = matte_room();
     let [one, three] = [1, 3].map(|threads| auto(&scene, threads, 20_000));
-    assert_eq!(one.pilots.len(), 3, "{:?}", one.reason);
+    assert!(one.pilots.len() >= 3, "{:?}", one.reason);
     assert_eq!(one.candidate, three.candidate);
     for (a, b) in one.pilots.iter().zip(&three.pilots) {
         println!("{}: {:.5}", a.candidate.name(), a.error());
@@ -335,7 +333,7 @@ fn the_choice_does_not_depend_on_threads() {
     }
     let chosen = one.chosen_pilot().expect("a trial");
     let best = one.pilots.iter().all(|trial| trial.squared_error >= chosen.squared_error);
-    assert!(best || chosen.candidate == Candidate::DEFAULT, "{}", chosen.candidate.name());
+    assert!(best, "{}", chosen.candidate.name());
     let bits = |choice: &Choice| -> Vec<_> {
         choice.weights.iter().map(|w| (w.effect, w.energy.map(f64::to_bits), w.saved.map(f64::to_bits))).collect()
     };
@@ -385,9 +383,7 @@ fn cloudy_glass_under_a_point_light_is_rendered_by_photons_in_media() {
     let chosen = |scene: &Scene| {
         let camera = scene.camera(&square(16)).expect("a camera");
         let make = |candidate| Some(Settings { iterations: Some(4), ..Settings::for_candidate(candidate) });
-        choose(View::new(scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false)
-            .expect("a choice")
-            .candidate
+        choose(View::new(scene, &camera), make, || false).expect("a choice").candidate
     };
     assert_eq!(chosen(&cloudy(false, 1.2)), Candidate::GUIDED_GATHERING);
     assert_eq!(chosen(&cloudy(true, 1.2)), Candidate::GUIDED);
@@ -408,9 +404,7 @@ fn switched_off_effects_are_weighed_too() {
             let settings = Settings { photons: 2000, iterations: Some(20_000), ..Settings::for_candidate(candidate) };
             (candidate == Candidate::GATHERING).then(|| Settings { classes: off.complement(), ..settings })
         };
-        choose(View::new(scene, &camera), &mut Finish::new(Denoiser::Own, None), make, || false)
-            .expect("a choice")
-            .weights
+        choose(View::new(scene, &camera), make, || false).expect("a choice").weights
     };
     // Glass needs photons, too, so leaving out this effect saves nothing where there is glass.
     for (scene, saves) in [(glass_room(), false), (matte_room(), true)] {
@@ -480,7 +474,7 @@ fn properties_of_the_scene_are_weighed() {
     assert!(lens.error_if_off.is_none_or(|error| error < 0.02) && lens.energy.is_none(), "{lens:?}");
 }
 
-/// After a stop request, a pilot runs only the few iterations with which all candidates begin.
+/// After a stop request, a pilot runs only the two iterations that it needs.
 #[test]
 fn a_pilot_can_be_stopped() {
     let scene = matte_room();
@@ -494,14 +488,13 @@ fn a_pilot_can_be_stopped() {
             times.set(times.get() + 1);
             answer
         };
-        let choice = choose(View::new(&scene, &camera), &mut Finish::new(Denoiser::Own, None), make, stop);
-        assert!(choice.is_some_and(|choice| choice.pilots.len() == 3));
+        let choice = choose(View::new(&scene, &camera), make, stop);
+        assert!(choice.is_some_and(|choice| choice.pilots.len() >= 3));
         times.get()
     };
     let (stopped, whole) = (asked(true), asked(false));
     println!("asked {stopped} times where the answer is to stop, {whole} times where it is not");
-    // One stop per candidate in each of two rounds.
-    assert!(stopped <= 6 && whole > 24, "{stopped}, {whole}");
+    assert!(stopped == 1 && whole > 8, "{stopped}, {whole}");
 }
 
 /// If one light path in half a million hits the glass, unguided candidates have neither the light nor visible noise in
@@ -520,7 +513,8 @@ fn caustics_are_left_to_guided_light_paths() {
     description.cameras.push(look_at(DVec3::new(0.0, 0.3, 0.5), DVec3::new(0.0, 0.05, 0.0), 50.0));
     let scene = build(description);
     let choice = auto(&scene, 2, 20_000);
-    assert!(choice.pilots.is_empty() && choice.candidate == Candidate::GUIDED, "{}", choice.candidate.name());
+    let Candidate { guided, counts, .. } = choice.candidate;
+    assert!(guided && counts.light_paths > 0 && counts.merging > 0.0, "{}", choice.candidate.name());
     let camera = scene.camera(&square(24)).expect("a camera");
     let light = |candidate| {
         let settings = Settings { iterations: Some(16), ..Settings::for_candidate(candidate) };
@@ -531,7 +525,7 @@ fn caustics_are_left_to_guided_light_paths() {
     println!("{guided:.3e} of caustics by guided light paths, {unguided:.3e} by others");
     assert!(guided > 0.0 && unguided < 0.2 * guided);
     let unguided = auto_among(&scene, 2, 20_000, |candidate| !candidate.guided);
-    assert_eq!(unguided.candidate, Candidate::DEFAULT);
+    assert!(!unguided.candidate.guided);
 }
 
 /// Candidates that the scene does not need are not tried, and a short render tries none.
@@ -539,15 +533,15 @@ fn caustics_are_left_to_guided_light_paths() {
 fn only_needed_candidates_are_tried() {
     let scene = matte_room();
     let matte_only = auto(&scene, 2, 20_000);
-    let tried: Vec<Method> = matte_only.pilots.iter().map(|trial| trial.candidate.method).collect();
-    assert_eq!(tried, [Method::Vcm, Method::Path, Method::Bdpt]);
+    let tried: Vec<Method> = matte_only.pilots.iter().map(|trial| trial.candidate.rendered_by()).collect();
+    assert!([Method::Vcm, Method::Path, Method::Bdpt].iter().all(|method| tried.contains(method)), "{tried:?}");
     assert!(matte_only.pilots.iter().all(|trial| !trial.candidate.guided));
     // Without narrow lobes, no photons of caustics are traced.
     let of_caustics = Settings { indirect: Indirect::Paths, ..Settings::default() };
     let photons = |narrow_lobes| of_caustics.photon_classes(&Survey { narrow_lobes, ..Survey::default() });
     assert!(photons(false).is_empty() && photons(true).has(PathClass::IndirectFocus));
-    // Only indirect light needs photons here, and direct light costs connections.
-    let choice = auto_among(&scene, 2, 20_000, |candidate| candidate.method != Method::Bdpt);
+    // Both kinds of light cost connections.
+    let choice = auto_among(&scene, 2, 20_000, |candidate| candidate.counts.connections > 0);
     let saved = |effect: Effect| weight(&choice.weights, effect).and_then(|w| w.saved);
     let whole = choice.chosen_pilot().map(|trial| trial.seconds_per_iteration);
     assert!(saved(Effect::Indirect) > Some(0.0) && saved(Effect::Indirect) < whole, "{:?}", choice.weights);

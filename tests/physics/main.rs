@@ -25,6 +25,7 @@ mod material;
 mod media;
 mod merging;
 mod mis;
+mod moments;
 mod narrow_spots;
 mod nesting;
 mod open_space;

@@ -553,6 +553,7 @@ impl<'a> Lab<'a> {
             techniques,
             light_paths,
             connections: samples.connections,
+            spared: if samples.connections > 0.0 { 1.0 } else { SPARED_BY_ROULETTE },
             merged_paths: 2.0 * light_paths,
             only: None,
         };
@@ -597,9 +598,7 @@ impl<'a> Lab<'a> {
         );
 
         let start = camera_paths.start(pixel, stream);
-        // Without connections, roulette of camera paths is that of path tracing.
-        let spared = if shared.connections > 0.0 { 1.0 } else { SPARED_BY_ROULETTE };
-        let eye_notes = notes(scene, &arena, start, stream, (Transport::Radiance, spared));
+        let eye_notes = notes(scene, &arena, start, stream, (Transport::Radiance, shared.spared));
         let light_notes =
             emitted.as_ref().map(|e| notes(scene, &arena, e.start, e.stream, (Transport::Importance, 1.0)));
         let from_light = light_notes.as_ref().map_or(&[][..], |n| &n.met[..]);

@@ -9,13 +9,15 @@ CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache (by default caust
 
 scripts/compare/setup.sh peers installs the other renderers and OIDN; their drivers are in scripts/compare/peers. Other
 renderers always have the budget in core-seconds (seconds times threads); with --clock wall, our renders have at most
-that. Rows give the core-seconds used.
+that. Rows give the core-seconds used. --before PROGRAM adds the `auto` of another program. A last table lists what
+`auto` has chosen, and why.
 """
 
 import sys
+from pathlib import Path
 
 from .. import peer_runs, references, renders
-from ..cache import CACHE, Failed, load, program, save
+from ..cache import BIN, CACHE, Failed, load, program, save
 from ..goals import FIGURES, goals, inputs
 from ..options import options
 from ..picture_errors import Reference
@@ -25,6 +27,7 @@ ARGUMENTS = references.ARGUMENTS | {
     "budgets": [15.0, 60.0, 240.0],
     "seeds": 1,
     "methods": ["auto", "path", "bdpt", "vcm", "sppm", "cppm"],
+    "before": "",
     "denoise": ["default"],
     "render_options": [],
     "clock": "wall",
@@ -60,23 +63,29 @@ def line(label, spent, figures, note=""):
 
 
 def seeds(make, figures):
-    """Renders with every seed; returns the mean errors by picture, the mean core-seconds, and the approximations."""
+    """Renders with every seed; returns the mean errors by picture, the mean core-seconds, and the facts of a render."""
     runs, spent = [], []
     for seed in range(1, options.seeds + 1):
         folder = make(seed)
         runs.append(figures(folder))
         spent.append(load(folder / "run.json"))
-    return mean(runs), sum(of["cpu_seconds"] for of in spent) / len(spent), spent[0].get("approximations")
+    return mean(runs), sum(of["cpu_seconds"] for of in spent) / len(spent), spent[0]
+
+
+def programs():
+    """The methods with the program that renders each, and the name of the row."""
+    rows = [(method, BIN, method) for method in options.methods]
+    return rows + ([("auto", Path(options.before).resolve(), "auto before")] if options.before else [])
 
 
 def ours(scene, budget, reference, halves, cell):
     """Measures our renders of a scene at a budget, and adds them to a cell."""
     for denoise in denoisers():
-        for method in options.methods:
-            name = f"{method} {denoise}".strip()
+        for method, binary, label in programs():
+            name = f"{label} {denoise}".strip()
             try:
-                pictures, spent, _ = seeds(
-                    lambda seed: renders.render(scene, method, denoise, budget, seed),
+                pictures, spent, facts = seeds(
+                    lambda seed: renders.render(scene, method, denoise, budget, seed, binary),
                     lambda folder: renders.figures(folder, reference, halves, renders.pictures),
                 )
             except Failed as failed:
@@ -84,6 +93,8 @@ def ours(scene, budget, reference, halves, cell):
                 print(f"    {name:<32}{failed}", flush=True)
                 continue
             cell["ours"][name], cell["core_seconds"][name] = pictures, spent
+            if method == "auto":
+                cell["chosen"][name] = facts["chosen"]
             if spent < MIN_CORE_SHARE * budget * options.threads:
                 cell["notes"][name] = f"spent {spent:.1f} of {budget * options.threads:g} core-seconds: try --clock cpu"
             line(name, spent, pictures["delivered"], cell["notes"].get(name, ""))
@@ -98,7 +109,7 @@ def others(peers, names, budget, reference, halves, cell):
     """Measures the peers' renders of a scene at a budget, and adds them to a cell."""
     for name in names:
         try:
-            pictures, spent, approximated = seeds(
+            pictures, spent, facts = seeds(
                 lambda seed: peers.render(name, budget, seed),
                 lambda folder: renders.figures(folder, reference, halves, peers.pictures),
             )
@@ -111,8 +122,8 @@ def others(peers, names, budget, reference, halves, cell):
             cell["notes"][name] = note
         else:
             cell["peers"][name] = pictures
-            if approximated:
-                cell["notes"][f"{name} approximates"] = "; ".join(approximated)
+            if facts.get("approximations"):
+                cell["notes"][f"{name} approximates"] = "; ".join(facts["approximations"])
         cell["core_seconds"][name] = spent
         line(name, spent, pictures["noisy"], note or "")
         if "oidn" in pictures:
@@ -142,7 +153,7 @@ def measure(scene, names):
     for budget in options.budgets:
         # Errors below a fiftieth of the reference's own count as this.
         cell = {"scene": references.name(scene), "budget": budget, "floor": max(reference.error / 50, 1e-9)}
-        cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes")})
+        cell.update({key: {} for key in ("ours", "peers", "core_seconds", "notes", "chosen")})
         own = f"reference by {made['options'][1]}, its own relMSE {reference.error:.2g}"
         print(f"\n{cell['scene']}, {budget:g} s, {own}\n{COLUMNS}", flush=True)
         ours(scene, budget, reference, halves, cell)
@@ -171,6 +182,14 @@ def count(cells):
     return counts
 
 
+def print_choices(cells):
+    """Prints what `auto` has chosen for each scene and budget, and why."""
+    print()
+    for cell in cells:
+        for name, reason in cell["chosen"].items():
+            print(f"{cell['scene']}, {cell['budget']:g} s, {name}: {reason.removeprefix('auto: ')}")
+
+
 def main():
     scenes = references.scenes()
     names, reason = peer_runs.select()
@@ -188,6 +207,7 @@ def main():
             cells += found
         except Failed as failed:
             print(f"\n{references.name(scene)}: no reference: {failed}", flush=True)
+    print_choices(cells)
     settings = {"program": program(), **{key: getattr(options, key) for key in ("width", "threads", "clock", "seeds")}}
     settings |= {"set": ",".join(options.scenes or []) or options.set, "options": options.render_options}
     values = {**settings, "figures": FIGURES, "counts": count(cells), "references": known}

@@ -34,7 +34,7 @@ use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
     Bidirectional, CameraPathStart, CameraPaths, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertex,
-    LightVertices, MergeLevels, MergePhoton, PixelSample, Splat, TechniqueSet,
+    LightVertices, MergeLevels, MergePhoton, PixelSample, SPARED_BY_ROULETTE, Splat, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -116,6 +116,7 @@ impl<'a> Passes<'a> {
             light_paths,
             connections: settings.counts.connections as f32,
             merged_paths: light_paths * pairs.len() as f32,
+            spared: if settings.counts.leave_camera_paths_alone(techniques.merge) { SPARED_BY_ROULETTE } else { 1.0 },
             only: None,
         };
         let guide =

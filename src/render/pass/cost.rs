@@ -27,8 +27,8 @@ const GUIDE: f64 = 0.11e-6;
 const LIGHT_VERTEX: f64 = 0.7e-6;
 /// Core-seconds for a vertex of a camera or light path in methods that store both with their MIS weights.
 const TWO_WAY_VERTEX: f64 = 0.78e-6;
-/// Core-seconds for a vertex of a camera path with MIS weights and no connections. Roulette spares such paths longer than
-/// the counted ones, as in path tracing; their vertices count here.
+/// Core-seconds for a vertex of a camera path with MIS weights and hardly any connections or merges. Roulette spares such
+/// paths longer than the counted ones, as in path tracing; their vertices count here.
 const UNCONNECTED_VERTEX: f64 = 0.92e-6;
 /// Core-seconds for the connection of two vertices.
 const CONNECTION: f64 = 0.51e-6;
@@ -103,7 +103,7 @@ impl Cost {
     /// methods also trace the light paths of the whole picture.
     pub fn film_seconds(&self, candidate: Candidate, settings: &Settings, camera: &Camera) -> f64 {
         let [film, whole] = camera.sizes().map(|(width, height)| f64::from(width) * f64::from(height));
-        let outside = if candidate.method.walks_whole_picture() { whole - film } else { 0.0 };
+        let outside = if settings.method.walks_whole_picture() { whole - film } else { 0.0 };
         let outside = outside * settings.counts.light_paths_per_pixel();
         let VertexCounts { light, light_media, textured, .. } = self.counts;
         let path = light_start_seconds(candidate)
@@ -115,7 +115,7 @@ impl Cost {
     /// Core-seconds of an iteration of a whole picture of `pixels` pixels with the candidate's method.
     pub fn iteration_seconds(&self, candidate: Candidate, settings: &Settings, pixels: f64) -> f64 {
         let camera_paths = pixels * camera_paths_per_pixel(settings);
-        let method = candidate.method;
+        let method = settings.method;
         let sum = if method.search() == Search::CameraPaths {
             pixels * self.path_tracing_seconds(settings)
         } else if method.gathers() {
@@ -163,7 +163,7 @@ impl Cost {
     /// Core-seconds of a camera path that gathers photons.
     fn gathering_path_seconds(&self, candidate: Candidate, settings: &Settings) -> f64 {
         let VertexCounts { camera_to_broad, camera_connectable, media_samples, .. } = self.counts;
-        let gather = match candidate.method.rules() {
+        let gather = match settings.method.rules() {
             _ if settings.photon_classes(&self.survey).is_empty() => 0.0,
             [BandwidthRule::ChiSquared] => GATHER + COUNTING,
             _ => GATHER,
@@ -201,14 +201,15 @@ impl Cost {
             (camera_to_broad, light_to_broad)
         };
         let light_paths = settings.counts.light_paths_per_pixel();
-        let merges = if candidate.method.has_bandwidths() {
+        let merges = if settings.method.has_bandwidths() {
             f64::from(settings.counts.merging) * (from_camera * MERGE_QUERY + light_paths * merged * MERGE)
         } else {
             0.0
         };
         let light_vertices = light * self.textured(TWO_WAY_VERTEX) + light_media * TWO_WAY_MEDIUM_VERTEX;
         let light_path = light_start_seconds(candidate) + light_vertices;
-        let vertex = if settings.counts.connections == 0 { UNCONNECTED_VERTEX } else { TWO_WAY_VERTEX };
+        let alone = settings.counts.leave_camera_paths_alone(settings.method.has_bandwidths());
+        let vertex = if alone { UNCONNECTED_VERTEX } else { TWO_WAY_VERTEX };
         let camera_vertices = camera * self.textured(vertex) + camera_media * TWO_WAY_MEDIUM_VERTEX;
         let connections = f64::from(settings.counts.connections) * from_camera * from_light * CONNECTION;
         CAMERA_PATH + camera_vertices + light_paths * light_path + connections + merges

@@ -95,7 +95,8 @@ pub(super) fn learn_guide(
 fn guiding_cost_ratio(camera_paths: &CameraPaths<'_>, settings: &Settings, guide: &Guide) -> f64 {
     let (width, height) = camera_paths.camera.size();
     let cost = |guide: Option<&Guide>| {
-        let candidate = Candidate { method: settings.method, indirect: settings.indirect, guided: guide.is_some() };
+        let Settings { method, indirect, counts, .. } = *settings;
+        let candidate = Candidate { method, indirect, guided: guide.is_some(), counts };
         Cost::count(camera_paths.scene, camera_paths.camera, settings, guide).iteration_seconds(
             candidate,
             settings,

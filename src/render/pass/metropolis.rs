@@ -304,6 +304,7 @@ impl<'a> Metropolis<'a> {
             techniques,
             light_paths: pixels,
             connections: 1.0,
+            spared: 1.0,
             merged_paths: pixels,
             only: None,
         };

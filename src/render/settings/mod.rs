@@ -169,6 +169,7 @@ impl Settings {
             method,
             indirect: candidate.indirect,
             guided: candidate.guided,
+            counts: candidate.counts,
             levels,
             photons: method.default_photons(),
             initial_bandwidth: if method.takes_photon_count() {
@@ -179,16 +180,13 @@ impl Settings {
             alpha: method.default_alpha(),
             ..Settings::default()
         }
+        .without_unused_techniques()
     }
 
-    /// The settings with the method that remains if some techniques have no samples: path tracing without light paths,
-    /// bidirectional path tracing without merging.
+    /// The settings with the method that remains if some techniques have no samples ([`Method::with_counts`]).
     #[must_use]
     pub fn without_unused_techniques(self) -> Settings {
         let method = self.method.with_counts(&self.counts);
-        if method == self.method {
-            return self;
-        }
         let levels = if method.has_levels() { self.levels } else { Levels::new(1) };
         Settings { method, levels, guided: self.guided && method.supports_guiding(), ..self }
     }

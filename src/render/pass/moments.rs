@@ -1,0 +1,506 @@
+//! Variances of every choice of numbers of samples, from one proxy render with one sample of each technique
+//! \[Grittmann et al. 2022, "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms"\].
+//!
+//! Let B be the sum over techniques of number of samples times density times worth (1, or 1 / (1 + N) for merges that
+//! share a camera path) of the proxy, and C that of a candidate. A sample of the proxy with the weighted contribution V
+//! and the worth w adds `V^2 B / (C w)` to an estimate of the candidate's second moment, and `V B / C` to the value of
+//! its camera path, whose samples are correlated; see docs/theory.md. B and C are affine in the numbers of light paths,
+//! connections and merges. The coefficients are differences between the weights of the same paths with other numbers of
+//! light paths and connections.
+//!
+//! Direct light is sampled alike by all candidates. Its variance is measured, and is the same for all of them.
+
+use super::guiding::learn_guide;
+use crate::camera::{Camera, GROUP_SIZE, TilePixel};
+use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
+use crate::estimator::{InitialBandwidth, level_factor2};
+use crate::film::Size;
+use crate::finish::window;
+use crate::light::{Group, Guide};
+use crate::math::{Rgb, Vec3};
+use crate::photon::PhotonMap;
+use crate::plan::{Part, PathClass};
+use crate::random::{Domain, Streams};
+use crate::render::settings::{Counts, Settings};
+use crate::scene::Scene;
+use crate::spectrum::IterationWavelengths;
+use crate::stat::{floor, median};
+use crate::transport::mis::{Eta, Merges, Ratios};
+use crate::transport::{
+    Bidirectional, CameraPathStart, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertices, MergeLevels,
+    MergePhoton, PathRecorder, PixelSample, Technique, TechniqueSet,
+};
+use bumpalo::Bump;
+use rayon::prelude::*;
+
+/// Side of a block of pixels of the render, for which moments are averaged.
+const BLOCK: f64 = 8.0;
+/// Share of the blocks, those with the largest moments, that the mean over blocks leaves out.
+const TRIMMED_SHARE: f64 = 0.001;
+/// Numbers of light paths (relative) and connections of the three sets of weights of a path.
+const VARIANTS: [(f32, f32); 3] = [(1.0, 1.0), (1.0, 2.0), (2.0, 1.0)];
+
+/// Sums of densities of all techniques that sample a path, by kind of technique, for one sample of each, relative to
+/// the density of the technique at hand.
+#[derive(Clone, Copy, Debug, Default)]
+struct Densities {
+    /// Emission that the camera path hits, and next-event estimation.
+    camera: f64,
+    connections: f64,
+    /// Light vertices seen by the camera.
+    light: f64,
+    /// Coefficients of eta.
+    merges: Merges,
+}
+
+impl Densities {
+    /// Separates the ratios of the same path under [`VARIANTS`].
+    fn of(technique: Technique, ratios: [Ratios; 3]) -> Densities {
+        let [one, connected, lit] = ratios.map(|ratios| ratios.plain);
+        // Ratios are relative to a technique with all of its samples.
+        let connected = if matches!(technique, Technique::Connect { .. }) { 2.0 * connected } else { connected };
+        let lit = if matches!(technique, Technique::Camera { .. }) { 2.0 * lit } else { lit };
+        let [connections, light] = [connected - one, lit - one].map(|difference| difference.max(0.0));
+        // Densities of photons are stored in single precision, which resolves no smaller differences.
+        let camera = (one - connections - light).max(f64::from(f32::EPSILON) * one);
+        Densities { camera, connections, light, merges: ratios[0].merged }
+    }
+}
+
+/// Numbers of samples of a candidate as factors of [`Densities`].
+#[derive(Clone, Copy, Debug)]
+struct Factors {
+    connections: f64,
+    light: f64,
+    /// Of eta for one light path per pixel.
+    merges: Merges,
+}
+
+impl Factors {
+    /// `covered` is the expected number of photons in a merging disc with one light path per pixel.
+    fn new(counts: Counts, covered: f64) -> Factors {
+        let light = counts.light_paths_per_pixel();
+        let merged = light * f64::from(counts.merging);
+        let connections = if counts.light_paths == 0 { 0.0 } else { f64::from(counts.connections) };
+        Factors { connections, light, merges: Merges::new(merged, merged / (1.0 + light * covered)) }
+    }
+
+    #[inline]
+    fn sum(&self, densities: &Densities, eta: f64) -> f64 {
+        let plain = densities.camera + self.connections * densities.connections + self.light * densities.light;
+        plain + eta * self.merges.dot(densities.merges)
+    }
+}
+
+/// A contribution of the proxy to a pixel.
+#[derive(Clone, Copy)]
+struct Contribution {
+    technique: Technique,
+    ratios: Ratios,
+    /// Weighted contribution.
+    value: Rgb,
+    is_direct: bool,
+}
+
+/// Records the contributions of a camera path.
+#[derive(Default)]
+struct Contributions(Vec<Contribution>);
+
+impl PathRecorder for Contributions {
+    fn contribution(&mut self, technique: Technique, _: Rgb, _: Vec3, ratios: Ratios) {
+        self.0.push(Contribution { technique, ratios, value: Rgb::ZERO, is_direct: false });
+    }
+
+    fn arrival(&mut self, _: Technique, (class, _): (PathClass, Group), _: usize, value: Rgb, weight: f32) {
+        if let Some(last) = self.0.last_mut() {
+            last.value += value * weight;
+            last.is_direct |= is_direct(class);
+        }
+    }
+}
+
+fn is_direct(class: PathClass) -> bool {
+    matches!(class.part(), Part::Emission | Part::Direct)
+}
+
+/// Samples that share a camera path, whose correlation is estimated.
+#[derive(Clone, Copy, PartialEq)]
+enum Correlated {
+    /// Hits and next-event estimation.
+    Camera,
+    Connections,
+    /// Merges that share a random camera path.
+    Merges,
+    /// Independent samples: light vertices seen by the camera, and merges at what the pixel shows.
+    None,
+}
+
+/// A weighted contribution of the proxy, with the densities of its path.
+struct Sample {
+    group: Correlated,
+    value: Rgb,
+    eta: f64,
+    /// Sum of the proxy's densities.
+    proxy: f64,
+    worth: f64,
+    densities: Densities,
+}
+
+/// Sums over the samples of the proxy for a candidate.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    /// Second moments, and products of different samples of one camera path.
+    moment: f64,
+    /// Values of the samples of camera, connections and merges.
+    values: [Rgb; 3],
+}
+
+impl Sums {
+    /// Adds the samples of one path.
+    #[inline]
+    fn add(&mut self, samples: &[Sample], factors: &Factors) {
+        let (mut values, mut squares) = ([Rgb::ZERO; 3], [0.0; 3]);
+        for sample in samples {
+            let ratio = sample.proxy / factors.sum(&sample.densities, sample.eta);
+            self.moment += mean_square(sample.value) * ratio / sample.worth;
+            if sample.group != Correlated::None {
+                let value = sample.value * ratio as f32;
+                values[sample.group as usize] += value;
+                squares[sample.group as usize] += mean_square(value);
+            }
+        }
+        let [camera, connections, merges] = values;
+        let (c, n) = (factors.connections as f32, factors.merges.x as f32);
+        let products = camera * connections * c + (camera + connections * c) * merges * n;
+        self.moment += 2.0 * f64::from(products.element_sum()) / 3.0 + mean_square(camera) - squares[0]
+            + factors.connections * (mean_square(connections) - squares[1]);
+        self.values.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+    }
+
+    /// The variance of an iteration, from the sums of `count` paths.
+    fn variance(&self, count: f64, factors: &Factors) -> f64 {
+        let [camera, connections, merges] = self.values.map(|sum| sum / count as f32);
+        let c = factors.connections;
+        let mean = camera + connections * c as f32 + merges * factors.merges.x as f32;
+        self.moment / count - mean_square(mean) + c * (c - 1.0) * mean_square(connections)
+    }
+}
+
+fn mean_square(value: Rgb) -> f64 {
+    f64::from((value * value).element_sum()) / 3.0
+}
+
+/// Sums over the samples of the proxy, by block of pixels.
+#[derive(Clone, Debug, Default)]
+struct Block {
+    /// Indirect light, by candidate.
+    sums: Vec<Sums>,
+    light: f64,
+    /// Sum over pixels of the variance of direct light in an iteration.
+    direct_variance: f64,
+    pixels: f64,
+}
+
+/// Second moments of all candidates.
+pub struct Moments {
+    blocks: Vec<Block>,
+    size: Size,
+    iterations: f64,
+    candidates: Vec<Factors>,
+}
+
+/// A proxy render in a small picture, which estimates the second moments of other renders.
+pub struct Proxy<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The camera with the size of the small picture.
+    pub camera: &'a Camera,
+    /// Settings of `vcm`.
+    pub settings: &'a Settings,
+    /// Width of the picture that will be rendered (pixels).
+    pub render_width: u32,
+    /// Iteration of the render whose bandwidths the proxy takes.
+    pub typical_iteration: u64,
+    /// Numbers of samples of the other renders.
+    pub candidates: &'a [Counts],
+}
+
+/// What the walks of all iterations read.
+struct Walks<'w, 'a> {
+    proxy: &'w Proxy<'a>,
+    variants: [Bidirectional<'w>; 3],
+    guide: Option<&'w Guide>,
+    radius2: Vec<f32>,
+    covered: f64,
+    /// Side of a block in pixels of the proxy.
+    side: u32,
+    blocks: Size,
+    candidates: Vec<Factors>,
+    of_proxy: Factors,
+}
+
+/// What one row of blocks leaves in an iteration.
+#[derive(Default)]
+struct RowOutput {
+    /// Sums of the row's blocks.
+    blocks: Vec<Vec<Sums>>,
+    /// Samples that light paths send to blocks of all rows.
+    splats: Vec<(usize, Sample)>,
+    /// Light by pixel.
+    light: Vec<(usize, f64)>,
+    /// Direct light of every pixel of the row.
+    direct: Vec<(usize, Rgb)>,
+    photons: [Vec<MergePhoton>; 3],
+}
+
+impl Proxy<'_> {
+    /// Learns where the light paths of the proxy start; `None` if they are not guided.
+    pub fn learn_guide(&self) -> Option<Guide> {
+        let initial_media = InitialMedia::of(self.scene, self.camera);
+        let camera_paths = self.settings.camera_paths(self.scene, self.camera, &initial_media);
+        self.settings.guided.then(|| learn_guide(&camera_paths, &initial_media, self.settings, None)).flatten()
+    }
+
+    /// Renders `iterations` iterations, or fewer once `stopped` returns true.
+    pub fn measure(&self, guide: Option<&Guide>, iterations: u64, stopped: &dyn Fn() -> bool) -> Moments {
+        let initial_media = InitialMedia::of(self.scene, self.camera);
+        let camera_paths = self.settings.camera_paths(self.scene, self.camera, &initial_media);
+        let (width, height) = self.camera.size();
+        let pixels = (width * height) as f32;
+        let variants = VARIANTS.map(|(light_paths, connections)| Bidirectional {
+            camera_paths,
+            initial_media: &initial_media,
+            techniques: TechniqueSet::VCM,
+            light_paths: light_paths * pixels,
+            connections,
+            merged_paths: pixels,
+            spared: 1.0,
+            only: None,
+        });
+        let (schedule, level) = (self.settings.schedule(self.typical_iteration), self.settings.levels.picture_level());
+        let none = PhotonMap::build(Vec::new());
+        let [widest, _] = self.settings.max_initial_bandwidth;
+        let bandwidths =
+            initial_bandwidths(&camera_paths, InitialBandwidth::Footprint, widest, self.settings.seed, [&none; 1]);
+        let shrunk = schedule.factor2() * level_factor2(level, schedule.levels());
+        let covered = std::f64::consts::PI * f64::from(FOOTPRINT_PIXELS * FOOTPRINT_PIXELS * shrunk);
+        let side = (BLOCK * f64::from(width) / f64::from(self.render_width)).round().max(1.0) as u32;
+        let blocks = Size { width: width.div_ceil(side) as usize, height: height.div_ceil(side) as usize };
+        let walks = Walks {
+            proxy: self,
+            variants,
+            guide,
+            radius2: bandwidths.iter().map(|[bandwidth]| schedule.radius2(*bandwidth, level)).collect(),
+            covered,
+            side,
+            blocks,
+            candidates: self.candidates.iter().map(|counts| Factors::new(*counts, covered)).collect(),
+            of_proxy: Factors::new(Counts::DEFAULT, covered),
+        };
+        walks.run(iterations, stopped)
+    }
+}
+
+impl Walks<'_, '_> {
+    fn run(&self, iterations: u64, stopped: &dyn Fn() -> bool) -> Moments {
+        let none = Block { sums: vec![Sums::default(); self.candidates.len()], ..Block::default() };
+        let mut blocks = vec![none; self.blocks.pixels()];
+        let mut direct = vec![[Rgb::ZERO; 2]; self.radius2.len()];
+        let mut photons: [Vec<MergePhoton>; 3] = Default::default();
+        let mut done = 0;
+        // The first iteration leaves the photons for the second, and is not counted.
+        for iteration in 0..=iterations {
+            if done >= 2 && stopped() {
+                break;
+            }
+            let maps = photons.map(PhotonMap::build);
+            let rows: Vec<RowOutput> =
+                (0..self.blocks.height).into_par_iter().map(|row| self.row(row, iteration, &maps)).collect();
+            photons = Default::default();
+            for row in &rows {
+                (0..3).for_each(|k| photons[k].extend_from_slice(&row.photons[k]));
+            }
+            if iteration > 0 {
+                done += 1;
+                self.add_rows(rows, &mut blocks, &mut direct);
+            }
+        }
+        let n = done as f32;
+        for (pixel, [sum, squares]) in direct.into_iter().enumerate() {
+            let variance = (squares - sum * sum / n) / (n - 1.0).max(1.0);
+            let block = &mut blocks[self.block_of(pixel)];
+            block.direct_variance += f64::from(variance.element_sum().max(0.0) / 3.0);
+            block.pixels += 1.0;
+        }
+        Moments { blocks, size: self.blocks, iterations: f64::from(n), candidates: self.candidates.clone() }
+    }
+
+    /// Adds the sums of an iteration, row by row.
+    fn add_rows(&self, rows: Vec<RowOutput>, blocks: &mut [Block], direct: &mut [[Rgb; 2]]) {
+        for (pixel, light) in rows.iter().flat_map(|row| &row.light) {
+            blocks[self.block_of(*pixel)].light += light;
+        }
+        for (pixel, light) in rows.iter().flat_map(|row| &row.direct) {
+            direct[*pixel][0] += *light;
+            direct[*pixel][1] += *light * *light;
+        }
+        for (block, sums) in blocks.iter_mut().zip(rows.iter().flat_map(|row| &row.blocks)) {
+            for (total, sums) in block.sums.iter_mut().zip(sums) {
+                total.moment += sums.moment;
+                total.values.iter_mut().zip(sums.values).for_each(|(total, value)| *total += value);
+            }
+        }
+        for (block, sample) in rows.iter().flat_map(|row| &row.splats) {
+            let sums = blocks[*block].sums.iter_mut().zip(&self.candidates);
+            sums.for_each(|(sums, factors)| sums.add(std::slice::from_ref(sample), factors));
+        }
+    }
+
+    fn block_of(&self, pixel: usize) -> usize {
+        let width = self.proxy.camera.size().0 as usize;
+        let (x, y) = (pixel % width, pixel / width);
+        y / self.side as usize * self.blocks.width + x / self.side as usize
+    }
+
+    fn levels(&self, pixel: usize) -> MergeLevels {
+        let radius2 = self.radius2[pixel];
+        let eta = Eta::new(radius2, self.variants[0].merged_paths).sharing_camera_path(self.covered as f32);
+        MergeLevels::new(std::iter::once((radius2, eta)))
+    }
+
+    /// Traces the light paths and camera paths of a row of blocks.
+    fn row(&self, row: usize, iteration: u64, maps: &[PhotonMap<MergePhoton>; 3]) -> RowOutput {
+        let Settings { seed, max_depth, .. } = *self.proxy.settings;
+        let (width, height) = self.proxy.camera.size();
+        let count = width * height;
+        let light_paths = LightPaths::new(seed, iteration, Domain::PilotLight, count, max_depth)
+            .guided(self.guide)
+            .with(IterationWavelengths::drifting(seed, iteration));
+        let streams = Streams::new(seed, iteration, Domain::PilotCamera);
+        let sums = vec![Sums::default(); self.candidates.len()];
+        let mut output = RowOutput { blocks: vec![sums; self.blocks.width], ..RowOutput::default() };
+        let mut arena = Bump::new();
+        let first = row as u32 * self.side;
+        for y in first..(first + self.side).min(height) {
+            for x0 in (0..width).step_by(GROUP_SIZE) {
+                let places = std::array::from_fn(|k| {
+                    let x = x0 + k as u32;
+                    let index = u64::from(y * width + x);
+                    (x < width).then_some(TilePixel { pixel: (x, y), index, at: index as usize })
+                });
+                let starts = self.variants[0].camera_paths.starts(&places, streams);
+                for (place, start) in places.iter().flatten().zip(starts.into_iter().flatten()) {
+                    arena.reset();
+                    self.pair(&arena, place.index as u32, (&light_paths, start), maps, &mut output);
+                }
+            }
+        }
+        output
+    }
+
+    /// Traces the light path and the camera path of a pixel, with the weights of each variant.
+    fn pair(
+        &self,
+        arena: &Bump,
+        index: u32,
+        (light_paths, mut start): (&LightPaths<'_>, CameraPathStart),
+        maps: &[PhotonMap<MergePhoton>; 3],
+        output: &mut RowOutput,
+    ) {
+        let pixel = index as usize;
+        start.0.wavelength_sample = light_paths.wavelength(index);
+        let emitted = light_paths.emit(self.proxy.scene, self.variants[0].initial_media, index);
+        let levels = self.levels(pixel);
+        let mut left: [Deposits; 3] = Default::default();
+        let mut found: [Contributions; 3] = Default::default();
+        let mut sample = PixelSample::default();
+        for k in [2, 1, 0] {
+            let shared = &self.variants[k];
+            let mut vertices = LightVertices::new_in(arena);
+            if let Some(emitted) = &emitted {
+                shared.light_path(light_paths, emitted, false, &mut vertices, &mut left[k], &mut ());
+            }
+            let context = CameraWalkContext { vertices: &vertices, photons: Some(&maps[k]), levels: &levels };
+            shared.camera_path(arena, &start, &context, &mut found[k], &mut sample);
+            output.photons[k].append(&mut left[k].photons);
+        }
+        output.direct.push((pixel, sample.direct));
+        let mut samples = Vec::new();
+        for ((one, connected), lit) in found[0].0.iter().zip(&found[1].0).zip(&found[2].0) {
+            let ratios = [one.ratios, connected.ratios, lit.ratios];
+            output.light.extend(lit_pixel(pixel, one.value));
+            samples.extend(self.sample(pixel, one.technique, ratios, one.value).filter(|_| !one.is_direct));
+        }
+        let block = &mut output.blocks[self.block_of(pixel) % self.blocks.width];
+        block.iter_mut().zip(&self.candidates).for_each(|(sums, factors)| sums.add(&samples, factors));
+        for ((one, connected), lit) in left[0].splats.iter().zip(&left[1].splats).zip(&left[2].splats) {
+            let (pixel, technique) = (one.pixel as usize, Technique::Camera { light: one.light });
+            let value = one.value * one.ratios.weight(self.levels(pixel).eta()[0]);
+            output.light.extend(lit_pixel(pixel, value));
+            let sample = self.sample(pixel, technique, [one.ratios, connected.ratios, lit.ratios], value);
+            output.splats.extend(sample.filter(|_| !is_direct(one.class)).map(|one| (self.block_of(pixel), one)));
+        }
+    }
+
+    /// A sample of the proxy; `None` without light.
+    fn sample(&self, pixel: usize, technique: Technique, ratios: [Ratios; 3], value: Rgb) -> Option<Sample> {
+        let square = mean_square(value);
+        if !(square > 0.0 && square.is_finite()) {
+            return None;
+        }
+        let (densities, own) = (Densities::of(technique, ratios), ratios[0].own);
+        let eta = std::f64::consts::PI * f64::from(self.radius2[pixel] * self.variants[0].merged_paths);
+        let group = match technique {
+            Technique::Hit { .. } | Technique::NextEvent { .. } => Correlated::Camera,
+            Technique::Connect { .. } => Correlated::Connections,
+            _ if own.y > 0.0 => Correlated::Merges,
+            _ => Correlated::None,
+        };
+        let worth = if own == Merges::ZERO { 1.0 } else { own.x + own.y / (1.0 + self.covered) };
+        Some(Sample { group, value, eta, proxy: self.of_proxy.sum(&densities, eta), worth, densities })
+    }
+}
+
+/// The light of a sample, with its pixel; `None` if it is not finite.
+fn lit_pixel(pixel: usize, value: Rgb) -> Option<(usize, f64)> {
+    let light = f64::from(value.element_sum()) / 3.0;
+    light.is_finite().then_some((pixel, light))
+}
+
+impl Moments {
+    /// The variance of an iteration's indirect light for a candidate, summed over the pixels of a block.
+    fn indirect_variance(&self, block: &Block, candidate: usize) -> f64 {
+        block.pixels * block.sums[candidate].variance(block.pixels * self.iterations, &self.candidates[candidate])
+    }
+
+    /// Mean over pixels of the variance of an iteration's indirect light, by candidate.
+    pub fn indirect_variances(&self) -> Vec<f64> {
+        let pixels: f64 = self.blocks.iter().map(|block| block.pixels).sum();
+        let sum = |candidate| self.blocks.iter().map(|block| self.indirect_variance(block, candidate)).sum::<f64>();
+        (0..self.candidates.len()).map(|candidate| sum(candidate) / pixels).collect()
+    }
+
+    /// Mean relative variance of an iteration of each candidate over the picture, without the worst blocks.
+    pub fn relative(&self) -> Vec<f64> {
+        let means: Vec<f64> =
+            self.blocks.iter().map(|block| block.light / (block.pixels * self.iterations).max(1.0)).collect();
+        let floor = floor::relative_to_mean(means.iter().copied());
+        let weight = |index: usize| {
+            let mut near: Vec<f64> = window(self.size, index, 1).map(|near| means[near]).collect();
+            let value = median(&mut near, f64::total_cmp).unwrap_or(0.0);
+            1.0 / (value * value + floor)
+        };
+        let weights: Vec<f64> = (0..self.blocks.len()).map(weight).collect();
+        let relative = |candidate: usize| {
+            let of_block = |(block, weight): (&Block, &f64)| {
+                let variance = self.indirect_variance(block, candidate).max(0.0) + block.direct_variance;
+                weight * variance / block.pixels.max(1.0)
+            };
+            let mut all: Vec<f64> = self.blocks.iter().zip(&weights).map(of_block).collect();
+            all.sort_unstable_by(f64::total_cmp);
+            all.truncate(all.len() - (all.len() as f64 * TRIMMED_SHARE).ceil() as usize);
+            all.iter().sum::<f64>() / all.len().max(1) as f64
+        };
+        (0..self.candidates.len()).map(relative).collect()
+    }
+}
