@@ -183,7 +183,7 @@ impl Settings {
         .without_unused_techniques()
     }
 
-    /// The settings with the method that remains if some techniques have no samples ([`Method::with_counts`]).
+    /// The settings with the method that remains if some techniques have no samples.
     #[must_use]
     pub fn without_unused_techniques(self) -> Settings {
         let method = self.method.with_counts(&self.counts);
