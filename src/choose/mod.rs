@@ -74,9 +74,13 @@ fn choose_untimed(
     let clock = Clock::start();
     let pilot = Pilot::new(view, &gathering);
     let limit = gathering.time.map(|seconds| MAX_PILOT_TIME_SHARE * seconds);
-    let stopped = || stopped() || limit.is_some_and(|limit| clock.seconds() > limit);
-    let (effects, effects_seconds) = pilot.weigh_effects();
-    let (pilots, reason) = pilot.run(effects_seconds, settings_of, &stopped);
+    let late = || limit.is_some_and(|limit| clock.seconds() > limit);
+    let (effects, effects_seconds) = if late() { (Vec::new(), 0.0) } else { pilot.weigh_effects() };
+    let (pilots, reason) = if late() {
+        (Vec::new(), Some("the time for a pilot is over"))
+    } else {
+        pilot.run(effects_seconds, settings_of, &|| stopped() || late())
+    };
     let chosen = pilots.iter().find(|pilot| pilot.chosen);
     let candidate = chosen.map_or_else(|| candidate_without_pilot(view.scene, settings_of), |chosen| chosen.candidate);
     let settings = settings_of(candidate)?;
