@@ -5,8 +5,9 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+use caustique::bsdf::Shading;
 use caustique::estimator::InitialBandwidth;
-use caustique::geometry::Mesh;
+use caustique::geometry::{Mesh, Surface};
 use caustique::material::Material;
 use caustique::math::{DVec3, Vec3};
 use caustique::render::{Control, Levels, Method, Settings, render};
@@ -147,9 +148,11 @@ fn main() {
     // Memory for keeping the light vertices of an iteration until its camera paths merge them, and for the photons kept
     // for the next iteration.
     let mib = |count: u64, size: usize| count as f64 * size as f64 / f64::from(1 << 20);
-    let (kept, whole) = (mib(photons[1], size_of::<MergePhoton>()), mib(photons[0], size_of::<LightVertex>()));
+    // A light vertex refers to its surface point and BSDF.
+    let vertex = size_of::<LightVertex>() + size_of::<Surface>() + size_of::<Shading>();
+    let (kept, whole) = (mib(photons[1], size_of::<MergePhoton>()), mib(photons[0], vertex));
     println!("\nmemory of vcm: {} photons of {} bytes, {kept:.0} MiB;", photons[1], size_of::<MergePhoton>());
-    println!("as light vertices kept whole: {} of {} bytes, {whole:.0} MiB", photons[0], size_of::<LightVertex>());
+    println!("as light vertices kept whole: {} of {} bytes, {whole:.0} MiB", photons[0], vertex);
     println!(
         "{{\"time_with_100352_emitters\": {crowded:.3}, \"vcm_photons_mib\": {kept:.1}, \"vcm_vertices_mib\": {whole:.1}, \"path_diffuse_million_per_core_s\": {:.3}, \"vcm_512\": {vcm:.3}}}",
         pixels * 1e-6 / path.seconds
