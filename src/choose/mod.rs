@@ -2,8 +2,8 @@
 //!
 //! The estimator is vertex connection and merging, which weighs all techniques against each other for every path. Its
 //! numbers of light paths, connections and merges decide where the work goes. A short proxy render of the same view in a
-//! small picture (the pilot) estimates the second moment of every choice, `crate::render::Proxy`. The choice with the
-//! least product of relative second moment and work of an iteration is taken. Path tracing and bidirectional path tracing
+//! small picture (the pilot) estimates the variance of every choice, `crate::render::Proxy`. The choice with the least
+//! product of relative variance and work of an iteration is taken. Path tracing and bidirectional path tracing
 //! are choices without light paths and without merging.
 //!
 //! The cost of an iteration is counted, not timed: mean numbers of vertices ([`crate::transport::VertexCounts`]) times

@@ -7,15 +7,15 @@ use crate::plan::{Effect, Presence};
 use crate::render::{Candidate, Cost, Counts, Method, Proxy, Settings};
 use crate::scene::{Scene, View};
 
-/// Share of the render's work that pilots (short renders by the compared methods) and the measurement of effects may
-/// take together.
+/// Share of the render's work that the pilot (a proxy render in a small picture) and the measurement of effects may take
+/// together.
 const PILOT_WORK_SHARE: f64 = 0.05;
 /// Share of [`PILOT_WORK_SHARE`] that the measurement of effects may take.
 const EFFECTS_WORK_SHARE: f64 = 0.2;
-/// Share of the render's work that the smallest possible pilots may take. It is larger than [`PILOT_WORK_SHARE`] because
+/// Share of the render's work that the smallest possible pilot may take. It is larger than [`PILOT_WORK_SHARE`] because
 /// in a short render a wrong choice costs more than a pilot.
 const MAX_PILOT_WORK_SHARE: f64 = 0.1;
-/// Smallest number of pixels of a pilot's picture: a denoiser needs them.
+/// Smallest number of pixels of a pilot's picture.
 const MIN_PIXELS: f64 = 1024.0;
 /// Largest number of pixels of a pilot's picture: more would leave fewer iterations.
 const MAX_PIXELS: f64 = 16384.0;
@@ -56,8 +56,8 @@ fn all_counts() -> Vec<Counts> {
 pub struct PilotResult {
     /// The candidate (method and settings).
     pub candidate: Candidate,
-    /// Expected squared relative noise of the render before the finish: the relative second moment of an iteration over
-    /// the number of iterations. Infinite if the candidate misses light.
+    /// Expected squared relative noise of the render before the finish: the relative variance of an iteration over the
+    /// number of iterations. Infinite if the candidate misses light.
     pub squared_error: f64,
     /// Core-seconds of an iteration of the whole picture, predicted from counted vertices.
     pub seconds_per_iteration: f64,
@@ -89,7 +89,7 @@ fn pixel_count(camera: &Camera) -> f64 {
     f64::from(width) * f64::from(height)
 }
 
-/// Plans and runs the pilots of a render: short renders by which `auto` compares methods.
+/// Plans and runs the pilot of a render, by which `auto` chooses numbers of samples.
 pub(super) struct Pilot<'a> {
     view: View<'a>,
     /// Settings of [`Candidate::GATHERING`].
@@ -197,23 +197,23 @@ impl<'a> Pilot<'a> {
         let guide = proxy.learn_guide();
         // Guided light paths are longer, because most of them meet glass.
         let guided_cost = guide.as_ref().map(|guide| Cost::count(scene, camera, self.gathering, Some(guide)));
-        let moments = proxy.measure(guide.as_ref(), size.iterations, stopped).relative();
-        let result = |(counts, moment): (Counts, f64)| {
+        let variances = proxy.measure(guide.as_ref(), size.iterations, stopped).relative();
+        let presence = Presence::of(scene, camera);
+        let result = |(counts, variance): (Counts, f64)| {
             let candidate = Candidate::with_counts(counts, guided && counts.light_paths > 0);
             let settings = settings_of(candidate)?;
             let cost = guided_cost.as_ref().filter(|_| candidate.guided).unwrap_or(&self.cost);
             let seconds_per_iteration = cost.film_seconds(candidate, &settings, camera);
-            let finds_all = self.finds_all(settings.method);
-            let squared_error = if finds_all { moment * seconds_per_iteration / self.budget } else { f64::INFINITY };
+            let finds_all = self.finds_all(settings.method, &presence);
+            let squared_error = if finds_all { variance * seconds_per_iteration / self.budget } else { f64::INFINITY };
             Some(PilotResult { candidate, squared_error, seconds_per_iteration, chosen: false })
         };
-        counts.into_iter().zip(moments).filter_map(result).collect()
+        counts.into_iter().zip(variances).filter_map(result).collect()
     }
 
-    /// Whether a method finds all light of the scene that `vcm` finds. A pilot may miss what is rare.
-    fn finds_all(&self, method: Method) -> bool {
+    /// Whether a method finds all light of the present effects that `vcm` finds. A pilot may miss light that is rare.
+    fn finds_all(&self, method: Method, presence: &Presence) -> bool {
         let survey = &self.view.scene.survey;
-        let presence = Presence::of(self.view.scene, self.view.camera);
         Effect::ALL
             .into_iter()
             .filter(|effect| presence.has(*effect))

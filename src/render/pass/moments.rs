@@ -72,7 +72,7 @@ impl Densities {
 struct Factors {
     connections: f64,
     light: f64,
-    /// Of eta for one light path per pixel.
+    /// Coefficients of eta for one light path per pixel.
     merges: Merges,
 }
 
@@ -225,7 +225,7 @@ pub struct Proxy<'a> {
     pub candidates: &'a [Counts],
 }
 
-/// What the walks of all iterations read.
+/// Data that the walks of all iterations read.
 struct Walks<'w, 'a> {
     proxy: &'w Proxy<'a>,
     variants: [Bidirectional<'w>; 3],
@@ -239,7 +239,7 @@ struct Walks<'w, 'a> {
     of_proxy: Factors,
 }
 
-/// What one row of blocks leaves in an iteration.
+/// Sums and photons of one row of blocks in an iteration.
 #[derive(Default)]
 struct RowOutput {
     /// Sums of the row's blocks.
