@@ -2,6 +2,7 @@
 
 mod account;
 mod clock;
+mod input;
 mod pass;
 mod session;
 mod settings;
@@ -12,14 +13,13 @@ pub use account::{
     RenderStats, Rendered, ShardResult, StopReason, UnseenLight,
 };
 pub use clock::{Clock, Phases, TimeSpent, cpu_seconds, peak_memory};
+pub use input::RenderInput;
 pub(crate) use pass::Cost;
 pub use pass::{
     MAX_TECHNIQUES, Moments, PHOTON_BYTES, PhotonCounts, Proxy, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile,
     photons_per_path, sample_bytes,
 };
-pub use session::{
-    Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, RenderInput, Session, State, render, run_session,
-};
+pub use session::{Control, ExpectedError, MIN_ITERATIONS_FOR_ERROR, Progress, Session, State, render, run_session};
 pub use settings::{
     BandwidthRule, Candidate, Counts, DEFAULT_ITERATIONS, DEFAULT_KNN, DEFAULT_MAP_KNN, DEFAULT_MAP_MEMORY,
     DEFAULT_MAP_PHOTONS, DEFAULT_PHOTONS, KernelChoice, LIGHT_PATH_STEPS, Levels, MAX_CONNECTIONS,

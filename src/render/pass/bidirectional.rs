@@ -18,7 +18,7 @@ use super::photon_counts::PhotonCounts;
 use super::sample_buffer::{self, SampleBuffer, SampleBufferPart};
 use super::techniques::{FilmRecorder, TechniquePicture, TileRecorder};
 use super::tiles::{BLOCK, PixelBlock, SlotPixel, TILE_PIXELS, Tiles, WholeTile};
-use crate::camera::{Camera, GROUP_SIZE, TilePixel};
+use crate::camera::{GROUP_SIZE, TilePixel};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, PixelAccumulator, Schedule, level_factor2};
 use crate::light::Guide;
@@ -27,14 +27,14 @@ use crate::plan::{CameraSuffix, Event, Part};
 use crate::random::{Domain, Purpose, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
+use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
-use crate::scene::Scene;
 use crate::spectrum::{IterationWavelengths, WavelengthSample};
 use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraPathStart, CameraPaths, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertex,
-    LightVertices, MergeLevels, MergePhoton, PixelSample, SPARED_BY_ROULETTE, Splat, TechniqueSet,
+    Bidirectional, CameraPathStart, CameraWalkContext, Deposits, LightPaths, LightVertex, LightVertices, MergeLevels,
+    MergePhoton, PixelSample, SPARED_BY_ROULETTE, Splat, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -57,12 +57,8 @@ impl Pair {
 }
 
 /// Integrator of the bidirectional methods (bdpt, bpm, vcm).
-pub struct Passes<'a> {
-    scene: &'a Scene,
-    camera: &'a Camera,
-    settings: &'a Settings,
-    initial_media: &'a InitialMedia,
-    shared: Bidirectional<'a>,
+pub struct Passes {
+    techniques: TechniqueSet,
     guide: Option<Arc<Guide>>,
     pairs: Vec<Pair>,
     tiles: Tiles,
@@ -84,15 +80,10 @@ pub struct Passes<'a> {
     initial: Vec<f32>,
 }
 
-impl<'a> Passes<'a> {
+impl Passes {
     /// Makes the integrator. `settings.levels` must be one level unless the method has levels.
-    pub fn new(
-        scene: &'a Scene,
-        camera: &'a Camera,
-        settings: &'a Settings,
-        initial_media: &'a InitialMedia,
-        techniques: TechniqueSet,
-    ) -> Passes<'a> {
+    pub fn new(input: &RenderInput<'_>, techniques: TechniqueSet) -> Passes {
+        let RenderInput { scene, camera, settings, initial_media } = input;
         let levels = settings.levels;
         let mut pairs =
             vec![Pair { light: Domain::Light, camera: Domain::CameraIndependent, levels: (0, levels.count) }];
@@ -107,27 +98,11 @@ impl<'a> Passes<'a> {
         let [film, whole] = [(camera.whole()[1], camera.size()), ((0, 0), camera.whole()[0])];
         let (at, size) = if techniques.merge { film } else { whole };
         let cells = LightCells::new(settings.counts, at, size);
-        let light_paths = cells.count() as f32;
-        let camera_paths = settings.camera_paths(scene, camera, initial_media);
-        let shared = Bidirectional {
-            camera_paths,
-            initial_media,
-            techniques,
-            light_paths,
-            connections: settings.counts.connections as f32,
-            merged_paths: light_paths * pairs.len() as f32,
-            spared: if settings.counts.leave_camera_paths_alone(techniques.merge) { SPARED_BY_ROULETTE } else { 1.0 },
-            only: None,
-        };
-        let guide =
-            settings.guided.then(|| learn_guide(&camera_paths, initial_media, settings, None)).flatten().map(Arc::new);
+        let learn = || learn_guide(&input.camera_paths(), initial_media, settings, None);
+        let guide = settings.guided.then(learn).flatten().map(Arc::new);
         let samples = pairs.iter().map(|pair| SampleBuffer::new(tiles.count() * TILE_PIXELS, pair.levels.1)).collect();
         Passes {
-            scene,
-            camera,
-            settings,
-            initial_media,
-            shared,
+            techniques,
             guide,
             pairs,
             tiles,
@@ -142,17 +117,28 @@ impl<'a> Passes<'a> {
         }
     }
 
-    fn camera_paths(&self) -> CameraPaths<'a> {
-        self.settings.camera_paths(self.scene, self.camera, self.initial_media)
+    /// Data that all pairs of paths share.
+    fn shared<'i>(&self, input: &'i RenderInput<'_>) -> Bidirectional<'i> {
+        let (light_paths, counts) = (self.cells.count() as f32, input.settings.counts);
+        Bidirectional {
+            camera_paths: input.camera_paths(),
+            initial_media: &input.initial_media,
+            techniques: self.techniques,
+            light_paths,
+            connections: counts.connections as f32,
+            merged_paths: light_paths * self.pairs.len() as f32,
+            spared: if counts.leave_camera_paths_alone(self.techniques.merge) { SPARED_BY_ROULETTE } else { 1.0 },
+            only: None,
+        }
     }
 
-    fn light_pass<'g>(&self, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPaths<'g> {
-        let Settings { seed, max_depth, .. } = *self.settings;
+    fn light_pass<'g>(&self, settings: &Settings, i: u64, pair: &Pair, guide: Option<&'g Guide>) -> LightPaths<'g> {
+        let Settings { seed, max_depth, .. } = *settings;
         let pass = LightPaths::new(seed, i, pair.light, self.cells.count(), max_depth).guided(guide);
         // Methods without merging connect paths of one pixel only, so any wavelength will do, and light paths of a
         // pixel can follow a low-discrepancy sequence over iterations. Photons serve all pixels and gain nothing from
         // that.
-        if self.shared.techniques.merge {
+        if self.techniques.merge {
             pass.with(IterationWavelengths::drifting(seed, i))
         } else {
             pass.drawing(Streams::in_sequence(seed, i, pair.light))
@@ -160,12 +146,13 @@ impl<'a> Passes<'a> {
     }
 
     /// Traces the photons of iteration `i`, if it was not rendered in this process.
-    fn photons_of(&self, i: u64) -> PhotonMap<MergePhoton> {
-        let Passes { shared, tiles, cells, .. } = *self;
+    fn photons_of(&self, input: &RenderInput<'_>, i: u64) -> PhotonMap<MergePhoton> {
+        let Passes { tiles, cells, .. } = *self;
+        let shared = self.shared(input);
         let mut parts = Vec::new();
         // In the order of an iteration, so that sums over coincident photons have equal bits.
         for pair in &self.pairs {
-            let pass = self.light_pass(i, pair, self.guide.as_deref());
+            let pass = self.light_pass(&input.settings, i, pair, self.guide.as_deref());
             let walk = |tile: &WholeTile| {
                 let (mut left, mut arena, mut traced) = (Deposits::default(), Bump::new(), TracedPaths::new());
                 for pixel in tiles.blocks(*tile).flat_map(|block| block.pixels) {
@@ -185,12 +172,18 @@ impl<'a> Passes<'a> {
     }
 
     /// Adds iteration `i` (from 1) to all pixels; `None` if the iteration was aborted.
-    fn pass<W: TileRecorder>(&mut self, i: u64, pixels: &mut [PixelAccumulator], recorders: &mut [W]) -> Option<Work> {
-        let shared = self.shared;
+    fn pass<W: TileRecorder>(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        recorders: &mut [W],
+    ) -> Option<Work> {
+        let (shared, settings) = (self.shared(input), &input.settings);
         if shared.techniques.merge && self.photons.as_ref().is_none_or(|(pass, _)| pass + 1 != i) {
             // Also before the first iteration: without photons it would lack the light that only photons find.
-            let photons = self.photons_of(i - 1);
-            if self.settings.stop.aborted() {
+            let photons = self.photons_of(input, i - 1);
+            if settings.stop.aborted() {
                 return None;
             }
             self.photons = Some((i - 1, photons));
@@ -201,20 +194,21 @@ impl<'a> Passes<'a> {
         let stored = map.map_or([0; 2], count_by_kind);
         let mut photons: Vec<MergePhoton> = Vec::new();
         let guide = self.guide.clone();
-        let light: Vec<_> = self.pairs.iter().map(|pair| self.light_pass(i, pair, guide.as_deref())).collect();
+        let light: Vec<_> =
+            self.pairs.iter().map(|pair| self.light_pass(settings, i, pair, guide.as_deref())).collect();
         let iteration = Iteration {
             shared,
             tiles: self.tiles,
             cells: self.cells,
             map,
-            merging: self.settings.counts.merging,
-            schedule: self.settings.schedule(i),
-            expected: self.covered * (self.pairs.len() as f64 * self.settings.counts.light_paths_per_pixel()) as f32,
+            merging: settings.counts.merging,
+            schedule: settings.schedule(i),
+            expected: self.covered * (self.pairs.len() as f64 * settings.counts.light_paths_per_pixel()) as f32,
             initial: &self.initial,
         };
         for ((pair, light_paths), samples) in self.pairs.iter().zip(&light).zip(&mut self.samples) {
-            let own = pair.own(self.settings.levels.picture_level());
-            let streams = Streams::in_sequence(self.settings.seed, i, pair.camera);
+            let own = pair.own(settings.levels.picture_level());
+            let streams = Streams::in_sequence(settings.seed, i, pair.camera);
             let walks = PairWalks { pair, light_paths, own, streams };
             let mut on_film = samples.par_tiles().zip(recorders.par_iter_mut()).collect::<Vec<_>>().into_iter();
             let film: Vec<_> = self.sources.iter().map(|tile| tile.tile.and_then(|_| on_film.next())).collect();
@@ -223,7 +217,7 @@ impl<'a> Passes<'a> {
                 .zip(film)
                 .zip(&mut self.left)
                 .for_each(|((tile, film), left)| iteration.walk_tile(&walks, *tile, film, left));
-            if self.settings.stop.aborted() {
+            if settings.stop.aborted() {
                 return None;
             }
             let splats = SplatsByTile::new(&self.left, &self.tiles);
@@ -241,7 +235,7 @@ impl<'a> Passes<'a> {
         let groups = |slot: usize| recorders[slot / TILE_PIXELS].group_light(slot % TILE_PIXELS);
         let slot = |index: usize| tiles.slot(index as u32);
         let gathered = sample_buffer::add(&self.samples, camera_paths, i, pixels, slot, groups);
-        if shared.techniques.merge && self.settings.shard.count == 1 {
+        if shared.techniques.merge && settings.shard.count == 1 {
             self.photons = Some((i, PhotonMap::build(photons)));
         }
         Some(Work { light_paths: walked, photons: merges, rejected, counts: PhotonCounts { stored, gathered } })
@@ -481,18 +475,19 @@ impl<'l> SplatsByTile<'l> {
     }
 }
 
-impl Integrator for Passes<'_> {
-    fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        if !self.settings.method.has_bandwidths() {
-            return self.settings.initial_pixels(self.scene, self.camera);
+impl Integrator for Passes {
+    fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator> {
+        let RenderInput { scene, camera, settings, .. } = input;
+        if !settings.method.has_bandwidths() {
+            return input.initial_pixels();
         }
         // Merging is one of many techniques, and small kernels suffice \[Georgiev et al. 2012\].
-        let initial = match self.settings.initial_bandwidth {
+        let initial = match settings.initial_bandwidth {
             InitialBandwidth::Fixed(radius) => InitialBandwidth::Fixed(radius),
             _ => InitialBandwidth::Footprint,
         };
-        let Settings { max_initial_bandwidth: [widest, _], seed, .. } = *self.settings;
-        let (none, camera_paths) = (PhotonMap::build(Vec::new()), self.camera_paths());
+        let Settings { max_initial_bandwidth: [widest, _], seed, .. } = *settings;
+        let (none, camera_paths) = (PhotonMap::build(Vec::new()), input.camera_paths());
         let all = initial_bandwidths(&camera_paths, initial, widest, seed, [&none; 2]);
         // A footprint covers the same number of pixels everywhere; a fixed radius is compared with the median
         // footprint.
@@ -503,10 +498,10 @@ impl Integrator for Passes<'_> {
                 let mut footprints = footprints.into_flattened();
                 FOOTPRINT_PIXELS * radius / median(&mut footprints, f32::total_cmp).unwrap_or(f32::INFINITY)
             }
-            _ => FOOTPRINT_PIXELS.min(widest * self.camera.whole_width()),
+            _ => FOOTPRINT_PIXELS.min(widest * camera.whole_width()),
         };
         self.covered = std::f32::consts::PI * covered * covered;
-        let pixels: Vec<PixelAccumulator> = all.into_iter().map(self.settings.pixel_factory(self.scene)).collect();
+        let pixels: Vec<PixelAccumulator> = all.into_iter().map(settings.pixel_factory(scene)).collect();
         self.initial = pixels.iter().map(|pixel| pixel.bandwidths[0]).collect();
         pixels
     }
@@ -515,12 +510,18 @@ impl Integrator for Passes<'_> {
         self.guide.as_deref()
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
+    fn iterate(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        phases: &mut Phases,
+    ) -> Option<Work> {
         let start = cpu_seconds();
         let mut recorder = std::mem::take(&mut self.recorder);
         let work = match recorder.start_iteration() {
-            Some(recorders) => self.pass(i, pixels, recorders),
-            None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
+            Some(recorders) => self.pass(input, i, pixels, recorders),
+            None => self.pass(input, i, pixels, &mut vec![(); self.tiles.count()]),
         };
         self.recorder = recorder;
         // Light and camera paths alternate within a pixel, so their times are not separated.

@@ -6,6 +6,7 @@ use crate::estimator::PixelAccumulator;
 use crate::light::Guide;
 use crate::photon::ByKind;
 use crate::render::clock::Phases;
+use crate::render::input::RenderInput;
 
 /// Numbers of light paths and photons of one iteration.
 #[derive(Default)]
@@ -20,14 +21,21 @@ pub(in crate::render) struct Work {
     pub counts: PhotonCounts,
 }
 
-/// Renders the iterations of a method, one at a time.
+/// Renders the iterations of a method, one at a time. It holds what passes from one iteration to the next. Scene and camera
+/// are arguments, because they move between iterations if there is motion blur.
 pub(in crate::render) trait Integrator {
     /// Runs the pilot that finds the initial bandwidths, if the method has one, and makes the pixels for the first
     /// iteration.
-    fn pixels(&mut self) -> Vec<PixelAccumulator>;
+    fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator>;
     /// Adds iteration `i` (from 1) to all pixels, and its core-seconds to `phases`. Returns `None` if the iteration was
     /// interrupted ([`Settings::stop`](crate::render::Settings::stop)) and has changed nothing.
-    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work>;
+    fn iterate(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        phases: &mut Phases,
+    ) -> Option<Work>;
     /// Squared radii of every pixel and level after the last iteration (square scene units), by kind of photons; `None` if
     /// they follow from the number of the iteration.
     fn counted(&self) -> Option<ByKind<Vec<f32>>> {

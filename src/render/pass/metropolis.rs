@@ -23,14 +23,13 @@ use crate::light::Group;
 use crate::math::{Rgb, UVec2, Vec2};
 use crate::plan::{Part, PathClass};
 use crate::random::{Chain, Domain, Purpose, Stream, Streams, mix};
-use crate::render::clock::Phases;
-use crate::render::clock::cpu_seconds;
+use crate::render::clock::{Phases, cpu_seconds};
+use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
-use crate::scene::Scene;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraPaths, CameraWalkContext, Deposits, Division, InitialMedia, LightPaths, LightVertices,
-    MergeLevels, PathRecorder, PixelSample, Splat, Technique, TechniqueSet,
+    Bidirectional, CameraWalkContext, Deposits, Division, LightPaths, LightVertices, MergeLevels, PathRecorder,
+    PixelSample, Splat, Technique, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -111,10 +110,7 @@ struct State {
 }
 
 /// Integrator of Metropolis light transport.
-pub(super) struct Metropolis<'a> {
-    camera_paths: CameraPaths<'a>,
-    settings: &'a Settings,
-    shared: Bidirectional<'a>,
+pub(super) struct Metropolis {
     tiles: Tiles,
     samples: Vec<PixelSample>,
     levels: MergeLevels,
@@ -287,31 +283,12 @@ fn starts(candidates: &[Candidate], count: usize, u: f64) -> (Vec<Candidate>, f6
     (found, total)
 }
 
-impl<'a> Metropolis<'a> {
-    pub fn new(
-        scene: &'a Scene,
-        camera: &'a Camera,
-        settings: &'a Settings,
-        initial_media: &'a InitialMedia,
-    ) -> Metropolis<'a> {
-        let (width, height) = camera.size();
-        let pixels = (width * height) as f32;
-        let camera_paths = settings.camera_paths(scene, camera, initial_media);
-        let techniques = TechniqueSet::BDPT;
-        let shared = Bidirectional {
-            camera_paths,
-            initial_media,
-            techniques,
-            light_paths: pixels,
-            connections: 1.0,
-            spared: 1.0,
-            merged_paths: pixels,
-            only: None,
-        };
+impl Metropolis {
+    pub fn new(camera: &Camera) -> Metropolis {
         let tiles = Tiles::new(camera);
         let samples = vec![PixelSample::default(); tiles.count() * TILE_PIXELS];
         let levels = MergeLevels::new(std::iter::once((0.0, Eta::NONE)));
-        Metropolis { camera_paths, settings, shared, tiles, samples, levels }
+        Metropolis { tiles, samples, levels }
     }
 
     /// Samples the paths of all pixels as usual (step 1). Returns the paths at which chains may start, and the number
@@ -350,16 +327,34 @@ impl<'a> Metropolis<'a> {
     }
 }
 
-impl Integrator for Metropolis<'_> {
-    fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        self.settings.initial_pixels(self.camera_paths.scene, self.camera_paths.camera)
+impl Integrator for Metropolis {
+    fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator> {
+        input.initial_pixels()
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
+    fn iterate(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        phases: &mut Phases,
+    ) -> Option<Work> {
         let started = cpu_seconds();
-        let Settings { seed, max_depth, .. } = *self.settings;
-        let (width, height) = self.camera_paths.camera.size();
-        let (shared, levels) = (self.shared, self.levels);
+        let RenderInput { settings, initial_media, .. } = input;
+        let Settings { seed, max_depth, .. } = *settings;
+        let (width, height) = input.size();
+        let count = (width * height) as f32;
+        let shared = Bidirectional {
+            camera_paths: input.camera_paths(),
+            initial_media,
+            techniques: TechniqueSet::BDPT,
+            light_paths: count,
+            connections: 1.0,
+            spared: 1.0,
+            merged_paths: count,
+            only: None,
+        };
+        let levels = self.levels;
         let walks = Walks {
             shared: &shared,
             light_paths: LightPaths::new(seed, i, Domain::Light, width * height, max_depth),
@@ -379,7 +374,7 @@ impl Integrator for Metropolis<'_> {
             .enumerate()
             .map_init(Bump::new, |arena, (number, candidate)| walks.chain(arena, number as u64, candidate, steps))
             .collect();
-        if self.settings.stop.aborted() {
+        if settings.stop.aborted() {
             return None;
         }
         // The steps represent all pixels, and light over importance is scaled to the mean `b`.
@@ -393,7 +388,7 @@ impl Integrator for Metropolis<'_> {
             };
             *into += value * scale;
         }
-        let (camera_paths, tiles, samples) = (self.camera_paths, self.tiles, &self.samples);
+        let (camera_paths, tiles, samples) = (shared.camera_paths, self.tiles, &self.samples);
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
             let sample = &samples[tiles.slot(index as u32)];
             pixel.record_first_hit(i, || camera_paths.first_hit(sample));

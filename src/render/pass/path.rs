@@ -6,39 +6,36 @@ use super::techniques::{FilmRecorder, TechniquePicture, TileRecorder};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::estimator::PixelAccumulator;
 use crate::random::{Domain, Streams};
-use crate::render::clock::Phases;
-use crate::render::clock::cpu_seconds;
-use crate::render::settings::Settings;
-use crate::transport::{CameraPaths, PixelSample, path_sample};
+use crate::render::clock::{Phases, cpu_seconds};
+use crate::render::input::RenderInput;
+use crate::transport::{PixelSample, path_sample};
 use bumpalo::Bump;
 use rayon::prelude::*;
 
 /// Integrator of path tracing.
-pub(super) struct Paths<'a> {
-    camera_paths: CameraPaths<'a>,
-    settings: &'a Settings,
+pub(super) struct Paths {
     tiles: Tiles,
     samples: [SampleBuffer; 1],
     recorder: FilmRecorder,
 }
 
-impl<'a> Paths<'a> {
-    pub fn new(camera_paths: CameraPaths<'a>, settings: &'a Settings) -> Paths<'a> {
-        let tiles = Tiles::new(camera_paths.camera);
+impl Paths {
+    pub fn new(RenderInput { scene, camera, settings, .. }: &RenderInput<'_>) -> Paths {
+        let tiles = Tiles::new(camera);
         let samples = [SampleBuffer::new(tiles.count() * TILE_PIXELS, 1)];
-        Paths {
-            camera_paths,
-            settings,
-            tiles,
-            samples,
-            recorder: FilmRecorder::new(settings, camera_paths.scene, &tiles),
-        }
+        Paths { tiles, samples, recorder: FilmRecorder::new(settings, scene, &tiles) }
     }
 
     /// Adds iteration `i` (from 1) to all pixels; false if the iteration was aborted.
-    fn pass<W: TileRecorder>(&mut self, i: u64, pixels: &mut [PixelAccumulator], recorders: &mut [W]) -> bool {
-        let (camera_paths, tiles) = (self.camera_paths, self.tiles);
-        let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);
+    fn pass<W: TileRecorder>(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        recorders: &mut [W],
+    ) -> bool {
+        let (camera_paths, tiles) = (input.camera_paths(), self.tiles);
+        let streams = Streams::in_sequence(input.settings.seed, i, Domain::CameraIndependent);
         let parts = self.samples[0].par_tiles().zip(recorders.par_iter_mut());
         parts.enumerate().for_each(|(tile, (mut samples, tile_recorder))| {
             let (mut arena, mut sample) = (Bump::new(), PixelSample::default());
@@ -55,7 +52,7 @@ impl<'a> Paths<'a> {
                 }
             }
         });
-        if self.settings.stop.aborted() {
+        if input.settings.stop.aborted() {
             return false;
         }
         let groups = |slot: usize| recorders[slot / TILE_PIXELS].group_light(slot % TILE_PIXELS);
@@ -64,17 +61,23 @@ impl<'a> Paths<'a> {
     }
 }
 
-impl Integrator for Paths<'_> {
-    fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        self.settings.initial_pixels(self.camera_paths.scene, self.camera_paths.camera)
+impl Integrator for Paths {
+    fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator> {
+        input.initial_pixels()
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
+    fn iterate(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        phases: &mut Phases,
+    ) -> Option<Work> {
         let start = cpu_seconds();
         let mut recorder = std::mem::take(&mut self.recorder);
         let done = match recorder.start_iteration() {
-            Some(recorders) => self.pass(i, pixels, recorders),
-            None => self.pass(i, pixels, &mut vec![(); self.tiles.count()]),
+            Some(recorders) => self.pass(input, i, pixels, recorders),
+            None => self.pass(input, i, pixels, &mut vec![(); self.tiles.count()]),
         };
         self.recorder = recorder;
         phases.eye += cpu_seconds() - start;

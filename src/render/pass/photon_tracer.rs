@@ -6,17 +6,17 @@ use super::integrator::Work;
 use super::light_path_ranges::light_path_ranges;
 use super::region::region;
 use super::volume::{Maps, VolumeMap};
-use crate::camera::Camera;
 use crate::estimator::bandwidth::{initial_bandwidths, initial_volume_bandwidths, median_radius2};
 use crate::estimator::{InitialBandwidth, PixelAccumulator};
 use crate::light::{Guide, Region};
 use crate::photon::{Kind, PhotonMap, kind};
 use crate::random::Domain;
 use crate::render::clock::{Phases, cpu_seconds};
+use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::spectrum::IterationWavelengths;
-use crate::transport::{CameraPaths, EqualFlux, Indirect, InitialMedia, LightPaths, Photons, light_path};
+use crate::transport::{EqualFlux, Indirect, InitialMedia, LightPaths, Photons, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -64,6 +64,12 @@ fn trace_by(
     photons
 }
 
+/// Photons of equal flux for each channel; `None` if the settings do not trace the channels separately.
+fn equal_flux(input: &RenderInput<'_>) -> Option<[Option<EqualFlux>; 3]> {
+    let of_channel = |channel| EqualFlux::new(input.scene, &input.initial_media, channel);
+    input.settings.has_channels().then(|| std::array::from_fn(of_channel))
+}
+
 /// Pixels before the first iteration, with their initial bandwidths, and a bound of bandwidths.
 pub(super) struct InitialPixels {
     pub pixels: Vec<PixelAccumulator>,
@@ -72,10 +78,7 @@ pub(super) struct InitialPixels {
 }
 
 /// Traces the light paths of a render.
-pub(super) struct PhotonTracer<'a> {
-    camera_paths: CameraPaths<'a>,
-    settings: &'a Settings,
-    initial_media: &'a InitialMedia,
+pub(super) struct PhotonTracer {
     guide: Option<Guide>,
     /// Sphere toward which lights at infinity send their light paths; `None`: the whole scene.
     region: Option<Region>,
@@ -83,26 +86,15 @@ pub(super) struct PhotonTracer<'a> {
     equal_flux: Option<[Option<EqualFlux>; 3]>,
 }
 
-impl<'a> PhotonTracer<'a> {
+impl PhotonTracer {
     /// Makes the tracer, and learns the guide of light paths if the settings ask for one.
-    pub fn new(
-        scene: &'a Scene,
-        camera: &'a Camera,
-        settings: &'a Settings,
-        initial_media: &'a InitialMedia,
-    ) -> PhotonTracer<'a> {
-        let camera_paths = settings.camera_paths(scene, camera, initial_media);
+    pub fn new(input: &RenderInput<'_>) -> PhotonTracer {
+        let RenderInput { scene, settings, initial_media, .. } = input;
+        let camera_paths = input.camera_paths();
         let guided = settings.guided && !settings.photon_classes(&scene.survey).is_empty();
         let region = region(&camera_paths, settings.seed);
         let guide = guided.then(|| learn_guide(&camera_paths, initial_media, settings, region)).flatten();
-        let of_channel = |channel| EqualFlux::new(scene, initial_media, channel);
-        let equal_flux = settings.has_channels().then(|| std::array::from_fn(of_channel));
-        PhotonTracer { camera_paths, settings, initial_media, guide, region, equal_flux }
-    }
-
-    /// The tracer of the render's camera paths.
-    pub fn camera_paths(&self) -> CameraPaths<'a> {
-        self.camera_paths
+        PhotonTracer { guide, region, equal_flux: equal_flux(input) }
     }
 
     /// The learnt distribution of starts of light paths; `None` if guiding is off or not worth its cost.
@@ -116,103 +108,50 @@ impl<'a> PhotonTracer<'a> {
     }
 
     /// Traces the photons of iteration `i` and builds their maps: one, or one for each colour channel.
-    pub fn maps(&self, i: u64, phases: &mut Phases) -> (Vec<Maps>, Work) {
+    pub fn maps(&self, input: &RenderInput<'_>, i: u64, phases: &mut Phases) -> (Vec<Maps>, Work) {
         let mut work = Work::default();
         let maps = match &self.equal_flux {
             None => {
-                let paths = self.light_paths(i, Domain::Light);
-                let trace = || trace_photons(self.camera_paths.scene, self.initial_media, &paths);
-                vec![self.timed_map(i, &paths, paths.count(), trace, phases, &mut work)]
+                let paths = self.light_paths(input, i, Domain::Light);
+                let trace = || trace_photons(input.scene, &input.initial_media, &paths);
+                vec![timed_map(input, i, &paths, paths.count(), trace, phases, &mut work)]
             }
-            Some(channels) => (0..).zip(channels).map(|(k, f)| self.channel_map(i, k, *f, phases, &mut work)).collect(),
+            Some(channels) => {
+                (0..).zip(channels).map(|(k, f)| channel_map(input, i, (k, *f), phases, &mut work)).collect()
+            }
         };
         (maps, work)
     }
 
-    /// Traces a third of the light paths for one colour channel and builds the map of their photons.
-    fn channel_map(&self, i: u64, channel: u64, flux: Option<EqualFlux>, phases: &mut Phases, work: &mut Work) -> Maps {
-        let Settings { seed, max_depth, photons, .. } = *self.settings;
-        let scene = self.camera_paths.scene;
-        // The channels share no random numbers.
-        let paths = LightPaths::new(seed, 3 * i + channel, Domain::Light, (photons / 3).max(1), max_depth)
-            .with(IterationWavelengths::new(seed, i))
-            .stopped_by(&self.settings.stop)
-            .wanting(self.settings.photon_classes(&scene.survey), Indirect::Photons);
-        let trace = || {
-            flux.map_or(Photons::default(), |flux| {
-                trace_by(&paths, 0..paths.count(), |arena, index, photons| {
-                    flux.light_path(scene, arena, self.initial_media, &paths, index, photons);
-                })
-            })
-        };
-        self.timed_map(i, &paths, 0, trace, phases, work)
-    }
-
-    /// Traces photons, builds their map, and adds times and counts to `phases` and `work`. `expected_paths` is the
-    /// number of light paths from which glints (light that mirrors and clear glass send to sharp lobes) derive the
-    /// expected number of photons; 0 if glints are not gathered.
-    fn timed_map(
-        &self,
-        i: u64,
-        paths: &LightPaths,
-        expected_paths: u32,
-        trace: impl FnOnce() -> Photons,
-        phases: &mut Phases,
-        work: &mut Work,
-    ) -> Maps {
-        let start = cpu_seconds();
-        let photons = trace();
-        let traced = cpu_seconds();
-        let maps = self.build(photons, expected_paths, i);
-        phases.light += traced - start;
-        phases.map += cpu_seconds() - traced;
-        work.light_paths += u64::from(paths.count());
-        work.photons += maps.len();
-        work.rejected += maps.rejected();
-        work.counts.add(&maps.counts());
-        maps
-    }
-
-    /// Builds the maps of the photons of iteration `i`. Glints (light that mirrors and clear glass send to
-    /// sharp lobes) are gathered if photons of caustics are traced.
-    fn build(&self, photons: Photons, expected_paths: u32, i: u64) -> Maps {
-        let survey = &self.camera_paths.scene.survey;
-        let lost = photons.lost;
-        let volume = survey.scattering.then(|| VolumeMap::new(photons.volume, i, self.settings));
-        let [others, caustics] = photons.surface.map(PhotonMap::build);
-        let [_, has_caustics] = self.settings.bandwidth_kinds(survey);
-        let surface = [others, caustics.of_paths(if has_caustics { expected_paths } else { 0 })];
-        Maps { surface, volume, wavelengths: IterationWavelengths::new(self.settings.seed, i), lost }
-    }
-
-    fn light_paths(&self, i: u64, domain: Domain) -> LightPaths<'_> {
-        let Settings { seed, photons, max_depth, .. } = *self.settings;
+    fn light_paths<'s>(&'s self, input: &'s RenderInput<'_>, i: u64, domain: Domain) -> LightPaths<'s> {
+        let RenderInput { scene, settings, .. } = input;
+        let Settings { seed, photons, max_depth, .. } = *settings;
         LightPaths::new(seed, i, domain, photons, max_depth)
             .guided(self.guide.as_ref())
             .lighting(self.region)
-            .wanting(self.settings.photon_classes(&self.camera_paths.scene.survey), self.settings.indirect)
+            .wanting(settings.photon_classes(&scene.survey), settings.indirect)
             .with(IterationWavelengths::new(seed, i))
-            .stopped_by(&self.settings.stop)
+            .stopped_by(&settings.stop)
     }
 
     /// Makes the pixels before the first iteration. Their bandwidths come from a pilot, if the settings derive them
     /// from photons.
-    pub fn initial_pixels(&self) -> InitialPixels {
-        let Settings { initial_bandwidth: initial, max_initial_bandwidth: [surface, volume], seed, .. } =
-            *self.settings;
-        let (camera_paths, scene) = (&self.camera_paths, self.camera_paths.scene);
+    pub fn initial_pixels(&self, input: &RenderInput<'_>) -> InitialPixels {
+        let RenderInput { scene, settings, .. } = input;
+        let Settings { initial_bandwidth: initial, max_initial_bandwidth: [surface, volume], seed, .. } = *settings;
+        let camera_paths = &input.camera_paths();
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
-            trace_photons(scene, self.initial_media, &self.light_paths(0, Domain::PilotLight))
+            trace_photons(scene, &input.initial_media, &self.light_paths(input, 0, Domain::PilotLight))
         } else {
             Photons::default()
         };
         let maps = pilot.surface.map(PhotonMap::build);
         let bandwidths = initial_bandwidths(camera_paths, initial, surface, seed, maps.each_ref());
-        let indirect_cap2 = match (initial, self.settings.indirect) {
+        let indirect_cap2 = match (initial, settings.indirect) {
             (InitialBandwidth::Nearest(k), Indirect::Paths) => median_radius2(&maps[Kind::Caustic as usize], k),
             _ => f32::INFINITY,
         };
-        let mut pixels: Vec<_> = bandwidths.into_iter().map(self.settings.pixel_factory(scene)).collect();
+        let mut pixels: Vec<_> = bandwidths.into_iter().map(settings.pixel_factory(scene)).collect();
         if scene.survey.scattering {
             let pilot = PhotonMap::build(pilot.volume);
             let bandwidths = initial_volume_bandwidths(camera_paths, initial, volume, seed, &pilot);
@@ -222,4 +161,67 @@ impl<'a> PhotonTracer<'a> {
         }
         InitialPixels { pixels, indirect_cap2 }
     }
+}
+
+/// Traces a third of the light paths for one colour channel and builds the map of their photons.
+fn channel_map(
+    input: &RenderInput<'_>,
+    i: u64,
+    (channel, flux): (u64, Option<EqualFlux>),
+    phases: &mut Phases,
+    work: &mut Work,
+) -> Maps {
+    let RenderInput { scene, settings, initial_media, .. } = input;
+    let Settings { seed, max_depth, photons, .. } = *settings;
+    // The channels share no random numbers.
+    let paths = LightPaths::new(seed, 3 * i + channel, Domain::Light, (photons / 3).max(1), max_depth)
+        .with(IterationWavelengths::new(seed, i))
+        .stopped_by(&settings.stop)
+        .wanting(settings.photon_classes(&scene.survey), Indirect::Photons);
+    let trace = || {
+        flux.map_or(Photons::default(), |flux| {
+            trace_by(&paths, 0..paths.count(), |arena, index, photons| {
+                flux.light_path(scene, arena, initial_media, &paths, index, photons);
+            })
+        })
+    };
+    timed_map(input, i, &paths, 0, trace, phases, work)
+}
+
+/// Traces photons, builds their map, and adds times and counts to `phases` and `work`. `expected_paths` is the
+/// number of light paths from which glints (light that mirrors and clear glass send to sharp lobes) derive the
+/// expected number of photons; 0 if glints are not gathered.
+fn timed_map(
+    input: &RenderInput<'_>,
+    i: u64,
+    paths: &LightPaths,
+    expected_paths: u32,
+    trace: impl FnOnce() -> Photons,
+    phases: &mut Phases,
+    work: &mut Work,
+) -> Maps {
+    let start = cpu_seconds();
+    let photons = trace();
+    let traced = cpu_seconds();
+    let maps = build(input, photons, expected_paths, i);
+    phases.light += traced - start;
+    phases.map += cpu_seconds() - traced;
+    work.light_paths += u64::from(paths.count());
+    work.photons += maps.len();
+    work.rejected += maps.rejected();
+    work.counts.add(&maps.counts());
+    maps
+}
+
+/// Builds the maps of the photons of iteration `i`. Glints (light that mirrors and clear glass send to
+/// sharp lobes) are gathered if photons of caustics are traced.
+fn build(input: &RenderInput<'_>, photons: Photons, expected_paths: u32, i: u64) -> Maps {
+    let RenderInput { scene, settings, .. } = input;
+    let survey = &scene.survey;
+    let lost = photons.lost;
+    let volume = survey.scattering.then(|| VolumeMap::new(photons.volume, i, settings));
+    let [others, caustics] = photons.surface.map(PhotonMap::build);
+    let [_, has_caustics] = settings.bandwidth_kinds(survey);
+    let surface = [others, caustics.of_paths(if has_caustics { expected_paths } else { 0 })];
+    Maps { surface, volume, wavelengths: IterationWavelengths::new(settings.seed, i), lost }
 }

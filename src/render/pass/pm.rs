@@ -22,10 +22,11 @@ use crate::photon::{ByKind, Kind, MAX_NEIGHBOURS, Nearest, Photon, PhotonMap, Ph
 use crate::random::{Domain, Streams};
 use crate::render::clock::Phases;
 use crate::render::clock::cpu_seconds;
+use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
 use crate::transport::{
-    CameraPaths, GatherBandwidths, Indirect, InitialMedia, LevelRadii, LightPaths, Photons, Scratch, light_path,
+    GatherBandwidths, Indirect, InitialMedia, LevelRadii, LightPaths, Photons, Scratch, light_path,
 };
 use bumpalo::Bump;
 
@@ -103,10 +104,7 @@ impl GatherBandwidths for Neighbours<'_> {
 }
 
 /// Integrator of classical photon mapping.
-pub(super) struct Pm<'a> {
-    camera_paths: CameraPaths<'a>,
-    settings: &'a Settings,
-    initial_media: &'a InitialMedia,
+pub(super) struct Pm {
     /// Photon maps of the render; `None` before the first iteration, which builds them.
     maps: Option<PhotonMaps>,
     /// Whether the light paths of the maps have been reported in the counts of an iteration.
@@ -114,27 +112,22 @@ pub(super) struct Pm<'a> {
     samples: [SampleBuffer; 1],
 }
 
-impl<'a> Pm<'a> {
-    pub fn new(
-        scene: &'a Scene,
-        camera: &'a Camera,
-        settings: &'a Settings,
-        initial_media: &'a InitialMedia,
-    ) -> Pm<'a> {
-        let camera_paths = settings.camera_paths(scene, camera, initial_media);
+impl Pm {
+    pub fn new(camera: &Camera) -> Pm {
         let samples = [SampleBuffer::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
-        Pm { camera_paths, settings, initial_media, maps: None, counted: false, samples }
+        Pm { maps: None, counted: false, samples }
     }
 
     /// Traces photons and builds the maps of the render.
-    fn build(&self, phases: &mut Phases) -> (PhotonMaps, u32, u64) {
-        let Settings { seed, photons, photon_memory, max_depth, .. } = *self.settings;
+    fn build(input: &RenderInput<'_>, phases: &mut Phases) -> (PhotonMaps, u32, u64) {
+        let RenderInput { scene, settings, initial_media, .. } = input;
+        let Settings { seed, photons, photon_memory, max_depth, .. } = *settings;
         let start = cpu_seconds();
         let pass = LightPaths::new(seed, 1, Domain::Light, photons, max_depth)
-            .wanting(self.settings.photon_classes(&self.camera_paths.scene.survey), Indirect::Photons)
-            .stopped_by(&self.settings.stop);
+            .wanting(settings.photon_classes(&scene.survey), Indirect::Photons)
+            .stopped_by(&settings.stop);
         let most = usize::try_from(photon_memory / PHOTON_BYTES).unwrap_or(usize::MAX).min(u32::MAX as usize);
-        let (photons, traced, lost) = trace(self.camera_paths.scene, self.initial_media, &pass, most);
+        let (photons, traced, lost) = trace(scene, initial_media, &pass, most);
         phases.light += cpu_seconds() - start;
         let start = cpu_seconds();
         let maps = photons.map(PhotonMap::build);
@@ -144,27 +137,34 @@ impl<'a> Pm<'a> {
     }
 }
 
-impl Integrator for Pm<'_> {
-    fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        self.settings.initial_pixels(self.camera_paths.scene, self.camera_paths.camera)
+impl Integrator for Pm {
+    fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator> {
+        input.initial_pixels()
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
+    fn iterate(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        phases: &mut Phases,
+    ) -> Option<Work> {
+        let settings = &input.settings;
         let (maps, traced, rejected) = match self.maps.take() {
             Some(maps) => (maps, 0, 0),
-            None => self.build(phases),
+            None => Pm::build(input, phases),
         };
-        if self.settings.stop.aborted() {
+        if settings.stop.aborted() {
             return None;
         }
         let start = cpu_seconds();
-        let (camera_paths, camera) = (&self.camera_paths, self.camera_paths.camera);
-        let count = match self.settings.initial_bandwidth {
+        let (camera_paths, camera) = (&input.camera_paths(), input.camera);
+        let count = match settings.initial_bandwidth {
             InitialBandwidth::Nearest(k) => k.clamp(2, MAX_NEIGHBOURS),
-            _ => self.settings.method.default_neighbours(1),
+            _ => settings.method.default_neighbours(1),
         };
         let least = MIN_RADIUS_RATIO * camera_paths.scene.lights.sky().radius;
-        let streams = Streams::in_sequence(self.settings.seed, i, Domain::CameraIndependent);
+        let streams = Streams::in_sequence(settings.seed, i, Domain::CameraIndependent);
         let scratch = <(Scratch, ByKind<Nearest>)>::default;
         par_pixels(
             self.samples[0].par_parts(pixels_per_band(camera.size().0)),
@@ -182,13 +182,13 @@ impl Integrator for Pm<'_> {
                 }
             },
         );
-        if !self.settings.stop.aborted() {
+        if !settings.stop.aborted() {
             sample_buffer::add(&self.samples, camera_paths, i, pixels, |index| index, |_| &[]);
         }
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();
         self.maps = Some(maps);
-        if self.settings.stop.aborted() {
+        if settings.stop.aborted() {
             return None;
         }
         // A resumed render traces the same maps again without counting them twice.

@@ -16,44 +16,45 @@ use crate::light::Guide;
 use crate::photon::{ByKind, Kernel};
 use crate::random::{Domain, Streams};
 use crate::render::clock::{Phases, cpu_seconds};
+use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::transport::{CameraPathStart, PixelSample, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Integrator of progressive photon mapping with the bandwidth rule `B` and the kernel `K`.
-pub(super) struct Sppm<'a, B, K> {
-    tracer: PhotonTracer<'a>,
-    settings: &'a Settings,
+pub(super) struct Sppm<B, K> {
+    tracer: PhotonTracer,
     bandwidths: B,
     kernel: K,
     /// Samples of all pixels in the current iteration, for each of a pixel's camera paths.
     samples: Vec<SampleBuffer>,
 }
 
-impl<'a, B: PixelBandwidths, K: Kernel> Sppm<'a, B, K> {
-    pub fn new(tracer: PhotonTracer<'a>, settings: &'a Settings, bandwidths: B, kernel: K) -> Sppm<'a, B, K> {
-        let (width, height) = tracer.camera_paths().camera.size();
-        let samples = SampleBuffer::of_paths(width as usize * height as usize, settings.levels);
-        Sppm { tracer, settings, bandwidths, kernel, samples }
+impl<B: PixelBandwidths, K: Kernel> Sppm<B, K> {
+    pub fn new(input: &RenderInput<'_>, tracer: PhotonTracer, bandwidths: B, kernel: K) -> Sppm<B, K> {
+        let (width, height) = input.size();
+        let samples = SampleBuffer::of_paths(width as usize * height as usize, input.settings.levels);
+        Sppm { tracer, bandwidths, kernel, samples }
     }
 
     /// Random numbers of the camera paths of `domain` in iteration `i`: for their points on film and lens, and for
     /// everything else.
-    fn streams(&self, i: u64, domain: Domain) -> [Streams; 2] {
+    fn streams(settings: &Settings, i: u64, domain: Domain) -> [Streams; 2] {
         // Measurement points of `ppm` stay where they are \[Hachisuka, Ogaki, Jensen 2008\]: at everything that one point
         // of the film sees, which may be several points if it sees glass.
-        let film = if self.settings.method.has_fixed_points() { 1 } else { i };
-        [film, i].map(|i| Streams::in_sequence(self.settings.seed, i, domain))
+        let film = if settings.method.has_fixed_points() { 1 } else { i };
+        [film, i].map(|i| Streams::in_sequence(settings.seed, i, domain))
     }
 
     /// Traces the camera paths of iteration `i` (from 1) and stores their samples. `maps` has the photons of the
     /// iteration: one map, or one for each colour channel.
-    fn trace_camera_paths(&mut self, i: u64, maps: &[Maps], pixels: &[PixelAccumulator]) {
+    fn trace_camera_paths(&mut self, input: &RenderInput<'_>, i: u64, maps: &[Maps], pixels: &[PixelAccumulator]) {
+        let settings = &input.settings;
         let [independent, correlated] =
-            [Domain::CameraIndependent, Domain::CameraCorrelated].map(|domain| self.streams(i, domain));
-        let Sppm { tracer, settings, bandwidths, kernel, samples } = self;
-        let (camera_paths, levels, kernel) = (tracer.camera_paths(), settings.levels, *kernel);
+            [Domain::CameraIndependent, Domain::CameraCorrelated].map(|domain| Self::streams(settings, i, domain));
+        let Sppm { bandwidths, kernel, samples, .. } = self;
+        let (camera_paths, levels, kernel) = (input.camera_paths(), settings.levels, *kernel);
         let size = camera_paths.camera.size();
         let band = pixels_per_band(size.0);
         let bands =
@@ -108,23 +109,29 @@ fn add_photons(all: &mut PixelSample, sample: &PixelSample) {
     all.rejection = all.rejection.or(sample.rejection);
 }
 
-impl<B: PixelBandwidths, K: Kernel> Integrator for Sppm<'_, B, K> {
-    fn pixels(&mut self) -> Vec<PixelAccumulator> {
-        let InitialPixels { pixels, indirect_cap2 } = self.tracer.initial_pixels();
+impl<B: PixelBandwidths, K: Kernel> Integrator for Sppm<B, K> {
+    fn pixels(&mut self, input: &RenderInput<'_>) -> Vec<PixelAccumulator> {
+        let InitialPixels { pixels, indirect_cap2 } = self.tracer.initial_pixels(input);
         self.bandwidths.start(&pixels, indirect_cap2);
         pixels
     }
 
-    fn iterate(&mut self, i: u64, pixels: &mut [PixelAccumulator], phases: &mut Phases) -> Option<Work> {
-        let (maps, mut work) = self.tracer.maps(i, phases);
+    fn iterate(
+        &mut self,
+        input: &RenderInput<'_>,
+        i: u64,
+        pixels: &mut [PixelAccumulator],
+        phases: &mut Phases,
+    ) -> Option<Work> {
+        let (maps, mut work) = self.tracer.maps(input, i, phases);
         let start = cpu_seconds();
         let before = self.bandwidths.clone();
-        self.trace_camera_paths(i, &maps, pixels);
-        let aborted = self.settings.stop.aborted();
+        self.trace_camera_paths(input, i, &maps, pixels);
+        let aborted = input.settings.stop.aborted();
         if aborted {
             self.bandwidths = before;
         } else {
-            let camera_paths = self.tracer.camera_paths();
+            let camera_paths = input.camera_paths();
             work.counts.gathered = sample_buffer::add(&self.samples, &camera_paths, i, pixels, |index| index, |_| &[]);
         }
         phases.eye += cpu_seconds() - start;

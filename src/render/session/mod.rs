@@ -1,12 +1,10 @@
 //! A render that advances by one iteration at a time, so that several renders can take turns.
 
 mod control;
-mod input;
 mod run;
 mod state;
 
 pub use control::{Control, ExpectedError, Progress};
-pub use input::RenderInput;
 pub use run::{MIN_ITERATIONS_FOR_ERROR, render, run_session};
 pub use state::State;
 
@@ -19,6 +17,7 @@ use crate::render::account::{
     ErrorReport, HistoryEntry, PhotonRecord, PixelState, RenderStats, Rendered, StopReason, output,
 };
 use crate::render::clock::{Phases, TimeSpent};
+use crate::render::input::RenderInput;
 use crate::render::pass::{Integrator, integrator};
 use crate::render::settings::Settings;
 use crate::stat::sum::MAX_TERMS;
@@ -43,10 +42,10 @@ impl<'a> Session<'a> {
     /// Starts a render on which `time` has been spent already, by choosing its settings. That time counts as part of the
     /// render.
     pub fn with_time_spent(input: &'a RenderInput<'a>, mut time: TimeSpent) -> Session<'a> {
-        let RenderInput { scene, camera, settings, initial_media } = input;
+        let RenderInput { scene, settings, initial_media, .. } = input;
         let (integrator, pixels) = time.measure(|| {
-            let mut integrator = integrator(scene, camera, settings, initial_media);
-            let pixels = integrator.pixels();
+            let mut integrator = integrator(input);
+            let pixels = integrator.pixels(input);
             (integrator, pixels)
         });
         let stats = RenderStats::new(PhotonRecord::new(scene, settings, initial_media), time);
@@ -101,7 +100,9 @@ impl<'a> Session<'a> {
     fn iterate(&mut self) -> bool {
         let Counters { next, stats, .. } = &mut self.counters;
         // Iterations are numbered from 1; the pilot has the number 0.
-        let Some(work) = self.integrator.iterate(*next + 1, &mut self.pixels, &mut stats.phases) else { return false };
+        let Some(work) = self.integrator.iterate(self.input, *next + 1, &mut self.pixels, &mut stats.phases) else {
+            return false;
+        };
         stats.add_iteration(&work);
         *next += self.input.settings.shard.count;
         self.error = None;

@@ -1,13 +1,12 @@
 //! The loop over iterations, and its stop conditions.
 
+use super::Session;
 use super::control::{Control, Progress};
-use super::{RenderInput, Session};
 use crate::camera::Camera;
 use crate::estimator::{PixelAccumulator, QUARTERS};
-use crate::render::account::Rendered;
-use crate::render::account::StopReason;
+use crate::render::account::{Rendered, StopReason};
+use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
-
 use crate::scene::Scene;
 
 /// Iterations that an estimated error needs before it may stop a render: two in every quarter, whose spread gives the
