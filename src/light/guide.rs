@@ -37,6 +37,7 @@ const MAX_LIGHTS: usize = 256;
 pub const UNGUIDED: usize = 0;
 
 /// Emitters that are guided together as one light: the triangles of an object, or one other light.
+#[derive(Clone)]
 struct GuidedLight {
     emitters: Range<usize>,
     /// Probability that selection by power gives one of these emitters.
@@ -52,6 +53,7 @@ struct GuidedLight {
 
 /// Guided emission: the probability of each cell (a light, or a pair of a light and a caustic target) from which light
 /// paths start.
+#[derive(Clone)]
 pub struct Guide {
     lights: Vec<GuidedLight>,
     /// For each emitter, the index in `lights` of its guided light; `u32::MAX` for unguided emitters.
@@ -114,6 +116,26 @@ impl Guide {
         let mut guide = Guide { lights: guided, light_of, cells, prior, max_targeted, choice };
         guide.update_lights();
         Some(guide)
+    }
+
+    /// The guide for the lights of another moment of a moving scene, whose powers and targets may differ. It keeps the
+    /// probabilities of the cells if it has the same lights and number of targets there, and starts anew otherwise.
+    /// `None` if there is no guided cell.
+    pub fn for_lights(&self, lights: &Lights) -> Option<Guide> {
+        let guided = guided_lights(lights)?;
+        let now = |light: &GuidedLight| guided.iter().find(|other| other.emitters == light.emitters);
+        let now: Option<Vec<GuidedLight>> = self.lights.iter().map(|light| now(light).cloned()).collect();
+        let targets = self.cells.iter().filter_map(|cell| cell.1).max().map_or(0, |last| last + 1);
+        match now
+            .filter(|_| targets == lights.targets().spheres().len() && self.light_of.len() == lights.emitters().len())
+        {
+            Some(lights) => {
+                let mut guide = Guide { lights, ..self.clone() };
+                guide.update_lights();
+                Some(guide)
+            }
+            None => Guide::new(lights, self.max_targeted < 1.0),
+        }
     }
 
     /// Number of cells (lights, and pairs of a light and a caustic target), with the cell of unguided paths.

@@ -83,9 +83,10 @@ const NOT_IN_PYTHON: [(&str, &str); 13] = [
 ];
 
 /// Options that are arguments of Python's `Scene`, and their names there.
-const OF_SCENE: [(&str, &str); 10] = [
+const OF_SCENE: [(&str, &str); 11] = [
     ("frames", "frame"),
     ("frame_rate", "frame_rate"),
+    ("shutter", "shutter"),
     ("env", "environment"),
     ("env_rotation", "environment_rotation"),
     ("env_strength", "environment_strength"),

@@ -28,6 +28,10 @@ pub struct SceneOptions {
     #[arg(long, value_name = "FPS", between = (Excluded(0.0), Unbounded), requires = "frames", help_heading = "Picture")]
     #[arg(hide_short_help = true)]
     pub frame_rate: Option<f64>,
+    /// Motion blur: when the shutter opens and closes, in frames relative to the frame, such as -0.25,0.25; 0 is none
+    /// [default: what the scene says]
+    #[arg(long, value_name = "OPEN,CLOSE", allow_hyphen_values = true, help_heading = "Picture")]
+    pub shutter: Option<Shutter>,
     /// The file is one of a sequence, of which each has a frame to itself
     #[arg(skip)]
     #[serde(skip)]
@@ -89,6 +93,24 @@ impl FromStr for EnvironmentChoice {
     }
 }
 
+/// Times at which the camera's shutter opens and closes, relative to the frame (frames).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Shutter(pub [f64; 2]);
+
+impl FromStr for Shutter {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let times = text.split(',').map(|part| part.trim().parse().ok().filter(|time: &f64| time.is_finite()));
+        match times.collect::<Option<Vec<f64>>>().as_deref() {
+            Some([0.0]) => Ok(Shutter([0.0; 2])),
+            Some(&[open, close]) if open <= close => Ok(Shutter([open, close])),
+            Some([_, _]) => Err("the shutter must not close before it opens".into()),
+            _ => Err("it must be two numbers OPEN,CLOSE, such as -0.25,0.25, or 0 for no motion blur".into()),
+        }
+    }
+}
+
 impl SceneOptions {
     /// Default options for a scene file; `allow_outside`: the file may name files outside its folder.
     pub fn of(path: &Path, allow_outside: bool) -> SceneOptions {
@@ -96,6 +118,7 @@ impl SceneOptions {
             path: path.into(),
             frames: None,
             frame_rate: None,
+            shutter: None,
             of_sequence: false,
             env: None,
             env_rotation: None,
@@ -130,7 +153,13 @@ impl SceneOptions {
             strength: self.env_strength,
             options: self.read_options(),
             off: self.switches().off,
+            shutter: self.shutter(),
         }
+    }
+
+    /// Times at which the shutter opens and closes, relative to the frame (frames); `None`: those of the scene.
+    pub fn shutter(&self) -> Option<[f64; 2]> {
+        self.shutter.map(|Shutter(times)| times)
     }
 
     /// The effects, such as dispersion, that the user switches off or asks for.
@@ -138,7 +167,8 @@ impl SceneOptions {
         self.effects.unwrap_or_default()
     }
 
-    fn read_options(&self) -> gltf::ReadOptions {
+    /// Choices about reading the scene file.
+    pub fn read_options(&self) -> gltf::ReadOptions {
         gltf::ReadOptions {
             light_units: self.light_units,
             glass: self.glass,
@@ -148,6 +178,7 @@ impl SceneOptions {
                 rate: self.frame_rate,
                 of_sequence: self.of_sequence,
             }),
+            after_frame: 0.0,
         }
     }
 }

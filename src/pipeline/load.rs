@@ -32,6 +32,8 @@ pub struct SceneRequest {
     pub options: gltf::ReadOptions,
     /// Effects, such as dispersion, that are switched off.
     pub off: EffectSet,
+    /// Times at which the shutter opens and closes, relative to the frame (frames); `None`: those of the scene.
+    pub shutter: Option<[f64; 2]>,
 }
 
 /// An environment light.
@@ -50,6 +52,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// Effects that were switched off and so removed from the scene.
     pub removed: Removed,
+    /// The file of the scene, if it is read again for other moments; `None` if it is not animated, or no glTF file.
+    pub file: Option<gltf::SceneFile>,
 }
 
 /// Reads and builds a scene. Embree builds with `threads` threads.
@@ -59,11 +63,31 @@ pub struct Loaded {
 /// `stop` is set.
 pub fn load(request: &SceneRequest, threads: usize, stop: &Stop) -> Result<Loaded> {
     check_memory(request, threads)?;
-    let description = match usd::is_stage(&request.path) {
-        true => usd::read(&request.path, &request.options, stop)?,
-        false => gltf::read(&request.path, &request.options)?,
+    if usd::is_stage(&request.path) {
+        return build(usd::read(&request.path, &request.options, stop)?, request, threads);
+    }
+    let file = gltf::SceneFile::open(&request.path)?;
+    let loaded = build(file.describe(&request.options)?, request, threads)?;
+    let file = loaded.scene.animated.then_some(file);
+    Ok(Loaded { file, ..loaded })
+}
+
+/// Reads and builds a scene, of `file` if that is its file, as it is `after_frame` frames after the frame of the request.
+///
+/// # Errors
+/// Errors of [`load`].
+pub(super) fn load_moment(
+    request: &SceneRequest,
+    file: Option<&gltf::SceneFile>,
+    after_frame: f64,
+    stop: &Stop,
+) -> Result<Scene> {
+    let options = gltf::ReadOptions { after_frame, ..request.options };
+    let description = match file {
+        Some(file) => file.describe(&options)?,
+        None => usd::read(&request.path, &options, stop)?,
     };
-    build(description, request, threads)
+    Ok(build(description, request, rayon::current_num_threads())?.scene)
 }
 
 /// Builds a scene from the bytes of a .glb file. `request.path` names it in messages.
@@ -83,7 +107,7 @@ fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
 fn build(mut description: Description, request: &SceneRequest, threads: usize) -> Result<Loaded> {
     set_environment(&mut description, request)?;
     let removed = switch::remove_effects(&mut description, request.off);
-    Ok(Loaded { scene: Scene::build(description, threads)?, removed })
+    Ok(Loaded { scene: Scene::build(description, threads)?, removed, file: None })
 }
 
 /// Replaces the environment of a scene description and changes it, as the request says.

@@ -20,6 +20,7 @@ pub mod layers;
 pub mod load;
 pub mod memory;
 pub mod merge;
+mod motion;
 mod observer;
 pub mod plan;
 mod prepare;
@@ -44,9 +45,10 @@ pub use request::{AutoRequest, MethodRequest, PictureRequest, Request, Saving};
 pub use worst::{Place, Tile, Worst};
 
 use crate::error::Result;
-use crate::render::RenderInput;
+use crate::render::{Motion, RenderInput};
 use crate::scene::View;
 use check::Checked;
+use motion::MovingScene;
 use observer::during;
 use resume::Resumption;
 use run::Running;
@@ -78,7 +80,9 @@ pub fn render_loaded(mut request: Request<'_>, loaded: &Loaded, observer: &mut d
     let planned = plan::plan_render(&request, &chosen, view, &loaded.removed)?;
     let prepared = prepare::prepare(&request, planned, view, observer)?;
     let facts = SceneFacts::new(view.scene, &request.picture.camera, &prepared.settings)?;
-    let stage = RenderInput::new(view.scene, view.camera, &prepared.settings);
+    let motion = MovingScene::new(&request, view, loaded.file.as_ref(), observer.stop())?;
+    let stage = RenderInput::new(view.scene, view.camera, &prepared.settings)
+        .with_motion(motion.as_ref().map(|motion| motion as &dyn Motion));
     let running = Running::start(&request, &stage, &chosen, prepared, resumption, facts.frame, observer)?;
     let iterated = running.iterate(observer)?;
     observer.event(Event::Rendered(&iterated.rendered));

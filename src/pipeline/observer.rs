@@ -53,6 +53,9 @@ pub enum Event<'a> {
     },
     /// A checkpoint could not be saved; the render continues.
     SaveFailed(&'a Error),
+    /// The scene could not be built at another moment of the shutter interval, which ends the render; the iterations so
+    /// far make the picture.
+    MomentFailed(&'a Error),
     /// The last iteration has ended. The pixel sums are still available.
     Rendered(&'a Rendered),
     /// The finish is about to begin. A file with these layers can be finished later if the process is killed meanwhile.

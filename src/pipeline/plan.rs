@@ -68,7 +68,7 @@ pub fn plan_picture(
     loaded: &Loaded,
     stop: impl Fn() -> bool,
 ) -> Result<PlannedPicture> {
-    let Loaded { scene, removed } = loaded;
+    let Loaded { scene, removed, .. } = loaded;
     let checked = check_picture(&picture, path, scene)?;
     let view = View::new(scene, &checked.camera);
     let chosen = choose(&mut picture.method, checked.settings, view, |_| true, stop);

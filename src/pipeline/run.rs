@@ -79,6 +79,12 @@ impl<'a> Running<'a> {
     pub fn iterate(self, observer: &mut dyn Observer) -> Result<Iterated> {
         let Running { mut session, mut between, head } = self;
         let stop = run_session(&mut session, |progress, session| between.after_iteration(progress, session, observer));
+        if let Some(failure) = session.take_failure() {
+            if session.iterations() == 0 {
+                return Err(failure);
+            }
+            observer.event(Event::MomentFailed(&failure));
+        }
         if session.iterations() == 0 && stop == StopReason::Interrupted {
             refuse_stop(observer)?;
         }

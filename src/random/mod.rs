@@ -37,6 +37,8 @@ pub enum Domain {
     GuideLight = 7,
     /// Camera paths that train the guiding of emission.
     GuideCamera = 8,
+    /// Moments of the shutter interval at which iterations render a moving scene.
+    Shutter = 9,
     /// Paths in unit tests.
     Test = 99,
 }
@@ -104,6 +106,8 @@ pub enum Purpose {
     Division = 28,
     /// Whether a camera path merges with photons.
     Merging = 29,
+    /// Moment of an iteration within the shutter interval.
+    Moment = 30,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.

@@ -1,10 +1,22 @@
 //! Scene, camera and settings that a render reads.
 
 use crate::camera::Camera;
+use crate::error::Result;
 use crate::estimator::PixelAccumulator;
+use crate::random::{Domain, Purpose, Streams};
 use crate::render::settings::{Levels, Settings};
 use crate::scene::Scene;
 use crate::transport::{CameraPaths, InitialMedia};
+
+/// The moments of a scene that moves while the shutter is open.
+pub trait Motion: Sync {
+    /// The scene and the camera at `time`, from 0, when the shutter opens, to 1, when it closes. All moments have the
+    /// same instances and lights, in the same order.
+    ///
+    /// # Errors
+    /// The scene cannot be read or built at this time.
+    fn at(&self, time: f64) -> Result<(Scene, Camera)>;
+}
 
 /// Scene, camera and settings of a render, and the media at the ray origins of camera and lights.
 pub struct RenderInput<'a> {
@@ -12,6 +24,8 @@ pub struct RenderInput<'a> {
     pub(in crate::render) camera: &'a Camera,
     pub(in crate::render) settings: Settings,
     pub(in crate::render) initial_media: InitialMedia,
+    /// The moments of the scene, one of which each iteration renders; `None`: nothing moves.
+    pub(in crate::render) motion: Option<&'a dyn Motion>,
 }
 
 impl<'a> RenderInput<'a> {
@@ -21,7 +35,29 @@ impl<'a> RenderInput<'a> {
         if !settings.method.has_levels() {
             settings.levels = Levels::new(1);
         }
-        RenderInput { scene, camera, settings, initial_media: InitialMedia::of(scene, camera) }
+        RenderInput { scene, camera, settings, initial_media: InitialMedia::of(scene, camera), motion: None }
+    }
+
+    /// The input of a render with motion blur: every iteration renders the scene at one of the moments.
+    #[must_use]
+    pub fn with_motion(self, motion: Option<&'a dyn Motion>) -> RenderInput<'a> {
+        RenderInput { motion, ..self }
+    }
+
+    /// Whether the scene changes between iterations.
+    pub(in crate::render) fn moves(&self) -> bool {
+        self.motion.is_some()
+    }
+
+    /// Renders one iteration by `render`, with the input at the moment of the iteration.
+    ///
+    /// # Errors
+    /// The scene cannot be built at this moment.
+    pub(in crate::render) fn at_iteration<T>(&self, i: u64, render: impl FnOnce(&RenderInput<'_>) -> T) -> Result<T> {
+        let Some(motion) = self.motion else { return Ok(render(self)) };
+        let (scene, camera) = motion.at(time_of_iteration(self.settings.seed, i))?;
+        let input = RenderInput::new(&scene, &camera, &self.settings);
+        Ok(render(&input.with_motion(Some(motion))))
     }
 
     /// The settings of the render.
@@ -43,4 +79,10 @@ impl<'a> RenderInput<'a> {
     pub fn size(&self) -> (u32, u32) {
         self.camera.size()
     }
+}
+
+/// The time of iteration `i` (from 1) within the shutter interval, 0 to 1. The times of a quarter of the iterations follow
+/// a low-discrepancy sequence, and the sequences of the quarters are scrambled independently.
+fn time_of_iteration(seed: u64, i: u64) -> f64 {
+    Streams::in_sequence(seed, i, Domain::Shutter).path(0).vertex(0).one_fine(Purpose::Moment)
 }

@@ -13,7 +13,7 @@ pub use account::{
     RenderStats, Rendered, ShardResult, StopReason, UnseenLight,
 };
 pub use clock::{Clock, Phases, TimeSpent, cpu_seconds, peak_memory};
-pub use input::RenderInput;
+pub use input::{Motion, RenderInput};
 pub(crate) use pass::Cost;
 pub use pass::{
     MAX_TECHNIQUES, Moments, PHOTON_BYTES, PhotonCounts, Proxy, TechniquePicture, WHOLE_TILE, bytes_per_whole_tile,

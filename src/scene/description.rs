@@ -45,6 +45,11 @@ pub struct Description {
     pub medium: Option<MediumParameters>,
     /// Settings of the picture, which options of the user override.
     pub picture: PictureDefaults,
+    /// Whether the file has animations.
+    pub animated: bool,
+    /// Times at which the camera's shutter opens and closes, relative to the frame (frames); `None` if the file does not
+    /// say.
+    pub shutter: Option<[f64; 2]>,
     /// Warnings about ignored or approximated features of the file, one sentence each: `material "glass": ...`.
     pub warnings: Vec<String>,
 }

@@ -65,6 +65,11 @@ pub struct Scene {
     pub cameras: Vec<CameraDescription>,
     /// Settings of the picture in the scene file, which options override.
     pub picture: PictureDefaults,
+    /// Whether the scene file has animations.
+    pub animated: bool,
+    /// Times at which the scene file opens and closes the shutter, relative to the frame (frames); `None` if it does not
+    /// say.
+    pub shutter: Option<[f64; 2]>,
     /// The medium that fills the space outside all solids; `None` if it is empty.
     pub medium: Option<MediumParameters>,
     /// Scattering data of the materials that were computed in advance.

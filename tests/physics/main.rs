@@ -26,6 +26,7 @@ mod media;
 mod merging;
 mod mis;
 mod moments;
+mod motion;
 mod narrow_spots;
 mod nesting;
 mod open_space;

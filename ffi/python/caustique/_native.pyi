@@ -93,6 +93,7 @@ class Scene:
         effects: str | None = None,
         frame: int | None = None,
         frame_rate: float | None = None,
+        shutter: Sequence[float] | Literal[0] | None = None,
         allow_outside: bool = False,
         strict: bool = False,
         threads: int = 0,

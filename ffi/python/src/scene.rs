@@ -15,7 +15,6 @@ use caustique::pipeline::load::{Environment, load, load_bytes};
 use caustique::pipeline::plan::plan_picture;
 use caustique::pipeline::{self, Delivery, Event, Loaded, Observer, Request, Saving, SceneRequest, checkpoint};
 use caustique::scene::description::EnvironmentSource;
-use caustique::scene::gltf;
 use caustique::stop::Stop;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -49,7 +48,7 @@ impl Scene {
     #[pyo3(
         signature = (source, **options),
         text_signature = "(source, *, environment=None, environment_rotation=None, environment_strength=None, \
-            light_units='auto', glass='auto', effects=None, frame=None, frame_rate=None, allow_outside=False, strict=False, threads=0)"
+            light_units='auto', glass='auto', effects=None, frame=None, frame_rate=None, shutter=None, allow_outside=False, strict=False, threads=0)"
     )]
     fn new(py: Python<'_>, source: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
         let mut keywords = Keywords::of(py, "Scene", options);
@@ -210,8 +209,10 @@ impl Scene {
             environment: self.identity.environment.clone().map(Environment::File),
             rotation: None,
             strength: None,
-            options: gltf::ReadOptions::default(),
+            options: self.options.read_options(),
             off: self.options.switches().off,
+            // A scene that is not read from files cannot be read again at other moments.
+            shutter: if self.identity.of_files { self.options.shutter() } else { Some([0.0; 2]) },
         }
     }
 
@@ -302,6 +303,9 @@ impl Observer for CallerReports<'_> {
             Event::Progress(progress) => self.call_back(progress),
             Event::SaveFailed(error) => {
                 self.caller.warn(&[format!("the state of the render is not saved: {error}; the render goes on")]);
+            }
+            Event::MomentFailed(error) => {
+                self.caller.warn(&[format!("{error}; the render ends here, with the iterations so far")]);
             }
             _ => {}
         }

@@ -48,7 +48,7 @@ pub fn run(args: &ConvergeArgs) -> Result<()> {
 
 fn converge(args: &ConvergeArgs, runs: Vec<Run>, more: Vec<(usize, u64)>) -> Result<()> {
     let threads = rayon::current_num_threads();
-    let Loaded { scene, removed } = scene::read(&args.scene, args.progress, threads)?;
+    let Loaded { scene, removed, .. } = scene::read(&args.scene, args.progress, threads)?;
     scene::print_warnings(&args.scene, &scene.warnings)?;
     let camera = scene.camera(&args.camera_request())?;
     let view = View::new(&scene, &camera);

@@ -121,6 +121,9 @@ impl Observer for Reports<'_> {
             Event::SaveFailed(error) => {
                 say(&format!("warning: the state of the render is not saved: {error}; the render goes on"));
             }
+            Event::MomentFailed(error) => {
+                say(&format!("warning: {error}; the render ends here, with the iterations so far"));
+            }
             Event::Rendered(rendered) => {
                 self.reporter.take().into_iter().for_each(|mut reporter| reporter.finish());
                 self.summary = Some(Summary::of(rendered));

@@ -11,7 +11,7 @@
 //! With bandwidth levels every pixel has two pairs of paths. Level 1 comes from the first pair, the other levels from
 //! the second. The pairs share nothing but the photons, which both light paths leave.
 
-use super::guiding::learn_guide;
+use super::guiding::{guide_at, learn_guide};
 use super::integrator::{Integrator, Work};
 use super::light_cells::{LightCells, TracedPaths};
 use super::photon_counts::PhotonCounts;
@@ -83,7 +83,7 @@ pub struct Passes {
 impl Passes {
     /// Makes the integrator. `settings.levels` must be one level unless the method has levels.
     pub fn new(input: &RenderInput<'_>, techniques: TechniqueSet) -> Passes {
-        let RenderInput { scene, camera, settings, initial_media } = input;
+        let RenderInput { scene, camera, settings, initial_media, .. } = input;
         let levels = settings.levels;
         let mut pairs =
             vec![Pair { light: Domain::Light, camera: Domain::CameraIndependent, levels: (0, levels.count) }];
@@ -149,10 +149,11 @@ impl Passes {
     fn photons_of(&self, input: &RenderInput<'_>, i: u64) -> PhotonMap<MergePhoton> {
         let Passes { tiles, cells, .. } = *self;
         let shared = self.shared(input);
+        let guide = guide_at(self.guide.as_deref(), input);
         let mut parts = Vec::new();
         // In the order of an iteration, so that sums over coincident photons have equal bits.
         for pair in &self.pairs {
-            let pass = self.light_pass(&input.settings, i, pair, self.guide.as_deref());
+            let pass = self.light_pass(&input.settings, i, pair, guide.as_deref());
             let walk = |tile: &WholeTile| {
                 let (mut left, mut arena, mut traced) = (Deposits::default(), Bump::new(), TracedPaths::new());
                 for pixel in tiles.blocks(*tile).flat_map(|block| block.pixels) {
@@ -194,6 +195,7 @@ impl Passes {
         let stored = map.map_or([0; 2], count_by_kind);
         let mut photons: Vec<MergePhoton> = Vec::new();
         let guide = self.guide.clone();
+        let guide = guide_at(guide.as_deref(), input);
         let light: Vec<_> =
             self.pairs.iter().map(|pair| self.light_pass(settings, i, pair, guide.as_deref())).collect();
         let iteration = Iteration {
@@ -235,7 +237,8 @@ impl Passes {
         let groups = |slot: usize| recorders[slot / TILE_PIXELS].group_light(slot % TILE_PIXELS);
         let slot = |index: usize| tiles.slot(index as u32);
         let gathered = sample_buffer::add(&self.samples, camera_paths, i, pixels, slot, groups);
-        if shared.techniques.merge && settings.shard.count == 1 {
+        // Photons of another moment would be at the wrong place.
+        if shared.techniques.merge && settings.shard.count == 1 && !input.moves() {
             self.photons = Some((i, PhotonMap::build(photons)));
         }
         Some(Work { light_paths: walked, photons: merges, rejected, counts: PhotonCounts { stored, gathered } })

@@ -16,11 +16,13 @@ use crate::math::{Rgb, Vec3, luminance};
 use crate::photon::{ByKind, Located, Nearest, Photon, PhotonMap, kind};
 use crate::plan::ClassSet;
 use crate::random::{Domain, Purpose, Stream};
+use crate::render::input::RenderInput;
 use crate::render::settings::Candidate;
 use crate::render::settings::Settings;
 use crate::transport::{CameraPaths, Indirect, InitialMedia, LightPaths, Photons, Probe, light_path};
 use bumpalo::Bump;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::f32::consts::PI;
 
 pub(super) const ROUNDS: u64 = 5;
@@ -88,6 +90,12 @@ pub(super) fn learn_guide(
         guide.learn(&error.of_cells, &paths, &work);
     }
     Some(guide)
+}
+
+/// The guide for the lights that an iteration sees: the learnt one, or one that is adapted to the moment of a moving
+/// scene.
+pub(super) fn guide_at<'g>(guide: Option<&'g Guide>, input: &RenderInput<'_>) -> Option<Cow<'g, Guide>> {
+    if input.moves() { guide?.for_lights(&input.scene.lights).map(Cow::Owned) } else { guide.map(Cow::Borrowed) }
 }
 
 /// Cost of an iteration with the guide over that without, by counted vertices: guided light paths meet glass at once,

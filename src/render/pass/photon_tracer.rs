@@ -1,7 +1,7 @@
 //! The light paths of stochastic progressive photon mapping: photon maps of an iteration, and initial bandwidths from a
 //! pilot.
 
-use super::guiding::learn_guide;
+use super::guiding::{guide_at, learn_guide};
 use super::integrator::Work;
 use super::light_path_ranges::light_path_ranges;
 use super::region::region;
@@ -110,9 +110,11 @@ impl PhotonTracer {
     /// Traces the photons of iteration `i` and builds their maps: one, or one for each colour channel.
     pub fn maps(&self, input: &RenderInput<'_>, i: u64, phases: &mut Phases) -> (Vec<Maps>, Work) {
         let mut work = Work::default();
-        let maps = match &self.equal_flux {
+        let equal_flux = if input.moves() { equal_flux(input) } else { self.equal_flux };
+        let maps = match &equal_flux {
             None => {
-                let paths = self.light_paths(input, i, Domain::Light);
+                let guide = guide_at(self.guide(), input);
+                let paths = self.light_paths(input, i, Domain::Light, guide.as_deref());
                 let trace = || trace_photons(input.scene, &input.initial_media, &paths);
                 vec![timed_map(input, i, &paths, paths.count(), trace, phases, &mut work)]
             }
@@ -123,11 +125,17 @@ impl PhotonTracer {
         (maps, work)
     }
 
-    fn light_paths<'s>(&'s self, input: &'s RenderInput<'_>, i: u64, domain: Domain) -> LightPaths<'s> {
+    fn light_paths<'s>(
+        &self,
+        input: &'s RenderInput<'_>,
+        i: u64,
+        domain: Domain,
+        guide: Option<&'s Guide>,
+    ) -> LightPaths<'s> {
         let RenderInput { scene, settings, .. } = input;
         let Settings { seed, photons, max_depth, .. } = *settings;
         LightPaths::new(seed, i, domain, photons, max_depth)
-            .guided(self.guide.as_ref())
+            .guided(guide)
             .lighting(self.region)
             .wanting(settings.photon_classes(&scene.survey), settings.indirect)
             .with(IterationWavelengths::new(seed, i))
@@ -141,7 +149,7 @@ impl PhotonTracer {
         let Settings { initial_bandwidth: initial, max_initial_bandwidth: [surface, volume], seed, .. } = *settings;
         let camera_paths = &input.camera_paths();
         let pilot = if matches!(initial, InitialBandwidth::Nearest(_)) {
-            trace_photons(scene, &input.initial_media, &self.light_paths(input, 0, Domain::PilotLight))
+            trace_photons(scene, &input.initial_media, &self.light_paths(input, 0, Domain::PilotLight, self.guide()))
         } else {
             Photons::default()
         };

@@ -151,8 +151,8 @@ impl Integrator for Pm {
     ) -> Option<Work> {
         let settings = &input.settings;
         let (maps, traced, rejected) = match self.maps.take() {
-            Some(maps) => (maps, 0, 0),
-            None => Pm::build(input, phases),
+            Some(maps) if !input.moves() => (maps, 0, 0),
+            _ => Pm::build(input, phases),
         };
         if settings.stop.aborted() {
             return None;
@@ -192,8 +192,11 @@ impl Integrator for Pm {
             return None;
         }
         // A resumed render traces the same maps again without counting them twice.
-        let (light_paths, rejected) =
-            if std::mem::replace(&mut self.counted, true) { (0, 0) } else { (u64::from(traced), rejected) };
+        let (light_paths, rejected) = if std::mem::replace(&mut self.counted, true) && !input.moves() {
+            (0, 0)
+        } else {
+            (u64::from(traced), rejected)
+        };
         Some(Work { light_paths, photons, rejected, ..Work::default() })
     }
 

@@ -8,7 +8,7 @@ pub use control::{Control, ExpectedError, Progress};
 pub use run::{MIN_ITERATIONS_FOR_ERROR, render, run_session};
 pub use state::State;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::estimator::{BandwidthState, PixelAccumulator};
 use crate::film::{self, LayerSet, Picture};
 use crate::finish::FinishedError;
@@ -31,6 +31,8 @@ pub struct Session<'a> {
     counters: Counters,
     /// Error of the picture after the last iteration; `None` if it has not been estimated.
     error: Option<ErrorReport>,
+    /// Why the scene could not be built at the moment of an iteration, which ends the render; otherwise `None`.
+    failure: Option<Error>,
 }
 
 impl<'a> Session<'a> {
@@ -50,7 +52,7 @@ impl<'a> Session<'a> {
         });
         let stats = RenderStats::new(PhotonRecord::new(scene, settings, initial_media), time);
         let counters = Counters { stats, next: settings.shard.index, next_record: 1, pilot_seconds: time.seconds };
-        Session { input, integrator, pixels, counters, error: None }
+        Session { input, integrator, pixels, counters, error: None, failure: None }
     }
 
     /// Continues a render from a saved state; `None` if the state is of another picture or method.
@@ -100,8 +102,15 @@ impl<'a> Session<'a> {
     fn iterate(&mut self) -> bool {
         let Counters { next, stats, .. } = &mut self.counters;
         // Iterations are numbered from 1; the pilot has the number 0.
-        let Some(work) = self.integrator.iterate(self.input, *next + 1, &mut self.pixels, &mut stats.phases) else {
-            return false;
+        let (i, integrator, pixels) = (*next + 1, &mut self.integrator, &mut self.pixels);
+        let iterated = self.input.at_iteration(i, |input| integrator.iterate(input, i, pixels, &mut stats.phases));
+        let work = match iterated {
+            Ok(Some(work)) => work,
+            Ok(None) => return false,
+            Err(failure) => {
+                self.failure = Some(failure);
+                return false;
+            }
         };
         stats.add_iteration(&work);
         *next += self.input.settings.shard.count;
@@ -121,6 +130,11 @@ impl<'a> Session<'a> {
         let error = self.estimate_error();
         self.counters.stats.record_error(error.estimate);
         self.counters.next_record = (self.iterations() as f64 * std::f64::consts::SQRT_2).ceil() as u64;
+    }
+
+    /// Takes the reason why the scene could not be built at the moment of an iteration; `None` if it could.
+    pub fn take_failure(&mut self) -> Option<Error> {
+        self.failure.take()
     }
 
     /// Progress of the render after its last iteration.

@@ -43,7 +43,11 @@ pub fn run_session<'a>(
         // The first iteration may exceed the time limit, so that there is a picture.
         let left = settings.time.filter(|_| session.iterations() > 0).map(|time| time - session.spent().seconds);
         if !session.step_within(left) {
-            return if settings.stop.requested() { StopReason::Interrupted } else { StopReason::Time };
+            return if settings.stop.requested() || session.failure.is_some() {
+                StopReason::Interrupted
+            } else {
+                StopReason::Time
+            };
         }
         let progress = session.progress();
         match observe(&progress, session) {

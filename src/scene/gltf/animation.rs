@@ -34,6 +34,9 @@ struct Channel {
     target: Value,
 }
 
+/// Stands for the time of the first key, where only the frame rate matters.
+const FIRST: FrameTime = FrameTime { number: 0, rate: None, of_sequence: false };
+
 /// A value of the document that an animation changes, and its curve over time.
 struct Track {
     /// JSON pointer to the value in the document.
@@ -48,20 +51,26 @@ struct Track {
 ///
 /// # Errors
 /// A frame is given, and an animation is invalid.
-pub(super) fn apply(document: &mut Document, frame: Option<FrameTime>, warnings: &mut Vec<String>) -> Result<()> {
+/// `after_frame` is added to the time of the frame (frames). Returns whether anything is animated.
+pub(super) fn apply(
+    document: &mut Document,
+    frame: Option<FrameTime>,
+    after_frame: f64,
+    warnings: &mut Vec<String>,
+) -> Result<bool> {
     let faults = FaultPolicy { fatal: frame.is_some() };
     let tracks = tracks(document, faults, warnings)?;
     let Some(start) = tracks.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
         if frame.is_some_and(|frame| !frame.of_sequence) {
             warnings.push("nothing in the scene is animated: its frames are all the same".into());
         }
-        return Ok(());
+        return Ok(false);
     };
     let time = match frame {
-        Some(frame) => f64::from(frame.number) / rate(document, frame, warnings)?,
+        Some(frame) => (f64::from(frame.number) + after_frame) / rate(document, frame, warnings)?,
         None => {
             warnings.push(format!("its animations begin at {start:.3} s, which is rendered (--frames chooses)"));
-            start
+            if after_frame == 0.0 { start } else { start + after_frame / rate(document, FIRST, warnings)? }
         }
     };
     for Track { pointer, place, curve } in &tracks {
@@ -77,7 +86,8 @@ pub(super) fn apply(document: &mut Document, frame: Option<FrameTime>, warnings:
             }
         }
     }
-    document.reparse_animated()
+    document.reparse_animated()?;
+    Ok(true)
 }
 
 /// Treatment of invalid animations: as errors or as warnings.

@@ -26,6 +26,7 @@ pub(super) struct SceneExtras {
     pub(super) film_transparent: bool,
     pub(super) frame: Option<i32>,
     pub(super) frame_rate: Option<Rate>,
+    pub(super) shutter: Option<[f64; 2]>,
 }
 
 /// Frames per second of a scene: a whole number or a fraction.
@@ -174,6 +175,7 @@ pub(super) const SCENE: &[&str] = &[
     "film_transparent",
     "frame",
     "frame_rate",
+    "shutter",
 ];
 pub(super) const MATERIAL: &[&str] =
     &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "contact", "null_bsdf", "spread_deg"];

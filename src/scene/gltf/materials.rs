@@ -3,7 +3,7 @@
 
 use super::document::{Document, get, named};
 use super::material::{self, Loaded};
-use super::texture::Textures;
+use super::texture::{Decoded, Textures};
 use super::topology::Solid;
 use super::{Glass, counted};
 use crate::error::Result;
@@ -27,8 +27,9 @@ pub(super) struct Library {
 }
 
 impl Library {
-    pub(super) fn new(glass: Glass) -> Library {
-        let (list, textures) = (Vec::new(), Textures::default());
+    /// An empty library; `images` holds images that have been decoded before.
+    pub(super) fn new(glass: Glass, images: HashMap<usize, Decoded>) -> Library {
+        let (list, textures) = (Vec::new(), Textures::with_images(images));
         Library { glass, list, textures, loaded: HashMap::new(), known: HashMap::new(), occluded: 0 }
     }
 

@@ -37,8 +37,11 @@ pub use files::{files, hash};
 use super::Description;
 use crate::error::{Error, ErrorKind, Result};
 use serde::Serialize;
+use std::collections::HashMap;
 use std::fmt::Display;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use texture::Decoded;
 
 /// Units of the intensities of punctual lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
@@ -94,6 +97,8 @@ pub struct ReadOptions {
     pub allow_outside: bool,
     /// The frame to read; `None`: the time of the first key of all animations.
     pub frame: Option<FrameTime>,
+    /// Time after the frame at which the scene is read (frames): a moment while the shutter is open.
+    pub after_frame: f64,
 }
 
 /// Reads the scene file at `path`. The buffers, textures and environment that it names must be in its folder, unless
@@ -103,9 +108,7 @@ pub struct ReadOptions {
 /// The file, or one that it names, cannot be read, is damaged, or requires an unsupported extension. The error names
 /// the file and the place in it.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
-    let bytes = std::fs::read(path)
-        .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
-    read_bytes(&bytes, path, options)
+    SceneFile::open(path)?.describe(options)
 }
 
 /// Does the work of [`read`] for the bytes of a file; files that the scene names are relative to `path`.
@@ -113,7 +116,35 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
 /// # Errors
 /// As for [`read`].
 pub fn read_bytes(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
-    nodes::describe(bytes, path, options).map_err(|e| e.within(path.display()))
+    nodes::describe(bytes, path, options, &mut HashMap::new()).map_err(|e| e.within(path.display()))
+}
+
+/// A scene file that is read several times, at different moments of its animations. Its images are decoded once.
+pub struct SceneFile {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    images: Mutex<HashMap<usize, Decoded>>,
+}
+
+impl SceneFile {
+    /// Reads the bytes of the file at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn open(path: &Path) -> Result<SceneFile> {
+        let bytes = std::fs::read(path)
+            .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
+        Ok(SceneFile { path: path.to_owned(), bytes, images: Mutex::default() })
+    }
+
+    /// Describes the scene at the time in `options`.
+    ///
+    /// # Errors
+    /// As for [`read`].
+    pub fn describe(&self, options: &ReadOptions) -> Result<Description> {
+        let mut images = self.images.lock().unwrap_or_else(PoisonError::into_inner);
+        nodes::describe(&self.bytes, &self.path, options, &mut images).map_err(|e| e.within(self.path.display()))
+    }
 }
 
 /// A number with its noun: `1 vertex`, `2 vertices`.

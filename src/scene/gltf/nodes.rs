@@ -8,6 +8,7 @@ use super::flat::flatten;
 use super::materials::{Library, tangent_coordinates};
 use super::mesh::MAX_COORDINATE;
 use super::shells;
+use super::texture::Decoded;
 use super::topology::Solid;
 use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
 use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
@@ -31,15 +32,21 @@ const VERTEX_BYTES: u64 = 128;
 /// Maximum memory of a triangle in bytes, Embree included.
 const TRIANGLE_BYTES: u64 = 128;
 
-/// Reads the bytes of a file into a description.
-pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
+/// Reads the bytes of a file into a description. `images` holds images that have been decoded before, and receives the
+/// others.
+pub(super) fn describe(
+    bytes: &[u8],
+    path: &Path,
+    options: &ReadOptions,
+    images: &mut HashMap<usize, Decoded>,
+) -> Result<Description> {
     let mut warnings = Vec::new();
     let folder = Folder::of(path, options.allow_outside);
     let mut document = Document::parse(bytes, folder, &mut warnings)?;
-    animation::apply(&mut document, options.frame, &mut warnings)?;
+    let animated = animation::apply(&mut document, options.frame, options.after_frame, &mut warnings)?;
     let mut reader = Reader {
         document: &document,
-        library: Library::new(options.glass),
+        library: Library::new(options.glass, std::mem::take(images)),
         meshes: HashMap::new(),
         worlds: WorldTransforms::new(&document),
         bounds: Vec::new(),
@@ -47,10 +54,11 @@ pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Resu
         divisors: None,
         options: *options,
         scene: SceneExtras::default(),
-        out: Description { source: path.to_owned(), warnings, ..Description::default() },
+        out: Description { source: path.to_owned(), warnings, animated, ..Description::default() },
     };
     reader.scene()?;
-    let Reader { library, mut out, clips, bounds, .. } = reader;
+    let Reader { mut library, mut out, clips, bounds, .. } = reader;
+    *images = std::mem::take(&mut library.textures.images);
     if library.occluded > 0 {
         let n = library.occluded;
         let plural = if n == 1 { "material has an occlusion texture" } else { "materials have occlusion textures" };
@@ -148,7 +156,8 @@ impl Reader<'_> {
 
     /// Checks the settings of the picture in the extras of the scene, and copies them to the description.
     fn picture(&mut self, place: &str) -> Result<()> {
-        let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, frame, frame_rate, .. } = self.scene;
+        let SceneExtras { resolution, exposure, tonemap, crop, film_transparent, frame, frame_rate, shutter, .. } =
+            self.scene;
         if resolution.is_some_and(|size| size.contains(&0)) {
             return Err(fault(place, "extras.caustique.resolution must be two numbers above zero"));
         }
@@ -162,6 +171,13 @@ impl Reader<'_> {
             let cause = "extras.caustique.crop must be left edge, top edge, width and height within 0 and 1";
             return Err(fault(place, cause));
         }
+        if shutter.is_some_and(|[open, close]| !(open.is_finite() && close.is_finite() && open <= close)) {
+            return Err(fault(
+                place,
+                "extras.caustique.shutter must be two finite numbers, the second not the smaller",
+            ));
+        }
+        self.out.shutter = shutter;
         let frame_rate = frame_rate.map(Rate::fraction);
         // The numerator of EXR's attribute is signed.
         if frame_rate.is_some_and(|rate| rate.contains(&0) || rate[0] > i32::MAX as u32) {

@@ -82,12 +82,12 @@ pub(super) struct Textures {
     /// Index in `list`, by the image, the sampler and the use of the texture.
     known: HashMap<(usize, Option<usize>, Use), u32>,
     /// Decoded images, by their index in the file.
-    images: HashMap<usize, Decoded>,
+    pub(super) images: HashMap<usize, Decoded>,
 }
 
 /// A decoded image, before its interpretation.
 #[derive(Clone)]
-struct Decoded {
+pub(super) struct Decoded {
     width: u32,
     height: u32,
     channels: u8,
@@ -95,6 +95,11 @@ struct Decoded {
 }
 
 impl Textures {
+    /// No textures, with images that have been decoded before.
+    pub(super) fn with_images(images: HashMap<usize, Decoded>) -> Textures {
+        Textures { images, ..Textures::default() }
+    }
+
     /// Loads the texture of a `textureInfo`, and returns a reference to it; `place` names it in messages.
     pub(super) fn reference(
         &mut self,

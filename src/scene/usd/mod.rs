@@ -62,17 +62,20 @@ pub fn read(path: &Path, options: &ReadOptions, stop: &Stop) -> Result<Descripti
     let glb = converter.folder.path().join("stage.glb");
     let mut arguments: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
     if let Some(frame) = options.frame {
-        arguments.extend(["--frame".into(), frame.number.to_string().into()]);
+        let time = f64::from(frame.number) + options.after_frame;
+        arguments.extend(["--frame".into(), time.to_string().into()]);
     }
     converter.run(&arguments, options.allow_outside, stop)?;
     // The converter has applied the frame, and has copied the files that the stage names beside the .glb.
     let frame = options.frame.map(|frame| FrameTime { of_sequence: true, ..frame });
-    let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..*options });
+    let read = gltf::read(&glb, &ReadOptions { frame, after_frame: 0.0, allow_outside: false, ..*options });
     let mut description = read.map_err(|mut error| {
         error.place = error.place.replace(&glb.display().to_string(), &path.display().to_string());
         error
     })?;
     description.source = path.to_owned();
+    // A stage may move wherever it has a frame.
+    description.animated = options.frame.is_some();
     // The converted file contains the layers, textures and other files of the stage.
     description.converted = Some(gltf::hash(&glb, false)?);
     Ok(description)
