@@ -4,7 +4,9 @@ import fractions
 import itertools
 import math
 
-import bpy
+import bpy  # first: it makes the others importable
+
+from mathutils import Matrix
 
 import export_guard as guard
 
@@ -32,7 +34,19 @@ def extras(thing, flat, warn):
     """Keys of the camera object `thing`: `shift` (in widths and heights of the picture), `aperture_radius` and
     `focus_distance` (m).
     """
-    camera, render, where, said = thing.data, flat.scene.render, flat.where(thing), {}
+    dof = thing.data.dof
+    if dof.use_dof and (dof.aperture_blades or dof.aperture_ratio != 1):
+        warn(flat.where(thing), "the shape of the aperture is not carried: it is round")
+    keys = optics(thing, flat.scene.render)
+    del keys["view"]
+    return keys
+
+
+def optics(thing, render):
+    """Keys of the camera object `thing`, and its `view`: the tangent of half its angle, or its size, up to a constant
+    factor."""
+    camera = thing.data
+    said = {"view": camera.ortho_scale if camera.type == "ORTHO" else camera.sensor_width / camera.lens}
     if camera.shift_x or camera.shift_y:
         width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
         across = camera.sensor_fit == "HORIZONTAL" or camera.sensor_fit == "AUTO" and width >= height
@@ -46,9 +60,19 @@ def extras(thing, flat, warn):
     if camera.dof.focus_object is not None:
         at = camera.dof.focus_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation
         focus = abs(thing.matrix_world.col[2].xyz.normalized().dot(at - thing.matrix_world.translation))
-    if camera.dof.aperture_blades or camera.dof.aperture_ratio != 1:
-        warn(where, "the shape of the aperture is not carried: it is round")
     return {**said, "aperture_radius": focal / (2 * camera.dof.aperture_fstop), "focus_distance": focus}
+
+
+def without_scale(matrix):
+    """A camera's matrix without scale and shear, as Cycles reads it: its line of sight and the direction up."""
+    back, up = matrix.col[2].xyz.normalized(), matrix.col[1].xyz
+    right = up.cross(back).normalized()
+    if right.length == 0:
+        return matrix
+    if matrix.determinant() < 0:
+        right = -right  # a mirrored picture
+    axes = Matrix((right, back.cross(right) * (-1 if matrix.determinant() < 0 else 1), back)).transposed()
+    return Matrix.Translation(matrix.translation) @ axes.to_4x4()
 
 
 def warn_of_clipping(thing, flat, warn):
@@ -108,8 +132,6 @@ def picture(scene, warn):
     _warn_of_limits(scene, where, warn)
     if _has_compositor(scene):
         warn(where, "its compositor is not carried: the picture is the one before compositing")
-    if render.use_motion_blur:
-        warn(where, "motion blur is not carried: everything stands still")
     return said
 
 

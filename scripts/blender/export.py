@@ -13,7 +13,8 @@
 - `shading`: transmissive materials on closed meshes become solid (KHR_materials_volume), so that they refract, with
   Cycles' coefficients; a custom property `abbe` (number V_d) or `dispersion` (20/V_d) becomes KHR_materials_dispersion;
 - `world` and `sky`: environment and medium; the sun of a sky texture becomes a lamp;
-- `camera_export`: lens, shift, and the scene's picture settings.
+- `camera_export`: lens, shift, and the scene's picture settings;
+- `motion` and `motion_gltf`: motion while the shutter is open, as an animation.
 
 `extras.caustique` holds features that glTF lacks (docs/scene-format.md). Lights keep the exporter's standard units
 (683 lm/W). A warning on stderr and in the file names each feature that is lost.
@@ -41,6 +42,7 @@ import camera_export
 import glb
 import export_guard as guard
 import lighting
+import motion_gltf
 import objects
 import shading
 import sky
@@ -95,11 +97,14 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
         progress("Writing the exported scene")
         _export_all_it_can(path, flat, warn)
     document, buffer = glb.read(path)
+    bodies_of_nodes = [node.get("name") for node in document.get("nodes", [])]
     _restore_names(document, flat.names)
     buffer = worn.finish(document, buffer, bodies)
     _warn_of_stretched_normals(document, warn)
     _correct_lamps(document, flat.lamp_factors, warn)
     _put_active_camera_first(document, scene)
+    buffer = motion_gltf.write(document, buffer, flat.motion, bodies_of_nodes, warn)
+    said.update(motion_gltf.scene_keys(flat.motion))
     said["losses"] = warnings
     document["scenes"][document.get("scene", 0)].setdefault("extras", {})["caustique"] = said
     used = {name for part in document.get("materials", []) for name in part.get("extensions", {})}
@@ -143,12 +148,14 @@ def _run_exporter(path):
         filepath=path, export_format="GLB", export_import_convert_lighting_mode="SPEC", export_yup=True,
         export_apply=False, export_cameras=True, export_lights=True, export_extras=True, use_active_scene=True,
         export_animations=False, export_current_frame=True, export_skins=False, export_morph=False,
-        export_tangents=False, export_image_format="AUTO")
+        export_tangents=False, export_attributes=motion_gltf.has_labels(bpy.context.scene.objects),
+        export_image_format="AUTO")
 
 
 def _export_all_it_can(path, flat, warn):
     """Run Blender's exporter. If it fails, find the objects that it cannot export, and leave them out."""
     faults = []
+    motion_gltf.keep_labels_alone(flat.things)
 
     def works(things):
         for thing in flat.things:

@@ -37,3 +37,18 @@ def write(path, document, buffer):
         chunks += struct.pack("<II", len(buffer), _BIN) + buffer
     with open(path, "wb") as file:
         file.write(struct.pack("<III", _MAGIC, 2, 12 + len(chunks)) + chunks)
+
+
+def add_view(document, buffer, data, index=None):
+    """Append `data` to `buffer` (a bytearray), with a new buffer view or in place of the one at `index`. Returns the view's
+    index."""
+    buffer += b"\0" * (-len(buffer) % 4)
+    views = document.setdefault("bufferViews", [])
+    view = {"buffer": 0, "byteOffset": len(buffer), "byteLength": len(data)}
+    buffer += data
+    document.setdefault("buffers", [{}])[0]["byteLength"] = len(buffer)
+    if index is None:
+        views.append(view)
+        return len(views) - 1
+    views[index] = view
+    return index

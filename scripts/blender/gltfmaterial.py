@@ -6,6 +6,8 @@ import tempfile
 import bpy
 import numpy
 
+import glb
+
 PLAIN = "plain"  # marks a channel whose image Blender's exporter has written
 _UNIFORM = 1.5e-3  # largest difference of texels that count as equal
 
@@ -19,13 +21,9 @@ class Writer:
     def image(self, texels, name, texcoord):
         """Add a texture of an array (size, size, 3 or 4) of stored values in [0, 1]. Returns its textureInfo."""
         data = _png(texels)
-        self.buffer += b"\0" * (-len(self.buffer) % 4)
-        views = self.document.setdefault("bufferViews", [])
-        views.append({"buffer": 0, "byteOffset": len(self.buffer), "byteLength": len(data)})
-        self.buffer += data
-        self.document.setdefault("buffers", [{}])[0]["byteLength"] = len(self.buffer)
+        view = glb.add_view(self.document, self.buffer, data)
         images = self.document.setdefault("images", [])
-        images.append({"name": name, "mimeType": "image/png", "bufferView": len(views) - 1})
+        images.append({"name": name, "mimeType": "image/png", "bufferView": view})
         samplers = self.document.setdefault("samplers", [])
         clamped = {"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071}
         if clamped not in samplers:

@@ -133,7 +133,8 @@ def _area_mesh(thing, flat):
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     mesh.materials.append(material)
     # A mirrored transform keeps the front, because the lamp still emits along its local -Z.
-    flat.add(name, mesh, thing.matrix_world.copy(), flat.hidden[thing.name], flat.groups[thing.name])
+    body = flat.add(name, mesh, thing.matrix_world.copy(), flat.hidden[thing.name], flat.groups[thing.name])
+    flat.motion.pass_on(thing, body)
 
 
 def _warn_of(thing, where, warn):

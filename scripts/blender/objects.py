@@ -13,7 +13,9 @@ import bmesh
 import numpy
 from mathutils import Matrix
 
+import camera_export
 import export_guard as guard
+import motion
 import standin
 import visibility
 from graph import upstream
@@ -42,7 +44,7 @@ class FlatScene:
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
     of rays that do not hit it. `groups`: the light group of each, or None. `lamp_factors`: for each measured lamp, the
     factors per channel of its nodes. `stretched`: names of materials with normal maps that uneven scale stretches, found
-    if the materials may be baked (`bakes`).
+    if the materials may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
     """
 
     def __init__(self, scene, undo, warn, bakes=True):
@@ -53,6 +55,7 @@ class FlatScene:
         self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
         self._indirect, self._layer = visibility.indirect_only(layer), layer
+        self.motion = motion.Recorder(scene, layer, warn)
         self.scene = bpy.data.scenes.new(scene.name)
         self.names[self.scene.name] = scene.name
         undo.callback(bpy.data.scenes.remove, self.scene)
@@ -75,8 +78,12 @@ class FlatScene:
                                            self._take, instance, depsgraph))
         if scene.camera is not None and not any(taken and taken[0] == scene.camera for taken in found):
             # The camera counts even if it is hidden.
-            place = scene.camera.evaluated_get(depsgraph).matrix_world.copy()
-            found.append((scene.camera, scene.camera.data, place, [], None, 0.0))
+            camera = scene.camera.evaluated_get(depsgraph)
+            place, key = camera.matrix_world.copy(), motion.identity_of(scene.camera)
+            self.motion.expect(key, camera, None, place)
+            found.append((scene.camera, scene.camera.data, place, [], None, 0.0, key))
+        guard.attempt(warn, f'scene "{scene.name}"', None, "nothing moves while the shutter is open",
+                      self.motion.record)
         for mesh, original in self._shapes:
             self._add_generated_coordinates(original, mesh)
         for taken in filter(None, found):
@@ -105,8 +112,8 @@ class FlatScene:
         return block
 
     def _take(self, instance, depsgraph):
-        """Object, data, world matrix, hidden rays, light group and random number (0 to 1) of an instance, or None if it
-        is invisible."""
+        """Object, data, world matrix, hidden rays, light group, random number (0 to 1) and key (`motion.identity`) of
+        an instance, or None if it is invisible."""
         thing = instance.object
         if not (instance.is_instance or instance.show_self) or thing.type in _INVISIBLE or _is_pattern(instance):
             return None
@@ -120,17 +127,22 @@ class FlatScene:
         elif thing.type not in {"LIGHT", "CAMERA"}:
             self._warn(f'object "{thing.name}"', f"objects of type {thing.type} are not carried")
             return None
-        hidden = visibility.hidden_rays(thing, instance.parent if instance.is_instance else None)
+        parent, matrix = instance.parent if instance.is_instance else None, instance.matrix_world.copy()
+        key = motion.identity(instance)
+        if data:
+            guard.attempt(self._warn, f'object "{thing.name}"', None, motion.STANDS_STILL, self.motion.expect,
+                          key, thing, parent, matrix, self._deformable(instance, data))
+        hidden = visibility.hidden_rays(thing, parent)
         if (instance.parent or thing).name in self._indirect and "camera" not in hidden:
             hidden.append("camera")
-        group = visibility.light_group(thing, instance.parent if instance.is_instance else None, self._layer)
-        return data and (thing.original, data, instance.matrix_world.copy(), hidden, group, random / 0xFFFFFFFF)
+        group = visibility.light_group(thing, parent, self._layer)
+        return data and (thing.original, data, matrix, hidden, group, random / 0xFFFFFFFF, key)
 
     def _mesh(self, instance, depsgraph):
         """The evaluated mesh of an instance, shared with equal instances; None without faces."""
         thing = instance.object
         name = thing.original.data.name
-        by_nodes = instance.is_instance and instance.instance_object.original == instance.parent.original
+        by_nodes = _is_by_nodes(instance)
         key = (thing.original.name_full, thing.data.as_pointer())
         if not by_nodes and _is_unmodified(thing.original):
             key = thing.original.data.name_full
@@ -151,18 +163,27 @@ class FlatScene:
         self._meshes[key] = mesh if mesh.polygons else None
         return self._meshes[key]
 
-    def _put(self, original, data, matrix, hidden, group, random):
+    @staticmethod
+    def _deformable(instance, data):
+        """`data` if it is a mesh that may deform while the shutter is open, else None."""
+        still = not _is_by_nodes(instance) and _is_unmodified(instance.object.original)
+        return data if isinstance(data, bpy.types.Mesh) and not still else None
+
+    def _put(self, original, data, matrix, hidden, group, random, key):
         if not all(math.isfinite(x) for row in matrix for x in row):
             self._warn(f'object "{original.name}"', f"its place is not a number: {_OUT}")
             return
+        at_frame = matrix
         if isinstance(data, bpy.types.Mesh):
             data, matrix = self._transformed(original, data, matrix)
-        elif not _has_no_shear(matrix):
+        elif not motion.has_no_shear(matrix):
             what = "skews its picture" if isinstance(data, bpy.types.Camera) else "shears it"
             self._warn(f'object "{original.name}"', f"the uneven scale of its parents {what} in Cycles, not here")
         if isinstance(data, bpy.types.Camera):
-            matrix = _without_scale(matrix)
+            matrix = camera_export.without_scale(matrix)
         body = self.add(original.name, data, matrix, hidden, group)
+        guard.attempt(self._warn, self.where(body), None, motion.STANDS_STILL,
+                      self.motion.follow, key, body, matrix, at_frame, self)
         body.color, body.pass_index, body[standin.RANDOM] = original.color, original.pass_index, random
         if "caustique" in original:
             self.add_extras(body, **original["caustique"].to_dict())
@@ -179,7 +200,7 @@ class FlatScene:
         bumps in world space and bakes them in object space, and uneven scale below normal maps, which it stretches.
         """
         relief, (place, turn, scale) = _relief(mesh), matrix.decompose()
-        sheared = not _has_no_shear(matrix)
+        sheared = not motion.has_no_shear(matrix)
         stretched = "NORMAL_MAP" in relief and (sheared or is_uneven(scale))
         if sheared:
             applied, rest = matrix, Matrix()
@@ -304,18 +325,6 @@ def _relief(mesh):
     return found
 
 
-def _without_scale(matrix):
-    """A camera's matrix without scale and shear, as Cycles reads it: its line of sight and the direction up."""
-    back, up = matrix.col[2].xyz.normalized(), matrix.col[1].xyz
-    right = up.cross(back).normalized()
-    if right.length == 0:
-        return matrix
-    if matrix.determinant() < 0:
-        right = -right  # a mirrored picture
-    axes = Matrix((right, back.cross(right) * (-1 if matrix.determinant() < 0 else 1), back)).transposed()
-    return Matrix.Translation(matrix.translation) @ axes.to_4x4()
-
-
 def _is_pattern(instance):
     """Whether renders show an object only as instances on the vertices or faces of its parent."""
     parent = instance.object.original.parent
@@ -324,14 +333,12 @@ def _is_pattern(instance):
     return not instance.is_instance or instance.parent.original != parent
 
 
+def _is_by_nodes(instance):
+    """Whether the geometry nodes of an object made an instance."""
+    return instance.is_instance and instance.instance_object.original == instance.parent.original
+
+
 def _is_unmodified(thing):
     """Whether an object shows its mesh unmodified, so that objects with this mesh can share it."""
     plain = thing.type == "MESH" and not thing.modifiers and thing.data.shape_keys is None
     return plain and all(slot.link == "DATA" for slot in thing.material_slots)
-
-
-def _has_no_shear(matrix):
-    """Whether a matrix is a composition of location, rotation and scale (no shear)."""
-    again = Matrix.LocRotScale(*matrix.decompose())
-    size = max(abs(x) for row in matrix.to_3x3() for x in row)
-    return all(abs(a - b) <= 1e-5 * size for x, y in zip(again.to_3x3(), matrix.to_3x3()) for a, b in zip(x, y))

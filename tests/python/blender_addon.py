@@ -87,6 +87,28 @@ class Renders(Installed):
             columns = numpy.flatnonzero((found["Depth.Z"] < 9.95).any(0))
             self.assertEqual((columns[0], columns[-1]), ((at + 2) * 8, (at + 2.5) * 8 - 1))
 
+    def test_motion_blur(self):
+        """A moving tile covers each pixel for its share of the time for which the shutter is open."""
+        self.plane()
+        self.sun(2 * math.pi)  # on reflectance 1/2: radiance 1
+        self.eye()
+        mesh = bpy.data.meshes.new("tile")
+        mesh.from_pydata([(0, -1, 1), (0.5, -1, 1), (0.5, 1, 1), (0, 1, 1)], [], [(0, 1, 2, 3)])
+        mesh.materials.append(self.material("black", Base_Color=(0, 0, 0, 1), Roughness=1.0, Specular_IOR_Level=0.0))
+        body = self.put("tile", mesh)
+        driver = body.driver_add("location", 0).driver
+        driver.expression = "(frame - 1) / 2"
+        self.scene.render.use_motion_blur, self.scene.render.motion_blur_shutter = True, 1.0
+        self.scene.render.motion_blur_position = "START"
+        self.settings.method, self.settings.finish, self.settings.iterations = "path", "off", 256
+        self.scene.frame_set(1)
+        found = self.render()["Combined.G"][12]
+        # The tile, four pixels wide, moves by four pixels to the right while the shutter is open. The sun shines
+        # straight down, so its shadow is beneath it.
+        x = numpy.arange(32) + 0.5 - 16
+        covered = numpy.clip(1 - abs(x - 4) / 4, 0, 1)
+        numpy.testing.assert_allclose(found, 1 - covered, atol=0.05)
+
     def test_files_beside_the_scene_are_found(self):
         """A modified, unsaved scene with an image and a library, both with relative paths."""
         picture = bpy.data.images.new("paint", 4, 4)

@@ -215,11 +215,11 @@ class Messages(Installed):
         self.assertIn("it has no objects that renders show", "".join(ignored_settings.warnings(self.scene)))
         self.stage()
         self.assertEqual(ignored_settings.warnings(self.scene), [])
-        for name in ("use_motion_blur", "use_multiview", "use_freestyle"):
+        for name in ("use_multiview", "use_freestyle"):
             setattr(render, name, True)
         render.pixel_aspect_x = 2
         lines = ignored_settings.warnings(self.scene)
-        self.assertEqual(len(lines), 4)
+        self.assertEqual(len(lines), 3)
         self.assertTrue(all(": " in line for line in lines))
 
     def test_simulations_are_named(self):

@@ -40,6 +40,8 @@ class Panels(Installed):
             ("scene_panels", "FilmPanel", {"film_transparent", "film_exposure"}),
             ("scene_panels", "PerformancePanel", {"threads", "threads_mode"}),
             ("scene_panels", "SimplifyPanel", {"simplify_subdivision_render"}),
+            ("scene_panels", "MotionBlurPanel", {"motion_blur_position", "motion_blur_shutter"}),
+            ("scene_panels", "ObjectMotionBlurPanel", {"motion_steps", "use_deform_motion"}),
             ("scene_panels", "LayerPanel", {"use_sky"}),
             ("scene_panels", "ObjectPanel", {"hide_render", "visible_camera", "lightgroup"}),
             ("scene_panels", "LightNodesPanel", {"nodes"}),

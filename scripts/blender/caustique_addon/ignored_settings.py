@@ -8,7 +8,6 @@ def warnings(scene):
     """A line for each setting of `scene` that is in use and ignored."""
     render = scene.render
     found = [
-        (render.use_motion_blur, "motion blur is not rendered: add it in the compositor, or render with Cycles"),
         (render.use_multiview, "stereoscopy is not rendered, and both eyes see the same: render from two cameras"),
         (render.pixel_aspect_x != render.pixel_aspect_y, "pixels are rendered as squares: set both pixel aspects to 1"),
         (render.use_freestyle, "Freestyle's lines are not drawn over the picture: render them with Cycles"),

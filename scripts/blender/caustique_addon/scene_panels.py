@@ -67,6 +67,49 @@ class SimplifyPanel(Panel, bpy.types.Panel):
         column.prop(render, "simplify_child_particles_render", text="Child Particles")
 
 
+class MotionBlurPanel(Panel, bpy.types.Panel):
+    """The shutter of motion blur."""
+
+    bl_idname = "CAUSTIQUE_PT_motion_blur"
+    bl_label = "Motion Blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context):
+        column, render = self._column(), context.scene.render
+        column.active = render.use_motion_blur
+        # Blender before 4.2 has the position among Cycles' settings.
+        owner = render if hasattr(render, "motion_blur_position") else getattr(context.scene, "cycles", None)
+        if owner is not None:
+            column.prop(owner, "motion_blur_position", text="Position")
+        column.prop(render, "motion_blur_shutter")
+
+
+class ObjectMotionBlurPanel(Panel, bpy.types.Panel):
+    """Whether an object's motion and deformation are blurred, and the number of sub-steps."""
+
+    bl_idname = "CAUSTIQUE_PT_object_motion_blur"
+    bl_label = "Motion Blur"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.object, "cycles")
+
+    def draw_header(self, context):
+        self.layout.prop(context.object.cycles, "use_motion_blur", text="")
+
+    def draw(self, context):
+        column, settings = self._column(), context.object.cycles
+        column.active = context.scene.render.use_motion_blur and settings.use_motion_blur
+        column.prop(settings, "motion_steps", text="Steps")
+        if context.object.type not in {"CAMERA", "LIGHT"}:
+            column.prop(settings, "use_deform_motion", text="Deformation")
+
+
 class LayerPanel(Panel, bpy.types.Panel):
     """The view layer's filter and light groups."""
 
@@ -160,6 +203,6 @@ class WorldPanel(Panel, bpy.types.Panel):
 
 
 register, unregister = bpy.utils.register_classes_factory((
-    FilmPanel, PerformancePanel, SimplifyPanel, LayerPanel, ObjectPanel, LightNodesPanel, DisplacementPanel,
-    WorldPanel,
+    FilmPanel, PerformancePanel, SimplifyPanel, MotionBlurPanel, LayerPanel, ObjectPanel, ObjectMotionBlurPanel,
+    LightNodesPanel, DisplacementPanel, WorldPanel,
 ))

@@ -46,12 +46,12 @@ struct Track {
     curve: Curve,
 }
 
-/// Writes the animated values at a frame into the document; without a frame, those at the time of the first key.
-/// Without a frame, invalid animations are skipped with a warning.
+/// Writes the animated values at a frame into the document; without a frame, those at the time of the first key. If the
+/// scene states the time of its only frame, that time is used. `after_frame` is added to the time (frames). Without a
+/// frame, invalid animations are skipped with a warning. Returns whether anything is animated.
 ///
 /// # Errors
 /// A frame is given, and an animation is invalid.
-/// `after_frame` is added to the time of the frame (frames). Returns whether anything is animated.
 pub(super) fn apply(
     document: &mut Document,
     frame: Option<FrameTime>,
@@ -66,11 +66,17 @@ pub(super) fn apply(
         }
         return Ok(false);
     };
-    let time = match frame {
-        Some(frame) => (f64::from(frame.number) + after_frame) / rate(document, frame, warnings)?,
-        None => {
+    let time = match (scene_extras(document)?.time, frame) {
+        (Some(time), _) => {
+            if frame.is_some_and(|frame| !frame.of_sequence) {
+                warnings.push("its animations are the motion of one frame: its frames are all the same".into());
+            }
+            later(document, time, after_frame, frame, warnings)?
+        }
+        (None, Some(frame)) => (f64::from(frame.number) + after_frame) / rate(document, frame, warnings)?,
+        (None, None) => {
             warnings.push(format!("its animations begin at {start:.3} s, which is rendered (--frames chooses)"));
-            if after_frame == 0.0 { start } else { start + after_frame / rate(document, FIRST, warnings)? }
+            later(document, start, after_frame, None, warnings)?
         }
     };
     for Track { pointer, place, curve } in &tracks {
@@ -108,10 +114,29 @@ impl FaultPolicy {
     }
 }
 
+/// The time `frames` frames after `start` (seconds).
+fn later(
+    document: &Document,
+    start: f64,
+    frames: f64,
+    frame: Option<FrameTime>,
+    warnings: &mut Vec<String>,
+) -> Result<f64> {
+    if frames == 0.0 {
+        return Ok(start);
+    }
+    Ok(start + frames / rate(document, frame.unwrap_or(FIRST), warnings)?)
+}
+
+fn scene_extras(document: &Document) -> Result<SceneExtras> {
+    let index = document.default_scene()?;
+    let raw = document.part("scenes", index);
+    extras::read(raw, &named("scene", raw["name"].as_str(), index))
+}
+
 /// Frames per second: the scene's rate, else that of `frame`, else the default.
 fn rate(document: &Document, frame: FrameTime, warnings: &mut Vec<String>) -> Result<f64> {
-    let index = document.default_scene()?;
-    let extras: SceneExtras = extras::read(document.part("scenes", index), &format!("scene {index}"))?;
+    let extras = scene_extras(document)?;
     let is_valid = |rate: &f64| rate.is_finite() && *rate > 0.0;
     // The reader of the scene's extras rejects an invalid rate.
     let rate = extras.frame_rate.map(|rate| {

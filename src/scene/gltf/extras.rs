@@ -27,6 +27,8 @@ pub(super) struct SceneExtras {
     pub(super) frame: Option<i32>,
     pub(super) frame_rate: Option<Rate>,
     pub(super) shutter: Option<[f64; 2]>,
+    /// Time of the frame in the animations of a file that has only one frame (seconds).
+    pub(super) time: Option<f64>,
 }
 
 /// Frames per second of a scene: a whole number or a fraction.
@@ -176,6 +178,7 @@ pub(super) const SCENE: &[&str] = &[
     "frame",
     "frame_rate",
     "shutter",
+    "time",
 ];
 pub(super) const MATERIAL: &[&str] =
     &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "contact", "null_bsdf", "spread_deg"];

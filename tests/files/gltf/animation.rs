@@ -179,6 +179,26 @@ fn the_first_of_two_actions_is_played() {
     assert_eq!(scene.warnings, [both]);
 }
 
+/// A file of one frame says its time in the animations, whatever frame is asked for.
+#[test]
+fn the_time_of_the_only_frame() {
+    let mut file = moves("LINEAR", &[0.0, 2.0], &[[0.0; 3], [8.0, 0.0, 0.0]]);
+    file.json["scenes"][0]["extras"] = json!({"caustique": {"frame": 90, "frame_rate": 4, "time": 0.5}});
+    let read = |frame: Option<(u32, bool)>, after_frame| {
+        let frame = frame.map(|(number, of_sequence)| FrameTime { number, rate: Some(24.0), of_sequence });
+        let options = ReadOptions { frame, after_frame, ..ReadOptions::default() };
+        let scene = read_bytes(&file.bytes(), Path::new("pool.glb"), &options).unwrap();
+        (scene.instances[0].to_world.translation.x, scene.warnings)
+    };
+    for frame in [None, Some((90, true)), Some((7, true))] {
+        for (after_frame, x) in [(0.0, 2.0), (-1.0, 1.0), (3.0, 5.0)] {
+            assert_eq!(read(frame, after_frame), (x, vec![]), "{frame:?}");
+        }
+    }
+    let same = "its animations are the motion of one frame: its frames are all the same";
+    assert_eq!(read(Some((91, false)), 0.0), (2.0, vec![same.into()]));
+}
+
 /// The frame rate of the scene, else of the option, else 24. Without a frame, the first key is used.
 #[test]
 fn frame_rates() {

@@ -201,6 +201,7 @@ fn shapes(everything: &Glb) -> Cases {
     let identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
     vec![
         ("no frame rate", json!({"/scenes/0/extras": {}, "frame": 12})),
+        ("one frame", json!({"/scenes/0/extras/caustique/time": 0.5, "frame": 12})),
         ("what moves is not there", json!({pointer: "/materials/9/alphaCutoff"})),
         ("what moves is not read", json!({pointer: "/images/0/uri"})),
         ("nothing moves", json!({"/animations/0/channels/0/target/path": "odd"})),
@@ -336,6 +337,7 @@ fn nodes() -> Cases {
         ("an exposure beyond numbers", json!({format!("{said}/exposure"): 1e300})),
         ("a window outside", json!({format!("{said}/crop"): [0.5, 0.5, 1, 1]})),
         ("no frames", json!({format!("{said}/frame_rate"): 0})),
+        ("a shutter that closes first", json!({format!("{said}/shutter"): [0.5, 0]})),
         ("a rate of another type", json!({format!("{said}/frame_rate"): "x"})),
         ("an environment that takes light", json!({format!("{said}/environment/strength"): -1})),
         ("a colour below zero", json!({format!("{said}/environment/color"): [-1, 0, 0]})),
