@@ -131,16 +131,13 @@ class _Writer:
             self._animate({"node": index, "path": "weights"}, rows)
 
     def _transforms(self, index, node, matrices):
-        places, turns, scales, before = {}, {}, {}, None
+        places, turns, scales = {}, {}, {}
         written = Quaternion(_from_gltf(node.get("rotation", (0, 0, 0, 1))))
         # Blender's exporter turns lights and cameras, which look along other axes in glTF.
         offset = _turned(matrices[0.0].decompose()[1]).inverted() @ written
         for time in sorted(matrices):
             place, turn, scale = matrices[time].decompose()
             turn = _turned(turn) @ (offset if "mesh" not in node else Quaternion())
-            if before is not None and before.dot(turn) < 0:
-                turn.negate()
-            before = turn
             places[time], turns[time] = _y_up(place), (turn.x, turn.y, turn.z, turn.w)
             scales[time] = (scale.x, scale.z, scale.y)
         self._animate({"node": index, "path": "translation"}, places)

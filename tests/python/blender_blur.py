@@ -6,6 +6,7 @@ import unittest
 
 import blender_motion  # first: it sets the search path
 import bpy
+import export
 import numpy
 import support
 from cycles_comparison import eye, glow, lamp, shared, square
@@ -104,6 +105,19 @@ class Blurred(blender_motion.Moving):
         light.rotation_euler, light.visible_camera = (3.14159, 0, 0), False
         self.keyed(light, "location", (-10, -5, 0.5), (10, 5, 0.5))
         self.agrees()
+
+    def test_frames(self):
+        """A frame of a sequence is blurred as the frame alone."""
+        self.keyed(self.square(), "location", (-6, -3, 0), (4, 1, 0))
+        export.write_frames(os.path.join(self.folder, "shot.##.glb"), 5, 6)
+        out = os.path.join(self.folder, "out.##.exr")
+        options = ("--iterations", 16, "--method", "path", "--seed", 1, "--frame-seed", "same", "--no-combine",
+                   "--progress", "none", "--layers", "beauty")
+        support.run(["render", os.path.join(self.folder, "shot.##.glb"), "--frames", "5-6", "-o", out, *options], check=0)
+        frames = [shared.pixels(os.path.join(self.folder, f"out.{frame:02}.exr")) for frame in (5, 6)]
+        alone = self.caustique(16, *options[2:])
+        numpy.testing.assert_array_equal(frames[1], alone)
+        self.assertGreater(difference(frames[0], alone), _DIFFERS)
 
     def test_moving_lamp(self):
         """Cycles holds lamps still while the shutter is open, so the mean of its still pictures is compared."""

@@ -160,11 +160,11 @@ class Moving(cycles_comparison.CyclesComparison):
                 self.close(played.vertices(name, time), evaluated(name), f"{name} at {time}")
             still = evaluated(name)
             self.scene.frame_set(FRAME)
-            self.assertGreater(_farthest(still, evaluated(name)), 1e-3, name)  # a fault would be seen
+            self.assertGreater(_farthest(still, evaluated(name)), 1e-2, name)  # a fault would be seen
         return played
 
     def close(self, ours, theirs, where):
-        self.assertLess(max(_farthest(ours, theirs), _farthest(theirs, ours)), 2e-3, where)
+        self.assertLess(max(_farthest(ours, theirs), _farthest(theirs, ours)), 1e-3, where)
 
 
 def _curves(block):
@@ -467,6 +467,21 @@ class LightsAndCameras(Moving):
             numpy.testing.assert_allclose(played.value(said + "/focus_distance", time, None), abs(away), rtol=1e-5)
             radius = body.data.lens * 1e-3 / 2 / body.data.dof.aperture_fstop
             numpy.testing.assert_allclose(played.value(said + "/aperture_radius", time, None), radius, rtol=1e-5)
+
+    def test_skewed_cameras(self):
+        """Cameras below uneven scale keep their line of sight and the direction up, as in Cycles."""
+        parent = shared.place("parent", None)
+        parent.scale = (1, 3, 1)
+        body = eye((0, 0, 5), (0, 0, 0))
+        body.parent = parent
+        self.keyed(body, "rotation_euler", (0, 0, 0), (1, 0.5, 1))
+        played = self.written()
+        for time in (-0.25, 0, 0.25):
+            self.scene.frame_set(FRAME - (time < 0), subframe=time % 1)
+            back, up = (body.matrix_world.col[k].xyz.normalized() for k in (2, 1))
+            ours = played.matrix("eye", time)
+            numpy.testing.assert_allclose(ours.col[2].xyz, back, atol=1e-5)
+            self.assertAlmostEqual(ours.col[0].xyz.dot(up), 0.0, 5)
 
     def test_orthographic_and_hidden_cameras(self):
         body = eye((0, 0, 5), (0, 0, 0), type="ORTHO")
