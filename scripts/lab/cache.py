@@ -46,8 +46,18 @@ def program(binary=BIN):
 def scene_key(path):
     """The name of a scene's folder: the scene's name, and a digest of its bytes, which changes with the scene."""
     inside = path.is_relative_to(ROOT / "scenes")
-    parts = path.relative_to(ROOT / "scenes").with_suffix("").parts if inside else ("twin", path.stem)
+    parts = path.relative_to(ROOT / "scenes").with_suffix("").parts if inside else (outside(path), path.stem)
     return f"{'-'.join(parts)}-{digest(path)}"
+
+
+def outside(path):
+    """The kind of a scene outside the project's folder of scenes: an animated shot, a still of one, or a twin."""
+    return {"shots": "shot", "stills": "still"}.get(path.parent.name, "twin")
+
+
+def frame_suffix(frame):
+    """The end of the name of a folder that holds one frame; empty for a scene that does not move."""
+    return "" if frame is None else f"-frame{frame}"
 
 
 @contextlib.contextmanager

@@ -1,5 +1,7 @@
 """Errors of pictures against two independent halves of a reference, whose own noise cancels."""
 
+import json
+
 import flip_evaluator
 import numpy as np
 import OpenEXR
@@ -14,6 +16,7 @@ class Layers:
     def __init__(self, path):
         with OpenEXR.File(str(path), separate_channels=True) as file:
             self.channels = {name: channel.pixels for name, channel in file.channels().items()}
+            self.header = dict(file.header())
 
     def get(self, name, components="RGB"):
         """A layer by name, the picture itself by the empty name; None if the file does not have it."""
@@ -21,6 +24,11 @@ class Layers:
         if not all(name in self.channels for name in names):
             return None
         return np.stack([self.channels[name] for name in names], -1).astype(np.float32)
+
+    def manifest(self, name):
+        """The identifiers, as hexadecimal texts, of a Cryptomatte layer by name of object or material."""
+        keys = [key for key, value in self.header.items() if key.startswith("cryptomatte/") and value == name]
+        return json.loads(self.header[keys[0].removesuffix("name") + "manifest"])
 
 
 def write(path, **layers):

@@ -8,7 +8,7 @@ reference.json names the program that rendered it.
 import math
 
 from . import twins
-from .cache import CACHE, create, load, program, run_timed, save, scene_key
+from .cache import CACHE, create, frame_suffix, load, outside, program, run_timed, save, scene_key
 from .commands import command, read
 from .options import options
 from .record import ROOT
@@ -16,6 +16,8 @@ from .record import ROOT
 ARGUMENTS = {"set": "first", "scenes": None, "width": 320, "threads": 2, "reference_seconds": 240.0}
 # Least share of the reference's core-seconds for a stored half, because times of iterations vary.
 MIN_SHARE = 0.8
+# Distance of the seeds of the two halves of a frame.
+FRAME_SEEDS = 10_000
 # The method that converges fastest and finds all light, where it is known. vcm has a bias that vanishes.
 METHODS = {"blocks": ["bdpt"], "interior": ["bdpt"], "stadium": ["vcm", "--guide", "on"]}
 # Factors of the core-seconds. A bulb seen through fluted glass has one bright sample in hundreds with every method.
@@ -51,13 +53,13 @@ def path(text):
 def name(scene):
     """A scene's name in tables."""
     if not scene.is_relative_to(ROOT / "scenes"):
-        return f"twin/{scene.stem}"
+        return f"{outside(scene)}/{scene.stem}"
     return scene.relative_to(ROOT / "scenes").with_suffix("").as_posix()
 
 
 def method(scene):
     """The method of a scene's reference, with its options: vcm if caustics are seen in mirrors or through glass."""
-    known = name(scene).removeprefix("twin/")
+    known = name(scene).removeprefix("twin/").removeprefix("shot/")
     if known in METHODS:
         return METHODS[known]
     effects = {effect["name"]: effect["simulated"] for effect in read("plan", str(scene))["effects"]}
@@ -69,14 +71,15 @@ def seconds(scene):
     return options.reference_seconds * TIME_FACTORS.get(name(scene).removeprefix("twin/"), 1)
 
 
-def folder(scene):
-    """The folder of a scene's halves: half1.exr, half2.exr, reference.json."""
-    return CACHE / "references" / scene_key(scene) / f"{options.width}"
+def folder(scene, frame=None):
+    """The folder of the halves of a scene, or of a frame of it: half1.exr, half2.exr, reference.json."""
+    return CACHE / "references" / scene_key(scene) / f"{options.width}{frame_suffix(frame)}"
 
 
-def reference(scene):
-    """Renders a scene's halves if they are missing or too short; returns their folder and the value of reference.json."""
-    where = folder(scene)
+def reference(scene, frame=None):
+    """Renders the halves of a scene, or of a frame of it, if they are missing or too short; returns their folder and the
+    value of reference.json."""
+    where = folder(scene, frame)
     known = load(where / "reference.json")
     if known and min(known["core_seconds"]) >= MIN_SHARE * seconds(scene):
         return where, known
@@ -92,7 +95,10 @@ def reference(scene):
     with create(where) as draft:
         for half in (1, 2):
             file = draft / f"half{half}.exr"
-            settings = {"width": options.width, "seed": 7770 + half, "threads": options.threads, "progress": "none"}
+            # The program adds a frame's number to its seed; no half may have the seed of a half of another frame.
+            seed = 7770 + half * (1 if frame is None else FRAME_SEEDS)
+            settings = {"width": options.width, "seed": seed, "threads": options.threads, "progress": "none"}
+            settings["frames"] = frame
             line = command("render", scene, "-o", file, *known["options"], **settings)
             # Clocks mislead on a busy machine, so a short render measures the core-seconds of an iteration.
             stop = ["--time", f"{max(0.05 * seconds(scene) / options.threads, 1):.3f}"]

@@ -4,7 +4,20 @@ import functools
 import os
 import subprocess
 
-from .cache import BIN, CACHE, Failed, create, digest, installed, load, program, run_timed, save, scene_key
+from .cache import (
+    BIN,
+    CACHE,
+    Failed,
+    create,
+    digest,
+    frame_suffix,
+    installed,
+    load,
+    program,
+    run_timed,
+    save,
+    scene_key,
+)
 from .commands import command, read
 from .options import options
 from .picture_errors import Layers, write
@@ -23,27 +36,27 @@ def has_option(option):
     return f"{option} " in done.stdout
 
 
-def render(scene, method, denoise, budget, seed, binary=BIN):
-    """Renders by a program, unless the cache has the render; returns the folder. Raises Failed if the program refuses
-    the render, which the cache also stores."""
+def render(scene, method, denoise, budget, seed, binary=BIN, frame=None):
+    """Renders a scene, or a frame of it, by a program, unless the cache has the render; returns the folder. Raises
+    Failed if the program refuses the render, which the cache also stores."""
     name = f"{method}-{denoise or 'default'}-{budget:g}s-{options.clock}-{options.threads}-seed{seed}-{options.width}"
     if options.render_options:
         name += "".join(c if c.isalnum() else "_" for c in " ".join(options.render_options))
-    folder = CACHE / "renders" / program(binary) / scene_key(scene) / name
+    folder = CACHE / "renders" / program(binary) / scene_key(scene) / f"{name}{frame_suffix(frame)}"
     known = load(folder / "run.json")
     if known is None:
         with create(folder) as draft:
-            known = _render(scene, method, denoise, budget, seed, draft / "picture.exr", binary)
+            known = _render(scene, method, denoise, budget, seed, draft / "picture.exr", binary, frame)
             save(draft / "run.json", known)
     if "refused" in known:
         raise Failed(known["refused"])
     return folder
 
 
-def _render(scene, method, denoise, budget, seed, file, binary):
+def _render(scene, method, denoise, budget, seed, file, binary, frame):
     if denoise and not has_option("--denoise"):
         return {"refused": "not available: this program has no --denoise"}
-    settings = {"method": method, "seed": seed, "width": options.width, "threads": options.threads}
+    settings = {"method": method, "seed": seed, "width": options.width, "threads": options.threads, "frames": frame}
     line = command("render", scene, "-o", file, **settings, progress="none", denoise=denoise or None, program=binary)
     line += options.render_options
     seconds, stop = budget, ["--time", f"{budget:.3f}"]

@@ -1,0 +1,196 @@
+"""Flicker of animations: four animated shots (lab/shots.py), each frame rendered by itself at equal time.
+
+Flicker is the root of the mean, over pixels and frames, of the squared temporal difference of the error: the error in the
+next frame, at the pixel that shows the same surface point, minus the error. It is relative and trimmed as relMSE is
+(lab/picture_errors.py). Beside it is the root of the mean relMSE of the frames. Each frame is compared with two
+independent halves of a reference, so that the references' own noise cancels.
+
+Surface points are followed by the transforms of objects and camera; pixels whose point is hidden in the next frame do
+not count (lab/temporal.py). Rows: the finished frames of each method, their estimates, Intel OIDN alone on these
+estimates, and other renderers with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by
+row. Renders are cached, so an interrupted run continues. CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache.
+"""
+
+import sys
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from .. import peer_runs, references, renders, shots, temporal
+from ..cache import CACHE, Failed, create, frame_suffix, load, program, run_timed, save, scene_key
+from ..commands import command
+from ..options import options
+from ..picture_errors import Reference
+from ..record import record
+
+ARGUMENTS = {
+    "shots": list(shots.SHOTS),
+    "frames": shots.FRAMES,
+    "width": 320,
+    "threads": 2,
+    "reference_seconds": 60.0,
+    "budgets": [15.0],
+    "methods": ["auto"],
+    "denoise": ["default"],
+    "render_options": [],
+    "clock": "cpu",
+    "peers": ["cycles_path"],
+}
+SHORT = {"width": 96, "frames": 6, "threads": 1, "reference_seconds": 5.0, "budgets": [2.0], "peers": []}
+# Camera paths per pixel for the positions and normals by which surfaces are followed.
+GUIDE_ITERATIONS = 16
+STRIP_FRAMES, LABEL_WIDTH = 8, 150
+KEYS = ("flicker", "flicker_trimmed", "error", "error_trimmed")
+PICTURES = {"delivered": "", "noisy": ", estimate", "oidn": ", OIDN alone"}
+PEER_PICTURES = {"noisy": "", "oidn": ", OIDN alone"}
+
+
+def guides(shot, frame):
+    """The guides of a frame, from the cache if possible."""
+    folder = CACHE / "guides" / scene_key(shot) / f"{options.width}{frame_suffix(frame)}"
+    if not folder.exists():
+        with create(folder) as draft:
+            settings = {"method": "path", "no_finish": True, "iterations": GUIDE_ITERATIONS, "frames": frame}
+            settings |= {"width": options.width, "layers": "P,Z,normal,CryptoObject00", "progress": "none"}
+            # Equal seeds, so that nothing changes where nothing moves.
+            settings |= {"frame_seed": "same", "threads": options.threads}
+            run_timed(command("render", shot, "-o", draft / "guides.exr", **settings))
+    return temporal.Guides.read(folder / "guides.exr")
+
+
+class Sequence:
+    """The references of a shot's frames, and the counterparts of their pixels."""
+
+    def __init__(self, name):
+        self.name, self.shot = name, shots.write(name)
+        self.frames = range(1, options.frames + 1)
+        made = [references.reference(self.shot, frame) for frame in self.frames]
+        self.halves = [folder for folder, _ in made]
+        self.made = [facts for _, facts in made]
+        self.references = [Reference.read(folder) for folder in self.halves]
+        animation, shown = shots.Animation(self.shot), [guides(self.shot, frame) for frame in self.frames]
+        self.matches = [
+            temporal.counterparts(temporal.vectors(animation, shown[i], frame, frame + 1), shown[i + 1])
+            for i, frame in enumerate(self.frames[:-1])
+        ]
+
+    def row(self, folders, picture, pictures_of):
+        """The flicker and the errors of a picture of all frames, by its name among `pictures_of(folder)`."""
+        errors = [
+            renders.figures(folder, reference, halves, pictures_of)[picture]
+            for folder, reference, halves in zip(folders, self.references, self.halves, strict=True)
+        ]
+        series = [pictures_of(folder)[picture].astype(float) for folder in folders]
+        found = temporal.flicker(series, self.references, self.matches)
+        for key, error in (("error", "relmse"), ("error_trimmed", "relmse_trimmed")):
+            found[key] = float(np.sqrt(max(np.mean([one[error] for one in errors]), 0.0)))
+        found["relmse_trimmed"] = [float(f"{one['relmse_trimmed']:.4g}") for one in errors]
+        found["core_seconds"] = float(np.mean([load(folder / "run.json")["cpu_seconds"] for folder in folders]))
+        return found, series
+
+
+def line(label, found):
+    """Prints a row of the table."""
+    values = "".join(f"{found[key]:>17.4f}" for key in KEYS)
+    print(f"    {label:<32}{found['core_seconds']:>8.1f}{values}", flush=True)
+
+
+def sources(sequence, budget, peers):
+    """The rows of a shot: the name, the folders of its frames, the reader of their pictures, and the pictures."""
+    for denoise in ["" if name == "default" else name for name in options.denoise]:
+        for method in options.methods:
+
+            def ours(frame, method=method, denoise=denoise):
+                return renders.render(sequence.shot, method, denoise, budget, 0, frame=frame)
+
+            yield f"{method} {denoise}".strip(), ours, renders.pictures, PICTURES
+    height = sequence.references[0].mean.shape[0]
+    for name in peers:
+
+        def theirs(frame, name=name):
+            still = CACHE / "stills" / f"{sequence.name}{frame_suffix(frame)}.glb"
+            shots.write_still(sequence.shot, frame, still)
+            return peer_runs.Peers(still, height).render(name, budget, frame)
+
+        def pictures(folder):
+            still = CACHE / "stills" / f"{sequence.name}{frame_suffix(sequence.frames[0])}.glb"
+            return peer_runs.Peers(still, height).pictures(folder)
+
+        yield name, theirs, pictures, PEER_PICTURES
+
+
+def display(picture, white):
+    """A picture as 8-bit sRGB, with the radiance `white` as white."""
+    linear = np.clip(np.nan_to_num(picture / white), 0, 1)
+    curve = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return (255 * curve + 0.5).astype(np.uint8)
+
+
+def write_strip(sequence, budget, rows):
+    """Writes the film strip of a shot: a row for each series of pictures, the references first."""
+    count = min(STRIP_FRAMES, len(sequence.frames))
+    chosen = np.linspace(0, len(sequence.frames) - 1, count).round().astype(int)
+    truth = [reference.mean for reference in sequence.references]
+    rows = {"reference": truth, **rows}
+    height, width = truth[0].shape[:2]
+    white = np.nanpercentile(np.stack(truth).mean(-1), 98)
+    strip = Image.new("RGB", (LABEL_WIDTH + count * width, len(rows) * height))
+    pen = ImageDraw.Draw(strip)
+    for at, (label, series) in enumerate(rows.items()):
+        pen.text((4, at * height + 4), label)
+        for column, frame in enumerate(chosen):
+            strip.paste(Image.fromarray(display(series[frame], white)), (LABEL_WIDTH + column * width, at * height))
+    folder = CACHE / "strips"
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{sequence.name}-{width}-{budget:g}s.png"
+    strip.save(path)
+    print(f"    {path}", flush=True)
+
+
+def measure(name, budget, peers):
+    """Measures a shot at a budget; returns the rows of the table, and the notes."""
+    sequence = Sequence(name)
+    own = np.sqrt(np.mean([reference.error for reference in sequence.references]))
+    head = "".join(f"{key.replace('_', ', '):>17}" for key in KEYS)
+    print(f"\n{name}, {budget:g} s, the references' own error {own:.2g}\n    {'':<32}{'core-s':>8}{head}", flush=True)
+    rows, strip, notes = [], {}, {}
+    for label, render, pictures_of, shown in sources(sequence, budget, peers):
+        try:
+            folders = [render(frame) for frame in sequence.frames]
+        except Failed as failed:
+            notes[label] = str(failed)
+            print(f"    {label:<32}{failed}", flush=True)
+            continue
+        available = pictures_of(folders[0])
+        for picture, suffix in shown.items():
+            if picture in available:
+                found, strip[label + suffix] = sequence.row(folders, picture, pictures_of)
+                line(label + suffix, found)
+                rows.append({"shot": name, "budget": budget, "row": label + suffix, **rounded(found)})
+    write_strip(sequence, budget, strip)
+    used = {"error": float(f"{own:.3g}"), "core_seconds": [made["core_seconds"] for made in sequence.made]}
+    return rows, notes, {**used, "options": sequence.made[0]["options"], "program": sequence.made[0]["program"]}
+
+
+def rounded(found):
+    """A row for the record, with four digits."""
+    return {key: value if isinstance(value, list) else float(f"{value:.4g}") for key, value in found.items()}
+
+
+def main():
+    unknown = set(options.shots) - set(shots.SHOTS)
+    if unknown or not 2 <= options.frames <= shots.FRAMES:
+        raise SystemExit(f"--shots are some of {', '.join(shots.SHOTS)}, and --frames is 2 to {shots.FRAMES}")
+    peers, reason = peer_runs.select()
+    if reason:
+        print(reason, file=sys.stderr)
+    rows, notes, known = [], {}, {}
+    for name in options.shots:
+        for budget in options.budgets:
+            found, notes[f"{name}, {budget:g} s"], known[name] = measure(name, budget, peers)
+            rows += found
+    settings = {key: getattr(options, key) for key in ("width", "frames", "threads", "clock", "reference_seconds")}
+    values = {"program": program(), **settings, "set": "short" if options.short else None, "short": options.short}
+    values |= {"options": options.render_options, "references": known, "notes": notes, "rows": rows}
+    save(CACHE / "flicker.json", values)
+    record("flicker", values)
