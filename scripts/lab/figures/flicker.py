@@ -7,20 +7,24 @@ independent halves of a reference, so that the references' own noise cancels.
 
 Surface points are followed by the transforms of objects and camera; pixels whose point is hidden in the next frame do
 not count (lab/temporal.py). Rows: the finished frames of each method, their estimates, Intel OIDN alone on these
-estimates, and other renderers with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by
+estimates, both on estimates averaged over neighbouring frames (lab/temporal_average.py, a prototype), and other renderers
+with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by
 row. Renders are cached, so an interrupted run continues. CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache.
 """
 
+import functools
 import sys
+import tempfile
+from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from .. import peer_runs, references, renders, shots, temporal
+from .. import peer_runs, references, renders, shots, temporal, temporal_average
 from ..cache import CACHE, Failed, create, frame_suffix, load, program, run_timed, save, scene_key
 from ..commands import command
 from ..options import options
-from ..picture_errors import Reference
+from ..picture_errors import Layers, Reference, write
 from ..record import record
 
 ARGUMENTS = {
@@ -68,25 +72,61 @@ class Sequence:
         self.halves = [folder for folder, _ in made]
         self.made = [facts for _, facts in made]
         self.references = [Reference.read(folder) for folder in self.halves]
-        animation, shown = shots.Animation(self.shot), [guides(self.shot, frame) for frame in self.frames]
-        self.matches = [
-            temporal.counterparts(temporal.vectors(animation, shown[i], frame, frame + 1), shown[i + 1])
-            for i, frame in enumerate(self.frames[:-1])
-        ]
+        self.animation, self.guides = shots.Animation(self.shot), [guides(self.shot, frame) for frame in self.frames]
+        self.match = functools.cache(self.match)
+        self.matches = [self.match(i, i + 1) for i in range(len(self.frames) - 1)]
 
-    def row(self, folders, picture, pictures_of):
-        """The flicker and the errors of a picture of all frames, by its name among `pictures_of(folder)`."""
-        errors = [
-            renders.figures(folder, reference, halves, pictures_of)[picture]
-            for folder, reference, halves in zip(folders, self.references, self.halves, strict=True)
-        ]
-        series = [pictures_of(folder)[picture].astype(float) for folder in folders]
-        found = temporal.flicker(series, self.references, self.matches)
+    def match(self, first, second):
+        """The counterparts of a frame's pixels in another frame, both counted from 0."""
+        moved = temporal.vectors(self.animation, self.guides[first], self.frames[first], self.frames[second])
+        return temporal.counterparts(moved, self.guides[second])
+
+    def row(self, folders, series, errors):
+        """The flicker and the errors of a series of pictures, from the errors of each."""
+        found = temporal.flicker([one.astype(float) for one in series], self.references, self.matches)
         for key, error in (("error", "relmse"), ("error_trimmed", "relmse_trimmed")):
             found[key] = float(np.sqrt(max(np.mean([one[error] for one in errors]), 0.0)))
         found["relmse_trimmed"] = [float(f"{one['relmse_trimmed']:.4g}") for one in errors]
         found["core_seconds"] = float(np.mean([load(folder / "run.json")["cpu_seconds"] for folder in folders]))
-        return found, series
+        return found
+
+    def rows(self, folders, pictures_of, shown):
+        """The rows of a render's pictures, and the pictures of all frames, by the ends of their names."""
+        errors = [
+            renders.figures(folder, reference, halves, pictures_of)
+            for folder, reference, halves in zip(folders, self.references, self.halves, strict=True)
+        ]
+        pictures = [pictures_of(folder) for folder in folders]
+        for name, suffix in shown.items():
+            if name in pictures[0]:
+                series = [one[name] for one in pictures]
+                yield suffix, self.row(folders, series, [one[name] for one in errors]), series
+
+    def averaged(self, folders):
+        """Rows of the prototype of a temporal finish: the averages, and OIDN alone on them."""
+        layers = [Layers(folder / "picture.exr") for folder in folders]
+        if any(one.get("Variance1") is None for one in layers):
+            return
+        estimates = [temporal_average.Estimate.read(one) for one in layers]
+        averages = [temporal_average.average(estimates, i, self.match)[0] for i in range(len(layers))]
+        series = {", averaged": averages}
+        if renders.PYTHON:
+            series[", averaged, OIDN alone"] = [denoise(*both) for both in zip(averages, layers, strict=True)]
+        for suffix, pictures in series.items():
+            errors = [
+                reference.measure(one.astype(np.float32))
+                for reference, one in zip(self.references, pictures, strict=True)
+            ]
+            yield suffix, self.row(folders, pictures, errors), pictures
+
+
+def denoise(picture, layers):
+    """A picture denoised by OIDN alone, with the albedo and the normals of a render."""
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        write(folder / "in.exr", picture=picture, albedo=layers.get("albedo"), normal=layers.get("normal", "XYZ"))
+        renders.denoise_file(folder, "in.exr", "out.exr")
+        return Layers(folder / "out.exr").get("")
 
 
 def line(label, found):
@@ -161,12 +201,11 @@ def measure(name, budget, peers):
             notes[label] = str(failed)
             print(f"    {label:<32}{failed}", flush=True)
             continue
-        available = pictures_of(folders[0])
-        for picture, suffix in shown.items():
-            if picture in available:
-                found, strip[label + suffix] = sequence.row(folders, picture, pictures_of)
-                line(label + suffix, found)
-                rows.append({"shot": name, "budget": budget, "row": label + suffix, **rounded(found)})
+        found = [*sequence.rows(folders, pictures_of, shown)]
+        found += sequence.averaged(folders) if shown is PICTURES else []
+        for suffix, row, strip[label + suffix] in found:
+            line(label + suffix, row)
+            rows.append({"shot": name, "budget": budget, "row": label + suffix, **rounded(row)})
     write_strip(sequence, budget, strip)
     used = {"error": float(f"{own:.3g}"), "core_seconds": [made["core_seconds"] for made in sequence.made]}
     return rows, notes, {**used, "options": sequence.made[0]["options"], "program": sequence.made[0]["program"]}
