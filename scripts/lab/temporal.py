@@ -1,7 +1,7 @@
 """Errors that change from frame to frame: motion vectors, counterparts of pixels in the next frame, and flicker.
 
-Vectors are displacements in pixels to the same surface point in another frame, as arrays of shape (rows, columns, 2) with
-components to the right and downwards. Everything but `vectors` takes any such array, also one from a motion layer.
+Vectors are displacements in pixels to the same surface point in another frame, as arrays of shape (rows, columns, 2)
+with components to the right and downwards. Everything but `vectors` takes any such array, also one from a motion layer.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ DEPTH_TOLERANCE, MIN_NORMAL_COSINE = 0.01, 0.8
 
 @dataclass
 class Guides:
-    """What a frame shows: the positions in world space and camera depths of the first visible hits, the normals at the
-    first hits that are neither mirror nor clear glass, and the names of the objects, as indices of `names` (-1: none)."""
+    """What a frame shows: positions in world space and camera depths of the first visible hits, normals at the first
+    hits that are neither mirror nor clear glass, and the objects, as indices of `names` (-1: none)."""
 
     positions: np.ndarray
     depths: np.ndarray

@@ -1,7 +1,7 @@
 """A prototype of a temporal finish: averages the estimates of neighbouring frames before they are denoised.
 
-A neighbour's weight is 1 / (v + b^2), with the variance v of its estimate and an estimate b^2 of the squared difference
-of the two true values, from 3 x 3 pixels. With exact b and n neighbours that all differ by b from a pixel of variance v,
+A neighbour's weight is 1 / (v + b^2), with the variance v of its estimate and an estimate b^2 of the squared
+difference of the two true values, from 3 x 3 pixels. With exact b and n neighbours that all differ by b from a pixel of variance v,
 the bias is at most n / (2 sqrt(n + 1)) standard errors: 0.9 for four neighbours. It vanishes with the noise, because
 weights fall with v / b^2.
 """
@@ -18,8 +18,8 @@ MIN_VARIANCE = 1e-12
 
 @dataclass
 class Estimate:
-    """The estimate of a frame, and the variance of the mean, smoothed: weights by the variance of the pixel itself would
-    favour pixels that have missed bright samples."""
+    """The estimate of a frame, and the variance of the mean, smoothed: weights by the variance of the pixel itself
+    would favour pixels that have missed bright samples."""
 
     picture: np.ndarray
     variance: np.ndarray
@@ -47,9 +47,9 @@ def window_mean(values, radius):
 
 
 def squared_bias(difference, variance, seen):
-    """An estimate of the squared difference of the true values of two frames, from the difference of their estimates and
-    its variance: the square of the mean beyond its noise, and the mean of the squares beyond theirs. The largest of the
-    channels counts."""
+    """An estimate of the squared difference of the true values of two frames, from the difference of their estimates
+    and its variance: the square of the mean beyond its noise, and the mean of the squares beyond theirs. The largest of
+    the channels counts."""
     share = np.maximum(window_mean(seen.astype(float), BIAS_RADIUS), 1e-12)[..., None]
     mean, square, noise = (
         window_mean(np.where(seen[..., None], values, 0.0), BIAS_RADIUS) / share

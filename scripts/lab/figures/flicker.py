@@ -1,15 +1,14 @@
 """Flicker of animations: four animated shots (lab/shots.py), each frame rendered by itself at equal time.
 
-Flicker is the root of the mean, over pixels and frames, of the squared temporal difference of the error: the error in the
-next frame, at the pixel that shows the same surface point, minus the error. It is relative and trimmed as relMSE is
+Flicker is the root of the mean, over pixels and frames, of the squared temporal difference of the error: the error in
+the next frame, at the pixel that shows the same surface point, minus the error. It is relative and trimmed as relMSE is
 (lab/picture_errors.py). Beside it is the root of the mean relMSE of the frames. Each frame is compared with two
 independent halves of a reference, so that the references' own noise cancels.
 
 Surface points are followed by the transforms of objects and camera; pixels whose point is hidden in the next frame do
 not count (lab/temporal.py). Rows: the finished frames of each method, their estimates, Intel OIDN alone on these
-estimates, both on estimates averaged over neighbouring frames (lab/temporal_average.py, a prototype), and other renderers
-with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by
-row. Renders are cached, so an interrupted run continues. CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache.
+estimates, both on estimates averaged over neighbouring frames (lab/temporal_average.py, a prototype), and other
+renderers with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by row. Renders are cached, so an interrupted run continues. CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache.
 """
 
 import functools
