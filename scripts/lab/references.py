@@ -77,8 +77,8 @@ def folder(scene, frame=None):
 
 
 def reference(scene, frame=None):
-    """Renders the halves of a scene, or of a frame of it, if they are missing or too short; returns their folder and the
-    value of reference.json."""
+    """Renders the halves of a scene, or of a frame of it, if they are missing or too short; returns their folder and
+    the value of reference.json."""
     where = folder(scene, frame)
     known = load(where / "reference.json")
     if known and min(known["core_seconds"]) >= MIN_SHARE * seconds(scene):

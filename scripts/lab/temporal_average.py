@@ -1,9 +1,9 @@
 """A prototype of a temporal finish: averages the estimates of neighbouring frames before they are denoised.
 
 A neighbour's weight is 1 / (v + b^2), with the variance v of its estimate and an estimate b^2 of the squared
-difference of the two true values, from 3 x 3 pixels. With exact b and n neighbours that all differ by b from a pixel of variance v,
-the bias is at most n / (2 sqrt(n + 1)) standard errors: 0.9 for four neighbours. It vanishes with the noise, because
-weights fall with v / b^2.
+difference of the two true values, from 3 x 3 pixels. With exact b and n neighbours that all differ by b from a pixel of
+variance v, the bias is at most n / (2 sqrt(n + 1)) standard errors: 0.9 for four neighbours. It vanishes with the
+noise, because weights fall with v / b^2.
 """
 
 from dataclasses import dataclass

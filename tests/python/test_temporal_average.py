@@ -49,7 +49,7 @@ class Average(unittest.TestCase):
         self.assertLess(variance.mean(), 0.3 * 0.01)
 
     def test_no_ghost_of_a_moving_caustic_is_above_one_standard_error(self):
-        """Means of 12 pictures, 24 rows and 3 channels have standard errors of at most 0.04; three of them are added."""
+        """Means of 12 pictures, 24 rows and 3 channels have standard errors of at most 0.04; the limit adds three."""
         for width, speed in ((0.7, 3), (2, 2), (6, 4)):
             for height in (1, 4, 8, 32):
                 with self.subTest(width=width, speed=speed, height=height):

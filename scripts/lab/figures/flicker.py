@@ -8,7 +8,9 @@ independent halves of a reference, so that the references' own noise cancels.
 Surface points are followed by the transforms of objects and camera; pixels whose point is hidden in the next frame do
 not count (lab/temporal.py). Rows: the finished frames of each method, their estimates, Intel OIDN alone on these
 estimates, both on estimates averaged over neighbouring frames (lab/temporal_average.py, a prototype), and other
-renderers with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by row. Renders are cached, so an interrupted run continues. CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache.
+renderers with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by row.
+
+Renders are cached, so an interrupted run continues. CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache.
 """
 
 import functools
