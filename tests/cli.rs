@@ -2,6 +2,8 @@
 
 mod support;
 
+#[path = "cli/blur.rs"]
+mod blur;
 #[path = "cli/checkpoints.rs"]
 mod checkpoints;
 #[path = "cli/commands.rs"]

@@ -43,8 +43,6 @@ def node(prim, stage, document, aspect=None, policy="expandAperture", lens=True)
         stage.losses.add(where, "it has an fStop and no focusDistance: everything is sharp")
     if get(camera.GetClippingPlanesAttr()):
         stage.losses.add(where, "clippingPlanes are not carried: nothing is cut away")
-    if get(camera.GetShutterCloseAttr(), 0.0) > get(camera.GetShutterOpenAttr(), 0.0):
-        stage.losses.add(where, "motion blur is not carried: everything stands still")
     role = get(camera.GetStereoRoleAttr())
     if role in ("left", "right"):
         stage.losses.add(where, f"it is the {role} one of a pair, of which each is rendered by itself")
@@ -61,6 +59,20 @@ def _conform(width, height, aspect, policy):
     if by_width.get(policy, False):
         return height * aspect, height
     return width, width / aspect
+
+
+def shutter(prim, stage):
+    """The times at which the shutter of a camera opens and closes, relative to the frame; None if nothing moves then."""
+    camera, get = UsdGeom.Camera(prim), stage.get
+    times = [float(get(a, 0.0)) for a in (camera.GetShutterOpenAttr(), camera.GetShutterCloseAttr())]
+    if not all(map(math.isfinite, times)):
+        raise Fault(prim.GetPath(), f"its shutter opens at {times[0]} and closes at {times[1]}", "give it two numbers")
+    if times[0] >= times[1] or not stage.moves():
+        return None
+    if not stage.has_frame:
+        stage.losses.add(prim.GetPath(), "its shutter is ignored, because no frame is given (--frames gives one)")
+        return None
+    return times
 
 
 def exposure(prim, stage):

@@ -11,7 +11,8 @@ from faults import Fault
 from stage import custom_keys
 
 # Keys of the scene's `extras.caustique`. All other `caustique:` attributes of the settings are options of `render`.
-SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate"}
+SCENE_KEYS = {"environment", "medium", "light_units", "exposure", "tonemap", "film_transparent", "frame", "frame_rate",
+              "shutter"}
 # Options allowed in a stage: about the picture, without files and permissions, because a stage may come from an
 # untrusted source. scripts/generate.sh writes the list from the program's definition of options.
 OPTIONS = frozenset(json.loads(pathlib.Path(__file__).with_name("options.json").read_text("utf-8"))["files_may_give"])
@@ -75,6 +76,10 @@ class Settings:
     def lens(self):
         """Whether cameras have depth of field."""
         return not self.get("disableDepthOfField", False)
+
+    def blurs(self):
+        """Whether what moves is blurred."""
+        return not self.get("disableMotionBlur", False)
 
     def aspect(self):
         """Aspect ratio of the displayed picture, or None."""

@@ -59,6 +59,9 @@ class Scene:
         for at, (prim, matrix) in enumerate(self._cameras):
             node = cameras.node(prim, self._stage, self.document, settings.aspect(), settings.policy(), settings.lens())
             self._place(lambda _, node=node, prim=prim: {"name": str(prim.GetPath()), **node}, matrix)
+            times = cameras.shutter(prim, self._stage) if at == 0 and settings.blurs() else None
+            if times:
+                keys.setdefault("shutter", times)
             stops = cameras.exposure(prim, self._stage)
             if at == 0 and stops:
                 keys.setdefault("exposure", stops)

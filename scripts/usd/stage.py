@@ -20,7 +20,8 @@ class Stage:
     """A stage at a time code: `time`, `stage` (Usd.Stage), `losses`, and the transform from its axes and units to
     glTF's.
 
-    `by_blender`: whether Blender 4 wrote it, which exports some lights with wrong values.
+    `has_frame`: whether the time code was given; `by_blender`: whether Blender 4 wrote it, which exports some lights with
+    wrong values.
     """
 
     def __init__(self, path, frame=None, allow_outside=False):
@@ -37,6 +38,7 @@ class Stage:
         for error in self.stage.GetCompositionErrors():
             self.losses.add(getattr(error, "rootSite", None) and error.rootSite.path or "stage",
                              f"composition: {text_of(error)}")
+        self.has_frame = frame is not None
         self.time = self._time_code(frame)
         # UsdGeom.GetStageMetersPerUnit fails for a value that is not a double.
         said = self.stage.HasAuthoredMetadata("metersPerUnit") and self.stage.GetMetadata("metersPerUnit")
@@ -50,6 +52,11 @@ class Stage:
         self.z_up = axis == UsdGeom.Tokens.z
         self.to_world = self._axes() * Gf.Matrix4d().SetScale(self.metres)
         self._bake_skins()
+
+    def moves(self):
+        """Whether any attribute of a prim may vary in time."""
+        return any(attribute.ValueMightBeTimeVarying() for prim in self.stage.Traverse(PREDICATE)
+                   for attribute in prim.GetAuthoredAttributes())
 
     def _time_code(self, frame):
         if frame is None and not self.stage.HasAuthoredTimeCodeRange():

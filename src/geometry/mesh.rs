@@ -2,6 +2,7 @@
 
 use super::precision::{Extent, coordinate_error};
 use crate::math::{Affine3A, Mat3A, Vec2, Vec3, Vec4};
+use std::sync::Arc;
 
 /// A triangle mesh with one material: a glTF primitive. An attribute has one value per vertex, or is empty if the file
 /// has none.
@@ -70,11 +71,11 @@ impl Face {
     }
 }
 
-/// The data of a mesh that surface lookups read.
+/// The data of a mesh that surface lookups read. Clones share it.
 #[derive(Clone, Debug)]
 pub(super) struct PackedMesh {
-    pub faces: Vec<Face>,
-    pub corners: Vec<Corner>,
+    pub faces: Arc<[Face]>,
+    pub corners: Arc<[Corner]>,
     /// Whether the mesh has other attributes: texture coordinate set 1, vertex colours or tangents.
     pub has_more: bool,
 }
@@ -83,7 +84,7 @@ impl PackedMesh {
     /// Packs a mesh for surface lookups. Moves normals and texture coordinate set 0 out of `mesh`.
     pub fn new(mesh: &mut Mesh) -> PackedMesh {
         let has_more = !(mesh.uvs[1].is_empty() && mesh.colors.is_empty() && mesh.tangents.is_empty());
-        PackedMesh { faces: Face::pack(mesh), corners: Corner::pack(mesh), has_more }
+        PackedMesh { faces: Face::pack(mesh).into(), corners: Corner::pack(mesh).into(), has_more }
     }
 }
 
@@ -100,6 +101,8 @@ pub struct Instance {
     pub object: u32,
     /// Whether camera rays pass through the instance. All other rays hit it.
     pub hidden_from_camera: bool,
+    /// Whether the place or the shape of the instance depends on the time while the shutter is open.
+    pub moves: bool,
     /// Transform from local to world space; `None` if the mesh is in world space.
     pub to_world: Option<Placement>,
 }

@@ -3,12 +3,14 @@
 use super::mesh::PackedMesh;
 use super::{Instance, Mesh, Surface};
 use crate::processor::prefetch;
+use std::sync::Arc;
 
 /// The scene's geometry: meshes and their instances.
 #[derive(Clone, Debug, Default)]
 pub struct Shapes {
-    /// Meshes, in local space if they are shared, otherwise in world space.
-    pub meshes: Vec<Mesh>,
+    /// Meshes, in world space if they have one instance that does not move, otherwise in local space. The moments of a
+    /// moving scene share meshes that keep their shape.
+    pub meshes: Vec<Arc<Mesh>>,
     /// Instances of the meshes. All their indices are valid.
     pub instances: Vec<Instance>,
     /// Packed triangles and vertices of each mesh, by the index of the mesh.
@@ -17,9 +19,19 @@ pub struct Shapes {
 
 impl Shapes {
     /// The geometry of these meshes and instances. Indices in the instances must be valid.
-    pub fn new(mut meshes: Vec<Mesh>, instances: Vec<Instance>) -> Shapes {
-        let packed = meshes.iter_mut().map(PackedMesh::new).collect();
+    pub fn new(mut meshes: Vec<Arc<Mesh>>, instances: Vec<Instance>) -> Shapes {
+        let packed = meshes.iter_mut().map(|mesh| PackedMesh::new(Arc::make_mut(mesh))).collect();
         Shapes { meshes, instances, packed }
+    }
+
+    /// The geometry at another moment of a moving scene. Meshes that are among the present ones are shared.
+    #[must_use]
+    pub fn at_moment(&self, mut meshes: Vec<Arc<Mesh>>, instances: Vec<Instance>) -> Shapes {
+        let packed = meshes.iter_mut().enumerate().map(|(i, mesh)| match self.meshes.get(i) {
+            Some(own) if Arc::ptr_eq(own, mesh) => self.packed[i].clone(),
+            _ => PackedMesh::new(Arc::make_mut(mesh)),
+        });
+        Shapes { packed: packed.collect(), meshes, instances }
     }
 
     /// Number of triangles of all instances.

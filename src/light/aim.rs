@@ -34,6 +34,8 @@ fn distance_to_line2(center: Vec3, p: Vec3, d: Vec3) -> f32 {
 
 /// Caustic targets: the bounding spheres of the objects that can make caustics, towards which light paths start.
 pub struct CausticTargets {
+    /// For each instance, its bounding sphere if it can make caustics.
+    instances: Vec<Option<(Vec3, f32)>>,
     /// Centre and radius (m) of the bounding sphere of each target.
     spheres: Vec<(Vec3, f32)>,
     /// Selects a target in proportion to the area of its disc, the cross-section of its sphere; `None` without targets.
@@ -49,6 +51,12 @@ fn bounding_sphere(points: impl Iterator<Item = Vec3> + Clone) -> Option<(Vec3, 
     let center = (low + high) * 0.5;
     let radius2 = points.map(|p| p.distance_squared(center)).fold(0.0, f32::max);
     (center.is_finite() && radius2 > 0.0).then(|| (center, radius2.sqrt()))
+}
+
+/// The bounding sphere of an instance; `None` if it has no extent.
+fn sphere_of(shapes: &Shapes, instance: usize) -> Option<(Vec3, f32)> {
+    let instance = &shapes.instances[instance];
+    bounding_sphere(shapes.meshes[instance.mesh as usize].positions.iter().map(|&p| instance.point(p)))
 }
 
 /// Centre and radius of the smallest sphere around two spheres.
@@ -124,19 +132,28 @@ fn merged_spheres(mut spheres: Vec<(Vec3, f32)>, most: usize) -> Vec<(Vec3, f32)
 impl CausticTargets {
     /// Finds the caustic targets of a scene from its objects and their materials.
     pub fn new(shapes: &Shapes, materials: &Materials) -> CausticTargets {
-        let spheres: Vec<(Vec3, f32)> = shapes
-            .instances
-            .iter()
-            .filter(|instance| materials.list[instance.material as usize].focuses())
-            .filter_map(|instance| {
-                let mesh = &shapes.meshes[instance.mesh as usize];
-                bounding_sphere(mesh.positions.iter().map(|&p| instance.point(p)))
-            })
-            .collect();
+        CausticTargets::find(shapes, materials, |instance| sphere_of(shapes, instance))
+    }
+
+    /// The targets at another moment of a moving scene.
+    pub fn at_moment(&self, shapes: &Shapes, materials: &Materials) -> CausticTargets {
+        let known = |instance: usize| self.instances.get(instance).copied().flatten();
+        CausticTargets::find(shapes, materials, |instance| match known(instance) {
+            Some(sphere) if !shapes.instances[instance].moves => Some(sphere),
+            _ => sphere_of(shapes, instance),
+        })
+    }
+
+    /// Finds the caustic targets, where `sphere` gives the bounding sphere of an instance.
+    fn find(shapes: &Shapes, materials: &Materials, sphere: impl Fn(usize) -> Option<(Vec3, f32)>) -> CausticTargets {
+        let focuses = |i: &usize| materials.list[shapes.instances[*i].material as usize].focuses();
+        let instances: Vec<_> =
+            (0..shapes.instances.len()).map(|i| Some(i).filter(focuses).and_then(&sphere)).collect();
+        let spheres: Vec<(Vec3, f32)> = instances.iter().copied().flatten().collect();
         let spheres = merged_spheres(spatially_merged(spheres, MAX_SPHERES), MAX_TARGETS);
         let areas = spheres.iter().map(|s| PI * s.1 * s.1);
         let area = areas.clone().sum();
-        CausticTargets { choice: Cdf::new(areas.map(f64::from)), spheres, area }
+        CausticTargets { choice: Cdf::new(areas.map(f64::from)), instances, spheres, area }
     }
 
     /// Turns the start of a light path from infinity, sampled uniformly on the disc of the whole scene, into a start
@@ -280,7 +297,8 @@ mod tests {
         let spheres = vec![(Vec3::new(0.3, 0.0, 0.1), 0.2), (Vec3::new(0.2, 0.1, -0.4), 0.25), (Vec3::X, 0.1)];
         let areas: Vec<f32> = spheres.iter().map(|s: &(Vec3, f32)| PI * s.1 * s.1).collect();
         let choice = Cdf::new(areas.iter().map(|&a| f64::from(a)));
-        let targets = CausticTargets { spheres, choice, area: areas.iter().sum() };
+        let area = areas.iter().sum();
+        let targets = CausticTargets { instances: Vec::new(), spheres, choice, area };
         let sky = Sky { center: Vec3::ZERO, radius: 1.05, environment: None, hidden_from_camera: false };
         let d = Vec3::NEG_Y;
         let whole = PI * sky.radius * sky.radius;
@@ -339,7 +357,8 @@ mod tests {
         for ratio in [10.0f32, 700.0, 7_000.0, 100_000.0] {
             let area = PI;
             let spheres = vec![(Vec3::new(0.3, -0.2, 0.5) * ratio, 1.0)];
-            let targets = CausticTargets { spheres, choice: Cdf::new(std::iter::once(f64::from(area))), area };
+            let choice = Cdf::new(std::iter::once(f64::from(area)));
+            let targets = CausticTargets { instances: Vec::new(), spheres, choice, area };
             let sky = Sky { center: Vec3::ZERO, radius: ratio, environment: None, hidden_from_camera: false };
             let whole = PI * ratio * ratio;
             let region = Region::new(Vec3::new(-0.4, 0.2, 0.1) * ratio, 1.0, ratio);

@@ -13,7 +13,7 @@ pub(super) fn position_error(&[corner, a, b]: &[Vec3; 3]) -> f32 {
 }
 
 /// A triangle of an emissive material, which emits light from one side or from both.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TriangleLight {
     /// Index of the instance (the object) that the triangle belongs to.
     pub instance: u32,
@@ -72,7 +72,7 @@ impl TriangleLight {
 }
 
 /// A light source. The scene has one flat list of them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Emitter {
     /// A triangle of an emissive material.
     Triangle(TriangleLight),

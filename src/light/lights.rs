@@ -16,6 +16,7 @@ use crate::material::{Alpha, Materials};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, one_minus_cos, warp};
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Share of the probability of selecting a light that all lights get equally; the rest is proportional to power.
 const EQUAL_SHARE: f64 = 0.05;
@@ -25,15 +26,15 @@ const MIN_COSINE: f32 = 1e-6;
 
 /// The lights of a scene, with the distributions that select them.
 pub struct Lights {
-    emitters: Vec<Emitter>,
-    choice: Option<LightSampler>,
+    emitters: Arc<[Emitter]>,
+    choice: Option<Arc<LightSampler>>,
     /// For each instance, the index of its first emitter; `u32::MAX` if the instance does not emit.
-    first: Vec<u32>,
+    first: Arc<[u32]>,
     /// For each instance and triangle, the index of its emitter minus the instance's entry in `first`; `u32::MAX` for
     /// triangles without area.
-    relative: Vec<Vec<u32>>,
+    relative: Arc<[Vec<u32>]>,
     /// Indices of the suns of finite size, which rays can hit.
-    suns: Vec<u32>,
+    suns: Arc<[u32]>,
     environment: Option<u32>,
     sky: Sky,
     targets: CausticTargets,
@@ -106,6 +107,43 @@ struct LightRay {
 impl Lights {
     /// Lists the emissive triangles of the shapes, then `others` (points, spots, suns), then the environment.
     pub fn new(shapes: &Shapes, materials: &Materials, others: Vec<Emitter>, sky: Sky) -> Lights {
+        Lights::build(shapes, materials, others, sky, CausticTargets::new(shapes, materials))
+    }
+
+    /// The lights at another moment of a moving scene, with the present light groups. The distributions that select
+    /// lights are shared if `changed` is false: no light, no material and not the bounding sphere has changed.
+    #[must_use]
+    pub fn at_moment(
+        &self,
+        (shapes, materials): (&Shapes, &Materials),
+        others: Vec<Emitter>,
+        sky: Sky,
+        changed: bool,
+    ) -> Lights {
+        let targets = self.targets.at_moment(shapes, materials);
+        if changed {
+            return Lights::build(shapes, materials, others, sky, targets).with_groups(self.groups.clone());
+        }
+        Lights {
+            emitters: Arc::clone(&self.emitters),
+            choice: self.choice.clone(),
+            first: Arc::clone(&self.first),
+            relative: Arc::clone(&self.relative),
+            suns: Arc::clone(&self.suns),
+            environment: self.environment,
+            sky,
+            targets,
+            groups: self.groups.clone(),
+        }
+    }
+
+    fn build(
+        shapes: &Shapes,
+        materials: &Materials,
+        others: Vec<Emitter>,
+        sky: Sky,
+        targets: CausticTargets,
+    ) -> Lights {
         let mut emitters = Vec::new();
         let mut first = vec![u32::MAX; shapes.instances.len()];
         let mut relative = vec![Vec::new(); shapes.instances.len()];
@@ -134,8 +172,9 @@ impl Lights {
         // light gets a minimum probability, which is also above the resolution of the random numbers.
         let floor = EQUAL_SHARE * powers.iter().sum::<f64>() / powers.len().max(1) as f64;
         let floored = powers.iter().map(|&power| if power > 0.0 { power + floor } else { 0.0 });
-        let choice = LightSampler::new(&emitters, &sky, floored);
-        let (targets, groups) = (CausticTargets::new(shapes, materials), Groups::default());
+        let choice = LightSampler::new(&emitters, &sky, floored).map(Arc::new);
+        let groups = Groups::default();
+        let (emitters, first, relative) = (emitters.into(), first.into(), relative.into());
         Lights { emitters, choice, first, relative, suns, environment, sky, targets, groups }
     }
 
@@ -193,6 +232,11 @@ impl Lights {
         if irradiance.is_normal() { ((irradiance.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
     }
 
+    /// The lights that are not triangles and not the environment: points, spots and suns.
+    pub fn others(&self) -> impl Iterator<Item = &Emitter> {
+        self.emitters.iter().filter(|light| !matches!(light, Emitter::Triangle(_) | Emitter::Environment))
+    }
+
     /// The lights, indexed by [`EmissionSample::light`].
     pub fn emitters(&self) -> &[Emitter] {
         &self.emitters
@@ -210,7 +254,7 @@ impl Lights {
 
     /// The distribution that selects lights by power; `None` if no light has any.
     pub(super) fn choice(&self) -> Option<&Cdf> {
-        self.choice.as_ref().map(LightSampler::power)
+        self.choice.as_ref().map(|choice| choice.power())
     }
 
     /// Probability of selecting a light for next-event estimation at a receiver, over the probability of selecting it
@@ -488,7 +532,7 @@ impl Lights {
             let (radiance, pdf_w) = environment.radiance_and_pdf_w(d);
             met(radiance, index, pdf_w);
         }
-        for &index in &self.suns {
+        for &index in self.suns.iter() {
             if let Emitter::Sun { frame, irradiance, one_minus_cos: size, hidden_from_camera } =
                 &self.emitters[index as usize]
             {

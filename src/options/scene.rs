@@ -153,13 +153,7 @@ impl SceneOptions {
             strength: self.env_strength,
             options: self.read_options(),
             off: self.switches().off,
-            shutter: self.shutter(),
         }
-    }
-
-    /// Times at which the shutter opens and closes, relative to the frame (frames); `None`: those of the scene.
-    pub fn shutter(&self) -> Option<[f64; 2]> {
-        self.shutter.map(|Shutter(times)| times)
     }
 
     /// The effects, such as dispersion, that the user switches off or asks for.
@@ -178,7 +172,7 @@ impl SceneOptions {
                 rate: self.frame_rate,
                 of_sequence: self.of_sequence,
             }),
-            after_frame: 0.0,
+            shutter: self.shutter.map(|Shutter(times)| times),
         }
     }
 }

@@ -32,8 +32,6 @@ pub struct SceneRequest {
     pub options: gltf::ReadOptions,
     /// Effects, such as dispersion, that are switched off.
     pub off: EffectSet,
-    /// Times at which the shutter opens and closes, relative to the frame (frames); `None`: those of the scene.
-    pub shutter: Option<[f64; 2]>,
 }
 
 /// An environment light.
@@ -52,8 +50,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// Effects that were switched off and so removed from the scene.
     pub removed: Removed,
-    /// The file of the scene, if it is read again for other moments; `None` if it is not animated, or no glTF file.
-    pub file: Option<gltf::SceneFile>,
+    /// The glTF file of the scene, if it is read again for other moments; otherwise `None`.
+    pub file: Option<gltf::MovingFile>,
 }
 
 /// Reads and builds a scene. Embree builds with `threads` threads.
@@ -64,29 +62,18 @@ pub struct Loaded {
 pub fn load(request: &SceneRequest, threads: usize, stop: &Stop) -> Result<Loaded> {
     check_memory(request, threads)?;
     if usd::is_stage(&request.path) {
-        return build(usd::read(&request.path, &request.options, stop)?, request, threads);
+        return build(usd::read(&request.path, &request.options, 0.0, stop)?, request, threads);
     }
-    let file = gltf::SceneFile::open(&request.path)?;
-    let loaded = build(file.describe(&request.options)?, request, threads)?;
-    let file = loaded.scene.animated.then_some(file);
-    Ok(Loaded { file, ..loaded })
+    let (description, file) = gltf::MovingFile::open(&request.path, &request.options)?;
+    Ok(Loaded { file, ..build(description, request, threads)? })
 }
 
-/// Reads and builds a scene, of `file` if that is its file, as it is `after_frame` frames after the frame of the request.
+/// Reads and builds the scene of a USD stage as it is `after_frame` frames after the frame of the request.
 ///
 /// # Errors
 /// Errors of [`load`].
-pub(super) fn load_moment(
-    request: &SceneRequest,
-    file: Option<&gltf::SceneFile>,
-    after_frame: f64,
-    stop: &Stop,
-) -> Result<Scene> {
-    let options = gltf::ReadOptions { after_frame, ..request.options };
-    let description = match file {
-        Some(file) => file.describe(&options)?,
-        None => usd::read(&request.path, &options, stop)?,
-    };
+pub(super) fn load_stage_moment(request: &SceneRequest, after_frame: f64, stop: &Stop) -> Result<Scene> {
+    let description = usd::read(&request.path, &request.options, after_frame, stop)?;
     Ok(build(description, request, rayon::current_num_threads())?.scene)
 }
 
@@ -96,7 +83,8 @@ pub(super) fn load_moment(
 /// Errors of [`load`].
 pub fn load_bytes(bytes: &[u8], request: &SceneRequest, threads: usize) -> Result<Loaded> {
     check_memory(request, threads)?;
-    build(gltf::read_bytes(bytes, &request.path, &request.options)?, request, threads)
+    let (description, file) = gltf::MovingFile::from_bytes(bytes.into(), &request.path, &request.options)?;
+    Ok(Loaded { file, ..build(description, request, threads)? })
 }
 
 fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {

@@ -45,10 +45,10 @@ pub use request::{AutoRequest, MethodRequest, PictureRequest, Request, Saving};
 pub use worst::{Place, Tile, Worst};
 
 use crate::error::Result;
-use crate::render::{Motion, RenderInput};
+use crate::render::{Motion, RenderInput, Rendered};
 use crate::scene::View;
 use check::Checked;
-use motion::MovingScene;
+use motion::{MovingScene, few_moments};
 use observer::during;
 use resume::Resumption;
 use run::Running;
@@ -79,12 +79,20 @@ pub fn render_loaded(mut request: Request<'_>, loaded: &Loaded, observer: &mut d
     };
     let planned = plan::plan_render(&request, &chosen, view, &loaded.removed)?;
     let prepared = prepare::prepare(&request, planned, view, observer)?;
-    let facts = SceneFacts::new(view.scene, &request.picture.camera, &prepared.settings)?;
+    let mut facts = SceneFacts::new(view.scene, &request.picture.camera, &prepared.settings)?;
     let motion = MovingScene::new(&request, view, loaded.file.as_ref(), observer.stop())?;
     let stage = RenderInput::new(view.scene, view.camera, &prepared.settings)
         .with_motion(motion.as_ref().map(|motion| motion as &dyn Motion));
     let running = Running::start(&request, &stage, &chosen, prepared, resumption, facts.frame, observer)?;
     let iterated = running.iterate(observer)?;
     observer.event(Event::Rendered(&iterated.rendered));
+    let Rendered { settings, stats, .. } = &iterated.rendered;
+    // Before the render, the plan warns of a small number of iterations that was asked for.
+    let planned = |iterations| few_moments(view.scene, iterations).is_some();
+    if !settings.is_shard() && !settings.iterations.is_some_and(planned) {
+        let few = few_moments(view.scene, stats.iterations);
+        few.iter().for_each(|warning| observer.event(Event::FewMoments(warning)));
+        facts.warnings.extend(few);
+    }
     during(Phase::Finishing, observer, |observer| deliver::deliver_render(&request, iterated, facts, observer))
 }

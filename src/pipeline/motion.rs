@@ -1,43 +1,61 @@
 //! Moments of a scene that moves while the shutter is open.
 
-use super::load::{SceneRequest, load_moment};
+use super::load::{SceneRequest, load_stage_moment};
 use super::request::Request;
 use crate::camera::Camera;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::Result;
+use crate::plan::switch;
 use crate::render::Motion;
-use crate::scene::gltf::SceneFile;
-use crate::scene::{CameraRequest, Scene, View};
+use crate::scene::description::missing_at_moments;
+use crate::scene::gltf::{Moments, MovingFile};
+use crate::scene::{CameraRequest, MomentBuilder, Scene, View};
 use crate::stop::Stop;
 
-/// A scene with motion blur, which is built anew for every moment.
+/// Number of moments below which single moments of a blurred object can be told apart.
+const MIN_MOMENTS: u64 = 32;
+
+/// A warning if a scene with motion blur is rendered in too few iterations, each of which shows one moment; otherwise
+/// `None`.
+pub(super) fn few_moments(scene: &Scene, iterations: u64) -> Option<String> {
+    let few = scene.shutter.is_some() && iterations < MIN_MOMENTS;
+    few.then(|| {
+        let moments = if iterations == 1 { "1 moment".into() } else { format!("{iterations} moments") };
+        format!(
+            "motion blur is the mean of {moments}, one per iteration, which show as copies of what moves (ask for \
+             --iterations {MIN_MOMENTS} or more, or more --time)"
+        )
+    })
+}
+
+/// A scene with motion blur.
 pub(super) struct MovingScene<'a> {
     request: &'a SceneRequest,
-    file: Option<&'a SceneFile>,
     camera: &'a CameraRequest,
-    /// The scene at the frame itself, which settings and layers are made for.
+    /// The scene at the frame itself, for which settings and layers are made.
     at_frame: &'a Scene,
+    /// Describes and builds moments of a glTF file; `None` for USD, whose stage is converted at every moment.
+    moments: Option<(Moments<'a>, MomentBuilder<'a>)>,
     /// Times at which the shutter opens and closes, relative to the frame (frames).
     shutter: [f64; 2],
     stop: Stop,
 }
 
 impl<'a> MovingScene<'a> {
-    /// The moving scene of a request; `None` if nothing moves, or the shutter is open for no time.
+    /// The moving scene of a request; `None` if nothing moves while the shutter is open.
     ///
     /// # Errors
     /// The scene is invalid when the shutter opens or closes, or has other objects then.
     pub fn new(
         request: &'a Request<'_>,
         view: View<'a>,
-        file: Option<&'a SceneFile>,
+        file: Option<&'a MovingFile>,
         stop: Stop,
     ) -> Result<Option<MovingScene<'a>>> {
-        let shutter = request.scene.shutter.or(view.scene.shutter).unwrap_or_default();
-        if shutter[0] == shutter[1] || !view.scene.animated {
-            return Ok(None);
-        }
+        let Some(shutter) = view.scene.shutter else { return Ok(None) };
         let (scene, camera) = (&request.scene, &request.picture.camera);
-        let moving = MovingScene { request: scene, file, camera, at_frame: view.scene, shutter, stop };
+        let moments =
+            file.map(MovingFile::moments).transpose()?.map(|moments| (moments, MomentBuilder::new(view.scene)));
+        let moving = MovingScene { request: scene, camera, at_frame: view.scene, moments, shutter, stop };
         // Faults are found before the first iteration.
         moving.at(0.0)?;
         moving.at(1.0)?;
@@ -49,12 +67,20 @@ impl Motion for MovingScene<'_> {
     fn at(&self, time: f64) -> Result<(Scene, Camera)> {
         let [open, close] = self.shutter;
         let after_frame = open + (close - open) * time;
-        let scene = load_moment(self.request, self.file, after_frame, &self.stop)?;
-        if let Some(name) = different_object(self.at_frame, &scene) {
-            let cause = format!("object \"{name}\" is there only for a part of the time for which the shutter is open");
-            let error = Error::new(ErrorKind::Scene, self.request.path.display(), cause);
-            return Err(error.hint("let it appear between two frames' shutters, or render without blur: --shutter 0"));
-        }
+        let scene = match &self.moments {
+            Some((moments, builder)) => {
+                let mut description = moments.describe(after_frame, builder.meshes())?;
+                switch::remove_at_moment(&mut description, self.request.off);
+                builder.build(description).map_err(|e| e.within(self.request.path.display()))?
+            }
+            None => {
+                let scene = load_stage_moment(self.request, after_frame, &self.stop)?;
+                if let Some(name) = different_object(self.at_frame, &scene) {
+                    return Err(missing_at_moments(&name).within(self.request.path.display()));
+                }
+                scene
+            }
+        };
         let camera = scene.camera(self.camera)?;
         Ok((scene, camera))
     }

@@ -1,6 +1,7 @@
 //! The fifth step: opens the finish and announces the render.
 
 use super::finish::{self, OpenFinish};
+use super::motion::few_moments;
 use super::observer::{Event, Observer};
 use super::plan::Planned;
 use super::request::Request;
@@ -42,6 +43,7 @@ pub(super) fn prepare(
         None => (None, settings.target_error),
     };
     let settings = Settings { target_error, stop: observer.stop(), ..settings };
+    plan.warnings.extend(settings.iterations.and_then(|iterations| few_moments(view.scene, iterations)));
     announce(&mut plan, view, &settings, observer);
     plan.warnings.splice(0..0, view.scene.warnings.iter().cloned());
     Ok(Prepared { settings, finish, target, plan })

@@ -52,6 +52,15 @@ fn remove_effect(description: &mut Description, effect: Effect) -> Vec<String> {
     truncate_reasons(because)
 }
 
+/// Removes effects from the description of a moment, which may lack materials and what does not move.
+pub fn remove_at_moment(description: &mut Description, effects: EffectSet) {
+    if !description.materials.is_empty() {
+        remove_effects(description, effects);
+    } else if effects.iter().any(|effect| effect == Effect::DepthOfField) {
+        remove_effect(description, Effect::DepthOfField);
+    }
+}
+
 /// A copy of the scene without one effect, as [`remove_effects`] removes it from the description. Unchanged data are
 /// shared. For depth of field, see [`crate::camera::Camera::without_lens`].
 ///

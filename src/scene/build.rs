@@ -26,6 +26,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     let first_light_sphere = description.objects.len() as u32;
     add_light_spheres(&mut description);
     let groups = light_groups(&description, &mut warnings);
+    let shutter = description.blur();
     let (center, radius) = bounding_sphere(&description);
     let origin = if center.length() > FAR_FROM_ORIGIN * radius { center } else { DVec3::ZERO };
 
@@ -71,8 +72,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         environment_unknown: description.environment_unknown,
         cameras: description.cameras,
         picture: description.picture,
-        animated: description.animated,
-        shutter: description.shutter,
+        shutter,
         medium: description.medium,
         scattering,
         survey,
@@ -219,8 +219,7 @@ pub(super) fn rebuild_with_materials(
         true => (scene.tracer.clone(), scene.pass_through_lights.clone()),
         false => tracers(&shapes, &materials, rayon::current_num_threads())?,
     };
-    let others = scene.lights.emitters().iter();
-    let others = others.filter(|light| !matches!(light, Emitter::Triangle(_) | Emitter::Environment)).cloned();
+    let others = scene.lights.others().cloned();
     let sky = Sky { environment, ..scene.lights.sky().clone() };
     let lights = Lights::new(&shapes, &materials, others.collect(), sky).with_groups(scene.lights.groups().clone());
     Ok(Scene {
@@ -236,7 +235,6 @@ pub(super) fn rebuild_with_materials(
         environment_unknown: scene.environment_unknown,
         cameras: scene.cameras.clone(),
         picture: scene.picture,
-        animated: scene.animated,
         shutter: scene.shutter,
         medium,
         scattering: scene.scattering.for_materials(&materials.list),
@@ -269,7 +267,7 @@ fn bounding_sphere(description: &Description) -> (DVec3, f64) {
 }
 
 /// Moves the meshes and instances of the description into shapes, with `origin` subtracted from positions. A mesh with
-/// one instance is transformed to world space; other meshes are shared.
+/// one instance that does not move is transformed to world space; other meshes stay in their own space.
 fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
     let mut uses = vec![0u32; description.meshes.len()];
     for placed in &description.instances {
@@ -279,9 +277,9 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
     for placed in &description.instances {
         let mut to_world = placed.to_world;
         to_world.translation -= origin;
-        let shared = uses[placed.mesh as usize] > 1;
+        let shared = placed.moves || uses[placed.mesh as usize] > 1;
         if !shared {
-            bake(&mut meshes[placed.mesh as usize], &to_world);
+            bake(Arc::make_mut(&mut meshes[placed.mesh as usize]), &to_world);
         }
         instances.push(Instance {
             name: placed.name.clone(),
@@ -289,10 +287,16 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
             material: placed.material,
             object: placed.object,
             hidden_from_camera: placed.hidden_from_camera,
-            to_world: shared.then(|| Placement::new(glam::Affine3A::from_mat4(glam::DMat4::from(to_world).as_mat4()))),
+            moves: placed.moves,
+            to_world: shared.then(|| placement(&to_world)),
         });
     }
     Shapes::new(meshes, instances)
+}
+
+/// The placement by a transform from local to world space, in single precision.
+pub(super) fn placement(to_world: &DAffine3) -> Placement {
+    Placement::new(glam::Affine3A::from_mat4(glam::DMat4::from(*to_world).as_mat4()))
 }
 
 /// Transforms a mesh to world space. A mirroring transform also flips the winding, so that the front stays the front,
@@ -319,28 +323,33 @@ fn bake(mesh: &mut Mesh, to_world: &DAffine3) {
 
 /// The properties of a material that Embree's hit filters use: how alpha acts at each hit, and whether all rays pass
 /// through the surface.
-fn hit_behaviour(material: &Material) -> (Alpha, bool) {
+pub(super) fn hit_behaviour(material: &Material) -> (Alpha, bool) {
     (material.alpha_per_hit(), material.null_bsdf)
 }
 
 /// Commits the shapes to Embree. Returns an Embree scene of all shapes except lights that all rays pass through, and
 /// one of these pass-through lights, if there are any.
-fn tracers(shapes: &Arc<Shapes>, materials: &Arc<Materials>, threads: usize) -> Result<(Tracer, Option<Tracer>)> {
-    let material = |instance: &Instance| &materials.list[instance.material as usize];
-    // For each instance that belongs to the scene, whether its hits are filtered.
-    let filtered = |null_bsdf: bool| {
-        let filtered = |instance: &Instance| {
-            let filtered = instance.hidden_from_camera || material(instance).alpha_per_hit() != Alpha::Opaque;
-            (material(instance).null_bsdf == null_bsdf).then_some(filtered)
-        };
-        shapes.instances.iter().map(filtered).collect::<Vec<_>>()
-    };
+pub(super) fn tracers(
+    shapes: &Arc<Shapes>,
+    materials: &Arc<Materials>,
+    threads: usize,
+) -> Result<(Tracer, Option<Tracer>)> {
     let filter = hit_filter(shapes, materials);
-    let tracer = Tracer::build(shapes, &filtered(false), &filter, threads)?;
-    let has_pass_through = shapes.instances.iter().any(|instance| material(instance).null_bsdf);
-    let pass_through =
-        has_pass_through.then(|| Tracer::build(shapes, &filtered(true), &filter, threads)).transpose()?;
-    Ok((tracer, pass_through))
+    let build = |passed| Tracer::build(shapes, &filtered(shapes, materials, passed), &filter, threads);
+    let passed = |instance: &Instance| materials.list[instance.material as usize].null_bsdf;
+    let has_pass_through = shapes.instances.iter().any(passed);
+    Ok((build(false)?, has_pass_through.then(|| build(true)).transpose()?))
+}
+
+/// For each instance, whether its hits are filtered; `None` for instances that are not lights that all rays pass through,
+/// if `null_bsdf`, and otherwise for those lights.
+pub(super) fn filtered(shapes: &Shapes, materials: &Materials, null_bsdf: bool) -> Vec<Option<bool>> {
+    let filtered = |instance: &Instance| {
+        let material = &materials.list[instance.material as usize];
+        let filtered = instance.hidden_from_camera || material.alpha_per_hit() != Alpha::Opaque;
+        (material.null_bsdf == null_bsdf).then_some(filtered)
+    };
+    shapes.instances.iter().map(filtered).collect()
 }
 
 /// A random number in (0, 1] that depends on the ray's token, the instance and `key` alone.
@@ -351,7 +360,7 @@ pub(super) fn random_cutoff(token: u32, instance: u32, key: u32) -> f32 {
 
 /// The filter of Embree's hits: rejects hits of camera rays on instances hidden from cameras, and hits on surfaces that
 /// the ray passes because of alpha.
-fn hit_filter(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
+pub(super) fn hit_filter(shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> HitFilter {
     let (shapes, materials) = (Arc::clone(shapes), Arc::clone(materials));
     Arc::new(move |instance, primitive, barycentric, token| {
         let placed = &shapes.instances[instance as usize];
@@ -396,7 +405,7 @@ fn one_minus_cos(angle: f64) -> f64 {
     2.0 * (0.5 * angle).sin().powi(2)
 }
 
-fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
+pub(super) fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
     let p = (light.to_world.translation - origin).as_vec3();
     match light.kind {
         PunctualKind::Point => Emitter::Point { p, intensity: light.intensity },
@@ -423,7 +432,7 @@ fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
 }
 
 /// Turns point lights with a radius into emissive spheres, which are visible and cast soft shadows.
-fn add_light_spheres(description: &mut Description) {
+pub(super) fn add_light_spheres(description: &mut Description) {
     for light in &description.lights {
         if !light.is_sphere() || light.intensity.max_element() <= 0.0 {
             continue;
@@ -455,10 +464,11 @@ fn add_light_spheres(description: &mut Description) {
             object: description.objects.len() as u32,
             hidden_from_camera: light.hidden_from_camera,
             light_group: light.light_group.clone(),
+            moves: description.blur().is_some(),
             to_world: DAffine3::from_translation(light.to_world.translation),
         });
         description.objects.push(light.name.clone());
-        description.meshes.push(mesh);
+        description.meshes.push(Arc::new(mesh));
         description.materials.push(material);
     }
 }

@@ -7,6 +7,7 @@ use crate::math::Vec3;
 use rayon::prelude::*;
 use rstar::{AABB, RTree, RTreeObject};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Minimum cosine of the angle between surfaces that count as touching. Surfaces that cross at larger angles share a
 /// line, which rays hit with probability zero.
@@ -19,6 +20,12 @@ const MAX_TRIANGLES: usize = 1 << 26;
 /// memory as the scene itself (20,000 instances of a glass ball: minutes and gigabytes); queries at every hit take a
 /// tenth of the render time.
 const MAX_TRANSMITTING: usize = 1 << 21;
+
+/// Maximum number of pairs of instances, one of them moving, whose bounding boxes are compared at a moment. With more of
+/// them, every hit queries touching surfaces.
+const MAX_BOX_PAIRS: usize = 1 << 22;
+/// Distance of bounding boxes that may touch, over the largest coordinate: a multiple of the rounding errors of positions.
+const TOUCHING_SHARE: f32 = 64.0 * f32::EPSILON;
 
 /// Whether two triangles of one mesh at the same point are opposite walls that touch. Otherwise they are neighbours on
 /// one surface.
@@ -90,7 +97,10 @@ impl RTreeObject for Triangle {
 pub struct Contacts {
     /// For each instance and triangle, the maximum distance of touching surfaces (metres), or 0 without contact. Empty
     /// for an instance without contacts.
-    reach: Vec<Box<[f32]>>,
+    reach: Arc<[Box<[f32]>]>,
+    /// For each instance, whether all its hits query touching surfaces, because it or its neighbour has moved since the
+    /// search; empty if none has.
+    queried: Box<[bool]>,
     /// Whether contacts were not searched, because the scene is large, so that every hit queries touching surfaces.
     unknown: bool,
     /// Whether any sheet of thin glass may touch an opaque surface.
@@ -182,7 +192,44 @@ impl Contacts {
             all.clear();
         }
         let sheets = found.iter().any(|contact| contact.sheet);
-        Contacts { reach: all, unknown: false, sheets, thin: walls.into_iter().collect() }
+        Contacts { reach: all.into(), sheets, thin: walls.into_iter().collect(), ..Contacts::default() }
+    }
+
+    /// The contacts at another moment of a moving scene. Touching surfaces are queried at every hit of an instance that
+    /// moves or may touch one that does, if either transmits light. `boxes`: bounding box of each instance.
+    pub fn at_moment(&self, shapes: &Shapes, materials: &Materials, boxes: &[(Vec3, Vec3)]) -> Contacts {
+        let material = |i: usize| &materials.list[shapes.instances[i].material as usize];
+        let transmits: Vec<bool> = (0..boxes.len()).map(|i| material(i).transmits()).collect();
+        let moving: Vec<usize> = (0..boxes.len()).filter(|&i| shapes.instances[i].moves).collect();
+        if self.unknown || moving.is_empty() || !transmits.contains(&true) {
+            return self.clone();
+        }
+        let is_sheet = |i: usize| transmits[i] && material(i).thin;
+        if moving.len().saturating_mul(boxes.len()) > MAX_BOX_PAIRS {
+            let sheets = (0..boxes.len()).any(is_sheet);
+            return Contacts { unknown: true, sheets, ..Contacts::default() };
+        }
+        let touch = |(low, high): (Vec3, Vec3), (other_low, other_high): (Vec3, Vec3)| {
+            let largest = low.abs().max(high.abs()).max_element();
+            let reach = Vec3::splat(TOUCHING_SHARE * largest);
+            (low - reach).cmple(other_high).all() && (other_low - reach).cmple(high).all()
+        };
+        let mut queried = vec![false; boxes.len()];
+        let mut sheets = self.sheets;
+        for &i in &moving {
+            queried[i] |= self.reach.get(i).is_some_and(|reach| !reach.is_empty());
+            let near = |j: &usize| *j != i && (transmits[i] || transmits[*j]) && touch(boxes[i], boxes[*j]);
+            for j in (0..boxes.len()).filter(near) {
+                (queried[i], queried[j]) = (true, true);
+                sheets |= is_sheet(i) != is_sheet(j) && (!transmits[i] || !transmits[j]);
+            }
+        }
+        if !queried.contains(&true) {
+            return self.clone();
+        }
+        let none = || vec![Box::default(); boxes.len()].into();
+        let reach = if self.reach.is_empty() { none() } else { Arc::clone(&self.reach) };
+        Contacts { reach, queried: queried.into(), sheets, ..Contacts::default() }
     }
 
     /// Whether the search has found no contact, so that no hit needs to query touching surfaces.
@@ -198,7 +245,10 @@ impl Contacts {
         if self.reach.is_empty() {
             return self.unknown.then_some(2.0 * error);
         }
-        let reach = self.reach[instance as usize].get(primitive as usize).copied()?;
+        let reach = self.reach[instance as usize].get(primitive as usize).copied().unwrap_or(0.0);
+        if self.queried.get(instance as usize) == Some(&true) {
+            return Some(reach.max(2.0 * error));
+        }
         (reach > 0.0).then_some(reach)
     }
 }

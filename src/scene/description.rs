@@ -1,5 +1,6 @@
 //! The content of a scene file as plain data: readers (glTF, USD) produce it, and `Scene::build` consumes it.
 
+use crate::error::{Error, ErrorKind};
 use crate::geometry::Mesh;
 use crate::light::SpotEdge;
 use crate::material::{Material, MediumParameters};
@@ -7,6 +8,7 @@ use crate::math::{DAffine3, Rgb};
 use crate::texture::Texture;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The content of a scene file. All indices are valid, all numbers finite, all transforms invertible.
 #[derive(Clone, Debug, Default)]
@@ -17,7 +19,7 @@ pub struct Description {
     /// for a file that is read without a converter.
     pub converted: Option<String>,
     /// Meshes in local space; each is listed once, even with several instances.
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<Arc<Mesh>>,
     /// Instances of the meshes: which mesh is placed where, with which material.
     pub instances: Vec<PlacedMesh>,
     /// Names of objects (nodes that carry a mesh).
@@ -45,13 +47,20 @@ pub struct Description {
     pub medium: Option<MediumParameters>,
     /// Settings of the picture, which options of the user override.
     pub picture: PictureDefaults,
-    /// Whether the file has animations.
+    /// Whether anything in the file depends on the time.
     pub animated: bool,
-    /// Times at which the camera's shutter opens and closes, relative to the frame (frames); `None` if the file does not
-    /// say.
+    /// Times at which the shutter opens and closes, relative to the frame (frames); `None` without motion blur.
     pub shutter: Option<[f64; 2]>,
     /// Warnings about ignored or approximated features of the file, one sentence each: `material "glass": ...`.
     pub warnings: Vec<String>,
+}
+
+impl Description {
+    /// Times at which the shutter opens and closes, relative to the frame (frames); `None` if nothing moves while it is
+    /// open.
+    pub fn blur(&self) -> Option<[f64; 2]> {
+        self.shutter.filter(|_| self.animated)
+    }
 }
 
 /// An instance of a mesh: its place, material and object.
@@ -69,6 +78,8 @@ pub struct PlacedMesh {
     pub hidden_from_camera: bool,
     /// Name of the light group (a named set of lights with a layer of its own) of the instance, if it is emissive.
     pub light_group: Option<String>,
+    /// Whether the place or the shape of the instance depends on the time while the shutter is open.
+    pub moves: bool,
     /// Transform from local to world space.
     pub to_world: DAffine3,
 }
@@ -227,4 +238,11 @@ pub enum EnvironmentSource {
         /// Radiance, top row first; finite and not negative.
         texels: Vec<[f32; 3]>,
     },
+}
+
+/// The error about an object that exists only for a part of the time for which the shutter is open.
+pub fn missing_at_moments(name: &str) -> Error {
+    let cause = format!("object \"{name}\" is there only for a part of the time for which the shutter is open");
+    let error = Error::new(ErrorKind::Scene, "", cause);
+    error.hint("let it appear between two frames' shutters, or render without blur: --shutter 0")
 }

@@ -9,6 +9,7 @@ pub mod description;
 pub mod environment_file;
 mod folder;
 pub mod gltf;
+mod moment;
 mod nesting;
 mod survey;
 pub mod usd;
@@ -17,6 +18,7 @@ mod view;
 pub use camera_request::{CameraRequest, Crop, MAX_SIZE};
 pub use contacts::Contacts;
 pub use description::Description;
+pub use moment::MomentBuilder;
 pub use nesting::{EMPTY_STACK, SolidStack, SolidStacks};
 pub use survey::Survey;
 pub use view::View;
@@ -65,10 +67,8 @@ pub struct Scene {
     pub cameras: Vec<CameraDescription>,
     /// Settings of the picture in the scene file, which options override.
     pub picture: PictureDefaults,
-    /// Whether the scene file has animations.
-    pub animated: bool,
-    /// Times at which the scene file opens and closes the shutter, relative to the frame (frames); `None` if it does not
-    /// say.
+    /// Times at which the shutter opens and closes, relative to the frame (frames); `None` if nothing moves while it is
+    /// open.
     pub shutter: Option<[f64; 2]>,
     /// The medium that fills the space outside all solids; `None` if it is empty.
     pub medium: Option<MediumParameters>,

@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
 /// Writes `moving.gltf`: an emissive wall that fills the view and jumps aside at frame 3, at 24 frames per second.
-fn write_animation(folder: &Folder) {
+pub(super) fn write_animation(folder: &Folder) {
     let (mut bytes, mut views, mut accessors) = (Vec::<u8>::new(), Vec::new(), Vec::new());
     let mut push = |floats: &[f32], kind: &str, width: usize| {
         views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": 4 * floats.len()}));

@@ -124,7 +124,7 @@ fn all_methods_agree_on_pass_through_lamps() {
     let mut description = lit_room(matte(0.5, 0.0));
     description.materials[1].null_bsdf = true;
     description.materials[1].double_sided = true;
-    for p in &mut description.meshes[1].positions {
+    for p in &mut std::sync::Arc::make_mut(&mut description.meshes[1]).positions {
         p.y -= 0.8;
     }
     add(&mut description, "mirror", sphere(Vec3::new(-0.5, 0.4, 0.2), 0.3, 48), mirror());

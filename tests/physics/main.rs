@@ -27,6 +27,7 @@ mod merging;
 mod mis;
 mod moments;
 mod motion;
+mod motion_files;
 mod narrow_spots;
 mod nesting;
 mod open_space;

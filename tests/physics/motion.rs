@@ -39,13 +39,13 @@ impl<F: Fn(f64) -> Description + Sync> Motion for Moving<F> {
     }
 }
 
-fn rendered(input: &RenderInput<'_>) -> Rendered {
+pub(crate) fn rendered(input: &RenderInput<'_>) -> Rendered {
     let mut session = Session::new(input);
     let stop = run_session(&mut session, |_, _| Control::Continue);
     session.finish(stop)
 }
 
-fn settings(method: Method, iterations: u64, seed: u64) -> Settings {
+pub(crate) fn settings(method: Method, iterations: u64, seed: u64) -> Settings {
     Settings {
         method,
         iterations: Some(iterations),

@@ -150,6 +150,32 @@ class Program(usd_support.Stages):
         self.assertLess(first.mean(), 0.9)
         numpy.testing.assert_allclose(second, 1, atol=1e-5)
 
+    def test_the_shutter_of_the_camera_blurs_what_moves(self):
+        floor = UsdGeom.Xformable.Get(self.stage, "/Floor").AddTranslateOp()
+        floor.Set((0, 0, 0), 1)
+        floor.Set((1e4, 0, 0), 2)
+        camera = UsdGeom.Camera.Get(self.stage, "/Camera")
+        camera.CreateShutterOpenAttr(-0.5)
+        camera.CreateShutterCloseAttr(0.5)
+        self.save()
+
+        def mean(*more):
+            said = self.run_on("render", "-o", self.out, *QUICK[:4], *QUICK[6:], "--iterations", 8, *more).stderr
+            return usd_support.read_exr(self.out).mean(), said
+
+        # The floor is there in the first half of the time; behind it, the dome has radiance 1.
+        still, _ = mean("--frames", 1, "--shutter", 0)
+        blurred, said = mean("--frames", 1)
+        self.assertAlmostEqual((1 - blurred) / (1 - still), 0.5, delta=0.2)
+        self.assertIn("motion blur is the mean of 8 moments", said)
+        _, said = mean()
+        self.assertIn("/Camera: its shutter is ignored, because no frame is given (--frames gives one)", said)
+        settings = UsdRender.Settings.Define(self.stage, "/Settings")
+        settings.CreateDisableMotionBlurAttr(True)
+        self.save()
+        disabled, _ = mean("--frames", 1)
+        self.assertAlmostEqual(disabled, still, delta=1e-4)
+
     def test_the_command_line_overrides_options_of_the_stage(self):
         self.save("""
 def RenderSettings "Settings" {

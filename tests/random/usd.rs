@@ -44,7 +44,8 @@ pub fn read(world: &World) -> Result<Description, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let path = folder.path().join("random.usda");
     std::fs::write(&path, stage(world)).map_err(|error| error.to_string())?;
-    caustique::scene::usd::read(&path, &ReadOptions::default(), &Stop::default()).map_err(|error| error.to_string())
+    caustique::scene::usd::read(&path, &ReadOptions::default(), 0.0, &Stop::default())
+        .map_err(|error| error.to_string())
 }
 
 /// The stage as text.

@@ -46,10 +46,11 @@ pub fn add_at(description: &mut Description, name: &str, mesh: Mesh, material: M
         object: description.objects.len() as u32,
         hidden_from_camera: false,
         light_group: None,
+        moves: false,
         to_world,
     });
     description.objects.push(name.into());
-    description.meshes.push(Mesh { name: name.into(), ..mesh });
+    description.meshes.push(Mesh { name: name.into(), ..mesh }.into());
     description.materials.push(Material { name: name.into(), ..material });
 }
 

@@ -211,8 +211,6 @@ impl Scene {
             strength: None,
             options: self.options.read_options(),
             off: self.options.switches().off,
-            // A scene that is not read from files cannot be read again at other moments.
-            shutter: if self.identity.of_files { self.options.shutter() } else { Some([0.0; 2]) },
         }
     }
 
@@ -304,6 +302,7 @@ impl Observer for CallerReports<'_> {
             Event::SaveFailed(error) => {
                 self.caller.warn(&[format!("the state of the render is not saved: {error}; the render goes on")]);
             }
+            Event::FewMoments(warning) => self.caller.warn(&[warning.into()]),
             Event::MomentFailed(error) => {
                 self.caller.warn(&[format!("{error}; the render ends here, with the iterations so far")]);
             }

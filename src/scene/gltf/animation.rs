@@ -13,7 +13,7 @@ use super::{FrameTime, fault};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Frames per second if neither the scene nor the user sets a rate: the default of Blender and of film.
 const DEFAULT_RATE: f64 = 24.0;
@@ -46,54 +46,113 @@ struct Track {
     curve: Curve,
 }
 
-/// Writes the animated values at a frame into the document; without a frame, those at the time of the first key. If the
-/// scene states the time of its only frame, that time is used. `after_frame` is added to the time (frames). Without a
-/// frame, invalid animations are skipped with a warning. Returns whether anything is animated.
-///
-/// # Errors
-/// A frame is given, and an animation is invalid.
-pub(super) fn apply(
-    document: &mut Document,
+/// The animations of a document, and the frame at which it is read.
+pub(super) struct Tracks {
+    list: Vec<Track>,
+    /// The frame to read; `None`: the time of the first key. If the scene states the time of its only frame, that time
+    /// is read.
     frame: Option<FrameTime>,
-    after_frame: f64,
-    warnings: &mut Vec<String>,
-) -> Result<bool> {
-    let faults = FaultPolicy { fatal: frame.is_some() };
-    let tracks = tracks(document, faults, warnings)?;
-    let Some(start) = tracks.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
-        if frame.is_some_and(|frame| !frame.of_sequence) {
+}
+
+impl Tracks {
+    /// Reads the animations of a document. Without a frame, invalid animations are skipped with a warning.
+    ///
+    /// # Errors
+    /// A frame is given, and an animation is invalid.
+    pub(super) fn read(document: &Document, frame: Option<FrameTime>, warnings: &mut Vec<String>) -> Result<Tracks> {
+        let list = tracks(document, FaultPolicy { fatal: frame.is_some() }, warnings)?;
+        if list.is_empty() && frame.is_some_and(|frame| !frame.of_sequence) {
             warnings.push("nothing in the scene is animated: its frames are all the same".into());
         }
-        return Ok(false);
-    };
-    let time = match (scene_extras(document)?.time, frame) {
-        (Some(time), _) => {
-            if frame.is_some_and(|frame| !frame.of_sequence) {
-                warnings.push("its animations are the motion of one frame: its frames are all the same".into());
-            }
-            later(document, time, after_frame, frame, warnings)?
-        }
-        (None, Some(frame)) => (f64::from(frame.number) + after_frame) / rate(document, frame, warnings)?,
-        (None, None) => {
-            warnings.push(format!("its animations begin at {start:.3} s, which is rendered (--frames chooses)"));
-            later(document, start, after_frame, None, warnings)?
-        }
-    };
-    for Track { pointer, place, curve } in &tracks {
-        let rotation = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
-        match pointer::put(&mut document.raw, pointer, &curve.value_at(time, rotation), container::is_supported) {
-            Ok(()) => {}
-            Err(PointerError::Missing) => {
-                let cause = format!("it moves {pointer}, which does not exist");
-                faults.handle(fault(place, cause).hint("the file is damaged: export it again"), warnings)?;
-            }
-            Err(PointerError::Unread) => {
-                warnings.push(format!("{place}: it moves {pointer}, which cannot be animated: it is ignored"));
-            }
-        }
+        Ok(Tracks { list, frame })
     }
-    document.reparse_animated()?;
-    Ok(true)
+
+    /// Whether nothing is animated.
+    pub(super) fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Writes the animated values into the document, `after_frame` frames after the frame to read.
+    ///
+    /// # Errors
+    /// A frame is given, and an animation changes a value that does not exist.
+    pub(super) fn apply(&self, document: &mut Document, after_frame: f64, warnings: &mut Vec<String>) -> Result<()> {
+        let Some(start) = self.list.iter().map(|track| track.curve.start()).min_by(f64::total_cmp) else {
+            return Ok(());
+        };
+        let time = match (scene_extras(document)?.time, self.frame) {
+            (Some(time), frame) => {
+                if frame.is_some_and(|frame| !frame.of_sequence) {
+                    warnings.push("its animations are the motion of one frame: its frames are all the same".into());
+                }
+                later(document, time, after_frame, frame, warnings)?
+            }
+            (None, Some(frame)) => (f64::from(frame.number) + after_frame) / rate(document, frame, warnings)?,
+            (None, None) => {
+                warnings.push(format!("its animations begin at {start:.3} s, which is rendered (--frames chooses)"));
+                later(document, start, after_frame, None, warnings)?
+            }
+        };
+        let faults = FaultPolicy { fatal: self.frame.is_some() };
+        for Track { pointer, place, curve } in &self.list {
+            let rotation = pointer.starts_with("/nodes/") && pointer.ends_with("/rotation");
+            match pointer::put(&mut document.raw, pointer, &curve.value_at(time, rotation), container::is_supported) {
+                Ok(()) => {}
+                Err(PointerError::Missing) => {
+                    let cause = format!("it moves {pointer}, which does not exist");
+                    faults.handle(fault(place, cause).hint("the file is damaged: export it again"), warnings)?;
+                }
+                Err(PointerError::Unread) => {
+                    warnings.push(format!("{place}: it moves {pointer}, which cannot be animated: it is ignored"));
+                }
+            }
+        }
+        document.reparse_animated()
+    }
+
+    /// The parts of the document that the animations change.
+    pub(super) fn moving_parts(&self) -> MovingParts {
+        let mut parts = MovingParts::default();
+        for Track { pointer, .. } in &self.list {
+            let mut words = pointer.split('/').skip(1);
+            let list = words.next().unwrap_or_default();
+            let index = words.next().and_then(|word| word.parse().ok());
+            match (list, index) {
+                ("nodes", Some(node)) if words.next() == Some("weights") => drop(parts.meshes_of_nodes.insert(node)),
+                ("nodes", Some(node)) => drop(parts.nodes.insert(node)),
+                ("meshes", Some(mesh)) => drop(parts.meshes.insert(mesh)),
+                ("materials", _) => parts.materials = true,
+                _ => {}
+            }
+        }
+        parts
+    }
+}
+
+/// The parts of a document that its animations change.
+#[derive(Default)]
+pub(super) struct MovingParts {
+    /// Indices of the nodes whose transforms or other values change.
+    nodes: HashSet<usize>,
+    /// Indices of the nodes whose morph weights change.
+    meshes_of_nodes: HashSet<usize>,
+    /// Indices of the meshes whose morph weights change.
+    meshes: HashSet<usize>,
+    /// Whether any material changes.
+    pub(super) materials: bool,
+}
+
+impl MovingParts {
+    /// Whether animations change values of the node `node` itself, such as its transform.
+    pub(super) fn moves(&self, node: usize) -> bool {
+        self.nodes.contains(&node)
+    }
+
+    /// Whether the shape of the mesh `mesh` at the node `node` changes; `skinned`: the node has a skin, whose joints may
+    /// move.
+    pub(super) fn deforms(&self, mesh: usize, node: usize, skinned: bool) -> bool {
+        self.meshes.contains(&mesh) || self.meshes_of_nodes.contains(&node) || (skinned && !self.nodes.is_empty())
+    }
 }
 
 /// Treatment of invalid animations: as errors or as warnings.

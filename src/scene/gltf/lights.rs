@@ -15,6 +15,7 @@ use gltf::json::validation::Checked;
 use serde::Deserialize;
 use serde_json::Value;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+use std::sync::Arc;
 
 /// Luminous efficacy (lm/W) with which Blender's exporter turns watts into lumens.
 const EFFICACY: f32 = 683.0;
@@ -75,6 +76,11 @@ pub(super) struct Divisors {
 }
 
 impl Divisors {
+    /// These divisors for intensities that are multiplied by `factor`.
+    pub(super) fn over(self, factor: f32) -> Divisors {
+        Divisors { sun: self.sun / factor, point: self.point / factor }
+    }
+
     const RADIOMETRIC: Divisors = Divisors { sun: 1.0, point: 1.0 };
     const PHOTOMETRIC: Divisors = Divisors { sun: EFFICACY, point: EFFICACY };
     /// Divisors for Blender's own units, where a point or spot light has the power (W) over the whole sphere.
@@ -108,18 +114,19 @@ pub(super) fn divisors(
 }
 
 /// Changes guessed units from lumens to watts, if as lumens the lights would be too dark to see. Blender's exporter
-/// omits the factor in its lighting mode "Unitless", and files do not state the mode.
-pub(super) fn reconsider_units(out: &mut Description) {
-    let Some(guessed) = out.guessed_units.as_mut().filter(|guessed| guessed.photometric) else { return };
+/// omits the factor in its lighting mode "Unitless", and files do not state the mode. Returns the factor by which
+/// intensities were multiplied.
+pub(super) fn reconsider_units(out: &mut Description) -> f32 {
+    let Some(guessed) = out.guessed_units.as_mut().filter(|guessed| guessed.photometric) else { return 1.0 };
     let glows = out.materials.iter().any(|material| material.emission.max_element() > 0.0);
     if glows || out.environment.as_ref().is_some_and(|environment| environment.strength > 0.0) {
         // The plan compares lights with the emissive surfaces and the environment.
-        return;
+        return 1.0;
     }
     let points = sample_vertices(&out.meshes, &out.instances);
     let total: f64 = out.lights.iter().take(MAX_SAMPLED_LIGHTS).map(|light| typical_irradiance(light, &points)).sum();
     if !(MIN_IRRADIANCE / f64::from(EFFICACY)..MIN_IRRADIANCE).contains(&total) {
-        return;
+        return 1.0;
     }
     guessed.photometric = false;
     out.lights.iter_mut().for_each(|light| light.intensity *= EFFICACY);
@@ -128,6 +135,7 @@ pub(super) fn reconsider_units(out: &mut Description) {
          taken in W/sr and W/m2, as Blender's lighting mode 'Unitless' writes them (--light-units decides)",
         guessed.from
     ));
+    EFFICACY
 }
 
 /// Irradiance of a light at the median distance of the points (W/m2); infinite without points.
@@ -145,7 +153,7 @@ fn typical_irradiance(light: &PunctualLight, points: &[DVec3]) -> f64 {
 }
 
 /// World positions of some vertices, spread evenly over the objects of a scene.
-fn sample_vertices(meshes: &[Mesh], instances: &[PlacedMesh]) -> Vec<DVec3> {
+fn sample_vertices(meshes: &[Arc<Mesh>], instances: &[PlacedMesh]) -> Vec<DVec3> {
     let each = (MAX_SAMPLED_POINTS / instances.len().max(1)).max(1);
     let step = instances.len().div_ceil(MAX_SAMPLED_POINTS).max(1);
     let mut points = Vec::new();

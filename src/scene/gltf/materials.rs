@@ -3,7 +3,7 @@
 
 use super::document::{Document, get, named};
 use super::material::{self, Loaded};
-use super::texture::{Decoded, Textures};
+use super::texture::Textures;
 use super::topology::Solid;
 use super::{Glass, counted};
 use crate::error::Result;
@@ -27,10 +27,28 @@ pub(super) struct Library {
 }
 
 impl Library {
-    /// An empty library; `images` holds images that have been decoded before.
-    pub(super) fn new(glass: Glass, images: HashMap<usize, Decoded>) -> Library {
-        let (list, textures) = (Vec::new(), Textures::with_images(images));
+    /// An empty library.
+    pub(super) fn new(glass: Glass) -> Library {
+        let (list, textures) = (Vec::new(), Textures::default());
         Library { glass, list, textures, loaded: HashMap::new(), known: HashMap::new(), occluded: 0 }
+    }
+
+    /// The materials in use, in the same order, and their textures, as a changed document describes them.
+    ///
+    /// # Errors
+    /// A material is invalid.
+    pub(super) fn reread(&self, document: &Document) -> Result<(Vec<Material>, Textures)> {
+        let mut textures = Textures::with_images_of(&self.textures);
+        let mut list = self.list.clone();
+        let mut known: Vec<_> = self.known.iter().collect();
+        known.sort_by_key(|&(_, at)| at);
+        for (&(index, solid), &at) in known {
+            let Some(index) = index else { continue };
+            let place = place(document, Some(index))?;
+            let Loaded { material, .. } = material::read(document, index, &place, &mut textures, &mut Vec::new())?;
+            list[at as usize] = Material { thin: !solid, ..material };
+        }
+        Ok((list, textures))
     }
 
     /// Index in `list` of the material `index` for a mesh. `bounds` is the topology of the mesh, which decides whether

@@ -36,12 +36,12 @@ pub use files::{files, hash};
 
 use super::Description;
 use crate::error::{Error, ErrorKind, Result};
+use crate::geometry::Mesh;
 use serde::Serialize;
-use std::collections::HashMap;
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
-use texture::Decoded;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Units of the intensities of punctual lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
@@ -97,8 +97,8 @@ pub struct ReadOptions {
     pub allow_outside: bool,
     /// The frame to read; `None`: the time of the first key of all animations.
     pub frame: Option<FrameTime>,
-    /// Time after the frame at which the scene is read (frames): a moment while the shutter is open.
-    pub after_frame: f64,
+    /// Times at which the shutter opens and closes, relative to the frame (frames); `None`: those of the file.
+    pub shutter: Option<[f64; 2]>,
 }
 
 /// Reads the scene file at `path`. The buffers, textures and environment that it names must be in its folder, unless
@@ -108,7 +108,7 @@ pub struct ReadOptions {
 /// The file, or one that it names, cannot be read, is damaged, or requires an unsupported extension. The error names
 /// the file and the place in it.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
-    SceneFile::open(path)?.describe(options)
+    Ok(MovingFile::open(path, options)?.0)
 }
 
 /// Does the work of [`read`] for the bytes of a file; files that the scene names are relative to `path`.
@@ -116,34 +116,78 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Description> {
 /// # Errors
 /// As for [`read`].
 pub fn read_bytes(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<Description> {
-    nodes::describe(bytes, path, options, &mut HashMap::new()).map_err(|e| e.within(path.display()))
+    Ok(MovingFile::from_bytes(bytes.into(), path, options)?.0)
 }
 
-/// A scene file that is read several times, at different moments of its animations. Its images are decoded once.
-pub struct SceneFile {
+/// A scene file in which something moves while the shutter is open.
+pub struct MovingFile {
     path: PathBuf,
     bytes: Vec<u8>,
-    images: Mutex<HashMap<usize, Decoded>>,
+    options: ReadOptions,
+    shared: nodes::Shared,
 }
 
-impl SceneFile {
-    /// Reads the bytes of the file at `path`.
-    ///
-    /// # Errors
-    /// The file cannot be read.
-    pub fn open(path: &Path) -> Result<SceneFile> {
-        let bytes = std::fs::read(path)
-            .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
-        Ok(SceneFile { path: path.to_owned(), bytes, images: Mutex::default() })
-    }
-
-    /// Describes the scene at the time in `options`.
+impl MovingFile {
+    /// Reads a scene file, and keeps it for other moments if something moves while the shutter is open.
     ///
     /// # Errors
     /// As for [`read`].
-    pub fn describe(&self, options: &ReadOptions) -> Result<Description> {
-        let mut images = self.images.lock().unwrap_or_else(PoisonError::into_inner);
-        nodes::describe(&self.bytes, &self.path, options, &mut images).map_err(|e| e.within(self.path.display()))
+    pub fn open(path: &Path, options: &ReadOptions) -> Result<(Description, Option<MovingFile>)> {
+        let bytes = std::fs::read(path)
+            .map_err(|e| Error::io(path, &e).hint("check the path of the scene file and your right to read it"))?;
+        MovingFile::from_bytes(bytes.into(), path, options)
+    }
+
+    /// Does the work of [`MovingFile::open`] for the bytes of a file.
+    ///
+    /// # Errors
+    /// As for [`read_bytes`].
+    pub fn from_bytes(
+        bytes: Cow<'_, [u8]>,
+        path: &Path,
+        options: &ReadOptions,
+    ) -> Result<(Description, Option<MovingFile>)> {
+        let (description, shared) = nodes::describe(&bytes, path, options).map_err(|e| e.within(path.display()))?;
+        let moves = description.blur().is_some();
+        let file = || MovingFile { path: path.to_owned(), bytes: bytes.into_owned(), options: *options, shared };
+        Ok((description, moves.then(file)))
+    }
+
+    /// Parses the file for descriptions of its moments.
+    ///
+    /// # Errors
+    /// A file that the scene names cannot be read any more.
+    pub fn moments(&self) -> Result<Moments<'_>> {
+        let mut document = nodes::parse(&self.bytes, &self.path, &self.options, &mut Vec::new())
+            .map_err(|e| e.within(self.path.display()))?;
+        let tracks = animation::Tracks::read(&document, self.options.frame, &mut Vec::new())?;
+        tracks.apply(&mut document, 0.0, &mut Vec::new())?;
+        Ok(Moments { file: self, moving: tracks.moving_parts(), tracks, document: Mutex::new(document) })
+    }
+}
+
+/// Describes the moments of a scene file.
+pub struct Moments<'a> {
+    file: &'a MovingFile,
+    tracks: animation::Tracks,
+    moving: animation::MovingParts,
+    document: Mutex<document::Document<'a>>,
+}
+
+impl Moments<'_> {
+    /// Describes the scene `after_frame` frames after its frame. Meshes that keep their shape are those of `meshes`, the
+    /// meshes of the scene that was built from the file, and the description has no materials if they do not change.
+    ///
+    /// # Errors
+    /// A value is invalid at this moment, or an object is there that is missing at the frame.
+    pub fn describe(&self, after_frame: f64, meshes: &[Arc<Mesh>]) -> Result<Description> {
+        let mut document = self.document.lock().unwrap_or_else(PoisonError::into_inner);
+        self.tracks
+            .apply(&mut document, after_frame, &mut Vec::new())
+            .map_err(|e| e.within(self.file.path.display()))?;
+        let MovingFile { path, options, shared, .. } = self.file;
+        let moment = nodes::Moment { shared, moving: &self.moving, meshes };
+        nodes::describe_moment(&document, path, options, moment).map_err(|e| e.within(path.display()))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Reads the node hierarchy: transforms composed in f64, and the meshes, lights and cameras of the nodes.
 
+use super::animation::{MovingParts, Tracks};
 use super::clipping::{self, Clip};
 use super::deform::Deformation;
 use super::document::{Document, extension, get, named};
@@ -8,22 +9,23 @@ use super::flat::flatten;
 use super::materials::{Library, tangent_coordinates};
 use super::mesh::MAX_COORDINATE;
 use super::shells;
-use super::texture::Decoded;
 use super::topology::Solid;
 use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
-use super::{ReadOptions, animation, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
+use super::{ReadOptions, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
 use crate::error::Result;
 use crate::geometry::Mesh;
+use crate::material::Material;
 use crate::math::{DAffine3, DMat3, DVec3, Rgb};
 use crate::memory;
 use crate::scene::Description;
-use crate::scene::description::{EnvironmentDescription, EnvironmentSource, PictureDefaults, PlacedMesh};
+use crate::scene::description::{self, EnvironmentDescription, EnvironmentSource, PictureDefaults, PlacedMesh};
 use crate::scene::environment_file;
 use crate::scene::folder::Folder;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Memory of an instance of a mesh in bytes, Embree included. Measured: 2^20 instances of a triangle take 957 MiB.
 const INSTANCE_BYTES: u64 = 1000;
@@ -32,44 +34,81 @@ const VERTEX_BYTES: u64 = 128;
 /// Maximum memory of a triangle in bytes, Embree included.
 const TRIANGLE_BYTES: u64 = 128;
 
-/// Reads the bytes of a file into a description. `images` holds images that have been decoded before, and receives the
-/// others.
-pub(super) fn describe(
-    bytes: &[u8],
-    path: &Path,
+/// Parses the bytes of a file.
+pub(super) fn parse<'a>(
+    bytes: &'a [u8],
+    path: &'a Path,
     options: &ReadOptions,
-    images: &mut HashMap<usize, Decoded>,
-) -> Result<Description> {
+    warnings: &mut Vec<String>,
+) -> Result<Document<'a>> {
+    Document::parse(bytes, Folder::of(path, options.allow_outside), warnings)
+}
+
+/// Reads the bytes of a file into a description. Also returns the parts that other moments of the scene share.
+pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<(Description, Shared)> {
     let mut warnings = Vec::new();
-    let folder = Folder::of(path, options.allow_outside);
-    let mut document = Document::parse(bytes, folder, &mut warnings)?;
-    let animated = animation::apply(&mut document, options.frame, options.after_frame, &mut warnings)?;
-    let mut reader = Reader {
-        document: &document,
-        library: Library::new(options.glass, std::mem::take(images)),
-        meshes: HashMap::new(),
-        worlds: WorldTransforms::new(&document),
-        bounds: Vec::new(),
-        clips: Vec::new(),
-        divisors: None,
-        options: *options,
-        scene: SceneExtras::default(),
-        out: Description { source: path.to_owned(), warnings, animated, ..Description::default() },
-    };
+    let mut document = parse(bytes, path, options, &mut warnings)?;
+    let tracks = Tracks::read(&document, options.frame, &mut warnings)?;
+    tracks.apply(&mut document, 0.0, &mut warnings)?;
+    let moving = tracks.moving_parts();
+    let mut reader = Reader::new(&document, path, options, (!tracks.is_empty()).then_some(&moving));
+    reader.out.warnings = warnings;
     reader.scene()?;
-    let Reader { mut library, mut out, clips, bounds, .. } = reader;
-    *images = std::mem::take(&mut library.textures.images);
+    let Reader { library, mut out, clips, bounds, meshes, divisors, flipped, .. } = reader;
     if library.occluded > 0 {
         let n = library.occluded;
         let plural = if n == 1 { "material has an occlusion texture" } else { "materials have occlusion textures" };
         out.warnings.push(format!("{n} {plural}, ignored: occlusion is simulated"));
     }
-    out.materials = library.list;
-    out.textures = library.textures.list;
-    lights::reconsider_units(&mut out);
+    out.materials.clone_from(&library.list);
+    out.textures.clone_from(&library.textures.list);
+    let factor = lights::reconsider_units(&mut out);
     clipping::check(&mut out, &clips, &bounds);
     let mut seen = HashSet::new();
     out.warnings.retain(|warning| seen.insert(warning.clone()));
+    Ok((
+        out,
+        Shared { library, parts: meshes, bounds, divisors: divisors.map(|divisors| divisors.over(factor)), flipped },
+    ))
+}
+
+/// The parts of a description that the moments of a scene share.
+pub(super) struct Shared {
+    library: Library,
+    parts: HashMap<(usize, Option<usize>), Vec<Part>>,
+    bounds: Vec<(DVec3, DVec3)>,
+    divisors: Option<lights::Divisors>,
+    /// Indices of the meshes in the file with inner shells of glass that were flipped.
+    flipped: HashSet<usize>,
+}
+
+/// A moment of a scene that was read before.
+#[derive(Clone, Copy)]
+pub(super) struct Moment<'r> {
+    pub(super) shared: &'r Shared,
+    pub(super) moving: &'r MovingParts,
+    /// The meshes of the scene that was built from the file.
+    pub(super) meshes: &'r [Arc<Mesh>],
+}
+
+/// Describes a moment of a scene, which `document` is set to. Without moving materials, the description has none.
+pub(super) fn describe_moment(
+    document: &Document,
+    path: &Path,
+    options: &ReadOptions,
+    moment: Moment<'_>,
+) -> Result<Description> {
+    let mut reader = Reader::new(document, path, options, Some(moment.moving));
+    reader.moment = Some(moment);
+    reader.bounds.clone_from(&moment.shared.bounds);
+    reader.divisors = moment.shared.divisors;
+    reader.out.meshes = moment.meshes.to_vec();
+    reader.scene()?;
+    let mut out = reader.out;
+    if moment.moving.materials {
+        let (materials, textures) = moment.shared.library.reread(document)?;
+        (out.materials, out.textures) = (materials, textures.list);
+    }
     Ok(out)
 }
 
@@ -103,6 +142,14 @@ struct Part {
     material: u32,
 }
 
+/// An object of the scene that is placed once or several times.
+struct Object<'o> {
+    name: String,
+    extras: &'o ObjectExtras,
+    /// Whether its place or shape depends on the time while the shutter is open.
+    moves: bool,
+}
+
 /// A primitive of a mesh as it was read, with its material.
 struct MaterialMesh {
     /// Index of the primitive in its mesh.
@@ -118,6 +165,10 @@ struct MaterialMesh {
 
 struct Reader<'r> {
     document: &'r Document<'r>,
+    /// The parts of the document that animations change; `None` if nothing is animated.
+    moving: Option<&'r MovingParts>,
+    /// The moment to read, with the parts that it shares with the scene that was read before; `None`: all is read.
+    moment: Option<Moment<'r>>,
     library: Library,
     /// Primitives of the meshes that were read, by index of the mesh, and of the node if it deforms the mesh.
     meshes: HashMap<(usize, Option<usize>), Vec<Part>>,
@@ -128,12 +179,37 @@ struct Reader<'r> {
     clips: Vec<Clip>,
     /// Divisors from the file's units of punctual lights to radiometric units; `None` until the first light is read.
     divisors: Option<lights::Divisors>,
+    /// Indices of the meshes in the file with inner shells of glass that were flipped.
+    flipped: HashSet<usize>,
     options: ReadOptions,
     scene: SceneExtras,
     out: Description,
 }
 
-impl Reader<'_> {
+impl<'r> Reader<'r> {
+    fn new(
+        document: &'r Document<'r>,
+        path: &Path,
+        options: &ReadOptions,
+        moving: Option<&'r MovingParts>,
+    ) -> Reader<'r> {
+        Reader {
+            document,
+            moving,
+            moment: None,
+            library: Library::new(options.glass),
+            meshes: HashMap::new(),
+            worlds: WorldTransforms::new(document),
+            bounds: Vec::new(),
+            clips: Vec::new(),
+            divisors: None,
+            flipped: HashSet::new(),
+            options: *options,
+            scene: SceneExtras::default(),
+            out: Description { source: path.to_owned(), ..Description::default() },
+        }
+    }
+
     fn scene(&mut self) -> Result<()> {
         let document = self.document;
         let index = document.default_scene()?;
@@ -150,7 +226,10 @@ impl Reader<'_> {
         }
         self.out.warnings.append(&mut self.scene.losses);
         self.picture(&place)?;
-        self.environment(&place).map_err(|e| e.within(&place))?;
+        // The environment of a scene does not move.
+        if self.moment.is_none() {
+            self.environment(&place).map_err(|e| e.within(&place))?;
+        }
         self.walk(roots)
     }
 
@@ -177,7 +256,9 @@ impl Reader<'_> {
                 "extras.caustique.shutter must be two finite numbers, the second not the smaller",
             ));
         }
-        self.out.shutter = shutter;
+        let shutter = self.options.shutter.or(shutter);
+        self.out.shutter = shutter.filter(|[open, close]| open < close);
+        self.out.animated = self.moving.is_some();
         let frame_rate = frame_rate.map(Rate::fraction);
         // The numerator of EXR's attribute is signed.
         if frame_rate.is_some_and(|rate| rate.contains(&0) || rate[0] > i32::MAX as u32) {
@@ -246,9 +327,10 @@ impl Reader<'_> {
     fn walk(&mut self, roots: Vec<usize>) -> Result<()> {
         let document = self.document;
         let mut seen = vec![false; document.nodes.len()];
-        let mut stack: Vec<(usize, DAffine3, bool)> =
-            roots.into_iter().rev().map(|n| (n, DAffine3::IDENTITY, true)).collect();
-        while let Some((index, parent, shown)) = stack.pop() {
+        let moving = self.moving.filter(|_| self.out.blur().is_some());
+        let mut stack: Vec<(usize, DAffine3, bool, bool)> =
+            roots.into_iter().rev().map(|n| (n, DAffine3::IDENTITY, true, false)).collect();
+        while let Some((index, parent, shown, moves)) = stack.pop() {
             let node = get(&document.nodes, index, "node")?;
             let place = named("node", node.name.as_deref(), index);
             if std::mem::replace(&mut seen[index], true) {
@@ -263,16 +345,24 @@ impl Reader<'_> {
             let shown = shown
                 && extension::<Visibility>(raw, "KHR_node_visibility", &place)?
                     .is_none_or(|visibility| visibility.visible);
-            self.node(index, raw, &place, to_world, shown)?;
+            let moves = moves || moving.is_some_and(|moving| moving.moves(index));
+            self.node(index, raw, &place, to_world, (shown, moves))?;
             for child in node.children.iter().flatten().rev() {
                 get(&document.nodes, child.value(), "node").map_err(|e| e.within(&place))?;
-                stack.push((child.value(), to_world, shown));
+                stack.push((child.value(), to_world, shown, moves));
             }
         }
         Ok(())
     }
 
-    fn node(&mut self, index: usize, raw: &Value, place: &str, to_world: DAffine3, shown: bool) -> Result<()> {
+    fn node(
+        &mut self,
+        index: usize,
+        raw: &Value,
+        place: &str,
+        to_world: DAffine3,
+        (shown, moves): (bool, bool),
+    ) -> Result<()> {
         let document = self.document;
         let node = &document.nodes[index];
         let name = node.name.clone().unwrap_or_default();
@@ -308,8 +398,14 @@ impl Reader<'_> {
             let shape = Deformation::of(document, mesh, index, &self.worlds).map_err(|e| e.within(place))?;
             // A skinned mesh ignores the transform of its node (specification, section 3.7.3.3).
             let to_world = shape.center.unwrap_or(to_world);
-            let parts = self.parts(mesh, deform::is_deformed(raw).then_some(index), &shape)?;
-            self.place(&parts, name, self.copies(raw, place)?, to_world, &extras, place)?;
+            let deforms = self.deforms(mesh, index, raw);
+            let owner = deform::is_deformed(raw).then_some(index);
+            let parts = match self.moment {
+                Some(moment) => self.parts_at_moment(moment, (mesh, owner), &shape, deforms, &name)?,
+                None => self.parts(mesh, owner, &shape)?,
+            };
+            let object = Object { name, extras: &extras, moves: moves || deforms };
+            self.place(&parts, object, self.copies(raw, place)?, to_world, place)?;
         }
         Ok(())
     }
@@ -318,10 +414,9 @@ impl Reader<'_> {
     fn place(
         &mut self,
         parts: &[Part],
-        name: String,
+        Object { name, extras, moves }: Object<'_>,
         copies: Vec<DAffine3>,
         to_world: DAffine3,
-        extras: &ObjectExtras,
         place: &str,
     ) -> Result<()> {
         if parts.is_empty() {
@@ -346,7 +441,8 @@ impl Reader<'_> {
                 };
                 let (name, light_group) = (name.clone(), extras.light_group.clone());
                 let hidden_from_camera = !extras.visible.camera;
-                let placed = PlacedMesh { name, mesh, material, object, hidden_from_camera, light_group, to_world };
+                let placed =
+                    PlacedMesh { name, mesh, material, object, hidden_from_camera, light_group, moves, to_world };
                 self.out.instances.push(placed);
             }
         }
@@ -364,7 +460,7 @@ impl Reader<'_> {
         let what = "meshes on nodes whose scale is zero along an axis";
         self.document.count_bytes(bytes, what).map_err(|e| e.within(place))?;
         self.bounds.push(self.bounds[mesh as usize]);
-        self.out.meshes.push(flat);
+        self.out.meshes.push(Arc::new(flat));
         Ok(Some(self.out.meshes.len() as u32 - 1))
     }
 
@@ -391,22 +487,72 @@ impl Reader<'_> {
         let source = get(&self.document.meshes, index, "mesh")?;
         let is_glass = |material: u32| self.library.list[material as usize].is_solid_glass();
         let glass = meshes.iter_mut().filter(|part| is_glass(part.material) && part.bounds.closed).collect();
-        orient_shells(glass, whole, &named("mesh", source.name.as_deref(), index), &mut self.out.warnings);
+        if orient_shells(glass, whole, &named("mesh", source.name.as_deref(), index), &mut self.out.warnings) {
+            self.flipped.insert(index);
+        }
         let mut parts = Vec::new();
         for MaterialMesh { mut mesh, material, .. } in meshes {
-            if mesh.tangents.is_empty()
-                && let Some(coordinates) = tangent_coordinates(&self.library.list[material as usize])
-            {
-                shading_frame::make_tangents(&mut mesh, &coordinates);
-            }
+            add_tangents(&mut mesh, &self.library.list[material as usize]);
             parts.push(Part { mesh: self.out.meshes.len() as u32, material });
-            let points = || mesh.positions.iter().map(|p| p.as_dvec3());
-            let low = points().fold(DVec3::INFINITY, DVec3::min);
-            self.bounds.push((low, points().fold(DVec3::NEG_INFINITY, DVec3::max)));
-            self.out.meshes.push(mesh);
+            self.bounds.push(bounds(&mesh));
+            self.out.meshes.push(Arc::new(mesh));
         }
         self.meshes.insert((index, owner), parts.clone());
         Ok(parts)
+    }
+
+    /// Whether the shape of a mesh at a node depends on the time while the shutter is open.
+    fn deforms(&self, mesh: usize, node: usize, raw: &Value) -> bool {
+        let moving = self.moving.filter(|_| self.out.blur().is_some());
+        moving.is_some_and(|moving| moving.deforms(mesh, node, raw.get("skin").is_some()))
+    }
+
+    /// The primitives of a mesh at another moment. They are read again if the mesh `deforms`.
+    fn parts_at_moment(
+        &mut self,
+        Moment { shared, .. }: Moment<'r>,
+        (index, owner): (usize, Option<usize>),
+        shape: &Deformation,
+        deforms: bool,
+        name: &str,
+    ) -> Result<Vec<Part>> {
+        let known = shared.parts.get(&(index, owner)).ok_or_else(|| description::missing_at_moments(name))?;
+        if !deforms || self.meshes.contains_key(&(index, owner)) {
+            return Ok(known.clone());
+        }
+        let mut meshes = self.deformed(index, shape, known)?;
+        if meshes.len() != known.len() {
+            return Err(description::missing_at_moments(name));
+        }
+        if shared.flipped.contains(&index) {
+            let is_glass = |part: &MaterialMesh| shared.library.list[part.material as usize].is_solid_glass();
+            let glass = meshes.iter_mut().filter(|part| is_glass(part) && part.bounds.closed).collect();
+            orient_shells(glass, CLOSED, name, &mut Vec::new());
+        }
+        for (MaterialMesh { mut mesh, .. }, &Part { mesh: at, material }) in meshes.into_iter().zip(known) {
+            add_tangents(&mut mesh, &shared.library.list[material as usize]);
+            self.bounds[at as usize] = bounds(&mesh);
+            self.out.meshes[at as usize] = Arc::new(mesh);
+        }
+        self.meshes.insert((index, owner), known.clone());
+        Ok(known.clone())
+    }
+
+    /// Reads the primitives of a mesh that have triangles at another moment. `known` are its primitives before.
+    fn deformed(&mut self, index: usize, shape: &Deformation, known: &[Part]) -> Result<Vec<MaterialMesh>> {
+        let document = self.document;
+        let source = get(&document.meshes, index, "mesh")?;
+        let mut meshes = Vec::new();
+        for primitive in 0..source.primitives.len() {
+            let Some(mut mesh) = mesh::read(document, index, primitive, shape, &mut Vec::new())? else { continue };
+            mesh::drop_degenerate(&mut mesh);
+            let Some(part) = known.get(meshes.len()).filter(|_| !mesh.triangles.is_empty()) else { continue };
+            mesh.closed = self.out.meshes[part.mesh as usize].closed;
+            let file_material = source.primitives[primitive].material.map(|m| m.value());
+            let bounds = Solid { closed: mesh.closed, ..CLOSED };
+            meshes.push(MaterialMesh { primitive, mesh, file_material, material: part.material, bounds });
+        }
+        Ok(meshes)
     }
 
     /// Reads the primitives of a mesh that have triangles, and the topology of all of them together.
@@ -491,9 +637,28 @@ impl Reader<'_> {
     }
 }
 
+/// Topology of a closed surface, where its volume and holes do not matter.
+const CLOSED: Solid = Solid { closed: true, flipped: false, rim: 0, volume: 0.0 };
+
+/// Makes the tangents of a mesh if its material needs them and the file lacks them.
+fn add_tangents(mesh: &mut Mesh, material: &Material) {
+    if mesh.tangents.is_empty()
+        && let Some(coordinates) = tangent_coordinates(material)
+    {
+        shading_frame::make_tangents(mesh, &coordinates);
+    }
+}
+
+/// Bounding box of a mesh, in its own space.
+fn bounds(mesh: &Mesh) -> (DVec3, DVec3) {
+    let points = || mesh.positions.iter().map(|p| p.as_dvec3());
+    (points().fold(DVec3::INFINITY, DVec3::min), points().fold(DVec3::NEG_INFINITY, DVec3::max))
+}
+
 /// Flips inner shells (connected parts) of glass solids that face the wrong way, and adds warnings about flipped and
-/// inverted shells. Primitives of one material are one solid.
-fn orient_shells(mut glass: Vec<&mut MaterialMesh>, whole: Solid, name: &str, warnings: &mut Vec<String>) {
+/// inverted shells. Primitives of one material are one solid. Returns whether any shell was flipped.
+fn orient_shells(mut glass: Vec<&mut MaterialMesh>, whole: Solid, name: &str, warnings: &mut Vec<String>) -> bool {
+    let mut any_flipped = false;
     while let Some(material) = glass.first().map(|part| part.file_material) {
         let (mut same, others) = glass.into_iter().partition::<Vec<_>, _>(|part| part.file_material == material);
         glass = others;
@@ -512,6 +677,7 @@ fn orient_shells(mut glass: Vec<&mut MaterialMesh>, whole: Solid, name: &str, wa
                 "{place}: its faces point inwards, so the inside of the glass is outside: flip its normals"
             ));
         }
+        any_flipped |= report.flipped > 0;
         if report.flipped > 0 {
             let shells = counted(report.flipped, "closed shell lies", "closed shells lie");
             warnings.push(format!(
@@ -519,4 +685,5 @@ fn orient_shells(mut glass: Vec<&mut MaterialMesh>, whole: Solid, name: &str, wa
             ));
         }
     }
+    any_flipped
 }

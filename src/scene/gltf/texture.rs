@@ -82,12 +82,12 @@ pub(super) struct Textures {
     /// Index in `list`, by the image, the sampler and the use of the texture.
     known: HashMap<(usize, Option<usize>, Use), u32>,
     /// Decoded images, by their index in the file.
-    pub(super) images: HashMap<usize, Decoded>,
+    images: HashMap<usize, Decoded>,
 }
 
 /// A decoded image, before its interpretation.
 #[derive(Clone)]
-pub(super) struct Decoded {
+struct Decoded {
     width: u32,
     height: u32,
     channels: u8,
@@ -95,9 +95,9 @@ pub(super) struct Decoded {
 }
 
 impl Textures {
-    /// No textures, with images that have been decoded before.
-    pub(super) fn with_images(images: HashMap<usize, Decoded>) -> Textures {
-        Textures { images, ..Textures::default() }
+    /// No textures, but the decoded images of `other`.
+    pub(super) fn with_images_of(other: &Textures) -> Textures {
+        Textures { images: other.images.clone(), ..Textures::default() }
     }
 
     /// Loads the texture of a `textureInfo`, and returns a reference to it; `place` names it in messages.

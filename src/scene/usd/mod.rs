@@ -52,23 +52,23 @@ pub fn is_stage(path: &Path) -> bool {
     path.extension().is_some_and(|own| EXTENSIONS.iter().any(|known| own.eq_ignore_ascii_case(known)))
 }
 
-/// Reads the stage at `path`, at the frame in `options` (a time code) or at its first.
+/// Reads the stage at `path`, `after_frame` frames after the frame in `options` (a time code), or at its first frame.
 ///
 /// # Errors
 /// There is no Python with `usd-core`, the stage is invalid (the error names the prim), [`gltf::read`] of the converted
 /// file fails, or `stop` ends the conversion.
-pub fn read(path: &Path, options: &ReadOptions, stop: &Stop) -> Result<Description> {
+pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -> Result<Description> {
     let converter = Converter::new(path)?;
     let glb = converter.folder.path().join("stage.glb");
     let mut arguments: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
     if let Some(frame) = options.frame {
-        let time = f64::from(frame.number) + options.after_frame;
+        let time = f64::from(frame.number) + after_frame;
         arguments.extend(["--frame".into(), time.to_string().into()]);
     }
     converter.run(&arguments, options.allow_outside, stop)?;
     // The converter has applied the frame, and has copied the files that the stage names beside the .glb.
     let frame = options.frame.map(|frame| FrameTime { of_sequence: true, ..frame });
-    let read = gltf::read(&glb, &ReadOptions { frame, after_frame: 0.0, allow_outside: false, ..*options });
+    let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..*options });
     let mut description = read.map_err(|mut error| {
         error.place = error.place.replace(&glb.display().to_string(), &path.display().to_string());
         error

@@ -6,7 +6,7 @@ use caustique::error::Error;
 use caustique::math::{DVec3, Vec3};
 use caustique::scene::Description;
 use caustique::scene::description::Projection;
-use caustique::scene::gltf::{FrameTime, ReadOptions, read_bytes};
+use caustique::scene::gltf::{FrameTime, MovingFile, ReadOptions, read_bytes};
 use glam::DQuat;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -186,9 +186,11 @@ fn the_time_of_the_only_frame() {
     file.json["scenes"][0]["extras"] = json!({"caustique": {"frame": 90, "frame_rate": 4, "time": 0.5}});
     let read = |frame: Option<(u32, bool)>, after_frame| {
         let frame = frame.map(|(number, of_sequence)| FrameTime { number, rate: Some(24.0), of_sequence });
-        let options = ReadOptions { frame, after_frame, ..ReadOptions::default() };
-        let scene = read_bytes(&file.bytes(), Path::new("pool.glb"), &options).unwrap();
-        (scene.instances[0].to_world.translation.x, scene.warnings)
+        let options = ReadOptions { frame, shutter: Some([-1.0, 3.0]), ..ReadOptions::default() };
+        let (scene, moving) = MovingFile::from_bytes(file.bytes().into(), Path::new("pool.glb"), &options).unwrap();
+        let moments = moving.as_ref().expect("it moves").moments().unwrap();
+        let moment = moments.describe(after_frame, &scene.meshes).unwrap();
+        (moment.instances[0].to_world.translation.x, scene.warnings)
     };
     for frame in [None, Some((90, true)), Some((7, true))] {
         for (after_frame, x) in [(0.0, 2.0), (-1.0, 1.0), (3.0, 5.0)] {

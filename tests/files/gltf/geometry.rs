@@ -114,7 +114,7 @@ fn strips_fans_and_soups() {
         };
         m.triangles.iter().map(cross).sum()
     };
-    assert_eq!(scene.meshes.iter().map(area).collect::<Vec<_>>(), [1.0, 1.0, 0.5]);
+    assert_eq!(scene.meshes.iter().map(|mesh| area(mesh)).collect::<Vec<_>>(), [1.0, 1.0, 0.5]);
     assert_eq!(scene.objects, ["sheets"]);
     assert_eq!(
         scene.warnings,

@@ -1,0 +1,274 @@
+//! Moments of a moving scene. They share with the scene at its frame all parts that do not move: meshes, their Embree
+//! scenes, materials, and the distributions of lights.
+
+use super::dense::limit_densities;
+use super::description::{Description, PlacedMesh, missing_at_moments};
+use super::{Contacts, Scene, SolidStacks, Survey, build};
+use crate::error::Result;
+use crate::geometry::{Instance, Mesh, Shapes};
+use crate::light::{Emitter, Sky};
+use crate::material::{Material, Materials, MediumParameters, Scattering};
+use crate::math::Vec3;
+use crate::trace::Tracer;
+use std::sync::Arc;
+
+/// Lower and upper corner of a bounding box.
+type Box3 = (Vec3, Vec3);
+
+/// Builds the moments of a scene in which something moves.
+pub struct MomentBuilder<'a> {
+    scene: &'a Scene,
+    /// Bounding box of each mesh, in the space of its positions.
+    mesh_boxes: Vec<Box3>,
+    /// Bounding box of each instance at the frame, in world space.
+    boxes: Vec<Box3>,
+    /// Number of meshes from the scene file. Those of spheres made for point lights follow.
+    meshes: usize,
+    /// Number of materials from the scene file. Those of spheres made for point lights follow.
+    materials: usize,
+}
+
+impl<'a> MomentBuilder<'a> {
+    /// Makes the builder for moments of `scene`, which was built at its frame.
+    pub fn new(scene: &'a Scene) -> MomentBuilder<'a> {
+        let Shapes { meshes, instances, .. } = &*scene.shapes;
+        let mesh_boxes: Vec<Box3> = meshes.iter().map(|mesh| bounding_box(mesh.positions.iter().copied())).collect();
+        let boxes = instances.iter().map(|instance| placed_box(instance, mesh_boxes[instance.mesh as usize])).collect();
+        let sphere = instances.iter().find(|instance| instance.object >= scene.first_light_sphere);
+        MomentBuilder {
+            scene,
+            mesh_boxes,
+            boxes,
+            meshes: sphere.map_or(meshes.len(), |sphere| sphere.mesh as usize),
+            materials: sphere.map_or(scene.materials.list.len(), |sphere| sphere.material as usize),
+        }
+    }
+
+    /// The meshes of the scene file, which descriptions of moments share.
+    pub fn meshes(&self) -> &[Arc<Mesh>] {
+        &self.scene.shapes.meshes[..self.meshes]
+    }
+
+    /// Builds a moment from its description. If the description has no materials, they are those at the frame.
+    ///
+    /// # Errors
+    /// An object or a light exists at only one of the two times, or Embree is out of memory.
+    pub fn build(&self, mut description: Description) -> Result<Scene> {
+        let scene = self.scene;
+        let materials_move = !description.materials.is_empty();
+        if !materials_move {
+            description.materials = scene.materials.list[..self.materials].to_vec();
+        }
+        build::add_light_spheres(&mut description);
+        self.check_objects(&description)?;
+        self.share_light_spheres(&mut description);
+        let instances = self.instances(&description);
+        let shapes = Arc::new(scene.shapes.at_moment(std::mem::take(&mut description.meshes), instances));
+        let (materials, medium) = self.materials(&mut description, &shapes, materials_move);
+        let boxes = self.boxes(&shapes);
+        let (sky, same_sky) = self.sky(&boxes);
+        let lights = description.lights.iter().filter(|light| !light.is_sphere());
+        let others: Vec<Emitter> = lights.map(|light| build::punctual(light, scene.origin)).collect();
+        let same_lights = same_sky
+            && Arc::ptr_eq(&materials, &scene.materials)
+            && others.iter().eq(scene.lights.others())
+            && !self.moves_emitters(&shapes, &materials);
+        let lights = scene.lights.at_moment((&shapes, &materials), others, sky, !same_lights);
+        let (tracer, pass_through_lights) = self.tracers(&shapes, &materials)?;
+        Ok(Scene {
+            source: scene.source.clone(),
+            converted: scene.converted.clone(),
+            origin: scene.origin,
+            objects: scene.objects.clone(),
+            first_light_sphere: scene.first_light_sphere,
+            tracer,
+            pass_through_lights,
+            light_names: scene.light_names.clone(),
+            guessed_units: scene.guessed_units.clone(),
+            environment_unknown: scene.environment_unknown,
+            cameras: description.cameras,
+            picture: scene.picture,
+            shutter: scene.shutter,
+            medium,
+            scattering: self.scattering(&materials),
+            survey: Survey::new(&shapes, &materials, &lights, medium),
+            contacts: self.contacts(&shapes, &materials, &boxes),
+            // The order of solids that overlap stays that of the frame.
+            ranks: Arc::clone(&scene.ranks),
+            solid_stacks: SolidStacks::default(),
+            warnings: Vec::new(),
+            shapes,
+            materials,
+            lights,
+        })
+    }
+
+    /// Checks that a description has the objects and lights of the frame.
+    fn check_objects(&self, description: &Description) -> Result<()> {
+        let scene = self.scene;
+        let placed = description.instances.iter().map(|placed| &placed.name);
+        let lights = description.lights.iter().filter(|light| !light.is_sphere()).map(|light| &light.name);
+        let own = scene.shapes.instances.iter().map(|instance| &instance.name);
+        match first_difference(placed, own).or_else(|| first_difference(lights, scene.light_names.iter())) {
+            Some(name) => Err(missing_at_moments(name)),
+            None => Ok(()),
+        }
+    }
+
+    /// Replaces the meshes of spheres for point lights by those at the frame, where they are equal.
+    fn share_light_spheres(&self, description: &mut Description) {
+        let Shapes { meshes, instances, .. } = &*self.scene.shapes;
+        let spheres = description.instances.iter().zip(instances);
+        for (placed, own) in spheres.filter(|(_, own)| own.object >= self.scene.first_light_sphere) {
+            let (mesh, own) = (&mut description.meshes[placed.mesh as usize], &meshes[own.mesh as usize]);
+            if mesh.positions == own.positions {
+                *mesh = Arc::clone(own);
+            }
+        }
+    }
+
+    /// The instances of a description. Those that do not move are those at the frame.
+    fn instances(&self, description: &Description) -> Vec<Instance> {
+        let place = |(placed, own): (&PlacedMesh, &Instance)| {
+            if !own.moves {
+                return own.clone();
+            }
+            let mut to_world = placed.to_world;
+            to_world.translation -= self.scene.origin;
+            Instance { mesh: placed.mesh, to_world: Some(build::placement(&to_world)), ..own.clone() }
+        };
+        description.instances.iter().zip(&self.scene.shapes.instances).map(place).collect()
+    }
+
+    /// The materials, and the medium outside all solids: those at the frame, if none of them moves.
+    fn materials(
+        &self,
+        description: &mut Description,
+        shapes: &Shapes,
+        materials_move: bool,
+    ) -> (Arc<Materials>, Option<MediumParameters>) {
+        let own = &self.scene.materials;
+        let emissions = |list: &[Material]| list[self.materials..].iter().map(|m| m.emission).collect::<Vec<_>>();
+        let list = std::mem::take(&mut description.materials);
+        if materials_move {
+            let mut materials = Materials { list, textures: std::mem::take(&mut description.textures).into() };
+            limit_densities(shapes, &mut materials, &mut description.medium, &mut Vec::new());
+            (Arc::new(materials), description.medium)
+        } else if emissions(&list) == emissions(&own.list) {
+            (Arc::clone(own), self.scene.medium)
+        } else {
+            (Arc::new(Materials { list, textures: Arc::clone(&own.textures) }), self.scene.medium)
+        }
+    }
+
+    /// The scattering of materials, with the tables of the frame if no index of refraction is new.
+    fn scattering(&self, materials: &Materials) -> Scattering {
+        let own = &self.scene.materials.list;
+        match materials.list.iter().all(|material| own.iter().any(|known| known.ior == material.ior)) {
+            true => self.scene.scattering.for_materials(&materials.list),
+            false => Scattering::new(&materials.list),
+        }
+    }
+
+    /// The bounding box of each instance, in world space.
+    fn boxes(&self, shapes: &Shapes) -> Vec<Box3> {
+        let own = &self.scene.shapes;
+        let bounds = |(i, instance): (usize, &Instance)| {
+            let mesh = instance.mesh as usize;
+            match own.meshes.get(mesh) {
+                _ if !instance.moves => self.boxes[i],
+                Some(before) if Arc::ptr_eq(before, &shapes.meshes[mesh]) => {
+                    placed_box(instance, self.mesh_boxes[mesh])
+                }
+                _ => bounding_box(shapes.meshes[mesh].positions.iter().map(|&p| instance.point(p))),
+            }
+        };
+        shapes.instances.iter().enumerate().map(bounds).collect()
+    }
+
+    /// The bounding sphere with the environment, and whether it is that of the frame, which is kept if nothing leaves the
+    /// box that it was made for.
+    fn sky(&self, boxes: &[Box3]) -> (Sky, bool) {
+        let own = self.scene.lights.sky();
+        let (low, high) = union(&self.boxes);
+        let (now_low, now_high) = union(boxes);
+        if low.cmple(now_low).all() && now_high.cmple(high).all() {
+            return (own.clone(), true);
+        }
+        let (low, high) = (low.min(now_low), high.max(now_high));
+        // As at the frame, slightly larger.
+        let radius = ((high - low).length() * 0.5).max(1e-6) * 1.001;
+        (Sky { center: (low + high) * 0.5, radius, ..own.clone() }, false)
+    }
+
+    /// Whether an emissive instance differs from that at the frame.
+    fn moves_emitters(&self, shapes: &Shapes, materials: &Materials) -> bool {
+        let own = &self.scene.shapes;
+        let points = |instance: &Instance| instance.to_world.map(|placement| placement.points);
+        let differs = |now: &Instance, before: &Instance| {
+            let mesh = &shapes.meshes[now.mesh as usize];
+            points(now) != points(before) || !Arc::ptr_eq(mesh, &own.meshes[before.mesh as usize])
+        };
+        let emits = |instance: &Instance| materials.list[instance.material as usize].emits();
+        let moving = shapes.instances.iter().zip(&own.instances).filter(|(now, _)| now.moves && emits(now));
+        moving.into_iter().any(|(now, before)| differs(now, before))
+    }
+
+    /// Commits the moving instances to Embree: those of the scene, and those of lights that all rays pass through.
+    fn tracers(&self, shapes: &Arc<Shapes>, materials: &Arc<Materials>) -> Result<(Tracer, Option<Tracer>)> {
+        let scene = self.scene;
+        let filtered = |passed| build::filtered(shapes, materials, passed);
+        // Embree's filters keep the materials that they were built with.
+        let unfiltered = || [false, true].iter().all(|&passed| !filtered(passed).contains(&Some(true)));
+        let behaviour = |materials: &Materials| materials.list.iter().map(build::hit_behaviour).collect::<Vec<_>>();
+        let same = || behaviour(materials) == behaviour(&scene.materials) && unfiltered();
+        if !(Arc::ptr_eq(materials, &scene.materials) || same()) {
+            return build::tracers(shapes, materials, rayon::current_num_threads());
+        }
+        let filter = build::hit_filter(shapes, materials);
+        let at = |tracer: &Tracer, passed| tracer.at_moment(&scene.shapes, shapes, &filtered(passed), &filter);
+        let pass_through = scene.pass_through_lights.as_ref().map(|tracer| at(tracer, true)).transpose()?;
+        Ok((at(&scene.tracer, false)?, pass_through))
+    }
+
+    fn contacts(&self, shapes: &Shapes, materials: &Materials, boxes: &[Box3]) -> Arc<Contacts> {
+        let passing = |materials: &Materials| materials.list.iter().map(Material::transmits).collect::<Vec<_>>();
+        Arc::new(match passing(materials) == passing(&self.scene.materials) {
+            true => self.scene.contacts.at_moment(shapes, materials, boxes),
+            false => Contacts::new(shapes, materials),
+        })
+    }
+}
+
+/// The first string by which two sequences differ; `None` if they are equal.
+fn first_difference<'s>(
+    mut a: impl Iterator<Item = &'s String>,
+    mut b: impl Iterator<Item = &'s String>,
+) -> Option<&'s str> {
+    loop {
+        match (a.next(), b.next()) {
+            (None, None) => return None,
+            (a, b) if a == b => {}
+            (a, b) => return a.or(b).map(String::as_str),
+        }
+    }
+}
+
+/// The bounding box of points; without points, its lower corner is above the upper one.
+fn bounding_box(points: impl Iterator<Item = Vec3>) -> Box3 {
+    points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+}
+
+/// A box in world space around the box of an instance's mesh.
+fn placed_box(instance: &Instance, (low, high): Box3) -> Box3 {
+    if low.cmpgt(high).any() {
+        return (low, high);
+    }
+    let corner = |i: u32| Vec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), high, low);
+    bounding_box((0..8).map(|i| instance.point(corner(i))))
+}
+
+/// The smallest box around boxes.
+fn union(boxes: &[Box3]) -> Box3 {
+    boxes.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), of| (low.min(of.0), high.max(of.1)))
+}
