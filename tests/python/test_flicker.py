@@ -2,6 +2,7 @@
 
 import importlib
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -298,6 +299,49 @@ class Shots(support.Scratch):
 
 
 class Strip(support.Scratch):
-    def test_the_strip_has_a_row_for_each_series(self):
+    def test_the_strip_has_a_row_for_each_series_and_eight_frames(self):
         figure = importlib.import_module("lab.figures.flicker")
-        self.assertEqual(figure.display(np.array([[[0.0, 1.0, 4.0]]]), 1.0).tolist(), [[[0, 255, 255]]])
+        truth = np.full((20, 30, 3), 0.5)
+        sequence = figure.Sequence.__new__(figure.Sequence)
+        sequence.name, sequence.frames = "pool", range(1, 25)
+        sequence.references = [picture_errors.Reference(truth, truth)] * 24
+        dark = [np.zeros_like(truth)] * 24
+        with unittest.mock.patch.object(figure, "CACHE", self.dir), unittest.mock.patch("builtins.print"):
+            figure.write_strip(sequence, 2.0, {"auto": dark, "auto, estimate": dark})
+        strip = np.asarray(figure.Image.open(self.dir / "strips" / "pool-30-2s.png"))[:, figure.LABEL_WIDTH :]
+        self.assertEqual(strip.shape, (60, 240, 3))
+        self.assertTrue((strip[:20] == 255).all() and (strip[20:] == 0).all())
+
+
+class Rows(support.Scratch):
+    def test_pictures_of_other_renderers_that_miss_light_are_named_and_not_stored(self):
+        figure = importlib.import_module("lab.figures.flicker")
+        truth = np.full((20, 30, 3), 0.5)
+        here = (*np.mgrid[:20, :30], np.ones((20, 30), bool))
+        sequence = figure.Sequence.__new__(figure.Sequence)
+        sequence.name, sequence.frames, sequence.halves, sequence.matches = "pool", range(3), [self.dir] * 3, [here] * 2
+        sequence.references = [picture_errors.Reference(truth, truth)] * 3
+        sequence.made = [{"core_seconds": [1.0, 1.0], "options": [], "program": "none"}] * 3
+        sequence.spent = lambda folders: 1.0
+        random = np.random.default_rng(1)
+        noise = 0.01 * random.standard_normal((3, *truth.shape))
+
+        def pictures(factor):
+            return lambda frame: {"noisy": (factor * truth + noise[frame]).astype(np.float32)}
+
+        sources = [
+            (name, int, pictures(factor), figure.PEER_PICTURES) for name, factor in (("whole", 1), ("dark", 0.9))
+        ]
+        measured = lambda folder, reference, halves, pictures_of: {
+            name: reference.measure(picture) for name, picture in pictures_of(folder).items()
+        }
+        patches = {"Sequence": lambda name: sequence, "sources": lambda *_: sources, "write_strip": lambda *_: None}
+        with (
+            unittest.mock.patch.multiple(figure, **patches),
+            unittest.mock.patch.object(figure.renders, "figures", measured),
+            unittest.mock.patch("builtins.print"),
+        ):
+            rows, notes, _ = figure.measure("pool", 1.0, [])
+        self.assertEqual([row["row"] for row in rows], ["whole"])
+        self.assertAlmostEqual(rows[0]["flicker"], 0.01 * np.sqrt(2 / 0.26), delta=0.001)
+        self.assertIn("not comparable", notes["dark"])

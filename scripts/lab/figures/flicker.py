@@ -8,7 +8,8 @@ independent halves of a reference, so that the references' own noise cancels.
 Surface points are followed by the transforms of objects and camera; pixels whose point is hidden in the next frame do
 not count (lab/temporal.py). Rows: the finished frames of each method, their estimates, Intel OIDN alone on these
 estimates, both on estimates averaged over neighbouring frames (lab/temporal_average.py, a prototype), and other
-renderers with OIDN, on single frames of the shots. A film strip of each shot shows eight frames by row.
+renderers with OIDN, on single frames of the shots; pictures with another mean than the reference are not stored, because
+light that is missing in every frame does not flicker. A film strip of each shot shows eight frames by row.
 
 Renders are cached, so an interrupted run continues. CAUSTIQUE_BIN names the program, and CAUSTIQUE_CACHE the cache.
 """
@@ -87,9 +88,17 @@ class Sequence:
         found = temporal.flicker([one.astype(float) for one in series], self.references, self.matches)
         for key, error in (("error", "relmse"), ("error_trimmed", "relmse_trimmed")):
             found[key] = float(np.sqrt(max(np.mean([one[error] for one in errors]), 0.0)))
+        ratios = np.array([[one["mean_ratio"], one["mean_ratio_error"]] for one in errors])
+        found["mean_ratio"] = float(ratios[:, 0].mean())
+        found["mean_ratio_error"] = float(np.sqrt(np.square(ratios[:, 1]).sum()) / len(errors))
         found["relmse_trimmed"] = [float(f"{one['relmse_trimmed']:.4g}") for one in errors]
-        found["core_seconds"] = float(np.mean([load(folder / "run.json")["cpu_seconds"] for folder in folders]))
+        found["core_seconds"] = self.spent(folders)
         return found
+
+    @staticmethod
+    def spent(folders):
+        """The mean core-seconds of the renders in folders."""
+        return float(np.mean([load(folder / "run.json")["cpu_seconds"] for folder in folders]))
 
     def rows(self, folders, pictures_of, shown):
         """The rows of a render's pictures, and the pictures of all frames, by the ends of their names."""
@@ -130,10 +139,10 @@ def denoise(picture, layers):
         return Layers(folder / "out.exr").get("")
 
 
-def line(label, found):
+def line(label, found, note=None):
     """Prints a row of the table."""
     values = "".join(f"{found[key]:>17.4f}" for key in KEYS)
-    print(f"    {label:<32}{found['core_seconds']:>8.1f}{values}", flush=True)
+    print(f"    {label:<32}{found['core_seconds']:>8.1f}{values}{'  ' + note if note else ''}", flush=True)
 
 
 def sources(sequence, budget, peers):
@@ -204,9 +213,13 @@ def measure(name, budget, peers):
             continue
         found = [*sequence.rows(folders, pictures_of, shown)]
         found += sequence.averaged(folders) if shown is PICTURES else []
+        mismatch = peer_runs.mean_mismatch(found[0][1]) if shown is PEER_PICTURES else None
+        if mismatch:
+            notes[label] = mismatch
         for suffix, row, strip[label + suffix] in found:
-            line(label + suffix, row)
-            rows.append({"shot": name, "budget": budget, "row": label + suffix, **rounded(row)})
+            line(label + suffix, row, mismatch)
+            if not mismatch:
+                rows.append({"shot": name, "budget": budget, "row": label + suffix, **rounded(row)})
     write_strip(sequence, budget, strip)
     used = {"error": float(f"{own:.3g}"), "core_seconds": [made["core_seconds"] for made in sequence.made]}
     return rows, notes, {**used, "options": sequence.made[0]["options"], "program": sequence.made[0]["program"]}
