@@ -65,19 +65,25 @@ fn still(file: &Glb, seconds: f64, settings: &Settings) -> Rendered {
 /// Checks that the blurred picture of a file is the mean of stills. The still picture at which the shutter opens must be
 /// rejected.
 fn is_mean_of_stills(what: &str, file: &Glb, method: Method, iterations: u64, bias: f64) {
+    is_mean_of_stills_with(what, file, |iterations, seed| settings(method, iterations, seed), iterations, bias);
+}
+
+/// Does the work of [`is_mean_of_stills`] with other settings, as a function of the number of iterations and the seed.
+fn is_mean_of_stills_with(what: &str, file: &Glb, settings: impl Fn(u64, u64) -> Settings, iterations: u64, bias: f64) {
+    let method = settings(1, 0).method;
     let mean_of_stills = |seed: u64| {
         let mut sums = vec![0.0; 3 * channels::TILES];
         for k in 0..STILLS {
             let seconds = 1.0 + SHUTTER[0] + (SHUTTER[1] - SHUTTER[0]) * (k as f64 + 0.5) / STILLS as f64;
-            let still = channels::tiles(&still(file, seconds, &settings(method, 2, 1000 * (seed + 1) + k)));
+            let still = channels::tiles(&still(file, seconds, &settings(2, 1000 * (seed + 1) + k)));
             sums.iter_mut().zip(still).for_each(|(sum, value)| *sum += value / STILLS as f64);
         }
         sums
     };
     let reference: Vec<Vec<f64>> = (0..6).map(mean_of_stills).collect();
-    let blurs = channels::seeds(method, 6, |seed| blurred(file, &settings(method, iterations, seed)));
+    let blurs = channels::seeds(method, 6, |seed| blurred(file, &settings(iterations, seed)));
     agree(what, &blurs, &reference, bias, 0.3);
-    let stills = channels::seeds(method, 6, |seed| still(file, 1.0 + SHUTTER[0], &settings(method, iterations, seed)));
+    let stills = channels::seeds(method, 6, |seed| still(file, 1.0 + SHUTTER[0], &settings(iterations, seed)));
     assert!(!disagreeing(&stills, &reference, bias).is_empty(), "{what}: a still picture passes the test");
 }
 
@@ -201,17 +207,39 @@ fn morph_targets_and_skins_are_blurred() {
     is_mean_of_stills("morph targets and skins", &file, Method::Path, 256, 0.005);
 }
 
+fn glass() -> Value {
+    json!({"name": "glass", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.0},
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0},
+            "KHR_materials_volume": {"thicknessFactor": 1.0}, "KHR_materials_ior": {"ior": 1.5}}})
+}
+
 /// A glass block that slides over the floor it touches: the ray queries of touching surfaces follow it.
 #[test]
 fn a_glass_block_that_slides_on_the_floor_is_blurred() {
     let mut file = stage();
-    let glass = json!({"name": "glass", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.0},
-        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0},
-            "KHR_materials_volume": {"thicknessFactor": 1.0}, "KHR_materials_ior": {"ior": 1.5}}});
-    let glass = file.push("materials", glass);
+    let glass = file.push("materials", glass());
     let cube = file.cube("block", Some(glass));
     let node = file.node(json!({"name": "block", "mesh": cube, "scale": [0.4, 0.3, 0.4]}));
     animate(&mut file, json!({"node": node, "path": "translation"}), [[-1.4, 0.3, 0.2], [1.4, 0.3, 0.2]]);
     is_mean_of_stills("glass", &file, Method::Vcm, 256, 0.03);
     is_mean_of_stills("glass", &file, Method::Cppm, 256, 0.05);
+}
+
+/// Guided light paths follow targets that move, and lights that change their share of the power.
+#[test]
+fn guided_light_paths_follow_moving_glass_and_lights() {
+    let mut file = stage();
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 1000.0,
+        "extras": {"caustique": {"radius": 0.1}}}]}});
+    let lamp = file.node(json!({"name": "ball", "extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    animate(&mut file, json!({"node": lamp, "path": "translation"}), [[-1.0, 2.0, 0.0], [1.0, 2.0, 0.0]]);
+    animate(&mut file, pointer("/extensions/KHR_lights_punctual/lights/0/intensity"), [[100.0], [9000.0]]);
+    let glass = file.push("materials", glass());
+    let cube = file.cube("block", Some(glass));
+    let node = file.node(json!({"name": "block", "mesh": cube, "scale": [0.3, 0.3, 0.3]}));
+    animate(&mut file, json!({"node": node, "path": "translation"}), [[-1.2, 0.6, 0.2], [1.2, 0.6, 0.2]]);
+    for (method, bias) in [(Method::Vcm, 0.03), (Method::Cppm, 0.05)] {
+        let guided = |iterations, seed| Settings { guided: true, ..settings(method, iterations, seed) };
+        is_mean_of_stills_with("guided", &file, guided, 256, bias);
+    }
 }
