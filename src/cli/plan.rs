@@ -78,7 +78,7 @@ fn report(args: &PlanArgs) -> Result<()> {
 /// Forecasts the cost of rendering to the relative error `target`; `None` if it cannot be known.
 fn forecast_error(args: &PlanArgs, loaded: &Loaded, planned: &PlannedPicture, target: f64) -> Result<Option<Forecast>> {
     let view = View::new(&loaded.scene, &planned.camera);
-    let settings = with_light_paths(planned.chosen.settings.clone(), args.options.photons, view.camera.size());
+    let settings = with_light_paths(planned.chosen.settings.clone(), args.options.photons, view.camera.whole()[0]);
     let mut finish = args.options.forecast_finish()?;
     let work = || forecast(view, &settings, &mut finish, target);
     Form::for_output(args.json).during("trying how the error falls", work)

@@ -36,11 +36,11 @@ pub struct RenderOptions {
     /// Method that finds the light; 'auto' chooses one for the scene
     #[arg(long, value_enum, default_value_t, help_heading = "Method")]
     pub method: MethodChoice,
-    /// Light paths per iteration: more give a smoother start, fewer give faster iterations [default: 100000]
+    /// Light paths per iteration: more give a smoother start, fewer give faster iterations [default: one per pixel, at least 100000]
     ///
     /// For ppm, sppm, appm and cppm in each iteration, for pm once, for its one map, by default 2000000. Guided light
-    /// paths with --indirect paths are one per pixel, at most 100000. The other methods send one light path per camera
-    /// path, or none
+    /// paths with --indirect paths are one per pixel in small pictures, too. The other methods send one light path per
+    /// camera path, or none
     #[arg(long, value_name = "N", whole = 1_u32..=50_000_000, help_heading = "Method")]
     #[arg(hide_short_help = true)]
     pub photons: Option<u32>,

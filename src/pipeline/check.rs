@@ -30,7 +30,7 @@ pub fn check_picture(picture: &PictureRequest<'_>, path: &Path, scene: &Scene) -
     let camera = scene.camera(&picture.camera)?;
     let settings = picture.method.settings();
     check_settings(settings, path, scene)?;
-    let settings = with_light_paths(settings.clone(), picture.photons, camera.size());
+    let settings = with_light_paths(settings.clone(), picture.photons, camera.whole()[0]);
     Ok(Checked { camera, settings })
 }
 
@@ -49,8 +49,8 @@ pub(super) fn check(request: &Request<'_>, scene: &Scene) -> Result<Checked> {
     Ok(checked)
 }
 
-/// Sets the number of light paths per iteration: `photons`, or if it is `None` the default for a picture of this width
-/// and height.
+/// Sets the number of light paths per iteration: `photons`, or if it is `None` the default for a whole picture of this
+/// width and height.
 pub fn with_light_paths(settings: Settings, photons: Option<u32>, size: (u32, u32)) -> Settings {
     Settings { photons: photons.unwrap_or(settings.default_photons(size)), ..settings }
 }

@@ -44,7 +44,7 @@ pub fn choose(
     stop: impl Fn() -> bool,
 ) -> Chosen {
     let MethodRequest::Auto(auto) = method else { return Chosen::named(checked) };
-    let settings_of = |candidate| (auto.settings_of)(candidate, view.camera.size()).filter(&accepts);
+    let settings_of = |candidate| (auto.settings_of)(candidate, view.camera.whole()[0]).filter(&accepts);
     match choose::choose(view, settings_of, stop) {
         Some(choice) => {
             Chosen { settings: choice.settings.clone(), candidate: Some(choice.candidate), choice: Some(choice) }
@@ -85,7 +85,7 @@ pub(super) fn chosen_before(
     view: View<'_>,
 ) -> Chosen {
     let settings = match (method, candidate) {
-        (MethodRequest::Auto(auto), Some(candidate)) => (auto.settings_of)(candidate, view.camera.size()),
+        (MethodRequest::Auto(auto), Some(candidate)) => (auto.settings_of)(candidate, view.camera.whole()[0]),
         _ => None,
     };
     Chosen { settings: settings.unwrap_or(checked), candidate, choice: None }

@@ -97,10 +97,12 @@ impl Plan {
         let finds = |effect| request.search.finds(effect, &scene.survey);
         let plan = |effect: Effect| {
             let removed = request.removed.because(effect);
-            let because = if removed.is_empty() { presence.because(effect) } else { removed }.to_vec();
+            let mut because = if removed.is_empty() { presence.because(effect) } else { removed }.to_vec();
             let present = !because.is_empty();
             let deep = request.max_depth.is_none_or(|most| most >= min_depth(effect, scene));
             let simulated = present && deep && finds(effect) && !request.switches.off.has(effect);
+            let limit = request.search.limit(effect, scene).filter(|_| simulated);
+            because.extend(limit.map(String::from));
             EffectPlan {
                 effect,
                 present,

@@ -82,6 +82,13 @@ impl Search {
         }
     }
 
+    /// Why the method does not take all of its techniques for an effect, in words for the user; `None` if it does.
+    pub(super) fn limit(self, effect: Effect, scene: &Scene) -> Option<&'static str> {
+        let merges = self == Search::ConnectionsAndMerging;
+        (merges && effect == Effect::Volume && scene.survey.scattering)
+            .then_some("nothing merges in media: connections find this light")
+    }
+
     /// The techniques that carry the light of an effect, in words for the user.
     pub(super) fn carrier(self, effect: Effect, scene: &Scene) -> &'static str {
         let media_scatter = scene.survey.scattering;
@@ -98,6 +105,7 @@ impl Search {
             (Effect::Direct, Search::CameraPaths | Search::PathsAndPhotons | Search::Map | Search::Photons) => {
                 "connections to lights"
             }
+            (Effect::Volume, Search::ConnectionsAndMerging) => "connections",
             (Effect::Caustic | Effect::Sds, Search::ConnectionsAndMerging | Search::PathsAndPhotons) => "photons",
             _ if walks => "eye paths",
             (_, Search::Merging) => "photons",

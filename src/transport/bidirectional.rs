@@ -237,6 +237,13 @@ pub trait PathRecorder {
         let _ = (technique, value, from, ratios);
     }
 
+    /// The path, a camera path or a light path, continues from a vertex. `survival(chance)` is the probability that roulette allows it if its
+    /// throughput is divided by `chance`.
+    #[inline]
+    fn continues(&mut self, survival: impl Fn(f32) -> f32) {
+        let _ = survival;
+    }
+
     /// `technique` adds light to the camera path's own pixel at `level`: its class and light group, `value` with
     /// visibility and kernel but without weight, and the weight. Depths count from 1, also for light from infinity.
     #[inline]

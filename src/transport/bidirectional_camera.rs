@@ -368,6 +368,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.history.delta);
         let joins = self.shared.joins(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Importance, joins, merges);
+        self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
 
     #[inline]
@@ -395,6 +396,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
         let joins = self.shared.joins(vertex.depth);
         self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, joins, Merges::ZERO);
+        self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
 
     #[inline]

@@ -256,6 +256,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
         let joins = self.shared.joins(vertex.depth);
         self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, joins, Merges::ZERO);
+        self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
 
     #[inline]
@@ -263,6 +264,7 @@ impl<'s, R: PathRecorder> Visitor<'s> for LightWalk<'_, 's, R> {
         let merges = self.shared.techniques.light_vertex_merge(vertex.depth);
         let joins = self.shared.joins(vertex.depth);
         self.mis = scatter(self.mis, vertex, sample, Transport::Radiance, joins, merges);
+        self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
 }
 

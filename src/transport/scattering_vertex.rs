@@ -53,7 +53,12 @@ pub trait ScatterPoint {
         false
     }
     /// Probability that roulette lets the path continue by the lobes in `set`, see [`Vertex::survival`].
-    fn survival(&self, set: LobeSet) -> f32;
+    fn survival(&self, set: LobeSet) -> f32 {
+        self.survival_chosen(set, 1.0)
+    }
+    /// Probability that roulette lets the path continue by the lobes in `set`, chosen with the probability `chance`, see
+    /// [`Vertex::survival_chosen`].
+    fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32;
     /// MIS weight (0 to 1) of next-event estimation at the vertex, see [`MediumVertex::next_event`].
     #[inline]
     fn next_event_share(&self) -> f32 {
@@ -208,8 +213,8 @@ impl ScatterPoint for Vertex<'_, '_> {
     }
 
     #[inline]
-    fn survival(&self, set: LobeSet) -> f32 {
-        Vertex::survival(self, set)
+    fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32 {
+        Vertex::survival_chosen(self, set, chance)
     }
 }
 
@@ -303,9 +308,9 @@ impl ScatterPoint for MediumVertex {
     }
 
     #[inline]
-    fn survival(&self, set: LobeSet) -> f32 {
-        let expected =
-            if set.intersects(LobeSet::BROAD) { self.throughput.max_element() * self.survival_scale } else { 0.0 };
+    fn survival_chosen(&self, set: LobeSet, chance: f32) -> f32 {
+        let weight = self.throughput.max_element() * self.survival_scale / chance;
+        let expected = if set.intersects(LobeSet::BROAD) { weight } else { 0.0 };
         survival(expected, self.depth, || false)
     }
 }

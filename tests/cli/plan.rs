@@ -167,3 +167,26 @@ fn plan_fails_for_a_missing_camera_and_with_strict() {
     assert_eq!((outcome.code, outcome.json()["warnings"].as_array().map(Vec::len)), (Some(1), Some(1)));
     assert!(outcome.stderr.starts_with("dark.glb: 1 thing is ignored or approximated"), "{}", outcome.stderr);
 }
+
+/// `auto` takes no more than a tenth of `--time` for its pilot, and says so if that is too short for one.
+#[test]
+fn the_pilot_ends_after_a_tenth_of_the_time() {
+    let plan = Folder::new().run("plan scene.glb --json --time 0.0001").json();
+    let because = plan["because"].as_str().expect("a reason");
+    assert!(because.ends_with("for the time for a pilot is over"), "{because}");
+}
+
+/// `vcm` merges nothing in media, and the plan says which technique finds their light.
+#[test]
+fn the_plan_says_that_nothing_merges_in_media() {
+    let fog = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/fog.glb");
+    let volume = |method| {
+        let plan = Folder::new().run(&format!("plan {fog} --json --method {method}")).json();
+        let effects = plan["effects"].as_array().expect("a list").clone();
+        let volume = effects.into_iter().find(|effect| effect["name"] == "volume").expect("it is listed");
+        (volume["by"].clone(), volume["because"].clone())
+    };
+    let reason = "nothing merges in media: connections find this light";
+    assert_eq!(volume("vcm"), (json!("connections"), json!(["the scene's medium", reason])));
+    assert_eq!(volume("sppm"), (json!("photons"), json!(["the scene's medium"])));
+}

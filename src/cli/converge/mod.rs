@@ -155,7 +155,7 @@ fn choose_all(
         let Settings { max_depth, seed, .. } = run.entry.settings;
         let (iterations, time) = (args.iterations, time(args));
         let limits = move |settings| Settings { max_depth, seed, iterations, time, ..settings };
-        let settings = with_light_paths(run.entry.settings.clone(), run.args.photons, view.camera.size());
+        let settings = with_light_paths(run.entry.settings.clone(), run.args.photons, view.camera.whole()[0]);
         let chosen = {
             let mut method = run.args.method_request()?.map_candidates(limits);
             let work = || choose(&mut method, settings, view, |_| true, || interrupt.requested());

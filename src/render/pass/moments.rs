@@ -8,6 +8,10 @@
 //! connections and merges. The coefficients are differences between the weights of the same paths with other numbers of
 //! light paths and connections.
 //!
+//! Camera paths of the proxy have the roulette of path tracing. A candidate whose roulette ends a path more often, by the
+//! ratio R of the probabilities to get as far as a sample, has R times the second moment there. A candidate of camera
+//! paths alone does without the roulette of light paths.
+//!
 //! Direct light is sampled alike by all candidates. Its variance is measured, and is the same for all of them.
 
 use super::guiding::learn_guide;
@@ -28,7 +32,7 @@ use crate::stat::{floor, median};
 use crate::transport::mis::{Eta, Merges, Ratios};
 use crate::transport::{
     Bidirectional, CameraPathStart, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertices, MergeLevels,
-    MergePhoton, PathRecorder, PixelSample, Technique, TechniqueSet,
+    MergePhoton, PathRecorder, PixelSample, SPARED_BY_ROULETTE, Technique, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -74,6 +78,8 @@ struct Factors {
     light: f64,
     /// Coefficients of eta for one light path per pixel.
     merges: Merges,
+    /// Whether roulette spares camera paths as in path tracing.
+    spares: bool,
 }
 
 impl Factors {
@@ -82,7 +88,8 @@ impl Factors {
         let light = counts.light_paths_per_pixel();
         let merged = light * f64::from(counts.merging);
         let connections = if counts.light_paths == 0 { 0.0 } else { f64::from(counts.connections) };
-        Factors { connections, light, merges: Merges::new(merged, merged / (1.0 + light * covered)) }
+        let merges = Merges::new(merged, merged / (1.0 + light * covered));
+        Factors { connections, light, merges, spares: counts.leave_camera_paths_alone(counts.merging > 0.0) }
     }
 
     #[inline]
@@ -100,19 +107,99 @@ struct Contribution {
     /// Weighted contribution.
     value: Rgb,
     is_direct: bool,
+    /// The connected light vertex, or the merged photon.
+    from: Vec3,
+    survival: CameraSurvival,
+}
+
+/// Probabilities that roulette lets a camera path get as far as a vertex.
+#[derive(Clone, Copy)]
+struct CameraSurvival {
+    /// With the roulette of the proxy, which spares camera paths as in path tracing.
+    spared: f32,
+    /// With a roulette that spares no path.
+    unspared: f32,
+}
+
+impl CameraSurvival {
+    const START: CameraSurvival = CameraSurvival { spared: 1.0, unspared: 1.0 };
+
+    /// Factor of the second moment of a sample if no path is spared.
+    fn ratio(self) -> f64 {
+        f64::from(self.spared / self.unspared)
+    }
+
+    /// Factor of the second moment if a spared camera path samples the whole path, of which `light` is the probability
+    /// that roulette lets the light path get as far. Unspared paths survive with about the light that is left.
+    fn without_light_path(self, light: f64) -> f64 {
+        let spared = |survival: f64| (survival / f64::from(SPARED_BY_ROULETTE)).min(1.0);
+        let camera = f64::from(self.unspared);
+        light * spared(camera) / spared(camera * light)
+    }
+}
+
+/// Probabilities that roulette lets a light path get as far as its vertices.
+struct LightSurvival(Vec<f32>);
+
+impl LightSurvival {
+    /// The probability for the vertex at `depth`, from 1.
+    fn at(&self, depth: u32) -> f32 {
+        self.0.get(depth as usize - 1).copied().unwrap_or(1.0)
+    }
+}
+
+impl PathRecorder for LightSurvival {
+    fn continues(&mut self, survival: impl Fn(f32) -> f32) {
+        let so_far = self.0.last().copied().unwrap_or(1.0);
+        self.0.push(so_far * survival(1.0));
+    }
+}
+
+/// Photons of an iteration, by the bits of their positions, with the probability that roulette lets the light path get
+/// there.
+#[derive(Default)]
+struct PhotonSurvival(Vec<([u32; 3], f32)>);
+
+impl PhotonSurvival {
+    fn push(&mut self, p: Vec3, survival: f32) {
+        self.0.push((p.to_array().map(f32::to_bits), survival));
+    }
+
+    /// Of photons at equal positions, any one.
+    fn of(&self, p: Vec3) -> f32 {
+        let bits = p.to_array().map(f32::to_bits);
+        self.0.binary_search_by_key(&bits, |(at, _)| *at).map_or(1.0, |index| self.0[index].1)
+    }
 }
 
 /// Records the contributions of a camera path.
-#[derive(Default)]
-struct Contributions(Vec<Contribution>);
+struct Contributions {
+    list: Vec<Contribution>,
+    survival: CameraSurvival,
+}
+
+impl Contributions {
+    fn new() -> Contributions {
+        Contributions { list: Vec::new(), survival: CameraSurvival::START }
+    }
+}
 
 impl PathRecorder for Contributions {
-    fn contribution(&mut self, technique: Technique, _: Rgb, _: Vec3, ratios: Ratios) {
-        self.0.push(Contribution { technique, ratios, value: Rgb::ZERO, is_direct: false });
+    fn contribution(&mut self, technique: Technique, _: Rgb, from: Vec3, ratios: Ratios) {
+        let (value, survival) = (Rgb::ZERO, self.survival);
+        self.list.push(Contribution { technique, ratios, value, is_direct: false, from, survival });
+    }
+
+    fn continues(&mut self, survival: impl Fn(f32) -> f32) {
+        let CameraSurvival { spared, unspared } = &mut self.survival;
+        // A path that roulette has spared less often has a larger throughput.
+        let onward = survival(*unspared / (SPARED_BY_ROULETTE * *spared));
+        *spared *= survival(1.0);
+        *unspared *= onward;
     }
 
     fn arrival(&mut self, _: Technique, (class, _): (PathClass, Group), _: usize, value: Rgb, weight: f32) {
-        if let Some(last) = self.0.last_mut() {
+        if let Some(last) = self.list.last_mut() {
             last.value += value * weight;
             last.is_direct |= is_direct(class);
         }
@@ -144,6 +231,10 @@ struct Sample {
     proxy: f64,
     worth: f64,
     densities: Densities,
+    /// Factors of the second moment by the roulette of a candidate: if it spares no camera path (or samples all of the
+    /// path by a light path), and if it spares them and samples all of the path by a camera path.
+    unspared: f64,
+    by_camera: f64,
 }
 
 /// Sums over the samples of the proxy for a candidate.
@@ -156,25 +247,36 @@ struct Sums {
 }
 
 impl Sums {
-    /// Adds the samples of one path.
+    /// Adds the samples of one path, in the order of its vertices.
     #[inline]
     fn add(&mut self, samples: &[Sample], factors: &Factors) {
-        let (mut values, mut squares) = ([Rgb::ZERO; 3], [0.0; 3]);
-        for sample in samples {
-            let ratio = sample.proxy / factors.sum(&sample.densities, sample.eta);
-            self.moment += mean_square(sample.value) * ratio / sample.worth;
-            if sample.group != Correlated::None {
-                let value = sample.value * ratio as f32;
-                values[sample.group as usize] += value;
-                squares[sample.group as usize] += mean_square(value);
-            }
-        }
-        let [camera, connections, merges] = values;
         let (c, n) = (factors.connections as f32, factors.merges.x as f32);
-        let products = camera * connections * c + (camera + connections * c) * merges * n;
-        self.moment += 2.0 * f64::from(products.element_sum()) / 3.0 + mean_square(camera) - squares[0]
-            + factors.connections * (mean_square(connections) - squares[1]);
-        self.values.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        // Numbers of pairs of a sample with samples of camera, connections and merges.
+        let pairs = [[1.0, c, n], [c, c, c * n], [n, c * n, 0.0]];
+        // Sums over the samples so far, times the ratio of their survival.
+        let mut before = [Rgb::ZERO; 3];
+        for sample in samples {
+            let density = factors.sum(&sample.densities, sample.eta);
+            let ratio = sample.proxy / density;
+            let roulette = if factors.spares {
+                let camera = sample.densities.camera / density;
+                let light = factors.light * sample.densities.light / density;
+                1.0 + camera * (sample.by_camera - 1.0) + light * (sample.unspared - 1.0)
+            } else {
+                sample.unspared
+            };
+            self.moment += mean_square(sample.value) * ratio / sample.worth * roulette;
+            if sample.group == Correlated::None {
+                continue;
+            }
+            let (group, value) = (sample.group as usize, sample.value * ratio as f32);
+            let [camera, connections, merges] = pairs[group];
+            let paired = before[0] * camera + before[1] * connections + before[2] * merges;
+            // A path that gets as far as the later sample of a pair has survived to the earlier one.
+            self.moment += 2.0 * f64::from((value * paired).element_sum()) / 3.0;
+            before[group] += if factors.spares { value } else { value * sample.unspared as f32 };
+            self.values[group] += value;
+        }
     }
 
     /// The variance of an iteration, from the sums of `count` paths.
@@ -251,6 +353,32 @@ struct RowOutput {
     /// Direct light of every pixel of the row.
     direct: Vec<(usize, Rgb)>,
     photons: [Vec<MergePhoton>; 3],
+    survival: PhotonSurvival,
+}
+
+/// Photons of the previous iteration: the maps of the three sets of weights, and the survival of their light paths.
+#[derive(Default)]
+struct Photons {
+    lists: [Vec<MergePhoton>; 3],
+    survival: PhotonSurvival,
+}
+
+/// [`Photons`] in maps.
+struct PhotonMaps {
+    maps: [PhotonMap<MergePhoton>; 3],
+    survival: PhotonSurvival,
+}
+
+impl Photons {
+    fn build(mut self) -> PhotonMaps {
+        self.survival.0.sort_unstable_by_key(|(at, _)| *at);
+        PhotonMaps { maps: self.lists.map(PhotonMap::build), survival: self.survival }
+    }
+
+    fn append(&mut self, row: &RowOutput) {
+        (0..3).for_each(|k| self.lists[k].extend_from_slice(&row.photons[k]));
+        self.survival.0.extend_from_slice(&row.survival.0);
+    }
 }
 
 impl Proxy<'_> {
@@ -274,7 +402,7 @@ impl Proxy<'_> {
             light_paths: light_paths * pixels,
             connections,
             merged_paths: pixels,
-            spared: 1.0,
+            spared: SPARED_BY_ROULETTE,
             only: None,
         });
         let (schedule, level) = (self.settings.schedule(self.typical_iteration), self.settings.levels.picture_level());
@@ -306,20 +434,18 @@ impl Walks<'_, '_> {
         let none = Block { sums: vec![Sums::default(); self.candidates.len()], ..Block::default() };
         let mut blocks = vec![none; self.blocks.pixels()];
         let mut direct = vec![[Rgb::ZERO; 2]; self.radius2.len()];
-        let mut photons: [Vec<MergePhoton>; 3] = Default::default();
+        let mut photons = Photons::default();
         let mut done = 0;
         // The first iteration leaves the photons for the second, and is not counted.
         for iteration in 0..=iterations {
             if done >= 2 && stopped() {
                 break;
             }
-            let maps = photons.map(PhotonMap::build);
+            let maps = photons.build();
             let rows: Vec<RowOutput> =
                 (0..self.blocks.height).into_par_iter().map(|row| self.row(row, iteration, &maps)).collect();
-            photons = Default::default();
-            for row in &rows {
-                (0..3).for_each(|k| photons[k].extend_from_slice(&row.photons[k]));
-            }
+            photons = Photons::default();
+            rows.iter().for_each(|row| photons.append(row));
             if iteration > 0 {
                 done += 1;
                 self.add_rows(rows, &mut blocks, &mut direct);
@@ -369,7 +495,7 @@ impl Walks<'_, '_> {
     }
 
     /// Traces the light paths and camera paths of a row of blocks.
-    fn row(&self, row: usize, iteration: u64, maps: &[PhotonMap<MergePhoton>; 3]) -> RowOutput {
+    fn row(&self, row: usize, iteration: u64, maps: &PhotonMaps) -> RowOutput {
         let Settings { seed, max_depth, .. } = *self.proxy.settings;
         let (width, height) = self.proxy.camera.size();
         let count = width * height;
@@ -404,7 +530,7 @@ impl Walks<'_, '_> {
         arena: &Bump,
         index: u32,
         (light_paths, mut start): (&LightPaths<'_>, CameraPathStart),
-        maps: &[PhotonMap<MergePhoton>; 3],
+        photons: &PhotonMaps,
         output: &mut RowOutput,
     ) {
         let pixel = index as usize;
@@ -412,24 +538,42 @@ impl Walks<'_, '_> {
         let emitted = light_paths.emit(self.proxy.scene, self.variants[0].initial_media, index);
         let levels = self.levels(pixel);
         let mut left: [Deposits; 3] = Default::default();
-        let mut found: [Contributions; 3] = Default::default();
+        let mut found = [(); 3].map(|()| Contributions::new());
         let mut sample = PixelSample::default();
+        let mut survival = LightSurvival(Vec::new());
         for k in [2, 1, 0] {
             let shared = &self.variants[k];
             let mut vertices = LightVertices::new_in(arena);
+            survival.0.clear();
+            survival.0.push(1.0);
             if let Some(emitted) = &emitted {
-                shared.light_path(light_paths, emitted, false, &mut vertices, &mut left[k], &mut ());
+                shared.light_path(light_paths, emitted, false, &mut vertices, &mut left[k], &mut survival);
             }
-            let context = CameraWalkContext { vertices: &vertices, photons: Some(&maps[k]), levels: &levels };
+            let context = CameraWalkContext { vertices: &vertices, photons: Some(&photons.maps[k]), levels: &levels };
             shared.camera_path(arena, &start, &context, &mut found[k], &mut sample);
+            if k == 0 {
+                let of_photons = left[0].photons.iter().map(|photon| (photon.p, survival.at(photon.depth.into())));
+                of_photons.for_each(|(p, survival)| output.survival.push(p, survival));
+            }
             output.photons[k].append(&mut left[k].photons);
         }
+        let light_survival = |technique, from| {
+            f64::from(match technique {
+                Technique::Hit { .. } | Technique::NextEvent { .. } => 1.0,
+                Technique::Connect { light, .. } | Technique::Camera { light } => survival.at(light),
+                Technique::Merge { .. } => photons.survival.of(from),
+            })
+        };
         output.direct.push((pixel, sample.direct));
         let mut samples = Vec::new();
-        for ((one, connected), lit) in found[0].0.iter().zip(&found[1].0).zip(&found[2].0) {
+        for ((one, connected), lit) in found[0].list.iter().zip(&found[1].list).zip(&found[2].list) {
             let ratios = [one.ratios, connected.ratios, lit.ratios];
             output.light.extend(lit_pixel(pixel, one.value));
-            samples.extend(self.sample(pixel, one.technique, ratios, one.value).filter(|_| !one.is_direct));
+            let sample = self.sample(pixel, one.technique, ratios, one.value).filter(|_| !one.is_direct);
+            samples.extend(sample.map(|sample| {
+                let by_camera = one.survival.without_light_path(light_survival(one.technique, one.from));
+                Sample { unspared: one.survival.ratio(), by_camera, ..sample }
+            }));
         }
         let block = &mut output.blocks[self.block_of(pixel) % self.blocks.width];
         block.iter_mut().zip(&self.candidates).for_each(|(sums, factors)| sums.add(&samples, factors));
@@ -438,6 +582,8 @@ impl Walks<'_, '_> {
             let value = one.value * one.ratios.weight(self.levels(pixel).eta()[0]);
             output.light.extend(lit_pixel(pixel, value));
             let sample = self.sample(pixel, technique, [one.ratios, connected.ratios, lit.ratios], value);
+            let by_camera = CameraSurvival::START.without_light_path(light_survival(technique, Vec3::ZERO));
+            let sample = sample.map(|sample| Sample { by_camera, ..sample });
             output.splats.extend(sample.filter(|_| !is_direct(one.class)).map(|one| (self.block_of(pixel), one)));
         }
     }
@@ -457,7 +603,8 @@ impl Walks<'_, '_> {
             _ => Correlated::None,
         };
         let worth = if own == Merges::ZERO { 1.0 } else { own.x + own.y / (1.0 + self.covered) };
-        Some(Sample { group, value, eta, proxy: self.of_proxy.sum(&densities, eta), worth, densities })
+        let proxy = self.of_proxy.sum(&densities, eta);
+        Some(Sample { group, value, eta, proxy, worth, densities, unspared: 1.0, by_camera: 1.0 })
     }
 }
 

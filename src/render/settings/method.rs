@@ -5,7 +5,7 @@ use crate::estimator::rule::memoryless;
 use crate::plan::Search;
 use serde::{Deserialize, Serialize};
 
-/// Default number of light paths per iteration, as in the papers.
+/// Smallest default number of light paths per iteration, the number of the papers.
 pub const DEFAULT_PHOTONS: u32 = 100_000;
 /// Default number of light paths of [`Method::Pm`], which are traced once.
 pub const DEFAULT_MAP_PHOTONS: u32 = 2_000_000;
@@ -324,7 +324,7 @@ impl Method {
         self.row().guides
     }
 
-    /// Default number of light paths, for methods that take it as a setting.
+    /// Default number of light paths in a small picture, for methods that take it as a setting.
     pub fn default_photons(self) -> u32 {
         self.row().photons.unwrap_or(DEFAULT_PHOTONS)
     }

@@ -28,6 +28,8 @@ use serde::{Deserialize, Serialize};
 
 /// Number of iterations of a render without a stop condition.
 pub const DEFAULT_ITERATIONS: u64 = 64;
+/// Largest default number of light paths per iteration, so that the photon maps of huge pictures fit into memory.
+const MAX_DEFAULT_PHOTONS: u32 = 10_000_000;
 /// Default of [`Settings::photon_memory`] (bytes).
 pub const DEFAULT_MAP_MEMORY: u64 = 1 << 30;
 
@@ -191,15 +193,18 @@ impl Settings {
         Settings { method, levels, guided: self.guided && method.supports_guiding(), ..self }
     }
 
-    /// Default number of light paths per iteration for a picture of this size. If photons carry caustics alone, most of
-    /// the error comes from camera paths. Guided light paths cost several times as much as unguided ones, because most of
-    /// them hit glass, so their default is at most one per pixel.
+    /// Default number of light paths per iteration for a whole picture of this size: one per pixel, as many as camera
+    /// paths, and in small pictures the number of the papers. If photons carry caustics alone, most of the error comes from
+    /// camera paths, and guided light paths cost several times as much as unguided ones, because most of them hit glass.
+    /// So their default is one per pixel in small pictures, too.
     pub fn default_photons(&self, (width, height): (u32, u32)) -> u32 {
-        let photons = self.method.default_photons();
-        if self.guided && self.indirect == Indirect::Paths {
-            photons.min(width.saturating_mul(height))
+        let pixels = width.saturating_mul(height).min(MAX_DEFAULT_PHOTONS);
+        if self.method.has_one_map() {
+            self.method.default_photons()
+        } else if self.guided && self.indirect == Indirect::Paths {
+            pixels
         } else {
-            photons
+            pixels.max(self.method.default_photons())
         }
     }
 
@@ -301,6 +306,28 @@ impl Settings {
             self.levels.count
         } else {
             self.levels.picture_level() + 1
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_pictures_have_one_light_path_per_pixel() {
+        let sppm = Settings::for_candidate(Candidate::GATHERING);
+        let caustics = Settings { guided: true, indirect: Indirect::Paths, ..sppm.clone() };
+        let pm = Settings { method: Method::Pm, ..sppm.clone() };
+        for (settings, size, photons) in [
+            (&sppm, (320, 180), 100_000),
+            (&sppm, (1920, 1080), 1920 * 1080),
+            (&sppm, (1 << 15, 1 << 15), MAX_DEFAULT_PHOTONS),
+            (&caustics, (48, 36), 48 * 36),
+            (&caustics, (1920, 1080), 1920 * 1080),
+            (&pm, (1920, 1080), DEFAULT_MAP_PHOTONS),
+        ] {
+            assert_eq!(settings.default_photons(size), photons, "{:?} {size:?}", settings.method);
         }
     }
 }
