@@ -9,12 +9,15 @@ GOALS = {
     "auto / OIDN alone": "`auto` over Open Image Denoise alone on the same input",
     "all methods / OIDN alone": "all methods over Open Image Denoise alone on the same input",
 }
+# The `auto` of the program that --before names.
+BEFORE = "auto before"
+AUTO = {"auto", BEFORE}
 FIGURES = {"relmse_trimmed": "relMSE, trimmed", "relmse": "relMSE, all pixels", "flip": "FLIP"}
 
 
 def finished(figures):
-    """Trimmed relMSE of finished pictures by scene and method, of the peers' with OIDN, and the ratio of auto to the best
-    other of our methods (or to the best peer, if there is no other)."""
+    """Trimmed relMSE of finished pictures by scene and method, of the peers' with OIDN, and the ratios of auto to the best
+    other of our methods (or to the best peer, if there is no other) and to the auto of another program."""
     values = figures.one("finished")
     trimmed = values["figures"].index("relmse_trimmed")
     cells = values["cells"]
@@ -24,17 +27,25 @@ def finished(figures):
     for cell in cells:
         mine = {name: cell["ours"][name]["delivered"][trimmed] for name in ours if name in cell["ours"]}
         theirs = {name: of["oidn"][trimmed] for name, of in cell["peers"].items() if "oidn" in of}
-        others = [error for name, error in mine.items() if name != "auto"] or list(theirs.values())
+        others = [error for name, error in mine.items() if name not in AUTO] or list(theirs.values())
         ratio = mine["auto"] / min(others) if "auto" in mine and others else None
-        shown = [*map(mine.get, ours), *map(theirs.get, peers), ratio]
+        change = [mine["auto"] / mine[BEFORE] if mine.keys() >= AUTO else None] if BEFORE in ours else []
+        shown = [*map(mine.get, ours), *map(theirs.get, peers), ratio, *change]
         rows.append([cell["scene"].split("/")[-1], *map(digits, shown)])
     head = [
         f"scene, {cells[0]['budget']:g} s",
         *(f"`{name}`" for name in ours),
         *(NAMES[peer] for peer in peers),
         "auto / best",
+        *(["auto / before"] if BEFORE in ours else []),
     ]
     return table(head, rows)
+
+
+def choices(figures):
+    """What auto has chosen for each scene, and why, as `caustique plan` prints it."""
+    cells = figures.one("finished")["cells"]
+    return table(["scene", "choice"], [[cell["scene"], cell["chosen"]["auto"].removeprefix("auto: ")] for cell in cells])
 
 
 def goals(figures):
@@ -55,4 +66,4 @@ def goals(figures):
     return table(["ratio", "of", "geometric mean", "worst", "within"], rows)
 
 
-KINDS = {"finished": finished, "goals": goals}
+KINDS = {"finished": finished, "choices": choices, "goals": goals}
