@@ -36,7 +36,8 @@ pub struct RenderOptions {
     /// Method that finds the light; 'auto' chooses one for the scene
     #[arg(long, value_enum, default_value_t, help_heading = "Method")]
     pub method: MethodChoice,
-    /// Light paths per iteration: more give a smoother start, fewer give faster iterations [default: one per pixel, at least 100000]
+    /// Light paths per iteration: more give a smoother start, fewer give faster iterations [default: one per pixel, at
+    /// least 100000]
     ///
     /// For ppm, sppm, appm and cppm in each iteration, for pm once, for its one map, by default 2000000. Guided light
     /// paths with --indirect paths are one per pixel in small pictures, too. The other methods send one light path per

@@ -11,7 +11,7 @@ use crate::scene::gltf::{Moments, MovingFile};
 use crate::scene::{CameraRequest, MomentBuilder, Scene, View};
 use crate::stop::Stop;
 
-/// Number of moments below which single moments of a blurred object can be told apart.
+/// Number of moments below which the copies of a blurred object are visible.
 const MIN_MOMENTS: u64 = 32;
 
 /// A warning if a scene with motion blur is rendered in too few iterations, each of which shows one moment; otherwise

@@ -237,8 +237,8 @@ pub trait PathRecorder {
         let _ = (technique, value, from, ratios);
     }
 
-    /// The path, a camera path or a light path, continues from a vertex. `survival(chance)` is the probability that roulette allows it if its
-    /// throughput is divided by `chance`.
+    /// The path, a camera path or a light path, continues from a vertex. `survival(chance)` is the probability that
+    /// roulette allows it if its throughput is divided by `chance`.
     #[inline]
     fn continues(&mut self, survival: impl Fn(f32) -> f32) {
         let _ = survival;

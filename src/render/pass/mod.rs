@@ -19,6 +19,7 @@ mod pm;
 mod region;
 mod sample_buffer;
 mod sppm;
+mod survival;
 mod techniques;
 mod tiles;
 mod volume;

@@ -15,6 +15,7 @@
 //! Direct light is sampled alike by all candidates. Its variance is measured, and is the same for all of them.
 
 use super::guiding::learn_guide;
+use super::survival::{CameraSurvival, LightSurvival, PhotonSurvival};
 use crate::camera::{Camera, GROUP_SIZE, TilePixel};
 use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, level_factor2};
@@ -112,66 +113,6 @@ struct Contribution {
     survival: CameraSurvival,
 }
 
-/// Probabilities that roulette lets a camera path get as far as a vertex.
-#[derive(Clone, Copy)]
-struct CameraSurvival {
-    /// With the roulette of the proxy, which spares camera paths as in path tracing.
-    spared: f32,
-    /// With a roulette that spares no path.
-    unspared: f32,
-}
-
-impl CameraSurvival {
-    const START: CameraSurvival = CameraSurvival { spared: 1.0, unspared: 1.0 };
-
-    /// Factor of the second moment of a sample if no path is spared.
-    fn ratio(self) -> f64 {
-        f64::from(self.spared / self.unspared)
-    }
-
-    /// Factor of the second moment if a spared camera path samples the whole path, of which `light` is the probability
-    /// that roulette lets the light path get as far. Unspared paths survive with about the light that is left.
-    fn without_light_path(self, light: f64) -> f64 {
-        let spared = |survival: f64| (survival / f64::from(SPARED_BY_ROULETTE)).min(1.0);
-        let camera = f64::from(self.unspared);
-        light * spared(camera) / spared(camera * light)
-    }
-}
-
-/// Probabilities that roulette lets a light path get as far as its vertices.
-struct LightSurvival(Vec<f32>);
-
-impl LightSurvival {
-    /// The probability for the vertex at `depth`, from 1.
-    fn at(&self, depth: u32) -> f32 {
-        self.0.get(depth as usize - 1).copied().unwrap_or(1.0)
-    }
-}
-
-impl PathRecorder for LightSurvival {
-    fn continues(&mut self, survival: impl Fn(f32) -> f32) {
-        let so_far = self.0.last().copied().unwrap_or(1.0);
-        self.0.push(so_far * survival(1.0));
-    }
-}
-
-/// Photons of an iteration, by the bits of their positions, with the probability that roulette lets the light path get
-/// there.
-#[derive(Default)]
-struct PhotonSurvival(Vec<([u32; 3], f32)>);
-
-impl PhotonSurvival {
-    fn push(&mut self, p: Vec3, survival: f32) {
-        self.0.push((p.to_array().map(f32::to_bits), survival));
-    }
-
-    /// Of photons at equal positions, any one.
-    fn of(&self, p: Vec3) -> f32 {
-        let bits = p.to_array().map(f32::to_bits);
-        self.0.binary_search_by_key(&bits, |(at, _)| *at).map_or(1.0, |index| self.0[index].1)
-    }
-}
-
 /// Records the contributions of a camera path.
 struct Contributions {
     list: Vec<Contribution>,
@@ -191,11 +132,7 @@ impl PathRecorder for Contributions {
     }
 
     fn continues(&mut self, survival: impl Fn(f32) -> f32) {
-        let CameraSurvival { spared, unspared } = &mut self.survival;
-        // A path that roulette has spared less often has a larger throughput.
-        let onward = survival(*unspared / (SPARED_BY_ROULETTE * *spared));
-        *spared *= survival(1.0);
-        *unspared *= onward;
+        self.survival.continues(survival);
     }
 
     fn arrival(&mut self, _: Technique, (class, _): (PathClass, Group), _: usize, value: Rgb, weight: f32) {
@@ -371,13 +308,13 @@ struct PhotonMaps {
 
 impl Photons {
     fn build(mut self) -> PhotonMaps {
-        self.survival.0.sort_unstable_by_key(|(at, _)| *at);
+        self.survival.sort();
         PhotonMaps { maps: self.lists.map(PhotonMap::build), survival: self.survival }
     }
 
     fn append(&mut self, row: &RowOutput) {
         (0..3).for_each(|k| self.lists[k].extend_from_slice(&row.photons[k]));
-        self.survival.0.extend_from_slice(&row.survival.0);
+        self.survival.append(&row.survival);
     }
 }
 
@@ -540,12 +477,11 @@ impl Walks<'_, '_> {
         let mut left: [Deposits; 3] = Default::default();
         let mut found = [(); 3].map(|()| Contributions::new());
         let mut sample = PixelSample::default();
-        let mut survival = LightSurvival(Vec::new());
+        let mut survival = LightSurvival::default();
         for k in [2, 1, 0] {
             let shared = &self.variants[k];
             let mut vertices = LightVertices::new_in(arena);
-            survival.0.clear();
-            survival.0.push(1.0);
+            survival.restart();
             if let Some(emitted) = &emitted {
                 shared.light_path(light_paths, emitted, false, &mut vertices, &mut left[k], &mut survival);
             }
