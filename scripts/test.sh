@@ -5,7 +5,7 @@
 #
 #   scripts/test.sh                     the tests that every change must pass
 #   scripts/test.sh --long              everything: also the tests marked long, and the hard cases by all methods
-#   scripts/test.sh --long-within 1300  also the tests marked long, if the others took fewer seconds than that
+#   scripts/test.sh --long-within 900  also the tests marked long, if the others took fewer seconds than that
 
 set -euo pipefail
 

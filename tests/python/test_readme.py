@@ -65,7 +65,7 @@ def anchors(page):
 
 def shortened(command):
     """A command shortened to seconds, by time limits and the width of pictures."""
-    command = re.sub(r"--time \S+", "--time 2", command)
+    command = re.sub(r"--time \S+", "--time 1", command)
     if re.match(rf"{PROGRAM} (render|plan|converge)\b", command) and "--help" not in command:
         command, widths = re.subn(r"--width \S+", "--width 64", command)
         if not widths:

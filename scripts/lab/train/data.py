@@ -41,8 +41,9 @@ PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
 # Least and greatest width of the picture of which a window is rendered. The light paths of vcm are as many as its
 # camera paths, so a window of a large picture would have too few of them.
 WIDTHS = {"sppm": (320, 1920), "vcm": (240, 480)}
-# Core-seconds of a target's half.
-TARGET_SECONDS = 16.0
+# Core-seconds of a target's half. Training averages over the noise of many targets, but errors on held-out views are
+# estimated from few.
+TARGET_SECONDS, HELD_OUT_SECONDS = 4.0, 16.0
 # Largest stored value; the maximum of float16 is 65504.
 LARGEST = 6e4
 # Least share of the pixels that are not black, and attempts to find a scene with that.
@@ -206,7 +207,8 @@ class Maker:
             settings["seed"] = 7000 + half
             self.render(scene, out, **settings, iterations=8)
             last = header_of(out)["history"][-1]
-            count = min(4 * math.ceil(2 * TARGET_SECONDS / max(last["cpu_seconds"], 1e-3)), 8192)
+            seconds = HELD_OUT_SECONDS if view.held_out else TARGET_SECONDS
+            count = min(4 * math.ceil(2 * seconds / max(last["cpu_seconds"], 1e-3)), 8192)
             picture = self.render(scene, out, **settings, resume=saved, iterations=max(count, 16))
             halves.append(rgb(picture, "") * np.float32(note["exposure"]))
             counts.append(header_of(out)["history"][-1]["iterations"])
