@@ -7,9 +7,11 @@ use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
 use caustique::light::Emitter;
+use caustique::math::Vec3;
 use caustique::options::SceneOptions;
 use caustique::pipeline::{FINISHED_PICTURE, Place};
 use caustique::scene::Scene;
+use caustique::scene::description::FileContents;
 use serde_json::{Map, Value, json};
 use std::fs::File;
 use std::io::Read;
@@ -185,26 +187,61 @@ fn scene_object(path: &Path, scene: &Scene) -> Value {
     let stored: usize = shapes.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     let materials: Vec<&str> = scene.materials.list.iter().map(|m| m.name.as_str()).collect();
     let cameras: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+    let textures = scene.materials.textures.iter();
+    let textures = textures.map(|t| json!({"name": t.name, "width": t.width, "height": t.height}));
     let mut lights = Map::new();
     for emitter in scene.lights.emitters() {
         let kind = kind(emitter);
         let count = lights.get(kind).and_then(Value::as_u64).unwrap_or(0);
         lights.insert(kind.into(), (count + 1).into());
     }
+    let FileContents { scenes, scene: shown, animations, variants, extensions } = &scene.contents;
     json!({
         "scene": path.display().to_string(),
+        "scenes": scenes,
+        "scene_shown": shown.map(|index| &scenes[index]),
+        "animations": animations,
+        "variants": variants,
+        "extensions": extensions,
         "objects": scene.objects,
+        "triangles_of_objects": triangles_of_objects(scene),
         "meshes": shapes.meshes.len(),
         "instances": shapes.instances.len(),
         "triangles": shapes.triangles(),
         "triangles_stored": stored,
         "materials": materials,
         "textures": scene.materials.textures.len(),
+        "texture_sizes": textures.collect::<Vec<Value>>(),
         "lights": lights,
+        "light_names": light_names(scene),
         "cameras": cameras,
+        "dimensions": dimensions(scene),
         "radius": scene.lights.sky().radius,
         "warnings": scene.warnings,
     })
+}
+
+/// Number of triangles of each object.
+fn triangles_of_objects(scene: &Scene) -> Vec<usize> {
+    let mut counts = vec![0; scene.objects.len()];
+    for instance in &scene.shapes.instances {
+        counts[instance.object as usize] += scene.shapes.meshes[instance.mesh as usize].triangles.len();
+    }
+    counts
+}
+
+/// Names of the lights: points, spots and suns, objects that emit light, and the environment.
+fn light_names(scene: &Scene) -> Vec<String> {
+    let mut names: Vec<String> = (0..scene.lights.emitters().len()).map(|index| scene.light_name(index)).collect();
+    // All triangles of an object have its name.
+    names.dedup();
+    names
+}
+
+/// Extents of the scene along X, Y and Z (m).
+fn dimensions(scene: &Scene) -> [f32; 3] {
+    let (low, high) = scene.shapes.bounds();
+    (high - low).max(Vec3::ZERO).to_array()
 }
 
 fn kind(emitter: &Emitter) -> &'static str {
@@ -220,26 +257,58 @@ fn kind(emitter: &Emitter) -> &'static str {
 /// Largest number of names of a kind (such as materials) that the text lists.
 const MAX_NAMES: usize = 24;
 
+/// The first names of a list, with their number.
+fn listed(names: &[String]) -> String {
+    match names.len() {
+        0 => "none".to_string(),
+        n if n <= MAX_NAMES => format!("{n}: {}", names.join(", ")),
+        n => format!("{n}: {} and {} more (all of them with --json)", names[..MAX_NAMES].join(", "), n - MAX_NAMES),
+    }
+}
+
 fn scene_text(path: &Path, object: &Value) -> String {
-    let names = |key: &str| {
-        let names: Vec<&str> = object[key].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-        match names.len() {
-            0 => "none".to_string(),
-            n if n <= MAX_NAMES => format!("{n}: {}", names.join(", ")),
-            n => format!("{n}: {} and {} more (all of them with --json)", names[..MAX_NAMES].join(", "), n - MAX_NAMES),
-        }
-    };
+    let list = |key: &str| object[key].as_array().into_iter().flatten();
+    let with = |key: &str, text: &dyn Fn(&Value) -> String| listed(&list(key).map(text).collect::<Vec<_>>());
+    let text_of = |value: &Value| value.as_str().unwrap_or_default().to_string();
+    let names = |key: &str| with(key, &text_of);
     let mut text = format!("{}\n", printable(&path.display().to_string()));
+    if list("scenes").count() > 1 {
+        text += &format!("  scenes     {}; shown: {}\n", names("scenes"), text_of(&object["scene_shown"]));
+    }
+    let number = |value: &Value| value.as_f64().unwrap_or(0.0);
+    let size: Vec<String> = list("dimensions").map(|length| format!("{:.3}", number(length))).collect();
+    text += &format!("  dimensions {} m (X, Y, Z)\n", size.join(" x "));
     text += &format!(
         "  triangles  {} in {} meshes, placed {} times\n",
         object["triangles"], object["meshes"], object["instances"]
     );
-    text += &format!("  objects    {}\n  materials  {}\n", names("objects"), names("materials"));
-    text += &format!("  textures   {}\n", object["textures"]);
+    let objects = list("objects").zip(list("triangles_of_objects"));
+    let objects: Vec<String> = objects.map(|(name, n)| format!("{} ({n} triangles)", text_of(name))).collect();
+    text += &format!("  objects    {}\n  materials  {}\n", listed(&objects), names("materials"));
+    let texture = |t: &Value| format!("{} ({} x {})", text_of(&t["name"]), t["width"], t["height"]);
+    text += &format!("  textures   {}\n", with("texture_sizes", &texture));
+    if list("animations").next().is_some() {
+        let animation = |value: &Value| match value["seconds"].as_array().map(Vec::as_slice) {
+            Some([start, end]) => format!("{} ({:.2} to {:.2} s)", text_of(&value["name"]), number(start), number(end)),
+            _ => text_of(&value["name"]),
+        };
+        text += &format!("  animations {}\n", with("animations", &animation));
+    }
+    if list("variants").next().is_some() {
+        text += &format!("  variants   {}\n", names("variants"));
+    }
     let lights = object["lights"].as_object().into_iter().flatten();
     let lights: Vec<String> = lights.map(|(kind, n)| format!("{kind} {n}")).collect();
-    text += &format!("  lights     {}\n", if lights.is_empty() { "none".into() } else { lights.join(", ") });
+    text += &match lights.is_empty() {
+        true => "  lights     none\n".into(),
+        false => format!("  lights     {}; {}\n", lights.join(", "), names("light_names")),
+    };
     text += &format!("  cameras    {}\n", names("cameras"));
+    if list("extensions").next().is_some() {
+        let fate = |value: &Value| if value["read"] == true { "read" } else { "ignored" };
+        let extension = |value: &Value| format!("{} ({})", text_of(&value["name"]), fate(value));
+        text += &format!("  extensions {}\n", with("extensions", &extension));
+    }
     for warning in object["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str) {
         text += &format!("warning: {warning}\n");
     }

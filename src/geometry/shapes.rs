@@ -2,6 +2,7 @@
 
 use super::mesh::PackedMesh;
 use super::{Instance, Mesh, Surface};
+use crate::math::Vec3;
 use crate::processor::prefetch;
 use std::sync::Arc;
 
@@ -32,6 +33,18 @@ impl Shapes {
             _ => PackedMesh::new(Arc::make_mut(mesh)),
         });
         Shapes { packed: packed.collect(), meshes, instances }
+    }
+
+    /// Vertices of all instances, in world space.
+    pub fn points(&self) -> impl Iterator<Item = Vec3> {
+        let positions = |instance: &Instance| self.meshes[instance.mesh as usize].positions.iter();
+        self.instances.iter().flat_map(move |instance| positions(instance).map(|p| instance.point(*p)))
+    }
+
+    /// The bounding box of all instances: its lowest and its highest corner. The first exceeds the second without
+    /// vertices.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.points().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
     }
 
     /// Number of triangles of all instances.

@@ -83,7 +83,11 @@ const NOT_IN_PYTHON: [(&str, &str); 13] = [
 ];
 
 /// Options that are arguments of Python's `Scene`, and their names there.
-const OF_SCENE: [(&str, &str); 11] = [
+const OF_SCENE: [(&str, &str); 15] = [
+    ("scene_name", "scene_name"),
+    ("animation", "animation"),
+    ("variant", "variant"),
+    ("pose", "pose"),
     ("frames", "frame"),
     ("frame_rate", "frame_rate"),
     ("shutter", "shutter"),

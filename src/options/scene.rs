@@ -4,7 +4,7 @@ use super::frames::{Frames, path_of_frame};
 use super::number::{Ranged, rgb, strength};
 use crate::pipeline::load::{Environment, SceneRequest};
 use crate::plan::Switches;
-use crate::scene::gltf::{self, Glass, LightUnits};
+use crate::scene::gltf::{self, Glass, LightUnits, Pose};
 use serde::{Serialize, Serializer};
 use std::ops::Bound::{Excluded, Unbounded};
 use std::path::{Path, PathBuf};
@@ -28,6 +28,22 @@ pub struct SceneOptions {
     #[arg(long, value_name = "FPS", between = (Excluded(0.0), Unbounded), requires = "frames", help_heading = "Picture")]
     #[arg(hide_short_help = true)]
     pub frame_rate: Option<f64>,
+    /// Name of the scene to render, in a file with several [default: the file's default scene]
+    #[arg(long = "scene", value_name = "NAME", help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
+    pub scene_name: Option<String>,
+    /// Name of the only animation that moves the scene [default: all do]
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
+    pub animation: Option<String>,
+    /// Name of the material variant to render (KHR_materials_variants) [default: the materials without a variant]
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
+    pub variant: Option<String>,
+    /// Pose of what the file animates: 'rest' is the file without its animations
+    #[arg(long, value_enum, default_value_t, help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
+    pub pose: Pose,
     /// Motion blur: when the shutter opens and closes, in frames relative to the frame, such as -0.25,0.25; 0 is none
     /// [default: what the scene says]
     #[arg(long, value_name = "OPEN,CLOSE", allow_hyphen_values = true, help_heading = "Picture")]
@@ -118,6 +134,10 @@ impl SceneOptions {
             path: path.into(),
             frames: None,
             frame_rate: None,
+            scene_name: None,
+            animation: None,
+            variant: None,
+            pose: Pose::default(),
             shutter: None,
             of_sequence: false,
             env: None,
@@ -167,6 +187,10 @@ impl SceneOptions {
             light_units: self.light_units,
             glass: self.glass,
             allow_outside: self.allow_outside,
+            scene: self.scene_name.clone(),
+            animation: self.animation.clone(),
+            variant: self.variant.clone(),
+            pose: self.pose,
             frame: self.frames.and_then(Frames::single).map(|number| gltf::FrameTime {
                 number,
                 rate: self.frame_rate,

@@ -51,6 +51,8 @@ pub struct Description {
     pub animated: bool,
     /// Times at which the shutter opens and closes, relative to the frame (frames); `None` without motion blur.
     pub shutter: Option<[f64; 2]>,
+    /// What the file offers to choose from, and its extensions.
+    pub contents: FileContents,
     /// Warnings about ignored or approximated features of the file, one sentence each: `material "glass": ...`.
     pub warnings: Vec<String>,
 }
@@ -61,6 +63,43 @@ impl Description {
     pub fn blur(&self) -> Option<[f64; 2]> {
         self.shutter.filter(|_| self.animated)
     }
+}
+
+/// What a glTF file offers to choose from, and the extensions that it uses.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct FileContents {
+    /// Names of its scenes; a scene without a name is called by its index, and so are animations.
+    pub scenes: Vec<String>,
+    /// Index of the scene that was read; `None` if the file has no scene, and all its nodes were read.
+    pub scene: Option<usize>,
+    /// Its animations.
+    pub animations: Vec<AnimationContents>,
+    /// Names of its material variants (KHR_materials_variants).
+    pub variants: Vec<String>,
+    /// The extensions that it uses, in the order of their names.
+    pub extensions: Vec<ExtensionContents>,
+}
+
+/// An animation of a glTF file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct AnimationContents {
+    /// Its name.
+    pub name: String,
+    /// Times of its first and its last key (seconds); `None` if the file does not state them.
+    pub seconds: Option<[f64; 2]>,
+}
+
+/// An extension that a glTF file uses.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExtensionContents {
+    /// Its name.
+    pub name: String,
+    /// Whether the file is invalid without it.
+    #[serde(rename = "required")]
+    pub is_required: bool,
+    /// Whether it is read; otherwise it is ignored.
+    #[serde(rename = "read")]
+    pub is_read: bool,
 }
 
 /// An instance of a mesh: its place, material and object.

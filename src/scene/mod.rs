@@ -29,7 +29,7 @@ use crate::light::{Emitter, Environment, Lights, TriangleLight};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
-use description::{CameraDescription, GuessedUnits, PictureDefaults};
+use description::{CameraDescription, FileContents, GuessedUnits, PictureDefaults};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -83,6 +83,8 @@ pub struct Scene {
     pub ranks: Arc<[u32]>,
     /// Stacks of solids, too deep for a path to carry, that paths have entered.
     pub solid_stacks: SolidStacks,
+    /// What the scene file offers to choose from, and its extensions.
+    pub contents: FileContents,
     /// Warnings about ignored or approximated features, from the reader and from [`Scene::build`].
     pub warnings: Vec<String>,
 }

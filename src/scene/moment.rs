@@ -86,6 +86,7 @@ impl<'a> MomentBuilder<'a> {
             light_names: scene.light_names.clone(),
             guessed_units: scene.guessed_units.clone(),
             environment_unknown: scene.environment_unknown,
+            contents: scene.contents.clone(),
             cameras: description.cameras,
             picture: scene.picture,
             shutter: scene.shutter,

@@ -110,8 +110,25 @@ fn info_lists_the_content_of_a_scene() {
     assert_eq!(json["cameras"], serde_json::json!(["Camera", "Side"]));
     assert_eq!(json["materials"], serde_json::json!(["stone", "silver"]));
     assert_eq!((&json["lights"]["point"], &json["warnings"]), (&1.into(), &serde_json::json!([])));
+    assert_eq!((&json["scenes"], &json["scene_shown"]), (&serde_json::json!(["0"]), &"0".into()));
+    assert_eq!(
+        (&json["dimensions"], &json["triangles_of_objects"]),
+        (&[10.0, 2.0, 10.0][..].into(), &[2, 2][..].into())
+    );
+    assert_eq!(json["light_names"], serde_json::json!(["light \"Lamp\""]));
+    let extension = serde_json::json!({"name": "KHR_lights_punctual", "required": false, "read": true});
+    assert_eq!(json["extensions"], serde_json::json!([extension]));
     let text = folder.run("info scene.glb").stdout;
-    assert!(text.contains("  cameras    2: Camera, Side\n"), "{text}");
+    for line in [
+        "  dimensions 10.000 x 2.000 x 10.000 m (X, Y, Z)",
+        "  objects    2: Floor (2 triangles), Mirror (2 triangles)",
+        "  textures   none",
+        "  lights     point 1; 1: light \"Lamp\"",
+        "  cameras    2: Camera, Side",
+        "  extensions 1: KHR_lights_punctual (read)",
+    ] {
+        assert!(text.contains(&format!("{line}\n")), "{line}: {text}");
+    }
     let outcome = folder.run("info nope");
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), "nope: No such file or directory (os error 2)\n"));
 }

@@ -4,6 +4,7 @@ pub mod glb;
 
 mod animation;
 mod bad_input;
+mod choice;
 pub mod everything;
 mod fuzz;
 mod geometry;

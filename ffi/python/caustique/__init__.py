@@ -61,6 +61,9 @@ class Scene(_native.Scene):
     glass                  'auto', 'solid' or 'thin': the kind of glass if the file does not say
     effects                effects to switch off or on, such as '-dispersion,+volume'
     frame                  frame of the file's animation
+    scene_name, animation, variant
+                           names of the scene, the only animation and the material variant to render
+    pose                   'animated', or 'rest': without any animation
     allow_outside          allow the scene to name files outside its own folder
     strict                 raise an error for anything that is ignored or approximated
     threads                threads that build the scene; 0 takes all cores

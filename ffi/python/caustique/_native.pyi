@@ -93,6 +93,10 @@ class Scene:
         effects: str | None = None,
         frame: int | None = None,
         frame_rate: float | None = None,
+        scene_name: str | None = None,
+        animation: str | None = None,
+        variant: str | None = None,
+        pose: Literal["animated", "rest"] = "animated",
         shutter: Sequence[float] | Literal[0] | None = None,
         allow_outside: bool = False,
         strict: bool = False,
@@ -102,6 +106,8 @@ class Scene:
     def warnings(self) -> list[str]: ...
     @property
     def cameras(self) -> list[str]: ...
+    @property
+    def contents(self) -> dict[str, Any]: ...
     def render(
         self,
         *,

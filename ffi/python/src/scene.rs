@@ -48,7 +48,8 @@ impl Scene {
     #[pyo3(
         signature = (source, **options),
         text_signature = "(source, *, environment=None, environment_rotation=None, environment_strength=None, \
-            light_units='auto', glass='auto', effects=None, frame=None, frame_rate=None, shutter=None, allow_outside=False, strict=False, threads=0)"
+            light_units='auto', glass='auto', effects=None, frame=None, frame_rate=None, \
+            scene_name=None, animation=None, variant=None, pose='animated', shutter=None, allow_outside=False, strict=False, threads=0)"
     )]
     fn new(py: Python<'_>, source: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
         let mut keywords = Keywords::of(py, "Scene", options);
@@ -93,6 +94,12 @@ impl Scene {
     #[getter]
     fn cameras(&self) -> Vec<String> {
         self.loaded.scene.cameras.iter().map(|camera| camera.name.clone()).collect()
+    }
+
+    /// The scenes, animations, material variants and extensions of the file, and the index of the scene that was read.
+    #[getter]
+    fn contents<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &json!(self.loaded.scene.contents))
     }
 
     // The signature and the text are generated from the definitions of the options: scripts/generate.sh.

@@ -188,7 +188,7 @@ fn later(
 }
 
 fn scene_extras(document: &Document) -> Result<SceneExtras> {
-    let index = document.default_scene()?;
+    let index = document.scene_index()?;
     let raw = document.part("scenes", index);
     extras::read(raw, &named("scene", raw["name"].as_str(), index))
 }
@@ -216,7 +216,7 @@ fn tracks(document: &Document, faults: FaultPolicy, warnings: &mut Vec<String>) 
     // The name of the animation that moves each pointer.
     let mut movers: HashMap<String, String> = HashMap::new();
     let mut tracks = Vec::new();
-    for (i, raw) in list.iter().enumerate() {
+    for (i, raw) in list.iter().enumerate().filter(|(i, _)| document.playing.plays(*i)) {
         let animation = match Animation::deserialize(raw) {
             Ok(animation) => animation,
             Err(e) => {
@@ -246,7 +246,7 @@ fn tracks(document: &Document, faults: FaultPolicy, warnings: &mut Vec<String>) 
                 }
                 Some(first) => {
                     let both = format!("{first} and {name} move the same value: {first} is used");
-                    warnings.push(format!("{both} (export without the other)"));
+                    warnings.push(format!("{both} (--animation chooses one)"));
                     continue;
                 }
                 None => movers.insert(pointer.clone(), name.clone()),

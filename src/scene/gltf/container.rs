@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
 /// Names of the glTF extensions that the reader supports.
-const SUPPORTED: [&str; 19] = [
+const SUPPORTED: [&str; 20] = [
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_animation_pointer",
@@ -24,6 +24,7 @@ const SUPPORTED: [&str; 19] = [
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
@@ -123,11 +124,7 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
             );
         }
     }
-    let listed = |key: &str| -> BTreeSet<String> {
-        let names = document[key].as_array().into_iter().flatten();
-        names.filter_map(|name| name.as_str().map(str::to_owned)).collect()
-    };
-    let required = listed("extensionsRequired");
+    let (used, required) = extensions(document);
     let unknown: Vec<&String> = required.iter().filter(|name| !is_supported(name)).collect();
     if let Some(first) = unknown.first() {
         let names: Vec<String> = unknown.iter().map(|name| format!("\"{name}\"")).collect();
@@ -138,12 +135,21 @@ pub(super) fn check(document: &Value, warnings: &mut Vec<String>) -> Result<()> 
         )
         .hint(remedy(first)));
     }
-    let mut used = listed("extensionsUsed");
-    collect_extensions(document, &mut used);
     for name in used.iter().filter(|name| !is_supported(name)) {
         warnings.push(format!("extension \"{name}\" is not supported and is ignored"));
     }
     Ok(())
+}
+
+/// Names of the glTF extensions that the document uses, listed or not, and of those that it requires.
+pub(super) fn extensions(document: &Value) -> (BTreeSet<String>, BTreeSet<String>) {
+    let listed = |key: &str| -> BTreeSet<String> {
+        let names = document[key].as_array().into_iter().flatten();
+        names.filter_map(|name| name.as_str().map(str::to_owned)).collect()
+    };
+    let (mut used, required) = (listed("extensionsUsed"), listed("extensionsRequired"));
+    collect_extensions(document, &mut used);
+    (used, required)
 }
 
 /// The error for a part of the document with an unsupported compression extension; `None` for other parts.

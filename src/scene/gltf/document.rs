@@ -1,5 +1,6 @@
 //! A glTF document: its parts as typed lists, and its raw JSON for extensions and extras.
 
+use super::choice::Playing;
 use super::container::{self, malformed};
 use super::{fault, uri};
 use crate::error::Result;
@@ -29,6 +30,10 @@ pub(super) struct Document<'a> {
     pub(super) images: Vec<json::Image>,
     pub(super) textures: Vec<json::Texture>,
     pub(super) samplers: Vec<json::texture::Sampler>,
+    /// Index of the scene that the user chooses; `None`: the default scene.
+    pub(super) chosen_scene: Option<usize>,
+    /// The animations that move the nodes.
+    pub(super) playing: Playing,
     /// Number of elements without data (zeros) that the file may still have.
     pub(super) zeros_left: Cell<u64>,
     /// Bytes that were allocated since free memory was last checked.
@@ -72,6 +77,8 @@ impl<'a> Document<'a> {
             samplers: parts(&raw, "samplers")?,
             raw,
             folder,
+            chosen_scene: None,
+            playing: Playing::All,
             zeros_left: Cell::new(MAX_ZEROS),
             unchecked_bytes: Cell::new(0),
             buffers: Vec::new(),
@@ -121,8 +128,11 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Index of the document's default scene.
-    pub(super) fn default_scene(&self) -> Result<usize> {
+    /// Index of the scene to read: the chosen one, or the document's default scene.
+    pub(super) fn scene_index(&self) -> Result<usize> {
+        if let Some(chosen) = self.chosen_scene {
+            return Ok(chosen);
+        }
         let Some(value) = self.raw.get("scene") else { return Ok(0) };
         let index = value.as_u64().and_then(|i| usize::try_from(i).ok());
         let index = index.ok_or_else(|| fault("scene", "the default scene is not an index"))?;

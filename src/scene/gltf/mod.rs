@@ -11,6 +11,7 @@
 
 mod accessor;
 mod animation;
+mod choice;
 mod clipping;
 mod container;
 mod curve;
@@ -86,8 +87,20 @@ pub struct FrameTime {
     pub of_sequence: bool,
 }
 
+/// Pose of the parts that a file animates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Pose {
+    /// As the animations place them at the frame
+    #[default]
+    Animated,
+    /// As the file places its nodes, without any animation
+    Rest,
+}
+
 /// Choices of the user for properties that a file may leave open.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct ReadOptions {
     /// Units of punctual lights.
     pub light_units: LightUnits,
@@ -95,6 +108,14 @@ pub struct ReadOptions {
     pub glass: Glass,
     /// Whether the scene may name files outside its own folder.
     pub allow_outside: bool,
+    /// Name of the scene to read; `None`: the file's default scene.
+    pub scene: Option<String>,
+    /// Name of the only animation that moves the scene; `None`: all move it.
+    pub animation: Option<String>,
+    /// Name of the material variant (KHR_materials_variants); `None`: each primitive's own material.
+    pub variant: Option<String>,
+    /// Pose of the parts that the file animates.
+    pub pose: Pose,
     /// The frame to read; `None`: the time of the first key of all animations.
     pub frame: Option<FrameTime>,
     /// Times at which the shutter opens and closes, relative to the frame (frames); `None`: those of the file.
@@ -149,7 +170,7 @@ impl MovingFile {
     ) -> Result<(Description, Option<MovingFile>)> {
         let (description, shared) = nodes::describe(&bytes, path, options).map_err(|e| e.within(path.display()))?;
         let moves = description.blur().is_some();
-        let file = || MovingFile { path: path.to_owned(), bytes: bytes.into_owned(), options: *options, shared };
+        let file = || MovingFile { path: path.to_owned(), bytes: bytes.into_owned(), options: options.clone(), shared };
         Ok((description, moves.then(file)))
     }
 

@@ -11,7 +11,7 @@ use super::mesh::MAX_COORDINATE;
 use super::shells;
 use super::topology::Solid;
 use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
-use super::{ReadOptions, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
+use super::{Pose, ReadOptions, choice, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
@@ -41,19 +41,44 @@ pub(super) fn parse<'a>(
     options: &ReadOptions,
     warnings: &mut Vec<String>,
 ) -> Result<Document<'a>> {
-    Document::parse(bytes, Folder::of(path, options.allow_outside), warnings)
+    let mut document = Document::parse(bytes, Folder::of(path, options.allow_outside), warnings)?;
+    choice::apply(&mut document, options)?;
+    Ok(document)
 }
 
-/// Reads the bytes of a file into a description. Also returns the parts that other moments of the scene share.
+/// Reads the bytes of a file into a description. Also returns the parts that other moments of the scene share. If an
+/// animation makes the scene invalid, and no frame is given, the file is read without its animations.
 pub(super) fn describe(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<(Description, Shared)> {
+    let mut animated = false;
+    describe_pose(bytes, path, options, &mut animated).or_else(|fault| {
+        if options.frame.is_some() || !animated {
+            return Err(fault);
+        }
+        let rest = ReadOptions { pose: Pose::Rest, ..options.clone() };
+        let Ok((mut out, shared)) = describe_pose(bytes, path, &rest, &mut animated) else { return Err(fault) };
+        out.warnings.insert(0, format!("its animations are ignored, because with them it cannot be read: {fault}"));
+        Ok((out, shared))
+    })
+}
+
+/// Reads the bytes of a file into a description, in the pose that `options` ask for. Sets `animated` if animations move
+/// the scene.
+fn describe_pose(
+    bytes: &[u8],
+    path: &Path,
+    options: &ReadOptions,
+    animated: &mut bool,
+) -> Result<(Description, Shared)> {
     let mut warnings = Vec::new();
     let mut document = parse(bytes, path, options, &mut warnings)?;
     let tracks = Tracks::read(&document, options.frame, &mut warnings)?;
+    *animated = !tracks.is_empty();
     tracks.apply(&mut document, 0.0, &mut warnings)?;
     let moving = tracks.moving_parts();
     let mut reader = Reader::new(&document, path, options, (!tracks.is_empty()).then_some(&moving));
     reader.out.warnings = warnings;
     reader.scene()?;
+    reader.out.contents = choice::contents(&document);
     let Reader { library, mut out, clips, bounds, meshes, divisors, flipped, .. } = reader;
     if library.occluded > 0 {
         let n = library.occluded;
@@ -204,7 +229,7 @@ impl<'r> Reader<'r> {
             clips: Vec::new(),
             divisors: None,
             flipped: HashSet::new(),
-            options: *options,
+            options: options.clone(),
             scene: SceneExtras::default(),
             out: Description { source: path.to_owned(), ..Description::default() },
         }
@@ -212,7 +237,7 @@ impl<'r> Reader<'r> {
 
     fn scene(&mut self) -> Result<()> {
         let document = self.document;
-        let index = document.default_scene()?;
+        let index = document.scene_index()?;
         let roots = match document.scenes.get(index) {
             Some(scene) => scene.nodes.iter().map(|n| n.value()).collect(),
             None => self.root_nodes(),

@@ -8,7 +8,7 @@ mod python;
 pub use python::Interpreter;
 
 use super::description::Description;
-use super::gltf::{self, FrameTime, ReadOptions};
+use super::gltf::{self, FrameTime, Pose, ReadOptions};
 use crate::error::{Error, ErrorKind, Result};
 use crate::memory;
 use crate::stop::Stop;
@@ -58,6 +58,7 @@ pub fn is_stage(path: &Path) -> bool {
 /// There is no Python with `usd-core`, the stage is invalid (the error names the prim), [`gltf::read`] of the converted
 /// file fails, or `stop` ends the conversion.
 pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -> Result<Description> {
+    check_choices(path, options)?;
     let converter = Converter::new(path)?;
     let glb = converter.folder.path().join("stage.glb");
     let mut arguments: Vec<OsString> = vec!["-o".into(), glb.clone().into()];
@@ -68,7 +69,7 @@ pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -
     converter.run(&arguments, options.allow_outside, stop)?;
     // The converter has applied the frame, and has copied the files that the stage names beside the .glb.
     let frame = options.frame.map(|frame| FrameTime { of_sequence: true, ..frame });
-    let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..*options });
+    let read = gltf::read(&glb, &ReadOptions { frame, allow_outside: false, ..options.clone() });
     let mut description = read.map_err(|mut error| {
         error.place = error.place.replace(&glb.display().to_string(), &path.display().to_string());
         error
@@ -79,6 +80,20 @@ pub fn read(path: &Path, options: &ReadOptions, after_frame: f64, stop: &Stop) -
     // The converted file contains the layers, textures and other files of the stage.
     description.converted = Some(gltf::hash(&glb, false)?);
     Ok(description)
+}
+
+/// Rejects options that choose among the parts of a glTF file.
+fn check_choices(path: &Path, options: &ReadOptions) -> Result<()> {
+    let ReadOptions { scene, animation, variant, pose, .. } = options;
+    let given = [
+        ("scene", scene.is_some()),
+        ("animation", animation.is_some()),
+        ("variant", variant.is_some()),
+        ("pose rest", *pose == Pose::Rest),
+    ];
+    let Some((option, _)) = given.into_iter().find(|(_, given)| *given) else { return Ok(()) };
+    let error = Error::new(ErrorKind::Usage, path.display(), format!("--{option} is for glTF files, not for stages"));
+    Err(error.hint("choose what the stage shows in the stage itself; --frames chooses the time"))
 }
 
 /// The stage's RenderSettings as options of `caustique render`.

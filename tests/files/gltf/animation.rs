@@ -174,8 +174,8 @@ fn the_first_of_two_actions_is_played() {
     channel(&mut file, 1, json!({"node": 0, "path": "translation"}), "STEP", &[0.0], &[[9.0; 3]]);
     let scene = at(&file, 1.0).unwrap();
     near(scene.instances[0].to_world.translation, DVec3::new(3.0, 8.0, 0.0));
-    let both = "animation \"act\" and animation \"other\" move the same value: animation \"act\" is used (export without \
-                the other)";
+    let both = "animation \"act\" and animation \"other\" move the same value: animation \"act\" is used (--animation \
+                chooses one)";
     assert_eq!(scene.warnings, [both]);
 }
 

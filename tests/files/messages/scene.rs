@@ -4,7 +4,8 @@ use super::{Said, message};
 use crate::gltf::everything::everything;
 use crate::gltf::glb::{CUBE, Glb};
 use crate::gltf::images::{jpegs, wearing};
-use caustique::scene::gltf::{FrameTime, ReadOptions, read, read_bytes};
+use caustique::scene::gltf::{FrameTime, Pose, ReadOptions, read, read_bytes};
+use caustique::stop::Stop;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -59,6 +60,8 @@ pub fn changed(base: &Glb, changes: &Value) -> Vec<String> {
     for (place, value) in changes.as_object().expect("changes") {
         match &**place {
             "frame" => options.frame = Some(FrameTime { number: 12, rate: None, of_sequence: false }),
+            "scene" => options.scene = value.as_str().map(str::to_owned),
+            "variant" => options.variant = value.as_str().map(str::to_owned),
             place if place.starts_with('#') => put_number(&mut file, place, value),
             place => put(&mut file.json, place, value.clone()),
         }
@@ -118,6 +121,9 @@ pub fn said() -> String {
     for (what, bytes) in containers() {
         said.case(what, &messages_of(&bytes, &ReadOptions::default()));
     }
+    let rest = ReadOptions { pose: Pose::Rest, ..ReadOptions::default() };
+    let stage = caustique::scene::usd::read(Path::new("a.usda"), &rest, 0.0, &Stop::default());
+    said.case("the rest pose of a stage", &[message(&stage.expect_err("it has none"))]);
     let missing = read(Path::new("/nowhere/a.glb"), &ReadOptions::default()).expect_err("it is not there");
     said.case("no such file", &[message(&missing)]);
     said.0
@@ -171,6 +177,13 @@ fn parts() -> Cases {
         ("Draco required", json!({"/extensionsRequired": ["KHR_draco_mesh_compression"]})),
         ("meshopt required", json!({"/extensionsRequired": ["EXT_meshopt_compression"]})),
         ("extensions used", json!({"/extensionsUsed": ["EXT_one"]})),
+        ("no such scene", json!({"scene": "other"})),
+        ("no variant", json!({"variant": "red"})),
+        (
+            "a variant of no material",
+            json!({"variant": "red", "/extensions/KHR_materials_variants/variants": [{"name": "red"}],
+                "/meshes/0/primitives/0/extensions/KHR_materials_variants/mappings": [{"variants": [0]}]}),
+        ),
     ]
 }
 
@@ -217,6 +230,7 @@ fn shapes(everything: &Glb) -> Cases {
         ("keys that fall", json!({"#11.0": 2})),
         ("values left over", json!({"/accessors/12/count": 1})),
         ("a key that is no number", json!({"#12.1": "inf"})),
+        ("a weight beyond all", json!({"#12.0": 1e38})),
         ("weights of others", json!({"/meshes/2/weights": [1, 2], "/animations": []})),
         ("colours that move", json!({"/meshes/2/primitives/0/targets/0/COLOR_0": 9, "#12.0": 1})),
         ("normals that stay", json!({"/meshes/2/primitives/0/targets/0": {"POSITION": 9}, "#12.0": 1})),
