@@ -2,6 +2,9 @@
 
 mod support;
 
+#[path = "files/gltf/glb.rs"]
+mod glb;
+
 #[path = "cli/blur.rs"]
 mod blur;
 #[path = "cli/checkpoints.rs"]
@@ -32,6 +35,8 @@ mod rejected;
 mod running;
 #[path = "cli/usage.rs"]
 mod usage;
+#[path = "cli/vectors.rs"]
+mod vectors;
 
 use caustique::film::LayerSet;
 use caustique::image::exr;

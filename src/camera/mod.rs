@@ -6,7 +6,7 @@ mod tiles;
 pub use filter::{Filter, MAX_FILTER_WIDTH};
 pub use tiles::{GROUP_SIZE, TilePixel, par_pixels, pixels_per_band};
 
-use crate::math::{DMat3, DMat4, DVec3, DVec4, Mat3, Vec2, Vec3, warp};
+use crate::math::{DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, Vec2, Vec3, warp};
 use std::f32::consts::PI;
 
 /// Perspective or orthographic projection, with the size of the film.
@@ -316,6 +316,18 @@ impl Camera {
         (p - self.position).dot(self.forward())
     }
 
+    /// Projects the point `p` through the centre of the lens. Returns its place in the whole picture: x from the left and
+    /// y from the top, 0 to 1 within the picture. `None` if a perspective camera has the point behind it.
+    pub fn project(&self, p: DVec3) -> Option<DVec2> {
+        let local = self.rotation.as_dmat3().transpose() * (p - self.position.as_dvec3());
+        let (half, distance) = match self.projection {
+            Projection::Perspective(half) => (half, -local.z),
+            Projection::Orthographic(half) => (half, 1.0),
+        };
+        let plane = (local.truncate() / distance - self.offset.as_dvec2()) / half.as_dvec2();
+        (distance > 0.0).then(|| DVec2::new(1.0 + plane.x, 1.0 - plane.y) * 0.5)
+    }
+
     /// Connects the point `p` to the lens; `lens` is a point of the unit square that samples it. `None` if `p` is out
     /// of view.
     ///
@@ -415,6 +427,10 @@ mod tests {
                 assert!((sample.film - film).length() < 2e-2, "{film} {}", sample.film);
                 assert!((sample.wi + ray.direction).length() < 1e-4);
                 assert!((sample.lens - ray.origin).length() < 1e-3);
+                if lens_radius == 0.0 {
+                    let projected = camera.project(p.as_dvec3()).unwrap().as_vec2() * Vec2::new(160.0, 90.0);
+                    assert!((projected - film).length() < 2e-2, "{film} {projected}");
+                }
                 let distance2 = if camera.is_orthographic() { 1.0 } else { (p - sample.lens).length_squared() };
                 assert!((sample.importance * distance2 / camera.pdf_w(ray.direction) - 1.0).abs() < 1e-3);
             }

@@ -11,6 +11,9 @@ pub const COMBINED: &str = "Combined";
 /// Prefixes of the names of the cryptomatte layers of objects and of materials.
 pub const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
 
+/// Name of the layer with motion vectors.
+pub const MOTION: &str = "Motion";
+
 /// The suffix of a layer's name, which follows the name of the layer's kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suffix {
@@ -38,7 +41,8 @@ pub enum Merge {
     Error,
     /// Counts: the sum over renders.
     Sum,
-    /// The first render's values: distances, which have no mean with the background, and bandwidths.
+    /// The first render's values: distances, which have no mean with the background, bandwidths, and motion vectors, which
+    /// all renders share.
     First,
     /// Cryptomatte ranks: coverages are added for each id.
     Matte,
@@ -120,7 +124,7 @@ impl LayerKind {
         LayerKind { name, meaning, suffix, merge, components: "X", unit: "m", ..LayerKind::COLOUR }
     }
 
-    /// The kind of a distance or position, taken from the first of merged renders.
+    /// The kind of a distance, position or motion, taken from the first of merged renders.
     const fn first(name: &'static str, components: &'static str, meaning: &'static str) -> LayerKind {
         LayerKind { name, components, unit: "m", meaning, merge: Merge::First, ..LayerKind::COLOUR }
     }
@@ -249,6 +253,17 @@ pub static LAYERS: &[LayerKind] = &[
         finish: Some(Use::Picture),
         blender: Some("Denoising Depth"),
         ..LayerKind::first("depth", "Z", "distance along the path to that hit; 1e10 where there is none")
+    },
+    LayerKind {
+        on_request: true,
+        blender: Some("Vector"),
+        unit: "pixels",
+        ..LayerKind::first(
+            MOTION,
+            "XYZW",
+            "motion at that hit: place in the previous frame less that in this one, and place in this frame less that in \
+             the next, y up; only if asked for by name",
+        )
     },
     LayerKind {
         compositing: true,

@@ -140,8 +140,8 @@ fn fault(layer: &Layer, component: &str, naming: Naming, length: usize) -> Optio
     if !starts_well || !letters.all(|c| c.is_ascii_alphanumeric() || c == '_') {
         return Some("a layer's name is a letter, then letters, digits or _");
     }
-    if component.len() != 1 || !component.chars().all(|c| "RGBAXYZUVrgba".contains(c)) {
-        return Some("a component is one of R G B A, X Y Z, U V, r g b a");
+    if component.len() != 1 || !component.chars().all(|c| "RGBAXYZWUVrgba".contains(c)) {
+        return Some("a component is one of R G B A, X Y Z W, U V, r g b a");
     }
     if layer.planes.len() > 4 {
         return Some("Nuke holds at most four components a layer");

@@ -7,7 +7,7 @@ use crate::error::{Error, ErrorKind, Result};
 /// The layers to write, the value of `--layers`.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub enum Selection {
-    /// Every layer except `Quarter1` to `Quarter4`.
+    /// Every layer except `Motion` and `Quarter1` to `Quarter4`.
     #[default]
     All,
     /// The beauty alone.

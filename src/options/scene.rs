@@ -197,6 +197,7 @@ impl SceneOptions {
                 of_sequence: self.of_sequence,
             }),
             shutter: self.shutter.map(|Shutter(times)| times),
+            motion_vectors: false,
         }
     }
 }

@@ -41,7 +41,7 @@ pub fn check_picture(picture: &PictureRequest<'_>, path: &Path, scene: &Scene) -
 pub(super) fn check(request: &Request<'_>, scene: &Scene) -> Result<Checked> {
     let checked = check_picture(&request.picture, &request.scene.path, scene)?;
     let (shape, finishes) = (layer_shape(&checked.settings, scene), request.finish.is_some());
-    layers::check(&request.layers, &shape, finishes)?;
+    layers::check(&request.layers, &shape, finishes, true)?;
     layers::check_names(&request.layers, &shape, finishes, request.naming)?;
     let view = View::new(scene, &checked.camera);
     let memory = MemoryCheck { view, method: request.picture.method.name(), finishes, limit: request.memory };

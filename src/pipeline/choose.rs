@@ -64,7 +64,7 @@ pub(super) fn choose_for_render(
     observer: &mut dyn Observer,
 ) -> Result<Chosen> {
     let (layers, finishes) = (&request.layers, request.finish.is_some());
-    let has_layers = |of: &Settings| layers::check(layers, &layer_shape(of, view.scene), finishes).is_ok();
+    let has_layers = |of: &Settings| layers::check(layers, &layer_shape(of, view.scene), finishes, true).is_ok();
     let method = &mut request.picture.method;
     let chosen = if let MethodRequest::Auto(_) = method {
         let stop = observer.stop();

@@ -10,7 +10,7 @@ use super::shard::ShardSums;
 use super::worst::{Visible, Worst};
 use crate::error::{Error, Result};
 use crate::estimator::PixelAccumulator;
-use crate::film::{LayerSet, Naming, Selection};
+use crate::film::{Layer, LayerSet, MOTION, Naming, Selection};
 use crate::finish::{ERROR, Finished, FinishedError, reads};
 use crate::image::exr::{self, Attributes};
 use crate::render::{Accuracy, CONFIDENCE, Clock, HistoryEntry, Rendered, TechniquePicture, cpu_seconds, peak_memory};
@@ -222,6 +222,9 @@ impl Layers {
         let wanted = |name: &str| selection.wants(name) || name.is_empty() || (finishes && reads(name));
         let mut set = rendered.layers(&facts.shape, wanted)?;
         let mut attributes = layers::add_cryptomattes(&facts.names, &rendered, selection, *naming, &mut set)?;
+        if let Some(motion) = facts.motion.as_ref().filter(|_| selection.wants(MOTION)) {
+            set.push(Layer::interleaved(MOTION, "XYZW", motion.iter().copied()))?;
+        }
         attributes.frame = Some(facts.frame);
         attributes.moment = exr::Moment { number: facts.made_for.frame, rate: facts.made_for.frame_rate };
         let techniques = std::mem::take(&mut rendered.techniques);

@@ -24,6 +24,8 @@ pub struct SceneFacts {
     pub frame: exr::Frame,
     /// Warnings from reading the scene.
     pub warnings: Vec<String>,
+    /// Motion vectors of the pixels, row by row from the top; `None` unless the user has asked for them.
+    pub(super) motion: Option<Vec<[f32; 4]>>,
     /// Frame, frame rate, exposure and tone curve that the scene asks for.
     pub made_for: PictureDefaults,
 }
@@ -43,6 +45,7 @@ impl SceneFacts {
             names: SceneNames::of(scene),
             frame: exr::Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc },
             warnings: scene.warnings.clone(),
+            motion: None,
             made_for: scene.picture,
         })
     }
@@ -58,5 +61,6 @@ impl SceneFacts {
             && (groups.is_empty() || method.has_techniques() && groups.len() <= MAX_GROUPS)
             && inside(x, part.size.0, width.min(MAX_SIZE))
             && inside(y, part.size.1, height.min(MAX_SIZE))
+            && self.motion.as_ref().is_none_or(|motion| motion.len() == part.size.0 as usize * part.size.1 as usize)
     }
 }

@@ -5,7 +5,7 @@ use crate::estimator::PixelAccumulator;
 use crate::film::cryptomatte::{Cryptomatte, PixelRanks, RANKS};
 use crate::film::output::{self, Shape};
 use crate::film::{
-    self, CRYPTOMATTES, Layer, LayerSet, Naming, Plane, Sample, Selection, describe, finished_part, part_names,
+    self, CRYPTOMATTES, Layer, LayerSet, MOTION, Naming, Plane, Sample, Selection, describe, finished_part, part_names,
 };
 use crate::image::exr::Attributes;
 use crate::render::Rendered;
@@ -33,12 +33,13 @@ pub fn channels(shape: &Shape) -> usize {
     names(shape, true).iter().filter_map(|name| describe(name)).map(|layer| layer.components.len()).sum()
 }
 
-/// Checks that a render of this shape has all layers of a selection.
+/// Checks that a render of this shape has all layers of a selection. `motion`: whether it has motion vectors.
 ///
 /// # Errors
 /// The render has no such layer.
-pub(super) fn check(selection: &Selection, shape: &Shape, finished: bool) -> Result<()> {
+pub(super) fn check(selection: &Selection, shape: &Shape, finished: bool, motion: bool) -> Result<()> {
     let all = names(shape, finished).into_iter().chain(black(selection, shape, finished));
+    let all = all.chain(motion.then(|| MOTION.into()));
     let layers = all.map(|name| Layer { name, planes: vec![] }).collect();
     selection.apply(LayerSet { width: 0, height: 0, layers }).map(drop)
 }

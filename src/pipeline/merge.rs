@@ -65,14 +65,18 @@ impl Shards {
     /// The file that does not belong to the others and why, or the number of a missing shard.
     pub fn open(paths: &[PathBuf], partial: bool) -> Result<Shards> {
         let mut files: Vec<(PathBuf, ShardFile)> = Vec::new();
+        // All shards have the same motion vectors, and one copy is kept.
+        let mut motion = None;
         for path in paths {
-            let Some(file) = ShardFile::open(path)? else {
+            let Some(mut file) = ShardFile::open(path)? else {
                 let error = Error::new(ErrorKind::Usage, path.display(), "is no shard of a render");
                 return Err(error.hint("merge files that --shard I/N made, or whole renders of other seeds alone"));
             };
             if let Some((first, whole)) = files.first() {
                 check_same_render((first, whole), (path, &file))?;
             }
+            let own = file.facts.motion.take();
+            motion = motion.or(own);
             files.push((path.clone(), file));
         }
         let index = |file: &ShardFile| file.part.settings.shard.index;
@@ -82,6 +86,9 @@ impl Shards {
             return Err(Error::new(ErrorKind::Usage, b.display(), cause).hint("name each shard once"));
         }
         let count = files.first().map_or(0, |(_, file)| file.part.settings.shard.count);
+        if let Some((_, first)) = files.first_mut() {
+            first.facts.motion = motion;
+        }
         let missing: Vec<u64> =
             (0..count).filter(|shard| files.binary_search_by_key(shard, |(_, file)| index(file)).is_err()).collect();
         if !partial {
@@ -127,7 +134,7 @@ impl Shards {
         let part = ShardResult::merge(&parts).ok_or_else(none)?;
         let (facts, plan) =
             files.first().map(|(_, file)| (file.facts.clone(), file.head.plan.clone())).ok_or_else(none)?;
-        layers::check(&request.layers, &facts.shape, request.finish.is_some())?;
+        layers::check(&request.layers, &facts.shape, request.finish.is_some(), facts.motion.is_some())?;
         let levels = Some(part.settings.levels.count);
         let mut finish = request.finish.as_ref().map(|wanted| finish::open(wanted, levels)).transpose()?;
         let mut pixels: Vec<PixelAccumulator> = Vec::new();

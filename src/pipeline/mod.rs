@@ -21,6 +21,7 @@ pub mod load;
 pub mod memory;
 pub mod merge;
 mod motion;
+mod motion_vectors;
 mod observer;
 pub mod plan;
 mod prepare;
@@ -45,10 +46,12 @@ pub use request::{AutoRequest, MethodRequest, PictureRequest, Request, Saving};
 pub use worst::{Place, Tile, Worst};
 
 use crate::error::Result;
+use crate::film::MOTION;
 use crate::render::{Motion, RenderInput, Rendered};
 use crate::scene::View;
 use check::Checked;
 use motion::{MovingScene, few_moments};
+use motion_vectors::motion_vectors;
 use observer::during;
 use resume::Resumption;
 use run::Running;
@@ -58,8 +61,9 @@ use run::Running;
 ///
 /// # Errors
 /// The scene; options that contradict it; memory; a stop before the first iteration; a scene that the observer rejects.
-pub fn render(request: Request<'_>, observer: &mut dyn Observer) -> Result<Delivery> {
+pub fn render(mut request: Request<'_>, observer: &mut dyn Observer) -> Result<Delivery> {
     let stop = observer.stop();
+    request.scene.options.motion_vectors = request.layers.wants(MOTION);
     let loaded = during(Phase::Reading, observer, |_| load::load(&request.scene, rayon::current_num_threads(), &stop))?;
     render_loaded(request, &loaded, observer)
 }
@@ -80,6 +84,7 @@ pub fn render_loaded(mut request: Request<'_>, loaded: &Loaded, observer: &mut d
     let planned = plan::plan_render(&request, &chosen, view, &loaded.removed)?;
     let prepared = prepare::prepare(&request, planned, view, observer)?;
     let mut facts = SceneFacts::new(view.scene, &request.picture.camera, &prepared.settings)?;
+    facts.motion = motion_vectors(&request, view, loaded.file.as_ref(), &observer.stop())?;
     let motion = MovingScene::new(&request, view, loaded.file.as_ref(), observer.stop())?;
     let stage = RenderInput::new(view.scene, view.camera, &prepared.settings)
         .with_motion(motion.as_ref().map(|motion| motion as &dyn Motion));

@@ -16,7 +16,7 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// The last bytes of the file of a shard (a part of a render's iterations).
-pub const MARK: &[u8; 8] = b"caustqS4";
+pub const MARK: &[u8; 8] = b"caustqS5";
 /// Bytes of the length and the mark at the end of a shard's file.
 const END_BYTES: i64 = 16;
 

@@ -93,7 +93,15 @@ impl Scene {
     /// # Errors
     /// No camera has the name, or the size is zero or too large.
     pub fn whole_camera(&self, request: &CameraRequest) -> Result<Camera> {
-        let described = self.described_camera(request.camera.as_deref())?;
+        self.whole_camera_among(&self.cameras, request)
+    }
+
+    /// Does the work of [`Scene::whole_camera`] for `cameras`, which are those of the scene at another time.
+    ///
+    /// # Errors
+    /// As for [`Scene::whole_camera`].
+    pub(super) fn whole_camera_among(&self, cameras: &[CameraDescription], request: &CameraRequest) -> Result<Camera> {
+        let described = self.described_camera(cameras, request.camera.as_deref())?;
         let (width, height) = self.picture_size(request, described.projection)?;
         let film_aspect = width as f32 / height as f32;
         let projection = match described.projection {
@@ -117,13 +125,17 @@ impl Scene {
         Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
     }
 
-    /// The camera called `name`; without a name the scene's first camera, or a default one if it has none.
-    fn described_camera(&self, name: Option<&str>) -> Result<Cow<'_, CameraDescription>> {
+    /// The camera called `name` among `cameras`; without a name the first of them, or a default one if it has none.
+    fn described_camera<'c>(
+        &self,
+        cameras: &'c [CameraDescription],
+        name: Option<&str>,
+    ) -> Result<Cow<'c, CameraDescription>> {
         let Some(name) = name else {
-            return Ok(self.cameras.first().map_or_else(|| Cow::Owned(self.default_camera()), Cow::Borrowed));
+            return Ok(cameras.first().map_or_else(|| Cow::Owned(self.default_camera()), Cow::Borrowed));
         };
-        self.cameras.iter().find(|camera| camera.name == name).map(Cow::Borrowed).ok_or_else(|| {
-            let names: Vec<String> = self.cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
+        cameras.iter().find(|camera| camera.name == name).map(Cow::Borrowed).ok_or_else(|| {
+            let names: Vec<String> = cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
             let error =
                 Error::new(ErrorKind::Usage, self.source.display(), format_args!("there is no camera \"{name}\""));
             error.hint(if names.is_empty() {

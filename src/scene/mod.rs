@@ -11,6 +11,7 @@ mod folder;
 pub mod gltf;
 mod moment;
 mod nesting;
+mod pose;
 mod survey;
 pub mod usd;
 mod view;
@@ -20,6 +21,7 @@ pub use contacts::Contacts;
 pub use description::Description;
 pub use moment::MomentBuilder;
 pub use nesting::{EMPTY_STACK, SolidStack, SolidStacks};
+pub use pose::{Pose, TrianglePoint};
 pub use survey::Survey;
 pub use view::View;
 

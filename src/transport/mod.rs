@@ -30,6 +30,7 @@ mod segment;
 mod shares;
 mod vertex;
 mod vertex_counts;
+mod visible;
 mod volume;
 mod walk;
 
@@ -57,5 +58,6 @@ pub use segment::{
 };
 pub use vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 pub use vertex_counts::VertexCounts;
+pub use visible::visible_surface;
 pub use volume::Volume;
 pub use walk::{PathStart, walk};

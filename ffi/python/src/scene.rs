@@ -71,6 +71,8 @@ impl Scene {
         let identity = Identity::of(py, bytes.is_none(), options)?;
         let mut request = scene_options.request();
         request.environment = array.or(request.environment);
+        // Whether a render will ask for motion vectors is not known yet.
+        request.options.motion_vectors = true;
         let done = work(py, threads, |_| match &bytes {
             Some(bytes) => load_bytes(bytes, &request, rayon::current_num_threads()),
             None => load(&request, rayon::current_num_threads(), &Stop::default()),

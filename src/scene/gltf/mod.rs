@@ -120,6 +120,8 @@ pub struct ReadOptions {
     pub frame: Option<FrameTime>,
     /// Times at which the shutter opens and closes, relative to the frame (frames); `None`: those of the file.
     pub shutter: Option<[f64; 2]>,
+    /// Whether the scene is read again at the frames around its frame, for motion vectors.
+    pub motion_vectors: bool,
 }
 
 /// Reads the scene file at `path`. The buffers, textures and environment that it names must be in its folder, unless
@@ -140,16 +142,20 @@ pub fn read_bytes(bytes: &[u8], path: &Path, options: &ReadOptions) -> Result<De
     Ok(MovingFile::from_bytes(bytes.into(), path, options)?.0)
 }
 
-/// A scene file in which something moves while the shutter is open.
+/// A scene file that is read again at other moments: something moves while the shutter is open, or motion vectors are to
+/// be computed.
 pub struct MovingFile {
     path: PathBuf,
     bytes: Vec<u8>,
     options: ReadOptions,
     shared: nodes::Shared,
+    /// The meshes as they were read; empty unless motion vectors are to be computed.
+    meshes: Vec<Arc<Mesh>>,
 }
 
 impl MovingFile {
-    /// Reads a scene file, and keeps it for other moments if something moves while the shutter is open.
+    /// Reads a scene file, and keeps it for other moments if something moves while the shutter is open, or if something is
+    /// animated and motion vectors are to be computed.
     ///
     /// # Errors
     /// As for [`read`].
@@ -169,9 +175,17 @@ impl MovingFile {
         options: &ReadOptions,
     ) -> Result<(Description, Option<MovingFile>)> {
         let (description, shared) = nodes::describe(&bytes, path, options).map_err(|e| e.within(path.display()))?;
-        let moves = description.blur().is_some();
-        let file = || MovingFile { path: path.to_owned(), bytes: bytes.into_owned(), options: options.clone(), shared };
-        Ok((description, moves.then(file)))
+        let vectors = options.motion_vectors && description.animated;
+        let kept = vectors || description.blur().is_some();
+        let meshes = if vectors { description.meshes.clone() } else { Vec::new() };
+        let file = || MovingFile {
+            path: path.to_owned(),
+            bytes: bytes.into_owned(),
+            options: options.clone(),
+            shared,
+            meshes,
+        };
+        Ok((description, kept.then(file)))
     }
 
     /// Parses the file for descriptions of its moments.
@@ -202,12 +216,25 @@ impl Moments<'_> {
     /// # Errors
     /// A value is invalid at this moment, or an object is there that is missing at the frame.
     pub fn describe(&self, after_frame: f64, meshes: &[Arc<Mesh>]) -> Result<Description> {
+        self.describe_sharing(after_frame, meshes, false)
+    }
+
+    /// Describes the scene `after_frame` frames after its frame, with meshes in their own space and without objects that
+    /// are missing at its frame. The file must have been read for motion vectors.
+    ///
+    /// # Errors
+    /// A value is invalid at this moment.
+    pub fn describe_pose(&self, after_frame: f64) -> Result<Description> {
+        self.describe_sharing(after_frame, &self.file.meshes, true)
+    }
+
+    fn describe_sharing(&self, after_frame: f64, meshes: &[Arc<Mesh>], partial: bool) -> Result<Description> {
         let mut document = self.document.lock().unwrap_or_else(PoisonError::into_inner);
         self.tracks
             .apply(&mut document, after_frame, &mut Vec::new())
             .map_err(|e| e.within(self.file.path.display()))?;
         let MovingFile { path, options, shared, .. } = self.file;
-        let moment = nodes::Moment { shared, moving: &self.moving, meshes };
+        let moment = nodes::Moment { shared, moving: &self.moving, meshes, partial };
         nodes::describe_moment(&document, path, options, moment).map_err(|e| e.within(path.display()))
     }
 }

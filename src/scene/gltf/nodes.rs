@@ -114,6 +114,8 @@ pub(super) struct Moment<'r> {
     pub(super) moving: &'r MovingParts,
     /// The meshes of the scene that was built from the file.
     pub(super) meshes: &'r [Arc<Mesh>],
+    /// Whether objects that are missing in that scene are left out; otherwise they are an error.
+    pub(super) partial: bool,
 }
 
 /// Describes a moment of a scene, which `document` is set to. Without moving materials, the description has none.
@@ -352,7 +354,7 @@ impl<'r> Reader<'r> {
     fn walk(&mut self, roots: Vec<usize>) -> Result<()> {
         let document = self.document;
         let mut seen = vec![false; document.nodes.len()];
-        let moving = self.moving.filter(|_| self.out.blur().is_some());
+        let moving = self.moving_parts();
         let mut stack: Vec<(usize, DAffine3, bool, bool)> =
             roots.into_iter().rev().map(|n| (n, DAffine3::IDENTITY, true, false)).collect();
         while let Some((index, parent, shown, moves)) = stack.pop() {
@@ -526,28 +528,33 @@ impl<'r> Reader<'r> {
         Ok(parts)
     }
 
-    /// Whether the shape of a mesh at a node depends on the time while the shutter is open.
+    /// The parts of the document that differ between moments; `None` if no other moment is rendered.
+    fn moving_parts(&self) -> Option<&'r MovingParts> {
+        self.moving.filter(|_| self.moment.is_some() || self.out.blur().is_some())
+    }
+
+    /// Whether the shape of a mesh at a node differs between moments.
     fn deforms(&self, mesh: usize, node: usize, raw: &Value) -> bool {
-        let moving = self.moving.filter(|_| self.out.blur().is_some());
-        moving.is_some_and(|moving| moving.deforms(mesh, node, raw.get("skin").is_some()))
+        self.moving_parts().is_some_and(|moving| moving.deforms(mesh, node, raw.get("skin").is_some()))
     }
 
     /// The primitives of a mesh at another moment. They are read again if the mesh `deforms`.
     fn parts_at_moment(
         &mut self,
-        Moment { shared, .. }: Moment<'r>,
+        Moment { shared, partial, .. }: Moment<'r>,
         (index, owner): (usize, Option<usize>),
         shape: &Deformation,
         deforms: bool,
         name: &str,
     ) -> Result<Vec<Part>> {
-        let known = shared.parts.get(&(index, owner)).ok_or_else(|| description::missing_at_moments(name))?;
+        let missing = || if partial { Ok(Vec::new()) } else { Err(description::missing_at_moments(name)) };
+        let Some(known) = shared.parts.get(&(index, owner)) else { return missing() };
         if !deforms || self.meshes.contains_key(&(index, owner)) {
             return Ok(known.clone());
         }
         let mut meshes = self.deformed(index, shape, known)?;
         if meshes.len() != known.len() {
-            return Err(description::missing_at_moments(name));
+            return missing();
         }
         if shared.flipped.contains(&index) {
             let is_glass = |part: &MaterialMesh| shared.library.list[part.material as usize].is_solid_glass();
