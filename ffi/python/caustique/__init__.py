@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from . import _native
 from ._native import Error, Image, Progress, SceneWarning, __version__, compare, finish, merge, read
 from .glb import pack
-from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight
+from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight, Texture
 
 __all__ = [
     "Camera",
@@ -35,6 +35,7 @@ __all__ = [
     "SceneWarning",
     "SpotLight",
     "SunLight",
+    "Texture",
     "__version__",
     "compare",
     "finish",

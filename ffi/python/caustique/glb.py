@@ -8,12 +8,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight, looking
+from .meshes import Camera, Light, Material, Medium, Mesh, PointLight, SpotLight, SunLight, Texture, looking
 
 FLOAT, UINT = 5126, 5125
+NEAREST = 9728
+#: Far plane of orthographic cameras, m. caustique does not clip.
+FAR = 1e6
+WRAPS = {"repeat": 10497, "mirror": 33648, "clamp": 33071}
 #: The largest index: glTF reserves the largest 32-bit number.
 MAX_INDEX = 2**32 - 2
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+#: {material field: its extension, its key, its default}, for fields that are written as they are
+FACTORS = {
+    "ior": ("KHR_materials_ior", "ior", 1.5),
+    "specular": ("KHR_materials_specular", "specularFactor", 1.0),
+    "specular_color": ("KHR_materials_specular", "specularColorFactor", (1.0, 1.0, 1.0)),
+    "dispersion": ("KHR_materials_dispersion", "dispersion", 0.0),
+    "clearcoat": ("KHR_materials_clearcoat", "clearcoatFactor", 0.0),
+    "clearcoat_roughness": ("KHR_materials_clearcoat", "clearcoatRoughnessFactor", 0.0),
+    "sheen_color": ("KHR_materials_sheen", "sheenColorFactor", (0.0, 0.0, 0.0)),
+    "sheen_roughness": ("KHR_materials_sheen", "sheenRoughnessFactor", 0.0),
+    "anisotropy": ("KHR_materials_anisotropy", "anisotropyStrength", 0.0),
+}
 
 
 def pack(
@@ -41,18 +57,18 @@ def pack(
 
 
 def png(name: str, texture) -> bytes:
-    """Encodes a texture (H, W, 3) of uint8 as the bytes of a PNG. `name` is for errors."""
+    """Encodes a texture (H, W, 3) or (H, W, 4) of uint8 as the bytes of a PNG. `name` is for errors."""
     pixels = np.asarray(texture)
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or pixels.dtype != np.uint8 or 0 in pixels.shape:
-        raise ValueError(f"{name}: a texture is (H, W, 3) uint8, not {pixels.shape} {pixels.dtype}")
-    height, width = pixels.shape[:2]
-    lines = np.zeros((height, 1 + 3 * width), np.uint8)
+    if pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or pixels.dtype != np.uint8 or 0 in pixels.shape:
+        raise ValueError(f"{name}: a texture is (H, W, 3) or (H, W, 4) uint8, not {pixels.shape} {pixels.dtype}")
+    height, width, channels = pixels.shape
+    lines = np.zeros((height, 1 + channels * width), np.uint8)
     lines[:, 1:] = pixels.reshape(height, -1)
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    head = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)
     parts = [chunk(b"IHDR", head), chunk(b"IDAT", zlib.compress(lines.tobytes())), chunk(b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 
@@ -65,6 +81,12 @@ def numbers(values) -> list[float]:
     return [float(x) for x in values]
 
 
+def channels(texture) -> int:
+    """Number of channels of a texture, 0 without one."""
+    pixels = texture.pixels if isinstance(texture, Texture) else texture
+    return 0 if pixels is None else np.asarray(pixels).shape[-1]
+
+
 class Writer:
     """A glTF document under construction, and its binary buffer."""
 
@@ -73,11 +95,12 @@ class Writer:
         self.document: dict = {
             "asset": {"version": "2.0", "generator": "caustique for Python"},
             "nodes": [], "meshes": [], "materials": [], "cameras": [], "accessors": [], "bufferViews": [],
-            "images": [], "textures": [],
+            "images": [], "textures": [], "samplers": [],
         }
         self.lights: list[dict] = []
         self.extensions: set[str] = set()
-        self.written: dict[int, tuple[Material, int]] = {}
+        # {identities of objects: the objects, index}, written once. They are kept, so that no other object gets an id.
+        self.written: dict[tuple[int, ...], tuple[object, int]] = {}
 
     def add(self, kind: str, item: dict) -> int:
         self.document[kind].append(item)
@@ -111,22 +134,36 @@ class Writer:
             item |= {"min": numbers(array.min(axis=0)), "max": numbers(array.max(axis=0))}
         return self.add("accessors", item)
 
+    def once(self, objects: tuple, write) -> int:
+        """The index that `write` returns; of the same objects it is called once."""
+        key = tuple(map(id, objects))
+        if key not in self.written:
+            self.written[key] = objects, write()
+        return self.written[key][1]
+
     def mesh(self, mesh: Mesh):
+        parts = (mesh.vertices, mesh.triangles, mesh.normals, mesh.uvs, mesh.colors, mesh.material)
+        node: dict = {"name": mesh.name, "mesh": self.once(parts, lambda: self.primitive(mesh))}
+        if mesh.transform is not None:
+            node["matrix"] = matrix(f'mesh "{mesh.name}"', mesh.transform)
+        self.node(node, {"light_group": mesh.light_group})
+
+    def primitive(self, mesh: Mesh) -> int:
+        """Adds the arrays and the material of a mesh, and returns its index."""
         place = f'mesh "{mesh.name}"'
         attributes = {"POSITION": self.accessor(f"{place}, vertices", mesh.vertices, 3)}
         if mesh.normals is not None:
             attributes["NORMAL"] = self.accessor(f"{place}, normals", mesh.normals, 3)
         if mesh.uvs is not None:
             attributes["TEXCOORD_0"] = self.accessor(f"{place}, uvs", mesh.uvs, 2)
+        if mesh.colors is not None:
+            attributes["COLOR_0"] = self.accessor(f"{place}, colors", mesh.colors, 3)
         primitive = {
             "attributes": attributes,
             "indices": self.accessor(f"{place}, triangles", mesh.triangles, 3, UINT),
             "material": self.material(mesh.material),
         }
-        node: dict = {"name": mesh.name, "mesh": self.add("meshes", {"name": mesh.name, "primitives": [primitive]})}
-        if mesh.transform is not None:
-            node["matrix"] = matrix(place, mesh.transform)
-        self.node(node, {"light_group": mesh.light_group})
+        return self.add("meshes", {"name": mesh.name, "primitives": [primitive]})
 
     def node(self, node: dict, said: dict):
         said = {key: value for key, value in said.items() if value is not None}
@@ -134,48 +171,84 @@ class Writer:
             node["extras"] = {"caustique": said}
         self.add("nodes", node)
 
+    def texture(self, place: str, texture, strength: dict | None = None) -> dict:
+        """Adds a texture and returns the reference to it."""
+        texture = texture if isinstance(texture, Texture) else Texture(pixels=texture)
+        if texture.wrap not in WRAPS:
+            raise ValueError(f'{place}: wrap is "repeat", "mirror" or "clamp", not {texture.wrap!r}')
+
+        def write() -> int:
+            view = self.view(png(place, texture.pixels))
+            return self.add("images", {"bufferView": view, "mimeType": "image/png"})
+
+        item = {"source": self.once((texture.pixels,), write)}
+        if texture.nearest or texture.wrap != "repeat":
+            sampler = {"wrapS": WRAPS[texture.wrap], "wrapT": WRAPS[texture.wrap]}
+            item["sampler"] = self.add("samplers", sampler | ({"magFilter": NEAREST} if texture.nearest else {}))
+        found: dict = {"index": self.add("textures", item)}
+        placed = {
+            "offset": numbers(texture.offset), "rotation": -float(np.radians(texture.rotation)),
+            "scale": numbers(texture.scale),
+        }
+        if placed != {"offset": [0.0, 0.0], "rotation": 0.0, "scale": [1.0, 1.0]}:
+            found["extensions"] = {"KHR_texture_transform": placed}
+            self.extensions.add("KHR_texture_transform")
+        return found
+
     def material(self, material: Material) -> int:
         """Adds a material and returns its index. A material of several meshes is written once."""
-        if id(material) in self.written:
-            return self.written[id(material)][1]
-        emission = np.asarray(material.emission, float)
-        item: dict = {
-            "name": material.name,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [*numbers(material.base_color), 1.0],
-                "metallicFactor": float(material.metallic),
-                "roughnessFactor": float(material.roughness),
-            },
-            # Cameras see through the back faces of single-sided surfaces.
-            "doubleSided": bool(material.double_sided) or not emission.any(),
+        return self.once((material,), lambda: self.add("materials", self.described(material)))
+
+    def described(self, material: Material) -> dict:
+        """A material as glTF describes it."""
+        place, emission = f'material "{material.name}"', np.asarray(material.emission, float)
+        surface: dict = {
+            "baseColorFactor": [*numbers(material.base_color), float(material.alpha)],
+            "metallicFactor": float(material.metallic),
+            "roughnessFactor": float(material.roughness),
         }
-        if material.base_color_texture is not None:
-            data = png(f'material "{material.name}"', material.base_color_texture)
-            image = self.add("images", {"bufferView": self.view(data), "mimeType": "image/png"})
-            item["pbrMetallicRoughness"]["baseColorTexture"] = {"index": self.add("textures", {"source": image})}
-        extensions: dict = {}
-        if material.transmission > 0.0:
-            extensions["KHR_materials_transmission"] = {"transmissionFactor": float(material.transmission)}
-            extensions["KHR_materials_volume"] = {"thicknessFactor": 0.0 if material.thin else 1.0}
-        if material.ior != 1.5:
-            extensions["KHR_materials_ior"] = {"ior": float(material.ior)}
-        if material.specular != 1.0:
-            extensions["KHR_materials_specular"] = {"specularFactor": float(material.specular)}
-        if material.dispersion > 0.0:
-            extensions["KHR_materials_dispersion"] = {"dispersion": float(material.dispersion)}
+        # Cameras see through the back faces of single-sided surfaces.
+        double_sided = bool(material.double_sided) or not emission.any()
+        item: dict = {"name": material.name, "pbrMetallicRoughness": surface, "doubleSided": double_sided}
+        for target, key, texture in (
+            (surface, "baseColorTexture", material.base_color_texture),
+            (surface, "metallicRoughnessTexture", material.metallic_roughness_texture),
+            (item, "normalTexture", material.normal_texture),
+            (item, "emissiveTexture", material.emission_texture),
+        ):
+            if texture is not None:
+                target[key] = self.texture(f"{place}, {key}", texture)
+        if material.alpha < 1.0 or channels(material.base_color_texture) == 4:
+            item["alphaMode"] = "BLEND"
+        extensions = self.layers(material)
         if emission.any():
             strength = max(1.0, float(emission.max()))
             item["emissiveFactor"] = numbers(emission / strength)
             extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
-        if material.medium is not None:
-            item["extras"] = {"caustique": {"medium": coefficients(material.medium)}}
+        own: dict = {} if material.medium is None else {"medium": coefficients(material.medium)}
+        if material.null_bsdf:
+            own["null_bsdf"] = True
+        if own:
+            item["extras"] = {"caustique": own}
         if extensions:
             item["extensions"] = extensions
             self.extensions.update(extensions)
-        index = self.add("materials", item)
-        # Keeps a reference to the material, so that no other object gets its id.
-        self.written[id(material)] = material, index
-        return index
+        return item
+
+    def layers(self, material: Material) -> dict:
+        """The extensions of a material for all but its emission."""
+        found: dict = {}
+        if material.transmission > 0.0:
+            found["KHR_materials_transmission"] = {"transmissionFactor": float(material.transmission)}
+            found["KHR_materials_volume"] = {"thicknessFactor": 0.0 if material.thin else 1.0}
+        for name, (extension, key, usual) in FACTORS.items():
+            value = getattr(material, name)
+            value = float(value) if isinstance(usual, float) else tuple(numbers(value))
+            if value != usual:
+                found.setdefault(extension, {})[key] = value
+        if material.anisotropy and material.anisotropy_rotation:
+            found["KHR_materials_anisotropy"]["anisotropyRotation"] = float(np.radians(material.anisotropy_rotation))
+        return found
 
     def light(self, light: Light):
         said: dict = {"light_group": light.light_group}
@@ -206,14 +279,21 @@ class Writer:
         self.node({"name": light.name, "matrix": matrix(light.name, pose), "extensions": reference}, said)
 
     def camera(self, camera: Camera):
-        perspective = {"yfov": float(np.radians(camera.fov)), "znear": 0.01}
-        if camera.aspect is not None:
-            perspective["aspectRatio"] = float(camera.aspect)
-        index = self.add("cameras", {"name": camera.name, "type": "perspective", "perspective": perspective})
+        view: dict
+        if camera.orthographic_height is not None:
+            kind, half = "orthographic", float(camera.orthographic_height) / 2.0
+            view = {"xmag": half * float(camera.aspect or 1.0), "ymag": half, "znear": 0.0, "zfar": FAR}
+        else:
+            kind, view = "perspective", {"yfov": float(np.radians(camera.fov)), "znear": 0.01}
+            if camera.aspect is not None:
+                view["aspectRatio"] = float(camera.aspect)
+        index = self.add("cameras", {"name": camera.name, "type": kind, kind: view})
         pose = looking(camera.position, camera.target, camera.up)
         to_target = float(np.linalg.norm(np.subtract(camera.target, camera.position)))
         distance = to_target if camera.focus_distance is None else float(camera.focus_distance)
-        lens = {"aperture_radius": float(camera.aperture_radius), "focus_distance": distance}
+        lens: dict = {"aperture_radius": float(camera.aperture_radius), "focus_distance": distance}
+        if any(camera.shift):
+            lens["shift"] = numbers(camera.shift)
         self.node({"name": camera.name, "camera": index, "matrix": matrix(camera.name, pose)}, lens)
 
     def bytes(self, said: dict) -> bytes:

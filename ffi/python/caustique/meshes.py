@@ -25,20 +25,46 @@ class Medium:
 
 
 @dataclass(kw_only=True, eq=False)
+class Texture:
+    """An image on a surface, with its placement: (u, v) looks up offset + rotation * (scale * (u, v))."""
+
+    #: (H, W, 3) or (H, W, 4) uint8, the top row first.
+    pixels: ArrayLike
+    #: Offset (u, v), in images.
+    offset: Sequence[float] = (0.0, 0.0)
+    #: Rotation, degrees, from u to v.
+    rotation: float = 0.0
+    #: Repetitions of the image along u and v.
+    scale: Sequence[float] = (1.0, 1.0)
+    #: Whether lookups take the nearest pixel, and do not interpolate.
+    nearest: bool = False
+    #: Behaviour outside the image: "repeat", "mirror" or "clamp".
+    wrap: str = "repeat"
+
+
+@dataclass(kw_only=True, eq=False)
 class Material:
     """A surface with the parameters of glTF. The default is matte white."""
 
     name: str = "material"
     #: Reflectance (r, g, b); of glass the tint.
     base_color: Triple = (1.0, 1.0, 1.0)
-    #: (H, W, 3) uint8, sRGB, the top row first; multiplies base_color. The mesh needs uvs.
-    base_color_texture: ArrayLike | None = None
+    #: (H, W, 3) uint8, sRGB, the top row first; multiplies base_color. The mesh needs uvs. A fourth channel is alpha.
+    base_color_texture: ArrayLike | Texture | None = None
+    #: Share of the surface that exists, 0 to 1: 0 is a hole.
+    alpha: float = 1.0
     #: 0 dielectric, 1 conductor.
     metallic: float = 0.0
     #: Perceptual roughness, 0 to 1; the GGX alpha is its square.
     roughness: float = 1.0
+    #: (H, W, 3) uint8: green multiplies roughness, blue multiplies metallic.
+    metallic_roughness_texture: ArrayLike | Texture | None = None
+    #: (H, W, 3) uint8: normals in tangent space, as in glTF.
+    normal_texture: ArrayLike | Texture | None = None
     #: Strength of a dielectric's reflection, 0 to 1; 0 makes a matte surface Lambertian.
     specular: float = 1.0
+    #: Colour (r, g, b) of a dielectric's reflection.
+    specular_color: Triple = (1.0, 1.0, 1.0)
     #: Share of light that is transmitted, 0 to 1: 1 is glass.
     transmission: float = 0.0
     #: Index of refraction, from 1 up.
@@ -47,17 +73,33 @@ class Material:
     thin: bool = False
     #: The medium inside the solid.
     medium: Medium | None = None
+    #: Whether rays pass through the surface unchanged. Its emission stays.
+    null_bsdf: bool = False
     #: 20 divided by the Abbe number; 0 is no dispersion.
     dispersion: float = 0.0
+    #: Strength of a clear coat of index 1.5, 0 to 1.
+    clearcoat: float = 0.0
+    #: Perceptual roughness of the clear coat, 0 to 1.
+    clearcoat_roughness: float = 0.0
+    #: Reflectance (r, g, b) of the sheen of cloth; black is no sheen.
+    sheen_color: Triple = (0.0, 0.0, 0.0)
+    #: Perceptual roughness of the sheen, 0 to 1.
+    sheen_roughness: float = 0.0
+    #: Strength of anisotropy, 0 to 1: the alpha along the tangent is a mix of the GGX alpha and 1, by its square.
+    anisotropy: float = 0.0
+    #: Rotation of the tangent, degrees.
+    anisotropy_rotation: float = 0.0
     #: Emitted radiance, W/(sr m2) per channel, from the front.
     emission: Triple = (0.0, 0.0, 0.0)
+    #: (H, W, 3) uint8, sRGB; multiplies emission.
+    emission_texture: ArrayLike | Texture | None = None
     #: Whether the back emits, too; otherwise cameras see through the back of an emissive surface.
     double_sided: bool = False
 
 
 @dataclass(kw_only=True, eq=False)
 class Mesh:
-    """A triangle mesh of one material."""
+    """A triangle mesh of one material. Meshes of the same arrays and material become instances of one mesh."""
 
     #: Positions (V, 3), m.
     vertices: ArrayLike
@@ -68,6 +110,8 @@ class Mesh:
     normals: ArrayLike | None = None
     #: Texture coordinates (V, 2), v downwards.
     uvs: ArrayLike | None = None
+    #: Colours (V, 3), scene-linear, 0 to 1; multiply base_color.
+    colors: ArrayLike | None = None
     #: Mesh to world (4, 4), for column vectors.
     transform: ArrayLike | None = None
     name: str = "mesh"
@@ -77,7 +121,7 @@ class Mesh:
 
 @dataclass(kw_only=True, eq=False)
 class Camera:
-    """A perspective camera."""
+    """A perspective camera, or an orthographic one."""
 
     position: Triple = (0.0, 0.0, 1.0)
     #: A point in the middle of the picture.
@@ -85,6 +129,10 @@ class Camera:
     up: Triple = (0.0, 1.0, 0.0)
     #: Vertical field of view, degrees.
     fov: float = 40.0
+    #: Height of the view of an orthographic camera, m; None is a perspective camera.
+    orthographic_height: float | None = None
+    #: Offset of the picture's centre from the axis, in widths to the right and heights up.
+    shift: Sequence[float] = (0.0, 0.0)
     #: Width over height, if a render gives only one of the two.
     aspect: float | None = None
     #: Radius of the thin lens, m; 0 is a pinhole.

@@ -2,7 +2,7 @@
 
     scripts/compare/mitsuba.py SCENE.glb [--seeds 8] [--spp 256] [--method path] [--png DIFFERENCE.png] [--json]
     scripts/compare/mitsuba.py export SCENE.glb -o SCENE.xml [--strict]
-    scripts/compare/mitsuba.py import SCENE.xml -o SCENE.glb
+    scripts/compare/mitsuba.py import SCENE.xml -o SCENE.glb [-D NAME=VALUE ...]
 
 `export` writes a Mitsuba scene (to_xml.py), `import` reads one (from_xml.py).
 
@@ -115,7 +115,12 @@ def exchange(command, words):
         parser.add_argument(
             "--strict", action="store_true", help="fail if a feature is approximated or left out"
         )
+    else:
+        parser.add_argument(
+            "-D", "--define", action="append", default=[], metavar="NAME=VALUE", help="a parameter of the scene"
+        )
     arguments = parser.parse_args(words)
+    defined = dict(word.partition("=")[::2] for word in getattr(arguments, "define", []))
     mi.set_variant("scalar_rgb")
     import from_xml
     import to_xml
@@ -125,7 +130,7 @@ def exchange(command, words):
             lose = gltf.refuse if arguments.strict else Warnings(arguments.scene)
             to_xml.write(arguments.scene, arguments.output, lose)
         else:
-            from_xml.convert(arguments.scene, arguments.output)
+            from_xml.convert(arguments.scene, arguments.output, defined)
     except (gltf.Unsupported, OSError) as error:
         sys.exit(f"{arguments.scene}: {error}")
 

@@ -10,6 +10,7 @@ import tempfile
 import threading
 import unittest
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +117,33 @@ class BesideTheCommandLine(unittest.TestCase):
             for component, values in planes.items():
                 there = b.layers[name][component][window]
                 self.assertTrue(values.tobytes() == there.tobytes(), f"{name}.{component}")
+
+    def test_materials_have_the_parameters_of_gltf(self):
+        """Each is in the packed file, and the reader accepts all of them without a warning."""
+        image = np.full((2, 2, 4), 128, np.uint8)
+        layered = cq.Material(
+            base_color_texture=cq.Texture(pixels=image, scale=(2, 3), offset=(0.5, 0), rotation=90, wrap="mirror", nearest=True),
+            metallic_roughness_texture=image[..., :3], normal_texture=image[..., :3], emission_texture=image[..., :3],
+            emission=(2, 2, 2), clearcoat=0.5, clearcoat_roughness=0.1, sheen_color=(0.1, 0.2, 0.3), sheen_roughness=0.4,
+            anisotropy=0.5, anisotropy_rotation=90, specular_color=(1, 0.5, 0.2), double_sided=True,
+        )
+        vertices, triangles = square()
+        mesh = cq.Mesh(vertices=vertices, triangles=triangles, uvs=vertices[:, :2], colors=np.ones((4, 3)), material=layered)
+        copies = [replace(mesh, transform=np.diag([x, x, x, 1])) for x in (1, 2)]
+        camera = cq.Camera(position=(0, 3, 0), up=(0, 0, 1), orthographic_height=4.0, aspect=1.0, shift=(0.1, 0.0))
+        data = cq.pack(copies, cameras=[camera])
+        document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+        self.assertEqual((len(document["meshes"]), len(document["materials"]), len(document["nodes"])), (1, 1, 3))
+        material, placed = document["materials"][0], document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+        self.assertEqual(material["alphaMode"], "BLEND")
+        self.assertEqual(material["extensions"]["KHR_materials_specular"]["specularColorFactor"], [1, 0.5, 0.2])
+        self.assertEqual(material["extensions"]["KHR_materials_clearcoat"],
+                         {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1})
+        self.assertAlmostEqual(placed["extensions"]["KHR_texture_transform"]["rotation"], -np.pi / 2)
+        self.assertEqual(document["cameras"][0]["orthographic"]["ymag"], 2)
+        self.assertEqual(cq.Scene.from_meshes(copies, cameras=[camera], strict=True).warnings, [])
+        with self.assertRaisesRegex(ValueError, 'wrap is "repeat"'):
+            cq.pack([replace(mesh, material=cq.Material(base_color_texture=cq.Texture(pixels=image, wrap="tile")))])
 
     def test_every_layer_of_a_render(self):
         cases = [
