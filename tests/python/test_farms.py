@@ -80,7 +80,7 @@ class Tasks(support.Scratch):
         task = subprocess.Popen(
             [FARM / "shard.sh", *map(str, words), "--progress", "json"], env=variables, stderr=subprocess.PIPE, text=True
         )
-        next(line for line in task.stderr if line.startswith("{"))
+        next(line for line in task.stderr if '"iteration":' in line)
         task.terminate()
         task.stderr.read()
         task.stderr.close()
@@ -183,6 +183,18 @@ class OpenJobDescription(support.Scratch):
             job, session = self.start(Options=f"--iterations 2 --width 8 {wrong}", Output=str(self.dir / "other.exr"))
             self.run_task(session, job.steps[0], 1, "FAILED")
             self.assertFalse(trap.exists(), wrong)
+
+    def test_relative_paths_start_in_a_known_folder(self):
+        """In the parameter Folder, which the submission resolves, or in the output's folder."""
+        (self.dir / "elsewhere").mkdir()
+        for number, (given, folder) in enumerate([({}, self.dir), ({"Folder": "elsewhere"}, self.dir / "elsewhere")]):
+            job, session = self.start(
+                Output=f"{number}.exr", MergeOptions="--png look.png", Options="--iterations 2 --width 8 --method path",
+                **given,
+            )
+            self.run_task(session, job.steps[0], 1)
+            self.assertTrue((folder / "look.png").exists())
+            self.assertTrue((self.dir / f"{number}.exr").exists())
 
     def run_task(self, session, step, shard, end="SUCCESS"):
         """Run a task, and assert that it ends with `end`."""
