@@ -15,6 +15,8 @@ mod commands;
 mod converge;
 #[path = "cli/files.rs"]
 mod files;
+#[path = "cli/first_picture.rs"]
+mod first_picture;
 #[path = "cli/frames.rs"]
 mod frames;
 #[path = "cli/generated.rs"]

@@ -15,7 +15,7 @@ setup render
 cd "$ROOT"
 seconds=${1:-300}
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/caustique-fuzz
-read -ra readers <<<"${READERS:-glb scene gltf png jpeg exr exr_environment hdr checkpoint shard model usd_options usd_fault}"
+read -ra readers <<<"${READERS:-glb scene gltf png jpeg webp ktx2 draco meshopt exr exr_environment hdr checkpoint shard model usd_options usd_fault}"
 
 rustup toolchain list | grep -q ^nightly || rustup toolchain install nightly --profile minimal
 cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz
@@ -36,7 +36,7 @@ tests/fuzz/target/$target/release/seeds "$ROOT/target/release/caustique" "$cache
 # WHOLE.
 limits() {
     case $1 in
-        png | jpeg | hdr | exr | exr_environment | gltf) echo "-malloc_limit_mb=2048 -rss_limit_mb=4096" ;;
+        png | jpeg | webp | ktx2 | hdr | exr | exr_environment | gltf) echo "-malloc_limit_mb=2048 -rss_limit_mb=4096" ;;
         *) echo "-malloc_limit_mb=512 -rss_limit_mb=2048" ;;
     esac
 }

@@ -10,7 +10,7 @@ from mathutils import Matrix
 
 import export_guard as guard
 
-_TONEMAPS = {"AgX": "agx", "Filmic": "filmic", "Standard": "srgb"}
+_TONEMAPS = {"AgX": "agx", "Filmic": "filmic", "Khronos PBR Neutral": "neutral", "Standard": "srgb"}
 # Rays along each side of the picture that search for clipped objects.
 _GRID = 16
 

@@ -2,6 +2,7 @@
 
 use super::progress::{Form, duration, percent};
 use super::render::place;
+use super::warnings::lines;
 use super::{plot, print, print_json, printable, scene};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, describe};
@@ -28,6 +29,9 @@ pub struct InfoArgs {
     /// Allow a scene to name files (buffers, textures, its environment) outside its own folder
     #[arg(long)]
     allow_outside: bool,
+    /// Print each warning; without it, the warnings of one kind are one line
+    #[arg(long)]
+    verbose: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -54,7 +58,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
         return print_json(&object);
     }
     escape(&mut object);
-    print(&scene_text(path, &object))
+    print(&scene_text(path, &object, args.verbose))
 }
 
 /// Escapes control characters in all texts of a JSON value.
@@ -266,7 +270,7 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-fn scene_text(path: &Path, object: &Value) -> String {
+fn scene_text(path: &Path, object: &Value, verbose: bool) -> String {
     let list = |key: &str| object[key].as_array().into_iter().flatten();
     let with = |key: &str, text: &dyn Fn(&Value) -> String| listed(&list(key).map(text).collect::<Vec<_>>());
     let text_of = |value: &Value| value.as_str().unwrap_or_default().to_string();
@@ -309,7 +313,8 @@ fn scene_text(path: &Path, object: &Value) -> String {
         let extension = |value: &Value| format!("{} ({})", text_of(&value["name"]), fate(value));
         text += &format!("  extensions {}\n", with("extensions", &extension));
     }
-    for warning in object["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+    let warnings: Vec<String> = list("warnings").map(text_of).collect();
+    for warning in lines(&warnings, verbose) {
         text += &format!("warning: {warning}\n");
     }
     text

@@ -17,6 +17,7 @@ mod shell;
 mod signals;
 mod stage;
 mod usage;
+mod warnings;
 
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::processor;

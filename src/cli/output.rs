@@ -58,7 +58,11 @@ impl PictureArgs {
     pub fn write_png(&self, set: &LayerSet, made_for: &PictureDefaults) -> Result<()> {
         let Some(path) = &self.png else { return Ok(()) };
         let (exposure, tonemap) = self.look(made_for);
-        png::write_tonemapped(path, &set.beauty()?, exposure, tonemap)
+        let alpha = set.get("").and_then(|beauty| beauty.plane("A")).filter(|_| made_for.film_transparent);
+        match alpha {
+            Some(alpha) => png::write_transparent(path, &set.beauty()?, &alpha.values, exposure, tonemap),
+            None => png::write_tonemapped(path, &set.beauty()?, exposure, tonemap),
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! `caustique plan`: prints which effects a render would simulate and why, with its warnings.
 
 use super::progress::{Form, duration, percent};
+use super::warnings::lines;
 use super::{print, print_json, printable, scene};
 use caustique::error::Result;
 use caustique::options::number::threads;
@@ -59,7 +60,7 @@ fn report(args: &PlanArgs) -> Result<()> {
         }
         print_json(&object)?
     } else {
-        let mut text = text(plan);
+        let mut text = text(plan, options.scene.verbose);
         if let Some((error, forecast)) = forecast {
             text += &sentence(error, forecast);
         }
@@ -134,7 +135,7 @@ fn carrier(e: &EffectPlan) -> String {
 }
 
 /// The plan as text: a table of effects for people.
-fn text(plan: &Plan) -> String {
+fn text(plan: &Plan, verbose: bool) -> String {
     let columns = columns(plan);
     let cells = |row: &dyn Fn(&Column) -> String| columns.iter().map(row).collect::<Vec<String>>();
     let mut rows = vec![(cells(&|column| column.0.into()), vec!["because".to_string()])];
@@ -163,8 +164,8 @@ fn text(plan: &Plan) -> String {
         }
         None => "light is left out that the scene calls for (nothing bounds the error by it)\n".into(),
     };
-    for warning in &plan.warnings {
-        text += &format!("warning: {}\n", printable(warning));
+    for warning in lines(&plan.warnings, verbose) {
+        text += &format!("warning: {}\n", printable(&warning));
     }
     text
 }
@@ -190,7 +191,7 @@ mod tests {
         assert_eq!(columns(&plan).len(), 2);
         let caustic = &mut plan.effects[Effect::Caustic as usize];
         (caustic.energy, caustic.seconds_per_iteration, caustic.error_if_off) = (Some(0.123), Some(0.25), Some(0.4));
-        let text = text(&plan);
+        let text = text(&plan, false);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[1], "  effect          simulated by  of the light  off saves  off costs   because");
         assert_eq!(

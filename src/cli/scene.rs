@@ -2,6 +2,7 @@
 
 use super::progress::{Form, Waiting};
 use super::say;
+use super::warnings::lines;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::SceneOptions;
 use caustique::pipeline::Loaded;
@@ -32,7 +33,7 @@ pub fn read(args: &SceneOptions, form: Form, threads: usize) -> Result<Loaded> {
 /// # Errors
 /// `--strict` is set and there are warnings.
 pub fn print_warnings(args: &SceneOptions, warnings: &[String]) -> Result<()> {
-    for warning in warnings {
+    for warning in lines(warnings, args.verbose) {
         say(&format!("warning: {}: {warning}", args.path.display()));
     }
     if !args.strict || warnings.is_empty() {

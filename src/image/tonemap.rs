@@ -15,6 +15,7 @@ impl ToneMap {
         let linear = match self {
             ToneMap::Agx => agx(exposed),
             ToneMap::Filmic => Vec3::from_array(exposed.to_array().map(|v| aces(v * PRE_EXPOSURE))),
+            ToneMap::Neutral => neutral(exposed),
             ToneMap::Srgb => exposed,
         };
         Vec3::from_array(linear.to_array().map(srgb_encode))
@@ -42,6 +43,26 @@ pub(super) fn aces(x: f32) -> f32 {
     // Larger squares would overflow; the curve exceeds 1 there.
     let x = x.min(1e6);
     (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).clamp(0.0, 1.0)
+}
+
+/// Khronos PBR Neutral tone mapper (Khronos Group 2024, ToneMapping/PBR_Neutral): linear Rec. 709 to linear Rec. 709.
+/// The Fresnel reflection of 4 % is taken off, and colours whose largest channel exceeds 0.8 are compressed and
+/// desaturated.
+fn neutral(colour: Rgb) -> Rgb {
+    const FRESNEL: f32 = 0.04;
+    const START: f32 = 0.8 - FRESNEL;
+    const DESATURATION: f32 = 0.15;
+    let least = colour.min_element();
+    let offset = if least < 2.0 * FRESNEL { least - least * least / (4.0 * FRESNEL) } else { FRESNEL };
+    let colour = colour - Vec3::splat(offset);
+    let peak = colour.max_element();
+    if peak < START {
+        return colour;
+    }
+    let room = 1.0 - START;
+    let compressed = 1.0 - room * room / (peak + room - START);
+    let grey = 1.0 - 1.0 / (DESATURATION * (peak - compressed) + 1.0);
+    (colour * (compressed / peak)).lerp(Vec3::splat(compressed), grey)
 }
 
 /// AgX, the base look as Blender 4 shows it: linear Rec. 709 to linear Rec. 709.

@@ -66,7 +66,8 @@ pub enum ValueKind {
 }
 
 /// Options that are not arguments in Python, and why.
-const NOT_IN_PYTHON: [(&str, &str); 13] = [
+const NOT_IN_PYTHON: [(&str, &str); 14] = [
+    ("verbose", "Python's warnings are not grouped"),
     ("output", "the picture is an Image: its method save writes it"),
     ("png", "an argument of Image.save"),
     ("exposure", "an argument of Image.save"),
@@ -83,7 +84,9 @@ const NOT_IN_PYTHON: [(&str, &str); 13] = [
 ];
 
 /// Options that are arguments of Python's `Scene`, and their names there.
-const OF_SCENE: [(&str, &str); 15] = [
+const OF_SCENE: [(&str, &str); 17] = [
+    ("light_preset", "light_preset"),
+    ("background", "background"),
     ("scene_name", "scene_name"),
     ("animation", "animation"),
     ("variant", "variant"),
@@ -108,7 +111,8 @@ const STAGE_HEADINGS: [&str; 6] = ["Method", "When to stop", "Expert", "Light an
 const ALSO_IN_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compression", "reproducible"];
 /// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has
 /// other means.
-const NOT_IN_STAGES: [&str; 6] = ["env", "model", "allow_outside", "strict", "photon_memory", "light_units"];
+const NOT_IN_STAGES: [&str; 7] =
+    ["env", "light_preset", "model", "allow_outside", "strict", "photon_memory", "light_units"];
 
 /// Describes the options of a command, in the order of its help.
 pub fn describe(command: &Command) -> Vec<OptionDescription> {

@@ -23,5 +23,5 @@ pub use frames::{Frames, is_pattern, path_of_frame};
 pub use parse::{InvalidOption, one_of, parse};
 pub use render::{RenderOptions, SizeOptions};
 pub use run::RunOptions;
-pub use scene::{EnvironmentChoice, SceneOptions};
+pub use scene::{Background, EnvironmentChoice, SceneOptions};
 pub use values::{BandwidthChoice, CropChoice, FrameSeed, GridChoice, MethodChoice, OnOff};

@@ -22,7 +22,7 @@ use crate::render::{
     LIGHT_PATH_STEPS, Levels, MAX_CONNECTIONS, MAX_LIGHT_PATHS_PER_PIXEL, Method, PHOTON_BYTES, RadiusRule, Settings,
     Shard,
 };
-use crate::scene::{CameraRequest, MAX_SIZE};
+use crate::scene::{CameraRequest, MAX_SIZE, Orbit};
 use crate::stat::sum::MAX_TERMS;
 use crate::stop::Stop;
 use crate::transport::{Indirect, MAX_LEVELS};
@@ -160,6 +160,13 @@ pub struct RenderOptions {
     /// Name of the camera [default: the scene's first]
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     pub camera: Option<String>,
+    /// View of the whole scene instead of a camera: azimuth and elevation in degrees around the middle of the scene, 0,0
+    /// from the front (+Z), 90,0 from the right (+X); distance in metres, or in per cent of the distance that frames the
+    /// scene [default: 30,20 if the scene has no camera]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION[,DISTANCE]", allow_hyphen_values = true, conflicts_with = "camera")]
+    #[arg(help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
+    pub orbit: Option<Orbit>,
 
     /// The scene and how it is read.
     #[command(flatten)]
@@ -202,6 +209,7 @@ impl RenderOptions {
         let filter = self.filter.as_deref().map_or(Ok(Filter::default()), filter)?;
         Ok(CameraRequest {
             camera: self.camera.clone(),
+            orbit: self.orbit,
             width: self.size.width,
             height: self.size.height,
             crop,

@@ -4,6 +4,7 @@ use super::frames::{Frames, path_of_frame};
 use super::number::{Ranged, rgb, strength};
 use crate::pipeline::load::{Environment, SceneRequest};
 use crate::plan::Switches;
+use crate::scene::LightPreset;
 use crate::scene::gltf::{self, Glass, LightUnits, Pose};
 use serde::{Serialize, Serializer};
 use std::ops::Bound::{Excluded, Unbounded};
@@ -63,6 +64,15 @@ pub struct SceneOptions {
     #[arg(long, value_name = "S", value_parser = strength)]
     #[arg(hide_short_help = true)]
     pub env_strength: Option<f64>,
+    /// Procedural environment in place of the scene's own [default: 'studio' if the scene has no light at all]
+    #[arg(long, value_enum, conflicts_with = "env")]
+    #[arg(hide_short_help = true)]
+    pub light_preset: Option<LightPreset>,
+    /// Environment behind the scene: 'hide' makes the background transparent, in the EXR and the PNG [default: as the
+    /// scene says, else 'show']
+    #[arg(long, value_enum, help_heading = "Picture")]
+    #[arg(hide_short_help = true)]
+    pub background: Option<Background>,
     /// Units of lamps: 'auto' decides by the program that wrote the file; 'photometric' is the default of Blender's
     /// exporter, 683 lumen per watt
     #[arg(long, value_enum, default_value_t)]
@@ -87,6 +97,11 @@ pub struct SceneOptions {
     #[arg(long)]
     #[arg(hide_short_help = true)]
     pub strict: bool,
+    /// Print each warning; without it, the warnings of one kind are one line
+    #[arg(long, help_heading = "Running")]
+    #[serde(skip)]
+    #[arg(hide_short_help = true)]
+    pub verbose: bool,
 }
 
 /// The value of `--env`, the environment light.
@@ -107,6 +122,16 @@ impl FromStr for EnvironmentChoice {
             None => Ok(EnvironmentChoice::File(text.into())),
         }
     }
+}
+
+/// Whether the environment is seen behind the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Background {
+    /// Camera rays see the environment
+    Show,
+    /// The background is transparent; the environment lights the scene anyway
+    Hide,
 }
 
 /// Times at which the camera's shutter opens and closes, relative to the frame (frames).
@@ -143,11 +168,14 @@ impl SceneOptions {
             env: None,
             env_rotation: None,
             env_strength: None,
+            light_preset: None,
+            background: None,
             light_units: LightUnits::default(),
             glass: Glass::default(),
             effects: None,
             allow_outside,
             strict: false,
+            verbose: false,
         }
     }
 
@@ -171,6 +199,8 @@ impl SceneOptions {
             environment,
             rotation: self.env_rotation,
             strength: self.env_strength,
+            light_preset: self.light_preset,
+            background_hidden: self.background.map(|background| background == Background::Hide),
             options: self.read_options(),
             off: self.switches().off,
         }

@@ -6,7 +6,7 @@ use crate::memory;
 use crate::plan::EffectSet;
 use crate::plan::switch::{self, Removed};
 use crate::scene::description::{Description, EnvironmentDescription, EnvironmentSource};
-use crate::scene::{Scene, environment_file, gltf, usd};
+use crate::scene::{LightPreset, Scene, environment_file, gltf, light_preset, usd};
 use crate::stop::Stop;
 use std::path::PathBuf;
 
@@ -28,6 +28,11 @@ pub struct SceneRequest {
     pub rotation: Option<f64>,
     /// Factor on the environment's radiance; `None`: the scene's own.
     pub strength: Option<f64>,
+    /// The environment for a scene without a light, or instead of the scene's own; `None`: the studio, for a scene
+    /// without a light.
+    pub light_preset: Option<LightPreset>,
+    /// Whether camera rays do not see the environment, and the background is transparent; `None`: as the scene says.
+    pub background_hidden: Option<bool>,
     /// Choices about reading that the file leaves open.
     pub options: gltf::ReadOptions,
     /// Effects, such as dispersion, that are switched off.
@@ -94,6 +99,9 @@ fn check_memory(request: &SceneRequest, threads: usize) -> Result<()> {
 
 fn build(mut description: Description, request: &SceneRequest, threads: usize) -> Result<Loaded> {
     set_environment(&mut description, request)?;
+    if let Some(hidden) = request.background_hidden {
+        description.picture.film_transparent = hidden;
+    }
     let removed = switch::remove_effects(&mut description, request.off);
     Ok(Loaded { scene: Scene::build(description, threads)?, removed, file: None })
 }
@@ -109,6 +117,8 @@ fn set_environment(description: &mut Description, request: &SceneRequest) -> Res
         description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
         description.environment_hidden_from_camera = false;
         description.environment_unknown = false;
+    } else {
+        light_preset::apply(description, request.light_preset);
     }
     set_rotation_and_strength(description, request)?;
     let Some(environment) = &description.environment else { return Ok(()) };

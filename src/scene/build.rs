@@ -49,7 +49,8 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
     warn_of_cut_solids(&shapes, &materials, &mut warnings);
     warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
     if description.cameras.is_empty() {
-        warnings.push("the scene has no camera: a view of the whole scene from the front is used".into());
+        warnings
+            .push("the scene has no camera: a three-quarter view of the whole scene is used (--orbit turns it)".into());
     }
     let scattering = Scattering::new(&materials.list);
     let contacts = Arc::new(Contacts::new(&shapes, &materials));
@@ -184,7 +185,7 @@ fn warn_of_lights(
             _ => "the intensities of all lights are zero",
         };
         warnings.push(format!(
-            "{dark}: the picture will be black (add --env, a lamp or an emissive material; Blender's own exporter leaves out \
+            "{dark}: the picture will be black (add --light-preset studio, --env, a lamp or an emissive material; Blender's own exporter leaves out \
              area lights and the world)"
         ));
     }

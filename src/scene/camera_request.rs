@@ -4,13 +4,19 @@ use super::Scene;
 use super::description::{CameraDescription, Projection};
 use crate::camera::{self, Camera, Filter};
 use crate::error::{Error, ErrorKind, Result};
-use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2};
+use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};
+use serde::Serialize;
 use std::borrow::Cow;
+use std::str::FromStr;
 
 /// Width of a picture in pixels, if neither the scene nor the user sets a size.
 const DEFAULT_WIDTH: u32 = 1280;
 /// Width over height of a picture when neither the camera nor the user gives it.
 const DEFAULT_ASPECT: f32 = 16.0 / 9.0;
+/// Vertical field of view of a view of the whole scene (radians): 35 degrees.
+const VIEW_YFOV: f64 = 35.0 * std::f64::consts::PI / 180.0;
+/// Share of the picture's height or width that the scene fills.
+const VIEW_FILL: f64 = 0.9;
 /// Maximum width and height of a picture in pixels.
 pub const MAX_SIZE: u32 = 32_768;
 
@@ -19,6 +25,8 @@ pub const MAX_SIZE: u32 = 32_768;
 pub struct CameraRequest {
     /// Name of the camera; `None`: the scene's first camera.
     pub camera: Option<String>,
+    /// A view of the whole scene instead of a camera; `None`: the camera, or the default view if the scene has none.
+    pub orbit: Option<Orbit>,
     /// Width of the whole picture in pixels; `None`: from the scene, or from the height.
     pub width: Option<u32>,
     /// Height of the whole picture in pixels; `None`: from the scene, or from the width.
@@ -27,6 +35,63 @@ pub struct CameraRequest {
     pub crop: Option<Crop>,
     /// Filter that reconstructs pixels.
     pub filter: Filter,
+}
+
+/// A view of the whole scene from a place on a sphere around its middle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Orbit {
+    /// Angle about +Y (degrees): 0 is the front (+Z), 90 the right side (+X).
+    pub azimuth: f64,
+    /// Angle above the horizon (degrees), -90 to 90.
+    pub elevation: f64,
+    /// Distance from the middle of the scene.
+    pub distance: Distance,
+}
+
+/// Distance of a view from the middle of the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Distance {
+    /// A number of metres.
+    Metres(f64),
+    /// A factor on the distance from which the scene fills the picture.
+    Framing(f64),
+}
+
+impl Default for Orbit {
+    /// A three-quarter view from above.
+    fn default() -> Orbit {
+        Orbit { azimuth: 30.0, elevation: 20.0, distance: Distance::Framing(1.0) }
+    }
+}
+
+impl FromStr for Orbit {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Orbit, String> {
+        let fault = || "it must be AZIMUTH,ELEVATION or AZIMUTH,ELEVATION,DISTANCE, such as 30,20 or 30,20,150%".into();
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let (azimuth, elevation, distance) = match text.split(',').collect::<Vec<_>>()[..] {
+            [azimuth, elevation] => (number(azimuth), number(elevation), Some(Distance::Framing(1.0))),
+            [azimuth, elevation, distance] => {
+                let distance = match distance.trim().strip_suffix('%') {
+                    Some(share) => number(share).map(|share| Distance::Framing(share / 100.0)),
+                    None => number(distance).map(Distance::Metres),
+                };
+                (number(azimuth), number(elevation), distance)
+            }
+            _ => return Err(fault()),
+        };
+        let (Some(azimuth), Some(elevation), Some(distance)) = (azimuth, elevation, distance) else {
+            return Err(fault());
+        };
+        let (Distance::Metres(length) | Distance::Framing(length)) = distance;
+        match (-90.0..=90.0).contains(&elevation) {
+            false => Err("the elevation must be between -90 and 90 degrees".into()),
+            true if length <= 0.0 => Err("the distance must be above zero".into()),
+            true => Ok(Orbit { azimuth, elevation, distance }),
+        }
+    }
 }
 
 /// A window of a picture, which is rendered alone: left edge, top edge, width and height.
@@ -101,7 +166,7 @@ impl Scene {
     /// # Errors
     /// As for [`Scene::whole_camera`].
     pub(super) fn whole_camera_among(&self, cameras: &[CameraDescription], request: &CameraRequest) -> Result<Camera> {
-        let described = self.described_camera(cameras, request.camera.as_deref())?;
+        let described = self.described_camera(cameras, request)?;
         let (width, height) = self.picture_size(request, described.projection)?;
         let film_aspect = width as f32 / height as f32;
         let projection = match described.projection {
@@ -125,14 +190,18 @@ impl Scene {
         Ok(camera.with_shift(described.shift.into()).with_filter(request.filter))
     }
 
-    /// The camera called `name` among `cameras`; without a name the first of them, or a default one if it has none.
+    /// The camera of the request: a view of the whole scene, the one of a name among `cameras`, or the first of them.
+    /// Without cameras it is the default view.
     fn described_camera<'c>(
         &self,
         cameras: &'c [CameraDescription],
-        name: Option<&str>,
+        request: &CameraRequest,
     ) -> Result<Cow<'c, CameraDescription>> {
-        let Some(name) = name else {
-            return Ok(cameras.first().map_or_else(|| Cow::Owned(self.default_camera()), Cow::Borrowed));
+        let Some(name) = request.camera.as_deref() else {
+            return match (request.orbit, cameras.first()) {
+                (None, Some(first)) => Ok(Cow::Borrowed(first)),
+                (orbit, _) => self.view(orbit.unwrap_or_default(), request).map(Cow::Owned),
+            };
         };
         cameras.iter().find(|camera| camera.name == name).map(Cow::Borrowed).ok_or_else(|| {
             let names: Vec<String> = cameras.iter().map(|c| format!("\"{}\"", c.name)).collect();
@@ -174,22 +243,45 @@ impl Scene {
     }
 
     /// A camera that sees the whole scene from the front, slightly from above.
-    fn default_camera(&self) -> CameraDescription {
-        let yfov = 40f32.to_radians();
-        let sky = self.lights.sky();
-        let distance = f64::from(sky.radius) / f64::from(0.5 * yfov).sin();
-        let back = DVec3::new(0.0, 0.35, 1.0).normalize();
-        let right = DVec3::Y.cross(back).normalize();
+
+    /// A camera that looks at the middle of the scene.
+    fn view(&self, orbit: Orbit, request: &CameraRequest) -> Result<CameraDescription> {
+        let projection = Projection::Perspective { yfov: VIEW_YFOV as f32, aspect: None };
+        let (width, height) = self.picture_size(request, projection)?;
+        let ((sa, ca), (se, ce)) = (orbit.azimuth.to_radians().sin_cos(), orbit.elevation.to_radians().sin_cos());
+        let back = DVec3::new(sa * ce, se, ca * ce);
+        let right = DVec3::new(ca, 0.0, -sa);
         let matrix = DMat3::from_cols(right, back.cross(right), back);
-        let position = sky.center.as_dvec3() + self.origin + back * distance;
-        CameraDescription {
+        let (low, high) = self.shapes.bounds();
+        let middle = if low.cmple(high).all() { 0.5 * (low + high) } else { self.lights.sky().center };
+        let distance = match orbit.distance {
+            Distance::Metres(length) => length,
+            Distance::Framing(factor) => {
+                factor * self.framing_distance(middle, matrix, f64::from(width) / f64::from(height))
+            }
+        };
+        Ok(CameraDescription {
             name: "default".into(),
-            to_world: DAffine3 { matrix3: matrix, translation: position },
-            projection: Projection::Perspective { yfov, aspect: None },
+            to_world: DAffine3 { matrix3: matrix, translation: middle.as_dvec3() + self.origin + back * distance },
+            projection,
             aperture_radius: 0.0,
             focus_distance: 1.0,
             shift: [0.0; 2],
-        }
+        })
+    }
+
+    /// Distance (m) from `middle` at which a camera with the axes of `rotation` sees all vertices, with a margin.
+    fn framing_distance(&self, middle: Vec3, rotation: DMat3, aspect: f64) -> f64 {
+        let half = (0.5 * VIEW_YFOV).tan() * VIEW_FILL;
+        let to_camera = rotation.transpose();
+        let least = |p: Vec3| {
+            let p = to_camera * (p - middle).as_dvec3();
+            p.z + (p.x.abs() / aspect).max(p.y.abs()) / half
+        };
+        let radius = f64::from(self.lights.sky().radius);
+        let distance = self.shapes.points().map(least).fold(0.0, f64::max);
+        // A scene without meshes, or one that is a point.
+        if distance > 0.0 { distance } else { radius / half }
     }
 }
 

@@ -43,6 +43,8 @@ pub struct Description {
     /// Whether the original scene may have an environment that the file lacks: the exporter that wrote the file never
     /// writes one.
     pub environment_unknown: bool,
+    /// Whether the file itself says that its environment is black.
+    pub environment_is_black: bool,
     /// The medium that fills the space outside all solids; `None` if it is empty.
     pub medium: Option<MediumParameters>,
     /// Settings of the picture, which options of the user override.
@@ -173,6 +175,8 @@ pub enum ToneMap {
     Agx,
     /// A film-like curve per channel: more contrast, bright colours keep their wavelength and clip
     Filmic,
+    /// Khronos PBR Neutral: base colours of products stay as they are, only highlights are compressed
+    Neutral,
     /// No curve: what is brighter than white is cut off
     Srgb,
 }

@@ -139,7 +139,7 @@ fn strict_turns_warnings_into_an_error() {
     let folder = Folder::new();
     support::glb::write(&folder.path("dark.glb"), false);
     let render = "render dark.glb -o out.exr --width 32 --iterations 1 --photons 100 --no-combine --progress none";
-    let warning = "warning: dark.glb: the scene has no light: the picture will be black (add --env, a lamp or an emissive material; Blender's own exporter leaves out area lights and the world)\n";
+    let warning = "warning: dark.glb: the scene has no light of its own: a neutral studio lights it (--light-preset chooses another light or none, --env an image)\n";
     let outcome = folder.run(render);
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), warning));
     assert_eq!(folder.read("out.exr").1["warnings"].as_array().map(Vec::len), Some(1));

@@ -124,6 +124,7 @@ fn python_type(option: &Value) -> String {
         "denoise" => "_Denoise".into(),
         "filter" => "_Filter | tuple[_Filter, float]".into(),
         "crop" => "Sequence[float]".into(),
+        "orbit" => "Sequence[float] | str".into(),
         "layers" => "str | Sequence[str]".into(),
         "cppm_grid" | "shard" => "tuple[int, int]".into(),
         "initial_bandwidth" => "float | Literal[\"knn\", \"footprint\"]".into(),

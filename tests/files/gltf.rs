@@ -5,6 +5,7 @@ pub mod glb;
 mod animation;
 mod bad_input;
 mod choice;
+pub mod compressed;
 pub mod everything;
 mod fuzz;
 mod geometry;

@@ -247,7 +247,7 @@ fn agx_looks_like_blenders() {
 
 #[test]
 fn every_curve_keeps_order_and_bounds() {
-    for curve in [ToneMap::Agx, ToneMap::Filmic, ToneMap::Srgb] {
+    for curve in [ToneMap::Agx, ToneMap::Filmic, ToneMap::Neutral, ToneMap::Srgb] {
         assert!(curve.display(Rgb::ZERO, 0.0).max_element() < 0.003, "{curve:?}");
         let mut last = -1.0;
         for i in -40..=40 {
@@ -270,6 +270,23 @@ fn every_curve_keeps_order_and_bounds() {
             }
         }
         assert!(curve.display(Rgb::NAN, 0.0).max_element() < 0.003);
+    }
+}
+
+/// Values of the published GLSL function, computed in double precision.
+#[test]
+fn neutral_is_the_published_curve() {
+    for (colour, expected) in [
+        ([0.18, 0.18, 0.18], [0.14, 0.14, 0.14]),
+        ([0.5, 0.2, 0.06], [0.4625, 0.1625, 0.0225]),
+        ([0.04, 0.04, 0.04], [0.01, 0.01, 0.01]),
+        ([2.0, 0.5, 0.25], [0.96, 0.321_136, 0.214_658]),
+        ([10.0, 10.0, 10.0], [0.993_898, 0.993_898, 0.993_898]),
+    ] {
+        let shown = ToneMap::Neutral.display(Rgb::from_array(colour), 0.0).to_array().map(srgb_decode);
+        for (shown, expected) in shown.into_iter().zip(expected) {
+            assert!((shown - expected).abs() < 1e-4, "{colour:?}: {shown} instead of {expected}");
+        }
     }
 }
 

@@ -22,12 +22,16 @@ use std::sync::LazyLock;
 pub type Reader = (&'static str, fn(&[u8], &Path));
 
 /// All readers.
-pub const READERS: [Reader; 13] = [
+pub const READERS: [Reader; 17] = [
     ("glb", glb),
     ("scene", scene),
     ("gltf", gltf),
     ("png", texture),
     ("jpeg", texture),
+    ("webp", texture),
+    ("ktx2", texture),
+    ("draco", draco),
+    ("meshopt", meshopt),
     ("exr", picture),
     ("exr_environment", environment),
     ("hdr", environment),
@@ -138,6 +142,54 @@ fn texture(bytes: &[u8], _: &Path) {
     if let Some(scene) = value_of(scene) {
         promises::check(&scene, "what was read");
         assert!(scene.textures.iter().all(|texture| texture.mean().is_finite()), "texels");
+    }
+}
+
+/// A mesh in Draco's compression, with positions and normals.
+fn draco(bytes: &[u8], _: &Path) {
+    let compression = serde_json::json!({"KHR_draco_mesh_compression":
+        {"bufferView": 0, "attributes": {"POSITION": 0, "NORMAL": 1}}});
+    let document = serde_json::json!({
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [
+            {"attributes": {"POSITION": 0, "NORMAL": 0}, "indices": 1, "extensions": compression.clone()},
+            {"attributes": {"POSITION": 2}, "indices": 3, "extensions": compression}]}],
+        "accessors": [
+            {"componentType": 5126, "type": "VEC3", "count": 4}, {"componentType": 5125, "type": "SCALAR", "count": 6},
+            {"componentType": 5126, "type": "VEC3", "count": 4}, {"componentType": 5125, "type": "SCALAR", "count": 6}],
+        "bufferViews": [{"buffer": 0, "byteLength": bytes.len()}], "buffers": [{"byteLength": bytes.len()}],
+    });
+    if let Some(scene) =
+        value_of(gltf::read_bytes(&packed(&document, bytes), Path::new("fuzz.glb"), &ReadOptions::default()))
+    {
+        promises::check(&scene, "what was read");
+    }
+}
+
+/// Buffer views in meshoptimizer's compression: vertices with each filter, triangles and indices.
+fn meshopt(bytes: &[u8], _: &Path) {
+    for (mode, stride, filter) in [
+        ("ATTRIBUTES", 12, "NONE"),
+        ("ATTRIBUTES", 12, "EXPONENTIAL"),
+        ("ATTRIBUTES", 4, "OCTAHEDRAL"),
+        ("ATTRIBUTES", 8, "QUATERNION"),
+        ("ATTRIBUTES", 8, "COLOR"),
+        ("TRIANGLES", 4, "NONE"),
+        ("INDICES", 2, "NONE"),
+    ] {
+        let view = serde_json::json!({"buffer": 0, "byteLength": bytes.len(), "byteStride": stride, "count": 6,
+            "mode": mode, "filter": filter});
+        let document = serde_json::json!({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"componentType": 5126, "type": "VEC3", "count": 6, "bufferView": 0}],
+            "bufferViews": [{"buffer": 0, "byteLength": 72, "extensions": {"EXT_meshopt_compression": view}}],
+            "buffers": [{"byteLength": bytes.len()}],
+        });
+        let read = gltf::read_bytes(&packed(&document, bytes), Path::new("fuzz.glb"), &ReadOptions::default());
+        if let Some(scene) = value_of(read) {
+            promises::check(&scene, "what was read");
+        }
     }
 }
 

@@ -72,7 +72,7 @@ class Image:
         *,
         compression: Literal["zip", "zips", "piz", "none"] = "zip",
         exposure: float = 0.0,
-        tonemap: Literal["agx", "filmic", "srgb"] = "agx",
+        tonemap: Literal["agx", "filmic", "neutral", "srgb"] = "agx",
     ) -> None: ...
     def __getitem__(self, name: str, /) -> NDArray[np.float32]: ...
     def __contains__(self, name: str, /) -> bool: ...
@@ -88,6 +88,8 @@ class Scene:
         environment: str | os.PathLike[str] | Sequence[float] | NDArray[Any] | None = None,
         environment_rotation: float | None = None,
         environment_strength: float | None = None,
+        light_preset: Literal["studio", "sky", "none"] | None = None,
+        background: Literal["show", "hide"] | None = None,
         light_units: Literal["auto", "radiometric", "photometric"] = "auto",
         glass: Literal["auto", "solid", "thin"] = "auto",
         effects: str | None = None,
@@ -120,6 +122,7 @@ class Scene:
         crop: Sequence[float] | None = None,
         filter: _Filter | tuple[_Filter, float] | None = None,
         camera: str | None = None,
+        orbit: Sequence[float] | str | None = None,
         layers: str | Sequence[str] = "all",
         method: _Method = "auto",
         photons: int | None = None,
@@ -169,6 +172,7 @@ class Scene:
         crop: Sequence[float] | None = None,
         filter: _Filter | tuple[_Filter, float] | None = None,
         camera: str | None = None,
+        orbit: Sequence[float] | str | None = None,
         method: _Method = "auto",
         photons: int | None = None,
         max_depth: int | None = None,

@@ -166,7 +166,7 @@ impl Image {
     ///
     /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
     /// exposure      of the PNG, stops
-    /// tonemap       of the PNG: 'agx', 'filmic' or 'srgb'
+    /// tonemap       of the PNG: 'agx', 'filmic', 'neutral' or 'srgb'
     #[pyo3(signature = (path, *, compression = "zip", exposure = 0.0, tonemap = "agx"))]
     fn save(&self, py: Python<'_>, path: PathBuf, compression: &str, exposure: f32, tonemap: &str) -> PyResult<()> {
         let compression = choice("save: compression", compression)?;

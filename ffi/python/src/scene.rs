@@ -48,7 +48,8 @@ impl Scene {
     #[pyo3(
         signature = (source, **options),
         text_signature = "(source, *, environment=None, environment_rotation=None, environment_strength=None, \
-            light_units='auto', glass='auto', effects=None, frame=None, frame_rate=None, \
+            light_preset=None, background=None, light_units='auto', glass='auto', \
+            effects=None, frame=None, frame_rate=None, \
             scene_name=None, animation=None, variant=None, pose='animated', shutter=None, allow_outside=False, strict=False, threads=0)"
     )]
     fn new(py: Python<'_>, source: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
@@ -218,6 +219,8 @@ impl Scene {
             environment: self.identity.environment.clone().map(Environment::File),
             rotation: None,
             strength: None,
+            light_preset: None,
+            background_hidden: None,
             options: self.options.read_options(),
             off: self.options.switches().off,
         }

@@ -185,7 +185,7 @@ fn open_finishes(
         let (max_depth, switches) = (args.max_depth, args.scene.switches());
         let plan = plan::plan(PlanInput { chosen: &chosen, max_depth, switches }, view, removed);
         let new: Vec<String> = plan.warnings.into_iter().filter(|warning| printed.insert(warning.clone())).collect();
-        print_plan_warnings(&args.scene.path, &new);
+        print_plan_warnings(&args.scene, &new);
         let place = format!("--run \"{}\"", entry.name);
         let levels = entry.settings.levels.count;
         let opened = (!options.no_finish).then(|| finish::open(&options.finish, Some(levels))).transpose();

@@ -120,6 +120,7 @@ impl ConvergeArgs {
     /// The camera and the size of the compared pictures.
     pub fn camera_request(&self) -> CameraRequest {
         CameraRequest {
+            orbit: None,
             camera: self.camera.clone(),
             width: self.size.width,
             height: self.size.height,

@@ -13,9 +13,11 @@ pub use options::RenderArgs;
 use super::finish::warn_missing_denoiser;
 use super::progress::{FrameOfRun, Reporter, Waiting};
 use super::signals::Interrupt;
+use super::warnings::lines;
 use super::{output, say, scene};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
+use caustique::options::SceneOptions;
 use caustique::pipeline::plan::reason;
 use caustique::pipeline::{self, Delivery, Event, Observer, Phase, Request};
 use caustique::plan::Plan;
@@ -25,7 +27,7 @@ use caustique::scene::description::PictureDefaults;
 use caustique::stop::Stop;
 use preview::Preview;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 pub use summary::{Summary, place, print_finish, print_picture, warn_unseen};
 
 /// Renders a scene, or frames of its animation, as `caustique render`.
@@ -179,7 +181,7 @@ impl<'a> Reports<'a> {
         self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         let RenderArgs { output, preview, picture, .. } = self.args;
         self.preview = preview.as_ref().map(|target| Preview::new(target, output, picture, self.made_for));
-        print_plan_warnings(&self.args.options.scene.path, &plan.warnings);
+        print_plan_warnings(&self.args.options.scene, &plan.warnings);
         self.reason_if_black.clone_from(&plan.reason_if_black);
     }
 
@@ -246,8 +248,8 @@ fn beauty(set: &LayerSet) -> Result<LayerSet> {
 }
 
 /// Prints the warnings of a render's plan.
-pub fn print_plan_warnings(scene: &Path, warnings: &[String]) {
-    for warning in warnings {
-        say(&format!("warning: {}: {warning}", scene.display()));
+pub fn print_plan_warnings(scene: &SceneOptions, warnings: &[String]) {
+    for warning in lines(warnings, scene.verbose) {
+        say(&format!("warning: {}: {warning}", scene.path.display()));
     }
 }

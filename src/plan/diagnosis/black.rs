@@ -1,14 +1,10 @@
 //! Explanations of a black picture.
 
 use super::super::{EffectPlan, PlanRequest};
-use super::rays;
+use super::{lights, rays};
 use crate::camera::Camera;
 use crate::light::Emitter;
-use crate::math::Vec2;
 use crate::scene::Scene;
-
-/// Number of test rays along each edge of the picture.
-const RAYS_PER_EDGE: u32 = 32;
 
 /// A warning if the camera sees no surface, no scattering medium and no light at infinity; otherwise `None`.
 pub(super) fn empty_view(scene: &Scene, camera: &Camera) -> Option<String> {
@@ -18,8 +14,7 @@ pub(super) fn empty_view(scene: &Scene, camera: &Camera) -> Option<String> {
     })
 }
 
-/// The most likely reason why a picture is black, with a remedy. Empty for a scene without light, because building it
-/// already warns. `warned`: the plan has other warnings.
+/// The most likely reason why a picture is black, with a remedy. `warned`: the plan has other warnings.
 pub(in super::super) fn reason(
     scene: &Scene,
     camera: &Camera,
@@ -28,10 +23,13 @@ pub(in super::super) fn reason(
     warned: bool,
 ) -> String {
     if scene.lights.is_empty() {
-        return String::new();
+        return "the scene has no light; --light-preset studio or --env gives one".into();
     }
     if !sees_anything(scene, camera) {
         return "the camera sees no surface; look at its place and direction, or choose another with --camera".into();
+    }
+    if let Some(blocked) = lights::blocked_environment(scene, camera) {
+        return blocked;
     }
     let left: Vec<&str> = effects.iter().filter(|e| e.present && !e.simulated).map(|e| e.effect.name()).collect();
     if !left.is_empty() {
@@ -45,11 +43,6 @@ pub(in super::super) fn reason(
 }
 
 fn sees_anything(scene: &Scene, camera: &Camera) -> bool {
-    let (width, height) = camera.size();
-    let at = |i: u32, size: u32| ((f64::from(i) + 0.5) / f64::from(RAYS_PER_EDGE) * f64::from(size)) as u32;
-    (0..RAYS_PER_EDGE * RAYS_PER_EDGE).any(|i| {
-        let film = camera.film_point((at(i % RAYS_PER_EDGE, width), at(i / RAYS_PER_EDGE, height)), Vec2::splat(0.5));
-        let ray = camera.ray(film, Vec2::splat(0.5));
-        rays::first(scene, ray.origin, ray.direction, f32::INFINITY, i).is_some()
-    })
+    let mut along = rays::of_camera(camera).zip(0..);
+    along.any(|(ray, i)| rays::first(scene, ray.origin, ray.direction, f32::INFINITY, i).is_some())
 }

@@ -3,6 +3,7 @@
 use super::super::names::truncate_names;
 use super::super::{Effect, PlanRequest};
 use super::rays;
+use crate::camera::Camera;
 use crate::light::{Emitter, TriangleLight};
 use crate::math::{Vec3, luminance, one_minus_cos};
 use crate::scene::Scene;
@@ -142,18 +143,46 @@ pub(super) fn encased_lights(scene: &Scene, camera: Vec3) -> Vec<String> {
     warnings
 }
 
-/// A warning if the environment cannot light the surroundings of the camera, because a sky dome or a closed room blocks
-/// it.
-pub(super) fn blocked_environment(scene: &Scene, camera: Vec3) -> Option<String> {
-    scene.lights.sky().environment.as_ref()?;
-    let rays = rays::directions(DIRECTIONS).map(|d| (camera, d)).collect();
-    let mut around = enclosure(scene, rays)?;
-    around.retain(|object| is_within(scene, &BTreeSet::from([*object]), camera));
+/// A warning if the environment or suns cannot light the surroundings of the camera, or the surfaces that it sees from
+/// outside, because a sky dome or a closed room blocks them.
+pub(super) fn blocked_environment(scene: &Scene, camera: &Camera) -> Option<String> {
+    let has_sun = scene.lights.emitters().iter().any(|emitter| matches!(emitter, Emitter::Sun { .. }));
+    let lights = match (&scene.lights.sky().environment, has_sun) {
+        (Some(_), false) => "the environment lights",
+        (Some(_), true) => "the environment and the sun light",
+        (None, true) => "the sun lights",
+        (None, false) => return None,
+    };
+    let position = camera.position();
+    let around_camera = enclosure(scene, rays::directions(DIRECTIONS).map(|d| (position, d)).collect());
+    let (mut around, inside) = match around_camera {
+        Some(around) => (around, position),
+        None => {
+            let rays = rays_from_seen_surfaces(scene, camera);
+            let inside = rays.first()?.0;
+            (enclosure(scene, rays)?, inside)
+        }
+    };
+    around.retain(|object| is_within(scene, &BTreeSet::from([*object]), inside));
     let names: Vec<String> = around.iter().map(|object| format!("\"{}\"", scene.objects[*object as usize])).collect();
     let by = if names.is_empty() { "everything around the camera".into() } else { truncate_names(&names) };
     Some(format!(
-        "the environment lights nothing that the camera sees: {by} shuts it out; make an opening, let it glow if it is the sky, or take it away"
+        "{lights} nothing that the camera sees: {by} shuts it out; make an opening, let it glow if it is the sky, or take it away"
     ))
+}
+
+/// Rays that leave the opaque surfaces which the camera sees, on the side of the camera.
+fn rays_from_seen_surfaces(scene: &Scene, camera: &Camera) -> Vec<(Vec3, Vec3)> {
+    let onward: Vec<Vec3> = rays::directions(DIRECTIONS).collect();
+    let mut from = Vec::new();
+    for (index, ray) in rays::of_camera(camera).enumerate() {
+        let Some(surface) = rays::first_seen(scene, ray.origin, ray.direction, index as u32) else { continue };
+        let front = if ray.direction.dot(surface.ng) < 0.0 { surface.ng } else { -surface.ng };
+        let next = onward[97 * index % onward.len()];
+        let next = if next.dot(front) < 0.0 { -next } else { next };
+        from.push((surface.ray_origin(next), next));
+    }
+    from
 }
 
 /// Indices of the opaque objects that rays (origin and direction) hit while they bounce from surface to surface; `None`
@@ -164,7 +193,7 @@ fn enclosure(scene: &Scene, mut rays: Vec<(Vec3, Vec3)>) -> Option<BTreeSet<u32>
     for bounce in 0..BOUNCES {
         for (index, ray) in rays.iter_mut().enumerate() {
             let (origin, direction) = *ray;
-            let surface = rays::first_opaque(scene, origin, direction, f32::INFINITY, index as u32)?;
+            let surface = rays::first_opaque(scene, origin, direction, f32::INFINITY, 2 * index as u32)?;
             met.insert(scene.shapes.instances[surface.instance as usize].object);
             // Continues on the side that the ray came from, in different directions for neighbouring rays.
             let front = if direction.dot(surface.ng) < 0.0 { surface.ng } else { -surface.ng };

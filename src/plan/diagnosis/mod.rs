@@ -26,7 +26,7 @@ pub(super) fn warnings(scene: &Scene, camera: &Camera, request: &PlanRequest) ->
     warnings.extend(lights::missing_environment(scene, request));
     if !scene.lights.is_empty() {
         warnings.extend(lights::encased_lights(scene, camera.position()));
-        warnings.extend(lights::blocked_environment(scene, camera.position()));
+        warnings.extend(lights::blocked_environment(scene, camera));
         warnings.extend(lights::delta_lights_behind_glass(scene, request));
         warnings.extend(glass::unlit_glass(scene));
         warnings.extend(black::empty_view(scene, camera));

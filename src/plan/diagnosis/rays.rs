@@ -1,7 +1,8 @@
 //! Rays in fixed directions, and the surfaces that they hit.
 
+use crate::camera::{Camera, CameraRay};
 use crate::geometry::Surface;
-use crate::math::Vec3;
+use crate::math::{Vec2, Vec3};
 use crate::scene::Scene;
 use crate::scene::contact::RaySurfaces;
 use crate::trace::Ray;
@@ -18,6 +19,33 @@ pub(super) fn directions(n: u32) -> impl Iterator<Item = Vec3> {
         let r = (1.0 - y * y).sqrt();
         Vec3::new((r * cos) as f32, y as f32, (r * sin) as f32)
     })
+}
+
+/// Number of test rays along each edge of the picture.
+const RAYS_PER_EDGE: u32 = 32;
+
+/// Rays of a camera, evenly spread over the picture.
+pub(super) fn of_camera(camera: &Camera) -> impl Iterator<Item = CameraRay> {
+    let (width, height) = camera.size();
+    let at = |i: u32, size: u32| ((f64::from(i) + 0.5) / f64::from(RAYS_PER_EDGE) * f64::from(size)) as u32;
+    (0..RAYS_PER_EDGE * RAYS_PER_EDGE).map(move |i| {
+        let film = camera.film_point((at(i % RAYS_PER_EDGE, width), at(i / RAYS_PER_EDGE, height)), Vec2::splat(0.5));
+        camera.ray(film, Vec2::splat(0.5))
+    })
+}
+
+/// The first opaque surface that a camera ray sees; `token` is the random number for alpha. The ray passes transmitting
+/// surfaces, objects that cameras do not see, and back faces that glTF culls.
+pub(super) fn first_seen(scene: &Scene, mut origin: Vec3, direction: Vec3, token: u32) -> Option<Surface> {
+    for _ in 0..MAX_SURFACES {
+        let surface = first_opaque(scene, origin, direction, f32::INFINITY, token)?;
+        let hidden = scene.shapes.instances[surface.instance as usize].hidden_from_camera;
+        if !hidden && !scene.culls(&surface, direction) {
+            return Some(surface);
+        }
+        origin = surface.ray_origin(direction);
+    }
+    None
 }
 
 /// The first surface along a ray of length `tmax`, opaque or not; `token` is the random number for alpha.

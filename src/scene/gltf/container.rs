@@ -9,10 +9,12 @@ use std::collections::BTreeSet;
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
 /// Names of the glTF extensions that the reader supports.
-const SUPPORTED: [&str; 20] = [
+const SUPPORTED: [&str; 23] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -27,6 +29,7 @@ const SUPPORTED: [&str; 20] = [
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
     "KHR_texture_basisu",
     "KHR_texture_transform",
@@ -155,17 +158,14 @@ pub(super) fn extensions(document: &Value) -> (BTreeSet<String>, BTreeSet<String
 /// The error for a part of the document with an unsupported compression extension; `None` for other parts.
 pub(super) fn compression_error(part: &Value) -> Option<Error> {
     let names = part["extensions"].as_object()?.keys();
-    let name = names.into_iter().find(|name| name.ends_with("_compression"))?;
+    let name = names.into_iter().find(|name| name.ends_with("_compression") && !is_supported(name))?;
     let cause = format!("all its data is compressed by extension \"{name}\", which is not supported");
     Some(fault("", cause).hint(remedy(name)))
 }
 
 fn remedy(extension: &str) -> &'static str {
     match extension {
-        "KHR_draco_mesh_compression" => "export without mesh compression (Blender: Data > Compression off)",
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "decompress the file, for instance with gltf-transform"
-        }
+        name if name.ends_with("_compression") => "decompress the file: gltf-transform copy IN.glb OUT.glb",
         _ => "export the scene without this extension",
     }
 }

@@ -2,7 +2,7 @@
 
 use super::choice::Playing;
 use super::container::{self, malformed};
-use super::{fault, uri};
+use super::{compressed, fault, uri};
 use crate::error::Result;
 use crate::memory;
 use crate::scene::folder::Folder;
@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::cell::Cell;
+use std::collections::HashMap;
 use std::fmt::Display;
 
 /// Maximum number of elements without data in a file. Accessors without a buffer view have them; they are zero unless a
@@ -39,6 +40,8 @@ pub(super) struct Document<'a> {
     /// Bytes that were allocated since free memory was last checked.
     unchecked_bytes: Cell<u64>,
     buffers: Vec<Cow<'a, [u8]>>,
+    /// Data of the buffer views that were compressed, by the index of the view.
+    pub(super) decoded: HashMap<usize, Vec<u8>>,
 }
 
 impl<'a> Document<'a> {
@@ -82,8 +85,10 @@ impl<'a> Document<'a> {
             zeros_left: Cell::new(MAX_ZEROS),
             unchecked_bytes: Cell::new(0),
             buffers: Vec::new(),
+            decoded: HashMap::new(),
         };
         document.buffers = document.load_buffers(&described, binary)?;
+        compressed::decode(&mut document)?;
         Ok(document)
     }
 
@@ -104,6 +109,8 @@ impl<'a> Document<'a> {
             let place = at("buffer", i);
             let bytes = match &buffer.uri {
                 Some(uri) => Cow::Owned(self.bytes_of(uri).map_err(|e| e.within(&place))?),
+                // The data of its views are elsewhere, and compressed.
+                None if compressed::is_fallback(&self.raw["buffers"][i]) => return Ok(Cow::Borrowed(&[][..])),
                 None if i == 0 => Cow::Borrowed(binary),
                 None => Cow::Borrowed(&[][..]),
             };
@@ -153,19 +160,24 @@ impl<'a> Document<'a> {
 
     /// The bytes of the buffer view with this index.
     pub(super) fn view(&self, index: usize) -> Result<&[u8]> {
+        if let Some(bytes) = self.decoded.get(&index) {
+            return Ok(bytes);
+        }
         let view = get(&self.views, index, "buffer view")?;
-        let buffer =
-            get(&self.buffers, view.buffer.value(), "buffer").map_err(|e| e.within(at("buffer view", index)))?;
         let start = view.byte_offset.unwrap_or_default().0;
-        let end = start.checked_add(view.byte_length.0);
+        self.buffer_range(view.buffer.value(), start, view.byte_length.0)
+            .map_err(|e| e.within(at("buffer view", index)))
+    }
+
+    /// `length` bytes of a buffer from byte `start`.
+    pub(super) fn buffer_range(&self, buffer: usize, start: u64, length: u64) -> Result<&[u8]> {
+        let bytes = get(&self.buffers, buffer, "buffer")?;
+        let end = start.checked_add(length);
         let range = end.and_then(|end| Some(usize::try_from(start).ok()?..usize::try_from(end).ok()?));
-        range.and_then(|range| buffer.get(range)).ok_or_else(|| {
-            let (length, have) = (view.byte_length.0, buffer.len());
-            fault(
-                at("buffer view", index),
-                format!("{length} bytes from byte {start} run past the {have} of buffer {}", view.buffer.value()),
-            )
-            .hint("the file is damaged: export it again")
+        range.and_then(|range| bytes.get(range)).ok_or_else(|| {
+            let have = bytes.len();
+            fault("", format!("{length} bytes from byte {start} run past the {have} of buffer {buffer}"))
+                .hint("the file is damaged: export it again")
         })
     }
 }

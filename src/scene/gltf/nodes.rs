@@ -327,6 +327,7 @@ impl<'r> Reader<'r> {
                 }
                 // A black environment is none.
                 if color == Rgb::ZERO {
+                    self.out.environment_is_black = true;
                     return Ok(());
                 }
                 EnvironmentSource::Color(color)

@@ -131,15 +131,14 @@ impl Textures {
     fn load(&mut self, document: &Document, index: u32, usage: Use, warnings: &mut Vec<String>) -> Result<u32> {
         let texture = get(&document.textures, index as usize, "texture")?;
         let raw = document.part("textures", index as usize);
-        if raw.get("source").is_none() {
+        let source = source(raw).ok_or_else(|| {
             let other = raw["extensions"].as_object().and_then(|e| e.keys().next());
             let cause = match other {
                 Some(name) => format!("texture {index} has only an image of {name}, which cannot be decoded"),
                 None => format!("texture {index} has no image"),
             };
-            return Err(fault("", cause).hint("export the textures as PNG or JPEG"));
-        }
-        let source = texture.source.value();
+            fault("", cause).hint("export the textures as PNG or JPEG")
+        })?;
         let key = (source, texture.sampler.map(|s| s.value()), usage);
         if let Some(&known) = self.known.get(&key) {
             return Ok(known);
@@ -188,13 +187,60 @@ impl Textures {
     }
 }
 
+/// Index of the image of a texture: a PNG or JPEG if it has one, which other programs may show instead of a compressed
+/// image, else the image of an extension.
+fn source(texture: &Value) -> Option<usize> {
+    let extensions = ["KHR_texture_basisu", "EXT_texture_webp"].map(|name| &texture["extensions"][name]["source"]);
+    let index = |value: &Value| usize::try_from(value.as_u64()?).ok();
+    std::iter::once(&texture["source"]).chain(extensions).find_map(index)
+}
+
+/// Decodes the first level of a Basis Universal image (ETC1S or UASTC in a KTX2 file).
+fn decode_basis(document: &Document, bytes: &[u8]) -> Result<Decoded> {
+    let broken = |cause: String| {
+        Error::new(ErrorKind::Image, "", format!("it cannot be decoded: {cause}")).hint(
+            "decode the textures: gltf-transform ktxdecompress IN.glb OUT.glb, or save the image again as PNG or JPEG",
+        )
+    };
+    // Width and height in the header (KTX 2.0, section 3).
+    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+    let (width, height) = word(20).zip(word(24)).ok_or_else(|| broken("its header is cut off".into()))?;
+    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
+        return Err(broken(format!("{width} x {height} texels are none or too many")));
+    }
+    let texels = u64::from(width) * u64::from(height);
+    document
+        .count_bytes(texels.saturating_mul(5), format_args!("{width} x {height} texels"))
+        .map_err(|e| e.hint("save the image smaller, or render with more memory"))?;
+    let decode = || {
+        let image = basisu::Transcoder::new(bytes)?;
+        let size = image.base_dimensions();
+        Ok((size, image.transcode(0, basisu::TargetFormat::Rgba32, basisu::DecodeFlags::NONE)?))
+    };
+    // A panic of the decoder must not end the program.
+    let decoded: std::thread::Result<std::result::Result<_, basisu::Error>> =
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode));
+    let decoded = decoded.map_err(|_| broken("the decoder failed".into()))?;
+    let (size, texels) = decoded.map_err(|e| broken(format!("{e:?}")))?;
+    if size != (width, height) || texels.len() as u64 != 4 * u64::from(width) * u64::from(height) {
+        return Err(broken("its size contradicts its header".into()));
+    }
+    Ok(Decoded { width, height, channels: 4, data: Arc::new(Integers::Bytes(texels)) })
+}
+
+/// The first bytes of a KTX2 file.
+const KTX2: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
+
 /// Decodes an image. A truncated JPEG keeps the texels in the file, with a warning.
 fn decode(document: &Document, bytes: &[u8], place: &str, warnings: &mut Vec<String>) -> Result<Decoded> {
     const HINT: &str = "save the image again as PNG or JPEG";
     let broken = |cause: String| Error::new(ErrorKind::Image, "", cause).hint(HINT);
+    if bytes.starts_with(KTX2) {
+        return decode_basis(document, bytes);
+    }
     let format = image::guess_format(bytes);
-    let Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = format else {
-        return Err(broken("it is neither PNG nor JPEG".into()));
+    let Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) = format else {
+        return Err(broken("it is neither PNG, JPEG, WebP nor KTX2".into()));
     };
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);

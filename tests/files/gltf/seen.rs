@@ -3,6 +3,7 @@
 use super::glb::Glb;
 use super::{message, read, try_read};
 use caustique::light::SpotEdge;
+use caustique::math::{Vec2, Vec3};
 use caustique::scene::description::{PictureDefaults, PunctualKind, ToneMap};
 use caustique::scene::{CameraRequest, Crop};
 use serde_json::{Value, json};
@@ -156,4 +157,34 @@ fn groups_of_lights() {
     );
     let scene = caustique::scene::Scene::build(description, 1).expect("a scene");
     assert_eq!(scene.lights.groups().names, ["key_light", "sky"]);
+}
+
+/// A view of the whole scene shows all vertices, for any shape of the picture, and leaves no more than a tenth of it
+/// empty at the nearest edges.
+#[test]
+fn a_view_of_the_whole_scene_frames_it() {
+    let mut file = Glb::new();
+    let mesh = file.cube("cube", None);
+    file.node(json!({"mesh": mesh, "translation": [5, -3, 2], "scale": [3, 1, 0.2]}));
+    let scene = caustique::scene::Scene::build(read(&file), 1).expect("a scene");
+    let (width, height) = (200, 100);
+    for orbit in ["30,20", "0,0", "90,0", "-135,-40", "200,90", "30,-90"] {
+        for (width, height) in [(width, height), (height, width)] {
+            let orbit = Some(orbit.parse().expect("it is a view"));
+            let size = (Some(width), Some(height));
+            let request = CameraRequest { orbit, width: size.0, height: size.1, ..CameraRequest::default() };
+            let camera = scene.camera(&request).expect("a camera");
+            let film = scene.shapes.points().map(|p| camera.sample(p, Vec2::splat(0.5)).expect("it is seen").film);
+            let half = Vec2::new(width as f32, height as f32) / 2.0;
+            let extent = film.map(|p| ((p - half) / half).abs().max_element()).fold(0.0, f32::max);
+            assert!((0.89..0.91).contains(&extent), "{orbit:?}, {width} x {height}: {extent}");
+        }
+    }
+    let distance = |orbit: &str| {
+        let orbit = Some(orbit.parse().expect("it is a view"));
+        let camera = scene.camera(&CameraRequest { orbit, ..CameraRequest::default() }).expect("a camera");
+        camera.position().distance(Vec3::new(5.0, -3.0, 2.0))
+    };
+    assert!((distance("30,20,7.5") - 7.5).abs() < 1e-5);
+    assert!((distance("30,20,200%") - 2.0 * distance("30,20")).abs() < 1e-4);
 }

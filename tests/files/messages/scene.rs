@@ -1,9 +1,12 @@
 //! Messages about scene files. A case changes a file with every supported feature, or a small one.
 
 use super::{Said, message};
+use crate::gltf::compressed::{SQUARES, draco};
 use crate::gltf::everything::everything;
 use crate::gltf::glb::{CUBE, Glb};
 use crate::gltf::images::{jpegs, wearing};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use caustique::scene::gltf::{FrameTime, Pose, ReadOptions, read, read_bytes};
 use caustique::stop::Stop;
 use serde_json::{Map, Value, json};
@@ -118,6 +121,18 @@ pub fn said() -> String {
         let indices: Vec<u32> = (0..shells.len() as u32).flat_map(shell).collect();
         said.case(what, &solid(&shells.concat(), &indices));
     }
+    let mut square = draco(&STANDARD.decode(SQUARES[0]).expect("it is base64"));
+    square.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] =
+        json!(7);
+    said.case("a Draco attribute that is not there", &messages_of(&square.bytes(), &ReadOptions::default()));
+    let ktx2 = |numbers: &[u8]| [b"\xabKTX 20\xbb\r\n\x1a\n", numbers].concat();
+    for (what, image) in [
+        ("a KTX2 file of its first bytes", ktx2(&[])),
+        ("a KTX2 file without texels", ktx2(&[0; 40])),
+        ("a KTX2 file without data", ktx2(&[[0; 8], [8, 0, 0, 0, 8, 0, 0, 0], [0; 8], [0; 8], [0; 8]].concat())),
+    ] {
+        said.case(what, &messages_of(&wearing(&image, "image/ktx2").bytes(), &ReadOptions::default()));
+    }
     for (what, bytes) in containers() {
         said.case(what, &messages_of(&bytes, &ReadOptions::default()));
     }
@@ -172,10 +187,30 @@ fn parts() -> Cases {
         (
             "Draco alone",
             json!({"/accessors/0": {"componentType": 5126, "type": "VEC3", "count": 8},
-                "/meshes/0/primitives/0/extensions": {"KHR_draco_mesh_compression": {}}}),
+                "/meshes/0/primitives/0/extensions": {"KHR_draco_mesh_compression":
+                    {"bufferView": 0, "attributes": {"POSITION": 0}}}}),
         ),
-        ("Draco required", json!({"/extensionsRequired": ["KHR_draco_mesh_compression"]})),
-        ("meshopt required", json!({"/extensionsRequired": ["EXT_meshopt_compression"]})),
+        ("a compression to come", json!({"/extensionsRequired": ["EXT_new_compression"]})),
+        (
+            "a compression to come, alone",
+            json!({"/accessors/0": {"componentType": 5126, "type": "VEC3", "count": 8},
+                "/meshes/0/primitives/0/extensions": {"EXT_new_compression": {}}}),
+        ),
+        (
+            "meshopt without data",
+            json!({"/bufferViews/1/extensions/EXT_meshopt_compression":
+                {"buffer": 0, "byteLength": 40, "byteStride": 4, "count": 8, "mode": "ATTRIBUTES"}}),
+        ),
+        (
+            "meshopt of odd elements",
+            json!({"/bufferViews/1/extensions/EXT_meshopt_compression":
+                {"buffer": 0, "byteLength": 40, "byteStride": 5, "count": 8, "mode": "ATTRIBUTES"}}),
+        ),
+        (
+            "meshopt of too many elements",
+            json!({"/bufferViews/1/extensions/EXT_meshopt_compression":
+                {"buffer": 0, "byteLength": 40, "byteStride": 256, "count": 1_000_000, "mode": "ATTRIBUTES"}}),
+        ),
         ("extensions used", json!({"/extensionsUsed": ["EXT_one"]})),
         ("no such scene", json!({"scene": "other"})),
         ("no variant", json!({"variant": "red"})),
@@ -297,7 +332,7 @@ fn textures() -> Cases {
     vec![
         ("a transform beyond numbers", json!({format!("{used}/extensions/KHR_texture_transform/offset"): [1e300, 0]})),
         ("many coordinates", json!({format!("{used}/texCoord"): 5})),
-        ("an image of others", json!({"/textures/0": {"extensions": {"KHR_texture_basisu": {"source": 0}}}})),
+        ("an image of others", json!({"/textures/0": {"extensions": {"EXT_texture_new": {"source": 0}}}})),
         ("a texture without an image", json!({"/textures/0": {}})),
         ("an image from nowhere", json!({"/images/0": {}})),
         ("no image", json!({"/images/0/bufferView": 1})),

@@ -30,6 +30,7 @@ const UNSAID: [(&str, &[&str]); 6] = [
             "files that the scene names",
             "name each file once, or render with more memory",
             "its texels",
+            "decompressed data",
             "its pixels",
             "meshes on nodes whose scale is zero along an axis",
         ],
@@ -48,13 +49,19 @@ const UNSAID: [(&str, &[&str]); 6] = [
             "the file ends too early",
             "copy or render it again; it is not whole",
             "no part",
+            "an attribute is damaged",
             "the output is missing",
             "the output has shape {shape:?} instead of {expected:?}",
         ],
     ),
     (
         "decoders have no fault that is known",
-        &["it cannot be decoded: the decoder failed", "the decoder failed", "the file contradicts itself"],
+        &[
+            "it cannot be decoded: the decoder failed",
+            "the decoder failed",
+            "the file contradicts itself",
+            "its size contradicts its header",
+        ],
     ),
     ("no mesh has a rim of one edge", &["edge has one face only"]),
     (
@@ -65,7 +72,10 @@ const UNSAID: [(&str, &[&str]); 6] = [
             "interrupted while the stage was read",
         ],
     ),
-    ("they are no messages", &["caustique checkpoint 6n", "caustique checkpoint ", "not said", "default material"]),
+    (
+        "they are no messages",
+        &["caustique checkpoint 6n", "caustique checkpoint ", "not said", "default material", "xabKTX 20xbbrnx1an"],
+    ),
 ];
 
 /// The source files of the loaders.

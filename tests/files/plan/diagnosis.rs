@@ -166,7 +166,7 @@ fn point_lamps_behind_glass() {
 #[test]
 fn scenes_without_light() {
     let warnings = |description: Description| crate::support::scenes::build(description).warnings;
-    let black = "the picture will be black (add --env, a lamp or an emissive material; Blender's own exporter leaves out area lights and the world)";
+    let black = "the picture will be black (add --light-preset studio, --env, a lamp or an emissive material; Blender's own exporter leaves out area lights and the world)";
     assert_eq!(warnings(floor()), [format!("the scene has no light: {black}")]);
     let mut dark = lit();
     dark.lights[0].intensity = Rgb::ZERO;
@@ -309,10 +309,20 @@ fn a_dome_shuts_the_environment_out() {
                 or take it away";
     let plan = plan(under(matte(0.5, 0.0), 50.0));
     assert_eq!(plan.warnings, [expected]);
-    assert_eq!(plan.reason_if_black, "the warnings above name the likely reason");
+    assert_eq!(plan.reason_if_black, expected);
     silent(under(glass(1.0), 50.0));
     // A ball beside the camera.
     silent(under(matte(0.5, 0.0), 1.0));
+    // The camera is outside, and looks through the dome.
+    let hidden = |mut description: Description| {
+        description.instances.last_mut().expect("the dome").hidden_from_camera = true;
+        description
+    };
+    assert_eq!(self::plan(hidden(under(matte(0.5, 0.0), 7.0))).warnings, [expected]);
+    let mut sunny = hidden(with(floor(), "Dome", sphere(Vec3::ZERO, 7.0, 16), matte(0.5, 0.0)));
+    let sun = PunctualKind::Sun { angle: 0.01 };
+    sunny.lights = vec![PunctualLight { kind: sun, ..point_light(DVec3::ZERO, 1.0) }];
+    assert_eq!(warning(sunny), expected.replace("the environment lights", "the sun lights"));
 }
 
 #[test]
@@ -331,7 +341,7 @@ fn a_limit_of_depth_is_reported() {
 #[test]
 fn reasons_of_black_pictures() {
     let reason = |description: Description| plan(description).reason_if_black;
-    assert_eq!(reason(floor()), "");
+    assert!(reason(floor()).starts_with("the scene has no light; "));
     let mut away = lit();
     away.cameras = vec![crate::support::scenes::look_at(DVec3::new(0.0, 5.0, 6.0), DVec3::new(0.0, 9.0, 6.1), 50.0)];
     assert!(warning(away.clone()).starts_with("the camera sees no surface, so the picture will be black; "));

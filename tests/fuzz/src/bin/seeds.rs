@@ -36,6 +36,7 @@ fn main() -> Outcome {
     let seeds = Seeds(folder.into());
     scenes(&seeds)?;
     textures(&seeds)?;
+    compressed(&seeds)?;
     environments(&seeds)?;
     pictures(&seeds)?;
     states(&seeds, program)?;
@@ -94,6 +95,17 @@ fn encoded(image: &DynamicImage, format: ImageFormat) -> Outcome<Vec<u8>> {
 /// Texels with different values.
 fn gradient(width: u32, height: u32) -> DynamicImage {
     image::RgbaImage::from_fn(width, height, |x, y| image::Rgba([(40 * x) as u8, (50 * y) as u8, 7, 200])).into()
+}
+
+/// The kept inputs of readers whose formats nothing here can write.
+fn compressed(seeds: &Seeds) -> Outcome {
+    for target in ["webp", "ktx2", "draco", "meshopt"] {
+        for entry in fs::read_dir(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../corpus").join(target))? {
+            let path = entry?.path();
+            seeds.add(target, &path.file_name().unwrap_or_default().to_string_lossy(), &fs::read(&path)?)?;
+        }
+    }
+    Ok(())
 }
 
 fn textures(seeds: &Seeds) -> Outcome {
