@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-[ $# -gt 0 ] || set -- test python usd compare peers bpy bpy-oldest bpy-newest farm deny lab/train/requirements
+[ $# -gt 0 ] || set -- test python package usd compare peers bpy bpy-oldest bpy-newest farm deny lab/train/requirements
 for name in "$@"; do
     case $name in
         */*) file=$name ;;

@@ -5,6 +5,7 @@
 #                              Image Denoise if available
 #   scripts/setup.sh python    render, and the Python packages of the tests in .venv
 #   scripts/setup.sh wheel     render, and packages to build and test the Python package in .venv-python
+#   scripts/setup.sh package   a linker, and packages that build portable packages in .venv-package
 #   scripts/setup.sh usd       render, and packages to read USD stages in .venv-usd
 #   scripts/setup.sh test      python, wheel and usd, and Blender as a Python module in .venv-bpy, .venv-bpy-oldest and
 #                              .venv-bpy-newest
@@ -159,12 +160,17 @@ need_venv_module() {
 # find_library NAME: prints version and path
 find_library() { "$PYTHON" "$ROOT/scripts/setup_library.py" "$1"; }
 
-# fetch_library NAME TEMPORARY. The libraries in the wheels do not depend on the Python version; naming a version makes
-# pip accept the wheel with any Python.
+# download_wheel NAME VENV FOLDER: the wheel that requirements-NAME.txt lists, by the pip of a virtual environment. The
+# libraries in the wheels do not depend on the Python version; naming a version makes pip accept the wheel with any.
+download_wheel() {
+    "$2/bin/python" -I -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
+        --require-hashes --python-version 3.11 -d "$3" -r "$ROOT/scripts/requirements-$1.txt" >&2
+}
+
+# fetch_library NAME TEMPORARY
 fetch_library() {
     "$PYTHON" -I -m venv "$2/venv" &&
-        "$2/venv/bin/python" -I -m pip download -q --disable-pip-version-check --no-deps --only-binary=:all: \
-            --require-hashes --python-version 3.11 -d "$2" -r "$ROOT/scripts/requirements-$1.txt" >&2 &&
+        download_wheel "$1" "$2/venv" "$2" &&
         "$PYTHON" "$ROOT/scripts/setup_library.py" "$1" unpack "$2"/*.whl >/dev/null
 }
 
@@ -277,15 +283,20 @@ need_blender() {
         fail "Blender's Python module lacks libraries: $(missing_libraries "$module")" "install the packages that hold them"
 }
 
-# setup render|python|wheel|usd|test|farm|train
+# setup render|python|wheel|package|usd|test|farm|train
 setup() {
     case $1 in
-    render | python | wheel | usd | test | farm | train) ;;
-    *) fail "unknown mode '$1'" "one of: render python wheel usd test farm train" ;;
+    render | python | wheel | package | usd | test | farm | train) ;;
+    *) fail "unknown mode '$1'" "one of: render python wheel package usd test farm train" ;;
     esac
     need_rust
     need_linker
     need_python
+    if [ "$1" = package ]; then
+        need_venv_module
+        need_venv .venv-package "$PYTHON" requirements-package.txt
+        return
+    fi
     need_embree
     need_onnxruntime
     need_oidn

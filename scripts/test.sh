@@ -130,7 +130,7 @@ other_blenders() {
     for which in oldest newest; do
         python=.venv-bpy-$which/bin/python
         if [ -x "$python" ]; then
-            tests "Python, $which Blender" env "$@" "$python" tests/python/timed.py blender_torture blender_broken blender_export blender_motion
+            tests "Python, $which Blender" env "$@" "$python" tests/python/timed.py blender_torture blender_broken blender_export blender_motion blender_addon_wheel
         else
             without "Python, $which Blender" 'it needs Python 3.11'
         fi

@@ -1,16 +1,23 @@
-//! Finds the libraries (in `.deps`) and Pythons (in `.venv-*`) that `scripts/setup.sh` has installed.
+//! Finds the libraries of a package, and the libraries (in `.deps`) and Pythons (in `.venv-*`) that `scripts/setup.sh`
+//! has installed.
 //!
-//! They are in the folder named by the environment variable [`HOME_VARIABLE`], or else in a folder above the program or
+//! A package holds its libraries in `lib/caustique`, beside the program's folder or in the Python package. What
+//! `scripts/setup.sh` installs is in the folder named by the environment variable [`HOME_VARIABLE`], or else in a folder above the program or
 //! the Python package. The current folder is never searched: it may hold files of other users, and what is found is
 //! run.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use caustique_library::Folders;
 pub use caustique_library::path_from_env;
 
 /// Environment variable that names the project's folder, the parent of `scripts`. If set, no other folder is searched.
 pub const HOME_VARIABLE: &str = "CAUSTIQUE_HOME";
+
+/// Folder of a package's libraries, relative to the folder of the program or of the Python module, or to the folder
+/// above it.
+const PACKAGE: &str = "lib/caustique";
 
 /// Mode bit of folders where everybody may create files, such as `/tmp`.
 const STICKY_BIT: u32 = 0o1000;
@@ -25,17 +32,36 @@ pub fn find(relative: &str) -> Option<PathBuf> {
     candidates(relative).into_iter().find(|path| path.exists())
 }
 
+/// The folders to search for a library besides the system's: the package that holds this code first, and `relative` in
+/// the project's folder last.
+pub fn folders(relative: &str) -> Folders {
+    Folders { first: package_folders(), last: candidates(relative) }
+}
+
 /// The origin of the library or Python at `path`, for messages: the name of the environment `variable` if it is set,
-/// `scripts/setup.sh` if the path is below `relative` in a project folder, or `system`.
+/// `package` if the path is in the package that holds this code, `scripts/setup.sh` if it is below `relative` in a
+/// project folder, or `system`.
 pub fn origin(variable: &'static str, relative: &str, path: &Path) -> &'static str {
     let below = |place: &PathBuf| path.starts_with(place) || place.canonicalize().is_ok_and(|it| path.starts_with(it));
     if path_from_env(variable).is_some() {
         variable
+    } else if package_folders().iter().any(below) {
+        "package"
     } else if candidates(relative).iter().any(below) {
         "scripts/setup.sh"
     } else {
         "system"
     }
+}
+
+/// The folders that hold the libraries if this code is in a package.
+fn package_folders() -> Vec<PathBuf> {
+    own_file().map(|own| packages_of(&own)).unwrap_or_default()
+}
+
+/// Where the libraries are if `file` is the program or the module of a package.
+fn packages_of(file: &Path) -> Vec<PathBuf> {
+    file.ancestors().skip(1).take(2).filter(|folder| !is_shared(folder)).map(|folder| folder.join(PACKAGE)).collect()
 }
 
 /// The folders that may be the project's, nearest first.
@@ -48,8 +74,12 @@ fn project_folders() -> Vec<PathBuf> {
 
 /// The folders above `file`, nearest first, except folders where everybody may create files.
 fn folders_above(file: &Path) -> Vec<PathBuf> {
-    let shared = |folder: &&Path| folder.metadata().is_ok_and(|data| data.mode() & STICKY_BIT != 0);
-    file.ancestors().skip(1).filter(|folder| !shared(folder)).map(Path::to_path_buf).collect()
+    file.ancestors().skip(1).filter(|folder| !is_shared(folder)).map(Path::to_path_buf).collect()
+}
+
+/// Whether everybody may create files in `folder`.
+fn is_shared(folder: &Path) -> bool {
+    folder.metadata().is_ok_and(|data| data.mode() & STICKY_BIT != 0)
 }
 
 /// The file that contains this code: the program or the Python module.
@@ -82,12 +112,23 @@ mod tests {
         let found = folders_above(&own.join("program"));
         assert_eq!(found.first(), Some(&own));
         assert!(found.contains(&PathBuf::from("/")) && !found.contains(&shared.path().to_path_buf()), "{found:?}");
+        assert_eq!(packages_of(&own.join("program")), [own.join(PACKAGE)]);
+    }
+
+    #[test]
+    fn a_package_holds_its_libraries_beside_the_folder_of_the_program_or_with_the_module() {
+        let expected = ["/opt/caustique/bin/lib/caustique", "/opt/caustique/lib/caustique"].map(PathBuf::from);
+        assert_eq!(packages_of(Path::new("/opt/caustique/bin/caustique")), expected);
+        let module = packages_of(Path::new("/site-packages/caustique/_native.abi3.so"));
+        assert_eq!(module[0], Path::new("/site-packages/caustique/lib/caustique"));
     }
 
     #[test]
     fn an_origin_is_a_variable_the_folder_or_the_system() {
         let library = candidates(".deps/oidn").remove(0).join("lib/libOpenImageDenoise.so");
         assert_eq!(origin("CAUSTIQUE_UNSET", ".deps/oidn", &library), "scripts/setup.sh");
+        let packaged = package_folders().remove(0).join("libOpenImageDenoise.so.2.5.1");
+        assert_eq!(origin("CAUSTIQUE_UNSET", ".deps/oidn", &packaged), "package");
         assert_eq!(origin("CAUSTIQUE_UNSET", ".deps/oidn", Path::new("/usr/lib/libfoo.so")), "system");
         assert_eq!(origin("PATH", ".deps/oidn", &library), "PATH");
     }

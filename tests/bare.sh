@@ -2,9 +2,10 @@
 # Runs the demo and the tests on bare Debian systems made by debootstrap, as a stranger would: git, Python 3 and a Rust
 # toolchain, nothing else. Needs root, debootstrap, unshare and this machine's Rust toolchain.
 #
-#   tests/bare.sh [12|13|both] [--dir DIR] [--only demo|test|setup] [--keep]
+#   tests/bare.sh [12|13|both] [--dir DIR] [--only demo|test|setup|package|blender] [--keep]
 #
-# The last commit is tested, not the working tree. DIR (default /var/tmp/caustique-bare) holds
+# `package` tests the packages in target/package (scripts/package.sh) by tests/package.sh, without Rust; `blender`, on
+# Debian 13, the extension there by tests/extension.sh. The last commit is tested, not the working tree. DIR (default /var/tmp/caustique-bare) holds
 #   root-12, root-13    the bare systems, made once and never written to again
 #   run-12, run-13      the copies that the scripts run in, made anew each time, removed afterwards (kept with --keep)
 #   cache               downloads of pip and cargo, shared by the runs
@@ -31,12 +32,14 @@ say() { printf 'bare: %s\n' "$*" >&2; }
 # inside RELEASE PART DIR SYSROOT
 inside() {
     local DIR=$3 SYSROOT=$4
-    local run=$DIR/run-$1 script status=0
+    local run=$DIR/run-$1 script status=0 needed=()
     mount -t proc proc "$run/proc"
     mount --rbind /dev "$run/dev"
     mkdir -p "$run/opt/rust" "$run/root/.cache/pip" "$run/root/.cargo/registry"
-    mount --bind "$SYSROOT" "$run/opt/rust"
-    mount -o remount,bind,ro "$run/opt/rust"
+    if [ "$2" != package ] && [ "$2" != blender ]; then
+        mount --bind "$SYSROOT" "$run/opt/rust"
+        mount -o remount,bind,ro "$run/opt/rust"
+    fi
     mount --bind "$DIR/cache/pip" "$run/root/.cache/pip"
     mount --bind "$DIR/cache/registry" "$run/root/.cargo/registry"
 
@@ -53,7 +56,13 @@ inside() {
         demo) script=./scripts/demo.sh ;;
         test) script=./scripts/test.sh ;;
         setup) script='./scripts/setup.sh test' ;;
+        package) needed=(python3-venv) script='./tests/package.sh /packages' ;;
+        blender)
+            needed=(blender python3-numpy xvfb xauth libgl1-mesa-dri) script='./tests/extension.sh /packages'
+            ;;
     esac
+    [ ${#needed[@]} -eq 0 ] || env -i "${variables[@]}" DEBIAN_FRONTEND=noninteractive chroot "$run" /bin/sh -c \
+        'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"' sh "${needed[@]}" >"$DIR/apt-$1.log" 2>&1
     env -i "${variables[@]}" chroot "$run" /bin/bash -c "cd /caustique && exec $script" || status=$?
     return "$status"
 }
@@ -72,11 +81,14 @@ while [ $# -gt 0 ]; do
         both) RELEASES=(12 13) ;;
         --dir) DIR=${2:?--dir wants a directory} && shift ;;
         --only)
-            case ${2:-} in demo | test | setup) PARTS=("$2") ;; *) fail "--only ${2:-}" "one of: demo test setup" ;; esac
+            case ${2:-} in
+                demo | test | setup | package | blender) PARTS=("$2") ;;
+                *) fail "--only ${2:-}" "one of: demo test setup package blender" ;;
+            esac
             shift
             ;;
         --keep) KEEP=1 ;;
-        *) fail "unknown argument '$1'" "tests/bare.sh [12|13|both] [--dir DIR] [--only demo|test|setup] [--keep]" ;;
+        *) fail "unknown argument '$1'" "tests/bare.sh [12|13|both] [--dir DIR] [--only demo|test|setup|package|blender] [--keep]" ;;
     esac
     shift
 done
@@ -160,6 +172,11 @@ for release in "${RELEASES[@]}"; do
     cp -a "$DIR/root-$release" "$tree"
     lend_network "$tree"
     git clone -q --no-local "$ROOT" "$tree/caustique"
+    if [[ ${PARTS[*]} = package || ${PARTS[*]} = blender ]]; then
+        mkdir "$tree/packages"
+        cp "$ROOT"/target/package/caustique-* "$tree/packages/" ||
+            fail "there are no packages to test" "scripts/package.sh makes them"
+    fi
     for part in "${PARTS[@]}"; do
         run "$release" "$part"
     done

@@ -1,18 +1,20 @@
 """Build the zip of the Blender add-on: an add-on for Blender 3.4, an extension for 4.2 and newer.
 
-    python3 scripts/blender/package.py OUT.zip
+    python3 scripts/blender/package.py OUT.zip [--wheel WHEEL]
 
-The zip holds one folder: the add-on, the exporter that it runs in a second Blender process, and the licences.
+The zip holds one folder: the add-on, the exporter that it runs in a second Blender process, and the licences. With a
+wheel of scripts/package.sh it also holds the program and its libraries, which Blender 4.2 and newer install with it.
 """
 
+import argparse
 import modulefinder
 import os
-import sys
 import zipfile
 
 _HERE = os.path.dirname(os.path.realpath(__file__))
 _ROOT = os.path.dirname(os.path.dirname(_HERE))
 _NAME = "caustique"
+_MANIFEST = "blender_manifest.toml"
 _DAY = (1980, 1, 1, 0, 0, 0)  # a constant time, so that equal files give equal zips; the earliest that zip supports
 
 
@@ -34,15 +36,37 @@ def _exporter():
     return {script, *(source for source in beside if source is not None)}  # built-in modules have no file
 
 
-def build(path):
-    """Write the zip to `path`."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, source in contents().items():
-            with open(source, "rb") as file:
-                archive.writestr(zipfile.ZipInfo(name, _DAY), file.read(), zipfile.ZIP_DEFLATED)
+def build(path, wheel=None):
+    """Write the zip to `path`, with a wheel that contains the program if `wheel` names one."""
+    files = {name: _read(source) for name, source in contents().items()}
+    if wheel is not None:
+        name = os.path.basename(wheel)
+        manifest = f"{_NAME}/{_MANIFEST}"
+        # A key after the table [permissions] would belong to that table.
+        files[manifest] = f'wheels = ["./wheels/{name}"]\n'.encode() + files[manifest]
+        files[f"{_NAME}/wheels/{name}"] = _read(wheel)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in files.items():
+            # A wheel is compressed already.
+            packing = zipfile.ZIP_STORED if name.endswith(".whl") else zipfile.ZIP_DEFLATED
+            archive.writestr(zipfile.ZipInfo(name, _DAY), data, packing)
+
+
+def _read(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def main():
+    """Parse the command line and write the zip."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="OUT.zip")
+    parser.add_argument("--wheel", help="a wheel of scripts/package.sh")
+    arguments = parser.parse_args()
+    if not arguments.out.endswith(".zip"):
+        parser.error("the output must end in .zip")
+    build(arguments.out, arguments.wheel)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2 or not sys.argv[1].endswith(".zip"):
-        sys.exit("usage: package.py OUT.zip")
-    build(sys.argv[1])
+    main()

@@ -4,9 +4,8 @@ use super::{print, print_json};
 use caustique::combine::Runtime;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::finish::denoiser;
-use caustique::installed;
 use caustique::scene::usd::Interpreter;
-use caustique_embree as embree;
+use caustique::trace;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -17,6 +16,20 @@ pub struct DoctorArgs {
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+}
+
+/// The commit that the program was built from, if the build says so, as `scripts/package.sh` does.
+const COMMIT: Option<&str> = option_env!("CAUSTIQUE_COMMIT");
+
+/// Version and commit of the program, and versions and files of the libraries that it loads, for `--version`.
+pub fn version() -> String {
+    let commit = COMMIT.map(|commit| format!(" (commit {commit})")).unwrap_or_default();
+    let line = |finding: Finding| match finding.found {
+        Ok(Found(version, path, _)) => format!("{} {version}, {path}\n", finding.name),
+        Err(_) => format!("{} not found\n", finding.name),
+    };
+    let libraries: String = [embree(), onnxruntime(), oidn()].into_iter().map(line).collect();
+    format!("caustique {}{commit}\n{libraries}", env!("CARGO_PKG_VERSION"))
 }
 
 /// The result of the search for a library that the program loads.
@@ -38,6 +51,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     if args.json {
         let mut object = serde_json::Map::new();
         object.insert("version".into(), env!("CARGO_PKG_VERSION").into());
+        object.insert("commit".into(), COMMIT.into());
         for finding in &findings {
             object.insert(finding.key.into(), finding.json());
         }
@@ -59,11 +73,8 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
 }
 
 fn embree() -> Finding {
-    let found = match embree::Library::load() {
-        Ok(library) => {
-            let origin = installed::origin(embree::LIBRARY_VARIABLE, ".deps/embree", library.path());
-            Ok(Found(library.version().to_string(), show(library.path()), origin))
-        }
+    let found = match trace::library() {
+        Ok(library) => Ok(Found(library.version().to_string(), show(library.path()), trace::origin(&library))),
         Err(error) => Err((error.to_string(), error.hint())),
     };
     Finding { name: "Embree", key: "embree", needed_for: "render", optional: false, found }

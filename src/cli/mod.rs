@@ -91,6 +91,9 @@ pub fn main() -> ExitCode {
             Some(error) => return fail(&error),
             None => {
                 // Help and version are data: they go to stdout.
+                if error.kind() == clap::error::ErrorKind::DisplayVersion {
+                    return print(&doctor::version()).map_or_else(|error| fail(&error), |()| ExitCode::SUCCESS);
+                }
                 return match error.print() {
                     Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => ExitCode::FAILURE,
                     _ => ExitCode::SUCCESS,

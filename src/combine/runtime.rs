@@ -1,14 +1,14 @@
 //! Finds and loads ONNX Runtime, once per process.
 //!
-//! If the environment variable `CAUSTIQUE_ONNXRUNTIME` is set, only the file that it names is tried. Otherwise the system's
-//! loader is asked for the common names of the library, then any `libonnxruntime.so*` below `.deps/onnxruntime/`, where
-//! `scripts/setup.sh` installs it (see [`installed`]).
+//! If the environment variable `CAUSTIQUE_ONNXRUNTIME` is set, only the file that it names is tried. Otherwise any
+//! `libonnxruntime.so*` of the package that holds this code is tried, then the library's common names for the system's
+//! loader, then any such file below `.deps/onnxruntime/`, where `scripts/setup.sh` installs it (see [`installed`]).
 
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use caustique_library::{file_name, find_below};
+use caustique_library::file_name;
 use ort::environment::Environment;
 
 use crate::error::{Error, ErrorKind, Result};
@@ -60,7 +60,7 @@ impl Runtime {
         &self.path
     }
 
-    /// Where the library was found, in words: an environment variable, `scripts/setup.sh` or `system`.
+    /// Where the library was found, in words (see [`installed::origin`]).
     pub fn origin(&self) -> &'static str {
         installed::origin(VARIABLE, FOLDER, &self.path)
     }
@@ -89,10 +89,8 @@ fn candidates(named: Option<PathBuf>) -> Result<Vec<PathBuf>> {
         return Ok(vec![absolute]);
     }
     let versioned = MINOR_VERSIONS.rev().map(|minor| format!("{NAME}.1.{minor}"));
-    let mut all: Vec<PathBuf> =
-        [NAME.into(), format!("{NAME}.1")].into_iter().chain(versioned).map(PathBuf::from).collect();
-    all.extend(find_below(&installed::candidates(FOLDER), NAME));
-    Ok(all)
+    let names = [NAME.into(), format!("{NAME}.1")].into_iter().chain(versioned);
+    Ok(installed::folders(FOLDER).candidates(NAME, names))
 }
 
 /// Loads the first of the candidate paths that is a supported version of ONNX Runtime.

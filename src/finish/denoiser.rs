@@ -113,15 +113,16 @@ impl Denoiser {
 /// Folder within the project into which `scripts/setup.sh` installs Open Image Denoise.
 const FOLDER: &str = ".deps/oidn";
 
-/// Loads Open Image Denoise, as installed by the system or by `scripts/setup.sh` (see [`installed`]).
+/// Loads Open Image Denoise: of the package that holds this code, of the system, or as installed by `scripts/setup.sh`
+/// (see [`installed`]).
 ///
 /// # Errors
 /// As [`oidn::Library::load`].
 pub fn library() -> std::result::Result<oidn::Library, oidn::Error> {
-    oidn::Library::load(&installed::candidates(FOLDER))
+    oidn::Library::load(&installed::folders(FOLDER))
 }
 
-/// Where Open Image Denoise was found, in words: an environment variable, `scripts/setup.sh` or `system`.
+/// Where Open Image Denoise was found, in words (see [`installed::origin`]).
 pub fn origin(library: &oidn::Library) -> &'static str {
     installed::origin(oidn::LIBRARY_VARIABLE, FOLDER, library.path())
 }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::geometry::Shapes;
+use crate::installed;
 use crate::math::{Affine3A, Vec3};
 use caustique_embree as embree;
 use embree::GeometryId;
@@ -125,6 +126,22 @@ fn instance_index(instance: Option<GeometryId>, geometry: GeometryId, still: u32
     instance.filter(|id| id.0 != still).unwrap_or(geometry).0
 }
 
+/// Folder within the project in which Embree may be installed.
+const FOLDER: &str = ".deps/embree";
+
+/// Loads Embree: of the package that holds this code, of the system, or from `.deps` (see [`installed`]).
+///
+/// # Errors
+/// As [`embree::Library::load`].
+pub fn library() -> std::result::Result<embree::Library, embree::Error> {
+    embree::Library::load(&installed::folders(FOLDER))
+}
+
+/// Where Embree was found, in words (see [`installed::origin`]).
+pub fn origin(library: &embree::Library) -> &'static str {
+    installed::origin(embree::LIBRARY_VARIABLE, FOLDER, library.path())
+}
+
 impl Tracer {
     /// Builds Embree's BVH with `threads` threads. `filtered` has one entry per instance: `None` leaves the instance
     /// out, `Some(true)` passes its hits to `filter`. Instances that move are kept apart from the others.
@@ -132,7 +149,7 @@ impl Tracer {
     /// # Errors
     /// Embree is missing or out of memory, or a coordinate is too large for it.
     pub fn build(shapes: &Shapes, filtered: &[Option<bool>], filter: &HitFilter, threads: usize) -> Result<Tracer> {
-        let library = embree::Library::load().map_err(convert)?;
+        let library = library().map_err(convert)?;
         let device = embree::Device::new(&library, threads).map_err(convert)?;
         Tracer::assemble(device, shapes, filtered, filter, Parts::default())
     }

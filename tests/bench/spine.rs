@@ -54,7 +54,7 @@ fn rays(scene: &Scene) -> Vec<Ray> {
 
 /// The triangles of the scene in Embree, without other code around it.
 fn raw(scene: &Scene) -> Result<embree::Scene, embree::Error> {
-    let device = embree::Device::new(&embree::Library::load()?, 1)?;
+    let device = embree::Device::new(&caustique::trace::library()?, 1)?;
     let mut root = embree::SceneBuilder::new(&device)?;
     let mut children: Vec<Option<embree::Scene>> = vec![None; scene.shapes.meshes.len()];
     for (i, instance) in scene.shapes.instances.iter().enumerate() {

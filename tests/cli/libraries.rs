@@ -88,3 +88,34 @@ fn caustique_home_is_searched_and_doctor_prints_the_origin_of_libraries() {
     let home = run("CAUSTIQUE_HOME", &folder.path("home"));
     assert_eq!((home["path"].as_str(), home["from"].as_str()), (Some(path), Some("scripts/setup.sh")));
 }
+
+/// A program in `bin` of a package takes the libraries in `lib/caustique` before others, wherever the package is moved.
+#[test]
+fn a_package_finds_its_own_libraries_first() {
+    let folder = Folder::new();
+    let found = folder.run("doctor --json").json();
+    let path = found["oidn"]["path"].as_str().expect("Open Image Denoise is found");
+    for place in ["package", "moved"] {
+        // Open Image Denoise finds its modules in `../lib` of its folder.
+        let (bin, lib) = (folder.path(place).join("bin"), folder.path(place).join("lib/caustique/lib"));
+        std::fs::create_dir_all(&bin).expect("it can be made");
+        std::fs::create_dir_all(&lib).expect("it can be made");
+        let original = folder.command("doctor").get_program().to_owned();
+        // A child process copies it, because a file that a fork of another test holds open for writing cannot run.
+        let copied = Command::new("cp").arg(original).arg(bin.join("caustique")).status();
+        assert!(copied.expect("cp runs").success());
+        for entry in Path::new(path).parent().expect("a folder").read_dir().expect("it can be read").flatten() {
+            let name = entry.file_name();
+            let wanted = ["libOpenImageDenoise", "libtbb"].iter().any(|stem| name.to_string_lossy().starts_with(stem));
+            if wanted && entry.path().is_file() && !entry.path().is_symlink() {
+                std::fs::copy(entry.path(), lib.join(name)).expect("it can be copied");
+            }
+        }
+        let mut command = Command::new(bin.join("caustique"));
+        command.args(["doctor", "--json"]).env_remove("CAUSTIQUE_OIDN");
+        let oidn = Outcome::of(command).json()["oidn"].clone();
+        assert_eq!(oidn["from"], "package", "{oidn}");
+        let own = oidn["path"].as_str().expect("it is found");
+        assert!(Path::new(own).starts_with(lib.canonicalize().expect("it exists")), "{own}");
+    }
+}

@@ -335,7 +335,25 @@ fn help_and_version_are_data_and_offer_only_what_exists() {
     {
         assert_eq!(commands.contains(&format!("\n  {command} ")), listed, "{command}");
     }
-    assert_eq!(folder.run("--version").stdout, concat!("caustique ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+/// `--version` prints the version, the commit if the build has it, and the libraries.
+#[test]
+fn the_version_names_the_libraries() {
+    let folder = Folder::new();
+    let lines: Vec<String> = folder.run("--version").stdout.lines().map(str::to_owned).collect();
+    assert!(lines[0].starts_with(concat!("caustique ", env!("CARGO_PKG_VERSION"))), "{lines:?}");
+    let found = folder.run("doctor --json").json();
+    for (line, (name, key)) in
+        lines[1..].iter().zip([("Embree", "embree"), ("ONNX Runtime", "onnxruntime"), ("Open Image Denoise", "oidn")])
+    {
+        let text = |field: &str| found[key][field].as_str().unwrap_or("none").to_owned();
+        assert_eq!(*line, format!("{name} {}, {}", text("version"), text("path")));
+    }
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    let mut without = folder.command("--version");
+    without.env("CAUSTIQUE_OIDN", "/no/such/library.so");
+    assert!(Outcome::of(without).stdout.ends_with("Open Image Denoise not found\n"));
 }
 
 /// The help begins with the most needed options. Options for researchers are last, and not in the short help.

@@ -52,7 +52,7 @@ class Installed(support.Scratch):
         super().setUp()
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.zip = self.dir / "caustique.zip"
-        package.build(str(self.zip))
+        package.build(str(self.zip), self.wheel())
         self.repository = self.dir / "extensions"
         repositories = bpy.context.preferences.extensions.repos
         self.place = repositories.new(
@@ -69,6 +69,10 @@ class Installed(support.Scratch):
         self.settings = self.scene.caustique_render
         self.settings.iterations, self.settings.method = 2, "vcm"
         self.layer = self.scene.view_layers[0]
+
+    def wheel(self):
+        """The wheel that the extension contains; None for none."""
+        return None
 
     def uninstall(self):
         if ADDON in bpy.context.preferences.addons:

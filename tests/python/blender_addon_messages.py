@@ -40,20 +40,20 @@ class Messages(Installed):
         self.preferences.program = str(self.dir / "nowhere")
         message = self.fault()
         self.assertIn("nowhere is not a program", message)
-        self.assertIn("Remedy: clone the repository", message)
+        self.assertIn("Remedy: install the extension that contains", message)
         self.assertIn("nowhere", part_of_addon("session").faults[self.scene.name].what)
 
     def test_a_program_that_is_not_on_the_path(self):
         self.stage()
         self.preferences.program = ""
         with mock.patch.dict(os.environ, PATH=str(self.dir)):
-            self.assertIn("the program caustique is not on the PATH Remedy: ", self.fault())
+            self.assertIn("the program caustique is neither in the extension nor on the PATH Remedy: ", self.fault())
         with mock.patch.dict(os.environ, PATH=f"{support.binary().parent}:{os.environ['PATH']}"):
             self.assertTrue(self.render())
 
     def test_a_program_that_is_too_old(self):
         self.stage()
-        self.program("echo caustique 0.0.9")
+        self.program("echo 'caustique 0.0.9 (commit 1a2b3c)'; echo Embree 4.4.0, /lib/libembree4.so.4")
         self.assertIn("is version 0.0.9, and the add-on needs 0.1.0 or newer Remedy: update", self.fault())
 
     def test_a_program_that_is_another(self):
@@ -196,7 +196,8 @@ class Messages(Installed):
         self.assertIn("the add-on has failed: ZeroDivisionError: division by zero Remedy: report it", message)
 
     def test_libraries_that_are_missing(self):
-        with mock.patch.dict(os.environ, CAUSTIQUE_OIDN="/nowhere/libOpenImageDenoise.so"):
+        nowhere = {"CAUSTIQUE_OIDN": "/nowhere/libOpenImageDenoise.so", "CAUSTIQUE_USD_PYTHON": "/nowhere/python"}
+        with mock.patch.dict(os.environ, nowhere):
             faults = part_of_addon("program").missing_libraries(str(support.binary()))
         self.assertEqual([fault.what.split(":")[0] for fault in faults], ["oidn"])
         self.assertTrue(faults[0].remedy)

@@ -13,7 +13,7 @@ DOCS = sorted((support.ROOT / "docs").rglob("*.md"))
 PAGES = [README, *DOCS]
 PROGRAM = "target/release/caustique"
 #: Scripts that set everything up: they exist, but run too long for a test.
-WHOLE = ("./scripts/demo.sh", "./scripts/test.sh", "./scripts/python.sh")
+WHOLE = ("./scripts/demo.sh", "./scripts/test.sh", "./scripts/python.sh", "./scripts/package.sh")
 #: Scripts that need Blender.
 EXPORTER = "scripts/blender/export.py"
 #: Blender as a Python module, where scripts/setup.sh test has installed it.
@@ -155,7 +155,7 @@ class Text(unittest.TestCase):
 
     def test_options_that_are_named_exist(self):
         names = ("render", "plan", "finish", "merge", "compare", "converge", "info", "doctor")
-        known = "".join(support.run([name, "--help"], check=0).stdout for name in names)
+        known = "".join(support.run([*words, "--help"], check=0).stdout for words in ([], *([name] for name in names)))
         for script in ("scripts/blender/export.py", "scripts/farm/ray_render.py", "scripts/farm/slurm.sh", "tests/hard/run.py"):
             known += (support.ROOT / script).read_text(encoding="utf-8")
         known += "".join(f"--{name.replace('_', '-')} " for name in lab.options.KNOWN)

@@ -6,10 +6,10 @@
 //! what to install. The environment variable [`LIBRARY_VARIABLE`] names a library file to use instead.
 //!
 //! ```no_run
-//! use caustique_embree::{Device, GeometryId, Library, Ray, SceneBuilder};
+//! use caustique_embree::{Device, Folders, GeometryId, Library, Ray, SceneBuilder};
 //!
 //! # fn main() -> Result<(), caustique_embree::Error> {
-//! let library = Library::load()?;
+//! let library = Library::load(&Folders::default())?;
 //! let device = Device::new(&library, 0)?;
 //! let mut builder = SceneBuilder::new(&device)?;
 //! let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -59,7 +59,7 @@ mod ray;
 mod scene;
 mod transform;
 
-pub use caustique_library::Version;
+pub use caustique_library::{Folders, Version};
 pub use device::Device;
 pub use error::Error;
 pub use filter::{Candidate, Filter};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use caustique_library::{Refusal, file_containing, load_first_of, open, path_from_env};
+use caustique_library::{Folders, Refusal, file_containing, load_first_of, open, path_from_env};
 
 use crate::api::{Common, Trace, Trace3, Trace4};
 use crate::error::Error;
@@ -25,17 +25,23 @@ const NAMES: &[&str] = &[
 #[cfg(windows)]
 const NAMES: &[&str] = &["embree4.dll", "embree3.dll"];
 
+/// Common start of all file names of Embree on Unix.
+const STEM: &str = "libembree";
+
 impl Library {
-    /// Loads the library that [`LIBRARY_VARIABLE`] names. If it names none, loads the first usable library that the
-    /// system's loader finds under Embree's names, version 4 before 3.
+    /// Loads the library that [`LIBRARY_VARIABLE`] names. If it names none, loads the first usable of `libembree*` below
+    /// the first `folders`, the libraries that the system's loader finds under Embree's names, version 4 before 3, and
+    /// `libembree*` below the last folders.
+    ///
+    /// Loading runs the file's initialisers, so the folders must be trusted.
     ///
     /// # Errors
     ///
     /// [`Error::NotFound`] with the names that were tried; [`Error::Unusable`] as for [`Library::load_from`].
-    pub fn load() -> Result<Library, Error> {
+    pub fn load(folders: &Folders) -> Result<Library, Error> {
         match path_from_env(LIBRARY_VARIABLE) {
             Some(path) => Library::load_from(path),
-            None => load_first(NAMES),
+            None => load_first(&folders.candidates(STEM, NAMES)),
         }
     }
 
@@ -51,9 +57,8 @@ impl Library {
     }
 }
 
-fn load_first(names: &[&str]) -> Result<Library, Error> {
-    let names: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
-    load_first_of(&names, load).map_err(|tried| Error::NotFound { tried })
+fn load_first(candidates: &[PathBuf]) -> Result<Library, Error> {
+    load_first_of(candidates, load).map_err(|tried| Error::NotFound { tried })
 }
 
 fn load(path: &Path) -> Result<Library, Refusal> {
@@ -89,7 +94,7 @@ mod tests {
 
     #[test]
     fn nothing_found_lists_what_was_tried_and_names_packages() {
-        let error = load_first(&["libno-such-embree.so.4", "libno-such-embree.so.3"]).unwrap_err();
+        let error = load_first(&["libno-such-embree.so.4".into(), "libno-such-embree.so.3".into()]).unwrap_err();
         let text = error.to_string();
         assert!(text.starts_with("Embree was not found; tried libno-such-embree.so.4: "), "{text}");
         assert!(text.contains("; libno-such-embree.so.3: "), "{text}");

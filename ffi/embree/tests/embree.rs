@@ -4,7 +4,9 @@ mod support;
 
 use std::sync::Arc;
 
-use caustique_embree::{Candidate, Error, GeometryId, Hit, Library, MAX_GEOMETRY_ID, Ray, Scene, SceneBuilder};
+use caustique_embree::{
+    Candidate, Error, Folders, GeometryId, Hit, Library, MAX_GEOMETRY_ID, Ray, Scene, SceneBuilder,
+};
 use support::*;
 
 const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
@@ -506,7 +508,7 @@ fn a_filter_needs_a_mesh_and_replaces_an_earlier_one() {
 
 #[test]
 fn scene_outlives_builder_device_and_library_handles() {
-    let library = Library::load().unwrap();
+    let library = Library::load(&Folders::default()).unwrap();
     let device = caustique_embree::Device::new(&library, 1).unwrap();
     let mut child = SceneBuilder::new(&device).unwrap();
     child.triangles(ID, &TRIANGLE, &[[0, 1, 2]]).unwrap();

@@ -85,6 +85,26 @@ pub fn load_first_of<T>(
     Err(tried)
 }
 
+/// Folders to search for a library in addition to those of the system's loader.
+#[derive(Clone, Debug, Default)]
+pub struct Folders {
+    /// Searched before the system's, such as the folder of a package that holds the program and its libraries.
+    pub first: Vec<PathBuf>,
+    /// Searched after the system's.
+    pub last: Vec<PathBuf>,
+}
+
+impl Folders {
+    /// The library files to try, in order: files below the first folders whose names begin with `stem`, the `names` for
+    /// the system's loader, and such files below the last folders.
+    pub fn candidates<N: AsRef<Path>>(&self, stem: &str, names: impl IntoIterator<Item = N>) -> Vec<PathBuf> {
+        let mut all = find_below(&self.first, stem);
+        all.extend(names.into_iter().map(|name| name.as_ref().to_owned()));
+        all.extend(find_below(&self.last, stem));
+        all
+    }
+}
+
 /// Finds the files below `folders` whose names begin with `stem`. In each folder, longer names come first: they contain
 /// the more complete version number.
 pub fn find_below(folders: &[PathBuf], stem: &str) -> Vec<PathBuf> {
@@ -166,6 +186,21 @@ mod tests {
         let found = find_below(&[folder.path().to_owned(), lib.clone()], "libOpenImageDenoise.so");
         let names: Vec<_> = found.iter().map(|path| file_name(path)).collect();
         assert_eq!(names, ["libOpenImageDenoise.so.2.5.1", "libOpenImageDenoise.so.2", "libOpenImageDenoise.so"]);
+    }
+
+    #[test]
+    fn a_package_is_searched_before_the_system_and_other_folders_after_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name).join("libfoo.so.1");
+        for name in ["package", "other"] {
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+            std::fs::write(file(name), "").unwrap();
+        }
+        let folders = Folders { first: vec![folder.path().join("package")], last: vec![folder.path().join("other")] };
+        let names = ["libfoo.so.1", "libfoo.so"];
+        let expected = [file("package"), names[0].into(), names[1].into(), file("other")];
+        assert_eq!(folders.candidates("libfoo.so", names), expected);
+        assert_eq!(Folders::default().candidates("libfoo.so", names), names.map(PathBuf::from));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use std::time::Instant;
 
-use caustique_oidn::{Device, Error, Input, Library, Quality};
+use caustique_oidn::{Device, Error, Folders, Input, Library, Quality};
 
 /// Random pixels whose values span several decades, like those of a render with few samples.
 fn noise(count: usize, seed: u64) -> Vec<[f32; 3]> {
@@ -44,7 +44,8 @@ fn main() -> Result<(), Error> {
     let numbers: Vec<usize> = std::env::args().skip(1).flat_map(|text| text.parse()).collect();
     let (width, height) = if let [width, height, ..] = numbers[..] { (width, height) } else { (1280, 720) };
     let threads = numbers.get(2..).filter(|list| !list.is_empty()).unwrap_or(&[1, 2]);
-    let library = Library::load(&[concat!(env!("CARGO_MANIFEST_DIR"), "/../../.deps/oidn").into()])?;
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../.deps/oidn");
+    let library = Library::load(&Folders { last: vec![own.into()], ..Folders::default() })?;
     println!("{library:?}, {width}x{height}; the second time of two in one filter");
     let pixels = width.saturating_mul(height);
     let (color, albedo, normal) = (noise(pixels, 1), noise(pixels, 2), noise(pixels, 3));

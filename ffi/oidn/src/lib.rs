@@ -5,10 +5,10 @@
 //! variable [`LIBRARY_VARIABLE`] names a library file to use instead.
 //!
 //! ```no_run
-//! use caustique_oidn::{Device, Input, Library};
+//! use caustique_oidn::{Device, Folders, Input, Library};
 //!
 //! # fn main() -> Result<(), caustique_oidn::Error> {
-//! let library = Library::load(&[])?;
+//! let library = Library::load(&Folders::default())?;
 //! let device = Device::new(&library, 2)?;
 //! let (width, height) = (64, 48);
 //! let (noisy, albedo) = (vec![[0.5; 3]; width * height], vec![[0.8; 3]; width * height]);
@@ -62,7 +62,7 @@ mod library;
 mod limits;
 mod load;
 
-pub use caustique_library::Version;
+pub use caustique_library::{Folders, Version};
 pub use device::Device;
 pub use error::Error;
 pub use filter::{Filter, Input, Quality};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use caustique_library::{Refusal, file_containing, find_below, load_first_of, open, path_from_env};
+use caustique_library::{Folders, Refusal, file_containing, load_first_of, open, path_from_env};
 
 use crate::api::Functions;
 use crate::device;
@@ -23,8 +23,9 @@ static LOADED: Mutex<Option<Library>> = Mutex::new(None);
 impl Library {
     /// Finds and loads Open Image Denoise. After the first success, all later calls return the same library.
     ///
-    /// If [`LIBRARY_VARIABLE`] is set, only the file that it names is tried. Otherwise the candidates are the library's
-    /// usual names for the system's loader, then any `libOpenImageDenoise.so*` below `folders`.
+    /// If [`LIBRARY_VARIABLE`] is set, only the file that it names is tried. Otherwise the candidates are any
+    /// `libOpenImageDenoise.so*` below the first `folders`, the library's usual names for the system's loader, and such
+    /// files below the last folders.
     ///
     /// Loading runs the file's initialisers, so the folders must be trusted.
     ///
@@ -32,14 +33,14 @@ impl Library {
     ///
     /// [`Error::NotFound`] with the candidates; [`Error::NoSuchFile`] if the variable names a missing file;
     /// [`Error::Unusable`] as for [`Library::load_from`].
-    pub fn load(folders: &[PathBuf]) -> Result<Library, Error> {
+    pub fn load(folders: &Folders) -> Result<Library, Error> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(library) = &*loaded {
             return Ok(library.clone());
         }
         let library = match path_from_env(LIBRARY_VARIABLE) {
             Some(path) => load_named(&path),
-            None => load_first(&candidates(folders)),
+            None => load_first(&folders.candidates(STEM, NAMES)),
         }?;
         Ok(loaded.insert(library).clone())
     }
@@ -69,11 +70,6 @@ fn load_named(path: &Path) -> Result<Library, Error> {
 
 fn load_first(candidates: &[PathBuf]) -> Result<Library, Error> {
     load_first_of(candidates, load).map_err(|tried| Error::NotFound { tried })
-}
-
-/// The file names and paths of the library to try if the environment variable is not set, in order.
-fn candidates(folders: &[PathBuf]) -> Vec<PathBuf> {
-    NAMES.iter().map(PathBuf::from).chain(find_below(folders, STEM)).collect()
 }
 
 fn load(path: &Path) -> Result<Library, Refusal> {

@@ -1,15 +1,16 @@
 //! Tests the binding with the Open Image Denoise that `CAUSTIQUE_OIDN` names, or that is found.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::OnceLock;
 
-use caustique_oidn::{Device, Error, Input, Library, MAX_SIDE, MAX_THREADS, Quality, Version};
+use caustique_oidn::{Device, Error, Folders, Input, Library, MAX_SIDE, MAX_THREADS, Quality, Version};
 
 const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::High];
 
 /// The folder in which `scripts/setup.sh` installs the library.
-fn folders() -> [PathBuf; 1] {
-    [Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.deps/oidn")]
+fn folders() -> Folders {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.deps/oidn");
+    Folders { last: vec![own], ..Folders::default() }
 }
 
 /// The library under test, loaded once.

@@ -104,11 +104,11 @@ def libraries(
 
     Arguments name files to load instead. A library is loaded once, at its first use, so name its file before. The
     arguments set the variables CAUSTIQUE_EMBREE, CAUSTIQUE_OIDN and CAUSTIQUE_ONNXRUNTIME of this process. Without
-    them, the libraries are searched by the system's loader, then in the folder .deps: in the folder that
+    them, the libraries are searched in this package, by the system's loader, then in the folder .deps: in the folder that
     CAUSTIQUE_HOME names, else in the folders above this package. The current folder is not searched.
 
     Returns a dict for each of 'embree', 'oidn' and 'onnxruntime': 'found', and 'version', 'path' and 'from' (the
-    variable, 'scripts/setup.sh' or 'system') or 'cause' and 'hint'.
+    variable, 'package', 'scripts/setup.sh' or 'system') or 'cause' and 'hint'.
     """
     named = {"embree": embree, "oidn": oidn, "onnxruntime": onnxruntime}
     for name, path in named.items():

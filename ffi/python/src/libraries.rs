@@ -2,7 +2,7 @@
 
 use caustique::combine::Runtime;
 use caustique::finish::denoiser;
-use caustique::installed;
+use caustique::trace;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
@@ -15,11 +15,8 @@ type Finding = Result<(String, String, &'static str), (String, Option<String>)>;
 pub fn find_libraries(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let show = |path: &Path| path.display().to_string();
     let found = py.detach(|| {
-        let embree: Finding = match caustique_embree::Library::load() {
-            Ok(library) => {
-                let origin = installed::origin(caustique_embree::LIBRARY_VARIABLE, ".deps/embree", library.path());
-                Ok((library.version().to_string(), show(library.path()), origin))
-            }
+        let embree: Finding = match trace::library() {
+            Ok(library) => Ok((library.version().to_string(), show(library.path()), trace::origin(&library))),
             Err(error) => Err((error.to_string(), error.hint())),
         };
         let oidn: Finding = match denoiser::library() {

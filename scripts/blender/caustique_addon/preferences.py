@@ -13,7 +13,7 @@ class Preferences(bpy.types.AddonPreferences):
 
     program: bpy.props.StringProperty(
         name="Program", subtype="FILE_PATH", update=lambda _self, _context: program.clear_cache(),
-        description="The program caustique; if empty, the one on the PATH")
+        description="The program caustique; if empty, the one in this extension, else the one on the PATH")
     exporter: bpy.props.StringProperty(
         name="Exporter", subtype="FILE_PATH",
         description="Another Blender, or a Python that has bpy, to export the scene with; if empty, this Blender")

@@ -1,6 +1,7 @@
 """Finds the program and asks for its version, its options and its missing libraries."""
 
 import functools
+import importlib.util
 import json
 import os
 import re
@@ -11,17 +12,17 @@ from .fault import Fault
 
 #: The oldest version whose command line is compatible with the add-on.
 OLDEST = (0, 1, 0)
-HOW_TO_GET_IT = ("clone the repository of caustique, run ./scripts/demo.sh there, "
-                 "and choose target/release/caustique in the add-on's preferences")
+HOW_TO_GET_IT = ("install the extension that contains the program, or clone the repository of caustique, run "
+                 "./scripts/demo.sh there, and choose target/release/caustique in the add-on's preferences")
 _MAX_SECONDS = 60  # for an answer of the program
 
 
 def find(chosen):
-    """The path of the program: `chosen` in the preferences, else `caustique` on the PATH. Raises a Fault if it is too
-    old."""
-    path = os.path.expanduser(chosen) if chosen else shutil.which("caustique")
+    """The path of the program: `chosen` in the preferences, else the one in the extension's wheel, else `caustique` on
+    the PATH. Raises a Fault if it is too old."""
+    path = os.path.expanduser(chosen) if chosen else _packaged() or shutil.which("caustique")
     if path is None:
-        raise Fault("the program caustique is not on the PATH", HOW_TO_GET_IT)
+        raise Fault("the program caustique is neither in the extension nor on the PATH", HOW_TO_GET_IT)
     if not os.path.isfile(path) or not os.access(path, os.X_OK):
         raise Fault(f"{path} is not a program", HOW_TO_GET_IT)
     found = version(path)
@@ -29,6 +30,20 @@ def find(chosen):
         raise Fault(f"{path} is version {dotted(found)}, and the add-on needs {dotted(OLDEST)} or newer",
                     "update the repository, build it with 'cargo build --release', and choose the new program")
     return path
+
+
+def _packaged():
+    """The path of the program in the Python package `caustique`, which Blender installs from the extension's wheel; None
+    without that package."""
+    package = importlib.util.find_spec("caustique")
+    for folder in (package and package.submodule_search_locations) or ():
+        path = os.path.join(folder, "bin", "caustique")
+        if os.path.isfile(path):
+            if not os.access(path, os.X_OK):
+                # Blender extracts wheels without permissions.
+                os.chmod(path, 0o755)
+            return path
+    return None
 
 
 def dotted(numbers):
@@ -39,7 +54,7 @@ def dotted(numbers):
 def version(path):
     """The version of the program at `path`: three numbers."""
     said = _ask(path, "--version").stdout
-    numbers = re.fullmatch(r"caustique (\d+)\.(\d+)\.(\d+)\S*\s*", said)
+    numbers = re.match(r"caustique (\d+)\.(\d+)\.(\d+)\S*(?: \(commit \S+\))?$", said, re.MULTILINE)
     if numbers is None:
         raise Fault(f"{path} does not answer as caustique does", HOW_TO_GET_IT)
     return tuple(map(int, numbers.groups()))
@@ -51,10 +66,10 @@ def options(path):
 
 
 def missing_libraries(path):
-    """A Fault for each library that the program cannot load."""
+    """A Fault for each library that the program cannot load; the add-on does not need USD."""
     said = json.loads(_ask(path, "doctor", "--json").stdout)
     return [Fault(f"{name}: {found['cause']}", found.get("hint") or "") for name, found in said.items()
-            if isinstance(found, dict) and not found["found"]]
+            if name != "usd" and isinstance(found, dict) and not found["found"]]
 
 
 def clear_cache():

@@ -226,7 +226,7 @@ fn settings(args: &ConvergeArgs, rules: &Rules) -> Vec<(String, String)> {
 fn machine(threads: usize, entries: &[Entry]) -> Vec<(String, String)> {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
-    let embree = caustique_embree::Library::load().ok().map(|library| library.version().to_string());
+    let embree = caustique::trace::library().ok().map(|library| library.version().to_string());
     let finished = entries.iter().any(|entry| entry.finish.is_some());
     let denoiser = if finished { caustique::finish::denoiser::library().ok() } else { None };
     let known = [

@@ -2,12 +2,14 @@
 
 use std::sync::OnceLock;
 
-use caustique_embree::{Device, GeometryId, Library, Ray, Scene, SceneBuilder};
+use caustique_embree::{Device, Folders, GeometryId, Library, Ray, Scene, SceneBuilder};
 
 /// The library under test, loaded once.
 pub fn library() -> &'static Library {
     static LIBRARY: OnceLock<Library> = OnceLock::new();
-    LIBRARY.get_or_init(|| Library::load().unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint())))
+    LIBRARY.get_or_init(|| {
+        Library::load(&Folders::default()).unwrap_or_else(|error| panic!("{error}\nhint: {:?}", error.hint()))
+    })
 }
 
 pub fn device(threads: usize) -> Device {

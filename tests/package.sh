@@ -1,0 +1,105 @@
+#!/usr/bin/env bash
+# Tests the packages that scripts/package.sh has made on a system without compilers, Rust, Embree and other libraries.
+#
+#   tests/package.sh PACKAGES       PACKAGES is the folder with the tarball and the wheel
+#
+# `tests/bare.sh --only package` runs it on bare Debian systems. It needs Python 3 with venv, and pip's registry for
+# numpy and USD. The last lines count the checks, and give the time from the download to the first picture.
+
+set -euo pipefail
+
+packages=$(cd "$1" && pwd)
+ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+passed=0 failed=0
+times=()
+
+# check NAME COMMAND...: counts a command that must succeed, and shows its output if it does not
+check() {
+    local name=$1
+    shift
+    if "$@" >check.log 2>&1; then
+        passed=$((passed + 1))
+    else
+        failed=$((failed + 1))
+        printf 'FAILED %s\n' "$name"
+        cat check.log
+    fi
+}
+
+# no COMMAND...: succeeds if the command fails
+no() { ! "$@"; }
+# says PATTERN COMMAND...: succeeds if the command does, and prints a line that matches
+says() { "${@:2}" >said && { cat said && grep -Eq -- "$1" said; }; }
+holds() { local file; for file; do [ -s "$file" ] || { echo "$file: missing or empty" && return 1; }; done; }
+# uses_own FOLDER COMMAND...: succeeds if the program takes its three libraries from the folder
+uses_own() {
+    "${@:2}" --version >said && cat said || return 1
+    [ "$(grep -c ", $1/" said)" -eq 3 ] && grep -Eq '^caustique .*commit [0-9a-f]+' said
+}
+# first_picture NAME START: notes the time since START
+first_picture() { times+=("$(printf '%-8s %3d s from the download to the first picture' "$1" $((SECONDS - $2)))"); }
+
+for tool in cc gcc clang cargo rustc; do
+    check "no $tool here" no command -v "$tool"
+done
+check 'no other libraries here' no says 'embree|OpenImageDenoise|onnxruntime|libtbb' /sbin/ldconfig -p
+picture=(--width 160 --iterations 8 --seed 3 --denoise oidn --strict --progress none)
+small=(--width 64 --iterations 4 --progress none)
+
+# The tarball.
+start=$SECONDS
+mkdir "a place"
+tar -xzf "$packages"/caustique-*-linux-x86_64.tar.gz -C "a place"
+home=$(echo "$work/a place"/caustique-*)
+scene=$home/share/caustique/scenes/pool.glb
+check 'tarball: render' "$home/bin/caustique" render "$scene" -o tar.exr --png tar.png "${picture[@]}"
+first_picture tarball "$start"
+check 'tarball: pictures' holds tar.exr tar.png
+check 'tarball: its own libraries' uses_own "$home" "$home/bin/caustique"
+check 'tarball: doctor without USD' says 'Embree .*from package' "$home/bin/caustique" doctor
+check 'tarball: ONNX Runtime' "$home/bin/caustique" render "$scene" -o net.exr --model compact "${small[@]}"
+share=$home/share
+check 'tarball: manual' holds "$share"/man/man1/caustique{,-render,-plan}.1
+check 'tarball: licences' holds "$share"/doc/caustique/LICENSE-{MIT,APACHE} \
+    "$share"/doc/caustique/{README,embree,oidn,tbb,onnxruntime,onnxruntime-licence,rust}.txt
+check 'tarball: completions' bash -n "$share/bash-completion/completions/caustique"
+mkdir elsewhere
+mv "$home" elsewhere/moved
+ln -s "$work/elsewhere/moved/bin/caustique" linked
+check 'tarball: its own libraries after a move, by a link' uses_own "$work/elsewhere/moved" ./linked
+
+# The wheel.
+start=$SECONDS
+python3 -m venv venv
+wheel=$(echo "$packages"/caustique-*.whl)
+pip=(venv/bin/pip install -q --disable-pip-version-check)
+check 'wheel: pip install' "${pip[@]}" "$wheel"
+scene=$work/elsewhere/moved/share/caustique/scenes/pool.glb
+check 'wheel: render' venv/bin/caustique render "$scene" -o wheel.exr --png wheel.png "${picture[@]}"
+first_picture wheel "$start"
+check 'wheel: its own libraries' uses_own "$work/venv/" venv/bin/caustique
+check 'wheel: the picture of the tarball' says '"relmse": 0\.0,' \
+    venv/bin/caustique compare wheel.exr tar.exr --json
+check 'wheel: licences' holds venv/lib/python3*/site-packages/caustique-*/licenses/{embree,oidn,tbb,onnxruntime,rust}.txt
+cat >render.py <<'PYTHON'
+import sys
+import caustique
+scene = caustique.Scene(sys.argv[1])
+picture = scene.render(width=64, iterations=2, denoise="oidn").picture
+assert picture.shape == (36, 64, 3) and picture.mean() > 0, picture
+for name, library in caustique.libraries().items():
+    assert library["found"] and library["from"] == "package", (name, library)
+PYTHON
+check 'wheel: Python' venv/bin/python render.py "$scene"
+check 'wheel: python -m' says '^Usage: caustique' venv/bin/python -m caustique --help
+check 'wheel: pip install of USD' "${pip[@]}" "${wheel}[usd]"
+check 'wheel: USD' says 'USD +[0-9]+\.' venv/bin/caustique doctor
+stage=$(find "$ROOT/scenes/usd" -name '*.usda' | sort | sed -n 1p)
+check 'wheel: a USD stage' venv/bin/caustique render "$stage" -o usd.exr "${small[@]}"
+
+printf '%s\n' "${times[@]}"
+printf '%d passed, %d failed\n' "$passed" "$failed"
+[ "$failed" -eq 0 ]
