@@ -196,6 +196,9 @@ class _Entry:
                             (("", "specular"), ("Color", "specular_colour")) if self.varies(name)})
         if content and (self.varies("metallic") or self.factor("metallic") < 1):  # metals have none
             self.extension("specular", content)
+        if self.factor("film", 0.0) > 0:
+            self.extension("iridescence", {"iridescenceFactor": 1.0, "iridescenceIor": max(self.factor("film_ior"), 1.0),
+                                           "iridescenceThicknessMaximum": self.factor("film")})
         if self.varies("direction", "anisotropy") or self.factor("anisotropy") > 0:
             content = {"anisotropyStrength": self.factor("anisotropy")}
             if self.varies("direction", "anisotropy"):

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import bpy
+
 from graph import is_constant
 
 WHITE, BLACK = (1.0,) * 3, (0.0,) * 3
@@ -33,6 +35,8 @@ class Lobe:
     sheen: object = BLACK
     sheen_roughness: object = 0.5
     anisotropy: object = 0.0
+    film: object = 0.0  # thickness of a thin film (nm)
+    film_ior: object = 1.33
     tangent: object = None
     normal: object = None
     emission: object = BLACK
@@ -115,7 +119,6 @@ class Reader:
         return g.divide(g.add(g.multiply(below, below), k2), g.add(g.multiply(above, above), k2))
 
     def _glass(self, leaf):
-        self._warn_unless_zero(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
         colour = self.get(leaf, "Color")
         lobe = Lobe(base=colour, roughness=self.get(leaf, "Roughness"), transmission=1.0, ior=self.get(leaf, "IOR"),
                     normal=self.normal(leaf))
@@ -125,7 +128,19 @@ class Reader:
             if is_constant(colour) and max(colour) - min(colour) > 0.25:
                 self.say("the tint of its Glass shader's reflections is carried at steep angles only")
         self._distribution(leaf, lobe)
+        self._film(leaf, lobe)
         return lobe
+
+    def _film(self, leaf, lobe):
+        """Set the thin film. Metals have one from Blender 5.0 on."""
+        thickness = self.get(leaf, "Thin Film Thickness")
+        if thickness is None or (bpy.app.version < (5, 0) and lobe.metallic == 1.0):
+            return
+        ior = self.get(leaf, "Thin Film IOR")
+        if self.graph.varies(thickness) or self.graph.varies(ior):
+            self.say("its thin film varies and is not carried")
+            return
+        lobe.film, lobe.film_ior = thickness, ior
 
     def _dielectric(self, leaf):
         """Glossy facets over a diffuse, refractive or transparent shader, mixed by Fresnel's equations."""
@@ -254,7 +269,7 @@ class Reader:
                 leaf, "Diffuse Roughness", "Diffuse Roughness is not carried: its diffuse part is Lambertian")
             self._warn_unless_zero(
                 leaf, "Subsurface Weight", "Subsurface Weight is not carried: light leaves where it arrives")
-        self._warn_unless_zero(leaf, "Thin Film Thickness", "Thin Film Thickness is not carried")
+        self._film(leaf, lobe)
         return lobe
 
     def _reflectance(self, leaf, lobe):

@@ -207,6 +207,7 @@ class _Match:
         coated = [g.multiply(d, lobe.specular) if lobe.faceted else 0.0 for lobe, d in zip(lobes, dull)]
         over = {"metallic": parts, "base": parts, "transmission": dull, "specular": dull, "roughness": shiny,
                 "ior": coated, "specular_colour": coated, "coat": parts, "sheen": parts, "anisotropy": shiny,
+                "film": shiny, "film_ior": shiny,
                 "coat_roughness": [g.multiply(p, lobe.coat) for lobe, p in zip(lobes, parts)],
                 "sheen_roughness": [g.multiply(p, g.max_component(lobe.sheen)) for lobe, p in zip(lobes, parts)]}
         found = Lobe(**{name: self._sum([getattr(lobe, name) for lobe in lobes], weights)

@@ -225,6 +225,12 @@ impl SideTables {
         })
     }
 
+    /// The reflectance at normal incidence, 0 to 1, at which [`SideTables::average_reflectance`] is `average`.
+    pub fn f0_of_average(&self, average: f32, f90: f32) -> f32 {
+        let rest = 1.0 - self.average_total - self.average_grazing;
+        ((average - f90 * self.average_grazing - self.average_total) / rest.max(1e-9)).clamp(0.0, 1.0)
+    }
+
     /// Average reflectance of the smooth interface over the hemisphere, weighted by the cosine.
     #[inline]
     pub fn average_reflectance(&self, f0: f32, f90: f32) -> f32 {

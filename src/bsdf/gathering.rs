@@ -123,15 +123,15 @@ impl Gathering<'_> {
         let both = i[2] * view.root + root * o.z;
         let value = f32x8::splat(0.5 * FRAC_1_PI / (ax * ay)) / (square(stretched) * both);
         let cos = (length2.sqrt() * 0.5).fast_min(f32x8::ONE);
-        let grazing = n.smooth[0].grazing_weight_from_thin(cos);
+        let grazing = n.dielectric.smooth[0].grazing_weight_from_thin(cos);
         let inverse = f32x8::ONE - cos;
         let schlick = square(square(inverse)) * inverse;
         let loss = at.of(&n.loss) * view.loss;
         let through = if broad { at.of(&n.through) * view.through } else { f32x8::ZERO };
         std::array::from_fn(|c| {
-            let (base, f0) = (layered.base[c], n.f0[c]);
+            let (base, f0) = (layered.base[c], n.dielectric.f0[c]);
             let metal = (schlick * (1.0 - base) + base) * layered.metal;
-            let matte = (grazing * (n.f90 - f0) + f0) * layered.matte;
+            let matte = (grazing * (n.dielectric.f90 - f0) + f0) * layered.matte;
             (metal + matte) * value + loss * layered.reflected_compensation[c] + through * layered.diffuse[c]
         })
     }

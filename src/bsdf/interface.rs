@@ -3,8 +3,10 @@
 
 use super::anisotropic::{AnisotropicProfile, SideProfiles};
 use super::cover::Cover;
-use super::energy::{CoverLayer, EnergyTables, SideTables};
-use super::fresnel::{Smooth, is_matched, normal_incidence};
+use super::dielectric::Dielectric;
+use super::energy::{COAT_ETA, CoverLayer, EnergyTables, SideTables};
+use super::film;
+use super::fresnel::{is_matched, schlick};
 use super::microfacet::{Ggx, lobe_class, refraction_width};
 use super::profile::{Position, Profile};
 use super::{DELTA_ALPHA, LobeSet, Parameters};
@@ -34,12 +36,8 @@ pub struct Interface<'a> {
     pub(super) matched: bool,
     /// Whether the interface is invisible over a diffuse base: it does not reflect and has no cover.
     pub(super) invisible: bool,
-    /// Fresnel's equations of the smooth dielectric, from above and from below.
-    pub(super) smooth: [Smooth; 2],
-    /// Reflectance of the dielectric at normal incidence, per channel.
-    pub(super) f0: Rgb,
-    /// Reflectance of the dielectric at grazing incidence.
-    pub(super) f90: f32,
+    /// The smooth dielectric interface of the facets.
+    pub(super) dielectric: Dielectric,
     /// Average reflectance of the dielectric from above, over the hemisphere.
     pub(super) average: Rgb,
     /// Albedo of multiple scattering between the facets, relative to a perfect reflector.
@@ -118,25 +116,30 @@ impl<'a> Interface<'a> {
         // metal with a ratio of alphas of 4, it is up to -18 % across and +6 % along.
         let mean_square = 0.5 * (sqr(ggx.alpha_x) + sqr(ggx.alpha_y));
         let alpha = Position::new(if rough { mean_square.sqrt() } else { 0.0 });
-        let sides = tables.sides(p.eta);
-        let (f0, f90) = match sides {
-            Some(_) => ((p.specular_color * normal_incidence(p.eta)).min(Rgb::ONE) * p.specular, p.specular),
-            None => (Rgb::ZERO, 0.0),
-        };
+        let dielectric = Dielectric::new(p);
+        let Dielectric { f0, f90, .. } = dielectric;
+        let filmed = dielectric.film.is_some();
+        // A film reflects between matched indices, too.
+        let table_eta = if filmed && is_matched(p.eta) { COAT_ETA } else { p.eta };
+        let sides = tables.sides(table_eta);
         let average = sides.map_or(Rgb::ZERO, |[above, _]| {
             let of = |f0: f32| above.average_reflectance(f0, f90);
-            Rgb::new(of(f0.x), of(f0.y), of(f0.z))
+            if filmed { dielectric.average() } else { Rgb::new(of(f0.x), of(f0.y), of(f0.z)) }
         });
         let loss = if rough { tables.white_loss(alpha) } else { Profile::constant(0.0) };
         let multiple_scattering = if rough { multiple_scattering(average, 1.0 - loss.average) } else { Rgb::ZERO };
-        let f0_max = f0.max_element();
+        let f0_max = if filmed { dielectric.upper_f0(table_eta) } else { f0.max_element() };
         let through = match sides {
             Some([above, _]) => above.base_transmittance(alpha, f0_max, f90, multiple_scattering.max_element()),
             None => Profile::constant(1.0),
         };
-        let matched = is_matched(p.eta);
+        let matched = is_matched(p.eta) && !filmed;
         let glass = match sides {
-            Some(sides) if bends && rough => Some(RoughGlass::new(&ggx, alpha, sides, (p.eta, f0_max, f90), keep)),
+            Some(sides) if bends && rough => {
+                let mean = average.element_sum() / 3.0;
+                let f0 = if filmed { sides[0].f0_of_average(mean, f90) } else { f0_max };
+                Some(RoughGlass::new(&ggx, alpha, sides, (p.eta, f0, f90), keep))
+            }
             _ => None,
         };
         let mut interface = Interface {
@@ -147,9 +150,7 @@ impl<'a> Interface<'a> {
             eta: p.eta,
             matched,
             invisible: (p.specular == 0.0 || matched) && !p.is_covered(),
-            smooth: [Smooth::new(p.eta), Smooth::new(if p.thin { p.eta } else { 1.0 / p.eta })],
-            f0,
-            f90,
+            dielectric,
             average,
             multiple_scattering,
             loss,
@@ -173,16 +174,21 @@ impl<'a> Interface<'a> {
         mu + (1.0 - mu) * self.lift
     }
 
-    /// Reflectance and transmittance of the dielectric at a facet where light arrives at cosine `cos` on `side` (0
-    /// above, 1 below), and the cosine of the refracted ray.
+    /// Reflectance of a facet of metal of colour `f0`.
     #[inline]
-    pub(super) fn dielectric(&self, cos: f32, side: usize) -> (Rgb, f32, f32) {
-        match self.smooth[side].grazing_weight(cos) {
-            None => (Rgb::ONE, 0.0, 0.0),
-            Some((grazing, cos_t)) => {
-                let f = self.f0 + (Rgb::splat(self.f90) - self.f0) * grazing;
-                (f, (1.0 - f.max_element()).max(0.0), cos_t)
-            }
+    pub(super) fn metal(&self, f0: Rgb, cos: f32) -> Rgb {
+        match &self.dielectric.film {
+            None => schlick(f0, cos),
+            Some((film, _)) => film.over_metal(f0, cos),
+        }
+    }
+
+    /// Average reflectance of smooth metal of colour `f0` over the hemisphere.
+    #[inline]
+    pub(super) fn metal_average(&self, f0: Rgb) -> Rgb {
+        match &self.dielectric.film {
+            None => f0 + (Rgb::ONE - f0) * (1.0 / 21.0),
+            Some((film, _)) => film::average(|cos| film.over_metal(f0, cos)),
         }
     }
 }

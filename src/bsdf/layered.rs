@@ -15,7 +15,6 @@
 
 use super::LobeSet;
 use super::cover::Angles;
-use super::fresnel::schlick;
 use super::interface::{Interface, RoughGlass, multiple_scattering};
 use super::profile::Position;
 use crate::math::{Rgb, Vec3};
@@ -160,11 +159,11 @@ impl<'a> Layered<'a> {
         let metal = metallic;
         let glass = (1.0 - metal) * transmission;
         let matte = (1.0 - metal) * (1.0 - transmission);
-        let has_facets = metal > 0.0 || (!matched && (glass > 0.0 || (matte > 0.0 && interface.f90 > 0.0)));
+        let has_facets = metal > 0.0 || (!matched && (glass > 0.0 || (matte > 0.0 && interface.dielectric.f90 > 0.0)));
         let straight = if matched { base * glass } else { Rgb::ZERO };
         let glass = if matched { 0.0 } else { glass };
         let (mut reflected_compensation, mut transmitted_compensation) = (Rgb::ZERO, Rgb::ZERO);
-        let metal_average = base + (Rgb::ONE - base) * (1.0 / 21.0);
+        let metal_average = interface.metal_average(base);
         if class != LobeSet::DELTA {
             let lost = interface.loss.average;
             let scale = FRAC_1_PI / lost.max(1e-9);
@@ -174,7 +173,11 @@ impl<'a> Layered<'a> {
             }
             if thin {
                 reflected_compensation += average * (glass * scale);
-                transmitted_compensation = base * ((1.0 - average.max_element()) * glass * scale);
+                let transmitted = match interface.dielectric.film {
+                    None => Rgb::splat(1.0 - average.max_element()),
+                    Some(_) => Rgb::ONE - average,
+                };
+                transmitted_compensation = base * (transmitted * glass * scale);
             }
         }
         let diffuse_albedo = base * matte;
@@ -237,9 +240,9 @@ impl<'a> Layered<'a> {
     /// Reflectance at a facet of the opaque parts of the mixture: metal, and the interface of the matte surface.
     #[inline]
     fn opaque(&self, cos: f32) -> Rgb {
-        let mut reflected = if self.metal > 0.0 { schlick(self.base, cos) * self.metal } else { Rgb::ZERO };
+        let mut reflected = if self.metal > 0.0 { self.interface.metal(self.base, cos) * self.metal } else { Rgb::ZERO };
         if self.matte > 0.0 {
-            reflected += self.interface.dielectric(cos, 0).0 * self.matte;
+            reflected += self.interface.dielectric.fresnel(cos, 0).0 * self.matte;
         }
         reflected
     }
@@ -252,8 +255,8 @@ impl<'a> Layered<'a> {
         if self.glass == 0.0 {
             return (opaque, Rgb::ZERO, 0.0);
         }
-        let (f, t, cos_t) = self.interface.dielectric(cos, side);
-        (opaque + f * self.glass, self.base * (self.glass * t), cos_t)
+        let (f, t, cos_t) = self.interface.dielectric.fresnel(cos, side);
+        (opaque + f * self.glass, self.base * (t * self.glass), cos_t)
     }
 
     /// The terms of the BSDF that depend only on the viewing direction `wo`.
@@ -305,7 +308,7 @@ impl<'a> Layered<'a> {
                 let loss = glass.loss_along(side, at, view.o);
                 let reflected = glass.reflected_along(side, at, view.o);
                 let transmitted = (1.0 - loss - reflected).max(0.0);
-                let smooth = n.dielectric(cos, side).0;
+                let smooth = n.dielectric.fresnel(cos, side).0;
                 let tint = smooth / smooth.max_element().max(f32::MIN_POSITIVE);
                 let single =
                     self.opaque(cos) * (1.0 - view.loss) + (tint * reflected + self.base * transmitted) * self.glass;

@@ -3,8 +3,10 @@
 mod anisotropic;
 mod coat;
 mod cover;
+mod dielectric;
 mod energy;
 mod facing;
+mod film;
 mod fresnel;
 mod gathering;
 mod interface;

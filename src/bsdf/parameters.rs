@@ -24,6 +24,12 @@ pub struct Parameters {
     pub specular: f32,
     /// Colour of the dielectric's reflection at normal incidence (KHR_materials_specular); may exceed 1.
     pub specular_color: Rgb,
+    /// Strength of the thin film on the interface (KHR_materials_iridescence).
+    pub film: f32,
+    /// Index of refraction of the thin film over the index above the surface.
+    pub film_eta: f32,
+    /// Optical path (nm) through the thin film and back at normal incidence: twice its index times its thickness.
+    pub film_path: f32,
     /// Strength of the clear coat.
     pub clearcoat: f32,
     /// GGX alpha of the clear coat: the square of its perceptual roughness.
@@ -47,6 +53,9 @@ impl Default for Parameters {
             thin: false,
             specular: 0.0,
             specular_color: Rgb::ONE,
+            film: 0.0,
+            film_eta: 1.3,
+            film_path: 0.0,
             clearcoat: 0.0,
             clearcoat_alpha: 0.0,
             sheen_color: Rgb::ZERO,

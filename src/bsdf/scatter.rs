@@ -55,7 +55,12 @@ impl Layered<'_> {
     pub(super) fn has_plain_facets(&self, view: &ViewTerms, set: LobeSet) -> bool {
         let n = self.interface;
         let facets = self.has_facets && n.class != LobeSet::DELTA && set.intersects(n.class);
-        facets && self.glass == 0.0 && n.cover.is_none() && n.smooth[0].is_from_thin() && view.o.z >= MIN_COSINE
+        facets
+            && self.glass == 0.0
+            && n.cover.is_none()
+            && n.dielectric.film.is_none()
+            && n.dielectric.smooth[0].is_from_thin()
+            && view.o.z >= MIN_COSINE
     }
 
     /// The value that [`Layered::evaluate`] returns, without computing the density.
@@ -201,7 +206,7 @@ impl Layered<'_> {
     #[inline]
     fn transmitting_facets(&self, view: &ViewTerms, i: Vec3) -> (Rgb, f32) {
         let (o, ggx) = (view.o, &self.interface.ggx);
-        let eta = self.interface.smooth[view.side].eta;
+        let eta = self.interface.dielectric.smooth[view.side].eta;
         let Some(h) = (o + i * eta).try_normalize() else { return (Rgb::ZERO, 0.0) };
         let h = if h.z < 0.0 { -h } else { h };
         let (cos_o, cos_i) = (o.dot(h), i.dot(h));
@@ -326,7 +331,7 @@ impl Layered<'_> {
             }
             Vec3::new(mirrored.x, mirrored.y, -mirrored.z)
         } else {
-            refract(o, h, n.smooth[side].eta, cos_t)
+            refract(o, h, n.dielectric.smooth[side].eta, cos_t)
         };
         if smooth {
             let weight = t * (self.radiance_scale(side, transport) * self.cover_transmittance(view, i));

@@ -72,6 +72,8 @@ impl Material {
             &self.anisotropy_texture,
             &self.specular_texture,
             &self.specular_color_texture,
+            &self.iridescence_texture,
+            &self.iridescence_thickness_texture,
             &self.clearcoat_texture,
             &self.clearcoat_roughness_texture,
             &self.sheen_color_texture,
@@ -116,6 +118,9 @@ impl Material {
             let texel = look_up(&self.specular_color_texture, surface, textures);
             p.specular_color *= texel.truncate().max(Rgb::ZERO);
         }
+        if self.iridescence > 0.0 {
+            self.thin_film(&mut p, surface, textures);
+        }
         if self.clearcoat > 0.0 {
             p.clearcoat = self.coat(surface, textures);
             let texel = look_up(&self.clearcoat_roughness_texture, surface, textures);
@@ -128,6 +133,16 @@ impl Material {
             p.sheen_alpha = sqr(unit(self.sheen_roughness) * unit(texel.w));
         }
         p
+    }
+
+    /// Sets the thin film in the parameters of the scattering model, whose relative index is set.
+    fn thin_film(&self, p: &mut Parameters, surface: &Surface, textures: &[Texture]) {
+        p.film = unit(self.iridescence) * unit(look_up(&self.iridescence_texture, surface, textures).x);
+        let around = if self.ior.is_finite() { self.ior / p.eta } else { 1.0 };
+        p.film_eta = self.iridescence_ior / around;
+        let [thin, thick] = self.iridescence_thickness;
+        let share = unit(look_up(&self.iridescence_thickness_texture, surface, textures).y);
+        p.film_path = 2.0 * self.iridescence_ior * (thin + (thick - thin) * share).max(0.0);
     }
 
     /// The shading frame. Its z axis is the interpolated or mapped normal, which stays on the side of the geometric

@@ -115,6 +115,8 @@ impl Material {
             self.transmission_texture,
             self.specular_texture,
             self.specular_color_texture,
+            self.iridescence_texture,
+            self.iridescence_thickness_texture,
             self.clearcoat_texture,
             self.clearcoat_roughness_texture,
             self.sheen_color_texture,

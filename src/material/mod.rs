@@ -80,6 +80,16 @@ pub struct Material {
     pub specular_color: Rgb,
     /// Texture of the specular colour (sRGB).
     pub specular_color_texture: Option<TextureRef>,
+    /// Strength of the thin film on the interface, 0 to 1 (KHR_materials_iridescence).
+    pub iridescence: f32,
+    /// Texture of the thin film's strength, in R.
+    pub iridescence_texture: Option<TextureRef>,
+    /// Index of refraction of the thin film, at least 1.
+    pub iridescence_ior: f32,
+    /// Thickness of the thin film (nm) where its texture is 0, and where it is 1 or there is no texture.
+    pub iridescence_thickness: [f32; 2],
+    /// Texture of the thin film's thickness, in G.
+    pub iridescence_thickness_texture: Option<TextureRef>,
     /// Strength of the clear coat, 0 to 1 (KHR_materials_clearcoat).
     pub clearcoat: f32,
     /// Texture of the clear coat's strength, in R.
@@ -136,6 +146,11 @@ impl Default for Material {
             specular_texture: None,
             specular_color: Rgb::ONE,
             specular_color_texture: None,
+            iridescence: 0.0,
+            iridescence_texture: None,
+            iridescence_ior: 1.3,
+            iridescence_thickness: [100.0, 400.0],
+            iridescence_thickness_texture: None,
             clearcoat: 0.0,
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,

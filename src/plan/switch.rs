@@ -149,6 +149,10 @@ fn flatten_material(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, 
     material.transmission *= take(&mut material.transmission_texture).x;
     material.specular *= take(&mut material.specular_texture).w;
     material.specular_color = color(material.specular_color, take(&mut material.specular_color_texture));
+    material.iridescence *= take(&mut material.iridescence_texture).x;
+    let [thin, thick] = material.iridescence_thickness;
+    let share = take(&mut material.iridescence_thickness_texture).y;
+    material.iridescence_thickness = [thin + (thick - thin) * share; 2];
     material.clearcoat *= take(&mut material.clearcoat_texture).x;
     material.clearcoat_roughness *= take(&mut material.clearcoat_roughness_texture).y;
     material.sheen_color = color(material.sheen_color, take(&mut material.sheen_color_texture));

@@ -94,6 +94,32 @@ pub fn sample(u: f32) -> (f32, Rgb) {
     (table.nm[k] + (table.nm[k + 1] - table.nm[k]) * t, table.weight[k] + (table.weight[k + 1] - table.weight[k]) * t)
 }
 
+/// Step (nm) and number of steps of the table of interference.
+const PATH_STEP: f32 = 4.0;
+const PATH_STEPS: usize = 5000;
+
+static INTERFERENCE: LazyLock<Vec<Rgb>> = LazyLock::new(|| {
+    let table = &*TABLE;
+    let at = |path: f32| {
+        let term = |k: usize| {
+            let share = if k == 0 || k == STEPS { 0.5 } else { 1.0 } / STEPS as f32;
+            table.weight[k] * (share * (std::f32::consts::TAU * path / table.nm[k]).cos())
+        };
+        (0..=STEPS).map(term).sum::<Rgb>()
+    };
+    (0..=PATH_STEPS).map(|i| at(PATH_STEP * i as f32)).collect()
+});
+
+/// Interference of two beams of white light with this difference of their optical paths (nm): the mean, over the
+/// wavelengths of each channel, of the cosine of the phase difference. 1 without a difference, and 0 above 20 µm.
+#[inline]
+pub fn interference(path: f32) -> Rgb {
+    let x = path * (1.0 / PATH_STEP);
+    let k = x as usize;
+    let (Some(low), Some(high)) = (INTERFERENCE.get(k), INTERFERENCE.get(k + 1)) else { return Rgb::ZERO };
+    *low + (*high - *low) * (x - k as f32)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -44,6 +44,11 @@ fn thin(alpha: f32) -> Parameters {
     Parameters { thin: true, ..glass(alpha, 1.5) }
 }
 
+/// A surface with a thin film of index 1.33 and thickness 420 nm.
+fn filmed(p: Parameters) -> Parameters {
+    Parameters { film: 1.0, film_eta: 1.33, film_path: 2.0 * 1.33 * 420.0, ..p }
+}
+
 /// Named parameters of surfaces that lose no energy, for furnace tests.
 fn white() -> Vec<(String, Parameters)> {
     let mut list = vec![("matte".to_string(), Parameters::default())];
@@ -88,14 +93,33 @@ fn white() -> Vec<(String, Parameters)> {
             ));
         }
     }
+    for alpha in [0.0, 0.1, 0.5] {
+        list.push((format!("metal with a film {alpha}"), filmed(metal(alpha))));
+        list.push((format!("thin wall with a film {alpha}"), filmed(thin(alpha))));
+        let bubble = Parameters { eta: 1.0, ..filmed(thin(alpha)) };
+        list.push((format!("film alone {alpha}"), Parameters { film: 0.7, ..bubble }));
+    }
+    for eta in [1.5, 1.0 / 1.5] {
+        list.push((format!("smooth glass with a film, eta {eta}"), filmed(glass(0.0, eta))));
+    }
     list.push(("matched".into(), glass(0.3, 1.0)));
     list.push(("legacy ior 0".into(), plastic(0.3, f32::INFINITY)));
     list
 }
 
+/// Surfaces with a thin film that lose a few per cent of the light: the diffuse light below, and the light between the
+/// facets of rough glass, follow the strongest channel and the mean of the film's colours.
+fn lossy_films() -> Vec<(String, Parameters)> {
+    let list = [0.0, 0.1, 0.5].map(|alpha| (format!("plastic with a film {alpha}"), filmed(plastic(alpha, 1.5))));
+    let glasses = [(0.25, 1.5), (0.5, 1.0 / 1.5)];
+    let glasses = glasses.map(|(alpha, eta)| (format!("glass with a film {alpha} eta {eta}"), filmed(glass(alpha, eta))));
+    list.into_iter().chain(glasses).collect()
+}
+
 /// [`white`] and coloured surfaces.
 fn all() -> Vec<(String, Parameters)> {
     let mut list = white();
+    list.extend(lossy_films());
     let tinted: Vec<_> = list
         .iter()
         .map(|(name, p)| {
@@ -163,6 +187,40 @@ fn white_furnace() {
     // A surface that loses 1 % is rejected.
     let grey = Parameters { base_color: Rgb::splat(0.99), ..metal(0.5) };
     assert!(furnace_error(&grey) > 0.005);
+}
+
+/// A white surface with a thin film does not gain energy, and loses at most 8 %.
+#[test]
+fn films_gain_no_energy() {
+    for (name, p) in lossy_films() {
+        let bsdf = bsdf(&p, &TABLES);
+        for wo in COSINES.map(|mu| outgoing(mu, 0.7)) {
+            let albedo = drawn_albedo(&bsdf, wo, Transport::Importance, 128);
+            assert!(albedo.max_element() < 1.01 && albedo.min_element() > 0.92, "{name}, {wo}: {albedo}");
+        }
+    }
+}
+
+/// A film on smooth glass reflects equally from both sides, at angles that refraction joins, and transmits the rest.
+#[test]
+fn films_reflect_equally_from_both_sides() {
+    let bsdf = bsdf(&filmed(glass(0.0, 1.5)), &TABLES);
+    let shares = |wo: Vec3| {
+        let mut shares = [Rgb::ZERO; 2];
+        for k in 0..256 {
+            let lobe = (k as f32 + 0.5) / 256.0;
+            let s = bsdf.sample(wo, Transport::Importance, LobeSet::ALL, lobe, Vec2::splat(0.5)).expect("a direction");
+            shares[usize::from(s.transmitted)] = s.weight * s.pdf_w;
+        }
+        shares
+    };
+    for mu in [1.0f32, 0.7, 0.3, 0.1] {
+        let inside = (1.0 - (1.0 - mu * mu) / 2.25).sqrt();
+        let ([above, through], [below, _]) = (shares(outgoing(mu, 0.0)), shares(-outgoing(inside, 0.0)));
+        assert!((above + through - Rgb::ONE).abs().max_element() < 1e-4, "{mu}: {above} {through}");
+        assert!((above - below).abs().max_element() < 1e-4, "{mu}: {above} is not {below}");
+        assert!(mu < 0.5 || above.max_element() - above.min_element() > 0.004, "{mu}: {above} has no colour");
+    }
 }
 
 /// The functions of a BSDF that the tests need. Implementations can plant bugs.

@@ -53,6 +53,8 @@ fn white() -> Vec<(&'static str, Material)> {
         ("brushed metal", Material { anisotropy: 0.8, ..metal(0.5) }),
         ("smooth plastic", plastic(0.0)),
         ("plastic", plastic(0.4)),
+        ("metal with a thin film", Material { iridescence: 1.0, ..metal(0.4) }),
+        ("soap bubble", Material { iridescence: 1.0, iridescence_ior: 1.33, ior: 1.0, ..shell(0.0) }),
         ("clear glass", glass(1.5)),
         ("frosted glass", Material { roughness: 0.5, ..glass(1.5) }),
         ("dispersing glass", Material { dispersion: 0.5, ..glass(1.6) }),

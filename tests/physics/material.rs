@@ -100,6 +100,26 @@ fn factors_textures_and_vertex_colours_multiply() {
     assert_eq!(missing.parameters(&self::surface(), &textures, 1.5).base_color, Rgb::ONE);
 }
 
+/// The thickness of a thin film is interpolated by G, without a texture it is the maximum, and its index is relative to
+/// the medium around the surface.
+#[test]
+fn thin_films_follow_their_textures() {
+    let textures = [texel([0.5, 0.25, 0.75, 0.4])];
+    let plain = Material { iridescence: 0.8, iridescence_ior: 1.6, ..Material::default() };
+    let textured = Material {
+        iridescence_texture: reference(0),
+        iridescence_thickness: [100.0, 500.0],
+        iridescence_thickness_texture: reference(0),
+        ..plain.clone()
+    };
+    let p = textured.parameters(&surface(), &textures, 1.5);
+    assert_eq!((p.film, p.film_eta, p.film_path), (0.4, 1.6, 2.0 * 1.6 * 200.0));
+    assert!(!textured.has_plain_interface() && textured.textures().count() == 2);
+    let p = plain.parameters(&surface(), &textures, 1.5 / 1.25);
+    assert!((p.film_eta - 1.6 / 1.25).abs() < 1e-6 && p.film_path == 2.0 * 1.6 * 400.0);
+    assert_eq!(Material::default().parameters(&surface(), &textures, 1.5).film, 0.0);
+}
+
 #[test]
 fn unlit_gives_its_base_colour_and_scatters_nothing() {
     let material = Material { unlit: true, base_color: [0.2, 0.4, 0.6, 1.0], ..Material::default() };

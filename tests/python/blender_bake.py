@@ -334,11 +334,24 @@ class Matched(Case):
         for name in ("BSDF_DIFFUSE", "DIFFUSE_BSDF"):
             self.assertEqual(closures.Leaf(types.SimpleNamespace(type=name), ()).type, "BSDF_DIFFUSE")
 
+    def test_thin_films_are_iridescence(self):
+        self.stage.principled(Thin_Film_Thickness=300.0, Thin_Film_IOR=1.4)
+        material, warnings = self.write()
+        film = material["extensions"]["KHR_materials_iridescence"]
+        self.assertEqual((film["iridescenceFactor"], film["iridescenceThicknessMaximum"]), (1.0, 300.0))
+        self.assertAlmostEqual(film["iridescenceIor"], 1.4, 5)
+        self.assertFalse([line for line in warnings if "film" in line])
+
+    def test_metal_has_a_thin_film_from_blender_5_on(self):
+        self.stage.principled(Thin_Film_Thickness=300.0, Metallic=1.0)
+        material, _ = self.write()
+        self.assertEqual("KHR_materials_iridescence" in material.get("extensions", {}), bpy.app.version >= (5, 0))
+
     def test_losses_are_named(self):
         losses = {
             "Coat Tint": dict(Coat_Weight=1.0, Coat_Tint=(1, 0.5, 0.5)), "sheen": dict(Sheen_Weight=1.0),
             "Diffuse Roughness": dict(Diffuse_Roughness=0.5), "Subsurface Weight": dict(Subsurface_Weight=0.5),
-            "Thin Film": dict(Thin_Film_Thickness=300.0), "Coat IOR": dict(Coat_Weight=1.0, Coat_IOR=1.8),
+            "Coat IOR": dict(Coat_Weight=1.0, Coat_IOR=1.8),
             "rim": dict(Metallic=1.0, Specular_Tint=(1, 0.5, 0.5)),
         }
         for words, inputs in losses.items():

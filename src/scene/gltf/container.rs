@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
 /// Names of the glTF extensions that the reader supports.
-const SUPPORTED: [&str; 23] = [
+const SUPPORTED: [&str; 24] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -21,6 +21,7 @@ const SUPPORTED: [&str; 23] = [
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
     "KHR_materials_specular",

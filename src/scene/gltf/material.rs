@@ -68,6 +68,14 @@ record! { Specular {
     specular_color_factor: [f32; 3] = [1.0; 3],
     specular_color_texture: Texture = None,
 }}
+record! { Iridescence {
+    iridescence_factor: f32 = 0.0,
+    iridescence_texture: Texture = None,
+    iridescence_ior: f32 = 1.3,
+    iridescence_thickness_minimum: f32 = 100.0,
+    iridescence_thickness_maximum: f32 = 400.0,
+    iridescence_thickness_texture: Texture = None,
+}}
 record! { Clearcoat {
     clearcoat_factor: f32 = 0.0,
     clearcoat_texture: Texture = None,
@@ -144,6 +152,7 @@ pub(super) fn read(
     }
     reader.specular_glossiness(&mut material)?;
     reader.surface(&mut material)?;
+    reader.thin_film(&mut material)?;
     reader.coatings(&mut material)?;
     let solid = reader.transmission(&mut material)?;
     // Section 3.9.5. Transmissive surfaces are not culled, because their back faces are visible from inside.
@@ -251,6 +260,24 @@ impl Reader<'_> {
         if let Some(e) = self.extension::<Dispersion>("KHR_materials_dispersion")? {
             material.dispersion = self.range(e.dispersion, f32::MAX, "dispersion")?;
         }
+        Ok(())
+    }
+
+    fn thin_film(&mut self, material: &mut Material) -> Result<()> {
+        let Some(e) = self.extension::<Iridescence>("KHR_materials_iridescence")? else { return Ok(()) };
+        material.iridescence = self.unit(e.iridescence_factor, "iridescenceFactor")?;
+        material.iridescence_texture = self.texture(e.iridescence_texture, Use::Data, "iridescenceTexture")?;
+        material.iridescence_ior = self.finite(e.iridescence_ior, "iridescenceIor")?;
+        if material.iridescence_ior < 1.0 {
+            self.warnings.push(format!("{}: an iridescenceIor of {} is raised to 1", self.place, e.iridescence_ior));
+            material.iridescence_ior = 1.0;
+        }
+        material.iridescence_thickness = [
+            self.range(e.iridescence_thickness_minimum, f32::MAX, "iridescenceThicknessMinimum")?,
+            self.range(e.iridescence_thickness_maximum, f32::MAX, "iridescenceThicknessMaximum")?,
+        ];
+        material.iridescence_thickness_texture =
+            self.texture(e.iridescence_thickness_texture, Use::Data, "iridescenceThicknessTexture")?;
         Ok(())
     }
 

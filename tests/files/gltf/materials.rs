@@ -43,6 +43,9 @@ fn every_field_is_read() {
             "KHR_materials_volume": {"thicknessFactor": 0.1, "attenuationDistance": 0.5, "attenuationColor": [1, 0.5, 0.25]},
             "KHR_materials_specular": {"specularFactor": 0.8, "specularTexture": t(0), "specularColorFactor": [2, 1, 0.5],
                 "specularColorTexture": t(0)},
+            "KHR_materials_iridescence": {"iridescenceFactor": 0.6, "iridescenceTexture": t(0), "iridescenceIor": 1.4,
+                "iridescenceThicknessMinimum": 50, "iridescenceThicknessMaximum": 600,
+                "iridescenceThicknessTexture": t(1)},
             "KHR_materials_clearcoat": {"clearcoatFactor": 0.7, "clearcoatTexture": t(0), "clearcoatRoughnessFactor": 0.3,
                 "clearcoatRoughnessTexture": t(0)},
             "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenColorTexture": t(0), "sheenRoughnessFactor": 0.4,
@@ -68,6 +71,8 @@ fn every_field_is_read() {
     assert!(!m.thin && m.priority == 3);
     assert_eq!((m.specular, m.specular_color), (0.8, Rgb::new(2.0, 1.0, 0.5)));
     assert_eq!((set(m.specular_texture), set(m.specular_color_texture)), (Some((1, 0)), Some((0, 0))));
+    assert_eq!((m.iridescence, m.iridescence_ior, m.iridescence_thickness), (0.6, 1.4, [50.0, 600.0]));
+    assert_eq!((set(m.iridescence_texture), set(m.iridescence_thickness_texture)), (Some((1, 0)), Some((1, 1))));
     assert_eq!((m.clearcoat, m.clearcoat_roughness), (0.7, 0.3));
     assert_eq!((m.sheen_color, m.sheen_roughness), (Rgb::new(0.1, 0.2, 0.3), 0.4));
     assert_eq!((set(m.sheen_color_texture), set(m.sheen_roughness_texture)), (Some((0, 0)), Some((1, 0))));
@@ -98,15 +103,17 @@ fn numbers_out_of_range_are_moved_with_a_warning() {
             "KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatNormalTexture": {"index": 0}},
             "KHR_materials_transmission": {"transmissionFactor": 1.0},
             "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0, 1, 1]},
-            "KHR_materials_iridescence": {"iridescenceFactor": 1}}}));
-    assert_eq!((m.metallic, m.ior), (1.0, 1.0));
+            "KHR_materials_iridescence": {"iridescenceFactor": 1, "iridescenceIor": 0.9},
+            "KHR_materials_volume_scatter": {}}}));
+    assert_eq!((m.metallic, m.ior, m.iridescence_ior), (1.0, 1.0, 1.0));
     assert!((m.medium.unwrap().sigma_a.x - 1e6f32.ln()).abs() < 1e-3);
     assert_eq!(
         warnings,
         [
-            "extension \"KHR_materials_iridescence\" is not supported and is ignored",
+            "extension \"KHR_materials_volume_scatter\" is not supported and is ignored",
             "material \"odd\": metallicFactor is 1.5; 1 is used",
             "material \"odd\": an index of refraction of 0.5 is raised to 1",
+            "material \"odd\": an iridescenceIor of 0.9 is raised to 1",
             "material \"odd\": clearcoatNormalTexture is ignored",
             "material \"odd\": attenuationColor is raised to 0.000001, absorption is finite",
             "1 material has an occlusion texture, ignored: occlusion is simulated",
