@@ -168,6 +168,16 @@ class _Entry:
             pbr["metallicRoughnessTexture"] = shared
         elif PLAIN not in (self.channels["roughness"], self.channels["metallic"]):
             pbr.pop("metallicRoughnessTexture", None)
+        if self.factor("sheet") > 0:
+            content = {"diffuseTransmissionFactor": self.factor("sheet"),
+                       "diffuseTransmissionColorFactor": list(self.factor("sheet_colour", (1.0,) * 3))}
+            if self.varies("sheet", "sheet_colour"):
+                size = self.size("sheet", "sheet_colour")
+                tint = self.channels["sheet_colour"]
+                tint = srgb(tint) if self.varies("sheet_colour") else numpy.ones((size, size, 3))
+                shared = self.image("diffuse transmission", tint, self.layer("sheet", size))
+                content["diffuseTransmissionTexture"] = content["diffuseTransmissionColorTexture"] = shared
+            self.extension("diffuse_transmission", content)
         transmission = self.factor("transmission")
         if transmission > 0:
             content = {"transmissionFactor": transmission}

@@ -41,6 +41,8 @@ class Lobe:
     normal: object = None
     emission: object = BLACK
     strength: object = 0.0
+    sheet: object = 0.0  # share of the diffuse light that leaves on the other side, and its colour
+    sheet_colour: object = WHITE
     thin: bool = False
     faceted: bool = True  # roughness and anisotropy have an effect
 
@@ -90,8 +92,7 @@ class Reader:
         return self._diffuse(leaf)
 
     def _translucent(self, leaf):
-        self.say("diffuse transmission is approximated by that of a rough thin sheet")
-        return Lobe(base=self.get(leaf, "Color"), transmission=1.0, thin=True, normal=self.normal(leaf), faceted=False)
+        return Lobe(sheet=1.0, sheet_colour=self.get(leaf, "Color"), normal=self.normal(leaf), faceted=False)
 
     def _glossy(self, leaf):
         """Glossy reflectance is constant; a metal's rises at grazing angles, by 1/21 of the remainder on average."""

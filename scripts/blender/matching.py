@@ -205,8 +205,10 @@ class _Match:
         dull = [g.multiply(p, g.subtract(1.0, lobe.metallic)) for lobe, p in zip(lobes, parts)]
         shiny = [p if lobe.faceted else 0.0 for lobe, p in zip(lobes, parts)]
         coated = [g.multiply(d, lobe.specular) if lobe.faceted else 0.0 for lobe, d in zip(lobes, dull)]
-        over = {"metallic": parts, "base": parts, "transmission": dull, "specular": dull, "roughness": shiny,
+        reflected = [g.multiply(p, g.subtract(1.0, lobe.sheet)) for lobe, p in zip(lobes, parts)]
+        over = {"metallic": parts, "base": reflected, "transmission": dull, "specular": dull, "roughness": shiny,
                 "ior": coated, "specular_colour": coated, "coat": parts, "sheen": parts, "anisotropy": shiny,
+                "sheet": dull, "sheet_colour": [g.multiply(d, lobe.sheet) for lobe, d in zip(lobes, dull)],
                 "film": shiny, "film_ior": shiny,
                 "coat_roughness": [g.multiply(p, lobe.coat) for lobe, p in zip(lobes, parts)],
                 "sheen_roughness": [g.multiply(p, g.max_component(lobe.sheen)) for lobe, p in zip(lobes, parts)]}
@@ -216,7 +218,7 @@ class _Match:
         if found.thin:
             found.roughness = self._sum([lobe.roughness for lobe in lobes], parts)
         found.tangent = next((lobe.tangent for lobe in lobes if lobe.tangent is not None), None)
-        apart = [name.replace("_", " ") for name, weights in over.items() if name != "base"
+        apart = [name.replace("_", " ") for name, weights in over.items() if name not in {"base", "sheet"}
                  and self._differ([getattr(lobe, name) for lobe, w in zip(lobes, weights) if w != 0.0])]
         if apart:
             apart += ["base colour"] * self._differ([lobe.base for lobe in lobes])

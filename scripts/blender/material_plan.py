@@ -18,18 +18,20 @@ _PASSES = {
     "base": ("base",), "surface": ("transmission", "roughness", "metallic"),
     "cover": ("alpha", "coat", "coat_roughness"), "gloss": ("specular", "sheen_roughness", "ior"),
     "specular_colour": ("specular_colour",), "sheen": ("sheen",), "emission": ("emission",),
-    "stretch": ("direction", "anisotropy"), "normal": ("normal",),
+    "stretch": ("direction", "anisotropy"), "normal": ("normal",), "sheet": ("sheet",), "sheet_colour": ("sheet_colour",),
 }
 _DISPLAY_NAMES = {
     "base": "Base Color", "transmission": "Transmission", "roughness": "Roughness", "metallic": "Metallic",
     "alpha": "Alpha", "coat": "Coat", "coat_roughness": "Coat Roughness", "specular": "Specular", "ior": "IOR",
     "sheen_roughness": "Sheen Roughness", "specular_colour": "Specular Tint", "sheen": "Sheen", "emission": "Emission",
     "anisotropy": "Anisotropy", "direction": "the direction of Anisotropy", "normal": "Normal",
+    "sheet": "Translucency", "sheet_colour": "the colour of Translucency",
 }
 _UNBAKED_DEFAULTS = {  # values of varying quantities if nothing may be baked
     "base": (0.8,) * 3, "emission": (1.0,) * 3, "roughness": 0.5, "metallic": 0.0, "transmission": 0.0, "alpha": 1.0,
     "ior": 1.5, "specular": 1.0, "specular_colour": (1.0,) * 3, "coat": 0.0, "coat_roughness": 0.0,
-    "sheen": (0.0,) * 3, "sheen_roughness": 0.5, "anisotropy": 0.0, "normal": None,
+    "sheen": (0.0,) * 3, "sheen_roughness": 0.5, "anisotropy": 0.0, "normal": None, "sheet": 0.0,
+    "sheet_colour": (1.0,) * 3,
 }
 _MIN_ROUGH_METAL = 0.05  # share of texels that is worth a warning
 _STEEP_COSINE, _OLD_STEEP_COSINE = 0.75, 0.97  # between the shading and the surface normal; the latter before Blender 4.5
@@ -222,7 +224,7 @@ class Plan:
             for i, part in enumerate(parts):
                 if part in channels and is_constant(channels[part]):
                     continue
-                one = texels[..., :3] if len(parts) == 1 and name != "stretch" else texels[..., i]
+                one = texels[..., :3] if isinstance(getattr(Matched, part, 0.0), tuple) else texels[..., i]
                 same = gltfmaterial.uniform(one, covered)
                 channels[part] = one if same is None else same
                 if part == "ior" and same is None:

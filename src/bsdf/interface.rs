@@ -34,7 +34,9 @@ pub struct Interface<'a> {
     pub(super) eta: f32,
     /// Whether the indices are matched, so that the interface has no effect.
     pub(super) matched: bool,
-    /// Whether the interface is invisible over a diffuse base: it does not reflect and has no cover.
+    /// Share of the diffuse light that leaves on the other side, 0 to 1, and its colour.
+    pub(super) diffuse_transmission: (f32, Rgb),
+    /// Whether the interface is invisible over a base that only reflects diffusely: it does not reflect and has no cover.
     pub(super) invisible: bool,
     /// The smooth dielectric interface of the facets.
     pub(super) dielectric: Dielectric,
@@ -149,7 +151,8 @@ impl<'a> Interface<'a> {
             thin: p.thin,
             eta: p.eta,
             matched,
-            invisible: (p.specular == 0.0 || matched) && !p.is_covered(),
+            diffuse_transmission: (p.diffuse_transmission, p.diffuse_transmission_color),
+            invisible: (p.specular == 0.0 || matched) && !p.is_covered() && p.diffuse_transmission == 0.0,
             dielectric,
             average,
             multiple_scattering,

@@ -49,6 +49,10 @@ pub struct Layered<'a> {
     pub(super) diffuse: Rgb,
     /// Factor of the albedo `diffuse_albedo * through(o)` of the diffuse lobe.
     pub(super) diffuse_albedo: Rgb,
+    /// Factor of the diffusely transmitted lobe `diffuse_transmitted * through(o) * through(i)`.
+    pub(super) diffuse_transmitted: Rgb,
+    /// Factor of the albedo `diffuse_transmitted_albedo * through(o)` of diffuse transmission.
+    pub(super) diffuse_transmitted_albedo: Rgb,
     /// Factor of the energy-compensating reflected lobe `reflected_compensation * loss(o) * loss(i)` of metal, matte
     /// and thin walls. Its albedo is `pi * average of loss * reflected_compensation * loss(o)`.
     pub(super) reflected_compensation: Rgb,
@@ -80,6 +84,8 @@ pub(super) struct LobeWeights {
     pub coat: f32,
     /// Weight of sheen.
     pub sheen: f32,
+    /// Weight of diffuse transmission.
+    pub diffuse_transmitted: f32,
 }
 
 impl LobeWeights {
@@ -88,7 +94,7 @@ impl LobeWeights {
     fn normalized(mut self) -> Option<LobeWeights> {
         let own =
             self.facets + self.reflected_compensation + self.transmitted_compensation + self.diffuse + self.straight;
-        let sum = own + self.covered_loss + self.coat + self.sheen;
+        let sum = own + self.covered_loss + self.coat + self.sheen + self.diffuse_transmitted;
         // This form returns `None` for NaN.
         let positive = sum > 0.0;
         if !positive {
@@ -103,6 +109,7 @@ impl LobeWeights {
         self.covered_loss *= scale;
         self.coat *= scale;
         self.sheen *= scale;
+        self.diffuse_transmitted *= scale;
         Some(self)
     }
 }
@@ -124,7 +131,8 @@ pub(super) struct ViewTerms {
     pub through: f32,
     /// Estimated albedo of each lobe, as a mean over the channels.
     means: LobeWeights,
-    /// Estimated albedos of five sets of lobes: facets with their compensation, diffuse, straight, coat, sheen.
+    /// Estimated albedos of five sets of lobes: facets with their compensation, diffuse reflection and transmission,
+    /// straight, coat, sheen.
     albedos: [Rgb; 5],
 }
 
@@ -180,13 +188,16 @@ impl<'a> Layered<'a> {
                 transmitted_compensation = base * (transmitted * glass * scale);
             }
         }
-        let diffuse_albedo = base * matte;
-        let diffuse = diffuse_albedo * (FRAC_1_PI / interface.through.average.max(1e-9));
+        let (behind, color_behind) = interface.diffuse_transmission;
+        let diffuse_albedo = base * (matte * (1.0 - behind));
+        let diffuse_transmitted_albedo = color_behind * (matte * behind);
+        let scale = FRAC_1_PI / interface.through.average.max(1e-9);
+        let (diffuse, diffuse_transmitted) = (diffuse_albedo * scale, diffuse_transmitted_albedo * scale);
         let mut lobes = LobeSet::empty();
         if has_facets {
             lobes |= class;
         }
-        if diffuse.max_element() > 0.0 {
+        if diffuse.max_element() > 0.0 || diffuse_transmitted.max_element() > 0.0 {
             lobes |= LobeSet::BROAD;
         }
         if straight.max_element() > 0.0 {
@@ -208,6 +219,8 @@ impl<'a> Layered<'a> {
             straight,
             diffuse,
             diffuse_albedo,
+            diffuse_transmitted,
+            diffuse_transmitted_albedo,
             reflected_compensation,
             transmitted_compensation,
             facet_average,
@@ -229,6 +242,12 @@ impl<'a> Layered<'a> {
     #[inline]
     pub(super) fn coat_probability(&self, view: &ViewTerms, set: LobeSet) -> f32 {
         self.lobe_weights(view, set).normalized().map_or(0.0, |probabilities| probabilities.coat)
+    }
+
+    /// Whether part of the diffuse light leaves on the other side.
+    #[inline]
+    pub(super) fn transmits_diffusely(&self) -> bool {
+        self.diffuse_transmitted.max_element() > 0.0
     }
 
     /// Energy compensation of solid rough glass; `None` if the surface is not such glass.
@@ -278,6 +297,11 @@ impl<'a> Layered<'a> {
             albedos: [Rgb::ZERO, self.diffuse_albedo * through, self.straight, Rgb::ZERO, Rgb::ZERO],
         };
         view.means.diffuse = mean(view.albedos[1]);
+        if self.transmits_diffusely() {
+            let transmitted = self.diffuse_transmitted_albedo * through;
+            view.means.diffuse_transmitted = mean(transmitted);
+            view.albedos[1] += transmitted;
+        }
         view.means.straight = mean(self.straight);
         if self.has_facets {
             let [single, reflected_compensation, transmitted_compensation] = self.facet_albedos(&view);
@@ -338,6 +362,7 @@ impl<'a> Layered<'a> {
             &mut view.means.reflected_compensation,
             &mut view.means.transmitted_compensation,
             &mut view.means.diffuse,
+            &mut view.means.diffuse_transmitted,
             &mut view.means.straight,
         ] {
             *share *= transmittance;
@@ -395,6 +420,7 @@ impl<'a> Layered<'a> {
             transmitted_compensation: means.transmitted_compensation * facets,
             covered_loss: means.covered_loss * facets,
             diffuse: means.diffuse * diffuse,
+            diffuse_transmitted: means.diffuse_transmitted * diffuse,
             straight: means.straight * straight,
             coat: means.coat * coat,
             sheen: means.sheen * sheen,

@@ -137,7 +137,7 @@ impl<'a> Bsdf<'a> {
     /// Whether a lobe other than a delta lobe transmits light.
     #[inline]
     pub fn transmits(&self) -> bool {
-        matches!(self, Bsdf::Layered(layered) if layered.glass > 0.0)
+        matches!(self, Bsdf::Layered(layered) if layered.glass > 0.0 || layered.transmits_diffusely())
     }
 
     /// Classes (delta, sharp, broad) of the lobes that scatter light.
@@ -187,7 +187,7 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// [`Bsdf::evaluate_view`] with the diffuse reflection multiplied by `share` (0 to 1). The density does not change.
+    /// [`Bsdf::evaluate_view`] with diffuse light multiplied by `share` (0 to 1). The density does not change.
     #[inline]
     fn evaluate_dimmed(
         &self,
@@ -205,6 +205,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(layered) => {
                 let mut layered = *layered;
                 layered.diffuse *= share;
+                layered.diffuse_transmitted *= share;
                 layered.evaluate(view, wi, transport, set)
             }
         }

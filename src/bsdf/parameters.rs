@@ -18,6 +18,10 @@ pub struct Parameters {
     pub eta: f32,
     /// Share (0 to 1) of the dielectric whose base transmits light instead of reflecting it diffusely.
     pub transmission: f32,
+    /// Share (0 to 1) of the diffuse light that leaves on the other side (KHR_materials_diffuse_transmission).
+    pub diffuse_transmission: f32,
+    /// Colour of the diffuse light that leaves on the other side.
+    pub diffuse_transmission_color: Rgb,
     /// Whether the surface is a thin wall, which transmits without refraction.
     pub thin: bool,
     /// Strength of the specular reflection of the dielectric (KHR_materials_specular).
@@ -50,6 +54,8 @@ impl Default for Parameters {
             alpha_y: 1.0,
             eta: 1.5,
             transmission: 0.0,
+            diffuse_transmission: 0.0,
+            diffuse_transmission_color: Rgb::ONE,
             thin: false,
             specular: 0.0,
             specular_color: Rgb::ONE,

@@ -44,7 +44,7 @@ impl Layered<'_> {
     #[inline]
     pub(super) fn diffuse_only(&self, view: &ViewTerms, set: LobeSet) -> Option<Rgb> {
         let facets = self.has_facets && set.intersects(self.interface.class);
-        if facets || self.interface.cover.is_some() || view.o.z < MIN_COSINE {
+        if facets || self.interface.cover.is_some() || view.o.z < MIN_COSINE || self.transmits_diffusely() {
             return None;
         }
         Some(self.diffuse * view.through)
@@ -57,6 +57,7 @@ impl Layered<'_> {
         let facets = self.has_facets && n.class != LobeSet::DELTA && set.intersects(n.class);
         facets
             && self.glass == 0.0
+            && !self.transmits_diffusely()
             && n.cover.is_none()
             && n.dielectric.film.is_none()
             && n.dielectric.smooth[0].is_from_thin()
@@ -86,13 +87,28 @@ impl Layered<'_> {
         let n = self.interface;
         let facets = self.has_facets && n.class != LobeSet::DELTA && set.intersects(n.class);
         if i.z > 0.0 {
-            self.evaluate_reflected::<PDF>(view, i, set, facets, probabilities)
-        } else if facets && self.glass > 0.0 {
-            let (f, pdf) = self.evaluate_transmitted(view, i, probabilities);
-            (f * self.radiance_scale(view.side, transport), pdf)
-        } else {
-            (Rgb::ZERO, 0.0)
+            return self.evaluate_reflected::<PDF>(view, i, set, facets, probabilities);
         }
+        let (mut f, mut pdf) = (Rgb::ZERO, 0.0);
+        if facets && self.glass > 0.0 {
+            (f, pdf) = self.evaluate_transmitted(view, i, probabilities);
+            f *= self.radiance_scale(view.side, transport);
+        }
+        if self.transmits_diffusely() && set.intersects(LobeSet::BROAD) {
+            f += self.evaluate_diffuse_transmission(view, i);
+            pdf -= probabilities.diffuse_transmitted * i.z * FRAC_1_PI;
+        }
+        (f, pdf)
+    }
+
+    /// Value of the BSDF (1/sr) for light transmitted diffusely from `o` (above) to `i` (below).
+    #[inline]
+    fn evaluate_diffuse_transmission(&self, view: &ViewTerms, i: Vec3) -> Rgb {
+        let at_i = Position::new(-i.z);
+        let f = self.diffuse_transmitted * (view.through * self.interface.through.at(at_i));
+        let Some(c) = &self.interface.cover else { return f };
+        let [from, to] = [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at).1);
+        f * (c.through * c.cover.transmittance(from) * c.cover.transmittance(to))
     }
 
     #[inline]
@@ -264,6 +280,8 @@ impl Layered<'_> {
         } else if chosen(probabilities.sheen).is_some() {
             let i = warp::sphere_uniform(u);
             SampledDirection::Lobe(Vec3::new(i.x, i.y, i.z.abs()), LobeSet::BROAD)
+        } else if chosen(probabilities.diffuse_transmitted).is_some() {
+            SampledDirection::Lobe(-warp::hemisphere_cosine(u), LobeSet::BROAD)
         } else {
             return None;
         };

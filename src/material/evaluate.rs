@@ -70,6 +70,8 @@ impl Material {
         let textures = [
             &self.metallic_roughness_texture,
             &self.anisotropy_texture,
+            &self.diffuse_transmission_texture,
+            &self.diffuse_transmission_color_texture,
             &self.specular_texture,
             &self.specular_color_texture,
             &self.iridescence_texture,
@@ -117,6 +119,12 @@ impl Material {
         if self.specular_color_texture.is_some() {
             let texel = look_up(&self.specular_color_texture, surface, textures);
             p.specular_color *= texel.truncate().max(Rgb::ZERO);
+        }
+        if self.diffuse_transmission > 0.0 && self.thin {
+            let texel = look_up(&self.diffuse_transmission_texture, surface, textures);
+            p.diffuse_transmission = unit(self.diffuse_transmission) * unit(texel.w);
+            let texel = look_up(&self.diffuse_transmission_color_texture, surface, textures);
+            p.diffuse_transmission_color = unit_color(self.diffuse_transmission_color) * unit_color(texel.truncate());
         }
         if self.iridescence > 0.0 {
             self.thin_film(&mut p, surface, textures);

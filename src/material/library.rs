@@ -60,12 +60,12 @@ impl Material {
     /// Whether surfaces of this material may transmit light.
     #[inline]
     pub fn transmits(&self) -> bool {
-        self.transmission > 0.0
+        self.transmission > 0.0 || self.diffuse_transmission > 0.0
     }
 
     /// Whether a mesh of this material is the boundary of a solid that light enters.
     pub fn is_solid_glass(&self) -> bool {
-        self.transmits() && !self.thin
+        self.transmission > 0.0 && !self.thin
     }
 
     /// Whether the base, without coats, may have a narrow lobe (delta or sharp).
@@ -113,6 +113,8 @@ impl Material {
             self.normal_texture.map(|(texture, _)| texture),
             self.emission_texture,
             self.transmission_texture,
+            self.diffuse_transmission_texture,
+            self.diffuse_transmission_color_texture,
             self.specular_texture,
             self.specular_color_texture,
             self.iridescence_texture,

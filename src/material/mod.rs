@@ -64,6 +64,15 @@ pub struct Material {
     pub transmission: f32,
     /// Texture of the transmission, in R.
     pub transmission_texture: Option<TextureRef>,
+    /// Share of the diffuse light that leaves on the other side of a thin sheet, 0 to 1
+    /// (KHR_materials_diffuse_transmission). Solid glass has none.
+    pub diffuse_transmission: f32,
+    /// Texture of the diffuse transmission, in A.
+    pub diffuse_transmission_texture: Option<TextureRef>,
+    /// Colour of the diffuse light that leaves on the other side.
+    pub diffuse_transmission_color: Rgb,
+    /// Texture of the colour of diffuse transmission (sRGB).
+    pub diffuse_transmission_color_texture: Option<TextureRef>,
     /// Whether the mesh is a thin wall without refraction. Otherwise it is the boundary of a solid.
     pub thin: bool,
     /// Medium that fills the solid: absorption from KHR_materials_volume, or `extras.caustique.medium`.
@@ -138,6 +147,10 @@ impl Default for Material {
             ior: 1.5,
             transmission: 0.0,
             transmission_texture: None,
+            diffuse_transmission: 0.0,
+            diffuse_transmission_texture: None,
+            diffuse_transmission_color: Rgb::ONE,
+            diffuse_transmission_color_texture: None,
             thin: true,
             medium: None,
             priority: 0,

@@ -147,6 +147,9 @@ fn flatten_material(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, 
     let color = |factor: Rgb, texel: Vec4| factor * texel.truncate();
     material.emission = color(material.emission, take(&mut material.emission_texture));
     material.transmission *= take(&mut material.transmission_texture).x;
+    material.diffuse_transmission *= take(&mut material.diffuse_transmission_texture).w;
+    material.diffuse_transmission_color =
+        color(material.diffuse_transmission_color, take(&mut material.diffuse_transmission_color_texture));
     material.specular *= take(&mut material.specular_texture).w;
     material.specular_color = color(material.specular_color, take(&mut material.specular_color_texture));
     material.iridescence *= take(&mut material.iridescence_texture).x;

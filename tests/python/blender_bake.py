@@ -334,6 +334,27 @@ class Matched(Case):
         for name in ("BSDF_DIFFUSE", "DIFFUSE_BSDF"):
             self.assertEqual(closures.Leaf(types.SimpleNamespace(type=name), ()).type, "BSDF_DIFFUSE")
 
+    def test_translucency_is_diffuse_transmission(self):
+        behind = self.stage.node("BsdfTranslucent", Color=(0.2, 0.6, 0.1))
+        self.stage.mix(0.25, self.stage.diffuse((0.5, 0.4, 0.3)), behind)
+        material, warnings = self.write()
+        sheet = material["extensions"]["KHR_materials_diffuse_transmission"]
+        self.assertAlmostEqual(sheet["diffuseTransmissionFactor"], 0.25, 5)
+        numpy.testing.assert_allclose(sheet["diffuseTransmissionColorFactor"], (0.2, 0.6, 0.1), atol=1e-6)
+        base = material["pbrMetallicRoughness"]["baseColorFactor"][:3]
+        numpy.testing.assert_allclose(base, (0.5, 0.4, 0.3), atol=1e-6)
+        self.assertFalse([line for line in warnings if "transmission" in line])
+
+    def test_the_colour_of_translucency_may_vary(self):
+        checker = self.stage.node("TexChecker", Color1=(0.8, 0.1, 0.1), Color2=(0.1, 0.8, 0.1))
+        self.stage.surface(self.stage.node("BsdfTranslucent", Color=checker.outputs["Color"]))
+        material, _ = self.write()
+        sheet = material["extensions"]["KHR_materials_diffuse_transmission"]
+        texels = self.texels(sheet["diffuseTransmissionColorTexture"])
+        found = {(round(float(red), 1), round(float(green), 1)) for red, green in texels[..., :2].reshape(-1, 2)}
+        self.assertLessEqual({(0.9, 0.3), (0.3, 0.9)}, found)
+        self.assertEqual(sheet["diffuseTransmissionFactor"], 1.0)
+
     def test_thin_films_are_iridescence(self):
         self.stage.principled(Thin_Film_Thickness=300.0, Thin_Film_IOR=1.4)
         material, warnings = self.write()

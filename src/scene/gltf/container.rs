@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
 /// Names of the glTF extensions that the reader supports.
-const SUPPORTED: [&str; 24] = [
+const SUPPORTED: [&str; 25] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
@@ -18,6 +18,7 @@ const SUPPORTED: [&str; 24] = [
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",

@@ -57,6 +57,12 @@ record! { SpecularGlossiness {
 record! { EmissiveStrength { emissive_strength: f32 = 1.0, }}
 record! { Ior { ior: f32 = 1.5, }}
 record! { Transmission { transmission_factor: f32 = 0.0, transmission_texture: Texture = None, }}
+record! { DiffuseTransmission {
+    diffuse_transmission_factor: f32 = 0.0,
+    diffuse_transmission_texture: Texture = None,
+    diffuse_transmission_color_factor: [f32; 3] = [1.0; 3],
+    diffuse_transmission_color_texture: Texture = None,
+}}
 record! { Volume {
     thickness_factor: f32 = 0.0,
     attenuation_distance: f32 = f32::INFINITY,
@@ -154,6 +160,7 @@ pub(super) fn read(
     reader.surface(&mut material)?;
     reader.thin_film(&mut material)?;
     reader.coatings(&mut material)?;
+    reader.diffuse_transmission(&mut material)?;
     let solid = reader.transmission(&mut material)?;
     // Section 3.9.5. Transmissive surfaces are not culled, because their back faces are visible from inside.
     material.culled = !material.double_sided && !material.transmits() && !material.null_bsdf;
@@ -263,6 +270,19 @@ impl Reader<'_> {
         Ok(())
     }
 
+    fn diffuse_transmission(&mut self, material: &mut Material) -> Result<()> {
+        const NAME: &str = "KHR_materials_diffuse_transmission";
+        let Some(e) = self.extension::<DiffuseTransmission>(NAME)? else { return Ok(()) };
+        material.diffuse_transmission = self.unit(e.diffuse_transmission_factor, "diffuseTransmissionFactor")?;
+        material.diffuse_transmission_texture =
+            self.texture(e.diffuse_transmission_texture, Use::Data, "diffuseTransmissionTexture")?;
+        material.diffuse_transmission_color =
+            self.color(e.diffuse_transmission_color_factor, 1.0, "diffuseTransmissionColorFactor")?;
+        material.diffuse_transmission_color_texture =
+            self.texture(e.diffuse_transmission_color_texture, Use::Color, "diffuseTransmissionColorTexture")?;
+        Ok(())
+    }
+
     fn thin_film(&mut self, material: &mut Material) -> Result<()> {
         let Some(e) = self.extension::<Iridescence>("KHR_materials_iridescence")? else { return Ok(()) };
         material.iridescence = self.unit(e.iridescence_factor, "iridescenceFactor")?;
@@ -320,6 +340,11 @@ impl Reader<'_> {
             solid = Some(thick);
             if thick {
                 material.medium = self.absorption(e.attenuation_distance, e.attenuation_color)?;
+            }
+            if thick && material.diffuse_transmission > 0.0 {
+                let (filled, sheet) = ("light passes through glass without diffuse transmission", "a thin sheet");
+                let what = if material.transmission > 0.0 { filled } else { sheet };
+                self.warnings.push(format!("{}: its diffuse transmission in a volume is approximated: {what}", self.place));
             }
         }
         extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
