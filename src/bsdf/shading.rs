@@ -52,21 +52,21 @@ impl<'a> Shading<'a> {
         Shading { frame, ng, bsdf, view: bsdf.view_terms(o), cos_og, flipped, mapped: None }
     }
 
-    /// Marks the shading frame as that of a normal map. A clear coat keeps `interpolated_normal`, the normal without the
-    /// map. `arena` holds both.
+    /// Marks the shading frame as that of a normal map, where `interpolated_normal` is the normal without the map, and
+    /// `coat_normal` the one of a clear coat. `arena` holds them.
     #[inline]
-    pub fn with_normal_map(mut self, interpolated_normal: Vec3, arena: &'a Bump) -> Shading<'a> {
-        if interpolated_normal == self.frame.n {
+    pub fn with_normal_map(mut self, interpolated_normal: Vec3, coat_normal: Vec3, arena: &'a Bump) -> Shading<'a> {
+        if interpolated_normal == self.frame.n && coat_normal == self.frame.n {
             return self;
         }
         let mut coat = None;
         if let Bsdf::Layered(layered) = &mut self.bsdf
             && let Some(covered) = layered.interface.cover.as_ref().filter(|covered| covered.cover.has_coat())
         {
-            layered.coat_normal = Some(arena.alloc(self.frame.to_local(interpolated_normal)));
+            layered.coat_normal = Some(arena.alloc(self.frame.to_local(coat_normal)));
             let o = self.view.wo();
             let wo = self.frame.to_world(if self.flipped { -o } else { o });
-            coat = Some(Coat::new(&covered.cover, interpolated_normal, self.ng, wo));
+            coat = Some(Coat::new(&covered.cover, coat_normal, self.ng, wo));
             self.view = layered.view_terms(o);
         }
         self.mapped = Some(arena.alloc(Mapped { interpolated_normal, coat }));

@@ -62,7 +62,14 @@ impl Material {
 
     /// Whether shading frames depend only on the interpolated normal: there is neither a normal map nor anisotropy.
     pub(super) fn has_plain_frame(&self) -> bool {
-        self.normal_texture.is_none() && self.anisotropy == 0.0
+        self.normal_texture.is_none() && self.clearcoat_normal_texture.is_none() && self.anisotropy == 0.0
+    }
+
+    /// Normal of the clear coat: the interpolated normal, or the one of the coat's own map, which the mesh must have
+    /// tangents for.
+    pub fn coat_normal(&self, surface: &Surface, textures: &[Texture]) -> Vec3 {
+        let map = self.clearcoat_normal_texture.as_ref().filter(|_| self.clearcoat > 0.0);
+        map.and_then(|map| mapped_normal(map, surface, textures)).unwrap_or(surface.ns)
     }
 
     /// Whether no texture affects the interface, so that all surfaces of the material can share one.
@@ -162,14 +169,8 @@ impl Material {
         }
         let tangent = surface.tangent.truncate();
         let mut frame = Frame::from_normal_tangent(surface.ns, tangent);
-        let has_tangents = tangent != Vec3::ZERO;
-        let handedness = if surface.tangent.w < 0.0 { -1.0 } else { 1.0 };
-        if let (Some((texture, scale)), true) = (&self.normal_texture, has_tangents) {
-            let texel = look_up(&Some(*texture), surface, textures).truncate() * 2.0 - Vec3::ONE;
-            let local = Vec3::new(texel.x * scale, texel.y * scale * handedness, texel.z);
-            if let Some(n) = frame.to_world(local).try_normalize() {
-                frame = Frame::from_normal_tangent(move_to_side_of(n, surface.ng), tangent);
-            }
+        if let Some(n) = self.normal_texture.as_ref().and_then(|map| mapped_normal(map, surface, textures)) {
+            frame = Frame::from_normal_tangent(n, tangent);
         }
         if self.anisotropy != 0.0 {
             let texel = look_up(&self.anisotropy_texture, surface, textures);
@@ -178,7 +179,7 @@ impl Material {
                 None => Vec2::X,
             };
             let direction = Vec2::from_angle(self.anisotropy_rotation).rotate(read);
-            let along = frame.t * direction.x + frame.b * (direction.y * handedness);
+            let along = frame.t * direction.x + frame.b * (direction.y * handedness(surface));
             frame = Frame::from_normal_tangent(frame.n, along);
         }
         frame
@@ -207,6 +208,26 @@ impl Material {
         }
         self.emission * look_up(&self.emission_texture, surface, textures).truncate()
     }
+}
+
+/// Handedness of the tangent space: -1 on mirrored texture coordinates, else 1.
+#[inline]
+fn handedness(surface: &Surface) -> f32 {
+    if surface.tangent.w < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// The normal of a normal map, given with the scale of its slopes, on the side of the geometric normal. `None` if the
+/// mesh has no tangents.
+#[inline]
+fn mapped_normal((texture, scale): &(TextureRef, f32), surface: &Surface, textures: &[Texture]) -> Option<Vec3> {
+    let tangent = surface.tangent.truncate();
+    if tangent == Vec3::ZERO {
+        return None;
+    }
+    let texel = look_up(&Some(*texture), surface, textures).truncate() * 2.0 - Vec3::ONE;
+    let local = Vec3::new(texel.x * scale, texel.y * scale * handedness(surface), texel.z);
+    let n = Frame::from_normal_tangent(surface.ns, tangent).to_world(local).try_normalize()?;
+    Some(move_to_side_of(n, surface.ng))
 }
 
 /// Moves the mapped normal `n` to the side of the geometric normal `ng`, if it is not there.

@@ -121,6 +121,7 @@ impl Material {
             self.iridescence_thickness_texture,
             self.clearcoat_texture,
             self.clearcoat_roughness_texture,
+            self.clearcoat_normal_texture.map(|(texture, _)| texture),
             self.sheen_color_texture,
             self.sheen_roughness_texture,
             self.anisotropy_texture,

@@ -107,6 +107,8 @@ pub struct Material {
     pub clearcoat_roughness: f32,
     /// Texture of the clear coat's roughness, in G.
     pub clearcoat_roughness_texture: Option<TextureRef>,
+    /// Texture of tangent-space normals of the clear coat, and the scale of their slopes.
+    pub clearcoat_normal_texture: Option<(TextureRef, f32)>,
     /// Sheen colour (KHR_materials_sheen).
     pub sheen_color: Rgb,
     /// Texture of the sheen colour (sRGB).
@@ -168,6 +170,7 @@ impl Default for Material {
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,
             clearcoat_roughness_texture: None,
+            clearcoat_normal_texture: None,
             sheen_color: Rgb::ZERO,
             sheen_color_texture: None,
             sheen_roughness: 0.0,

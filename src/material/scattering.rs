@@ -19,7 +19,7 @@ pub struct Scattering {
 /// large.
 struct PreparedMaterial {
     unlit: bool,
-    /// Whether the material has neither a normal map nor anisotropy.
+    /// Whether the material has neither normal maps nor anisotropy.
     plain_frame: bool,
     /// Base colour before the vertex colour, metalness and transmission of the material; `None` if they have textures.
     shares: Option<(Vec4, f32, f32)>,
@@ -133,7 +133,8 @@ impl Scattering {
         if ready.plain_frame {
             return Shading::new(Frame::from_normal(surface.ns), surface.ng, bsdf, wo);
         }
-        Shading::new(materials.shading_frame(surface), surface.ng, bsdf, wo).with_normal_map(surface.ns, arena)
+        let (frame, coat_normal) = materials.shading_frame(surface);
+        Shading::new(frame, surface.ng, bsdf, wo).with_normal_map(surface.ns, coat_normal, arena)
     }
 
     #[inline(always)]
@@ -166,8 +167,9 @@ impl Scattering {
 /// Evaluation of materials whose textures matter. Not inlined, so that the code for untextured ones stays small.
 impl Materials {
     #[inline(never)]
-    fn shading_frame(&self, surface: &Surface) -> Frame {
-        self.list[surface.material as usize].shading_frame(surface, &self.textures)
+    fn shading_frame(&self, surface: &Surface) -> (Frame, Vec3) {
+        let material = &self.list[surface.material as usize];
+        (material.shading_frame(surface, &self.textures), material.coat_normal(surface, &self.textures))
     }
 
     #[inline(never)]

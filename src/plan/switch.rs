@@ -144,6 +144,7 @@ fn flatten_material(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, 
     material.metallic *= metallic_roughness.z;
     // The mean of a normal map is the surface's normal.
     material.normal_texture = None;
+    material.clearcoat_normal_texture = None;
     let color = |factor: Rgb, texel: Vec4| factor * texel.truncate();
     material.emission = color(material.emission, take(&mut material.emission_texture));
     material.transmission *= take(&mut material.transmission_texture).x;

@@ -44,6 +44,11 @@ fn thin(alpha: f32) -> Parameters {
     Parameters { thin: true, ..glass(alpha, 1.5) }
 }
 
+/// A sheet that transmits part of the diffuse light.
+fn sheet(p: Parameters) -> Parameters {
+    Parameters { diffuse_transmission: 0.4, ..p }
+}
+
 /// A surface with a thin film of index 1.33 and thickness 420 nm.
 fn filmed(p: Parameters) -> Parameters {
     Parameters { film: 1.0, film_eta: 1.33, film_path: 2.0 * 1.33 * 420.0, ..p }
@@ -98,6 +103,14 @@ fn white() -> Vec<(String, Parameters)> {
         list.push((format!("thin wall with a film {alpha}"), filmed(thin(alpha))));
         let bubble = Parameters { eta: 1.0, ..filmed(thin(alpha)) };
         list.push((format!("film alone {alpha}"), Parameters { film: 0.7, ..bubble }));
+    }
+    for (name, p) in [
+        ("matte", Parameters::default()),
+        ("plastic", plastic(0.25, 1.5)),
+        ("half of all", Parameters { metallic: 0.3, transmission: 0.4, thin: true, ..plastic(0.3, 1.5) }),
+        ("coated", Parameters { clearcoat: 1.0, clearcoat_alpha: 0.1, ..Parameters::default() }),
+    ] {
+        list.push((format!("{name} sheet"), sheet(p)));
     }
     for eta in [1.5, 1.0 / 1.5] {
         list.push((format!("smooth glass with a film, eta {eta}"), filmed(glass(0.0, eta))));
@@ -568,7 +581,7 @@ fn every_lobe_is_in_one_class() {
                     assert_eq!(bsdf.albedo(o, set), Rgb::ZERO, "{name}");
                 }
             }
-            if p.transmission == 0.0 && o.z * i.z < 0.0 {
+            if p.transmission == 0.0 && p.diffuse_transmission == 0.0 && o.z * i.z < 0.0 {
                 assert_eq!(all, Rgb::ZERO, "{name}: an opaque surface lets light through");
             }
         }

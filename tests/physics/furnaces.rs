@@ -60,6 +60,7 @@ fn white() -> Vec<(&'static str, Material)> {
         ("dispersing glass", Material { dispersion: 0.5, ..glass(1.6) }),
         ("film", shell(0.0)),
         ("frosted film", shell(0.6)),
+        ("paper", Material { diffuse_transmission: 0.4, double_sided: true, ..plastic(0.5) }),
         ("below a coat", Material { clearcoat: 1.0, clearcoat_roughness: 0.2, ..matte(1.0, 0.0) }),
         ("below sheen", Material { sheen_color: Rgb::splat(0.7), sheen_roughness: 0.5, ..matte(1.0, 0.0) }),
         ("half of all", Material { metallic: 0.5, transmission: 0.5, ..plastic(0.4) }),

@@ -100,6 +100,35 @@ fn factors_textures_and_vertex_colours_multiply() {
     assert_eq!(missing.parameters(&self::surface(), &textures, 1.5).base_color, Rgb::ONE);
 }
 
+/// A map of the clear coat's normals does not turn the base. Without a coat it has no effect.
+#[test]
+fn the_coat_has_its_own_normal_map() {
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let textures = [texel([0.5 + 0.5 * half, 0.5, 0.5 + 0.5 * half, 1.0])];
+    let map = reference(0).map(|r| (r, 1.0));
+    let material = Material { clearcoat: 1.0, clearcoat_normal_texture: map, ..Material::default() };
+    assert!((material.coat_normal(&surface(), &textures) - Vec3::new(half, 0.0, half)).length() < 1e-5);
+    assert_eq!(material.shading_frame(&surface(), &textures).n, Vec3::Z);
+    assert_eq!(Material { clearcoat: 0.0, ..material }.coat_normal(&surface(), &textures), Vec3::Z);
+}
+
+/// Diffuse transmission is A of its texture, on thin sheets only.
+#[test]
+fn diffuse_transmission_follows_its_textures() {
+    let textures = [texel([0.5, 0.25, 0.75, 0.4])];
+    let sheet = Material {
+        diffuse_transmission: 0.5,
+        diffuse_transmission_texture: reference(0),
+        diffuse_transmission_color_texture: reference(0),
+        ..Material::default()
+    };
+    let p = sheet.parameters(&surface(), &textures, 1.5);
+    assert_eq!((p.diffuse_transmission, p.diffuse_transmission_color), (0.2, Rgb::new(0.5, 0.25, 0.75)));
+    assert!(sheet.transmits() && !sheet.is_solid_glass() && !sheet.has_plain_interface());
+    let solid = Material { thin: false, transmission: 0.5, ..sheet };
+    assert_eq!(solid.parameters(&surface(), &textures, 1.5).diffuse_transmission, 0.0);
+}
+
 /// The thickness of a thin film is interpolated by G, without a texture it is the maximum, and its index is relative to
 /// the medium around the surface.
 #[test]
@@ -224,12 +253,15 @@ fn tilted(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, Shade<'_>)
     check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo));
 }
 
-/// [`tilted`], and again with a steep normal map on a surface whose interpolated normal is tilted, too.
+/// [`tilted`], and again with a steep normal map on a surface whose interpolated normal is tilted, too, with and without
+/// another map for the clear coat.
 fn tilted_and_mapped(p: &Parameters, tables: &EnergyTables, check: impl Fn(Vec3, Shade<'_>)) {
     tilted(p, tables, &check);
     let (n, smooth) = (Vec3::new(0.8, 0.1, 0.5).normalize(), Vec3::new(-0.1, 0.05, 1.0).normalize());
     let (bsdf, arena) = (support::bsdf(p, tables), Bump::new());
-    check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo).with_normal_map(smooth, &arena));
+    for coat in [smooth, Vec3::new(0.1, -0.4, 0.9).normalize()] {
+        check(n, &|wo| Shading::new(Frame::from_normal(n), Vec3::Z, bsdf, wo).with_normal_map(smooth, coat, &arena));
+    }
 }
 
 fn direction(k: u64) -> Vec3 {
@@ -289,7 +321,7 @@ fn steep_metal_is_not_black() {
         mean_and_error(&weights)
     };
     for wo in [Vec3::Z, Vec3::new(0.0, 0.8, 0.6), Vec3::new(-0.28, 0.0, 0.96), Vec3::new(-0.96, 0.0, 0.28)] {
-        let (mean, error) = seen(shading(&metal, wo).with_normal_map(Vec3::Z, &arena));
+        let (mean, error) = seen(shading(&metal, wo).with_normal_map(Vec3::Z, Vec3::Z, &arena));
         println!("{wo}: {mean} +- {error}");
         assert!((mean - 1.0).abs() < 5.0 * error + 5e-3, "{wo}: {mean} +- {error}");
     }
@@ -299,7 +331,7 @@ fn steep_metal_is_not_black() {
     let below = n * (2.0 * n.dot(wo)) - wo;
     let lamp = Vec3::new(below.x, below.y, -below.z);
     assert!(below.z < -0.2);
-    let to_lamp = shading(&mirror, wo).with_normal_map(Vec3::Z, &arena).sample(
+    let to_lamp = shading(&mirror, wo).with_normal_map(Vec3::Z, Vec3::Z, &arena).sample(
         Transport::Radiance,
         LobeSet::ALL,
         0.5,
@@ -307,7 +339,7 @@ fn steep_metal_is_not_black() {
     );
     let to_lamp = to_lamp.expect("a mirror's direction");
     assert!((to_lamp.wi - lamp).length() < 1e-5 && (to_lamp.weight.x - 1.0).abs() < 1e-5, "{to_lamp:?}");
-    let lit = shading(&mirror, lamp).with_normal_map(Vec3::Z, &arena);
+    let lit = shading(&mirror, lamp).with_normal_map(Vec3::Z, Vec3::Z, &arena);
     let draw = |u| lit.sample(Transport::Importance, LobeSet::ALL, u, Vec2::splat(0.5));
     let to_eye = [0.25, 0.75].map(draw).into_iter().flatten().find(|s| (s.wi - wo).length() < 1e-5).expect("the eye");
     // One of two directions is sampled with the probability 1/2, and its weight is per geometric cosine.
@@ -332,10 +364,10 @@ fn relief_shadows_its_own_diffuse_light() {
     let lit = |s: Shading<'_>| s.eval_cos(lamp, Transport::Radiance, LobeSet::ALL).x;
     assert!((lit(bare) - 0.5 / std::f32::consts::PI).abs() < 1e-5);
     let expected = 2.0 / (1.0 + (1.0 + 0.375 * 99.0f32).sqrt());
-    assert!((lit(bare.with_normal_map(Vec3::Z, &arena)) / lit(bare) - expected).abs() < 1e-4);
+    assert!((lit(bare.with_normal_map(Vec3::Z, Vec3::Z, &arena)) / lit(bare) - expected).abs() < 1e-4);
     let u = |k: u64, salt: u64| (mix(mix(k) ^ salt) >> 40) as f32 / 16_777_216.0;
     for (lean, cycles) in [(20.0, 0.943), (45.0, 0.744), (60.0, 0.565), (70.0, 0.421)] {
-        let shading = leaning(lean).with_normal_map(Vec3::Z, &arena);
+        let shading = leaning(lean).with_normal_map(Vec3::Z, Vec3::Z, &arena);
         let draw = |k| shading.sample(Transport::Radiance, LobeSet::ALL, u(k, 7), Vec2::new(u(k, 8), u(k, 9)));
         let drawn: Vec<f64> = (0..40_000).map(|k| draw(k).map_or(0.0, |s| f64::from(s.weight.x))).collect();
         let (mean, error) = mean_and_error(&drawn);
@@ -356,7 +388,8 @@ fn a_clear_coat_keeps_its_own_normal() {
         let white = Parameters { clearcoat: 1.0, clearcoat_alpha, ..Parameters::default() };
         let black = Parameters { base_color: Rgb::ZERO, ..white };
         let shading = |p: &Parameters, n: Vec3, wo| {
-            Shading::new(Frame::from_normal(n), Vec3::Z, support::bsdf(p, &tables), wo).with_normal_map(Vec3::Z, &arena)
+            let bare = Shading::new(Frame::from_normal(n), Vec3::Z, support::bsdf(p, &tables), wo);
+            bare.with_normal_map(Vec3::Z, Vec3::Z, &arena)
         };
         for k in 0..200 {
             let (wo, wi, n) = (upper(3 * k), upper(3 * k + 1), upper(3 * k + 2));
@@ -370,6 +403,16 @@ fn a_clear_coat_keeps_its_own_normal() {
                 if let (Some(a), Some(b)) = (a, b) {
                     assert!((a.wi - b.wi).length() < 1e-4 && (a.weight - b.weight).length() < 1e-3, "{a:?} {b:?}");
                 }
+            }
+        }
+        // A map of the coat alone tilts the coat.
+        for k in 0..200 {
+            let (wo, wi, n) = (upper(3 * k), upper(3 * k + 1), upper(3 * k + 2));
+            let on = |n| Shading::new(Frame::from_normal(n), Vec3::Z, support::bsdf(&black, &tables), wo);
+            let (tilted, mapped) = (on(n), on(Vec3::Z).with_normal_map(Vec3::Z, n, &arena));
+            for transport in [Transport::Radiance, Transport::Importance] {
+                let [a, b] = [&tilted, &mapped].map(|shading| shading.evaluate_cos(wi, transport, LobeSet::ALL));
+                assert!((a.0 - b.0).length() <= 1e-4 * a.0.length() && (a.1 - b.1).abs() <= 1e-4 * a.1, "{a:?} {b:?}");
             }
         }
         for k in 0..20 {
@@ -393,7 +436,8 @@ fn shading_normals_treat_radiance_and_importance_alike() {
     let plastic = Parameters { specular: 1.0, alpha_x: 0.3, alpha_y: 0.3, ..Parameters::default() };
     let glass = Parameters { transmission: 1.0, ..plastic };
     let coated = Parameters { clearcoat: 0.8, clearcoat_alpha: 0.3, ..plastic };
-    for p in [Parameters::default(), plastic, glass, coated] {
+    let sheet = Parameters { diffuse_transmission: 0.4, ..coated };
+    for p in [Parameters::default(), plastic, glass, coated, sheet] {
         tilted_and_mapped(&p, &tables, |_, shading| {
             for k in 0..4000 {
                 let (wo, wi) = (direction(2 * k), direction(2 * k + 1));
@@ -409,7 +453,7 @@ fn shading_normals_treat_radiance_and_importance_alike() {
                     let back = shading(wi).pdf(wo, transport, LobeSet::ALL);
                     assert!((there - back).abs() <= 2e-3 * there.max(back), "{wo} {wi} {transport:?}: {there} {back}");
                 }
-                if p.transmission == 0.0 && wo.z * wi.z < 0.0 {
+                if p.transmission == 0.0 && p.diffuse_transmission == 0.0 && wo.z * wi.z < 0.0 {
                     assert_eq!(radiance, Rgb::ZERO, "light leaks");
                 }
             }

@@ -87,7 +87,7 @@ record! { Clearcoat {
     clearcoat_texture: Texture = None,
     clearcoat_roughness_factor: f32 = 0.0,
     clearcoat_roughness_texture: Texture = None,
-    clearcoat_normal_texture: Option<Value> = None,
+    clearcoat_normal_texture: Texture = None,
 }}
 record! { Sheen {
     sheen_color_factor: [f32; 3] = [0.0; 3],
@@ -151,11 +151,7 @@ pub(super) fn read(
         double_sided: core.double_sided,
         ..Material::default()
     };
-    if let Some(info) = core.normal_texture {
-        let scale = reader.finite(info.scale, "normalTexture.scale")?;
-        let texture = reader.texture(Some(info), Use::Data, "normalTexture")?;
-        material.normal_texture = texture.map(|t| (t, scale));
-    }
+    material.normal_texture = reader.normal_map(core.normal_texture, "normalTexture")?;
     reader.specular_glossiness(&mut material)?;
     reader.surface(&mut material)?;
     reader.thin_film(&mut material)?;
@@ -217,6 +213,13 @@ impl Reader<'_> {
 
     /// Reads KHR_materials_pbrSpecularGlossiness as a dielectric with the specular colour as reflectance at normal
     /// incidence. The legacy index 0 of KHR_materials_ior expresses this, because it makes the Fresnel factor 1.
+    /// A texture of normals, and the scale of their slopes.
+    fn normal_map(&mut self, info: Texture, name: &str) -> Result<Option<(TextureRef, f32)>> {
+        let Some(info) = info else { return Ok(None) };
+        let scale = self.finite(info.scale, &format!("{name}.scale"))?;
+        Ok(self.texture(Some(info), Use::Data, name)?.map(|texture| (texture, scale)))
+    }
+
     fn specular_glossiness(&mut self, material: &mut Material) -> Result<()> {
         const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
         let Some(old) = self.extension::<SpecularGlossiness>(NAME)? else { return Ok(()) };
@@ -308,9 +311,7 @@ impl Reader<'_> {
             material.clearcoat_roughness = self.unit(e.clearcoat_roughness_factor, "clearcoatRoughnessFactor")?;
             material.clearcoat_roughness_texture =
                 self.texture(e.clearcoat_roughness_texture, Use::Data, "clearcoatRoughnessTexture")?;
-            if e.clearcoat_normal_texture.is_some() {
-                self.warnings.push(format!("{}: clearcoatNormalTexture is ignored", self.place));
-            }
+            material.clearcoat_normal_texture = self.normal_map(e.clearcoat_normal_texture, "clearcoatNormalTexture")?;
         }
         if let Some(e) = self.extension::<Sheen>("KHR_materials_sheen")? {
             material.sheen_color = self.color(e.sheen_color_factor, 1.0, "sheenColorFactor")?;
@@ -342,9 +343,7 @@ impl Reader<'_> {
                 material.medium = self.absorption(e.attenuation_distance, e.attenuation_color)?;
             }
             if thick && material.diffuse_transmission > 0.0 {
-                let (filled, sheet) = ("light passes through glass without diffuse transmission", "a thin sheet");
-                let what = if material.transmission > 0.0 { filled } else { sheet };
-                self.warnings.push(format!("{}: its diffuse transmission in a volume is approximated: {what}", self.place));
+                self.diffuse_volume(material);
             }
         }
         extras::check_keys(self.raw, extras::MATERIAL, self.place, self.warnings);
@@ -371,6 +370,17 @@ impl Reader<'_> {
             material.medium = None;
         }
         Ok(solid)
+    }
+
+    /// Warns that a solid does not transmit light diffusely. Without glass, its surface is a thin sheet.
+    fn diffuse_volume(&mut self, material: &mut Material) {
+        let what = if material.transmission > 0.0 {
+            "ignored: it is solid glass"
+        } else {
+            material.medium = None;
+            "that of a thin sheet: its volume is empty"
+        };
+        self.warnings.push(format!("{}: its diffuse transmission is {what}", self.place));
     }
 
     /// The absorbing medium with sigma_a = -ln(c) / d, which transmits the colour c over the distance d in metres

@@ -149,5 +149,6 @@ fn check_coordinates(material: &Material, mesh: &Mesh, place: &str, warnings: &m
 pub(super) fn tangent_coordinates(material: &Material) -> Option<TextureRef> {
     let set = material.anisotropy_texture.map_or(0, |t| t.set);
     let plain = TextureRef { texture: 0, set, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
-    material.normal_texture.map(|(t, _)| t).or((material.anisotropy > 0.0).then_some(plain))
+    let maps = material.normal_texture.or(material.clearcoat_normal_texture);
+    maps.map(|(t, _)| t).or((material.anisotropy > 0.0).then_some(plain))
 }

@@ -47,7 +47,10 @@ fn every_field_is_read() {
                 "iridescenceThicknessMinimum": 50, "iridescenceThicknessMaximum": 600,
                 "iridescenceThicknessTexture": t(1)},
             "KHR_materials_clearcoat": {"clearcoatFactor": 0.7, "clearcoatTexture": t(0), "clearcoatRoughnessFactor": 0.3,
-                "clearcoatRoughnessTexture": t(0)},
+                "clearcoatRoughnessTexture": t(0), "clearcoatNormalTexture": {"index": 0, "scale": 0.5}},
+            "KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 0.3,
+                "diffuseTransmissionTexture": t(0), "diffuseTransmissionColorFactor": [0.5, 1, 0],
+                "diffuseTransmissionColorTexture": t(0)},
             "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenColorTexture": t(0), "sheenRoughnessFactor": 0.4,
                 "sheenRoughnessTexture": t(0)},
             "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 1.5, "anisotropyTexture": t(0)},
@@ -71,6 +74,10 @@ fn every_field_is_read() {
     assert!(!m.thin && m.priority == 3);
     assert_eq!((m.specular, m.specular_color), (0.8, Rgb::new(2.0, 1.0, 0.5)));
     assert_eq!((set(m.specular_texture), set(m.specular_color_texture)), (Some((1, 0)), Some((0, 0))));
+    assert_eq!((m.diffuse_transmission, m.diffuse_transmission_color), (0.3, Rgb::new(0.5, 1.0, 0.0)));
+    let behind = (set(m.diffuse_transmission_texture), set(m.diffuse_transmission_color_texture));
+    assert_eq!(behind, (Some((1, 0)), Some((0, 0))));
+    assert_eq!(m.clearcoat_normal_texture.map(|(_, scale)| scale), Some(0.5));
     assert_eq!((m.iridescence, m.iridescence_ior, m.iridescence_thickness), (0.6, 1.4, [50.0, 600.0]));
     assert_eq!((set(m.iridescence_texture), set(m.iridescence_thickness_texture)), (Some((1, 0)), Some((1, 1))));
     assert_eq!((m.clearcoat, m.clearcoat_roughness), (0.7, 0.3));
@@ -100,7 +107,6 @@ fn numbers_out_of_range_are_moved_with_a_warning() {
     let (m, warnings) = material(json!({"name": "odd", "pbrMetallicRoughness": {"metallicFactor": 1.5},
         "occlusionTexture": {"index": 0},
         "extensions": {"KHR_materials_ior": {"ior": 0.5},
-            "KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatNormalTexture": {"index": 0}},
             "KHR_materials_transmission": {"transmissionFactor": 1.0},
             "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [0, 1, 1]},
             "KHR_materials_iridescence": {"iridescenceFactor": 1, "iridescenceIor": 0.9},
@@ -114,7 +120,6 @@ fn numbers_out_of_range_are_moved_with_a_warning() {
             "material \"odd\": metallicFactor is 1.5; 1 is used",
             "material \"odd\": an index of refraction of 0.5 is raised to 1",
             "material \"odd\": an iridescenceIor of 0.9 is raised to 1",
-            "material \"odd\": clearcoatNormalTexture is ignored",
             "material \"odd\": attenuationColor is raised to 0.000001, absorption is finite",
             "1 material has an occlusion texture, ignored: occlusion is simulated",
         ]
