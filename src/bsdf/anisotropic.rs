@@ -1,5 +1,5 @@
-//! Albedos of anisotropic rough glass. They depend on the azimuth as much as on the cosine, so isotropic profiles are
-//! too inaccurate.
+//! Albedos of anisotropic rough interfaces. They depend on the azimuth as much as on the cosine, so isotropic profiles
+//! are too inaccurate.
 
 use super::profile::{NODES, Position, Profile, node};
 use crate::math::{Vec2, Vec3, Vec4, atan2_turns, sin_cos_turns};
@@ -62,23 +62,23 @@ pub(super) struct AnisotropicProfile {
     swapped: bool,
 }
 
-/// Functions of the direction for both sides of an interface. They are large, so they are stored outside of the
-/// interface.
+/// Functions of the direction, of one kind or for both sides of an interface. They are large, so they are stored outside
+/// of the interface.
 #[derive(Debug)]
-pub(super) enum SideProfiles<'a> {
+pub(super) enum Profiles<'a> {
     /// Functions of an interface that is shared by all surfaces of a material.
-    Owned(Box<[AnisotropicProfile; 2]>),
+    Owned(Box<[AnisotropicProfile]>),
     /// Functions of the interface at one path vertex, in the arena of the path.
-    InArena(&'a [AnisotropicProfile; 2]),
+    InArena(&'a [AnisotropicProfile]),
 }
 
-impl std::ops::Deref for SideProfiles<'_> {
-    type Target = [AnisotropicProfile; 2];
+impl std::ops::Deref for Profiles<'_> {
+    type Target = [AnisotropicProfile];
     #[inline]
-    fn deref(&self) -> &[AnisotropicProfile; 2] {
+    fn deref(&self) -> &[AnisotropicProfile] {
         match self {
-            SideProfiles::Owned(sides) => sides,
-            SideProfiles::InArena(sides) => sides,
+            Profiles::Owned(profiles) => profiles,
+            Profiles::InArena(profiles) => profiles,
         }
     }
 }

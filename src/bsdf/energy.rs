@@ -202,6 +202,11 @@ impl SideTables {
         Profile::new(self.albedos(alpha), SCATTERED, 1.0, Vec4::new(-1.0, -f0, -f90, 0.0))
     }
 
+    /// The loss [`SideTables::white_loss`] for anisotropic roughness.
+    pub fn anisotropic_white_loss(&self, alphas: [Position; 2]) -> AnisotropicProfile {
+        self.anisotropic(alphas, (REFLECTED, 1.0, -Vec4::X))
+    }
+
     /// The loss [`SideTables::glass_loss`] for anisotropic roughness.
     pub fn anisotropic_glass_loss(&self, alphas: [Position; 2], f0: f32, f90: f32) -> AnisotropicProfile {
         self.anisotropic(alphas, (SCATTERED, 1.0, -Vec4::new(1.0, f0, f90, 0.0)))
@@ -334,6 +339,11 @@ impl EnergyTables {
     #[inline]
     pub(super) fn white_loss(&self, alpha: Position) -> Profile {
         self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.white_loss(alpha))
+    }
+
+    /// The loss [`EnergyTables::white_loss`] for anisotropic roughness, as a function of the direction.
+    pub(super) fn anisotropic_white_loss(&self, alphas: [Position; 2]) -> Option<AnisotropicProfile> {
+        self.sides(COAT_ETA).map(|[above, _]| above.anisotropic_white_loss(alphas))
     }
 
     /// Albedo of a clear coat of roughness `alpha`, as a function of the cosine.

@@ -1,7 +1,7 @@
 //! The part of a surface's BSDF that does not depend on its base colour. It is computed once per material, or per path
 //! vertex if textures affect it.
 
-use super::anisotropic::{AnisotropicProfile, SideProfiles};
+use super::anisotropic::{AnisotropicProfile, Profiles};
 use super::cover::Cover;
 use super::dielectric::Dielectric;
 use super::energy::{COAT_ETA, CoverLayer, EnergyTables, SideTables};
@@ -44,8 +44,11 @@ pub struct Interface<'a> {
     pub(super) average: Rgb,
     /// Albedo of multiple scattering between the facets, relative to a perfect reflector.
     pub(super) multiple_scattering: Rgb,
-    /// Energy share that single scattering loses at a perfect reflector, as a function of the cosine.
+    /// Energy share that single scattering loses at a perfect reflector, as a function of the cosine; for anisotropic
+    /// roughness a mean over azimuths.
     pub(super) loss: Profile,
+    /// For anisotropic roughness: the loss as a function of the direction.
+    pub(super) anisotropic_loss: Option<Profiles<'a>>,
     /// Transmittance of the interface to the diffuse base, as a function of the cosine.
     pub(super) through: Profile,
     pub(super) glass: Option<RoughGlass<'a>>,
@@ -58,7 +61,7 @@ pub(super) struct RoughGlass<'a> {
     /// Energy share that single scattering loses on each side, as a mean over azimuths.
     pub loss: [Profile; 2],
     /// For anisotropic roughness: the loss and the albedo of reflection on each side, as functions of the direction.
-    anisotropic: Option<[SideProfiles<'a>; 2]>,
+    anisotropic: Option<[Profiles<'a>; 2]>,
     /// Albedo of reflection on each side for isotropic roughness, as a function of the cosine.
     reflected: [Profile; 2],
     /// Factor of the compensating reflected lobe `reflected_compensation[side] * loss(o) * loss(i)`.
@@ -88,20 +91,20 @@ pub(super) struct CoverEffect {
 impl<'a> Interface<'a> {
     /// The interface that the parameters of a BSDF describe. Their base colour does not matter.
     pub fn new(p: &Parameters, tables: &EnergyTables) -> Interface<'a> {
-        Interface::with(p, tables, |sides| SideProfiles::Owned(Box::new(sides)))
+        Interface::with(p, tables, |profiles| Profiles::Owned(profiles.into()))
     }
 
     /// The interface that the parameters of a BSDF describe, allocated in `arena`, which runs no destructors.
     #[inline]
     pub fn new_in(p: &Parameters, tables: &EnergyTables, arena: &'a Bump) -> &'a Interface<'a> {
-        arena.alloc_with(|| Interface::with(p, tables, |sides| SideProfiles::InArena(arena.alloc(sides))))
+        arena.alloc_with(|| Interface::with(p, tables, |profiles| Profiles::InArena(arena.alloc_slice_copy(profiles))))
     }
 
     #[inline]
     fn with(
         p: &Parameters,
         tables: &EnergyTables,
-        keep: impl Fn([AnisotropicProfile; 2]) -> SideProfiles<'a>,
+        keep: impl Fn(&[AnisotropicProfile]) -> Profiles<'a>,
     ) -> Interface<'a> {
         let bends = p.transmission * (1.0 - p.metallic) > 0.0 && !p.thin;
         let mut class = lobe_class(p.alpha_x, p.alpha_y);
@@ -113,9 +116,7 @@ impl<'a> Interface<'a> {
         // A lobe that is below the limit along one axis only is widened there and sampled as a lobe.
         let ggx = Ggx { alpha_x: p.alpha_x.max(DELTA_ALPHA), alpha_y: p.alpha_y.max(DELTA_ALPHA) };
         let rough = class != LobeSet::DELTA;
-        // All tables except those of glass are isotropic: an anisotropic lobe uses the loss of the isotropic lobe with
-        // the same mean square slope. The error of the loss is below 3 % at normal incidence. At grazing angles, for a
-        // metal with a ratio of alphas of 4, it is up to -18 % across and +6 % along.
+        // The transmittance to the base is from isotropic tables, at the roughness with the same mean square slope.
         let mean_square = 0.5 * (sqr(ggx.alpha_x) + sqr(ggx.alpha_y));
         let alpha = Position::new(if rough { mean_square.sqrt() } else { 0.0 });
         let dielectric = Dielectric::new(p);
@@ -128,7 +129,15 @@ impl<'a> Interface<'a> {
             let of = |f0: f32| above.average_reflectance(f0, f90);
             if filmed { dielectric.average() } else { Rgb::new(of(f0.x), of(f0.y), of(f0.z)) }
         });
-        let loss = if rough { tables.white_loss(alpha) } else { Profile::constant(0.0) };
+        let all_glass = bends && p.metallic == 0.0 && p.transmission == 1.0;
+        let stretched = (rough && ggx.alpha_x != ggx.alpha_y && !all_glass)
+            .then(|| tables.anisotropic_white_loss([ggx.alpha_x, ggx.alpha_y].map(Position::new)))
+            .flatten();
+        let loss = match &stretched {
+            Some(loss) => loss.mean(),
+            None if rough => tables.white_loss(alpha),
+            None => Profile::constant(0.0),
+        };
         let multiple_scattering = if rough { multiple_scattering(average, 1.0 - loss.average) } else { Rgb::ZERO };
         let f0_max = if filmed { dielectric.upper_f0(table_eta) } else { f0.max_element() };
         let through = match sides {
@@ -140,7 +149,7 @@ impl<'a> Interface<'a> {
             Some(sides) if bends && rough => {
                 let mean = average.element_sum() / 3.0;
                 let f0 = if filmed { sides[0].f0_of_average(mean, f90) } else { f0_max };
-                Some(RoughGlass::new(&ggx, alpha, sides, (p.eta, f0, f90), keep))
+                Some(RoughGlass::new(&ggx, alpha, sides, (p.eta, f0, f90), &keep))
             }
             _ => None,
         };
@@ -157,6 +166,7 @@ impl<'a> Interface<'a> {
             average,
             multiple_scattering,
             loss,
+            anisotropic_loss: stretched.map(|loss| keep(&[loss])),
             through,
             glass,
             cover: None,
@@ -175,6 +185,35 @@ impl<'a> Interface<'a> {
     #[inline]
     pub(super) fn effective_cosine(&self, mu: f32) -> f32 {
         mu + (1.0 - mu) * self.lift
+    }
+
+    /// Energy share that single scattering loses at a perfect reflector along `w`; `at` is the table position of its
+    /// cosine.
+    #[inline]
+    pub(super) fn loss_along(&self, at: Position, w: Vec3) -> f32 {
+        match &self.anisotropic_loss {
+            None => self.loss.at(at),
+            Some(loss) => loss[0].at(at, w),
+        }
+    }
+
+    /// [`Interface::loss_along`], and the density per solid angle with which [`Interface::sample_loss`] draws `w`.
+    #[inline]
+    pub(super) fn loss_with_pdf_w(&self, at: Position, w: Vec3) -> (f32, f32) {
+        match &self.anisotropic_loss {
+            None => self.loss.at_with_pdf_w(at, w.z.abs()),
+            Some(loss) => (loss[0].at(at, w), loss[0].pdf_w(at, w)),
+        }
+    }
+
+    /// Samples a direction of the upper hemisphere in proportion to the energy that single scattering loses at a perfect
+    /// reflector; `None` if it loses none.
+    #[inline]
+    pub(super) fn sample_loss(&self, u: Vec2) -> Option<Vec3> {
+        match &self.anisotropic_loss {
+            None => self.loss.sample(u),
+            Some(loss) => loss[0].sample(u),
+        }
     }
 
     /// Reflectance of a facet of metal of colour `f0`.
@@ -204,12 +243,12 @@ impl<'a> RoughGlass<'a> {
         alpha: Position,
         sides: [&SideTables; 2],
         (eta, f0, f90): (f32, f32, f32),
-        keep: impl Fn([AnisotropicProfile; 2]) -> SideProfiles<'a>,
+        keep: &impl Fn(&[AnisotropicProfile]) -> Profiles<'a>,
     ) -> RoughGlass<'a> {
         let alphas = [ggx.alpha_x, ggx.alpha_y].map(Position::new);
         let anisotropic = (ggx.alpha_x != ggx.alpha_y).then(|| {
-            let loss = keep(sides.map(|s| s.anisotropic_glass_loss(alphas, f0, f90)));
-            [loss, keep(sides.map(|s| s.anisotropic_reflection(alphas, f0, f90)))]
+            let loss = keep(&sides.map(|s| s.anisotropic_glass_loss(alphas, f0, f90)));
+            [loss, keep(&sides.map(|s| s.anisotropic_reflection(alphas, f0, f90)))]
         });
         let loss = match &anisotropic {
             Some([loss, _]) => [loss[0].mean(), loss[1].mean()],

@@ -291,7 +291,7 @@ impl<'a> Layered<'a> {
             side,
             at,
             root: n.ggx.root(o),
-            loss: n.loss.at(at),
+            loss: n.loss_along(at, o),
             through,
             means: LobeWeights::default(),
             albedos: [Rgb::ZERO, self.diffuse_albedo * through, self.straight, Rgb::ZERO, Rgb::ZERO],

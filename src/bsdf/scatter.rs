@@ -60,6 +60,7 @@ impl Layered<'_> {
             && !self.transmits_diffusely()
             && n.cover.is_none()
             && n.dielectric.film.is_none()
+            && n.anisotropic_loss.is_none()
             && n.dielectric.smooth[0].is_from_thin()
             && view.o.z >= MIN_COSINE
     }
@@ -129,7 +130,7 @@ impl Layered<'_> {
             let (value, both, cos) = n.ggx.reflection(view.o, view.root, i);
             let (r, t, _) = self.fresnel(cos, view.side);
             single = r * value;
-            let (loss_i, mut density) = n.loss.at_with_pdf_w(at_i, i.z);
+            let (loss_i, mut density) = n.loss_with_pdf_w(at_i, i);
             separable[0] = self.reflected_compensation * (view.loss * loss_i);
             if let Some(glass) = self.rough_glass() {
                 let side = view.side;
@@ -188,7 +189,7 @@ impl Layered<'_> {
                 single += t * value;
                 let visible = value * both / (view.o.z + view.root);
                 pdf += probabilities.facets * (1.0 - Self::reflect_probability(r, t)) * visible;
-                let (loss_i, density) = n.loss.at_with_pdf_w(at_i, -i.z);
+                let (loss_i, density) = n.loss_with_pdf_w(at_i, i);
                 separable = self.transmitted_compensation * (view.loss * loss_i);
                 pdf += probabilities.transmitted_compensation * density;
                 norm = n.cover.as_ref().map_or(1.0, |c| c.loss);
@@ -266,10 +267,10 @@ impl Layered<'_> {
         } else if chosen(probabilities.diffuse).is_some() {
             SampledDirection::Lobe(warp::hemisphere_cosine(u), LobeSet::BROAD)
         } else if chosen(probabilities.reflected_compensation).is_some() {
-            let drawn = self.rough_glass().map_or_else(|| n.loss.sample(u), |glass| glass.sample(side, u));
+            let drawn = self.rough_glass().map_or_else(|| n.sample_loss(u), |glass| glass.sample(side, u));
             SampledDirection::Lobe(drawn?, n.class)
         } else if chosen(probabilities.transmitted_compensation).is_some() {
-            let drawn = self.rough_glass().map_or_else(|| n.loss.sample(u), |glass| glass.sample(1 - side, u));
+            let drawn = self.rough_glass().map_or_else(|| n.sample_loss(u), |glass| glass.sample(1 - side, u));
             SampledDirection::Lobe(-drawn?, n.class)
         } else if chosen(probabilities.straight).is_some() {
             SampledDirection::delta(-o, self.straight * self.cover_transmittance(view, -o), probabilities.straight)

@@ -75,6 +75,9 @@ fn white() -> Vec<(String, Parameters)> {
             let stretched = Parameters { alpha_x, alpha_y, ..glass(0.0, eta) };
             list.push((format!("glass {alpha_x} {alpha_y} eta {eta}"), stretched));
         }
+        let stretched = |p: Parameters| Parameters { alpha_x, alpha_y, ..p };
+        list.push((format!("metal {alpha_x} {alpha_y}"), stretched(metal(0.0))));
+        list.push((format!("thin wall {alpha_x} {alpha_y}"), stretched(thin(0.0))));
     }
     for (name, p) in [
         ("metal", metal(0.0)),
