@@ -184,6 +184,10 @@ class Materials:
         if surface.coat != 0:
             add("KHR_materials_clearcoat", self._textured(entry, sets, {
                 "clearcoat": (surface.coat, 0), "clearcoatRoughness": (surface.coat_roughness, 1)}))
+        if surface.film * surface.film_thickness > 0:
+            add("KHR_materials_iridescence", {
+                "iridescenceFactor": min(surface.film, 1.0), "iridescenceIor": max(surface.film_ior, 1.0),
+                "iridescenceThicknessMaximum": surface.film_thickness})
         if any(surface.sheen):
             add("KHR_materials_sheen", {"sheenColorFactor": list(surface.sheen),
                                         "sheenRoughnessFactor": surface.sheen_roughness})

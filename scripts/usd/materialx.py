@@ -22,7 +22,8 @@ _NAMES = {
         "emission": ("emission_luminance", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
         "presence": ("geometry_opacity", 1.0), "thin": ("geometry_thin_walled", False),
         "normal": ("geometry_normal", None), "subsurface": ("subsurface_weight", 0.0),
-        "film": ("thin_film_weight", 0.0), "diffuse_roughness": ("base_diffuse_roughness", 0.0),
+        "film": ("thin_film_weight", 0.0), "film_thickness": ("thin_film_thickness", 0.5),
+        "film_ior": ("thin_film_ior", 1.4), "diffuse_roughness": ("base_diffuse_roughness", 0.0),
     },
     STANDARD: {
         "base": ("base_color", (0.8,) * 3), "base_weight": ("base", 1.0), "metal": ("metalness", 0.0),
@@ -37,20 +38,21 @@ _NAMES = {
         "sheen_color": ("sheen_color", (1.0,) * 3), "sheen_roughness": ("sheen_roughness", 0.3),
         "emission": ("emission", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
         "presence": ("opacity", (1.0,) * 3), "thin": ("thin_walled", False), "normal": ("normal", None),
-        "subsurface": ("subsurface", 0.0), "film": ("thin_film_thickness", 0.0),
+        "subsurface": ("subsurface", 0.0), "film": (None, 1.0),
+        "film_thickness": ("thin_film_thickness", 0.0), "film_ior": ("thin_film_IOR", 1.5),
         "diffuse_roughness": ("diffuse_roughness", 0.0),
     },
 }
+_FILM_UNITS = {OPEN_PBR: 1000.0, STANDARD: 1.0}  # unit of a film's thickness (nm)
 _LOST = {
     "subsurface": "subsurface scattering is not carried: the surface is diffuse",
-    "film": "a thin film is not carried",
     "diffuse_roughness": "diffuse roughness is not carried: the surface is Lambertian",
 }
 # {quantity: quantity that must not be 0 for it to have an effect}
 _DEPENDS_ON = {
     "inside": "transmission", "depth": "transmission", "scatter": "transmission", "scatter_g": "transmission",
     "abbe": "transmission", "dispersed": "transmission", "coat_roughness": "coat", "coat_color": "coat",
-    "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission",
+    "film_thickness": "film", "film_ior": "film", "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission",
 }
 _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence", "coat", "coat_roughness",
              "transmission"}
@@ -83,6 +85,8 @@ def surface(shader, reader, losses):
                   presence=presence, ior=given["ior"], specular=given["specular"],
                   specular_color=given["specular_color"], anisotropy=given["anisotropy"], coat=given["coat"],
                   coat_roughness=given["coat_roughness"], thin=bool(given["thin"]))
+    out.film, out.film_ior = given["film"], given["film_ior"]
+    out.film_thickness = given["film_thickness"] * _FILM_UNITS[reader.identifier(shader)]
     out.emission = _scaled(given["emission_color"], given["emission"])
     if given["sheen"]:
         losses.add(where, "its fuzz is taken for the sheen of glTF, whose lobe differs a little")

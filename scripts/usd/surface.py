@@ -23,6 +23,9 @@ class Surface:
     coat_roughness: object = 0.0
     sheen: tuple = (0.0, 0.0, 0.0)
     sheen_roughness: float = 0.3
+    film: float = 0.0  # share of a thin film, its thickness (nm) and its index of refraction
+    film_thickness: float = 0.0
+    film_ior: float = 1.4
     transmission: object = 0.0
     # Transmittance after `depth` (stage units) inside; with depth 0 it tints at the surface, as `base` does.
     inside: tuple = (1.0, 1.0, 1.0)

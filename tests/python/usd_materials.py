@@ -100,10 +100,21 @@ class Materials(usd_support.Stages):
         numpy.testing.assert_allclose(medium["sigma_s"], [0.2, 0.4, 0.6], rtol=1e-6)
         numpy.testing.assert_allclose(numpy.add(medium["sigma_a"], medium["sigma_s"]), [2 * math.log(2)] * 3, rtol=1e-6)
 
+    def test_thin_films_are_iridescence(self):
+        for kind, factor, inputs in (
+                (OPEN_PBR, 0.5, {"thin_film_weight": 0.5, "thin_film_thickness": 0.4, "thin_film_ior": 1.25}),
+                (STANDARD, 1.0, {"thin_film_thickness": 400.0, "thin_film_IOR": 1.25})):
+            found, lost = self.worn(kind, "mtlx", **inputs)
+            film = found["extensions"]["KHR_materials_iridescence"]
+            self.assertEqual((film["iridescenceFactor"], film["iridescenceIor"]), (factor, 1.25))
+            self.assertAlmostEqual(film["iridescenceThicknessMaximum"], 400, places=3)
+            self.assertEqual(lost, [])
+            self.stage.RemovePrim("/Material")
+
     def test_losses_of_materialx_are_named(self):
-        _, lost = self.worn(OPEN_PBR, "mtlx", subsurface_weight=0.5, thin_film_weight=1.0)
+        _, lost = self.worn(OPEN_PBR, "mtlx", subsurface_weight=0.5, base_diffuse_roughness=1.0)
         self.assertEqual([line.split(": ")[1].split(" is ")[0] for line in lost],
-                         ["subsurface scattering", "a thin film"])
+                         ["subsurface scattering", "diffuse roughness"])
         self.stage.RemovePrim("/Material")
         found, lost = self.worn("ND_disney_principled", "mtlx")
         self.assertIn("a surface ND_disney_principled is not read", lost[0])
