@@ -125,10 +125,8 @@ mod tests {
     fn airy(cos: f32, eta: f32, base: f32, turns: f32) -> f32 {
         let sin2 = 1.0 - cos * cos;
         let cos_film = (1.0 - sin2 / (eta * eta)).sqrt();
-        let (top, bottom) = (
-            amplitudes(cos, cos_film, eta),
-            amplitudes(cos_film, (1.0 - sin2 / (base * base)).sqrt(), base / eta),
-        );
+        let (top, bottom) =
+            (amplitudes(cos, cos_film, eta), amplitudes(cos_film, (1.0 - sin2 / (base * base)).sqrt(), base / eta));
         let (sin, cos) = (std::f32::consts::TAU * turns * cos_film).sin_cos();
         let of = |k: usize| {
             let (a, b) = (top[k], bottom[k]);

@@ -197,7 +197,7 @@ impl<'a> Layered<'a> {
         if has_facets {
             lobes |= class;
         }
-        if diffuse.max_element() > 0.0 || diffuse_transmitted.max_element() > 0.0 {
+        if diffuse.max_element() > 0.0 || diffuse_transmitted_albedo.max_element() > 0.0 {
             lobes |= LobeSet::BROAD;
         }
         if straight.max_element() > 0.0 {
@@ -247,7 +247,7 @@ impl<'a> Layered<'a> {
     /// Whether part of the diffuse light leaves on the other side.
     #[inline]
     pub(super) fn transmits_diffusely(&self) -> bool {
-        self.diffuse_transmitted.max_element() > 0.0
+        self.diffuse_transmitted_albedo.max_element() > 0.0
     }
 
     /// Energy compensation of solid rough glass; `None` if the surface is not such glass.
@@ -259,7 +259,8 @@ impl<'a> Layered<'a> {
     /// Reflectance at a facet of the opaque parts of the mixture: metal, and the interface of the matte surface.
     #[inline]
     fn opaque(&self, cos: f32) -> Rgb {
-        let mut reflected = if self.metal > 0.0 { self.interface.metal(self.base, cos) * self.metal } else { Rgb::ZERO };
+        let mut reflected =
+            if self.metal > 0.0 { self.interface.metal(self.base, cos) * self.metal } else { Rgb::ZERO };
         if self.matte > 0.0 {
             reflected += self.interface.dielectric.fresnel(cos, 0).0 * self.matte;
         }

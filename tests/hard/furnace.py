@@ -69,8 +69,12 @@ def _lobe(name, title, material, methods=("path", "bdpt", "vcm"), bound=0.005, i
 def _with(material, layer, roughness, strength):
     """A material with a layer (clearcoat or sheen) of this roughness and strength on top."""
     key = {"clearcoat": "clearcoatFactor", "sheen": "sheenColorFactor"}[layer]
-    values = {key: strength, f"{layer}RoughnessFactor": roughness}
-    return {**material, "extensions": {**material.get("extensions", {}), f"KHR_materials_{layer}": values}}
+    return _extended(material, layer, {key: strength, f"{layer}RoughnessFactor": roughness})
+
+
+def _extended(material, name, values):
+    """A material with one more extension."""
+    return {**material, "extensions": {**material.get("extensions", {}), f"KHR_materials_{name}": values}}
 
 
 CASES = [
@@ -110,6 +114,18 @@ CASES = [
         "clearcoat", "A clear coat over white metal", lambda r: _with(s.metal(1, 0.5), "clearcoat", r, 1.0), bound=0.01
     ),
     _lobe("sheen", "White sheen over a white base", lambda r: _with(s.diffuse(1), "sheen", r, [1, 1, 1]), bound=0.01),
+    _lobe(
+        "film",
+        "White metal below a thin film",
+        lambda r: _extended(s.metal(1, r), "iridescence", {"iridescenceFactor": 1}),
+        bound=0.01,
+    ),
+    _lobe(
+        "paper",
+        "White paper that transmits part of the diffuse light",
+        lambda r: _extended(s.plastic(1, r), "diffuse_transmission", {"diffuseTransmissionFactor": 0.4}),
+        bound=0.01,
+    ),
     Case(
         "furnace-glass-box",
         "A closed box of clear glass, seen through its edges and corners",

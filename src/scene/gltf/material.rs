@@ -311,7 +311,8 @@ impl Reader<'_> {
             material.clearcoat_roughness = self.unit(e.clearcoat_roughness_factor, "clearcoatRoughnessFactor")?;
             material.clearcoat_roughness_texture =
                 self.texture(e.clearcoat_roughness_texture, Use::Data, "clearcoatRoughnessTexture")?;
-            material.clearcoat_normal_texture = self.normal_map(e.clearcoat_normal_texture, "clearcoatNormalTexture")?;
+            material.clearcoat_normal_texture =
+                self.normal_map(e.clearcoat_normal_texture, "clearcoatNormalTexture")?;
         }
         if let Some(e) = self.extension::<Sheen>("KHR_materials_sheen")? {
             material.sheen_color = self.color(e.sheen_color_factor, 1.0, "sheenColorFactor")?;
