@@ -26,6 +26,12 @@ FACTORS = {
     "dispersion": ("KHR_materials_dispersion", "dispersion", 0.0),
     "clearcoat": ("KHR_materials_clearcoat", "clearcoatFactor", 0.0),
     "clearcoat_roughness": ("KHR_materials_clearcoat", "clearcoatRoughnessFactor", 0.0),
+    "iridescence": ("KHR_materials_iridescence", "iridescenceFactor", 0.0),
+    "iridescence_ior": ("KHR_materials_iridescence", "iridescenceIor", 1.3),
+    "iridescence_thickness": ("KHR_materials_iridescence", "iridescenceThicknessMaximum", 400.0),
+    "diffuse_transmission": ("KHR_materials_diffuse_transmission", "diffuseTransmissionFactor", 0.0),
+    "diffuse_transmission_color": (
+        "KHR_materials_diffuse_transmission", "diffuseTransmissionColorFactor", (1.0, 1.0, 1.0)),
     "sheen_color": ("KHR_materials_sheen", "sheenColorFactor", (0.0, 0.0, 0.0)),
     "sheen_roughness": ("KHR_materials_sheen", "sheenRoughnessFactor", 0.0),
     "anisotropy": ("KHR_materials_anisotropy", "anisotropyStrength", 0.0),

@@ -81,6 +81,13 @@ class Material:
     clearcoat: float = 0.0
     #: Perceptual roughness of the clear coat, 0 to 1.
     clearcoat_roughness: float = 0.0
+    #: Share of the surface that a thin film covers, 0 to 1, its index of refraction and its thickness, nm.
+    iridescence: float = 0.0
+    iridescence_ior: float = 1.3
+    iridescence_thickness: float = 400.0
+    #: Share of the diffuse light that leaves on the other side of a thin sheet, 0 to 1, and its colour (r, g, b).
+    diffuse_transmission: float = 0.0
+    diffuse_transmission_color: Triple = (1.0, 1.0, 1.0)
     #: Reflectance (r, g, b) of the sheen of cloth; black is no sheen.
     sheen_color: Triple = (0.0, 0.0, 0.0)
     #: Perceptual roughness of the sheen, 0 to 1.

@@ -125,6 +125,7 @@ class BesideTheCommandLine(unittest.TestCase):
             base_color_texture=cq.Texture(pixels=image, scale=(2, 3), offset=(0.5, 0), rotation=90, wrap="mirror", nearest=True),
             metallic_roughness_texture=image[..., :3], normal_texture=image[..., :3], emission_texture=image[..., :3],
             emission=(2, 2, 2), clearcoat=0.5, clearcoat_roughness=0.1, sheen_color=(0.1, 0.2, 0.3), sheen_roughness=0.4,
+            iridescence=0.5, iridescence_thickness=300.0, diffuse_transmission=0.25,
             anisotropy=0.5, anisotropy_rotation=90, specular_color=(1, 0.5, 0.2), double_sided=True,
         )
         vertices, triangles = square()
@@ -139,6 +140,9 @@ class BesideTheCommandLine(unittest.TestCase):
         self.assertEqual(material["extensions"]["KHR_materials_specular"]["specularColorFactor"], [1, 0.5, 0.2])
         self.assertEqual(material["extensions"]["KHR_materials_clearcoat"],
                          {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1})
+        self.assertEqual(material["extensions"]["KHR_materials_iridescence"],
+                         {"iridescenceFactor": 0.5, "iridescenceThicknessMaximum": 300})
+        self.assertEqual(material["extensions"]["KHR_materials_diffuse_transmission"], {"diffuseTransmissionFactor": 0.25})
         self.assertAlmostEqual(placed["extensions"]["KHR_texture_transform"]["rotation"], -np.pi / 2)
         self.assertEqual(document["cameras"][0]["orthographic"]["ymag"], 2)
         self.assertEqual(cq.Scene.from_meshes(copies, cameras=[camera], strict=True).warnings, [])
