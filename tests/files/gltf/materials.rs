@@ -59,7 +59,7 @@ fn every_field_is_read() {
         },
         "extras": {"caustique": {"priority": 3}, "maker": "us"},
     }));
-    assert_eq!(warnings, [""; 0]);
+    assert_eq!(warnings, ["material \"all\": its diffuse transmission is ignored: it is solid glass"]);
     assert_eq!((m.name.as_str(), m.double_sided, m.alpha, m.unlit), ("all", true, Alpha::Mask(0.25), true));
     assert!(!m.culled);
     assert_eq!((m.base_color, m.metallic, m.roughness), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
