@@ -35,6 +35,8 @@ mod plan;
 mod rejected;
 #[path = "cli/running.rs"]
 mod running;
+#[path = "cli/temporal.rs"]
+mod temporal;
 #[path = "cli/usage.rs"]
 mod usage;
 #[path = "cli/vectors.rs"]

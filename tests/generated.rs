@@ -71,6 +71,7 @@ fn layers() -> Value {
         "parts": part_names().collect::<Vec<_>>(),
         "groups": LAYERS.iter().filter(of_group).map(|kind| kind.name).collect::<Vec<_>>(),
         "layers": names.collect::<Vec<String>>(),
+        "on_request": LAYERS.iter().filter(|kind| kind.on_request).map(|kind| kind.name).collect::<Vec<_>>(),
     })
 }
 

@@ -1,4 +1,5 @@
-"""Motion while the shutter is open: samples of the evaluated scene at the sub-steps at which Cycles takes them.
+"""Motion around the frame: samples of the evaluated scene while the shutter is open, and one frame before and after for
+motion vectors.
 
 Cycles samples an object at 2^steps + 1 times, from the opening of the shutter to its closing, and interpolates between
 them. One of these times is always the frame itself, whatever the shutter's position.
@@ -205,13 +206,17 @@ class Motion:
 
 
 class Recorder:
-    """Samples the objects of a scene while the shutter is open.
+    """Samples the objects of a scene while the shutter is open, and in the frames around if the view layer has the pass
+    Vector.
 
-    `of`: the `Motion` of objects of the flat scene, by their names. `rate`: frames per second.
+    `of`: the `Motion` of objects of the flat scene, by their names. `rate`: frames per second. `begins`: the first of all
+    times, relative to the frame (frames).
     """
 
     def __init__(self, scene, layer, warn):
         self.scene, self.shutter, self.of = scene, shutter(scene, layer), {}
+        self.vectors = (-1.0, 1.0) if getattr(layer, "use_pass_vector", False) else ()
+        self.begins = min((0.0, *self.vectors, *(self.shutter or ())))
         self._warn, self._tracks, self._shapes = warn, {}, {}
         self._frame = scene.frame_current, scene.frame_subframe
         self.rate = scene.render.fps / scene.render.fps_base
@@ -221,11 +226,14 @@ class Recorder:
     def expect(self, key, thing, parent, matrix, mesh=None):
         """Plan the samples of an evaluated object or instance with this key. `parent`: its instancer, or None. `matrix`:
         in the world at the frame. `mesh`: its mesh in the flat scene if that may deform."""
-        steps, deforms = _settings(thing, parent) if self.shutter is not None else (0, False)
-        if not steps:
+        steps, deforms = _settings(thing, parent) if self.shutter is not None else (0, True)
+        times = set(self.vectors)
+        if steps:
+            opens, closes = self.shutter
+            times |= {opens + (closes - opens) * k / 2 ** steps for k in range(2 ** steps + 1)}
+        if not times:
             return
-        opens, closes = self.shutter
-        times = [opens + (closes - opens) * k / 2 ** steps for k in range(2 ** steps + 1)]
+        times = sorted(times)
         track = self._tracks[key] = Track(times, {0.0: matrix})
         if thing.type == "CAMERA":
             track.optics[0.0] = self._optics(thing)
@@ -287,6 +295,10 @@ class Recorder:
         if track is None:
             return
         matrices, optics = dict(track.matrices), track.optics
+        if self.vectors and self.shutter is not None and not set(self.shutter) <= set(track.times):
+            # Without motion blur the object rests while the shutter is open, also if it moves before and after.
+            matrices |= dict.fromkeys(self.shutter, at_frame)
+            optics |= dict.fromkeys(self.shutter, optics[0.0]) if optics else {}
         shape = track.shape if track.shape is not None and track.shape.labels is not None else None
         if body.type == "CAMERA":
             matrices = {time: camera_export.without_scale(matrix) for time, matrix in matrices.items()}

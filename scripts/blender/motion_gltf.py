@@ -1,7 +1,7 @@
-"""Writes motion within the shutter interval into a glTF document, as an animation: transforms of nodes, projections of
-cameras, and morph targets with weights that interpolate between the sampled shapes.
+"""Writes motion around the frame into a glTF document, as an animation: transforms of nodes, projections of cameras, and
+morph targets with weights that interpolate between the sampled shapes.
 
-The shutter opens at 0 s of the animation, because glTF has no negative times. `extras.caustique.time` is the time of
+The first sample is at 0 s of the animation, because glTF has no negative times. `extras.caustique.time` is the time of
 the frame.
 """
 
@@ -51,10 +51,10 @@ def write(document, buffer, recorder, bodies, warn):
 
 def scene_keys(recorder):
     """Keys of the scene's `extras.caustique`: `shutter` (frames), and `time` of the frame in the animation (s)."""
-    if recorder.shutter is None:
-        return {}
-    opens, closes = recorder.shutter
-    return {"shutter": [opens, closes], "time": -opens / recorder.rate}
+    keys = {"shutter": list(recorder.shutter)} if recorder.shutter is not None else {}
+    if recorder.shutter is not None or recorder.vectors:
+        keys["time"] = -recorder.begins / recorder.rate
+    return keys
 
 
 class _Writer:
@@ -62,7 +62,7 @@ class _Writer:
         self.document, self.buffer = document, bytearray(buffer)
         self.animation = {"name": "shutter", "channels": [], "samplers": []}
         self.inputs, self.deformed, self.targets = {}, {}, set()
-        self.rate, self.opens = recorder.rate, recorder.shutter[0] if recorder.shutter else 0.0
+        self.rate, self.begins = recorder.rate, recorder.begins
 
     def take_labels(self):
         """Take the attribute `motion.CORNER` and others of its kind out of all meshes. Returns accessor and labels of
@@ -106,7 +106,7 @@ class _Writer:
         self.targets.add(key)
         times = tuple(sorted(samples))
         if times not in self.inputs:
-            seconds = (numpy.array(times) - self.opens) / self.rate
+            seconds = (numpy.array(times) - self.begins) / self.rate
             self.inputs[times] = self._accessor(numpy.maximum(seconds, 0.0), True)
         values = numpy.array([samples[time] for time in times], float)
         # A list of weights has one number per key and target.

@@ -1,13 +1,14 @@
-//! `caustique finish`: finishes a rendered EXR. Also opens the finish of other commands.
+//! `caustique finish`: finishes a rendered EXR, or the frames of an animation. Also opens the finish of other commands.
 
+use super::finish_frames::FrameFinish;
 use super::output::{self, PictureArgs};
 use super::progress::{Form, duration};
 use super::say;
 use caustique::error::{Error, Result};
 use caustique::film::{Naming, take_plain_names};
-use caustique::image::exr;
-use caustique::options::FinishOptions;
+use caustique::image::exr::{self, Attributes};
 use caustique::options::number::threads;
+use caustique::options::{FinishOptions, Frames, path_of_frame};
 use caustique::pipeline::{OpenFinish, finish, write_error_of_finish};
 use caustique::render::Clock;
 use caustique::scene::description::PictureDefaults;
@@ -20,17 +21,27 @@ use std::path::PathBuf;
 /// renderer the beauty with a layer Variance (of the mean) or two independent halves, Half1 and Half2. The denoiser also
 /// uses albedo and normal, under the names of Blender, Mitsuba, pbrt, LuxCore and Arnold. --model needs Level1, Level2,
 /// ... and Variance1, ... The picture is replaced, all other layers stay.
+///
+/// With '####' in the names of both files, the frames of an animation are finished with up to two neighbours on each
+/// side, and flicker less. The files need the layer Motion; those of 'caustique render --temporal' have all that is
+/// useful.
 #[derive(clap::Args)]
 pub struct FinishArgs {
-    /// EXR to finish
+    /// EXR to finish; '####' in its name stands for the number of a frame
     input: PathBuf,
-    /// EXR to write
+    /// EXR to write, with '####' in its name if the input has it
     #[arg(short, long, value_name = "OUT.exr", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
     finish: FinishOptions,
     #[command(flatten)]
     picture: PictureArgs,
+    /// Finish these frames only; the frames around them still count [default: all frames that exist]
+    #[arg(long, value_name = "A-B[,STEP]", help_heading = "Running")]
+    frames: Option<Frames>,
+    /// Skip frames whose output exists, so that a run can continue and several machines can share one
+    #[arg(long, help_heading = "Running")]
+    skip_existing: bool,
     /// Threads; 0 takes all cores
     #[arg(long, value_name = "T", default_value_t = 0, value_parser = threads, help_heading = "Running")]
     threads: usize,
@@ -38,6 +49,13 @@ pub struct FinishArgs {
 
 /// Finishes the picture of an EXR, as `caustique finish`.
 pub fn run(args: &FinishArgs) -> Result<()> {
+    if path_of_frame(&args.input, 0).is_some() && !args.input.exists() {
+        return run_frames(args);
+    }
+    if args.frames.is_some() || args.skip_existing {
+        let error = Error::usage("--frames and --skip-existing concern the frames of an animation");
+        return Err(error.hint("leave them out, or put '####' where the frame's number belongs, such as shot.####.exr"));
+    }
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     super::pool(args.threads)?.install(|| {
@@ -61,10 +79,40 @@ pub fn run(args: &FinishArgs) -> Result<()> {
         }
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
-        args.picture.write_png(&set, &PictureDefaults::default())?;
+        args.picture.write_png(&set, &look_of(&attributes))?;
         say(&format!("finished with {} in {}", opened.name(), duration(clock.seconds())));
         Ok(())
     })
+}
+
+/// Finishes the frames of an animation.
+fn run_frames(args: &FinishArgs) -> Result<()> {
+    for (option, path) in [("--output", Some(&args.output)), ("--png", args.picture.png.as_ref())] {
+        let Some(path) = path.filter(|path| path_of_frame(path, 0).is_none()) else { continue };
+        let error = Error::usage(format!("{option} {}: all frames have the same name", path.display()));
+        return Err(error.hint("put '####' where the frame's number belongs, such as out.####.exr"));
+    }
+    output::check(&args.output, "exr")?;
+    args.picture.check()?;
+    let frames = FrameFinish {
+        input: &args.input,
+        output: &args.output,
+        frames: args.frames,
+        finish: &args.finish,
+        picture: &args.picture,
+        skip_existing: args.skip_existing,
+        of_render: false,
+        progress: Form::Auto,
+    };
+    super::pool(args.threads)?.install(|| frames.run())
+}
+
+/// Exposure and tone curve of a render's scene, as its header has them.
+pub fn look_of(attributes: &Attributes) -> PictureDefaults {
+    let header = attributes.object().unwrap_or_default();
+    let exposure = header["exposure"].as_f64().map(|exposure| exposure as f32);
+    let tonemap = serde_json::from_value(header["tonemap"].clone()).ok();
+    PictureDefaults { exposure, tonemap, ..PictureDefaults::default() }
 }
 
 /// Opens a finish (denoiser and network) for this number of bandwidth levels, and warns if the preferred denoiser is

@@ -4,6 +4,7 @@ mod compare;
 mod converge;
 mod doctor;
 mod finish;
+mod finish_frames;
 mod info;
 mod layout;
 mod merge;

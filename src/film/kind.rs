@@ -256,6 +256,7 @@ pub static LAYERS: &[LayerKind] = &[
     },
     LayerKind {
         on_request: true,
+        switch: Some("use_pass_vector"),
         blender: Some("Vector"),
         unit: "pixels",
         ..LayerKind::first(

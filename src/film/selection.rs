@@ -1,6 +1,6 @@
 //! The layers that `--layers` selects.
 
-use super::kind::{LAYERS, LayerKind, Suffix, describe, finished_part, kind_of, part_names, stem};
+use super::kind::{LAYERS, LayerKind, MOTION, Suffix, Use, describe, finished_part, kind_of, part_names, stem};
 use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, ErrorKind, Result};
 
@@ -15,8 +15,11 @@ pub enum Selection {
     /// Layers for compositing: beauty, finished parts, albedo, normal, depth and cryptomattes, as half floats where these
     /// suffice.
     Comp,
-    /// Layers by name; `beauty` is the beauty, and `Level` selects `Level1`, `Level2`, ...
+    /// Layers by name; `beauty` is the beauty, `Level` selects `Level1`, `Level2`, ..., and `all` and `comp` select what
+    /// they select alone.
     List(Vec<String>),
+    /// A selection, and the layers that the temporal finish of the picture and of its finished parts needs.
+    Temporal(Box<Selection>),
 }
 
 impl Selection {
@@ -36,7 +39,8 @@ impl Selection {
             return Err(Error::new(ErrorKind::Usage, "--layers", "no layer is named")
                 .hint("give all, comp, beauty, or names such as beauty,Noisy,albedo"));
         }
-        match names.iter().find(|name| *name != "beauty" && describe(name).is_none()) {
+        let is_known = |name: &str| ["all", "comp", "beauty"].contains(&name) || describe(name).is_some();
+        match names.iter().find(|name| !is_known(name)) {
             Some(unknown) => {
                 let known = suggestions();
                 Err(unknown_layer(unknown, known.iter().map(String::as_str)))
@@ -52,10 +56,26 @@ impl Selection {
             Selection::All => !kind_of(name).is_some_and(|(kind, _)| kind.on_request),
             Selection::Beauty => name.is_empty(),
             Selection::Comp => kind_of(name).is_some_and(|(kind, finished)| finished || kind.compositing),
-            Selection::List(names) => {
-                names.iter().any(|n| n == name || (n == "beauty" && name.is_empty()) || (!stem.is_empty() && n == stem))
+            Selection::List(names) => names.iter().any(|n| match n.as_str() {
+                "all" => Selection::All.wants(name),
+                "comp" => Selection::Comp.wants(name),
+                "beauty" => name.is_empty(),
+                n => n == name || (!stem.is_empty() && n == stem),
+            }),
+            Selection::Temporal(chosen) => {
+                // Parts are finished together, because they sum to the picture.
+                let any_part = || part_names().filter_map(finished_part).any(|part| chosen.wants(&part));
+                let part = || finished_part(name).is_some_and(|part| chosen.wants(&part) || any_part());
+                let read = |kind: &LayerKind| matches!(kind.finish, Some(Use::Picture | Use::Error));
+                let of_picture = || kind_of(name).is_some_and(|(kind, finished)| !finished && read(kind));
+                chosen.wants(name) || name.is_empty() || name == MOTION || of_picture() || part()
             }
         }
+    }
+
+    /// The user's selection, without layers that only the temporal finish needs.
+    pub fn chosen(&self) -> &Selection {
+        if let Selection::Temporal(chosen) = self { chosen } else { self }
     }
 
     /// The set with the selected layers only.
@@ -63,7 +83,8 @@ impl Selection {
     /// # Errors
     /// A selected layer is missing; the hint has the nearest present one.
     pub fn apply(&self, set: LayerSet) -> Result<LayerSet> {
-        if let Selection::List(names) = self {
+        let chosen = self.chosen();
+        if let Selection::List(names) = chosen {
             let present = |name: &String| {
                 let only = Selection::List(vec![name.clone()]);
                 set.layers.iter().any(|layer| only.wants(&layer.name))
@@ -76,7 +97,7 @@ impl Selection {
             }
         }
         let layers = set.layers.into_iter().filter(|layer| self.wants(&layer.name));
-        let layers = match self {
+        let layers = match chosen {
             Selection::Comp => {
                 layers.map(|layer| if fits_half(&layer) { layer.stored_as(Sample::Half) } else { layer }).collect()
             }

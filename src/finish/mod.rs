@@ -8,6 +8,8 @@
 //! 4. The additive parts, finished so that they sum to the picture ([`parts`]).
 //! 5. The error of the result, estimated from independent quarters of the iterations ([`FinishedError`]).
 //!
+//! Frames of an animation are averaged with their neighbours after step 2 ([`temporal`]).
+//!
 //! Input and output are named layers, so that a stored picture, also of another renderer, is finished like a new one.
 
 pub mod bound;
@@ -17,6 +19,7 @@ mod estimate;
 mod finished_error;
 pub mod parts;
 pub mod statistical;
+pub mod temporal;
 mod window;
 
 pub use bound::Clamped;
@@ -82,6 +85,16 @@ pub struct Finished {
 /// A layer's name and its picture.
 type Named = (String, Picture);
 
+/// An estimate, its denoised picture, and what the finish makes of half of the iterations.
+struct Prepared {
+    estimate: Estimate,
+    denoised: Picture,
+    /// The finished picture by the first half of the iterations; `None` if the quarters of the iterations are unknown.
+    half: Option<Picture>,
+    /// Number of bandwidth levels that the network has combined.
+    combined: Option<usize>,
+}
+
 impl Finish {
     /// A finish by a denoiser, and by the network that combines bandwidth levels with equation (6), if there is one.
     pub fn new(denoiser: Denoiser, network: Option<Combiner>) -> Finish {
@@ -125,9 +138,15 @@ impl Finish {
     /// pixels.
     fn with_spread(&mut self, estimate: &Estimate) -> Result<([Picture; 2], Clamped)> {
         let denoised = self.denoiser.run(estimate, self.quality)?;
-        let spread = bound::spread(estimate);
-        let (picture, clamped) = conserve::bounded(&estimate.mean, &denoised, Noise { estimate, spread: &spread });
-        Ok(([picture, spread], clamped))
+        Ok(displaced(estimate, &denoised))
+    }
+
+    /// The estimate in a layer set, and the number of bandwidth levels that the network has combined to it.
+    fn estimate(&mut self, set: &LayerSet) -> Result<(Estimate, Option<usize>)> {
+        let mut estimate = Estimate::of(set)?;
+        let Some(network) = &mut self.network else { return Ok((estimate, None)) };
+        estimate.mean = network.run(&LevelStack::of(set)?)?;
+        Ok((estimate, Some(network.metadata().levels)))
     }
 
     /// Finishes the picture of the layer set and makes the result its beauty; alpha stays. Adds `Error`,
@@ -137,18 +156,64 @@ impl Finish {
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), or the denoiser or the network fails; the set is unchanged then.
     pub fn apply(&mut self, set: &mut LayerSet, wanted: impl Fn(&str) -> bool) -> Result<Finished> {
-        let mut estimate = Estimate::of(set)?;
-        let combined = match &mut self.network {
-            Some(network) => {
-                estimate.mean = network.run(&LevelStack::of(set)?)?;
-                Some(network.metadata().levels)
-            }
-            None => None,
-        };
-        let ([picture, spread], clamped) = self.with_spread(&estimate)?;
-        let (error, error_map) = self.error_by_quarters(set, &estimate, wanted(ERROR))?.unzip();
+        let (estimate, combined) = self.estimate(set)?;
+        let denoised = self.denoiser.run(&estimate, self.quality)?;
+        let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
+        self.deliver(set, None, &Prepared { estimate, denoised, half, combined }, wanted)
+    }
+
+    /// Reads and denoises a frame of an animation for the temporal finish of itself and of its neighbours.
+    ///
+    /// # Errors
+    /// Layers are missing ([`Estimate::of`]), motion vectors too, or the denoiser or the network fails.
+    pub fn frame(&mut self, set: &LayerSet) -> Result<temporal::Frame> {
+        let (estimate, combined) = self.estimate(set)?;
+        let quarters = quarters(set);
+        let mut half = None;
+        if let Some(quarters) = &quarters {
+            let estimate = estimate.first_half(quarters);
+            let denoised = self.denoiser.run(&estimate, self.quality)?;
+            half = Some([estimate.mean, denoised]);
+        }
+        let denoised = self.denoiser.run(&estimate, self.quality)?;
+        let is_denoised = !matches!(self.denoiser, Denoiser::None);
+        let pictures = temporal::Pictures { estimate, denoised, half, combined, is_denoised };
+        temporal::Frame::new(set, pictures, quarters.as_ref())
+    }
+
+    /// Does the work of [`Finish::apply`] for the layer set of the frame in the middle of a window, averaged with its
+    /// neighbours.
+    ///
+    /// # Errors
+    /// As for [`Finish::apply`].
+    pub fn apply_in_window(
+        &mut self,
+        set: &mut LayerSet,
+        window: &temporal::Window<'_>,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<Finished> {
+        let Some((average, combined)) = temporal::average(window) else { return self.apply(set, wanted) };
+        let half = average.half.map(|(estimate, denoised)| displaced(&estimate, &denoised).0[0].clone());
+        let prepared = Prepared { estimate: average.estimate, denoised: average.denoised, half, combined };
+        self.deliver(set, Some(&average.parts), &prepared, wanted)
+    }
+
+    /// Finishes the picture and makes it the beauty of the layer set, with its error and its parts. `parts` holds the
+    /// parts of the estimate if it is not the set's own.
+    fn deliver(
+        &mut self,
+        set: &mut LayerSet,
+        parts: Option<&LayerSet>,
+        prepared: &Prepared,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<Finished> {
+        let Prepared { estimate, denoised, half, combined } = prepared;
+        let ([picture, spread], clamped) = displaced(estimate, denoised);
+        let (error, error_map) =
+            half.as_ref().and_then(|half| error_by_quarters(set, estimate, half, wanted(ERROR))).unzip();
         let error_map = error_map.flatten();
-        let parts = self.parts(set, &picture, Noise { estimate: &estimate, spread: &spread }, wanted)?;
+        let noise = Noise { estimate, spread: &spread };
+        let parts = self.parts(parts.unwrap_or(set), &picture, noise, wanted)?;
         let alpha = alpha(set);
         set.layers.retain(|layer| layer.name != "Combined");
         set.push(match alpha {
@@ -167,7 +232,7 @@ impl Finish {
         for (name, part) in parts {
             set.push(Layer::interleaved(name, "RGB", part))?;
         }
-        Ok(Finished { combined, error, error_map, clamped })
+        Ok(Finished { combined: *combined, error, error_map, clamped })
     }
 
     /// The error of a picture finished from the first half of the iterations, by the second half; `None` if a quarter
@@ -177,28 +242,8 @@ impl Finish {
     /// Layers are missing, or the denoiser fails.
     pub fn estimate_error(&mut self, set: &LayerSet) -> Result<Option<FinishedError>> {
         let estimate = Estimate::of(set)?;
-        Ok(self.error_by_quarters(set, &estimate, false)?.map(|(error, _)| error))
-    }
-
-    /// [`estimate_error`](Self::estimate_error) for a known estimate, with the errors of the pixels if they are wanted.
-    fn error_by_quarters(
-        &mut self,
-        set: &LayerSet,
-        estimate: &Estimate,
-        wants_map: bool,
-    ) -> Result<Option<(FinishedError, Option<ErrorMap>)>> {
-        let Some(quarters) = quarters(set) else { return Ok(None) };
-        let half = self.picture(&estimate.first_half(&quarters))?;
-        let own = own_level(set);
-        let [own, larger] = [own, own + 1].map(|level| set.picture(&format!("Level{level}")));
-        let levels = own.as_ref().zip(larger.as_ref()).map(|(own, larger)| [own, larger]);
-        let estimator = ErrorEstimator { half: &half, quarters: &quarters, deviation: &estimate.deviation, levels };
-        Ok(Some(if wants_map {
-            let (error, map) = estimator.error_and_map();
-            (error, Some(map))
-        } else {
-            (estimator.error(), None)
-        }))
+        let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
+        Ok(half.and_then(|half| error_by_quarters(set, &estimate, &half, false)).map(|(error, _)| error))
     }
 
     /// The finished parts of the picture whose names are wanted, with their layers' names. Parts that together sum to
@@ -254,6 +299,35 @@ impl Finish {
         let finished = parts::split(&estimates, whole, noise);
         Ok(names.into_iter().zip(finished).collect())
     }
+}
+
+/// An estimate after its bounded displacement towards its denoised picture, the [spread](bound::spread) that limits it,
+/// and the numbers of clamped pixels.
+fn displaced(estimate: &Estimate, denoised: &Picture) -> ([Picture; 2], Clamped) {
+    let spread = bound::spread(estimate);
+    let (picture, clamped) = conserve::bounded(&estimate.mean, denoised, Noise { estimate, spread: &spread });
+    ([picture, spread], clamped)
+}
+
+/// The error of the picture `half`, finished from the first half of the iterations, with the errors of the pixels if they
+/// are wanted; `None` if a quarter of the iterations is missing or black.
+fn error_by_quarters(
+    set: &LayerSet,
+    estimate: &Estimate,
+    half: &Picture,
+    wants_map: bool,
+) -> Option<(FinishedError, Option<ErrorMap>)> {
+    let quarters = quarters(set)?;
+    let own = own_level(set);
+    let [own, larger] = [own, own + 1].map(|level| set.picture(&format!("Level{level}")));
+    let levels = own.as_ref().zip(larger.as_ref()).map(|(own, larger)| [own, larger]);
+    let estimator = ErrorEstimator { half, quarters: &quarters, deviation: &estimate.deviation, levels };
+    Some(if wants_map {
+        let (error, map) = estimator.error_and_map();
+        (error, Some(map))
+    } else {
+        (estimator.error(), None)
+    })
 }
 
 /// The light of light groups. If lights outside all groups have added any to `whole`, their light comes first, without

@@ -66,7 +66,7 @@ pub enum ValueKind {
 }
 
 /// Options that are not arguments in Python, and why.
-const NOT_IN_PYTHON: [(&str, &str); 14] = [
+const NOT_IN_PYTHON: [(&str, &str); 15] = [
     ("verbose", "Python's warnings are not grouped"),
     ("output", "the picture is an Image: its method save writes it"),
     ("png", "an argument of Image.save"),
@@ -80,6 +80,7 @@ const NOT_IN_PYTHON: [(&str, &str); 14] = [
     ("debug_techniques", "files beside the EXR"),
     ("skip_existing", "a Scene is one frame"),
     ("frame_seed", "a Scene is one frame"),
+    ("temporal", "a Scene is one frame"),
     ("no_checkpoint", "nothing is saved unless checkpoint is given"),
 ];
 
@@ -111,8 +112,8 @@ const STAGE_HEADINGS: [&str; 6] = ["Method", "When to stop", "Expert", "Light an
 const ALSO_IN_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compression", "reproducible"];
 /// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has
 /// other means.
-const NOT_IN_STAGES: [&str; 7] =
-    ["env", "light_preset", "model", "allow_outside", "strict", "photon_memory", "light_units"];
+const NOT_IN_STAGES: [&str; 8] =
+    ["env", "light_preset", "model", "allow_outside", "strict", "photon_memory", "light_units", "temporal"];
 
 /// Describes the options of a command, in the order of its help.
 pub fn describe(command: &Command) -> Vec<OptionDescription> {
@@ -214,6 +215,7 @@ mod tests {
             "preview",
             "debug_techniques",
             "skip_existing",
+            "temporal",
             "progress",
         ];
         let listed =

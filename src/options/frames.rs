@@ -2,6 +2,7 @@
 
 use super::number::whole;
 use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -79,6 +80,25 @@ pub fn path_of_frame(path: &Path, frame: u32) -> Option<PathBuf> {
         (rest, found) = (after, true);
     }
     found.then(|| path.with_file_name(made + rest))
+}
+
+/// The files that exist under the name `pattern`, such as `shot.####.exr`, by the numbers of their frames.
+///
+/// # Errors
+/// The folder cannot be read.
+pub fn files_of_frames(pattern: &Path) -> std::io::Result<BTreeMap<u32, PathBuf>> {
+    let folder = pattern.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder)? {
+        let name = entry?.file_name();
+        let digits = name.to_str().into_iter().flat_map(|name| name.split(|c: char| !c.is_ascii_digit()));
+        let of_frame = |number: u32| {
+            let path = path_of_frame(pattern, number)?;
+            (path.file_name() == Some(&name)).then_some((number, path))
+        };
+        found.extend(digits.filter_map(|digits| digits.parse().ok()).find_map(of_frame));
+    }
+    Ok(found)
 }
 
 /// Whether a file name is certainly meant as a pattern. A single `#` is not, because it may be part of the name.

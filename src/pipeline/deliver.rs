@@ -146,6 +146,8 @@ impl Contents<'_> {
         header.insert("warnings".into(), json!(warnings));
         header.extend(self.facts.made_for.frame.map(|frame| ("frame".to_owned(), frame.into())));
         header.extend(self.facts.made_for.frame_rate.map(|rate| ("frame_rate".to_owned(), json!(rate))));
+        header.extend(self.facts.made_for.exposure.map(|exposure| ("exposure".to_owned(), json!(exposure))));
+        header.extend(self.facts.made_for.tonemap.map(|curve| ("tonemap".to_owned(), json!(curve))));
         header.insert("error_of".into(), "Noisy".into());
         header
     }

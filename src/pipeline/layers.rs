@@ -47,7 +47,7 @@ pub(super) fn check(selection: &Selection, shape: &Shape, finished: bool, motion
 /// Names of the selected layers of additive parts that a render of this shape has no light for. They are delivered
 /// black.
 pub(super) fn black(selection: &Selection, shape: &Shape, finished: bool) -> Vec<String> {
-    let Selection::List(selected) = selection else { return Vec::new() };
+    let Selection::List(selected) = selection.chosen() else { return Vec::new() };
     let present = names(shape, finished);
     let mut black: Vec<String> = part_names().map(String::from).collect();
     if finished {

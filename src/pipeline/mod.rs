@@ -33,6 +33,7 @@ mod saver;
 pub mod seeds;
 pub mod shard;
 mod slow_iteration;
+pub mod temporal;
 mod worst;
 
 pub use check::with_light_paths;

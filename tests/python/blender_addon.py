@@ -52,6 +52,20 @@ class Renders(Installed):
         for axis, value in zip("XYZ", (0, -0.6, 0.8)):
             numpy.testing.assert_allclose(found[f"Normal.{axis}"], value, atol=1e-4)
 
+    def test_motion_vectors_are_a_pass(self):
+        """A plane moves by two pixels to the right and one up in each frame, with and without other passes."""
+        plane = self.plane()
+        self.eye(height=10, width=4)
+        for axis, expression in enumerate(("(frame - 6) / 4", "(frame - 6) / 8")):
+            plane.driver_add("location", axis).driver.expression = expression
+        self.scene.frame_set(6)
+        self.settings.method, self.settings.finish = "path", "off"
+        for more in ((), ("parts",)):
+            self.passes("use_pass_vector", *more)
+            found = self.render()
+            for component, value in zip("XYZW", (-2, -1, -2, -1)):
+                numpy.testing.assert_allclose(found[f"Vector.{component}"][12, 16], value, atol=1e-2)
+
     def test_light_groups_are_passes(self):
         """Each group's light has its colour, and the finished groups sum to the picture."""
         self.plane()

@@ -151,7 +151,7 @@ class PassesPanel(Panel, bpy.types.Panel):
     def draw(self, context):
         layer = context.view_layer
         groups = (
-            ("Data", layer, ("use_pass_z", "use_pass_position", "use_pass_normal")),
+            ("Data", layer, ("use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_vector")),
             ("", layer.caustique, ("albedo",)),
             ("Light", layer.caustique, ("parts", "noisy_parts", "noisy")),
             ("Noise", layer.caustique, ("error", "levels")),

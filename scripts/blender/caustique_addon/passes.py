@@ -17,8 +17,10 @@ _NO_LETTER = re.compile("[^0-9A-Za-z]")
 #: The program's table of layers: tests/generated.rs writes the file.
 _TABLE = json.loads(pathlib.Path(__file__).with_name("layers.json").read_text("utf-8"))
 _PARTS, _GROUPS = _TABLE["parts"], tuple(_TABLE["groups"])
+#: Layers that `--layers all` leaves out.
+_ON_REQUEST = _TABLE["on_request"]
 #: {components: data type in Blender's compositor}; all others are colours.
-_KINDS = {"X": "VALUE", "Z": "VALUE", "XYZ": "VECTOR"}
+_KINDS = {"X": "VALUE", "Z": "VALUE", "XYZ": "VECTOR", "XYZW": "VECTOR"}
 
 
 def _pass(name, components, layer, switch, always):
@@ -47,9 +49,10 @@ def _group_passes(view_layer):
 
 def layers(chosen):
     """The value of `--layers` for these passes. The program rejects names that the scene cannot have."""
+    named = dict.fromkeys(one.layer for one in chosen)
     if not all(one.always for one in chosen):
-        return "all"
-    return ",".join(dict.fromkeys(["beauty", *(one.layer for one in chosen)]))
+        return ",".join(["all", *(name for name in named if name in _ON_REQUEST)])
+    return ",".join(["beauty", *named])
 
 
 def fill(render_layer, picture, frame=None):

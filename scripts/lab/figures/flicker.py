@@ -7,7 +7,7 @@ independent halves of a reference, so that the references' own noise cancels.
 
 Surface points are followed by the transforms of objects and camera; pixels whose point is hidden in the next frame do
 not count (lab/temporal.py). Rows: the finished frames of each method, their estimates, Intel OIDN alone on these
-estimates, both on estimates averaged over neighbouring frames (lab/temporal_average.py, a prototype), and other
+estimates, the frames as the temporal finish of `caustique finish` makes them, and other
 renderers with OIDN, on single frames of the shots; pictures with another mean than the reference are not stored, because
 light that is missing in every frame does not flicker. A film strip of each shot shows eight frames by row.
 
@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from .. import peer_runs, references, renders, shots, temporal, temporal_average
+from .. import peer_runs, references, renders, shots, temporal
 from ..cache import CACHE, Failed, create, frame_suffix, load, program, run_timed, save, scene_key
 from ..commands import command
 from ..options import options
-from ..picture_errors import Layers, Reference, write
+from ..picture_errors import Layers, Reference
 from ..record import record
 
 ARGUMENTS = {
@@ -45,6 +45,9 @@ ARGUMENTS = {
 SHORT = {"width": 96, "frames": 6, "threads": 1, "reference_seconds": 5.0, "budgets": [2.0], "peers": []}
 # Camera paths per pixel for the positions and normals by which surfaces are followed.
 GUIDE_ITERATIONS = 16
+TEMPORAL, GIF_MILLISECONDS = ", temporal", 80
+# The layers that the temporal finish reads.
+LAYERS = ["--layers", "all,Motion,Quarter"]
 STRIP_FRAMES, LABEL_WIDTH = 8, 150
 KEYS = ("flicker", "flicker_trimmed", "error", "error_trimmed")
 PICTURES = {"delivered": "", "noisy": ", estimate", "oidn": ", OIDN alone"}
@@ -112,31 +115,18 @@ class Sequence:
                 series = [one[name] for one in pictures]
                 yield suffix, self.row(folders, series, [one[name] for one in errors]), series
 
-    def averaged(self, folders):
-        """Rows of the prototype of a temporal finish: the averages, and OIDN alone on them."""
-        layers = [Layers(folder / "picture.exr") for folder in folders]
-        if any(one.get("Variance1") is None for one in layers):
-            return
-        estimates = [temporal_average.Estimate.read(one) for one in layers]
-        averages = [temporal_average.average(estimates, i, self.match)[0] for i in range(len(layers))]
-        series = {", averaged": averages}
-        if renders.PYTHON:
-            series[", averaged, OIDN alone"] = [denoise(*both) for both in zip(averages, layers, strict=True)]
-        for suffix, pictures in series.items():
-            errors = [
-                reference.measure(one.astype(np.float32))
-                for reference, one in zip(self.references, pictures, strict=True)
-            ]
-            yield suffix, self.row(folders, pictures, errors), pictures
-
-
-def denoise(picture, layers):
-    """A picture denoised by OIDN alone, with the albedo and the normals of a render."""
-    with tempfile.TemporaryDirectory() as folder:
-        folder = Path(folder)
-        write(folder / "in.exr", picture=picture, albedo=layers.get("albedo"), normal=layers.get("normal", "XYZ"))
-        renders.denoise_file(folder, "in.exr", "out.exr")
-        return Layers(folder / "out.exr").get("")
+    def finished_together(self, folders):
+        """The row of the temporal finish, and its pictures."""
+        with tempfile.TemporaryDirectory() as scratch:
+            scratch = Path(scratch)
+            for frame, folder in zip(self.frames, folders, strict=True):
+                (scratch / f"in.{frame:04}.exr").symlink_to(folder / "picture.exr")
+            line = command("finish", scratch / "in.####.exr", "-o", scratch / "out.####.exr", threads=options.threads)
+            _, _, spent = run_timed(line)
+            pictures = [Layers(scratch / f"out.{frame:04}.exr").get("") for frame in self.frames]
+        errors = [reference.measure(one) for reference, one in zip(self.references, pictures, strict=True)]
+        row = self.row(folders, pictures, errors)
+        return {**row, "finish_core_seconds": round(spent / len(pictures), 2)}, pictures
 
 
 def line(label, found, note=None):
@@ -197,6 +187,19 @@ def write_strip(sequence, budget, rows):
     print(f"    {path}", flush=True)
 
 
+def write_animation(sequence, budget, label, rows):
+    """Writes a GIF of a shot: the frames finished alone on the left, with their neighbours on the right."""
+    sides = [rows[label], rows[label + TEMPORAL]]
+    white = np.nanpercentile(np.stack([reference.mean for reference in sequence.references]).mean(-1), 98)
+    pictures = [Image.fromarray(display(np.concatenate(pair, 1), white)) for pair in zip(*sides, strict=True)]
+    # One palette and no dithering, which would flicker too.
+    palette = pictures[0].quantize(256)
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    path = CACHE / "strips" / f"{sequence.name}-{frames[0].width}-{budget:g}s.gif"
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=GIF_MILLISECONDS, loop=0)
+    print(f"    {path}", flush=True)
+
+
 def measure(name, budget, peers):
     """Measures a shot at a budget; returns the rows of the table, and the notes."""
     sequence = Sequence(name)
@@ -212,7 +215,8 @@ def measure(name, budget, peers):
             print(f"    {label:<32}{failed}", flush=True)
             continue
         found = [*sequence.rows(folders, pictures_of, shown)]
-        found += sequence.averaged(folders) if shown is PICTURES else []
+        if shown is PICTURES:
+            found.append((TEMPORAL, *sequence.finished_together(folders)))
         mismatch = peer_runs.mean_mismatch(found[0][1]) if shown is PEER_PICTURES else None
         if mismatch:
             notes[label] = mismatch
@@ -221,6 +225,9 @@ def measure(name, budget, peers):
             if not mismatch:
                 rows.append({"shot": name, "budget": budget, "row": label + suffix, **rounded(row)})
     write_strip(sequence, budget, strip)
+    for label in strip:
+        if label + TEMPORAL in strip:
+            write_animation(sequence, budget, label, strip)
     used = {"error": float(f"{own:.3g}"), "core_seconds": [made["core_seconds"] for made in sequence.made]}
     return rows, notes, {**used, "options": sequence.made[0]["options"], "program": sequence.made[0]["program"]}
 
@@ -237,6 +244,7 @@ def main():
     peers, reason = peer_runs.select()
     if reason:
         print(reason, file=sys.stderr)
+    options.render_options = [*options.render_options, *LAYERS]
     rows, notes, known = [], {}, {}
     for name in options.shots:
         for budget in options.budgets:

@@ -8,6 +8,7 @@ mod sequence;
 mod summary;
 mod techniques;
 
+pub use claim::{Claim, Claimed};
 pub use options::RenderArgs;
 
 use super::finish::warn_missing_denoiser;
@@ -49,7 +50,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 /// Renders one picture, of a scene or of a frame. Everything that can be wrong is found before the first light path.
 fn render_one(args: &RenderArgs, turn: Option<FrameOfRun>) -> Result<()> {
     let picture = args.picture_request()?;
-    let layers = args.run.selection()?;
+    let layers = args.selection()?;
     output::check_render(&args.output)?;
     args.picture.check()?;
     files::check_usd_layer(args)?;

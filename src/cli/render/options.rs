@@ -4,6 +4,7 @@ use super::preview::Target;
 use crate::cli::output::PictureArgs;
 use crate::cli::progress::Form;
 use caustique::error::{Error, Result};
+use caustique::film::Selection;
 use caustique::options::{RenderOptions, RunOptions, is_pattern, path_of_frame, takes};
 use caustique::pipeline::{MethodRequest, PictureRequest, Saving};
 use clap::builder::{OsStringValueParser, TypedValueParser};
@@ -39,6 +40,15 @@ pub struct RenderArgs {
     #[serde(skip)]
     #[arg(hide_short_help = true)]
     pub skip_existing: bool,
+
+    /// After the last frame, finish the frames again, each with up to two neighbours on each side: they flicker less
+    ///
+    /// The files then also have the layers that this needs, such as Motion, Noisy, Variance1 and Quarter1, whatever
+    /// --layers says. Frames of one seed cannot be averaged
+    #[arg(long, requires = "frames", conflicts_with = "no_finish", help_heading = "Finish")]
+    #[serde(skip)]
+    #[arg(hide_short_help = true)]
+    pub temporal: bool,
 
     #[command(flatten)]
     #[serde(flatten)]
@@ -91,6 +101,15 @@ impl RenderArgs {
             return Err(error.hint("leave --debug-techniques out"));
         }
         Ok(request)
+    }
+
+    /// The layers to write: those of `--layers`, and those that the temporal finish needs.
+    ///
+    /// # Errors
+    /// No layer has such a name.
+    pub fn selection(&self) -> Result<Selection> {
+        let chosen = self.run.selection()?;
+        Ok(if self.temporal { Selection::Temporal(Box::new(chosen)) } else { chosen })
     }
 
     /// Whether the command line or the USD stage names the EXR.

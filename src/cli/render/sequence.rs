@@ -2,17 +2,19 @@
 
 use super::claim::{Claim, Claimed};
 use super::options::RenderArgs;
+use crate::cli::finish_frames::FrameFinish;
 use crate::cli::progress::FrameOfRun;
 use crate::cli::say;
 use crate::cli::signals::Interrupt;
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::options::{Frames, is_pattern, path_of_frame};
+use caustique::options::{FrameSeed, Frames, is_pattern, path_of_frame};
 
 /// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     // Report errors of the options here, without the number of a frame.
     args.picture_request()?;
     check(args, frames)?;
+    check_temporal(args)?;
     let count = frames.iter().len();
     for (before, frame) in frames.iter().enumerate() {
         let mut one = args.at(frame);
@@ -65,7 +67,20 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             error.within(format!("frame {frame}"))
         })?;
     }
-    Ok(())
+    if !args.temporal {
+        return Ok(());
+    }
+    let finish = FrameFinish {
+        input: &args.output,
+        output: &args.output,
+        frames: Some(frames),
+        finish: &args.options.finish,
+        picture: &args.picture,
+        skip_existing: args.skip_existing,
+        of_render: true,
+        progress: args.progress,
+    };
+    finish.run()
 }
 
 /// Whether the output of the frame exists. Files are replaced atomically, so an existing file is complete, unless it is
@@ -87,6 +102,24 @@ fn check(args: &RenderArgs, frames: Frames) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Checks that the frames can be finished with their neighbours, if the user asks for it.
+fn check_temporal(args: &RenderArgs) -> Result<()> {
+    let (cause, remedy) = match &args.options {
+        _ if !args.temporal => return Ok(()),
+        options if options.frame_seed == FrameSeed::Same => (
+            "--temporal: frames of one seed have equal noise, which their average keeps",
+            "leave --frame-seed same out",
+        ),
+        options if options.shard.is_some() => (
+            "--temporal: a shard is not finished",
+            "render with --layers all,Motion,Quarter, merge the shards of each frame, and finish the merged frames with \
+             'caustique finish'",
+        ),
+        _ => return Ok(()),
+    };
+    Err(Error::usage(cause).hint(remedy))
 }
 
 /// Checks that no file name has a placeholder for a frame's number.

@@ -1,0 +1,212 @@
+//! The temporal finish of files: reads the frames of an animation around each frame, and finishes them together.
+
+use super::deliver::write_error_of_finish;
+use super::finish::OpenFinish;
+use crate::error::{Error, ErrorKind, Result};
+use crate::film::{LayerSet, Naming, take_plain_names};
+use crate::finish::Finished;
+use crate::finish::temporal::{self, REACH, WINDOW};
+use crate::image::exr::{self, Attributes};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Files of an animation, one per frame. Each is read once if frames are finished in ascending order.
+pub struct FrameFiles {
+    paths: BTreeMap<u32, PathBuf>,
+    /// Frames in memory, by number.
+    held: BTreeMap<u32, Held>,
+    /// Whether each frame in memory, by number, and the next one are averaged.
+    joined: BTreeMap<u32, bool>,
+}
+
+/// A frame in memory.
+struct Held {
+    frame: temporal::Frame,
+    /// The file's layers, names and attributes, until the frame is finished.
+    file: Option<(LayerSet, Naming, Attributes)>,
+    /// Seed of the render; `None` for files of other programs.
+    seed: Option<u64>,
+}
+
+/// A frame that has been finished with its neighbours.
+pub struct FinishedFrame {
+    /// All layers of the frame.
+    pub set: LayerSet,
+    /// The file's attributes, with the finish in its header.
+    pub attributes: Attributes,
+    /// Names of the file's channels.
+    pub naming: Naming,
+    /// Remarks for the user: layers left out, neighbours that do not count.
+    pub remarks: Vec<String>,
+}
+
+impl FrameFiles {
+    /// Files by the numbers of their frames.
+    pub fn new(paths: BTreeMap<u32, PathBuf>) -> FrameFiles {
+        FrameFiles { paths, held: BTreeMap::new(), joined: BTreeMap::new() }
+    }
+
+    /// The file of a frame.
+    ///
+    /// # Errors
+    /// There is none.
+    fn path(&self, number: u32) -> Result<&Path> {
+        let missing = || Error::usage(format!("there is no file of frame {number}"));
+        self.paths.get(&number).map(PathBuf::as_path).ok_or_else(missing)
+    }
+
+    /// Numbers of the frames around a frame and the frame itself, without a gap between them: its window.
+    pub fn window(&self, number: u32) -> Vec<u32> {
+        let before = (1..=REACH as u32).map_while(|k| number.checked_sub(k).filter(|n| self.paths.contains_key(n)));
+        let after = (1..=REACH as u32).map_while(|k| number.checked_add(k).filter(|n| self.paths.contains_key(n)));
+        let mut window: Vec<u32> = before.chain([number]).chain(after).collect();
+        window.sort_unstable();
+        window
+    }
+
+    /// Finishes a frame with the frames of its window. The result depends on nothing else. `only_present`: no layers are
+    /// added that the file lacks.
+    ///
+    /// # Errors
+    /// A file of the window cannot be read or finished, or two frames have one seed.
+    pub fn finish(&mut self, number: u32, finish: &mut OpenFinish, only_present: bool) -> Result<FinishedFrame> {
+        let around = self.window(number);
+        let mut remarks = self.gaps(number);
+        self.held.retain(|frame, _| around.contains(frame));
+        self.joined.retain(|frame, _| around.contains(frame));
+        for &frame in &around {
+            if self.held.get(&frame).is_none_or(|held| frame == number && held.file.is_none()) {
+                let held = self.read(frame, finish, &mut remarks)?;
+                self.held.insert(frame, held);
+            }
+        }
+        for pair in around.windows(2) {
+            if !self.joined.contains_key(&pair[0]) {
+                let obstacle = self.obstacle(pair[0], pair[1])?;
+                self.joined.insert(pair[0], obstacle.is_none());
+                remarks.extend(obstacle);
+            }
+        }
+        let path = self.path(number)?.to_owned();
+        let file = self.held.get_mut(&number).and_then(|held| held.file.take());
+        let (mut set, naming, mut attributes) =
+            file.ok_or_else(|| Error::new(ErrorKind::Io, path.display(), "there is no such frame"))?;
+        let (window, averaged) = self.averaged(number);
+        let present: Vec<String> = set.layers.iter().map(|layer| layer.name.clone()).collect();
+        let wanted = |name: &str| !only_present || present.iter().any(|layer| layer == name);
+        let finished = finish.finish().apply_in_window(&mut set, &window, wanted);
+        let finished = finished.map_err(|error| error.within(path.display()))?;
+        write_header(&mut attributes, finish, &finished, [&around, &averaged])?;
+        Ok(FinishedFrame { set, attributes, naming, remarks })
+    }
+
+    /// Whether the header of a frame's file says that the frame has been finished with all frames of its window.
+    pub fn is_finished(&self, number: u32) -> bool {
+        let read = self.path(number).and_then(exr::read).ok();
+        let header = read.and_then(|(_, attributes)| attributes.object());
+        header.is_some_and(|header| header["combined"][WINDOW_KEY] == json!(self.window(number)))
+    }
+
+    /// Reads a frame and denoises it.
+    fn read(&self, number: u32, finish: &mut OpenFinish, remarks: &mut Vec<String>) -> Result<Held> {
+        let path = self.path(number)?.to_owned();
+        let (mut set, attributes) = exr::read(&path)?;
+        // The naming style of the file, which its cryptomatte attributes also use, is kept.
+        let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
+        let naming = if blender { Naming::Blender } else { Naming::Plain };
+        remarks.extend(take_plain_names(&mut set).iter().map(|name| {
+            format!("{}: layer \"{name}\" cannot be written under this name and is left out", path.display())
+        }));
+        let frame = finish.finish().frame(&set).map_err(|error| error.within(path.display()))?;
+        let seed = attributes.object().and_then(|header| header["seed"].as_u64());
+        Ok(Held { frame, file: Some((set, naming, attributes)), seed })
+    }
+
+    /// Remarks on missing frames beside a frame, except before the first and after the last one.
+    fn gaps(&self, number: u32) -> Vec<String> {
+        let (first, last) = (self.paths.keys().next(), self.paths.keys().next_back());
+        let between = |frame: &u32| first < Some(frame) && Some(frame) < last;
+        let next = [number.checked_sub(1), number.checked_add(1)].into_iter().flatten().filter(between);
+        let missing = next.filter(|frame| !self.paths.contains_key(frame));
+        let remark = |frame: u32| {
+            format!("frame {frame} is missing: frame {number} is finished without it and the frames beyond it")
+        };
+        missing.map(remark).collect()
+    }
+
+    /// The reason for which a frame and the next one are not averaged; `None` if they are.
+    ///
+    /// # Errors
+    /// Both have one seed.
+    fn obstacle(&self, number: u32, next: u32) -> Result<Option<String>> {
+        let Some((a, b)) = self.held.get(&number).zip(self.held.get(&next)) else { return Ok(None) };
+        let names = [self.path(number)?, self.path(next)?].map(|path| path.display().to_string());
+        if a.seed.is_some() && a.seed == b.seed {
+            let cause = format!("has the seed of {}, so both have equal noise, which their average keeps", names[0]);
+            let error = Error::new(ErrorKind::Image, &names[1], cause);
+            return Err(error.hint("render without --frame-seed same, or finish each frame alone"));
+        }
+        let [here, there] = [a, b].map(|held| held.frame.size());
+        Ok(if here != there {
+            let sizes = [here, there].map(|size| format!("{} x {}", size.width, size.height));
+            Some(format!(
+                "{} has {} pixels and {} {}: frames on both sides are finished without each other; render all frames at \
+                 one size",
+                names[0], sizes[0], names[1], sizes[1]
+            ))
+        } else if temporal::is_cut(&a.frame, &b.frame) {
+            Some(format!(
+                "{} shows hardly any surface of {}: frames on both sides of the cut are finished without each other",
+                names[1], names[0]
+            ))
+        } else {
+            None
+        })
+    }
+
+    /// The frames that are averaged with a frame, as a window and by number.
+    fn averaged(&self, number: u32) -> (temporal::Window<'_>, Vec<u32>) {
+        let mut window = [None; WINDOW];
+        let mut numbers = vec![number];
+        window[REACH] = self.held.get(&number).map(|held| &held.frame);
+        let joined = |frame: u32| self.joined.get(&frame).copied().unwrap_or(false);
+        for (k, frame) in (1..=REACH).map_while(|k| Some((k, number.checked_sub(k as u32)?))) {
+            if !joined(frame) {
+                break;
+            }
+            window[REACH - k] = self.held.get(&frame).map(|held| &held.frame);
+            numbers.insert(0, frame);
+        }
+        for (k, frame) in (1..=REACH).map_while(|k| Some((k, number.checked_add(k as u32)?))) {
+            if !joined(frame - 1) {
+                break;
+            }
+            window[REACH + k] = self.held.get(&frame).map(|held| &held.frame);
+            numbers.push(frame);
+        }
+        (window, numbers)
+    }
+}
+
+/// Key of the header's object `combined` with the numbers of the frames that the temporal finish has read.
+const WINDOW_KEY: &str = "window";
+/// Key of the header's object `combined` with the numbers of the frames that are averaged.
+const AVERAGED_KEY: &str = "averaged";
+
+/// Writes the finish into the header of a frame.
+fn write_header(
+    attributes: &mut Attributes,
+    finish: &OpenFinish,
+    finished: &Finished,
+    [window, averaged]: [&[u32]; 2],
+) -> Result<()> {
+    let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
+    object["combined"] = finish.header(finished);
+    object["combined"][WINDOW_KEY] = json!(window);
+    object["combined"][AVERAGED_KEY] = json!(averaged);
+    if let Value::Object(header) = &mut object {
+        write_error_of_finish(header, finished);
+    }
+    attributes.insert(exr::ATTRIBUTE, &object)
+}
