@@ -242,8 +242,6 @@ impl Scene {
         Ok((width, height))
     }
 
-    /// A camera that sees the whole scene from the front, slightly from above.
-
     /// A camera that looks at the middle of the scene.
     fn view(&self, orbit: Orbit, request: &CameraRequest) -> Result<CameraDescription> {
         let projection = Projection::Perspective { yfov: VIEW_YFOV as f32, aspect: None };

@@ -172,7 +172,7 @@ fn texels(scene: &Description) -> Vec<u8> {
 
 #[test]
 fn webp_textures_are_decoded() {
-    let expected: Vec<u8> = (0..4 * 6).map(|i| 10 * i as u8 | 1).collect();
+    let expected: Vec<u8> = (0..4 * 6).map(|i| (10 * i as u8) | 1).collect();
     let picture = image::RgbaImage::from_raw(3, 2, expected.clone()).expect("six texels");
     let mut webp = Cursor::new(Vec::new());
     picture.write_to(&mut webp, image::ImageFormat::WebP).expect("it can be written");
@@ -184,7 +184,7 @@ fn ktx2(colors: [[u8; 4]; 2]) -> Vec<u8> {
     let mut file = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
     let mut words = |words: &[u32]| file.extend(words.iter().flat_map(|word| word.to_le_bytes()));
     let (head, description, block) = (80 + 24, 44, 16);
-    let data = (head + description + 15) / 16 * 16;
+    let data = (head + description).next_multiple_of(16);
     // No format, bytes of a type, width, height, depth, layers, faces, levels, no supercompression.
     words(&[0, 1, 8, 4, 0, 0, 1, 1, 0]);
     words(&[head, description, 0, 0, 0, 0, 0, 0]);
