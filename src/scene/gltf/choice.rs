@@ -1,7 +1,7 @@
 //! Choice of the scene, the animations and the material variant to read, and the list of all that a file offers.
 
 use super::container;
-use super::document::{Document, get, named};
+use super::document::{Document, Playing, get, named};
 use super::{Pose, ReadOptions, fault};
 use crate::error::{Error, ErrorKind, Result};
 use crate::scene::description::{AnimationContents, ExtensionContents, FileContents};
@@ -28,26 +28,6 @@ pub(super) fn apply(document: &mut Document, options: &ReadOptions) -> Result<()
         (Pose::Animated, Some(name)) => Playing::One(find(&list(&document.raw["animations"]), "animation", name)?),
     };
     Ok(())
-}
-
-/// The animations of a document that move its nodes.
-#[derive(Clone, Copy)]
-pub(super) enum Playing {
-    All,
-    None,
-    /// The animation with this index.
-    One(usize),
-}
-
-impl Playing {
-    /// Whether the animation with this index moves the nodes.
-    pub(super) fn plays(self, index: usize) -> bool {
-        match self {
-            Playing::All => true,
-            Playing::None => false,
-            Playing::One(one) => one == index,
-        }
-    }
 }
 
 /// Gives each primitive the material that it has in the variant with this index.

@@ -1,6 +1,7 @@
 //! Compressed geometry: KHR_draco_mesh_compression, EXT_meshopt_compression and KHR_meshopt_compression. Compressed data
 //! are decoded into buffer views, so that the rest of the reader sees plain accessors.
 
+use super::container::MESHOPT;
 use super::document::{Document, at, extension, get, named};
 use super::fault;
 use crate::error::{Error, Result};
@@ -11,12 +12,10 @@ use gltf::json::buffer::View;
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Accessor, Index};
 use serde::Deserialize;
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 const DRACO: &str = "KHR_draco_mesh_compression";
-const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// Content of KHR_draco_mesh_compression.
 #[derive(Deserialize)]
@@ -104,11 +103,6 @@ pub(super) fn decode(document: &mut Document) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Whether a buffer only holds place for decoded data.
-pub(super) fn is_fallback(buffer: &Value) -> bool {
-    MESHOPT.iter().any(|name| buffer["extensions"][name]["fallback"] == true)
 }
 
 /// The fault of an attribute of a kind that the decoder does not give.

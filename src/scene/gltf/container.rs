@@ -37,6 +37,14 @@ const SUPPORTED: [&str; 25] = [
     "KHR_texture_transform",
 ];
 
+/// Names of the extension for buffer views that meshoptimizer has compressed.
+pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// Whether a buffer only holds place for decoded data.
+pub(super) fn is_fallback(buffer: &Value) -> bool {
+    MESHOPT.iter().any(|name| buffer["extensions"][name]["fallback"] == true)
+}
+
 /// Whether the reader supports the glTF extension of this name.
 pub(super) fn is_supported(extension: &str) -> bool {
     SUPPORTED.contains(&extension)

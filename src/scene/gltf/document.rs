@@ -1,8 +1,7 @@
 //! A glTF document: its parts as typed lists, and its raw JSON for extensions and extras.
 
-use super::choice::Playing;
 use super::container::{self, malformed};
-use super::{compressed, fault, uri};
+use super::{fault, uri};
 use crate::error::Result;
 use crate::memory;
 use crate::scene::folder::Folder;
@@ -42,6 +41,26 @@ pub(super) struct Document<'a> {
     buffers: Vec<Cow<'a, [u8]>>,
     /// Data of the buffer views that were compressed, by the index of the view.
     pub(super) decoded: HashMap<usize, Vec<u8>>,
+}
+
+/// The animations of a document that move its nodes.
+#[derive(Clone, Copy)]
+pub(super) enum Playing {
+    All,
+    None,
+    /// The animation with this index.
+    One(usize),
+}
+
+impl Playing {
+    /// Whether the animation with this index moves the nodes.
+    pub(super) fn plays(self, index: usize) -> bool {
+        match self {
+            Playing::All => true,
+            Playing::None => false,
+            Playing::One(one) => one == index,
+        }
+    }
 }
 
 impl<'a> Document<'a> {
@@ -88,7 +107,6 @@ impl<'a> Document<'a> {
             decoded: HashMap::new(),
         };
         document.buffers = document.load_buffers(&described, binary)?;
-        compressed::decode(&mut document)?;
         Ok(document)
     }
 
@@ -110,7 +128,7 @@ impl<'a> Document<'a> {
             let bytes = match &buffer.uri {
                 Some(uri) => Cow::Owned(self.bytes_of(uri).map_err(|e| e.within(&place))?),
                 // The data of its views are elsewhere, and compressed.
-                None if compressed::is_fallback(&self.raw["buffers"][i]) => return Ok(Cow::Borrowed(&[][..])),
+                None if container::is_fallback(&self.raw["buffers"][i]) => return Ok(Cow::Borrowed(&[][..])),
                 None if i == 0 => Cow::Borrowed(binary),
                 None => Cow::Borrowed(&[][..]),
             };

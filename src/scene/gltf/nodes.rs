@@ -11,7 +11,9 @@ use super::mesh::MAX_COORDINATE;
 use super::shells;
 use super::topology::Solid;
 use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
-use super::{Pose, ReadOptions, choice, counted, deform, fault, lights, mesh, shading_frame, topology, uri};
+use super::{
+    Pose, ReadOptions, choice, compressed, counted, deform, fault, lights, mesh, shading_frame, topology, uri,
+};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::material::Material;
@@ -42,6 +44,7 @@ pub(super) fn parse<'a>(
     warnings: &mut Vec<String>,
 ) -> Result<Document<'a>> {
     let mut document = Document::parse(bytes, Folder::of(path, options.allow_outside), warnings)?;
+    compressed::decode(&mut document)?;
     choice::apply(&mut document, options)?;
     Ok(document)
 }

@@ -183,7 +183,7 @@ fn webp_textures_are_decoded() {
 fn ktx2(colors: [[u8; 4]; 2]) -> Vec<u8> {
     let mut file = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
     let mut words = |words: &[u32]| file.extend(words.iter().flat_map(|word| word.to_le_bytes()));
-    let (head, description, block) = (80 + 24, 44, 16);
+    let (head, description, block) = (80 + 24_u32, 44, 16);
     let data = (head + description).next_multiple_of(16);
     // No format, bytes of a type, width, height, depth, layers, faces, levels, no supercompression.
     words(&[0, 1, 8, 4, 0, 0, 1, 1, 0]);
