@@ -43,12 +43,13 @@ python -I scripts/package_libraries.py "$work/wheels" "$tree/lib/caustique" "$no
 python -I scripts/package_notices.py >"$notices/rust.txt"
 
 say "building the program and the Python module"
-# Together, because the module needs more features of some crates, which would otherwise be compiled twice.
+# Together, because the module needs more features of some crates, which would otherwise be compiled twice. The module
+# must not name a libpython: the Python that loads it has the symbols.
+export PYO3_BUILD_EXTENSION_MODULE=1 PYO3_PYTHON=$ROOT/.venv-package/bin/python
 cargo-zigbuild zigbuild --quiet --locked --release --target "$TARGET.$GLIBC" \
     --package caustique --bin caustique --package caustique-python --lib
-maturin build --quiet --locked --release --zig --target "$TARGET" --compatibility "manylinux_${GLIBC/./_}" \
-    --manifest-path ffi/python/Cargo.toml --interpreter "$ROOT/.venv-package/bin/python" --out "$work/built"
-program=$CARGO_TARGET_DIR/$TARGET/release/caustique
+built=$CARGO_TARGET_DIR/$TARGET/release
+program=$built/caustique
 
 say "making the tarball"
 mkdir -p "$tree/bin" "$tree/share/caustique/scenes" "$tree/share/man/man1" "$tree/share/zsh/site-functions" \
@@ -68,12 +69,16 @@ tar -C "$work" --sort=name --owner=0 --group=0 --numeric-owner --mode=u+w,go-w,a
     -cf - "caustique-$version" | gzip -9n >"$archive"
 
 say "making the wheel"
-python -m wheel unpack --dest "$work/unpacked" "$work"/built/*.whl >/dev/null
-inside=$work/unpacked/caustique-$version
+inside=$work/inside
+info=$inside/caustique-$version.dist-info
 mkdir -p "$inside/caustique/bin"
+(cd ffi/python && maturin pep517 write-dist-info --metadata-directory "$inside" --interpreter "$PYO3_PYTHON") >/dev/null 2>&1
+sed -i "s/^Tag: .*/Tag: cp310-abi3-manylinux_${GLIBC/./_}_x86_64/" "$info/WHEEL"
+cp ffi/python/caustique/*.py* ffi/python/caustique/py.typed "$inside/caustique/"
+cp "$built/lib_native.so" "$inside/caustique/_native.abi3.so"
 cp "$program" "$inside/caustique/bin/"
 cp -r "$tree/lib" "$inside/caustique/"
-cp "$notices"/*.txt "$inside/caustique-$version.dist-info/licenses/"
+cp "$notices"/*.txt "$info/licenses/"
 rm -f "$out"/caustique-*.whl
 python -m wheel pack --dest-dir "$out" "$inside" >/dev/null
 wheel=$(echo "$out"/caustique-*.whl)
