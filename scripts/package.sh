@@ -6,7 +6,7 @@
 #                                 caustique-VERSION-blender.zip, which contains that wheel
 #
 # Each holds Embree, Open Image Denoise, TBB and ONNX Runtime, with licences and notices. Zig links the program to the
-# symbols of glibc 2.28, and auditwheel checks the wheel. It takes 10 to 15 minutes on two cores.
+# symbols of glibc 2.28, and auditwheel checks the wheel.
 # CAUSTIQUE_RUSTFLAGS are more flags for rustc, such as those of profile-guided optimisation.
 
 set -euo pipefail

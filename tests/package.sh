@@ -80,7 +80,7 @@ check 'wheel: pip install' "${pip[@]}" "$wheel"
 scene=$work/elsewhere/moved/share/caustique/scenes/pool.glb
 check 'wheel: render' venv/bin/caustique render "$scene" -o wheel.exr --png wheel.png "${picture[@]}"
 first_picture wheel "$start"
-check 'wheel: its own libraries' uses_own "$work/venv/" venv/bin/caustique
+check 'wheel: its own libraries' uses_own "$work/venv" venv/bin/caustique
 check 'wheel: the picture of the tarball' says '"relmse": 0\.0,' \
     venv/bin/caustique compare wheel.exr tar.exr --json
 check 'wheel: licences' holds venv/lib/python3*/site-packages/caustique-*/licenses/{embree,oidn,tbb,onnxruntime,rust}.txt
