@@ -89,7 +89,8 @@ def render(scene, method, stop, seed):
 def progress(folder):
     """The progress reports of a render."""
     lines = (folder / "progress.jsonl").read_text(encoding="utf-8").splitlines()
-    return [json.loads(line) for line in lines if line.startswith("{")]
+    events = [json.loads(line) for line in lines if line.startswith("{")]
+    return [event for event in events if "iteration" in event]
 
 
 def evaluate(folder, truth):

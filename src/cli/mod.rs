@@ -3,6 +3,7 @@
 mod compare;
 mod converge;
 mod doctor;
+mod events;
 mod finish;
 mod finish_frames;
 mod info;
@@ -81,6 +82,7 @@ fn named_command(line: &clap::Command) -> Option<&clap::Command> {
 
 /// Runs the program and returns its exit code.
 pub fn main() -> ExitCode {
+    events::use_if_asked(std::env::args_os());
     if let Err(error) = processor::check().and_then(|()| signals::survive_large_files()) {
         return fail(&error);
     }
@@ -127,9 +129,11 @@ pub fn main() -> ExitCode {
 
 /// Prints an error with its hint to stderr, and returns its exit code.
 fn fail(error: &Error) -> ExitCode {
-    say(&error.to_string());
-    if let Some(hint) = &error.hint {
-        say(&format!("hint: {hint}"));
+    if events::are_in_use() {
+        events::print_error(error);
+    } else {
+        say(&error.to_string());
+        error.hint.iter().for_each(|hint| say(&format!("hint: {hint}")));
     }
     ExitCode::from(error.exit_code())
 }
@@ -149,10 +153,15 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     builder.build().map_err(|error| Error::new(ErrorKind::Io, "threads", error).hint("ask for fewer with --threads"))
 }
 
-/// Prints a line to stderr. Ignores errors, so that a render continues after its terminal or its pipe is closed.
+/// Prints a message to stderr: a line, or an event if programs read it.
 fn say(line: &str) {
+    if events::are_in_use() { events::print_message(line) } else { write_line(&printable(line)) }
+}
+
+/// Writes a line to stderr. Ignores errors, so that a render continues after its terminal or its pipe is closed.
+fn write_line(line: &str) {
     progress::hide_bar_during(|| {
-        let _ = writeln!(std::io::stderr().lock(), "{}", printable(line));
+        let _ = writeln!(std::io::stderr().lock(), "{line}");
     });
 }
 
@@ -183,8 +192,7 @@ fn print_file(path: &Path) -> std::io::Result<()> {
     std::io::copy(&mut File::open(path)?, &mut out).map(drop)
 }
 
-/// Prints an indented JSON object to stdout. Escapes control characters, which occur only within strings.
+/// Prints an indented JSON object to stdout.
 fn print_json(value: &serde_json::Value) -> Result<()> {
-    let escape = |c: char| if c != '\n' && is_control(c) { format!("\\u{:04x}", c as u32) } else { c.to_string() };
-    print(&format!("{value:#}\n").chars().map(escape).collect::<String>())
+    print(&events::escaped(&format!("{value:#}\n")))
 }

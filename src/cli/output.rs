@@ -35,6 +35,17 @@ pub struct PictureArgs {
     #[arg(long, value_enum, default_value_t)]
     #[arg(hide_short_help = true)]
     pub compression: Compression,
+    /// Store layers for which half floats suffice as such, as --layers comp does: the picture, its finished parts, albedo
+    /// and normals
+    #[arg(long)]
+    #[serde(skip)]
+    #[arg(hide_short_help = true)]
+    pub half: bool,
+    /// Store each layer as a part of the EXR, for programs that unpack all channels of a part
+    #[arg(long)]
+    #[serde(skip)]
+    #[arg(hide_short_help = true)]
+    pub multi_part: bool,
 }
 
 impl PictureArgs {
@@ -45,7 +56,7 @@ impl PictureArgs {
 
     /// How the EXR is written: its compression, and its channel names.
     pub fn exr_options(&self, naming: Naming) -> exr::Options {
-        exr::Options { compression: self.compression, naming }
+        exr::Options { compression: self.compression, naming, half: self.half, multi_part: self.multi_part }
     }
 
     /// Exposure in stops and tone curve of the PNG: the user's, else the scene's.

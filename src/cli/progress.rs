@@ -1,6 +1,6 @@
 //! Progress on stderr: a bar on a terminal, lines in logs, JSON or Open Job Description for programs.
 
-use super::{printable, say};
+use super::{events, printable, say};
 use caustique::pipeline::FINISHED_PICTURE;
 pub use caustique::pipeline::plan::percent;
 use caustique::render::{ExpectedError, Progress, Settings};
@@ -20,7 +20,7 @@ pub enum Form {
     Auto,
     /// A line every few seconds
     Plain,
-    /// A JSON object per iteration, a line each
+    /// Events as JSON objects, a line each: start, progress, warning, output, finish, error
     Json,
     /// Progress and status lines of Open Job Description, for render farms
     Openjd,
@@ -167,7 +167,7 @@ pub struct Reporter {
     next_line: f64,
 }
 
-/// A line of `--progress json` about one iteration. Scripts rely on its keys.
+/// The event `progress` of one iteration. Scripts rely on its keys.
 #[derive(Serialize)]
 struct Line {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -217,9 +217,7 @@ impl Reporter {
                 let frame = self.turn.map(|turn| turn.frame);
                 let line =
                     Line { frame, iteration, iterations, seconds, remaining, light_paths, error, error_of, expected };
-                if let Ok(line) = serde_json::to_string(&line) {
-                    say(&line);
-                }
+                events::print("progress", line);
             }
             Form::Openjd => {
                 say(&format!("openjd_progress: {:.1}", 100.0 * self.fraction(progress)));

@@ -99,7 +99,7 @@ impl Selection {
         let layers = set.layers.into_iter().filter(|layer| self.wants(&layer.name));
         let layers = match chosen {
             Selection::Comp => {
-                layers.map(|layer| if fits_half(&layer) { layer.stored_as(Sample::Half) } else { layer }).collect()
+                layers.map(|layer| if layer.fits_half() { layer.stored_as(Sample::Half) } else { layer }).collect()
             }
             _ => layers.collect(),
         };
@@ -107,13 +107,15 @@ impl Selection {
     }
 }
 
-/// Whether half floats show no difference for the layer: colours and directions without very bright values. Depth needs
-/// more digits, and the ids of cryptomattes need all bits.
-fn fits_half(layer: &Layer) -> bool {
-    /// The largest finite half float.
-    const MAX_HALF: f32 = 65_504.0;
-    kind_of(&layer.name).is_some_and(|(kind, finished)| finished || kind.half)
-        && layer.planes.iter().all(|plane| plane.values.iter().all(|value| value.abs() <= MAX_HALF))
+impl Layer {
+    /// Whether half floats show no difference: colours and directions without very bright values. Depth needs more digits,
+    /// and the ids of cryptomattes need all bits.
+    pub fn fits_half(&self) -> bool {
+        /// The largest finite half float.
+        const MAX_HALF: f32 = 65_504.0;
+        kind_of(&self.name).is_some_and(|(kind, finished)| finished || kind.half)
+            && self.planes.iter().all(|plane| plane.values.iter().all(|value| value.abs() <= MAX_HALF))
+    }
 }
 
 /// Names of all layers, for suggestions; numbered layers by the first number, light groups left out.

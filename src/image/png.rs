@@ -67,3 +67,11 @@ pub fn write_transparent(path: &Path, picture: &Picture, alpha: &[f32], ev: f32,
 pub fn write_tonemapped(path: &Path, picture: &Picture, ev: f32, curve: ToneMap) -> Result<()> {
     write(path, picture.size(), picture.iter().map(|&rgb| curve.display(rgb.into(), ev)))
 }
+
+/// The bytes of the PNG that [`write_tonemapped()`] writes.
+///
+/// # Errors
+/// The picture has no pixels.
+pub fn encode_tonemapped(picture: &Picture, ev: f32, curve: ToneMap) -> Result<Vec<u8>> {
+    encode(picture.size(), picture.iter().map(|&rgb| curve.display(rgb.into(), ev)))
+}

@@ -66,13 +66,15 @@ pub enum ValueKind {
 }
 
 /// Options that are not arguments in Python, and why.
-const NOT_IN_PYTHON: [(&str, &str); 15] = [
+const NOT_IN_PYTHON: [(&str, &str); 17] = [
     ("verbose", "Python's warnings are not grouped"),
     ("output", "the picture is an Image: its method save writes it"),
     ("png", "an argument of Image.save"),
     ("exposure", "an argument of Image.save"),
     ("tonemap", "an argument of Image.save"),
     ("compression", "an argument of Image.save"),
+    ("half", "a format of files"),
+    ("multi_part", "a format of files"),
     ("exr_naming", "layers in memory have plain names"),
     ("usd_layer", "a file beside the EXR"),
     ("preview", "the callback progress shows how a render goes"),
@@ -109,7 +111,8 @@ const OF_SCENE: [(&str, &str); 17] = [
 /// files and permissions.
 const STAGE_HEADINGS: [&str; 6] = ["Method", "When to stop", "Expert", "Light and glass", "Effects", "Finish"];
 /// Options under other headings that a stage may set.
-const ALSO_IN_STAGES: [&str; 5] = ["filter", "layers", "exr_naming", "compression", "reproducible"];
+const ALSO_IN_STAGES: [&str; 7] =
+    ["filter", "layers", "exr_naming", "compression", "half", "multi_part", "reproducible"];
 /// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has
 /// other means.
 const NOT_IN_STAGES: [&str; 8] =
@@ -211,6 +214,8 @@ mod tests {
             "exposure",
             "tonemap",
             "compression",
+            "half",
+            "multi_part",
             "usd_layer",
             "preview",
             "debug_techniques",

@@ -1,6 +1,7 @@
 //! The files that a render writes.
 
 use crate::{Folder, support, values};
+use caustique::film::{LayerSet, Sample};
 use caustique::image::exr;
 use serde_json::Value;
 
@@ -449,6 +450,36 @@ fn light_groups_of_any_names_have_layers() {
             let warning = format!("light group \"{group}\": its layers are called {name}: ");
             assert!(outcome.stderr.contains(&warning), "{warning} in {}", outcome.stderr);
         }
+    }
+}
+
+/// Each layer is a part, of the layer's name, and half floats hold what they suffice for. All layers read back.
+#[test]
+fn layers_can_be_parts_and_half_floats() {
+    let folder = Folder::new();
+    let render = "--iterations 2 --exr-naming plain --reproducible";
+    small(&folder, render);
+    std::fs::rename(folder.path("out.exr"), folder.path("one.exr")).expect("it can be renamed");
+    small(&folder, &format!("{render} --multi-part"));
+    let ((one, first), (many, header)) = (folder.read("one.exr"), folder.read("out.exr"));
+    assert_eq!(first, header);
+    assert_eq!(one.layers.len(), many.layers.len());
+    for layer in &one.layers {
+        assert_eq!(Some(layer), many.get(&layer.name), "{}", layer.name);
+    }
+    let parts = ::exr::meta::MetaData::read_from_file(folder.path("out.exr"), true).expect("it is an EXR").headers;
+    let names: Vec<String> =
+        parts.iter().map(|part| part.own_attributes.layer_name.clone().expect("it has a name").to_string()).collect();
+    assert_eq!(names.len(), one.layers.len());
+    assert!(["beauty", "Noisy", "Level1", "Z"].iter().all(|name| names.contains(&(*name).to_string())), "{names:?}");
+
+    small(&folder, &format!("{render} --half"));
+    let (half, _) = folder.read("out.exr");
+    let sample = |set: &LayerSet, layer: &str| set.get(layer).expect(layer).planes[0].sample;
+    assert_eq!(["", "albedo", "normal"].map(|layer| sample(&half, layer)), [Sample::Half; 3]);
+    assert_eq!(["Noisy", "Z", "Variance1"].map(|layer| sample(&half, layer)), [Sample::Float; 3]);
+    for (exact, rounded) in values(&one, "").as_flattened().iter().zip(values(&half, "").as_flattened()) {
+        assert!((exact - rounded).abs() <= exact.abs() / 2048.0 + 1e-7, "{exact} {rounded}");
     }
 }
 

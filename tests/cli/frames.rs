@@ -182,7 +182,7 @@ fn an_interrupted_sequence_continues() {
         let mut line = String::new();
         assert_ne!(lines.read_line(&mut line).expect("stderr can be read"), 0, "it has ended");
         let progress: Value = serde_json::from_str(&line).unwrap_or_default();
-        if progress["frame"] == 2 {
+        if progress["frame"] == 2 && progress["event"] == "progress" {
             break;
         }
     }
@@ -191,7 +191,9 @@ fn an_interrupted_sequence_continues() {
     let mut rest = String::new();
     lines.read_to_string(&mut rest).expect("stderr can be read");
     assert_eq!(child.wait().expect("it ends").code(), Some(130), "{rest}");
-    assert!(rest.ends_with("which are written\nhint: the same command with --skip-existing goes on\n"), "{rest}");
+    let error: Value = serde_json::from_str(rest.lines().last().unwrap_or_default()).expect("an event");
+    assert!(error["message"].as_str().is_some_and(|message| message.ends_with("which are written")), "{rest}");
+    assert_eq!(error["hint"], "the same command with --skip-existing goes on");
     assert_eq!(folder.read("out.2.exr").1["stopped"], "interrupted");
     let outcome = folder.run(&format!("{render} --frames 1-2 -o out.#.exr --skip-existing --progress plain"));
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);

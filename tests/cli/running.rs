@@ -12,11 +12,20 @@ use std::time::Duration;
 fn progress_for_programs_is_json_or_open_job_description() {
     let folder = Folder::new();
     let outcome = folder.render("-o out.exr --iterations 3 --no-combine --progress json");
-    let lines: Vec<Value> = outcome.stderr.lines().map(|l| serde_json::from_str(l).expect("a JSON line")).collect();
-    assert_eq!(lines.len(), 3);
+    let events: Vec<Value> = outcome.stderr.lines().map(|l| serde_json::from_str(l).expect("a JSON line")).collect();
+    let kinds: Vec<&str> = events.iter().filter_map(|event| event["event"].as_str()).collect();
+    assert_eq!(kinds, ["start", "progress", "progress", "progress", "output", "finish"], "{}", outcome.stderr);
+    assert_eq!((&events[0]["scene"], &events[0]["iterations"]), (&"scene.glb".into(), &3.into()));
+    assert_eq!((&events[4]["path"], &events[4]["kind"]), (&"out.exr".into(), &"exr".into()));
+    assert_eq!((&events[5]["iterations"], &events[5]["interrupted"]), (&3.into(), &false.into()));
+    assert!(events.iter().all(|event| event["version"] == 1));
+    let lines = &events[1..4];
     for (i, line) in lines.iter().enumerate() {
         let keys: Vec<&String> = line.as_object().expect("an object").keys().collect();
-        assert_eq!(keys, ["error", "error_of", "iteration", "iterations", "light_paths", "remaining", "seconds"]);
+        assert_eq!(
+            keys,
+            ["error", "error_of", "event", "iteration", "iterations", "light_paths", "remaining", "seconds", "version"]
+        );
         assert_eq!((&line["iteration"], &line["iterations"]), (&(i + 1).into(), &3.into()));
         assert_eq!(line["light_paths"], 2000 * (i + 1));
     }
@@ -28,6 +37,25 @@ fn progress_for_programs_is_json_or_open_job_description() {
     assert_eq!(folder.render("-o out.exr --iterations 2 --no-combine --progress none").stderr, "");
 }
 
+/// Errors, also those of the command line, and warnings are events, too.
+#[test]
+fn all_that_programs_read_is_json() {
+    let folder = Folder::new();
+    for (words, code) in [("--iterations 0", 2), ("--no-such-option", 2), ("--camera nobody", 2), ("--env no.exr", 1)] {
+        let outcome = folder.run(&format!("render scene.glb -o out.exr {words} --progress plain --progress=json"));
+        let events: Vec<Value> =
+            outcome.stderr.lines().map(|l| serde_json::from_str(l).expect("a JSON line")).collect();
+        let last = events.last().expect("there is an error");
+        assert_eq!((&last["event"], &last["exit_code"]), (&"error".into(), &code.into()), "{}", outcome.stderr);
+        assert_eq!(outcome.code, Some(code));
+        assert!(last["message"].as_str().is_some_and(|message| !message.is_empty()));
+    }
+    let outcome = folder.run("render scene.glb -o out.exr --iterations 1 --width 8 --threads 1024 --progress json");
+    let first: Value = serde_json::from_str(outcome.stderr.lines().next().unwrap_or_default()).expect("a JSON line");
+    assert_eq!(first["event"], "warning");
+    assert!(first["message"].as_str().is_some_and(|message| message.starts_with("--threads 1024")), "{first}");
+}
+
 /// Control characters in names of a scene are escaped, so they affect neither a terminal nor a farm.
 #[test]
 fn names_in_a_scene_cannot_control_terminals_or_farms() {
@@ -37,7 +65,11 @@ fn names_in_a_scene_cannot_control_terminals_or_farms() {
     let acts = |text: &str| text.chars().any(|c| c != '\n' && (c.is_control() || c == '\u{202e}'));
     for progress in ["plain", "openjd", "json"] {
         let outcome = crate::files::small(&folder, &format!("--iterations 2 --no-combine --progress {progress}"));
-        assert!(outcome.stderr.contains("\\u{1b}]0;title\\u{7}\\nopenjd_fail: forged"), "{}", outcome.stderr);
+        let escaped = match progress {
+            "json" => r"\u001b]0;title\u0007\nopenjd_fail: forged",
+            _ => r"\u{1b}]0;title\u{7}\nopenjd_fail: forged",
+        };
+        assert!(outcome.stderr.contains(escaped), "{}", outcome.stderr);
         assert!(!outcome.stderr.contains("\nopenjd_fail") && !acts(&outcome.stderr), "{progress}");
     }
     for command in ["info scene.glb", "plan scene.glb", "info out.exr"] {
@@ -273,8 +305,10 @@ fn an_output_folder_that_disappears_loses_no_render() {
     let mut text = String::new();
     rest.read_to_string(&mut text).expect("stderr can be read");
     assert_eq!(child.wait().expect("it ends").code(), Some(1), "{text}");
-    assert!(text.contains("\ngone/out.exr: "), "{text}");
-    let (_, rescued) = text.trim_end().rsplit_once("hint: the render is in ").expect("the hint names a file");
+    let error: Value = serde_json::from_str(text.trim_end().lines().last().unwrap_or_default()).expect("an event");
+    assert!(error["message"].as_str().is_some_and(|message| message.starts_with("gone/out.exr: ")), "{text}");
+    let hint = error["hint"].as_str().unwrap_or_default();
+    let rescued = hint.strip_prefix("the render is in ").expect("the hint names a file");
     assert!(rescued.starts_with(&*folder.path("temporary").to_string_lossy()), "{rescued}");
     assert!(exr::read(rescued.as_ref()).is_ok_and(|(set, _)| set.get("Level5").is_some()));
 }

@@ -51,7 +51,7 @@ fn written_files_are_read_back() {
         for compression in COMPRESSIONS {
             let path = folder.path().join("a.exr");
             let set = fixture(width, height);
-            exr::write(&path, &set, &attributes(), Options { compression, naming: Naming::Plain }).unwrap();
+            exr::write(&path, &set, &attributes(), Options { compression, ..Options::default() }).unwrap();
             let (back, found) = exr::read(&path).unwrap();
             assert_eq!(sorted(back), sorted(set), "{compression:?} {width}x{height}");
             assert_eq!(found, attributes());
@@ -81,7 +81,7 @@ fn bytes_do_not_depend_on_run_or_threads() {
         let bytes = |run: usize, threads: usize| {
             let path = folder.path().join(format!("{run}-{threads}.exr"));
             with_threads(threads, || {
-                exr::write(&path, &set, &attributes(), Options { compression, naming: Naming::Plain }).unwrap()
+                exr::write(&path, &set, &attributes(), Options { compression, ..Options::default() }).unwrap()
             });
             fs::read(path).unwrap()
         };
@@ -377,7 +377,7 @@ fn malformed_files_are_errors() {
     };
     let (mut failed, mut read) = (0, 0);
     for compression in COMPRESSIONS {
-        exr::write(&path, &fixture(19, 37), &attributes(), Options { compression, naming: Naming::Plain }).unwrap();
+        exr::write(&path, &fixture(19, 37), &attributes(), Options { compression, ..Options::default() }).unwrap();
         let good = fs::read(&path).unwrap();
         // Most invalid bytes are in the header and the offset table.
         let head = 1500.min(good.len());

@@ -7,6 +7,7 @@ use caustique::error::{Error, ErrorKind};
 use caustique::film::{Layer, LayerSet, Plane, Sample};
 use caustique::image::exr::{self, Attributes};
 use caustique::image::png;
+use caustique::image::tonemap::ToneMap;
 use caustique::memory;
 use caustique::pipeline::Delivery;
 use caustique::pipeline::shard::ShardSums;
@@ -14,7 +15,7 @@ use numpy::ndarray::{Array3, ArrayView2, Axis};
 use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};
 use pyo3::exceptions::{PyKeyError, PyMemoryError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
 /// A picture: named layers of float32 planes, and a header. Images are immutable.
@@ -160,6 +161,12 @@ impl Image {
 
     fn __repr__(&self) -> String {
         format!("<caustique.Image: {} x {} pixels, {} layers>", self.set.width, self.set.height, self.set.layers.len())
+    }
+
+    /// The picture as a tone-mapped PNG, which notebooks show.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let encoded = py.detach(|| png::encode_tonemapped(&self.set.beauty()?, 0.0, ToneMap::default()));
+        encoded.map(|bytes| PyBytes::new(py, &bytes)).map_err(raised)
     }
 
     /// Writes an EXR with all layers (and the pixel sums of a shard), or a tone-mapped PNG, by the extension of `path`.

@@ -8,6 +8,7 @@ use crate::options;
 use crate::progress::Progress;
 use crate::value::{to_json, to_python};
 use crate::work::{Caller, warn, work};
+use caustique::error::Error as Fault;
 use caustique::film::Naming;
 use caustique::image::atomic;
 use caustique::options::SceneOptions;
@@ -31,6 +32,8 @@ pub struct Scene {
     pub(crate) path: PathBuf,
     pub(crate) options: SceneOptions,
     identity: Identity,
+    /// The arguments of the call that made the scene, with absolute paths: another process can repeat it.
+    made_from: (Py<PyAny>, Py<PyDict>),
 }
 
 /// Identity of a scene for headers, checkpoints and shards: its options, as JSON, and the file of its environment.
@@ -75,7 +78,7 @@ impl Scene {
         // Whether a render will ask for motion vectors is not known yet.
         request.options.motion_vectors = true;
         let done = work(py, threads, |_| match &bytes {
-            Some(bytes) => load_bytes(bytes, &request, rayon::current_num_threads()),
+            Some(bytes) => load_bytes(bytes, &request, rayon::current_num_threads()).map_err(about_arrays),
             None => load(&request, rayon::current_num_threads(), &Stop::default()),
         })?;
         let loaded = done.whole()?;
@@ -84,7 +87,15 @@ impl Scene {
             return Err(usage(format!("strict=True, and something is ignored or approximated:\n{list}"), "mend it"));
         }
         warn(py, &loaded.scene.warnings)?;
-        Ok(Scene { loaded, path, options: scene_options, identity })
+        Ok(Scene { loaded, path, options: scene_options, identity, made_from: made_from(source, options)? })
+    }
+
+    /// Pickles a scene as its source (the path or the bytes) and its options. Unpickling builds it again.
+    fn __reduce__<'py>(this: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Py<PyAny>,))> {
+        let (source, options) = &this.get().made_from;
+        let partial = this.py().import("functools")?.getattr("partial")?;
+        let build = partial.call((this.get_type(),), Some(options.bind(this.py())))?;
+        Ok((build, (source.clone_ref(this.py()),)))
     }
 
     /// Warnings: everything in the scene that is ignored or approximated.
@@ -254,6 +265,33 @@ impl Identity {
         )?;
         Ok(Identity { options, environment, of_files: of_file && !array })
     }
+}
+
+/// The source and the options of a scene, with absolute paths.
+fn made_from(source: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<(Py<PyAny>, Py<PyDict>)> {
+    let py = source.py();
+    let absolute = |given: &Bound<'_, PyAny>| -> PyResult<Py<PyAny>> {
+        match given.extract::<PathBuf>() {
+            Ok(path) => Ok(std::path::absolute(path)?.into_pyobject(py)?.into_any().unbind()),
+            Err(_) => Ok(given.clone().unbind()),
+        }
+    };
+    let options = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
+    if let Some(environment) = options.get_item("environment")? {
+        options.set_item("environment", absolute(&environment)?)?;
+    }
+    Ok((absolute(source)?, options.unbind()))
+}
+
+/// An error in a scene of arrays or bytes: it has no file that can be exported again.
+fn about_arrays(mut fault: Fault) -> Fault {
+    let place = fault.place.strip_prefix("scene.glb").unwrap_or(&fault.place);
+    fault.place = place.trim_start_matches(": ").to_owned();
+    fault.hint = fault.hint.map(|hint| match hint.contains("export") {
+        true => "correct the mesh arrays, or the bytes of the .glb".into(),
+        false => hint,
+    });
+    fault
 }
 
 /// Keyword arguments as JSON, under the names of the command line, without those in `but`.

@@ -30,11 +30,21 @@ class Run:
         with self._process.stderr as messages:
             for line in map(str.rstrip, messages):
                 if line.startswith("{"):
-                    self.progress = json.loads(line)
-                elif line.startswith("warning: "):
-                    self.warnings.append(handoff.without_file(line[len("warning: "):]))
+                    self._take(json.loads(line))
                 elif line:
                     self._rest.append(handoff.without_file(line))
+
+    def _take(self, event):
+        """Keep what an event of `--progress json` says."""
+        kind = event.get("event", "progress")
+        if kind == "progress":
+            self.progress = event
+        elif kind == "warning":
+            self.warnings.append(handoff.without_file(event["message"]))
+        elif kind in ("error", "note"):
+            self._rest.append(handoff.without_file(event["message"]))
+            if event.get("hint"):
+                self._rest.append(handoff.without_file(f"hint: {event['hint']}"))
 
     @property
     def process_id(self):

@@ -57,7 +57,8 @@ pub fn write_estimate(args: &RenderArgs, set: &LayerSet, attributes: &Attributes
         return None;
     }
     let path = args.output.with_extension("estimate.exr");
-    let options = exr::Options { compression: exr::Compression::None, naming: args.run.exr_naming };
+    let compression = exr::Compression::None;
+    let options = exr::Options { compression, naming: args.run.exr_naming, ..exr::Options::default() };
     exr::write_followed(&path, set, attributes, options, |_| Ok(())).ok().map(|()| path)
 }
 

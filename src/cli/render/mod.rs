@@ -15,7 +15,7 @@ use super::finish::warn_missing_denoiser;
 use super::progress::{FrameOfRun, Reporter, Waiting};
 use super::signals::Interrupt;
 use super::warnings::lines;
-use super::{output, say, scene};
+use super::{events, output, say, scene};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
 use caustique::options::SceneOptions;
@@ -175,10 +175,23 @@ impl<'a> Reports<'a> {
         }
     }
 
+    /// The number of the frame, if the command renders frames.
+    fn frame(&self) -> Option<u32> {
+        self.turn.map(|turn| turn.frame)
+    }
+
     fn begins(&mut self, plan: &Plan, settings: &Settings) {
         if let Some(reason) = self.reason.take().filter(|_| self.args.progress.for_people()) {
             say(&format!("method: {reason}"));
         }
+        events::print(
+            "start",
+            json!({
+                "scene": self.args.options.scene.path, "output": self.args.output, "frame": self.frame(),
+                "method": settings.method, "iterations": settings.iterations, "seconds": settings.time,
+                "target_error": settings.target_error,
+            }),
+        );
         self.reporter = Some(Reporter::new(self.args.progress, settings, self.turn));
         let RenderArgs { output, preview, picture, .. } = self.args;
         self.preview = preview.as_ref().map(|target| Preview::new(target, output, picture, self.made_for));
@@ -194,6 +207,7 @@ impl<'a> Reports<'a> {
 
     /// Writes all files of a render, and reports how it ended.
     fn deliver(self, delivery: Delivery) -> Result<()> {
+        let frame = self.frame();
         let Reports { args, summary, preview, made_for, reason_if_black, estimate, .. } = self;
         let Delivery { set, attributes, techniques, sums, .. } = &delivery;
         let Some(summary) = summary else { return Ok(()) };
@@ -213,6 +227,7 @@ impl<'a> Reports<'a> {
         if talk {
             Summary::print_files(args, set, techniques.len());
         }
+        summary.print_events(args, &delivery, frame);
         if let Some(error) = delivery.finish_error {
             let output = args.output.display();
             return Err(error.hint(format!(

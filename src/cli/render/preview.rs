@@ -3,7 +3,7 @@
 use crate::cli::output::{self, PictureArgs};
 use crate::cli::say;
 use caustique::error::{Error, ErrorKind, Result};
-use caustique::film::{LayerSet, Naming};
+use caustique::film::LayerSet;
 use caustique::image::exr::{self, Attributes, Compression, Frame};
 use caustique::image::png;
 use caustique::render::Clock;
@@ -122,7 +122,7 @@ impl<'a> Preview<'a> {
                 png::write_tonemapped(path, &set.beauty()?, exposure, curve)
             }
             Target::Exr(path) => {
-                let options = exr::Options { compression: Compression::None, naming: Naming::Plain };
+                let options = exr::Options { compression: Compression::None, ..exr::Options::default() };
                 exr::write(path, set, &Attributes { frame, ..Attributes::default() }, options)
             }
             Target::Tev => self.stream(set).map_err(|cause| {

@@ -4,10 +4,11 @@ use super::claim::{Claim, Claimed};
 use super::options::RenderArgs;
 use crate::cli::finish_frames::FrameFinish;
 use crate::cli::progress::FrameOfRun;
-use crate::cli::say;
 use crate::cli::signals::Interrupt;
+use crate::cli::{events, say};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::options::{FrameSeed, Frames, is_pattern, path_of_frame};
+use serde_json::json;
 
 /// Renders the frames in order. Ends at the first frame that fails, as Blender does; the frames before it are written.
 pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
@@ -22,6 +23,7 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             if args.progress.for_people() {
                 say(&format!("frame {frame}: {} {why}", one.output.display()));
             }
+            events::print("skipped", json!({"frame": frame, "output": one.output, "message": why}));
         };
         // The checkpoint that a stopped run has left of this frame.
         let left = || {

@@ -3,11 +3,12 @@
 use super::options::RenderArgs;
 use crate::cli::output::is_stdout;
 use crate::cli::progress::{count, duration, percent};
-use crate::cli::say;
+use crate::cli::{events, say};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::LayerSet;
-use caustique::pipeline::{Delivery, Place, Reached};
+use caustique::pipeline::{Delivery, FINISHED_PICTURE, Place, Reached};
 use caustique::render::{ErrorCoverage, Rejections, Rendered, StopReason, peak_memory};
+use serde_json::json;
 use std::path::Path;
 
 /// Figures of a render for its report, kept after its pixels are freed.
@@ -90,6 +91,29 @@ impl Summary {
         if let Some(folder) = &args.debug_techniques {
             say(&format!("{}: {techniques} techniques, weighted and unweighted", folder.display()));
         }
+    }
+
+    /// Prints the events of the written files and of the end of the render.
+    pub fn print_events(&self, args: &RenderArgs, delivery: &Delivery, frame: Option<u32>) {
+        let LayerSet { width, height, .. } = delivery.set;
+        events::print(
+            "output",
+            json!({"path": args.output, "kind": "exr", "frame": frame, "width": width, "height": height}),
+        );
+        let others = [("png", &args.picture.png), ("usd", &args.usd_layer), ("techniques", &args.debug_techniques)];
+        for (kind, path) in others.into_iter().filter_map(|(kind, path)| path.as_ref().map(|path| (kind, path))) {
+            events::print("output", json!({"path": path, "kind": kind, "frame": frame}));
+        }
+        let finished = delivery.reached.as_ref().map(Reached::error);
+        let error_of = if finished.is_some() { FINISHED_PICTURE } else { self.error_coverage.name() };
+        events::print(
+            "finish",
+            json!({
+                "frame": frame, "iterations": self.iterations, "seconds": self.seconds, "light_paths": self.light_paths,
+                "error": finished.or(self.error), "error_of": error_of,
+                "interrupted": self.stop == StopReason::Interrupted,
+            }),
+        );
     }
 
     /// Warns if the photon map of `pm` became full.

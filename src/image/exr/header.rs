@@ -8,23 +8,29 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 /// Bytes of the magic number and the version of an EXR, which precede the first attribute.
 const PREAMBLE: u64 = 8;
 
-/// Sorts the attributes in the header of a single-part EXR by name, as the OpenEXR library writes them.
+/// Sorts the attributes in the headers of an EXR with this number of parts by name, as the OpenEXR library writes them.
 ///
 /// # Errors
 /// Errors of `file`, and `InvalidData` if the bytes are not a header.
-pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F) -> io::Result<()> {
+pub(super) fn sort_attributes<F: Read + Write + Seek>(file: &mut F, parts: usize) -> io::Result<()> {
     file.seek(SeekFrom::Start(PREAMBLE))?;
-    let mut attributes = Vec::new();
+    let mut sorted = Vec::new();
     {
         let mut reader = io::BufReader::new(&mut *file);
-        while let Some(attribute) = read_attribute(&mut reader)? {
-            attributes.push(attribute);
+        for part in 0..parts {
+            let mut attributes = Vec::new();
+            while let Some(attribute) = read_attribute(&mut reader)? {
+                attributes.push(attribute);
+            }
+            // The bytes begin with the name, whose terminating zero sorts before any letter: byte order is the order of
+            // names.
+            attributes.sort_unstable();
+            sorted.extend((part > 0).then_some(0));
+            sorted.extend(attributes.concat());
         }
     }
-    // The bytes begin with the name, whose terminating zero sorts before any letter: byte order is the order of names.
-    attributes.sort_unstable();
     file.seek(SeekFrom::Start(PREAMBLE))?;
-    file.write_all(&attributes.concat())
+    file.write_all(&sorted)
 }
 
 /// The bytes of one attribute of the header: name, zero, type, zero, size of the value (four bytes, little endian),

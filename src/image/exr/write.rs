@@ -1,6 +1,6 @@
 //! Writes layers to an EXR.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -46,6 +46,10 @@ pub struct Options {
     pub compression: Compression,
     /// Naming scheme of the channels.
     pub naming: Naming,
+    /// Whether layers for which half floats suffice are stored as such ([`Layer::fits_half`]).
+    pub half: bool,
+    /// Whether each layer is a part of its own, so that readers unpack only what they need.
+    pub multi_part: bool,
 }
 
 /// Writes all layers and attributes to `path`, atomically (see [`atomic::write`]). Compresses on the current rayon
@@ -70,39 +74,74 @@ pub fn write_followed(
     tail: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
 ) -> Result<()> {
     check_names(set, options.naming).map_err(|error| error.within(path.display()))?;
-    let mut planes: Vec<(String, Source<'_>)> = Vec::new();
-    for layer in &set.layers {
-        for plane in &layer.planes {
-            let (component, negated) = options.naming.axis(&layer.name, &plane.component);
-            let source = Source { plane: layer.plane(component).unwrap_or(plane), negated };
-            planes.push((options.naming.channel(&layer.name, &plane.component), source));
-        }
-    }
-    if planes.is_empty() || set.pixels() == 0 {
-        let cause = format!("{} channels of {} x {} pixels are no picture", planes.len(), set.width, set.height);
+    let parts = parts(set, options);
+    let channels: usize = parts.iter().map(|part| part.channels.len()).sum();
+    if channels == 0 || set.pixels() == 0 {
+        let cause = format!("{channels} channels of {} x {} pixels are no picture", set.width, set.height);
         return Err(Error::new(ErrorKind::Image, path.display(), cause));
     }
-    planes.sort_by(|(a, _), (b, _)| a.cmp(b));
-    let header = header(set, &planes, attributes, options).map_err(|error| error.within(path.display()))?;
-    let planes: Vec<Source<'_>> = planes.into_iter().map(|(_, plane)| plane).collect();
+    // The first part holds the texts; readers look for them there.
+    let moment = Attributes { texts: BTreeMap::new(), ..attributes.clone() };
+    let header_of = |(index, part)| header(set, part, if index == 0 { attributes } else { &moment }, options);
+    let headers: Result<exr::meta::Headers> = parts.iter().enumerate().map(header_of).collect();
+    let headers = headers.map_err(|error| error.within(path.display()))?;
     atomic::write(path, |file| {
-        write_chunks(file, set.width, &planes, header).map_err(|error| failure(path, error))?;
-        let ended = sort(file).and_then(|()| file.seek(SeekFrom::End(0))).and_then(|_| tail(file));
+        write_chunks(file, set.width, &parts, headers).map_err(|error| failure(path, error))?;
+        let ended = sort(file, parts.len()).and_then(|()| file.seek(SeekFrom::End(0))).and_then(|_| tail(file));
         ended.map_err(|error| atomic::failure(path, &error))
     })
+}
+
+/// The channels of a part of the file, sorted by name.
+struct Part<'a> {
+    name: String,
+    channels: Vec<(String, Source<'a>)>,
+}
+
+/// One part with all channels, or one part for each layer with planes.
+fn parts(set: &LayerSet, options: Options) -> Vec<Part<'_>> {
+    let mut parts: Vec<Part<'_>> = Vec::new();
+    for layer in set.layers.iter().filter(|layer| !layer.planes.is_empty()) {
+        let half = options.half && layer.fits_half();
+        let channels: Vec<_> = layer
+            .planes
+            .iter()
+            .map(|plane| {
+                let (component, negated) = options.naming.axis(&layer.name, &plane.component);
+                let plane_of_axis = layer.plane(component).unwrap_or(plane);
+                let sample = if half { Sample::Half } else { plane_of_axis.sample };
+                let source = Source { plane: plane_of_axis, sample, negated };
+                (options.naming.channel(&layer.name, &plane.component), source)
+            })
+            .collect();
+        match parts.last_mut().filter(|_| !options.multi_part) {
+            Some(part) => part.channels.extend(channels),
+            None => parts.push(Part { name: part_name(&layer.name, &channels[0].0), channels }),
+        }
+    }
+    parts.iter_mut().for_each(|part| part.channels.sort_by(|(a, _), (b, _)| a.cmp(b)));
+    parts
+}
+
+/// Name of a layer's part: the name of its channels without the component.
+fn part_name(layer: &str, channel: &str) -> String {
+    let name = channel.rsplit_once('.').map_or(layer, |(name, _)| name);
+    if name.is_empty() { "beauty".into() } else { name.into() }
 }
 
 /// Source of the values of one channel of the EXR.
 #[derive(Clone, Copy)]
 struct Source<'a> {
     plane: &'a Plane,
+    /// Number format of the values in the file.
+    sample: Sample,
     /// Whether the values are negated in the file.
     negated: bool,
 }
 
-fn sort(file: &mut BufWriter<&mut File>) -> std::io::Result<()> {
+fn sort(file: &mut BufWriter<&mut File>, parts: usize) -> std::io::Result<()> {
     file.flush()?;
-    header::sort_attributes(*file.get_mut())
+    header::sort_attributes(*file.get_mut(), parts)
 }
 
 fn failure(path: &Path, error: exr::error::Error) -> Error {
@@ -112,17 +151,13 @@ fn failure(path: &Path, error: exr::error::Error) -> Error {
     }
 }
 
-fn header(
-    set: &LayerSet,
-    planes: &[(String, Source<'_>)],
-    attributes: &Attributes,
-    options: Options,
-) -> Result<Header> {
+fn header(set: &LayerSet, part: &Part<'_>, attributes: &Attributes, options: Options) -> Result<Header> {
     use exr::meta::BlockDescription::ScanLines;
-    let channels: SmallVec<[ChannelDescription; 5]> = planes
+    let channels: SmallVec<[ChannelDescription; 5]> = part
+        .channels
         .iter()
         .map(|(name, source)| {
-            let sample = if source.plane.sample == Sample::Half { SampleType::F16 } else { SampleType::F32 };
+            let sample = if source.sample == Sample::Half { SampleType::F16 } else { SampleType::F32 };
             ChannelDescription::named(name.as_str(), sample)
         })
         .collect();
@@ -144,6 +179,7 @@ fn header(
         other.insert(Text::from("imageCounter"), AttributeValue::I32(number));
     }
     let mut own = LayerAttributes { other, software_name: Some(Text::from(SOFTWARE)), ..LayerAttributes::default() };
+    own.layer_name = Text::new_or_none(&part.name).filter(|_| options.multi_part);
     let mut header = Header::new(Text::default(), (set.width, set.height), channels).with_encoding(
         compression,
         ScanLines,
@@ -180,18 +216,17 @@ const REC_709: Chromaticities =
 fn write_chunks(
     file: &mut BufWriter<&mut File>,
     width: usize,
-    planes: &[Source<'_>],
-    header: Header,
+    parts: &[Part<'_>],
+    headers: exr::meta::Headers,
 ) -> exr::error::UnitResult {
-    let headers: exr::meta::Headers = std::iter::once(header).collect();
     exr::block::write(file, headers, true, |meta, chunks| {
         let blocks: Vec<_> = enumerate_ordered_header_block_indices(&meta.headers).collect();
         let compress = |&(number, index): &(usize, BlockIndex)| {
-            let block = UncompressedBlock::from_lines(&meta.headers[0].channels, index, |line| {
+            let block = UncompressedBlock::from_lines(&meta.headers[index.layer].channels, index, |line| {
                 let at = line.location;
-                let Source { plane, negated } = planes[at.channel];
+                let Source { plane, sample, negated } = parts[index.layer].channels[at.channel].1;
                 let start = at.position.y() * width + at.position.x();
-                fill(line.value, &plane.values[start..start + at.sample_count], plane.sample, negated);
+                fill(line.value, &plane.values[start..start + at.sample_count], sample, negated);
             });
             (number, pack(block, &meta.headers))
         };

@@ -25,6 +25,13 @@ class Layers(unittest.TestCase):
         scene = ground([cq.SunLight(direction=(0, -1, 0), irradiance=(1, 1, 1))], albedo=0.5)
         cls.image = scene.render(method="path", iterations=4, width=6, height=4, finish=False)
 
+    def test_notebooks_show_the_picture(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "picture.png"
+            self.image.save(file)
+            self.assertEqual(self.image._repr_png_(), file.read_bytes())
+        self.assertTrue(self.image._repr_png_().startswith(b"\x89PNG"))
+
     def test_planes_are_not_copied(self):
         image = self.image
         red = image.layers["Noisy"]["R"]

@@ -3,6 +3,7 @@
 import inspect
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -402,6 +403,9 @@ class Faults(unittest.TestCase):
             cq.Scene.from_meshes([cq.Mesh(vertices=vertices, triangles=triangles + 10)])
         self.assertEqual(caught.exception.kind, "scene")
         self.assertIn("past the 4 vertices", str(caught.exception))
+        # Arrays have no file, and nothing to export again.
+        self.assertTrue(caught.exception.place.startswith('mesh "mesh"'), caught.exception.place)
+        self.assertIn("correct the mesh arrays", caught.exception.hint)
         with self.assertRaises(cq.Error) as caught:
             cq.Scene("no/such.glb")
         self.assertEqual(caught.exception.kind, "io")
@@ -416,6 +420,23 @@ class Faults(unittest.TestCase):
                 cq.Scene.from_meshes([cq.Mesh(**{"vertices": vertices, "triangles": triangles} | arrays)])
         with self.assertRaises(cq.Error):
             cq.Scene.from_meshes([cq.Mesh(vertices=vertices * np.nan, triangles=triangles)])
+
+    def test_a_pickled_scene_is_built_again_from_its_source(self):
+        """From a path, also in another folder, and from bytes; with the options, arrays among them."""
+        small = {"method": "path", "iterations": 2, "width": 8, "finish": False}
+        sky = np.full((2, 4, 3), 0.5, np.float32)
+        here = os.getcwd()
+        self.addCleanup(os.chdir, here)
+        os.chdir(TORUS.parent)
+        scenes = [cq.Scene(TORUS.name, environment=sky), cq.Scene(TORUS.name, glass="thin"), still_life()]
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            for scene in scenes:
+                again = pickle.loads(pickle.dumps(scene))
+                self.assertIs(type(again), cq.Scene)
+                np.testing.assert_array_equal(again.render(**small).picture, scene.render(**small).picture)
+                self.assertEqual(again.warnings, scene.warnings)
+            os.chdir(here)
 
     def test_messages_name_arguments_not_options(self):
         with tempfile.TemporaryDirectory() as folder:
