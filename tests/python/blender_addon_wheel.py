@@ -10,8 +10,10 @@ import unittest
 import zipfile
 from unittest import mock
 
+import bpy
+
 import support
-from addon import Installed, part_of_addon
+from addon import ADDON, Installed, part_of_addon
 
 _METADATA = {
     "METADATA": "Metadata-Version: 2.1\nName: caustique\nVersion: 0.1.0\n",
@@ -56,6 +58,7 @@ class Wheel(Installed):
     def test_uninstalling_removes_the_program(self):
         found = part_of_addon("program").find("")
         self.uninstall()
+        self.assertNotIn(ADDON, bpy.context.preferences.addons)
         self.assertFalse(os.path.exists(found))
 
 
