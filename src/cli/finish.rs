@@ -1,17 +1,17 @@
-//! `caustique finish`: finishes a rendered EXR, or the frames of an animation. Also opens the finish of other commands.
+//! `caustique finish`: finishes a rendered EXR, or the frames of an animation.
 
 use super::finish_frames::FrameFinish;
+use super::finish_options::{look_of, open};
 use super::output::{self, PictureArgs};
 use super::progress::{Form, duration};
 use super::say;
 use caustique::error::{Error, Result};
 use caustique::film::{Naming, take_plain_names};
-use caustique::image::exr::{self, Attributes};
+use caustique::image::exr;
 use caustique::options::number::threads;
 use caustique::options::{FinishOptions, Frames, path_of_frame};
-use caustique::pipeline::{OpenFinish, finish, write_error_of_finish};
+use caustique::pipeline::write_error_of_finish;
 use caustique::render::Clock;
-use caustique::scene::description::PictureDefaults;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -105,32 +105,4 @@ fn run_frames(args: &FinishArgs) -> Result<()> {
         progress: Form::Auto,
     };
     super::pool(args.threads)?.install(|| frames.run())
-}
-
-/// Exposure and tone curve of a render's scene, as its header has them.
-pub fn look_of(attributes: &Attributes) -> PictureDefaults {
-    let header = attributes.object().unwrap_or_default();
-    let exposure = header["exposure"].as_f64().map(|exposure| exposure as f32);
-    let tonemap = serde_json::from_value(header["tonemap"].clone()).ok();
-    PictureDefaults { exposure, tonemap, ..PictureDefaults::default() }
-}
-
-/// Opens a finish (denoiser and network) for this number of bandwidth levels, and warns if the preferred denoiser is
-/// missing.
-///
-/// # Errors
-/// Errors of [`finish::open`].
-pub fn open(options: &FinishOptions, levels: Option<usize>) -> Result<OpenFinish> {
-    let opened = finish::open(&options.request(), levels)?;
-    warn_missing_denoiser(opened.missing.as_ref());
-    Ok(opened)
-}
-
-/// Warns that the built-in denoiser replaces a missing one.
-pub fn warn_missing_denoiser(missing: Option<&Error>) {
-    let Some(error) = missing else { return };
-    say(&format!("warning: {error}: our own denoiser takes its place, whose pictures are grainier"));
-    if let Some(hint) = &error.hint {
-        say(&format!("hint: {hint}"));
-    }
 }

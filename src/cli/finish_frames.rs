@@ -1,9 +1,9 @@
 //! The temporal finish of an animation: `caustique finish` with a pattern, and the end of `caustique render --temporal`.
 
-use super::finish::{look_of, open};
+use super::claim::{Claim, Claimed};
+use super::finish_options::{look_of, open};
 use super::output::PictureArgs;
 use super::progress::{Form, duration};
-use super::render::{Claim, Claimed};
 use super::say;
 use super::signals::Interrupt;
 use caustique::error::{Error, ErrorKind, Result};

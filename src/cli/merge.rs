@@ -1,6 +1,6 @@
 //! `caustique merge`: merges the shards of one render to its picture, or renders of different seeds to their mean.
 
-use super::finish::warn_missing_denoiser;
+use super::finish_options::warn_missing_denoiser;
 use super::output::{self, PictureArgs};
 use super::progress::Form;
 use super::render::{Summary, print_finish, print_picture, warn_unseen};

@@ -1,11 +1,13 @@
 //! The command line, one file per command. Data goes to stdout, messages to stderr. Only this file prints.
 
+mod claim;
 mod compare;
 mod converge;
 mod doctor;
 mod events;
 mod finish;
 mod finish_frames;
+mod finish_options;
 mod info;
 mod layout;
 mod merge;

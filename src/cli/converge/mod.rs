@@ -11,7 +11,7 @@ pub use options::ConvergeArgs;
 
 use super::render::print_plan_warnings;
 use super::signals::Interrupt;
-use super::{finish, say, scene};
+use super::{finish_options, say, scene};
 use caustique::camera::Camera;
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::finish::Finish;
@@ -188,7 +188,7 @@ fn open_finishes(
         print_plan_warnings(&args.scene, &new);
         let place = format!("--run \"{}\"", entry.name);
         let levels = entry.settings.levels.count;
-        let opened = (!options.no_finish).then(|| finish::open(&options.finish, Some(levels))).transpose();
+        let opened = (!options.no_finish).then(|| finish_options::open(&options.finish, Some(levels))).transpose();
         let opened = opened.map_err(|mut error| {
             if error.kind == ErrorKind::Usage {
                 error.place = place;

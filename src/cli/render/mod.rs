@@ -1,6 +1,5 @@
 //! `caustique render`: renders a scene to an EXR, and to a PNG if the user asks for one.
 
-mod claim;
 mod files;
 mod options;
 mod preview;
@@ -8,10 +7,9 @@ mod sequence;
 mod summary;
 mod techniques;
 
-pub use claim::{Claim, Claimed};
 pub use options::RenderArgs;
 
-use super::finish::warn_missing_denoiser;
+use super::finish_options::warn_missing_denoiser;
 use super::progress::{FrameOfRun, Reporter, Waiting};
 use super::signals::Interrupt;
 use super::warnings::lines;

@@ -1,7 +1,7 @@
 //! `--frames`: renders frames one after the other.
 
-use super::claim::{Claim, Claimed};
 use super::options::RenderArgs;
+use crate::cli::claim::{Claim, Claimed};
 use crate::cli::finish_frames::FrameFinish;
 use crate::cli::progress::FrameOfRun;
 use crate::cli::signals::Interrupt;
