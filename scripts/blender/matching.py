@@ -209,7 +209,7 @@ class _Match:
         over = {"metallic": parts, "base": reflected, "transmission": dull, "specular": dull, "roughness": shiny,
                 "ior": coated, "specular_colour": coated, "coat": parts, "sheen": parts, "anisotropy": shiny,
                 "sheet": dull, "sheet_colour": [g.multiply(d, lobe.sheet) for lobe, d in zip(lobes, dull)],
-                "film": shiny, "film_ior": shiny,
+                "film": shiny, "film_ior": [g.multiply(p, lobe.film) for lobe, p in zip(lobes, shiny)],
                 "coat_roughness": [g.multiply(p, lobe.coat) for lobe, p in zip(lobes, parts)],
                 "sheen_roughness": [g.multiply(p, g.max_component(lobe.sheen)) for lobe, p in zip(lobes, parts)]}
         found = Lobe(**{name: self._sum([getattr(lobe, name) for lobe in lobes], weights)
@@ -218,6 +218,9 @@ class _Match:
         if found.thin:
             found.roughness = self._sum([lobe.roughness for lobe in lobes], parts)
         found.tangent = next((lobe.tangent for lobe in lobes if lobe.tangent is not None), None)
+        if not (is_constant(found.film) and is_constant(found.film_ior)):
+            self.say("its thin film varies and is not carried")
+            found.film, found.film_ior = Lobe.film, Lobe.film_ior
         apart = [name.replace("_", " ") for name, weights in over.items() if name not in {"base", "sheet"}
                  and self._differ([getattr(lobe, name) for lobe, w in zip(lobes, weights) if w != 0.0])]
         if apart:

@@ -4,7 +4,9 @@ use super::{is_control, write_line};
 use caustique::error::Error;
 use serde::Serialize;
 use serde_json::json;
+use std::borrow::Cow;
 use std::ffi::OsString;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Version of the events. It grows when a key is renamed or removed, not when one is added.
@@ -40,6 +42,11 @@ pub fn use_if_asked(arguments: impl Iterator<Item = OsString>) {
 /// Whether messages are events.
 pub fn are_in_use() -> bool {
     IN_USE.load(Ordering::Relaxed)
+}
+
+/// A path as a value of an event. The value of `json!` must be valid UTF-8, which paths need not be.
+pub fn path(path: &Path) -> Cow<'_, str> {
+    path.to_string_lossy()
 }
 
 /// Prints an event if messages are events.

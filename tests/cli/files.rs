@@ -498,10 +498,11 @@ fn a_named_part_without_light_is_black() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn scene_names_may_be_invalid_utf8() {
+fn names_may_be_invalid_utf8() {
     use std::os::unix::ffi::OsStrExt;
+    let bytes = |name: &'static [u8]| std::ffi::OsStr::from_bytes(name);
     let folder = Folder::new();
-    let name = std::ffi::OsStr::from_bytes(b"sc\xffne.glb");
+    let name = bytes(b"sc\xffne.glb");
     std::fs::rename(folder.path("scene.glb"), folder.path("").join(name)).expect("it can be renamed");
     for command in ["render -o out.exr --width 8 --iterations 1 --method path --progress none", "plan", "info"] {
         let mut command = folder.command(command);
@@ -510,4 +511,16 @@ fn scene_names_may_be_invalid_utf8() {
         assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     }
     assert_eq!(folder.read("out.exr").1["arguments"]["scene"], "sc\u{fffd}ne.glb");
+    for progress in ["none", "json"] {
+        let mut command = folder.command("render --width 8 --iterations 1 --method path --progress");
+        command
+            .arg(progress)
+            .arg(name)
+            .arg("-o")
+            .arg(bytes(b"pi\xffture.exr"))
+            .arg("--png")
+            .arg(bytes(b"pi\xffture.png"));
+        let outcome = crate::Outcome::of(command);
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    }
 }

@@ -125,6 +125,11 @@ fn the_caustic_of_a_moving_ball_is_the_mean_of_still_pictures() {
         let still = channels::seeds(method, 6, |seed| moving.still(0.5, &settings(method, iterations, seed)));
         assert!(!disagreeing(&still, &reference, 0.03).is_empty(), "{method:?}: a still picture passes the test");
     }
+    // A planted fault: photons of a moment that is an eighth of the shutter's time late. The camera and what it sees rest,
+    // so this is a ball that is late.
+    let late = Moving(|time: f64| rolling_ball(time - 0.125));
+    let late = channels::seeds(Method::Sppm, 6, |seed| late.blurred(&settings(Method::Sppm, 256, seed)));
+    assert!(!disagreeing(&late, &reference, 0.03).is_empty(), "photons of another moment pass the test");
 }
 
 /// A moving render stops and continues without a change of its bits: the moment of an iteration follows from its number.

@@ -363,6 +363,20 @@ class Matched(Case):
         self.assertAlmostEqual(film["iridescenceIor"], 1.4, 5)
         self.assertFalse([line for line in warnings if "film" in line])
 
+    def test_shaders_with_and_without_a_film_are_mixed(self):
+        """By a texture: indices of films without thickness do not count, and a film of one shader alone is named."""
+        for thickness in (0.0, 300.0):
+            with self.subTest(thickness=thickness):
+                checker = self.stage.node("TexChecker")
+                shaders = [self.stage.node("BsdfPrincipled", Thin_Film_IOR=ior, Thin_Film_Thickness=film, Base_Color=colour)
+                           for ior, film, colour in ((1.33, 0.0, (0.8, 0.1, 0.1)), (1.6, thickness, (0.1, 0.8, 0.1)))]
+                self.stage.mix(checker.outputs["Fac"], *shaders)
+                material, warnings = self.write()
+                self.assertIn("baseColorTexture", material["pbrMetallicRoughness"])
+                self.assertNotIn("KHR_materials_iridescence", material.get("extensions", {}))
+                self.assertEqual(any("thin film varies" in line for line in warnings), thickness > 0)
+                self.assertFalse([line for line in warnings if "cannot be exported" in line or "film ior" in line])
+
     def test_metal_has_a_thin_film_from_blender_5_on(self):
         self.stage.principled(Thin_Film_Thickness=300.0, Metallic=1.0)
         material, _ = self.write()

@@ -185,7 +185,8 @@ impl<'a> Reports<'a> {
         events::print(
             "start",
             json!({
-                "scene": self.args.options.scene.path, "output": self.args.output, "frame": self.frame(),
+                "scene": events::path(&self.args.options.scene.path), "output": events::path(&self.args.output),
+                "frame": self.frame(),
                 "method": settings.method, "iterations": settings.iterations, "seconds": settings.time,
                 "target_error": settings.target_error,
             }),

@@ -23,7 +23,8 @@ pub fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
             if args.progress.for_people() {
                 say(&format!("frame {frame}: {} {why}", one.output.display()));
             }
-            events::print("skipped", json!({"frame": frame, "output": one.output, "message": why}));
+            let output = events::path(&one.output);
+            events::print("skipped", json!({"frame": frame, "output": output, "message": why}));
         };
         // The checkpoint that a stopped run has left of this frame.
         let left = || {

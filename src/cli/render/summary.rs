@@ -98,11 +98,13 @@ impl Summary {
         let LayerSet { width, height, .. } = delivery.set;
         events::print(
             "output",
-            json!({"path": args.output, "kind": "exr", "frame": frame, "width": width, "height": height}),
+            json!({
+                "path": events::path(&args.output), "kind": "exr", "frame": frame, "width": width, "height": height,
+            }),
         );
         let others = [("png", &args.picture.png), ("usd", &args.usd_layer), ("techniques", &args.debug_techniques)];
         for (kind, path) in others.into_iter().filter_map(|(kind, path)| path.as_ref().map(|path| (kind, path))) {
-            events::print("output", json!({"path": path, "kind": kind, "frame": frame}));
+            events::print("output", json!({"path": events::path(path), "kind": kind, "frame": frame}));
         }
         let finished = delivery.reached.as_ref().map(Reached::error);
         let error_of = if finished.is_some() { FINISHED_PICTURE } else { self.error_coverage.name() };
