@@ -10,7 +10,7 @@
 //! `V` is the variance of the frame's estimate, averaged over 7 x 7 pixels and over the frames: weights by the variance
 //! of single pixels would favour pixels that have missed bright samples. `g_k` is the variance of the other frame
 //! relative to this one. `b_k^2` estimates the squared difference of the true values from 3 x 3 pixels
-//! ([`Pair::squared_bias`]). With exact `b`, `g = 1` and n neighbours that all differ by `b`, the bias is at most
+//! (`Pair::squared_bias`). With exact `b`, `g = 1` and n neighbours that all differ by `b`, the bias is at most
 //! n / (2 sqrt(n + 1)) standard errors of the estimate: 0.9 for four neighbours. As noise vanishes, so do the weights of
 //! all values that differ, and the average is consistent.
 //!

@@ -46,7 +46,7 @@ pub struct Options {
     pub compression: Compression,
     /// Naming scheme of the channels.
     pub naming: Naming,
-    /// Whether layers for which half floats suffice are stored as such ([`Layer::fits_half`]).
+    /// Whether layers for which half floats suffice are stored as such ([`crate::film::Layer::fits_half`]).
     pub half: bool,
     /// Whether each layer is a part of its own, so that readers unpack only what they need.
     pub multi_part: bool,
