@@ -6,11 +6,10 @@ use super::output::{self, PictureArgs};
 use super::progress::{Form, duration};
 use super::say;
 use caustique::error::{Error, Result};
-use caustique::film::{Naming, take_plain_names};
 use caustique::image::exr;
 use caustique::options::number::threads;
 use caustique::options::{FinishOptions, Frames, path_of_frame};
-use caustique::pipeline::write_error_of_finish;
+use caustique::pipeline::{RenderedFile, write_finish};
 use caustique::render::Clock;
 use serde_json::json;
 use std::path::PathBuf;
@@ -59,24 +58,15 @@ pub fn run(args: &FinishArgs) -> Result<()> {
     output::check(&args.output, "exr")?;
     args.picture.check()?;
     super::pool(args.threads)?.install(|| {
-        let (opened, read) = rayon::join(|| open(&args.finish, None), || exr::read(&args.input));
-        let (mut opened, (mut set, mut attributes)) = (opened?, read?);
-        // Keep the naming style of the input, which its cryptomatte attributes also use.
-        let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
-        let naming = if blender { Naming::Blender } else { Naming::Plain };
-        for name in take_plain_names(&mut set) {
-            let input = args.input.display();
-            say(&format!("warning: {input}: layer \"{name}\" cannot be written under this name and is left out"));
-        }
+        let (opened, file) = rayon::join(|| open(&args.finish, None), || RenderedFile::read(&args.input));
+        let (mut opened, RenderedFile { mut set, mut attributes, naming, remarks }) = (opened?, file?);
+        remarks.iter().for_each(|remark| say(&format!("warning: {remark}")));
         let clock = Clock::start();
         let finish = || opened.finish().apply(&mut set, |_| true);
         let account =
             Form::Auto.during("finishing the picture", finish).map_err(|error| error.within(args.input.display()))?;
         let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-        object["combined"] = opened.header(&account);
-        if let Some(header) = object.as_object_mut() {
-            write_error_of_finish(header, &account);
-        }
+        write_finish(&mut object, &opened, &account);
         attributes.insert(exr::ATTRIBUTE, &object)?;
         exr::write(&args.output, &set, &attributes, args.picture.exr_options(naming))?;
         args.picture.write_png(&set, &look_of(&attributes))?;

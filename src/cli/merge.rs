@@ -11,7 +11,7 @@ use caustique::finish::DenoiserChoice;
 use caustique::image::exr::{self, Attributes};
 use caustique::pipeline::merge::{MergeEvent, MergeRequest, Shards, is_shard};
 use caustique::pipeline::seeds::Seeds;
-use caustique::pipeline::{FinishRequest, finish, write_error_of_finish};
+use caustique::pipeline::{FinishRequest, finish, write_finish};
 use caustique::scene::description::PictureDefaults;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -140,14 +140,16 @@ fn merge_shards(args: &MergeArgs) -> Result<()> {
 /// Merges renders of different seeds to their mean.
 fn average_seeds(args: &MergeArgs) -> Result<()> {
     let mut seeds = Seeds::default();
-    let mut blender = false;
+    let mut read_as = Naming::Plain;
     for path in &args.inputs {
         let (mut set, attributes) = exr::read(path)?;
-        blender |= set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
+        if Naming::of(&set) == Naming::Blender {
+            read_as = Naming::Blender;
+        }
         take_plain_names(&mut set);
         seeds.add(path, set, attributes)?;
     }
-    let naming = args.exr_naming.unwrap_or(if blender { Naming::Blender } else { Naming::Plain });
+    let naming = args.exr_naming.unwrap_or(read_as);
     let (mut set, mut attributes) = seeds.mean()?;
     let mut header = attributes.object().unwrap_or_default();
     let arguments = header["arguments"].clone();
@@ -155,10 +157,7 @@ fn average_seeds(args: &MergeArgs) -> Result<()> {
         let mut opened = finish::open(&request, None)?;
         warn_missing_denoiser(opened.missing.as_ref());
         let account = opened.finish().apply(&mut set, |_| true)?;
-        header["combined"] = opened.header(&account);
-        if let Some(header) = header.as_object_mut() {
-            write_error_of_finish(header, &account);
-        }
+        write_finish(&mut header, &opened, &account);
     }
     if let Some(layers) = &args.layers {
         set = Selection::parse(layers)?.apply(set)?;

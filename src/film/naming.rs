@@ -23,6 +23,15 @@ pub enum Naming {
 }
 
 impl Naming {
+    /// The naming scheme of layers that have been read from a file.
+    pub fn of(set: &LayerSet) -> Naming {
+        if set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer.")) {
+            Naming::Blender
+        } else {
+            Naming::Plain
+        }
+    }
+
     /// Name of the layer in a file, without component; `name` is its plain name.
     pub fn layer(self, name: &str) -> String {
         match self {

@@ -310,19 +310,23 @@ fn pooled_variance(own: &Frame, neighbours: &[Neighbour<'_>]) -> Vec<f32> {
     (0..own.variance.len()).into_par_iter().map(pooled).collect()
 }
 
-/// Differences between a frame and another one, pixel by pixel.
+/// Differences between a frame and another one.
 struct Pair {
     size: Size,
+    /// The difference of each pixel; `None` where the other frame does not show its point.
+    pixels: Vec<Option<Difference>>,
+}
+
+/// The difference between a pixel of a frame and its place in another one.
+struct Difference {
     /// Difference of the estimates.
-    estimate: Vec<[f32; 3]>,
+    estimate: [f32; 3],
     /// Squared difference of the denoised pictures, mean over RGB; zero without a denoiser.
-    denoised: Vec<f32>,
+    denoised: f32,
     /// Variance of the difference of the estimates, mean over RGB: averaged over 7 x 7 pixels, and of the pixel alone.
-    variance: Vec<[f32; 2]>,
+    variance: [f32; 2],
     /// The part of the variance that the mean over 3 x 3 pixels keeps.
-    correlation: Vec<f32>,
-    /// Whether the other frame shows the point of the pixel.
-    seen: Vec<bool>,
+    correlation: f32,
 }
 
 impl Pair {
@@ -331,9 +335,9 @@ impl Pair {
         let [mean, denoised] = own.pictures(half)?;
         let [mean_there, denoised_there] = other.frame.pictures(half)?;
         let factor = if half { 2.0 } else { 1.0 };
+        let is_denoised = own.pictures.is_denoised && other.frame.pictures.is_denoised;
         let of_pixel = |i: usize| {
-            let hidden = ([0.0; 3], 0.0, [0.0; 2], 1.0, false);
-            let Some(j) = other.place(i) else { return hidden };
+            let j = other.place(i)?;
             let ratio = own.albedo_ratio(i, other.frame, j);
             let scale = channel_mean(ratio.map(|r| r * r)) as f32;
             let apart = |here: &Picture, there: &Picture| -> [f32; 3] {
@@ -342,54 +346,38 @@ impl Pair {
             let sum = |a: f32, b: f32| factor * (a + scale * b);
             let (a, b) = (own.smooth_variance[i], other.frame.smooth_variance[j]);
             let (estimate, denoised) = (apart(mean, mean_there), apart(denoised, denoised_there));
-            let is_denoised = own.pictures.is_denoised && other.frame.pictures.is_denoised;
             let denoised = if is_denoised { channel_mean(denoised.map(|d| d * d)) as f32 } else { 0.0 };
             let variance = [sum(a, b), sum(own.variance[i], other.frame.variance[j])];
             let kept = factor * (own.correlation[i] * a + other.frame.correlation[j] * scale * b);
             let finite = estimate.iter().chain(&variance).chain([&denoised]).all(|value| value.is_finite());
             let correlation = if variance[0] > 0.0 { kept / variance[0] } else { 1.0 };
-            if finite { (estimate, denoised, variance, correlation, true) } else { hidden }
+            finite.then_some(Difference { estimate, denoised, variance, correlation })
         };
         let size = own.size();
-        let mut pair = Pair {
-            size,
-            estimate: Vec::with_capacity(size.pixels()),
-            denoised: Vec::with_capacity(size.pixels()),
-            variance: Vec::with_capacity(size.pixels()),
-            correlation: Vec::with_capacity(size.pixels()),
-            seen: Vec::with_capacity(size.pixels()),
-        };
-        let all: Vec<_> = (0..size.pixels()).into_par_iter().map(of_pixel).collect();
-        for (estimate, denoised, variance, correlation, seen) in all {
-            pair.estimate.push(estimate);
-            pair.denoised.push(denoised);
-            pair.variance.push(variance);
-            pair.correlation.push(correlation);
-            pair.seen.push(seen);
-        }
-        Some(pair)
+        Some(Pair { size, pixels: (0..size.pixels()).into_par_iter().map(of_pixel).collect() })
     }
 
     /// A cautious estimate, from 3 x 3 pixels, of the squared difference of the true values, mean over RGB. The largest of:
     /// [`CAUTION`] times the square of the mean difference beyond its noise, as much of the mean of the squares beyond
-    /// theirs, and the mean squared difference of the denoised pictures, which have little noise.
-    fn squared_bias(&self, i: usize) -> f32 {
+    /// theirs, and the mean squared difference of the denoised pictures, which have little noise. `None` where the other
+    /// frame does not show the point.
+    fn squared_bias(&self, i: usize) -> Option<f32> {
+        let correlation = self.pixels[i].as_ref()?.correlation;
         let (mut mean, mut square, mut denoised, mut variance, mut count) = ([0f32; 3], 0.0, 0.0, [0f32; 2], 0.0);
-        for j in window(self.size, i, BIAS_REACH).filter(|j| self.seen[*j]) {
-            let difference = self.estimate[j];
-            mean = std::array::from_fn(|c| mean[c] + difference[c]);
-            square += channel_mean(difference.map(|d| d * d)) as f32;
-            denoised += self.denoised[j];
-            variance = std::array::from_fn(|k| variance[k] + self.variance[j][k]);
+        for there in window(self.size, i, BIAS_REACH).filter_map(|j| self.pixels[j].as_ref()) {
+            mean = std::array::from_fn(|c| mean[c] + there.estimate[c]);
+            square += channel_mean(there.estimate.map(|d| d * d)) as f32;
+            denoised += there.denoised;
+            variance = std::array::from_fn(|k| variance[k] + there.variance[k]);
             count += 1.0;
         }
         // The variance of single pixels is large where they hold rare bright samples, as is their difference.
         let variance = variance[0].max(variance[1]) / count;
         let of_mean = channel_mean(mean.map(|sum| (sum / count).powi(2))) as f32;
-        let kept = self.correlation[i].max(1.0 / count);
+        let kept = correlation.max(1.0 / count);
         // With correlated noise, the mean of few squares varies by as much as their expectation.
         let beyond = (of_mean - kept * variance).max(square / count - (1.0 + kept) * variance);
-        (CAUTION * beyond).max(denoised / count)
+        Some((CAUTION * beyond).max(denoised / count))
     }
 }
 
@@ -411,11 +399,10 @@ impl<'a> Average<'a> {
         let of_neighbour = |other: &Neighbour<'_>| -> Option<Vec<f32>> {
             let pair = Pair::new(own, other, half)?;
             let weight = |i: usize| {
-                if !pair.seen[i] || own.pictures.estimate.is_exact(i) {
-                    return 0.0;
-                }
+                let exact = own.pictures.estimate.is_exact(i);
+                let Some(bias) = (!exact).then(|| pair.squared_bias(i)).flatten() else { return 0.0 };
                 let variance = factor * variance[i];
-                let weight = variance / (other.ratio * variance + pair.squared_bias(i));
+                let weight = variance / (other.ratio * variance + bias);
                 if weight.is_finite() { weight } else { 0.0 }
             };
             Some((0..variance.len()).into_par_iter().map(weight).collect())

@@ -333,9 +333,16 @@ impl Reached {
     }
 }
 
-/// Writes the error of a picture that was rendered before and is finished now to its header. Does nothing if the picture
-/// has no quarters.
-pub fn write_error_of_finish(header: &mut Map<String, Value>, finished: &Finished) {
+/// Writes the finish of a picture that was rendered before to its header: the key `combined`, and the picture's error if it
+/// has quarters.
+pub fn write_finish(header: &mut Value, finish: &OpenFinish, finished: &Finished) {
+    header["combined"] = finish.header(finished);
+    if let Some(header) = header.as_object_mut() {
+        write_error(header, finished);
+    }
+}
+
+fn write_error(header: &mut Map<String, Value>, finished: &Finished) {
     let iterations = header.get("iterations").and_then(Value::as_u64).unwrap_or(1).max(1);
     let last = header.get("history").and_then(Value::as_array).and_then(|moments| moments.last());
     let number = |key: &str| last.and_then(|last| last.get(key)).and_then(Value::as_f64);

@@ -26,6 +26,7 @@ mod observer;
 pub mod plan;
 mod prepare;
 pub mod records;
+mod rendered_file;
 mod request;
 mod resume;
 mod run;
@@ -37,12 +38,13 @@ pub mod temporal;
 mod worst;
 
 pub use check::with_light_paths;
-pub use deliver::{Delivery, FINISHED_PICTURE, Reached, write_error_of_finish};
+pub use deliver::{Delivery, FINISHED_PICTURE, Reached, write_finish};
 pub use facts::SceneFacts;
 pub use finish::{FinishRequest, OpenFinish};
 pub use forecast::{Forecast, forecast};
 pub use load::{Loaded, SceneRequest};
 pub use observer::{Event, Observer, Phase};
+pub use rendered_file::RenderedFile;
 pub use request::{AutoRequest, MethodRequest, PictureRequest, Request, Saving};
 pub use worst::{Place, Tile, Worst};
 

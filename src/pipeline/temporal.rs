@@ -1,13 +1,13 @@
 //! The temporal finish of files: reads the frames of an animation around each frame, and finishes them together.
 
-use super::deliver::write_error_of_finish;
+use super::deliver::write_finish;
 use super::finish::OpenFinish;
+use super::rendered_file::RenderedFile;
 use crate::error::{Error, ErrorKind, Result};
-use crate::film::{LayerSet, Naming, take_plain_names};
 use crate::finish::Finished;
 use crate::finish::temporal::{self, REACH, WINDOW};
 use crate::image::exr::{self, Attributes};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -23,22 +23,10 @@ pub struct FrameFiles {
 /// A frame in memory.
 struct Held {
     frame: temporal::Frame,
-    /// The file's layers, names and attributes, until the frame is finished.
-    file: Option<(LayerSet, Naming, Attributes)>,
+    /// The file, until the frame is finished.
+    file: Option<RenderedFile>,
     /// Seed of the render; `None` for files of other programs.
     seed: Option<u64>,
-}
-
-/// A frame that has been finished with its neighbours.
-pub struct FinishedFrame {
-    /// All layers of the frame.
-    pub set: LayerSet,
-    /// The file's attributes, with the finish in its header.
-    pub attributes: Attributes,
-    /// Names of the file's channels.
-    pub naming: Naming,
-    /// Remarks for the user: layers left out, neighbours that do not count.
-    pub remarks: Vec<String>,
 }
 
 impl FrameFiles {
@@ -65,12 +53,12 @@ impl FrameFiles {
         window
     }
 
-    /// Finishes a frame with the frames of its window. The result depends on nothing else. `only_present`: no layers are
-    /// added that the file lacks.
+    /// Finishes a frame with the frames of its window. The result depends on nothing else. Its remarks are on layers left out
+    /// and on neighbours that do not count. `only_present`: no layers are added that the file lacks.
     ///
     /// # Errors
     /// A file of the window cannot be read or finished, or two frames have one seed.
-    pub fn finish(&mut self, number: u32, finish: &mut OpenFinish, only_present: bool) -> Result<FinishedFrame> {
+    pub fn finish(&mut self, number: u32, finish: &mut OpenFinish, only_present: bool) -> Result<RenderedFile> {
         let around = self.window(number);
         let mut remarks = self.gaps(number);
         self.held.retain(|frame, _| around.contains(frame));
@@ -90,15 +78,14 @@ impl FrameFiles {
         }
         let path = self.path(number)?.to_owned();
         let file = self.held.get_mut(&number).and_then(|held| held.file.take());
-        let (mut set, naming, mut attributes) =
-            file.ok_or_else(|| Error::new(ErrorKind::Io, path.display(), "there is no such frame"))?;
+        let mut file = file.ok_or_else(|| Error::new(ErrorKind::Io, path.display(), "there is no such frame"))?;
         let (window, averaged) = self.averaged(number);
-        let present: Vec<String> = set.layers.iter().map(|layer| layer.name.clone()).collect();
+        let present: Vec<String> = file.set.layers.iter().map(|layer| layer.name.clone()).collect();
         let wanted = |name: &str| !only_present || present.iter().any(|layer| layer == name);
-        let finished = finish.finish().apply_in_window(&mut set, &window, wanted);
+        let finished = finish.finish().apply_in_window(&mut file.set, &window, wanted);
         let finished = finished.map_err(|error| error.within(path.display()))?;
-        write_header(&mut attributes, finish, &finished, [&around, &averaged])?;
-        Ok(FinishedFrame { set, attributes, naming, remarks })
+        write_header(&mut file.attributes, finish, &finished, [&around, &averaged])?;
+        Ok(RenderedFile { remarks, ..file })
     }
 
     /// Whether the header of a frame's file says that the frame has been finished with all frames of its window.
@@ -111,16 +98,11 @@ impl FrameFiles {
     /// Reads a frame and denoises it.
     fn read(&self, number: u32, finish: &mut OpenFinish, remarks: &mut Vec<String>) -> Result<Held> {
         let path = self.path(number)?.to_owned();
-        let (mut set, attributes) = exr::read(&path)?;
-        // The naming style of the file, which its cryptomatte attributes also use, is kept.
-        let blender = set.layers.iter().any(|layer| layer.name.starts_with("ViewLayer."));
-        let naming = if blender { Naming::Blender } else { Naming::Plain };
-        remarks.extend(take_plain_names(&mut set).iter().map(|name| {
-            format!("{}: layer \"{name}\" cannot be written under this name and is left out", path.display())
-        }));
-        let frame = finish.finish().frame(&set).map_err(|error| error.within(path.display()))?;
-        let seed = attributes.object().and_then(|header| header["seed"].as_u64());
-        Ok(Held { frame, file: Some((set, naming, attributes)), seed })
+        let mut file = RenderedFile::read(&path)?;
+        remarks.append(&mut file.remarks);
+        let frame = finish.finish().frame(&file.set).map_err(|error| error.within(path.display()))?;
+        let seed = file.attributes.object().and_then(|header| header["seed"].as_u64());
+        Ok(Held { frame, file: Some(file), seed })
     }
 
     /// Remarks on missing frames beside a frame, except before the first and after the last one.
@@ -171,20 +153,15 @@ impl FrameFiles {
         let mut numbers = vec![number];
         window[REACH] = self.held.get(&number).map(|held| &held.frame);
         let joined = |frame: u32| self.joined.get(&frame).copied().unwrap_or(false);
-        for (k, frame) in (1..=REACH).map_while(|k| Some((k, number.checked_sub(k as u32)?))) {
-            if !joined(frame) {
-                break;
-            }
-            window[REACH - k] = self.held.get(&frame).map(|held| &held.frame);
-            numbers.insert(0, frame);
-        }
-        for (k, frame) in (1..=REACH).map_while(|k| Some((k, number.checked_add(k as u32)?))) {
-            if !joined(frame - 1) {
-                break;
-            }
-            window[REACH + k] = self.held.get(&frame).map(|held| &held.frame);
+        let before =
+            |k: usize| number.checked_sub(k as u32).filter(|frame| joined(*frame)).map(|frame| (REACH - k, frame));
+        let after =
+            |k: usize| number.checked_add(k as u32).filter(|frame| joined(frame - 1)).map(|frame| (REACH + k, frame));
+        for (at, frame) in (1..=REACH).map_while(before).chain((1..=REACH).map_while(after)) {
+            window[at] = self.held.get(&frame).map(|held| &held.frame);
             numbers.push(frame);
         }
+        numbers.sort_unstable();
         (window, numbers)
     }
 }
@@ -202,11 +179,8 @@ fn write_header(
     [window, averaged]: [&[u32]; 2],
 ) -> Result<()> {
     let mut object = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-    object["combined"] = finish.header(finished);
+    write_finish(&mut object, finish, finished);
     object["combined"][WINDOW_KEY] = json!(window);
     object["combined"][AVERAGED_KEY] = json!(averaged);
-    if let Value::Object(header) = &mut object {
-        write_error_of_finish(header, finished);
-    }
     attributes.insert(exr::ATTRIBUTE, &object)
 }

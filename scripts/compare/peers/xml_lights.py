@@ -21,7 +21,7 @@ SKY_PARAMETERS = (
 
 
 def light(node, matrix):
-    """A light without a surface, or None if `environment` reads it."""
+    """A light without a surface, or None with a warning."""
     kind, name = node.type, node.id or node.name or node.type
     if kind == "point" or kind == "spot":
         given = node.vector("position")

@@ -1,0 +1,34 @@
+//! Reads the EXR of a render to finish it.
+
+use crate::error::Result;
+use crate::film::{LayerSet, Naming, take_plain_names};
+use crate::image::exr::{self, Attributes};
+use std::path::Path;
+
+/// The EXR of a render of this or another program.
+pub struct RenderedFile {
+    /// All layers, under plain names.
+    pub set: LayerSet,
+    /// The file's attributes.
+    pub attributes: Attributes,
+    /// Names of the file's channels, which its cryptomatte attributes also use.
+    pub naming: Naming,
+    /// Remarks for the user, such as on layers that are left out.
+    pub remarks: Vec<String>,
+}
+
+impl RenderedFile {
+    /// Reads a file. Layers whose names cannot be written are left out, with a remark.
+    ///
+    /// # Errors
+    /// As for [`exr::read`].
+    pub fn read(path: &Path) -> Result<RenderedFile> {
+        let (mut set, attributes) = exr::read(path)?;
+        let naming = Naming::of(&set);
+        let remark = |name: String| {
+            format!("{}: layer \"{name}\" cannot be written under this name and is left out", path.display())
+        };
+        let remarks = take_plain_names(&mut set).into_iter().map(remark).collect();
+        Ok(RenderedFile { set, attributes, naming, remarks })
+    }
+}
