@@ -7,6 +7,7 @@ from mathutils import Vector
 
 import export_guard as guard
 import lamp_nodes
+import lamp_profiles
 from graph import FUNCTIONS, upstream
 from shading import constant, nodes_of, output_of, source
 
@@ -92,7 +93,8 @@ def _add_lamp(thing, flat, warn):
         flat.remove(thing)
         return
     _warn_of(thing, flat.where(thing), warn)
-    _measure_nodes(thing, flat, warn)
+    if not _add_profile(thing, flat):
+        _measure_nodes(thing, flat, warn)
     if light.type == "AREA":
         _area_mesh(thing, flat)
         flat.remove(thing)
@@ -102,6 +104,17 @@ def _add_lamp(thing, flat, warn):
         flat.add_extras(thing, radius=light.shadow_soft_size)
         if light.type == "SPOT":
             flat.add_extras(thing, blend=light.spot_blend)
+
+
+def _add_profile(thing, flat):
+    """Carry a lamp with an IES profile and a constant colour. Returns whether that is all that its nodes do."""
+    node = emission_node(thing.data)
+    colour = _colour(node.inputs["Color"]) if node is not None else None
+    factor = lamp_profiles.add(thing, flat) if colour is not None else None
+    if factor is None:
+        return False
+    flat.lamp_factors[thing.data.name] = [c * factor for c in colour]
+    return True
 
 
 def _area_mesh(thing, flat):

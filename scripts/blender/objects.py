@@ -43,8 +43,9 @@ class FlatScene:
 
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
     of rays that do not hit it. `groups`: the light group of each, or None. `lamp_factors`: for each measured lamp, the
-    factors per channel of its nodes. `stretched`: names of materials with normal maps that uneven scale stretches, found
-    if the materials may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
+    factors per channel of its nodes. `profiles`: the texts of IES profiles (bytes) that lamps name. `stretched`: names
+    of materials with normal maps that uneven scale stretches, found if the materials may be baked (`bakes`). `motion`:
+    how the objects move while the shutter is open.
     """
 
     def __init__(self, scene, undo, warn, bakes=True):
@@ -52,6 +53,7 @@ class FlatScene:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
+        self.profiles = []
         self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
         self._indirect, self._layer = visibility.indirect_only(layer), layer

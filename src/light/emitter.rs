@@ -1,10 +1,11 @@
 //! One light source, its power, and the falloff of spots.
 
-use super::{Environment, Spread};
+use super::{Distribution, Environment, Spread};
 use crate::geometry::{Shapes, triangle_error};
 use crate::material::Materials;
-use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sqr, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sin_cos_turns, sqr, warp};
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 /// Bound on the rounding error of points on a triangle (m), given by a corner and the edges to the other corners.
 #[inline]
@@ -71,6 +72,48 @@ impl TriangleLight {
     }
 }
 
+/// A point or a spot whose intensity has a distribution of its own over directions, such as a photometric profile. It
+/// shines from a point, or from a ball that no ray can hit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapedLight {
+    /// Position of the point, or of the ball's centre (m).
+    pub p: Vec3,
+    /// Radius of the ball that emits (m); 0 makes the light a mathematical point.
+    pub radius: f32,
+    /// Frame of the distribution; its normal is the axis, pointing in the direction of the emitted light.
+    pub frame: Frame,
+    /// Radiant intensity in a direction of relative intensity 1 (W/sr).
+    pub intensity: Rgb,
+    /// Relative intensity by direction.
+    pub distribution: Arc<Distribution>,
+}
+
+impl ShapedLight {
+    /// Samples a point of the ball by the uniform point `u`. From every side, the ball looks like a uniform disc.
+    #[inline]
+    pub fn point(&self, u: Vec2) -> Vec3 {
+        if self.radius == 0.0 {
+            return self.p;
+        }
+        // The projection of a uniform point of the unit sphere in four dimensions to three; its projection to two is
+        // uniform on the disc. The third number is made of the low bits of the first.
+        let height = (1.0 - u.x).sqrt() * sin_cos_turns(0.5 * (4096.0 * u.x).fract()).1;
+        self.p + warp::around_z(u.x.sqrt(), height, u.y) * self.radius
+    }
+
+    /// Radiant intensity along a unit direction (W/sr).
+    #[inline]
+    pub(super) fn intensity_along(&self, d: Vec3) -> Rgb {
+        self.intensity * self.distribution.relative(self.frame.to_local(d))
+    }
+
+    /// Density per solid angle with which light paths leave along a unit direction.
+    #[inline]
+    pub(super) fn pdf_w(&self, d: Vec3) -> f32 {
+        self.distribution.pdf_w(self.frame.to_local(d))
+    }
+}
+
 /// A light source. The scene has one flat list of them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Emitter {
@@ -102,6 +145,8 @@ pub enum Emitter {
         /// Falloff of the intensity between `inner` and `outer`.
         edge: SpotEdge,
     },
+    /// A point or a spot with a distribution of its own over directions.
+    Shaped(ShapedLight),
     /// Light from a small cone of directions at infinity.
     Sun {
         /// Frame whose normal points from the scene towards the sun.
@@ -226,6 +271,7 @@ impl Emitter {
             Emitter::Spot { intensity, inner, outer, edge, .. } => {
                 light(*intensity) * f64::from(spot_solid_angle(*inner, *outer, *edge))
             }
+            Emitter::Shaped(shaped) => light(shaped.intensity * shaped.distribution.flux()),
             Emitter::Sun { irradiance, .. } => light(*irradiance) * disc,
             Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| light(e.mean())) * sphere * disc,
         }
@@ -238,7 +284,7 @@ impl Emitter {
             Emitter::Triangle(TriangleLight { instance, primitive, .. }) => {
                 shapes.surface(*instance, *primitive, [1.0 / 3.0, 1.0 / 3.0]).map(|s| s.ray_origin(s.ng))
             }
-            Emitter::Point { p, .. } | Emitter::Spot { p, .. } => Some(*p),
+            Emitter::Point { p, .. } | Emitter::Spot { p, .. } | Emitter::Shaped(ShapedLight { p, .. }) => Some(*p),
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }
@@ -246,7 +292,7 @@ impl Emitter {
     /// Whether the light is a delta light: no ray can hit it.
     pub fn is_delta(&self) -> bool {
         match self {
-            Emitter::Point { .. } | Emitter::Spot { .. } => true,
+            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) => true,
             Emitter::Sun { one_minus_cos, .. } => *one_minus_cos == 0.0,
             Emitter::Triangle(_) | Emitter::Environment => false,
         }

@@ -16,7 +16,7 @@ use super::lights::Lights;
 use super::{Cdf, Emitter, Region};
 use crate::geometry::{Shapes, offset_origin};
 use crate::material::Materials;
-use crate::math::{DVec2, Frame, Vec2, Vec3, one_minus_cos, warp};
+use crate::math::{DVec2, Frame, Rgb, Vec2, Vec3, one_minus_cos, warp};
 use std::f32::consts::PI;
 use std::ops::Range;
 
@@ -224,7 +224,11 @@ impl Guide {
             }
             None => choice.x,
         };
-        let mut emission = lights.sample_emission(shapes, materials, u, point, direction)?;
+        // A direction without light is no fault if the start is aimed afterwards.
+        let mut emission = match target {
+            Some(_) => lights.sample_start(shapes, materials, u, point, direction)?,
+            None => lights.sample_emission(shapes, materials, u, point, direction)?,
+        };
         match target {
             Some(target) => emission = Self::aim_at(lights, emission, target, point, direction)?,
             None => lights.aim_with_region(&mut emission, region, rest, point),
@@ -255,16 +259,17 @@ impl Guide {
         let (center, radius) = lights.targets().spheres()[target];
         if emission.infinite {
             lights.targets().aim_at(lights.sky(), &mut emission, target, point);
-            return Some(emission);
+            return (emission.flux != Rgb::ZERO).then_some(emission);
         }
-        let Some((axis, one_minus_cos)) = cone(emission.origin, center, radius) else { return Some(emission) };
+        let Some((axis, one_minus_cos)) = cone(emission.origin, center, radius) else {
+            return (emission.flux != Rgb::ZERO).then_some(emission);
+        };
         let d = Frame::from_normal(axis).to_world(warp::cone_uniform(direction, one_minus_cos));
         if let Emitter::Triangle(triangle) = &lights.emitters()[emission.light as usize] {
             let at = triangle.point(warp::triangle_uniform(point));
             emission.origin = offset_origin(at, triangle.normal(), d, triangle.error);
         }
-        emission.direction = d;
-        (emission.density.onward, emission.density.cos) = lights.direction_density(emission.light as usize, d)?;
+        lights.redirect(&mut emission, d)?;
         Some(emission)
     }
 

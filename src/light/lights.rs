@@ -5,7 +5,9 @@ use super::aim::CausticTargets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
-use super::emitter::{Emitter, Sky, TriangleLight, position_error, spot_falloff, spot_point, spot_solid_angle};
+use super::emitter::{
+    Emitter, ShapedLight, Sky, TriangleLight, position_error, spot_falloff, spot_point, spot_solid_angle,
+};
 use super::environment::EnvironmentSample;
 use super::group::{Group, Groups};
 use super::receiver::Receiver;
@@ -302,6 +304,10 @@ impl Lights {
                 let falloff = spot_falloff(one_minus_cos(d, frame.n), *inner, *outer, *edge);
                 (falloff > 0.0).then(|| (falloff / spot_solid_angle(*inner, *outer, *edge), 1.0))
             }
+            Emitter::Shaped(shaped) => {
+                let density = shaped.pdf_w(d);
+                (density > 0.0).then_some((density, 1.0))
+            }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }
@@ -368,6 +374,7 @@ impl Lights {
                 let arrival_factor = falloff / (spot_solid_angle(*inner, *outer, *edge) * to.length_squared());
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_factor, light })
             }
+            Emitter::Shaped(shaped) => Self::sample_shaped(shaped, p, (light, probability), u),
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
                     let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
@@ -394,6 +401,21 @@ impl Lights {
                 (pdf_w > 0.0).then_some(sample)
             }
         }
+    }
+
+    /// Does the work of [`Lights::sample_light`] for a point or a spot with a distribution of its own. Not inlined, so
+    /// that the common lights stay fast.
+    #[inline(never)]
+    fn sample_shaped(shaped: &ShapedLight, p: Vec3, (light, probability): (u32, f32), u: Vec2) -> Option<DirectSample> {
+        let at = shaped.point(u);
+        let to = at - p;
+        let (wi, distance2) = (to.try_normalize()?, to.length_squared());
+        let radiance = shaped.intensity_along(-wi) / distance2;
+        if radiance == Rgb::ZERO {
+            return None;
+        }
+        let arrival_factor = shaped.pdf_w(-wi) / distance2;
+        Some(DirectSample { wi, target: Some(at), radiance, pdf_w: probability, delta: true, arrival_factor, light })
     }
 
     /// Does the work of [`Lights::sample_light`] for a triangle.
@@ -442,6 +464,10 @@ impl Lights {
             Emitter::Spot { p, radius, frame, outer, .. } => {
                 let at = spot_point(*p, *radius, frame, u);
                 Some((at, Cone::new(at, frame.n, *outer)))
+            }
+            Emitter::Shaped(shaped) => {
+                let at = shaped.point(u);
+                Some((at, Cone::new(at, shaped.frame.n, shaped.distribution.reach())))
             }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
@@ -555,6 +581,21 @@ impl Lights {
         point: Vec2,
         direction: Vec2,
     ) -> Option<EmissionSample> {
+        let emission = self.sample_start(shapes, materials, choice, point, direction)?;
+        // Non-finite flux is emitted too, so that the pixels it reaches report it.
+        (emission.flux.max_element() > 0.0 || !emission.flux.is_finite()).then_some(emission)
+    }
+
+    /// Does the work of [`Lights::sample_emission`]. The flux may be zero, in a direction without light.
+    #[inline]
+    pub(super) fn sample_start(
+        &self,
+        shapes: &Shapes,
+        materials: &Materials,
+        choice: f64,
+        point: Vec2,
+        direction: Vec2,
+    ) -> Option<EmissionSample> {
         let (index, probability, rest) = self.choice()?.sample(choice);
         let emitter = &self.emitters[index];
         let ray = match emitter {
@@ -566,6 +607,7 @@ impl Lights {
                 LightRay { origin: *p, direction, flux, start: 1.0, onward: 0.5 / TAU, cos: 1.0 }
             }
             Emitter::Spot { .. } => Self::emit_from_spot(emitter, point, direction)?,
+            Emitter::Shaped(shaped) => Self::emit_from_shaped(shaped, point, direction)?,
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
                 // A facing surface receives the irradiance E from the whole cone; a path from one direction carries
@@ -590,17 +632,32 @@ impl Lights {
         let start = start * probability;
         let density = EmissionDensity { direct: start, start, onward, cos, infinite, delta };
         let (light, entry) = (index as u32, EntryDisc::Whole);
-        // Non-finite flux is emitted too, so that the pixels it reaches report it.
-        (flux.max_element() > 0.0 || !flux.is_finite()).then_some(EmissionSample {
-            origin,
-            direction,
-            flux,
-            light,
-            delta,
-            infinite,
-            entry,
-            density,
-        })
+        Some(EmissionSample { origin, direction, flux, light, delta, infinite, entry, density })
+    }
+
+    /// Turns the start of a light path at a light that is not at infinity into the unit direction `d`, with the flux and
+    /// the densities that unguided emission has there. `None` if the light emits nothing along `d`.
+    pub(super) fn redirect(&self, emission: &mut EmissionSample, d: Vec3) -> Option<()> {
+        let (onward, cos) = self.direction_density(emission.light as usize, d)?;
+        match &self.emitters[emission.light as usize] {
+            Emitter::Shaped(shaped) => {
+                emission.flux = shaped.intensity_along(d) / (onward * emission.density.start);
+                if emission.flux == Rgb::ZERO {
+                    return None;
+                }
+            }
+            Emitter::Triangle(TriangleLight { spread, .. }) if *spread != Spread::LAMBERTIAN => {
+                let before = spread.relative_radiance(emission.density.cos);
+                if before == 0.0 {
+                    return None;
+                }
+                emission.flux *= spread.relative_radiance(cos) / before;
+            }
+            _ => {}
+        }
+        emission.direction = d;
+        (emission.density.onward, emission.density.cos) = (onward, cos);
+        Some(())
     }
 
     /// Samples a ray that leaves a triangle; `back` selects its back side, if it emits from both sides.
@@ -643,6 +700,15 @@ impl Lights {
         let direction = frame.to_world(warp::around_z(sin, 1.0 - h, direction.y));
         let (origin, flux) = (spot_point(*p, *radius, frame, point), *intensity * filled);
         Some(LightRay { origin, direction, flux, start: 1.0, onward: falloff / filled, cos: 1.0 })
+    }
+
+    /// Samples a ray that leaves a point or a spot with a distribution of its own.
+    #[inline(never)]
+    fn emit_from_shaped(shaped: &ShapedLight, point: Vec2, direction: Vec2) -> Option<LightRay> {
+        let (local, onward) = shaped.distribution.sample(direction)?;
+        let flux = shaped.intensity * shaped.distribution.relative(local) / onward;
+        let (origin, direction) = (shaped.point(point), shaped.frame.to_world(local));
+        Some(LightRay { origin, direction, flux, start: 1.0, onward, cos: 1.0 })
     }
 
     /// Aims the start of a light path from infinity at caustic targets (see [`CausticTargets::aim`]). Starts at other

@@ -5,7 +5,10 @@ use super::nesting::ranks;
 use super::{Contacts, Scene, SolidStacks, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
-use crate::light::{Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS, Sky};
+use crate::light::{
+    Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS, Pattern,
+    ShapedLight, Sky, SpotCone,
+};
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
 use crate::texture::Texture;
@@ -44,7 +47,9 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         environment: environment(description.environment),
     };
     let others = description.lights.iter().filter(|light| !light.is_sphere());
-    let (light_names, others) = others.map(|light| (light.name.clone(), punctual(light, origin))).unzip();
+    let mut distributions = Distributions::default();
+    let (light_names, others) =
+        others.map(|light| (light.name.clone(), punctual(light, origin, &mut distributions))).unzip();
     let lights = Lights::new(&shapes, &materials, others, sky).with_groups(groups);
     warn_of_cut_solids(&shapes, &materials, &mut warnings);
     warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
@@ -408,20 +413,64 @@ fn one_minus_cos(angle: f64) -> f64 {
     2.0 * (0.5 * angle).sin().powi(2)
 }
 
-pub(super) fn punctual(light: &PunctualLight, origin: DVec3) -> Emitter {
+/// The distributions of the lights of a scene, which lights with equal patterns and cones share.
+#[derive(Default)]
+pub(super) struct Distributions(Vec<(Arc<Pattern>, Option<SpotCone>, Option<Arc<Distribution>>)>);
+
+impl Distributions {
+    /// The distribution of a pattern within a cone; `None` if no light is left.
+    fn get(&mut self, pattern: &Arc<Pattern>, cone: Option<SpotCone>) -> Option<Arc<Distribution>> {
+        let known = self.0.iter().find(|(other, of, _)| Arc::ptr_eq(other, pattern) && *of == cone);
+        if let Some((.., known)) = known {
+            return known.clone();
+        }
+        let made = Distribution::new(Arc::clone(pattern), cone).map(Arc::new);
+        self.0.push((Arc::clone(pattern), cone, made.clone()));
+        made
+    }
+}
+
+/// The emitter of a point or a spot with a pattern. Without any light it is a point of no intensity.
+fn shaped(light: &PunctualLight, p: Vec3, pattern: &Arc<Pattern>, distributions: &mut Distributions) -> Emitter {
+    let cone = match light.kind {
+        PunctualKind::Spot { inner, outer, edge } => {
+            let [inner, outer] = cone_sizes(inner, outer);
+            Some(SpotCone { inner, outer, edge })
+        }
+        _ => None,
+    };
+    let Some(distribution) = distributions.get(pattern, cone) else {
+        return Emitter::Point { p, intensity: Rgb::ZERO };
+    };
+    let right = (light.to_world.matrix3 * DVec3::X).normalize_or(DVec3::X).as_vec3();
+    let frame = Frame::from_normal_tangent(axis(light), right);
+    Emitter::Shaped(ShapedLight { p, radius: light.radius, frame, intensity: light.intensity, distribution })
+}
+
+/// 1 minus the cosines of the half angles of a spot's cone (radians); the second is greater, so that the ramp between
+/// them has a width.
+fn cone_sizes(inner: f32, outer: f32) -> [f32; 2] {
+    let [inner, outer] = [inner, outer].map(|angle| one_minus_cos(f64::from(angle)));
+    [inner as f32, outer.max(inner * (1.0 + 1e-6)) as f32]
+}
+
+/// The emitter of a punctual light that is not a sphere.
+pub(super) fn punctual(light: &PunctualLight, origin: DVec3, distributions: &mut Distributions) -> Emitter {
     let p = (light.to_world.translation - origin).as_vec3();
+    if let Some(pattern) = &light.pattern {
+        return shaped(light, p, pattern, distributions);
+    }
     match light.kind {
         PunctualKind::Point => Emitter::Point { p, intensity: light.intensity },
         PunctualKind::Spot { inner, outer, edge } => {
-            let [inner, outer] = [inner, outer].map(|angle| one_minus_cos(f64::from(angle)));
+            let [inner, outer] = cone_sizes(inner, outer);
             Emitter::Spot {
                 p,
                 radius: light.radius,
                 frame: Frame::from_normal(axis(light)),
                 intensity: light.intensity,
-                inner: inner as f32,
-                // Greater than `inner`, so that the ramp between them has a width.
-                outer: outer.max(inner * (1.0 + 1e-6)) as f32,
+                inner,
+                outer,
                 edge,
             }
         }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, ErrorKind};
 use crate::geometry::Mesh;
-use crate::light::SpotEdge;
+use crate::light::{Pattern, SpotEdge};
 use crate::material::{Material, MediumParameters};
 use crate::math::{DAffine3, Rgb};
 use crate::texture::Texture;
@@ -207,11 +207,16 @@ pub struct PunctualLight {
     pub name: String,
     /// Transform from the light's space to world space.
     pub to_world: DAffine3,
-    /// Radiant intensity (W/sr) of points and spots, irradiance (W/m2) of suns, per channel.
+    /// Radiant intensity (W/sr) of points and spots, irradiance (W/m2) of suns, per channel. With a pattern, the intensity
+    /// where the pattern is 1.
     pub intensity: Rgb,
     /// Point, spot or sun.
     pub kind: PunctualKind,
-    /// Radius (m) of a point light's sphere or of a spot's disc; 0 for a mathematical point.
+    /// Relative intensity of a point or a spot by direction, within the cone of a spot; `None` for equal intensity in
+    /// all directions. The x axis of the pattern's frame is that of the light's space.
+    pub pattern: Option<Arc<Pattern>>,
+    /// Radius (m) of a point light's sphere, of a spot's disc, or of the ball of a light with a pattern; 0 for a
+    /// mathematical point.
     pub radius: f32,
     /// Whether camera rays do not see the light; it lights the scene anyway.
     pub hidden_from_camera: bool,
@@ -220,9 +225,10 @@ pub struct PunctualLight {
 }
 
 impl PunctualLight {
-    /// Whether the scene has an emissive sphere in place of the light: it is a point light with a radius.
+    /// Whether the scene has an emissive sphere in place of the light: it is a point light with a radius, and without a
+    /// pattern.
     pub fn is_sphere(&self) -> bool {
-        self.kind == PunctualKind::Point && self.radius > 0.0
+        self.kind == PunctualKind::Point && self.radius > 0.0 && self.pattern.is_none()
     }
 }
 

@@ -9,6 +9,7 @@ pub mod description;
 pub mod environment_file;
 mod folder;
 pub mod gltf;
+pub mod ies;
 pub mod light_preset;
 mod moment;
 mod nesting;
@@ -148,7 +149,7 @@ impl Scene {
                 format!("{kind} \"{}\"", instance.name)
             }
             Emitter::Environment => "the environment".into(),
-            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Sun { .. } => {
+            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) | Emitter::Sun { .. } => {
                 let environment = usize::from(self.lights.sky().environment.is_some());
                 let first = self.lights.emitters().len() - environment - self.light_names.len();
                 format!("light \"{}\"", self.light_names[index - first])

@@ -68,7 +68,9 @@ impl<'a> MomentBuilder<'a> {
         let boxes = self.boxes(&shapes);
         let (sky, same_sky) = self.sky(&boxes);
         let lights = description.lights.iter().filter(|light| !light.is_sphere());
-        let others: Vec<Emitter> = lights.map(|light| build::punctual(light, scene.origin)).collect();
+        let mut distributions = build::Distributions::default();
+        let others: Vec<Emitter> =
+            lights.map(|light| build::punctual(light, scene.origin, &mut distributions)).collect();
         let same_lights = same_sky
             && Arc::ptr_eq(&materials, &scene.materials)
             && others.iter().eq(scene.lights.others())

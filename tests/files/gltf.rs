@@ -13,6 +13,7 @@ pub mod images;
 mod lights;
 mod materials;
 mod outside;
+mod profiles;
 mod scenes;
 mod seen;
 mod valid;

@@ -77,6 +77,7 @@ fn sun(intensity: f32) -> PunctualLight {
         to_world: DAffine3::from_quat(glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
         intensity: Rgb::splat(intensity),
         kind: PunctualKind::Sun { angle: 0.0 },
+        pattern: None,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

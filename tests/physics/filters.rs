@@ -35,6 +35,7 @@ fn strip() -> Scene {
         to_world: DAffine3::from_quat(DQuat::from_rotation_arc(DVec3::NEG_Z, DVec3::NEG_Y)),
         intensity: Rgb::splat(PI as f32 / 0.5),
         kind: PunctualKind::Sun { angle: 0.0 },
+        pattern: None,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

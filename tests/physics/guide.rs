@@ -8,7 +8,7 @@ use crate::support;
 
 use caustique::choose::{Choice, EffectWeight, choose};
 use caustique::estimator::{InitialBandwidth, PixelAccumulator};
-use caustique::light::{Guide, Region, SpotEdge};
+use caustique::light::{Guide, Pattern, Profile, Region, SpotEdge};
 use caustique::material::Material;
 use caustique::math::{DVec3, Rgb, Vec2, Vec3};
 use caustique::medium::MediumParameters;
@@ -22,6 +22,7 @@ use caustique::scene::{Description, Scene, View};
 use caustique::stat::floor;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 use caustique::transport::{Indirect, InitialMedia, LightPaths};
+use std::sync::Arc;
 use support::scenes::{add, build, cuboid, glass, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, t_critical};
 
@@ -56,6 +57,15 @@ fn lit() -> Vec<(&'static str, Scene)> {
     let point: Light = |d| d.lights.push(point_light(DVec3::new(0.2, 1.7, 0.8), 4.0));
     let kinds = |kind| PunctualLight { kind, ..point_light(DVec3::new(-0.2, 0.5, 3.0), 5.0) };
     let spot = kinds(PunctualKind::Spot { inner: 0.3, outer: 0.6, edge: SpotEdge::Squared });
+    let honeycomb: Light = |d| {
+        let material = Material { spread: 0.9, ..matte(0.0, 3.0) };
+        add(d, "honeycomb", quad(Vec3::new(-0.5, 1.5, -0.5), Vec3::X, Vec3::Z), material);
+    };
+    let values = (0..15).map(|i| [0.2, 1.0, 0.0, 0.5, 0.7, 0.1, 0.9][i % 7]).collect::<Vec<f32>>();
+    let values = [&values[..], &values[..5]].concat();
+    let profile = Profile::new(vec![0.0, 0.3, 0.6, 1.2, 3.0], vec![0.0, 0.3, 0.6, 1.0], values).expect("a profile");
+    let pattern = Some(Arc::new(Pattern::Profile(profile)));
+    let shaped = PunctualLight { pattern, radius: 0.1, ..point_light(DVec3::new(0.2, 0.6, 2.0), 8.0) };
     let sky: Light = |d| {
         let (width, height) = (16, 8);
         let texels = (0..width * height).map(|i| [0.2 + (i % 5) as f32, 1.0, 0.5]).collect();
@@ -74,6 +84,8 @@ fn lit() -> Vec<(&'static str, Scene)> {
         ("sheet of two sides", scene(&[sheet], &[])),
         ("point", scene(&[point], &[])),
         ("spot", scene(&[], std::slice::from_ref(&spot))),
+        ("profile", scene(&[], std::slice::from_ref(&shaped))),
+        ("honeycomb", scene(&[honeycomb], &[])),
         ("sky", scene(&[sky], &[])),
         ("all", scene(&[lamp, sheet, point, sky], &[spot])),
     ]

@@ -213,6 +213,7 @@ fn cameras_see_no_hidden_light_from_infinity() {
         to_world: caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-PI / 2.0)),
         intensity: Rgb::ONE,
         kind: PunctualKind::Sun { angle: 0.2 },
+        pattern: None,
         radius: 0.0,
         hidden_from_camera: true,
         light_group: None,

@@ -32,6 +32,7 @@ mod narrow_spots;
 mod nesting;
 mod open_space;
 mod photon_mapping;
+mod profiles;
 mod progressive;
 mod shadow_rays;
 mod stability;

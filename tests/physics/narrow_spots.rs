@@ -22,6 +22,7 @@ fn scene(inner: f32, outer: f32, edge: SpotEdge, radius: f32) -> Scene {
         to_world: DAffine3::from_quat(down),
         intensity: Rgb::ONE,
         kind: PunctualKind::Spot { inner, outer, edge },
+        pattern: None,
         radius,
         hidden_from_camera: false,
         light_group: None,

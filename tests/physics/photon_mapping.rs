@@ -143,6 +143,7 @@ fn sun_through_a_slab() {
         to_world: DAffine3::from_quat(glam::DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2)),
         intensity: Rgb::splat(e),
         kind: PunctualKind::Sun { angle: 0.0 },
+        pattern: None,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

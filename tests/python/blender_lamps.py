@@ -1,6 +1,7 @@
 """Exported lamps and skies, compared with Cycles."""
 
 import math
+import os
 import unittest
 
 import cycles_comparison  # first: it sets the search path
@@ -165,8 +166,40 @@ class Lamps(cycles_comparison.CyclesComparison):
         self.alike(self.caustique(), self.cycles(), parts=1, tolerance=0.5)
         self.assertIn("its shader nodes are not carried: it shines alike", "".join(self.warnings))
 
-    def test_profiles_have_the_strength_of_directions_that_meet_objects(self):
-        """A lamp with an IES profile that varies around two axes lights a small square in different directions."""
+    def test_profiles(self):
+        """Points and spots with an IES profile that has no symmetry shine as in Cycles, which interpolates it with
+        cubics."""
+        def strength(vertical, horizontal):
+            up, turn = math.radians(vertical), math.radians(horizontal)
+            return 300 + 200 * math.cos(2 * up) + math.sin(up) * (80 * math.cos(turn - 0.9) + 60 * math.sin(2 * turn))
+
+        vertical, horizontal = range(0, 91, 5), range(0, 361, 15)
+        rows = [" ".join(f"{max(strength(v, h), 20):.3f}" for v in vertical) for h in horizontal]
+        text = "\n".join(["IESNA:LM-63-2002", "TILT=NONE", f"1 1000 1 {len(vertical)} {len(horizontal)} 1 2 0 0 0",
+                          "1 1 100", " ".join(map(str, vertical)), " ".join(map(str, horizontal)), *rows])
+        path = os.path.join(self.folder, "lamp.ies")
+        with open(path, "w") as file:
+            file.write(text)
+        self.floor(4)
+        for kind, radius in (("POINT", 0.0), ("POINT", 0.2), ("SPOT", 0.0)):
+            with self.subTest(kind=kind, radius=radius):
+                body = lamp(kind, (0, 0, 1), 300.0, shadow_soft_size=radius, use_soft_falloff=False)
+                body.rotation_euler = (0.2, 0.1, 0.4)
+                if kind == "SPOT":
+                    body.data.spot_size = 2.6
+                tree, node = self.nodes(body)
+                source, dim = tree.nodes.new("ShaderNodeTexIES"), tree.nodes.new("ShaderNodeMath")
+                source.mode, source.filepath = "EXTERNAL", path
+                dim.operation, dim.inputs[1].default_value = "MULTIPLY", 0.5
+                tree.links.new(source.outputs[0], dim.inputs[0])
+                tree.links.new(dim.outputs[0], node.inputs["Strength"])
+                eye((0, 0, 5), (0, 0, 0), lens=50)
+                self.alike(self.caustique(32, "--method", "path"), self.cycles(64), parts=4, tolerance=0.03)
+                self.assertEqual(self.warnings, [])
+                bpy.data.objects.remove(body)
+
+    def test_measured_profiles_have_the_strength_of_directions_that_meet_objects(self):
+        """A lamp with an IES profile that nodes rotate lights a small square in different directions."""
         profile = bpy.data.texts.new("profile")
         profile.write("IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 3 5 1 2 0 0 0 1 1 100\n0 90 180\n0 90 180 270 360\n"
                       "500 1000 100\n500 300 100\n500 50 100\n500 200 100\n500 1000 100\n")
@@ -175,6 +208,9 @@ class Lamps(cycles_comparison.CyclesComparison):
         tree, node = self.nodes(body)
         source = tree.nodes.new("ShaderNodeTexIES")
         source.ies = profile
+        around, turned = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
+        tree.links.new(around.outputs["Normal"], turned.inputs["Vector"])
+        tree.links.new(turned.outputs["Vector"], source.inputs["Vector"])
         tree.links.new(source.outputs[0], node.inputs["Strength"])
         wall = shared.place("wall", square(shared.node_material("grey", "ShaderNodeBsdfDiffuse"), 0.5))
         seen = []

@@ -7,12 +7,14 @@ use caustique::combine::{Model, Runtime};
 use caustique::error::Result;
 use caustique::film::{Naming, Selection};
 use caustique::image::exr;
+use caustique::light::{Distribution, Pattern};
+use caustique::math::Vec2;
 use caustique::pipeline::merge::{MergeRequest, Shards};
 use caustique::pipeline::{checkpoint, records, shard};
 use caustique::render::{Candidate, Control, Method, RenderInput, Session, Settings, StopReason, render};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{CameraRequest, Scene, environment_file, usd};
+use caustique::scene::{CameraRequest, Scene, environment_file, ies, usd};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -22,7 +24,7 @@ use std::sync::LazyLock;
 pub type Reader = (&'static str, fn(&[u8], &Path));
 
 /// All readers.
-pub const READERS: [Reader; 17] = [
+pub const READERS: [Reader; 18] = [
     ("glb", glb),
     ("scene", scene),
     ("gltf", gltf),
@@ -35,6 +37,7 @@ pub const READERS: [Reader; 17] = [
     ("exr", picture),
     ("exr_environment", environment),
     ("hdr", environment),
+    ("ies", profile),
     ("checkpoint", checkpoint),
     ("shard", shard),
     ("model", model),
@@ -222,6 +225,19 @@ fn environment(bytes: &[u8], folder: &Path) {
     if let Some(EnvironmentSource::Image { width, height, texels }) = value_of(read) {
         assert_eq!(texels.len(), width as usize * height as usize);
         assert!(texels.iter().flatten().all(|x| x.is_finite() && *x >= 0.0));
+    }
+}
+
+/// A photometric profile.
+fn profile(bytes: &[u8], _: &Path) {
+    let read = ies::parse(bytes, &mut Vec::new()).map_err(|error| error.within("fuzz.ies"));
+    if let Some(photometry) = value_of(read) {
+        assert!(photometry.peak() > 0.0 && photometry.peak().is_finite());
+        let turn = ies::Turn { degrees: 30.0, clockwise: true };
+        let shape = photometry.profile(turn).map(|profile| Distribution::new(Pattern::Profile(profile).into(), None));
+        if let Some(shape) = shape.flatten() {
+            assert!(shape.sample(Vec2::splat(0.5)).is_none_or(|(d, pdf)| d.is_finite() && pdf > 0.0));
+        }
     }
 }
 

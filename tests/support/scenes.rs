@@ -130,6 +130,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
         to_world: DAffine3::from_translation(p),
         intensity: Rgb::splat(intensity),
         kind: PunctualKind::Point,
+        pattern: None,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

@@ -1,6 +1,7 @@
 //! Bounds on the positions and directions of lights, and the best split of a cluster into halves.
 
-use crate::light::emitter::{Emitter, TriangleLight};
+use crate::light::emitter::{Emitter, ShapedLight, TriangleLight};
+use crate::light::profile::polar_angle;
 use crate::math::{Vec3, luminance};
 use std::f32::consts::PI;
 
@@ -53,6 +54,14 @@ impl Bounds {
                 let reach = 2.0 * (0.5 * outer).clamp(0.0, 1.0).sqrt().asin();
                 let (low, high) = (p - *radius, p + *radius);
                 Bounds { low, high, ..at(*p, frame.n, 0.0, reach, luminance(*intensity)) }
+            }
+            Emitter::Shaped(ShapedLight { p, radius, frame, intensity, distribution }) => {
+                let reach = polar_angle(distribution.reach());
+                // The bound of wide lights must not depend on rounding at the back of the axis.
+                let (axis, spread) = if reach < 3.0 { (frame.n, 0.0) } else { (Vec3::Z, PI) };
+                let (low, high) = (p - *radius, p + *radius);
+                let brightest = luminance(*intensity) * distribution.peak();
+                Bounds { low, high, ..at(*p, axis, spread, reach.min(3.0), brightest) }
             }
             Emitter::Sun { .. } | Emitter::Environment => return None,
         };

@@ -4,8 +4,8 @@ use super::super::names::truncate_names;
 use super::super::{Effect, PlanRequest};
 use super::rays;
 use crate::camera::Camera;
-use crate::light::{Emitter, TriangleLight};
-use crate::math::{Vec3, luminance, one_minus_cos};
+use crate::light::{Emitter, ShapedLight, TriangleLight};
+use crate::math::{Rgb, Vec3, luminance, one_minus_cos};
 use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f32::consts::PI;
@@ -38,7 +38,7 @@ pub(super) fn wrong_units(scene: &Scene) -> Option<String> {
                 let own = scene.shapes.instances[*instance as usize].object < scene.first_light_sphere;
                 *if own { &mut surfaces } else { &mut points } += emitter.power(sky) as f32;
             }
-            Emitter::Point { .. } | Emitter::Spot { .. } => points += emitter.power(sky) as f32,
+            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) => points += emitter.power(sky) as f32,
             Emitter::Sun { irradiance, .. } => suns += luminance(*irradiance),
             Emitter::Environment => {}
         }
@@ -100,6 +100,9 @@ fn light_rays(scene: &Scene) -> Vec<LightRays> {
             Emitter::Point { p, .. } => sources.push(from(*p, &|_| true)),
             Emitter::Spot { p, frame, outer, .. } => {
                 sources.push(from(*p, &|d| one_minus_cos(*d, frame.n) < *outer));
+            }
+            Emitter::Shaped(ShapedLight { p, frame, distribution, .. }) => {
+                sources.push(from(*p, &|d| distribution.relative(frame.to_local(*d)) != Rgb::ZERO));
             }
             Emitter::Triangle(TriangleLight { instance, .. }) => glowing.entry(*instance).or_default().push(index),
             Emitter::Sun { .. } | Emitter::Environment => {}

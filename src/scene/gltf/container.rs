@@ -9,7 +9,8 @@ use std::collections::BTreeSet;
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
 /// Names of the glTF extensions that the reader supports.
-const SUPPORTED: [&str; 25] = [
+const SUPPORTED: [&str; 26] = [
+    "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",

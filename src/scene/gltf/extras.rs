@@ -152,6 +152,19 @@ pub(super) struct LightExtras {
     pub(super) blend: Option<f32>,
     pub(super) visible: Option<Visible>,
     pub(super) light_group: Option<String>,
+    pub(super) ies: Option<IesExtras>,
+}
+
+/// Content of `extras.caustique.ies`: a photometric profile in a file or in a buffer view.
+#[derive(Clone, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct IesExtras {
+    pub(super) file: Option<String>,
+    #[serde(rename = "bufferView")]
+    pub(super) buffer_view: Option<u32>,
+    pub(super) rotation_deg: f32,
+    pub(super) clockwise: bool,
+    pub(super) normalize: bool,
 }
 
 /// Keys of `extras.caustique` that the reader knows in a scene; keys of nested objects follow a dot.
@@ -183,7 +196,20 @@ pub(super) const SCENE: &[&str] = &[
 pub(super) const MATERIAL: &[&str] =
     &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "contact", "null_bsdf", "spread_deg"];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
-pub(super) const LIGHT: &[&str] = &["radius", "angle_deg", "blend", "visible", "visible.camera", "light_group"];
+pub(super) const LIGHT: &[&str] = &[
+    "radius",
+    "angle_deg",
+    "blend",
+    "visible",
+    "visible.camera",
+    "light_group",
+    "ies",
+    "ies.file",
+    "ies.bufferView",
+    "ies.rotation_deg",
+    "ies.clockwise",
+    "ies.normalize",
+];
 pub(super) const NODE: &[&str] = &[
     "aperture_radius",
     "focus_distance",
@@ -194,6 +220,12 @@ pub(super) const NODE: &[&str] = &[
     "visible",
     "visible.camera",
     "light_group",
+    "ies",
+    "ies.file",
+    "ies.bufferView",
+    "ies.rotation_deg",
+    "ies.clockwise",
+    "ies.normalize",
 ];
 
 /// Reads `extras.caustique` of a part of the document; the default if there are no extras. `place` names the part in

@@ -3,6 +3,7 @@
 use super::clipping::Clip;
 use super::document::{Document, get, named};
 use super::extras::{self, CameraExtras, LightExtras, Units};
+use super::profiles::Profiles;
 use super::{LightUnits, fault};
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -79,6 +80,11 @@ impl Divisors {
     /// These divisors for intensities that are multiplied by `factor`.
     pub(super) fn over(self, factor: f32) -> Divisors {
         Divisors { sun: self.sun / factor, point: self.point / factor }
+    }
+
+    /// Divisor for points and spots, to W/sr.
+    pub(super) fn point(self) -> f32 {
+        self.point
     }
 
     const RADIOMETRIC: Divisors = Divisors { sun: 1.0, point: 1.0 };
@@ -172,7 +178,7 @@ pub(super) fn light(
     node: (&str, &Value),
     to_world: DAffine3,
     divisors: Divisors,
-    warnings: &mut Vec<String>,
+    (profiles, warnings): (&mut Profiles, &mut Vec<String>),
 ) -> Result<PunctualLight> {
     let list = document.raw["extensions"]["KHR_lights_punctual"]["lights"].as_array();
     let raw = get(list.map_or(&[][..], Vec::as_slice), index, "light")?;
@@ -220,7 +226,12 @@ pub(super) fn light(
     let hidden_from_camera = on_node.visible.or(on_light.visible).is_some_and(|visible| !visible.camera);
     let radius = if sun { 0.0 } else { radius };
     let light_group = on_node.light_group.or(on_light.light_group);
-    Ok(PunctualLight { name, to_world, intensity, kind, radius, hidden_from_camera, light_group })
+    let mut light =
+        PunctualLight { name, to_world, intensity, kind, pattern: None, radius, hidden_from_camera, light_group };
+    if let Some(ies) = on_node.ies.or(on_light.ies) {
+        profiles.apply(document, &ies, &mut light, &place, warnings)?;
+    }
+    Ok(light)
 }
 
 /// Checks the cone of a spot. `blend` is the width of the soft edge over that of the whole cone, both as 1 minus the

@@ -27,6 +27,7 @@ mod materials;
 mod mesh;
 mod nodes;
 mod pointer;
+mod profiles;
 mod shading_frame;
 mod shells;
 mod texture;

@@ -12,7 +12,7 @@ use super::shells;
 use super::topology::Solid;
 use super::transform::{WorldTransforms, compose, is_finite, is_invertible, local};
 use super::{
-    Pose, ReadOptions, choice, compressed, counted, deform, fault, lights, mesh, shading_frame, topology, uri,
+    Pose, ReadOptions, choice, compressed, counted, deform, fault, lights, mesh, profiles, shading_frame, topology, uri,
 };
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -209,6 +209,7 @@ struct Reader<'r> {
     clips: Vec<Clip>,
     /// Divisors from the file's units of punctual lights to radiometric units; `None` until the first light is read.
     divisors: Option<lights::Divisors>,
+    profiles: profiles::Profiles,
     /// Indices of the meshes in the file with inner shells of glass that were flipped.
     flipped: HashSet<usize>,
     options: ReadOptions,
@@ -233,6 +234,7 @@ impl<'r> Reader<'r> {
             bounds: Vec::new(),
             clips: Vec::new(),
             divisors: None,
+            profiles: profiles::Profiles::default(),
             flipped: HashSet::new(),
             options: options.clone(),
             scene: SceneExtras::default(),
@@ -408,17 +410,9 @@ impl<'r> Reader<'r> {
         if !shown {
             return Ok(());
         }
-        if let Some(reference) = extension::<LightReference>(raw, "KHR_lights_punctual", place)? {
-            let (units, file_units) = (self.options.light_units, self.scene.light_units);
-            let out = &mut self.out;
-            let divisors = *self.divisors.get_or_insert_with(|| {
-                let (divisors, guessed) = lights::divisors(document, units, file_units, &mut out.warnings);
-                out.guessed_units = guessed;
-                divisors
-            });
-            let warnings = &mut out.warnings;
-            let light = lights::light(document, reference.light as usize, (&name, raw), to_world, divisors, warnings);
-            self.out.lights.push(light.map_err(|e| e.within(place))?);
+        let reference = extension::<LightReference>(raw, "KHR_lights_punctual", place)?;
+        if reference.is_some() || profiles::has_light(raw) {
+            self.lights(reference, (&name, raw), place, to_world).map_err(|e| e.within(place))?;
         }
         if let Some(mesh) = node.mesh {
             let mesh = mesh.value();
@@ -438,6 +432,30 @@ impl<'r> Reader<'r> {
             let object = Object { name, extras: &extras, moves: moves || deforms };
             self.place(&parts, object, self.copies(raw, place)?, to_world, place)?;
         }
+        Ok(())
+    }
+
+    /// Adds the lights of a node, which is given by its name and raw JSON, to the description.
+    fn lights(
+        &mut self,
+        reference: Option<LightReference>,
+        node: (&str, &Value),
+        place: &str,
+        to_world: DAffine3,
+    ) -> Result<()> {
+        let (document, units, file_units) = (self.document, self.options.light_units, self.scene.light_units);
+        let out = &mut self.out;
+        let divisors = *self.divisors.get_or_insert_with(|| {
+            let (divisors, guessed) = lights::divisors(document, units, file_units, &mut out.warnings);
+            out.guessed_units = guessed;
+            divisors
+        });
+        if let Some(LightReference { light }) = reference {
+            let read = (&mut self.profiles, &mut out.warnings);
+            out.lights.push(lights::light(document, light as usize, node, to_world, divisors, read)?);
+        }
+        let read = (&mut self.profiles, &mut out.warnings);
+        out.lights.extend(profiles::light(document, node, place, to_world, divisors, read)?);
         Ok(())
     }
 
