@@ -71,6 +71,16 @@ class Data(unittest.TestCase):
             self.assertEqual(views.files(folder, False, paths=[2]), [(stem("a-0"), "sppm", 1)])
             self.assertEqual(views.files(folder, False, pairs="deep-single"), [(stem("a-0"), "sppm", 1)])
 
+    def test_mapped_files_equal_what_was_written(self):
+        stored = arrays(np.random.default_rng(4))
+        with tempfile.TemporaryDirectory() as folder:
+            data.write(Path(folder, "stack.npz"), stored)
+            found = views.mapped(Path(folder, "stack.npz"))
+            self.assertEqual(set(found), set(stored))
+            for name, value in stored.items():
+                np.testing.assert_array_equal(found[name], value)
+                self.assertEqual(found[name].dtype, value.dtype)
+
 
 class Samples(unittest.TestCase):
     def test_all_inputs_have_their_channels_and_finite_values(self):
@@ -81,6 +91,22 @@ class Samples(unittest.TestCase):
             self.assertEqual((y.shape, z.shape, halves.shape), ((count, 3, 16, 16), (count, 3, 16, 16), (2, 3, 16, 16)))
             self.assertTrue(np.isfinite(image).all())
 
+    def test_the_deep_combiner_reads_pictures_of_two_methods_from_files(self):
+        stored = arrays(np.random.default_rng(5))
+        other = {"picture": stored["finished"], "quarters": stored["quarters"], "deviation": stored["depth"]}
+        with tempfile.TemporaryDirectory() as folder:
+            for name, content in (("seed2", stored), ("target", {"halves": stored["halves"]}), ("bdpt2", other)):
+                content = {key: value for key, value in content.items() if (key == "halves") == (name == "target")}
+                data.write(Path(folder, f"sppm-{name}.npz"), content | {"iterations": stored["iterations"]})
+            found = views.read((Path(folder), "sppm", 2))
+            for pairs, version, count in (("deep-single", 4, 1), ("deep-multi", 5, 4)):
+                stack = views.snapshot(found, 1, pairs, (slice(2, 14), slice(3, 11)))
+                image, y, z, _ = views.sample(stack, pairs, version)
+                self.assertEqual(image.shape, (normalise.channels(5, version), 12, 8))
+                self.assertEqual((y.shape, z.shape), ((count, 3, 12, 8),) * 2)
+                wanted = other["quarters"][1, :, 2:14, 3:11] if count == 4 else other["picture"][1, None, 2:14, 3:11]
+                np.testing.assert_array_equal(y, np.moveaxis(wanted, -1, 1).astype(np.float32))
+
     def test_augmentation_moves_all_pictures_alike_and_scales_radiance_alone(self):
         stored = arrays(np.random.default_rng(2))
         # Every picture holds the number of its pixel.
@@ -90,7 +116,7 @@ class Samples(unittest.TestCase):
                 stored[name] = np.broadcast_to(number if name in views.PLANAR else number[..., None], value.shape)
         rng = np.random.default_rng(3)
         for _ in range(20):
-            stack = views.augment(views.snapshot(stored, 0), rng, 8)
+            stack = views.augment(views.snapshot(stored, 0, part=views.random_part(stored, rng, 8)), rng)
             albedo, gain = stack["albedo"][..., 0], stack["halves"][0, 0, 0, 0] / stack["albedo"][0, 0, 0]
             self.assertGreater(len(np.unique(albedo)), 60)
             for name, value in stack.items():

@@ -16,11 +16,12 @@ from lab.train import apply, combination, export_network, fixture, model, normal
 # Arrays of a stack of 70 x 101 pixels that the input of version 1 needs.
 SHAPES = {"levels": (5, 70, 101, 3), "deviations": (5, 70, 101), "depth": (70, 101)}
 SHAPES |= {"albedo": (70, 101, 3), "normal": (70, 101, 3)}
+DEVICES = ["cpu", "cuda"] if torch.cuda.is_available() else ["cpu"]
 
 
-def inputs(dimensions, dtype, window=7, size=(9, 12), seed=1):
+def inputs(dimensions, dtype, window=7, size=(9, 12), seed=1, device="cpu"):
     """Random arguments of the sums: phi, weight, falloff, difference, window; some distances exceed their maximum."""
-    generator = torch.Generator().manual_seed(seed)
+    generator = torch.Generator(device).manual_seed(seed)
     shape = (2, 3, *size)
     phi = 2.5 * torch.randn(2, 3, dimensions, *size, generator=generator, dtype=dtype)
     weight, falloff = (torch.rand(shape, generator=generator, dtype=dtype) for _ in range(2))
@@ -41,9 +42,14 @@ class Equation(unittest.TestCase):
             self.assertLess(((a - b).abs().max() / b.abs().max()).item(), tolerance, f"result {k}")
 
     def test_compiled_sums_and_gradients_equal_the_reference(self):
+        for device in DEVICES:
+            with torch.device(device):
+                self.compare_sums(device)
+
+    def compare_sums(self, device):
         for dtype, tolerance in ((torch.float64, 1e-13), (torch.float32, 5e-6)):
             for dimensions in range(1, 9):
-                given, difference, window = inputs(dimensions, dtype)
+                given, difference, window = inputs(dimensions, dtype, device=device)
                 pair = (combination.AffinitySums.apply, combination.reference_affinity)
                 for more in ((window,), (5, 2), (3, 7)):
                     self.assert_equal(*(results(sums, given, difference, *more) for sums in pair), tolerance)

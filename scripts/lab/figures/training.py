@@ -1,14 +1,17 @@
 """Trains the networks of the combiner in turns, at the lowest priority, and prints their errors on held-out views. A
-repeated run continues where the last one stopped, also on another machine.
+repeated run continues where the last one stopped, also on another machine. On a machine with a GPU and many cores,
+--together trains all at once, and --seconds ends their schedules after a time.
 
 It needs views of scripts/lab.sh training_data; those that are finished later join. The run `paper` is the paper's
 network with its loss, the others compare inputs and pairs of pictures with the compact network
 (scripts/lab/train/README.md).
 """
 
+import importlib.util
 import json
 import os
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -31,6 +34,7 @@ RUNS = {
     "deep-single": ["--pairs", "deep-single", "--methods", "sppm", "--paths", 1, *STEPS],
     "deep-multi": ["--pairs", "deep-multi", "--methods", "sppm", "--paths", 1, *STEPS],
 }
+UNLIMITED = 10**9
 # Minutes of a run before it is the next one's turn.
 TURN = 20.0
 
@@ -40,6 +44,8 @@ def add_arguments(parser):
     parser.add_argument("--hours", type=float, default=10.0, help="hours of this call [default: 10]")
     parser.add_argument("--runs", type=names, default=list(RUNS), help=f"runs to train [default: {','.join(RUNS)}]")
     parser.add_argument("--threads", type=int, default=1, help="threads [default: 1]")
+    parser.add_argument("--together", action="store_true", help="train all runs at the same time")
+    parser.add_argument("--seconds", type=float, help="seconds of a run, in place of its steps")
 
 
 def last_line(run):
@@ -57,35 +63,39 @@ def steps(run):
 def trainable(run):
     """Whether a run is not finished, and the data have what it needs."""
     line = last_line(run)
-    if line and line["step"] >= steps(run):
+    if line and (line["seconds"] >= options.seconds if options.seconds else line["step"] >= steps(run)):
         return False
     paths, pairs = 1 if "--paths" in RUNS[run] else 2, run if run.startswith("deep") else "multi"
     return bool(views.files(options.folder, False, ["sppm"], [paths], pairs))
 
 
-def train(run, minutes):
-    """Trains a run for at most some minutes; returns whether that succeeded."""
+def start(run, minutes):
+    """Starts to train a run for at most some minutes."""
     words = ["--data", options.folder, "--out", options.folder / "runs" / run, "--threads", options.threads]
     words += ["--minutes", f"{minutes:.1f}", *RUNS[run]]
-    line = [installed(".venv-train"), "-m", "lab.train.train", *words]
-    return subprocess.run(list(map(str, line))).returncode == 0
+    if options.seconds:
+        words += ["--seconds", options.seconds, "--steps", UNLIMITED]
+    line = [installed(".venv-train") or sys.executable, "-m", "lab.train.train", *words]
+    return subprocess.Popen(list(map(str, line)))
 
 
 def main():
     os.nice(19)
-    if not installed(".venv-train"):
-        raise SystemExit("training needs .venv-train; run it by scripts/lab.sh")
+    if not installed(".venv-train") and not importlib.util.find_spec("torch"):
+        raise SystemExit("training needs PyTorch; scripts/setup.sh train installs it")
     unknown = [run for run in options.runs if run not in RUNS]
     if unknown:
         raise SystemExit(f"--runs {unknown[0]} is not one of {', '.join(RUNS)}")
     end, failed = time.monotonic() + 3600 * options.hours, set()
     while time.monotonic() < end:
         runs = [run for run in options.runs if run not in failed and trainable(run)]
-        for run in runs:
-            if not train(run, max(min(TURN, (end - time.monotonic()) / 60), 0.1)):
-                failed.add(run)
         if not runs:
             break
+        for group in [runs] if options.together else [[run] for run in runs]:
+            left = (end - time.monotonic()) / 60
+            minutes = max(left if options.together else min(TURN, left), 0.1)
+            started = {run: start(run, minutes) for run in group}
+            failed |= {run for run, process in started.items() if process.wait() != 0}
     for run in options.runs:
         print(f"{run:14}{'failed; ' if run in failed else ''}{json.dumps(last_line(run))}")
     return 1 if failed else 0

@@ -24,13 +24,12 @@ def main():
     os.nice(19)
     maker = data.Maker(options.folder, BIN)
     chosen = [view for view in data.views(options.folder, options.views) if options.only in (None, view.family)]
-    # The deep combiner is a baseline, so its pictures come last.
-    for finished, make in ((False, maker.make), (True, maker.add_independent)):
-        for view in chosen:
-            if (view.name in data.manifest(options.folder)) != finished:
-                continue
-            try:
-                make(view)
-                print(f"{view.name}: done", flush=True)
-            except Failed as failed:
-                print(f"{view.name}: {failed}", flush=True)
+    done = data.manifest(options.folder)
+    for view in chosen:
+        if view.name in done:
+            continue
+        try:
+            maker.make(view)
+            print(f"{view.name}: done", flush=True)
+        except Failed as failed:
+            print(f"{view.name}: {failed}", flush=True)

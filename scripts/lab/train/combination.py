@@ -2,8 +2,8 @@
 
 out_c = 1/W sum_j sum_{i in window of c} w_i^j (y_i^j + z_c^j - z_i^j)
 
-In equation (6) all y^j are level 1, and z^j is level j + 1. On the CPU, the sums and their derivatives are compiled
-from equation6.cpp; on a GPU, and in tests, `reference_*` compute them by torch's own derivatives.
+In equation (6) all y^j are level 1, and z^j is level j + 1. The sums and their derivatives are compiled from
+equation6.cpp, or from equation6.cu for a GPU; tests compare them with `reference_*`, which torch differentiates.
 """
 
 import ctypes
@@ -19,9 +19,12 @@ from torch.nn.functional import pad
 
 from ..cache import HOME
 
-SOURCE = Path(__file__).with_name("equation6.cpp")
-COMPILE = ["c++", "-std=c++20", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math"]
-COMPILE += ["-fopenmp", "-shared", "-fPIC"]
+# Sources and how they are compiled, by the kind of device.
+OPTIMISED = ["-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-fopenmp", "-fPIC"]
+SOURCES = {
+    "cpu": ("equation6.cpp", ["c++", "-std=c++20", "-shared", *OPTIMISED]),
+    "cuda": ("equation6.cu", ["nvcc", "-std=c++20", "-shared", "-O3", "-arch=native", "-Xcompiler", "-fPIC"]),
+}
 
 # Largest exponent of an affinity, and bounds of the logarithms: they keep every weight positive in float32.
 MAX_DISTANCE = 60.0
@@ -65,12 +68,11 @@ def pair_sums(output, y, z, form):
     for group, dilation in zip(groups, form.dilations):
         if form.kind == "features":
             phi, source, falloff, centre = split_features(group, pairs, form.features)
-            add = reference_affinity if group.is_cuda else AffinitySums.apply
-            total, sums = add(phi, source, falloff, difference, form.window, dilation)
+            total, sums = AffinitySums.apply(phi, source, falloff, difference, form.window, dilation)
             total, sums = total * centre, sums * centre.unsqueeze(2)
         else:
-            add = reference_kernel if group.is_cuda else KernelSums.apply
-            total, sums = add(group.unflatten(1, (pairs, form.window**2)), difference, form.window, dilation)
+            kernels = group.unflatten(1, (pairs, form.window**2))
+            total, sums = KernelSums.apply(kernels, difference, form.window, dilation)
         weights.append(total)
         # The sums contain the weighted y_i - z_i; z_c is added with the total weight of its pair.
         values.append(sums + z * total.unsqueeze(2))
@@ -124,25 +126,34 @@ def shifted(x, dy, dx, r):
 
 
 @functools.cache
-def library():
-    """equation6.cpp as a library, compiled into the cache at the first use by this processor."""
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    cpu = "".join(sorted({line for line in lines if line.startswith(("model name", "flags"))}))
-    key = hashlib.sha256(SOURCE.read_bytes() + f"{COMPILE}{cpu}".encode()).hexdigest()[:16]
+def library(kind):
+    """The compiled source for the CPU or a GPU, from the cache if it was compiled on such a processor before."""
+    name, compiler = SOURCES[kind]
+    source = Path(__file__).with_name(name)
+    key = hashlib.sha256(source.read_bytes() + f"{compiler}{processor(kind)}".encode()).hexdigest()[:16]
     path = HOME / "caustique" / f"equation6-{key}.so"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         draft = path.with_suffix(f".{os.getpid()}.part")
-        subprocess.run([*COMPILE, SOURCE, "-o", draft], check=True)
+        subprocess.run([*compiler, source, "-o", draft], check=True)
         draft.rename(path)
     return ctypes.CDLL(str(path))
 
 
+def processor(kind):
+    """A text that differs between processors for which compilers make different code."""
+    if kind == "cuda":
+        return torch.cuda.get_device_name()
+    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    return "".join(sorted({line for line in lines if line.startswith(("model name", "flags"))}))
+
+
 def call(name, shape, *tensors):
-    """Calls a function of the library for contiguous tensors of one type."""
-    suffix = {torch.float32: "f32", torch.float64: "f64"}[tensors[0].dtype]
-    sizes = (ctypes.c_long * 7)(*shape, torch.get_num_threads())
-    getattr(library(), f"{name}_{suffix}")(sizes, *(ctypes.c_void_p(x.data_ptr()) for x in tensors))
+    """Calls a function of the library for contiguous tensors of one type on one device."""
+    suffix, kind = {torch.float32: "f32", torch.float64: "f64"}[tensors[0].dtype], tensors[0].device.type
+    last = torch.cuda.current_stream().cuda_stream if kind == "cuda" else torch.get_num_threads()
+    sizes = (ctypes.c_long * 7)(*shape, last)
+    getattr(library(kind), f"{name}_{suffix}")(sizes, *(ctypes.c_void_p(x.data_ptr()) for x in tensors))
 
 
 class AffinitySums(torch.autograd.Function):

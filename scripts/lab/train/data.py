@@ -3,10 +3,9 @@
 A view is a random scene of a family (families/) or a scene of scenes/, and for each method a window of SIDE x SIDE
 pixels of a picture of random width. Its folder has, for each method,
 
-  METHOD-seedN.npz   arrays by snapshot (ITERATIONS): levels, deviations, quarters, parts, finished, radius, albedo,
+  METHOD-seedN.npz   arrays by snapshot (of ITERATIONS): levels, deviations, quarters, parts, finished, radius, albedo,
                      normal, depth
-  METHOD-bdptN.npz   for sppm, the same snapshots of bdpt: picture, quarters, deviation; for the deep combiner,
-                     and added after all views have the other files
+  sppm-bdpt2.npz     the same snapshots by bdpt, for the deep combiner: picture, quarters, deviation
   METHOD-target.npz  `halves`: two independent pictures without bias (bdpt), or with a bandwidth of less than a pixel
                      (vcm), where mirrors or glass show caustics
 
@@ -33,8 +32,12 @@ from ..record import ROOT
 
 SIDE = 128
 ITERATIONS = (8, 16, 32, 64, 128)
+# Two of three views for training stop after 32 iterations, so that the same time renders 1.7 times as many views.
+SHORT, LONG_SHARE = 3, 1 / 3
 # Camera paths per pixel of the noisy stacks, by seed: the paper has two; one takes 0.6 times as long.
 PATHS = {1: 2, 2: 1}
+# Seed of the stack by sppm that the deep combiner reads.
+DEEP_SEED = 2
 LEVELS = 5
 # Additive parts, in the order in which the arrays hold them.
 PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
@@ -60,6 +63,8 @@ class View:
         self.name = f"{family}-{index}"
         self.folder = folder / "views" / self.name
         self.held_out = scene is not None or family in families.HELD_OUT
+        long = self.held_out or self.rng("iterations").random() < LONG_SHARE
+        self.iterations = ITERATIONS if long else ITERATIONS[:SHORT]
 
     def rng(self, *words):
         """A random generator of the view."""
@@ -121,22 +126,10 @@ class Maker:
                 if not (view.folder / f"{method}-seed{seed}.npz").exists():
                     self.stacks(view, note, method, seed, scene, work)
                     self.store(view, note)
-        self.finish(view, work)
-
-    def add_independent(self, view):
-        """Renders the pictures of bdpt that are missing of a finished view."""
-        wanted = [(seed, view.folder / independent_file("sppm", seed)) for seed in PATHS]
-        if all(file.exists() for _, file in wanted):
-            return
-        work, note = view.folder / "work", load(view.folder / "view.json")
-        work.mkdir(exist_ok=True)
-        scene = view.scene or work / "scene.glb"
-        if not view.scene:
-            self.build(view, note["attempt"], scene)
-        for seed, file in wanted:
-            if not file.exists():
-                write(file, self.independent(note, seed, scene, work))
-                self.store(view, note)
+        deep = view.folder / independent_file("sppm", DEEP_SEED)
+        if not deep.exists():
+            write(deep, self.independent(view, note, DEEP_SEED, scene, work))
+            self.store(view, note)
         self.finish(view, work)
 
     def finish(self, view, work):
@@ -179,7 +172,9 @@ class Maker:
                 break
         else:
             raise Failed("all attempts are dark")
-        effects = json.loads(self.run(command("plan", scene, program=self.binary, json=True)))["effects"]
+        # With a method, the plan needs no pilot.
+        line = command("plan", scene, program=self.binary, json=True, method="vcm")
+        effects = json.loads(self.run(line))["effects"]
         simulated = {effect["name"]: effect["simulated"] for effect in effects}
         note = {
             "family": view.family,
@@ -221,10 +216,10 @@ class Maker:
         radii = note["radii"] if method == "sppm" else ["Radius"]
         settings = place(note, method) | {"method": method, "levels": LEVELS, "eye_paths": PATHS[seed], "seed": seed}
         settings["layers"], height = ",".join([*layers, *radii]), settings["height"]
-        arrays = self.snapshots(scene, work, settings, lambda picture: stack(picture, note, height, radii))
+        arrays = self.snapshots(view, scene, work, settings, lambda picture: stack(picture, note, height, radii))
         write(view.folder / f"{method}-seed{seed}.npz", arrays)
 
-    def independent(self, note, seed, scene, work):
+    def independent(self, view, note, seed, scene, work):
         """All snapshots of the window of sppm by bdpt."""
         settings = place(note, "sppm") | {
             "method": "bdpt",
@@ -234,18 +229,20 @@ class Maker:
         }
 
         arrays = lambda picture: independent_arrays(picture, note["exposure"])
-        return self.snapshots(scene, work, settings, arrays)
+        return self.snapshots(view, scene, work, settings, arrays)
 
-    def snapshots(self, scene, work, settings, arrays):
-        """Renders ITERATIONS, each continuing the one before; returns the arrays of all by name."""
+    def snapshots(self, view, scene, work, settings, arrays):
+        """Renders the iterations of a view, each continuing the one before; returns the arrays of all by name."""
         out, saved = work / "noisy.exr", work / "noisy.saved"
         saved.unlink(missing_ok=True)
         found = []
-        for iterations in ITERATIONS:
+        for iterations in view.iterations:
             resume = saved if found else None
             picture = self.render(scene, out, **settings, checkpoint=saved, iterations=iterations, resume=resume)
             found.append(arrays(picture))
-        return {key: np.stack([one[key] for one in found]) for key in found[0]} | {"iterations": np.array(ITERATIONS)}
+        return {key: np.stack([one[key] for one in found]) for key in found[0]} | {
+            "iterations": np.array(view.iterations)
+        }
 
 
 def sha256(path):
@@ -254,9 +251,9 @@ def sha256(path):
 
 
 def write(path, arrays):
-    """Writes arrays atomically."""
+    """Writes arrays atomically, and without compression, so that training can map them into memory."""
     draft = path.with_name("part-" + path.name)
-    np.savez_compressed(draft, **arrays)
+    np.savez(draft, **arrays)
     draft.rename(path)
 
 

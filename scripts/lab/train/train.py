@@ -21,7 +21,8 @@ from .evaluate import validate
 from .pairs import PAIRS
 
 DECAY = 0.999  # of the moving average of the weights, which is validated and exported
-SAVE_SECONDS, VALIDATE_SECONDS = 120, 1200
+# Seconds between checkpoints, most seconds between validations, and their least number in a run.
+SAVE_SECONDS, VALIDATE_SECONDS, VALIDATIONS = 120, 1200, 4
 # Options that belong to a run and are stored with it.
 STORED = (
     "arch",
@@ -83,6 +84,9 @@ def arguments():
     )
     parser.add_argument("--minutes", type=float, default=60, help="minutes of this call")
     parser.add_argument("--steps", type=int, default=40_000, help="steps of the learning-rate schedule")
+    parser.add_argument(
+        "--seconds", type=float, default=math.inf, help="seconds of the schedule, if it ends before its steps"
+    )
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--side", type=int, default=64, help="pixels of a training crop's side")
     parser.add_argument("--squared", type=float, default=0.5, help="weight of the squared error in the loss, 0 to 1")
@@ -135,6 +139,7 @@ class Run:
             "steps": self.step,
             "schedule": self.args.steps,
             "seconds": self.seconds,
+            "finished": self.progress() == 1,
             "machines": self.machines,
             "data": f"{len({item[0] for item in views.files(self.args.data, False)})} views of {self.args.data.name}",
         }
@@ -150,13 +155,15 @@ class Run:
         with open(self.args.out / "log.jsonl", "a", encoding="utf-8") as log:
             log.write(json.dumps(line) + "\n")
 
+    def progress(self):
+        """The finished share of the schedule."""
+        return min(max(self.step / self.args.steps, self.seconds / self.args.seconds), 1)
+
     def train_step(self, pool):
         """One step. The learning rate is a cosine after a short warm-up. Random numbers depend on the step, so a
         resumed run does not repeat crops."""
         args = self.args
-        rate = (
-            args.rate * min(1, (self.step + 1) / 200) * (0.5 + 0.5 * math.cos(math.pi * min(self.step / args.steps, 1)))
-        )
+        rate = args.rate * min(1, (self.step + 1) / 200) * (0.5 + 0.5 * math.cos(math.pi * self.progress()))
         for group in self.optimiser.param_groups:
             group["lr"] = rate + 1e-6
         batch = pool.batch(np.random.default_rng([args.seed, self.step]), args.batch, args.side, self.net.version)
@@ -180,15 +187,16 @@ def main():
     run, pool = Run(args), views.Pool(args.data, args.methods, args.paths, args.pairs)
     before = run.seconds
     start = saved = time.monotonic()
-    reported = start - VALIDATE_SECONDS + 120
-    while run.step < args.steps and run.seconds - before < args.minutes * 60:
+    between = min(VALIDATE_SECONDS, args.seconds / VALIDATIONS)
+    reported = start - between + 120
+    while run.progress() < 1 and run.seconds - before < args.minutes * 60:
         run.train_step(pool)
         now = time.monotonic()
         run.seconds = before + now - start
         if now - saved > SAVE_SECONDS:
             run.save()
             saved = now
-        if now - reported > VALIDATE_SECONDS:
+        if now - reported > between:
             run.report()
             reported = now
     run.save()

@@ -1,5 +1,9 @@
-"""The rendered views (data.py) as training samples and as items for validation, in memory a few at a time."""
+"""The rendered views (data.py) as training samples and as items for validation, mapped into memory."""
 
+import functools
+import math
+import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +13,9 @@ from .data import PATHS, independent_file, manifest
 from .pairs import PAIRS
 
 # Arrays without a last axis of colour or direction; others have one.
-PLANAR = ("deviations", "pair_deviations", "radius", "depth")
+PLANAR = ("deviations", "deviation", "pair_deviations", "radius", "depth")
+# Stacks of which a pool keeps the files open.
+OPEN = 128
 # Arrays without radiance, and the one whose last axis is a direction.
 DIMENSIONLESS = ("radius", "depth", "albedo", "normal", "iterations")
 # Standard deviation of the logarithm of the random factor on radiance: exposures of crops differ from their pictures'.
@@ -32,22 +38,48 @@ def files(folder, held_out, methods=("sppm", "vcm"), paths=(1, 2), pairs="multi"
 def read(item):
     """The arrays of a noisy stack, by snapshot, and `halves` of its target."""
     folder, method, seed = item
-    with np.load(folder / f"{method}-seed{seed}.npz") as stored:
-        arrays = dict(stored)
-    with np.load(folder / f"{method}-target.npz") as stored:
-        arrays["halves"] = stored["halves"]
+    arrays = mapped(folder / f"{method}-seed{seed}.npz") | mapped(folder / f"{method}-target.npz")
     independent = folder / independent_file(method, seed)
     if independent.exists():
-        with np.load(independent) as stored:
-            arrays |= {f"bdpt_{key}": value for key, value in stored.items()}
+        arrays |= {f"bdpt_{key}": value for key, value in mapped(independent).items() if key != "iterations"}
     return arrays
 
 
-def snapshot(arrays, k, pairs="multi"):
-    """Snapshot k as a stack (normalise.py) in float32, with `halves`."""
-    stack = {key: value[k].astype(np.float32) for key, value in arrays.items() if key not in ("halves", "iterations")}
+def mapped(path):
+    """The arrays of an .npz file without compression, as memory maps, which processes share."""
+    found, memory = {}, np.memmap(path, np.uint8, "r")
+    with zipfile.ZipFile(path) as archive, open(path, "rb") as file:
+        for member in archive.infolist():
+            # The local header has 26 bytes, two lengths, the name and more; then follows the array with its own header.
+            file.seek(member.header_offset + 26)
+            lengths = np.frombuffer(file.read(4), "<u2")
+            file.seek(int(lengths.sum()), 1)
+            np.lib.format.read_magic(file)
+            shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+            name = member.filename.removesuffix(".npy")
+            found[name] = np.ndarray(shape, dtype, memory, file.tell())
+    return found
+
+
+def whole(arrays):
+    """Indices of all pixels of a picture."""
+    height, width = arrays["depth"].shape[-2:]
+    return slice(height), slice(width)
+
+
+def snapshot(arrays, k, pairs="multi", part=None):
+    """Snapshot k as a stack (normalise.py) in float32, with `halves`; of a part of the pixels (slices of rows and
+    columns) if given."""
+    rows, columns = part or whole(arrays)
+    stack = {}
+    for key, value in arrays.items():
+        if key == "iterations":
+            stack[key] = value[k]
+            continue
+        value = value if key == "halves" else value[k]
+        pixels = (..., rows, columns) if key.removeprefix("bdpt_") in PLANAR else (..., rows, columns, slice(None))
+        stack[key] = value[pixels].astype(np.float32)
     stack["depth"] = np.where(stack["depth"] >= 6e4, np.inf, stack["depth"])
-    stack |= {"halves": arrays["halves"].astype(np.float32), "iterations": arrays["iterations"][k]}
     if pairs.startswith("deep"):
         several = pairs == "deep-multi"
         stack["independent"] = stack["bdpt_quarters"] if several else stack["bdpt_picture"][None]
@@ -56,12 +88,17 @@ def snapshot(arrays, k, pairs="multi"):
     return {key: value for key, value in stack.items() if not key.startswith("bdpt_")}
 
 
-def augment(stack, rng, side):
-    """A random part, rotated and mirrored, with permuted colours and a random exposure. Permuting the axes of the
-    normal rotates or mirrors it."""
-    h, w = stack["depth"].shape
-    side = min(side, h, w)
-    y, x = rng.integers(h - side + 1), rng.integers(w - side + 1)
+def random_part(arrays, rng, side):
+    """Rows and columns of a random square."""
+    height, width = arrays["depth"].shape[-2:]
+    side = min(side, height, width)
+    y, x = rng.integers(height - side + 1), rng.integers(width - side + 1)
+    return slice(y, y + side), slice(x, x + side)
+
+
+def augment(stack, rng):
+    """A stack rotated and mirrored, with permuted colours and a random exposure. Permuting the axes of the normal
+    rotates or mirrors it."""
     turns, mirror, order = rng.integers(4), rng.random() < 0.5, rng.permutation(3)
     gain = np.float32(np.exp(rng.normal(0, EXPOSURE_SPREAD)))
     out = {"iterations": stack["iterations"]}
@@ -69,8 +106,7 @@ def augment(stack, rng, side):
         if key == "iterations":
             continue
         axes = (-2, -1) if key in PLANAR else (-3, -2)
-        cut = (..., slice(y, y + side), slice(x, x + side)) + (() if key in PLANAR else (slice(None),))
-        value = np.rot90(value[cut], turns, axes)
+        value = np.rot90(value, turns, axes)
         value = np.flip(value, axes[1]) if mirror else value
         value = value if key in PLANAR else value[..., order]
         out[key] = value if key in DIMENSIONLESS else value * gain
@@ -86,25 +122,23 @@ def sample(stack, pairs, version):
 
 
 class Pool:
-    """Some stacks in memory, of which each batch replaces a few; a part of the data that is finished later joins
-    then."""
+    """Random samples of all stacks; those that are finished later join within a minute."""
 
-    def __init__(self, folder, methods, paths, pairs, size=48):
-        self.folder, self.methods, self.paths, self.pairs, self.size = folder, methods, paths, pairs, size
-        self.loaded = []
+    def __init__(self, folder, methods, paths, pairs):
+        self.given, self.pairs = (folder, False, methods, paths, pairs), pairs
+        self.known, self.looked = [], -math.inf
+        self.read = functools.lru_cache(OPEN)(read)
 
     def batch(self, rng, count, side, version):
         """Arrays of `count` random samples."""
-        known = files(self.folder, False, self.methods, self.paths, self.pairs)
-        if not known:
-            raise SystemExit(f"{self.folder}: no views to train with; render some with scripts/lab.sh training_data")
-        wanted = 1 if len(self.loaded) >= min(self.size, len(known)) else 4
-        for _ in range(wanted):
-            self.loaded.append(read(known[rng.integers(len(known))]))
-        self.loaded = self.loaded[-self.size :]
+        if time.monotonic() - self.looked > 60:
+            self.known, self.looked = files(*self.given), time.monotonic()
+        if not self.known:
+            raise SystemExit(f"{self.given[0]}: no views to train with; render some with scripts/lab.sh training_data")
         chosen = []
         for _ in range(count):
-            arrays = self.loaded[rng.integers(len(self.loaded))]
-            stack = snapshot(arrays, rng.integers(len(arrays["iterations"])), self.pairs)
-            chosen.append(sample(augment(stack, rng, side), self.pairs, version))
+            arrays = self.read(self.known[rng.integers(len(self.known))])
+            part = random_part(arrays, rng, side)
+            stack = snapshot(arrays, rng.integers(len(arrays["iterations"])), self.pairs, part)
+            chosen.append(sample(augment(stack, rng), self.pairs, version))
         return [np.stack(part) for part in zip(*chosen)]
