@@ -25,6 +25,8 @@ mod generated;
 mod libraries;
 #[path = "cli/limits.rs"]
 mod limits;
+#[path = "cli/lobes.rs"]
+mod lobes;
 #[path = "cli/merge.rs"]
 mod merge;
 #[path = "cli/peers.rs"]

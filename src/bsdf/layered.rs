@@ -133,7 +133,7 @@ pub(super) struct ViewTerms {
     means: LobeWeights,
     /// Estimated albedos of five sets of lobes: facets with their compensation, diffuse reflection and transmission,
     /// straight, coat, sheen.
-    albedos: [Rgb; 5],
+    pub(super) albedos: [Rgb; 5],
 }
 
 impl ViewTerms {
@@ -347,6 +347,27 @@ impl<'a> Layered<'a> {
                 [(r + t) * (1.0 - view.loss), reflected_compensation, transmitted_compensation]
             }
         }
+    }
+
+    /// Estimated share of transmitted light in what the facets scatter, by channel.
+    pub(super) fn transmitted_share(&self, view: &ViewTerms) -> Rgb {
+        if !self.has_facets || self.glass == 0.0 {
+            return Rgb::ZERO;
+        }
+        let [single, reflected, across] = self.facet_albedos(view);
+        let transmitted = match self.rough_glass() {
+            Some(glass) => {
+                let loss = glass.loss_along(view.side, view.at, view.o);
+                let kept = 1.0 - loss - glass.reflected_along(view.side, view.at, view.o);
+                self.base * (kept.max(0.0) * self.glass)
+            }
+            None => {
+                let (_, transmitted, _) = self.fresnel(self.interface.effective_cosine(view.o.z), view.side);
+                transmitted * (1.0 - view.loss)
+            }
+        };
+        let all = single + reflected + across;
+        Rgb::select(all.cmpgt(Rgb::ZERO), ((transmitted + across) / all).min(Rgb::ONE), Rgb::ZERO)
     }
 
     /// Attenuates the estimated albedos in `view` by the cover, and adds those of the coat and the sheen.

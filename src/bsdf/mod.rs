@@ -11,6 +11,7 @@ mod fresnel;
 mod gathering;
 mod interface;
 mod layered;
+mod lobe_shares;
 mod microfacet;
 mod parameters;
 mod profile;

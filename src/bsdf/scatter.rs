@@ -104,7 +104,7 @@ impl Layered<'_> {
 
     /// Value of the BSDF (1/sr) for light transmitted diffusely from `o` (above) to `i` (below).
     #[inline]
-    fn evaluate_diffuse_transmission(&self, view: &ViewTerms, i: Vec3) -> Rgb {
+    pub(super) fn evaluate_diffuse_transmission(&self, view: &ViewTerms, i: Vec3) -> Rgb {
         let at_i = Position::new(-i.z);
         let f = self.diffuse_transmitted * (view.through * self.interface.through.at(at_i));
         let Some(c) = &self.interface.cover else { return f };

@@ -176,6 +176,29 @@ impl<'a> Shading<'a> {
         (first + f * second.z.abs(), if radiance { pdf + more } else { 0.5 * (pdf + more) })
     }
 
+    /// The part of [`Shading::evaluate_cos`] that diffuse lobes and sheen scatter.
+    pub(super) fn diffuse_cos(&self, wi: Vec3, transport: Transport) -> Rgb {
+        let Some((i, cos_ig)) = self.local(wi, transport) else { return Rgb::ZERO };
+        let (bsdf, radiance) = (&self.bsdf, transport == Transport::Radiance);
+        let cosine = if radiance { i.z.abs() } else { self.view.o.z };
+        let value = match self.relief(if radiance { wi } else { self.wo_world() }) {
+            None => bsdf.diffuse_value(1.0, &self.view, i) * cosine,
+            Some((relief, second)) => {
+                let first = bsdf.diffuse_value(relief.diffuse, &self.view, i) * cosine;
+                let mirrored = second.map_or(Rgb::ZERO, |second| {
+                    let value = if radiance {
+                        bsdf.diffuse_value(0.0, &self.view, second)
+                    } else {
+                        bsdf.diffuse_value(0.0, &bsdf.view_terms(second), i)
+                    };
+                    value * second.z.abs()
+                });
+                first + mirrored
+            }
+        };
+        if radiance { value } else { value * (cos_ig / self.cos_og) }
+    }
+
     /// The value of [`Shading::evaluate_cos`], the BSDF times the cosine, without its density.
     #[inline]
     pub fn eval_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> Rgb {

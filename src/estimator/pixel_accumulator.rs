@@ -6,7 +6,7 @@ use crate::photon::ByKind;
 use crate::random;
 use crate::stat::sum::Term;
 use crate::stat::{Grids, Moments, Sum, Total, variance_of_mean};
-use crate::transport::{Cause, MAX_LEVELS, PixelSample};
+use crate::transport::{Cause, LobeLayer, LobeLight, MAX_LEVELS, PixelSample};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
@@ -45,6 +45,13 @@ struct Quarter {
     count: u32,
 }
 
+/// Sums over iterations of a pixel's light by the lobe of the first hit, and of the albedos there.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct LobeSums {
+    light: [Sum<DVec3>; LobeLayer::ALL.len()],
+    colors: [DVec3; 3],
+}
+
 /// Statistics of one pixel over the iterations so far: sums and counts that do not depend on the order of iterations.
 /// Accumulators of disjoint iterations join to that of all ([`PixelAccumulator::join`]).
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -67,6 +74,8 @@ pub struct PixelAccumulator {
     /// For each light group (lights that the user has put on a layer of their own), the sums of its light and of its
     /// caustics.
     groups: Box<[[Sum<DVec3>; 2]]>,
+    /// Sums by the lobe of the first hit; `None` unless layers need them.
+    lobes: Option<Box<LobeSums>>,
     /// Sum over camera paths of the albedo in the G-buffer.
     albedo: DVec3,
     normal: DVec3,
@@ -123,21 +132,37 @@ impl PixelAccumulator {
         PixelAccumulator { groups: vec![[Sum::default(); 2]; groups].into_boxed_slice(), ..self }
     }
 
-    /// Memory in bytes of an accumulator with `levels` bandwidth levels and `groups` light groups.
-    pub fn bytes(levels: usize, groups: usize) -> usize {
+    /// Adds empty sums by the lobe of the first hit if `lobes` is true.
+    #[must_use]
+    pub fn with_lobes(self, lobes: bool) -> PixelAccumulator {
+        PixelAccumulator { lobes: lobes.then(Box::default), ..self }
+    }
+
+    /// Whether the accumulator has sums by the lobe of the first hit.
+    pub fn has_lobes(&self) -> bool {
+        self.lobes.is_some()
+    }
+
+    /// Memory in bytes of an accumulator with `levels` bandwidth levels and `groups` light groups, and with sums by the
+    /// lobe of the first hit if `lobes` is true.
+    pub fn bytes(levels: usize, groups: usize, lobes: bool) -> usize {
         size_of::<PixelAccumulator>()
             + PixelAccumulator::others(levels) * size_of::<Moments>()
             + groups * size_of::<[Sum<DVec3>; 2]>()
+            + if lobes { size_of::<LobeSums>() } else { 0 }
     }
 
     /// Memory of this accumulator in bytes.
     pub fn size(&self) -> usize {
-        PixelAccumulator::bytes(self.levels(), self.groups.len())
+        PixelAccumulator::bytes(self.levels(), self.groups.len(), self.lobes.is_some())
     }
 
-    /// Whether the accumulator has sums for exactly `levels` bandwidth levels and `groups` light groups.
-    pub fn holds(&self, levels: usize, groups: usize) -> bool {
-        self.others.len() == PixelAccumulator::others(levels) && self.groups.len() == groups
+    /// Whether the accumulator has sums for exactly `levels` bandwidth levels and `groups` light groups, and sums by the
+    /// lobe of the first hit exactly if `lobes` is true.
+    pub fn holds(&self, levels: usize, groups: usize, lobes: bool) -> bool {
+        self.others.len() == PixelAccumulator::others(levels)
+            && self.groups.len() == groups
+            && self.lobes.is_some() == lobes
     }
 
     /// Length of the field `others` for a number of bandwidth levels: all levels but one, plus one difference; 0 for
@@ -213,6 +238,19 @@ impl PixelAccumulator {
         self.groups[group].map(|sum| sum.value() / count)
     }
 
+    /// Mean over iterations of the light in a layer by the lobe of the first hit; zero if the pixel has no such sums.
+    pub fn lobe_light(&self, layer: LobeLayer) -> DVec3 {
+        let sum = self.lobes.as_ref().map_or(DVec3::ZERO, |lobes| lobes.light[layer as usize].value());
+        sum / f64::from(self.iterations.max(1))
+    }
+
+    /// Mean over iterations of the albedos of the diffuse, glossy and transmitting lobes at the first hit; zero if the
+    /// pixel has no such sums.
+    pub fn lobe_colors(&self) -> [DVec3; 3] {
+        let count = f64::from(self.iterations.max(1));
+        self.lobes.as_ref().map_or([DVec3::ZERO; 3], |lobes| lobes.colors.map(|sum| sum / count))
+    }
+
     /// Mean albedo over the camera paths with finite features; zero if there are none.
     pub fn albedo(&self) -> DVec3 {
         if self.features == 0 { DVec3::ZERO } else { self.albedo / f64::from(self.features) }
@@ -271,17 +309,17 @@ impl PixelAccumulator {
     /// levels come from `independent`.
     #[inline]
     pub fn add(&mut self, i: u64, independent: &PixelSample, correlated: Option<&PixelSample>) {
-        self.add_with_groups(i, independent, correlated, &[]);
+        self.add_with_groups(i, independent, correlated, (&[], None));
     }
 
-    /// Adds an iteration as [`PixelAccumulator::add`] does, and for each light group its light and the caustics in it,
-    /// at the picture level.
+    /// Adds an iteration as [`PixelAccumulator::add`] does, and at the picture level for each light group its light and
+    /// the caustics in it, and the light by the lobe of the first hit.
     pub fn add_with_groups(
         &mut self,
         i: u64,
         independent: &PixelSample,
         correlated: Option<&PixelSample>,
-        groups: &[[Rgb; 2]],
+        (groups, lobes): (&[[Rgb; 2]], Option<&LobeLight>),
     ) {
         let (count, own) = (self.levels(), self.picture_level());
         let mut values = [Rgb::ZERO; MAX_LEVELS];
@@ -301,7 +339,8 @@ impl PixelAccumulator {
         ];
         let difference = if count > 1 { self.difference_of(&values, independent, correlated) } else { Rgb::ZERO };
         let (mut most, mut finite) = (Rgb::ZERO, true);
-        for list in [&values[..count], &parts, &[difference], groups.as_flattened()] {
+        let by_lobe = lobes.map_or(&[][..], |lobes| &lobes.layers);
+        for list in [&values[..count], &parts, &[difference], groups.as_flattened(), by_lobe] {
             for value in list {
                 (most, finite) = (most.max(value.abs()), finite & value.is_finite());
             }
@@ -332,6 +371,14 @@ impl PixelAccumulator {
         }
         for (sum, light) in self.groups.as_flattened_mut().iter_mut().zip(groups.as_flattened()) {
             sum.add(light.as_dvec3(), rounding[0]);
+        }
+        if let Some((sums, lobes)) = self.lobes.as_mut().zip(lobes) {
+            for (sum, light) in sums.light.iter_mut().zip(lobes.layers) {
+                sum.add(light.as_dvec3(), rounding[0]);
+            }
+            for (sum, color) in sums.colors.iter_mut().zip(lobes.colors).filter(|(_, color)| color.is_finite()) {
+                *sum += on_fixed_grid(color);
+            }
         }
         std::iter::once(independent).chain(correlated).for_each(|sample| self.add_features(sample));
     }
@@ -397,6 +444,7 @@ impl PixelAccumulator {
         quarters
             .chain(&mut self.parts)
             .chain(self.groups.as_flattened_mut())
+            .chain(self.lobes.iter_mut().flat_map(|lobes| &mut lobes.light))
             .for_each(|sum| from.coarsen_values(sum, to));
         self.others.iter_mut().for_each(|moments| moments.coarsen(from, to));
     }
@@ -416,6 +464,10 @@ impl PixelAccumulator {
         self.parts.iter_mut().zip(&other.parts).for_each(|(own, other)| own.join(other));
         let groups = self.groups.as_flattened_mut().iter_mut();
         groups.zip(other.groups.as_flattened()).for_each(|(own, other)| own.join(other));
+        if let Some((own, other)) = self.lobes.as_mut().zip(other.lobes.as_ref()) {
+            own.light.iter_mut().zip(&other.light).for_each(|(own, other)| own.join(other));
+            own.colors.iter_mut().zip(other.colors).for_each(|(own, other)| *own += other);
+        }
         self.albedo += other.albedo;
         self.normal += other.normal;
         self.depth.join(&other.depth);

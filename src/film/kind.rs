@@ -1,6 +1,8 @@
 //! The table of layers. Names in files, `--layers`, `info`, merging, the finish, Blender's add-on, the USD converter and
 //! the page for compositors read it; `output.rs` computes the values.
 
+use crate::transport::LobeLayer;
+
 /// Prefix of the name of a layer with the light of one light group.
 pub const LIGHT_GROUP: &str = "LightGroup_";
 /// Prefix of the name of a layer with the caustics of one light group.
@@ -10,6 +12,22 @@ pub const COMBINED: &str = "Combined";
 
 /// Prefixes of the names of the cryptomatte layers of objects and of materials.
 pub const CRYPTOMATTES: [&str; 2] = ["CryptoObject", "CryptoMaterial"];
+
+/// Names of the layers of light by the lobe of the first hit, in the order in which they are finished.
+pub const LOBE_LAYERS: [(LobeLayer, &str); LobeLayer::ALL.len()] = [
+    (LobeLayer::Emit, "Emit"),
+    (LobeLayer::Environment, "Environment"),
+    (LobeLayer::VolumeDirect, "VolumeDirect"),
+    (LobeLayer::VolumeIndirect, "VolumeIndirect"),
+    (LobeLayer::TransmissionDirect, "TransmissionDirect"),
+    (LobeLayer::TransmissionIndirect, "TransmissionIndirect"),
+    (LobeLayer::GlossyDirect, "GlossyDirect"),
+    (LobeLayer::GlossyIndirect, "GlossyIndirect"),
+    (LobeLayer::DiffuseDirect, "DiffuseDirect"),
+    (LobeLayer::DiffuseIndirect, "DiffuseIndirect"),
+];
+/// Names of the layers with the albedos of the diffuse, glossy and transmitting lobes at the first hit.
+pub const LOBE_COLORS: [&str; 3] = ["DiffuseColor", "GlossyColor", "TransmissionColor"];
 
 /// Name of the layer with motion vectors.
 pub const MOTION: &str = "Motion";
@@ -118,6 +136,18 @@ impl LayerKind {
         LayerKind { suffix: Suffix::Group, ..LayerKind::part(name, meaning, finished) }
     }
 
+    /// The kind of light by the lobe of the first hit, which is written only on request.
+    const fn of_lobe(layer: usize, meaning: &'static str, finished: &'static str) -> LayerKind {
+        let (_, name) = LOBE_LAYERS[layer];
+        LayerKind { on_request: true, switch: None, ..LayerKind::part(name, meaning, finished) }
+    }
+
+    /// The kind of the albedo of lobes at the first hit, which is written only on request.
+    const fn color(index: usize, blender: &'static str, meaning: &'static str) -> LayerKind {
+        let (name, blender) = (LOBE_COLORS[index], Some(blender));
+        LayerKind { name, unit: "1", meaning, half: true, on_request: true, blender, ..LayerKind::COLOUR }
+    }
+
     /// The kind of photon-gathering bandwidths, one layer for each bandwidth level.
     const fn radius(name: &'static str, meaning: &'static str) -> LayerKind {
         let (suffix, merge) = (Suffix::Level, Merge::First);
@@ -199,6 +229,59 @@ pub static LAYERS: &[LayerKind] = &[
         "light after several bounces, and what shine, coats and rough metal show, caustics excepted",
         "Indirect as finished",
     ),
+    LayerKind::of_lobe(
+        0,
+        "lights with a surface that the camera sees directly; only if asked for by name",
+        "Emit as finished",
+    ),
+    LayerKind::of_lobe(
+        1,
+        "environment and suns that the camera sees directly; only if asked for by name",
+        "Environment as finished",
+    ),
+    LayerKind::of_lobe(
+        2,
+        "light of lights that a medium scatters to the camera; only if asked for by name",
+        "VolumeDirect as finished",
+    ),
+    LayerKind::of_lobe(
+        3,
+        "other light that a medium scatters to the camera; only if asked for by name",
+        "VolumeIndirect as finished",
+    ),
+    LayerKind::of_lobe(
+        4,
+        "light of lights that the first hit transmits to the camera; only if asked for by name",
+        "TransmissionDirect as finished",
+    ),
+    LayerKind::of_lobe(
+        5,
+        "other light that the first hit transmits to the camera; only if asked for by name",
+        "TransmissionIndirect as finished",
+    ),
+    LayerKind::of_lobe(
+        6,
+        "light of lights that mirrors and gloss at the first hit reflect to the camera; only if asked for by name",
+        "GlossyDirect as finished",
+    ),
+    LayerKind::of_lobe(
+        7,
+        "other light that mirrors and gloss at the first hit reflect to the camera; only if asked for by name",
+        "GlossyIndirect as finished",
+    ),
+    LayerKind::of_lobe(
+        8,
+        "light of lights that the first hit scatters diffusely to the camera; only if asked for by name",
+        "DiffuseDirect as finished",
+    ),
+    LayerKind::of_lobe(
+        9,
+        "other light that the first hit scatters diffusely to the camera; only if asked for by name",
+        "DiffuseIndirect as finished",
+    ),
+    LayerKind::color(0, "DiffCol", "albedo of the diffuse lobes at the first hit; only if asked for by name"),
+    LayerKind::color(1, "GlossCol", "albedo of mirrors and gloss at the first hit; only if asked for by name"),
+    LayerKind::color(2, "TransCol", "albedo of transmission at the first hit; only if asked for by name"),
     LayerKind::of_group(LIGHT_GROUP, "light of one group of lights", "light of one group of lights, finished"),
     LayerKind::of_group(CAUSTIC, "caustics of one group of lights", "caustics of one group of lights, finished"),
     LayerKind {
@@ -325,10 +408,17 @@ pub fn kind_of(name: &str) -> Option<(&'static LayerKind, bool)> {
     finished.map(|kind| (kind, true)).or_else(|| Some((is(name)?, false)))
 }
 
-/// Names of the layers with additive parts of the picture, in the order in which they are finished.
+/// Names of the layers with additive parts of the picture that every render has, in the order in which they are finished.
 pub fn part_names() -> impl Iterator<Item = &'static str> {
-    let is_part = |kind: &&LayerKind| matches!(kind.finish, Some(Use::Part(_))) && kind.suffix == Suffix::None;
+    let is_part = |kind: &&LayerKind| {
+        matches!(kind.finish, Some(Use::Part(_))) && kind.suffix == Suffix::None && !kind.on_request
+    };
     LAYERS.iter().filter(is_part).map(|kind| kind.name)
+}
+
+/// Names of the layers with the light by the lobe of the first hit, in the order in which they are finished.
+pub fn lobe_names() -> impl Iterator<Item = &'static str> {
+    LOBE_LAYERS.iter().map(|(_, name)| *name)
 }
 
 /// Name of the finished part of the layer `name`; `None` if the layer is not an additive part.

@@ -11,7 +11,7 @@ mod selection;
 pub use cryptomatte::ascii_json;
 pub use kind::{
     CAUSTIC, COMBINED, CRYPTOMATTES, LIGHT_GROUP, LayerDescription, MOTION, describe, finished_part, kind_of,
-    part_names,
+    lobe_names, part_names,
 };
 pub use layers::{Layer, LayerSet, Plane, Role, Sample};
 pub use naming::{Naming, check_names, take_plain_names};

@@ -10,7 +10,7 @@
 //! - `depth` is the mean over the camera paths that have a first rough hit, and 1e10 if none has; `albedo` and `normal`
 //!   are zero then.
 
-use super::kind::{CAUSTIC, LIGHT_GROUP, kind_of};
+use super::kind::{CAUSTIC, LIGHT_GROUP, LOBE_COLORS, LOBE_LAYERS, kind_of};
 use super::layers::{Layer, LayerSet, Plane, Sample};
 use crate::error::Result;
 use crate::estimator::{BandwidthState, FAR, Parts, PixelAccumulator, QUARTERS, SquaredError, variance_ratio};
@@ -44,6 +44,8 @@ pub struct Shape {
     pub volume: bool,
     /// Whether photons are gathered in media.
     pub volume_photons: bool,
+    /// Whether the light is recorded by the lobe of the first hit.
+    pub lobes: bool,
     /// Names of the light groups that have layers.
     pub groups: Vec<String>,
 }
@@ -186,6 +188,12 @@ fn part_columns(shape: &Shape) -> Vec<Column> {
             columns.push(Column::rgb(format!("{CAUSTIC}{name}"), move |p| p.group(group)[1]));
         }
     }
+    if shape.lobes {
+        let light = |(layer, name): (_, &'static str)| Column::rgb(name, move |p| p.lobe_light(layer));
+        columns.extend(LOBE_LAYERS.map(light));
+        let color = |(lobe, name)| Column::rgb(name, move |p: &PixelAccumulator| p.lobe_colors()[lobe]);
+        columns.extend(LOBE_COLORS.into_iter().enumerate().map(color));
+    }
     columns
 }
 
@@ -269,6 +277,7 @@ mod tests {
             classes: ClassSet::ALL,
             volume: true,
             volume_photons: true,
+            lobes: true,
             groups: vec!["key".into()],
         }
     }

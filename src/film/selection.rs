@@ -1,13 +1,15 @@
 //! The layers that `--layers` selects.
 
-use super::kind::{LAYERS, LayerKind, MOTION, Suffix, Use, describe, finished_part, kind_of, part_names, stem};
+use super::kind::{
+    LAYERS, LOBE_COLORS, LayerKind, MOTION, Suffix, Use, describe, finished_part, kind_of, lobe_names, part_names, stem,
+};
 use super::layers::{Layer, LayerSet, Sample};
 use crate::error::{Error, ErrorKind, Result};
 
 /// The layers to write, the value of `--layers`.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub enum Selection {
-    /// Every layer except `Motion` and `Quarter1` to `Quarter4`.
+    /// Every layer except those on request, such as `Motion` and `DiffuseDirect`.
     #[default]
     All,
     /// The beauty alone.
@@ -16,7 +18,7 @@ pub enum Selection {
     /// suffice.
     Comp,
     /// Layers by name; `beauty` is the beauty, `Level` selects `Level1`, `Level2`, ..., and `all` and `comp` select what
-    /// they select alone.
+    /// they select alone. `lobes` selects all layers by the lobe of the first hit.
     List(Vec<String>),
     /// A selection, and the layers that the temporal finish of the picture and of its finished parts needs.
     Temporal(Box<Selection>),
@@ -39,7 +41,7 @@ impl Selection {
             return Err(Error::new(ErrorKind::Usage, "--layers", "no layer is named")
                 .hint("give all, comp, beauty, or names such as beauty,Noisy,albedo"));
         }
-        let is_known = |name: &str| ["all", "comp", "beauty"].contains(&name) || describe(name).is_some();
+        let is_known = |name: &str| ["all", "comp", "beauty", LOBES].contains(&name) || describe(name).is_some();
         match names.iter().find(|name| !is_known(name)) {
             Some(unknown) => {
                 let known = suggestions();
@@ -60,17 +62,26 @@ impl Selection {
                 "all" => Selection::All.wants(name),
                 "comp" => Selection::Comp.wants(name),
                 "beauty" => name.is_empty(),
+                LOBES => is_of_lobe(name),
                 n => n == name || (!stem.is_empty() && n == stem),
             }),
             Selection::Temporal(chosen) => {
                 // Parts are finished together, because they sum to the picture.
                 let any_part = || part_names().filter_map(finished_part).any(|part| chosen.wants(&part));
-                let part = || finished_part(name).is_some_and(|part| chosen.wants(&part) || any_part());
+                let any_lobe = || lobe_names().filter_map(finished_part).any(|part| chosen.wants(&part));
+                let any = || if is_of_lobe(name) { any_lobe() } else { any_part() };
+                let part = || finished_part(name).is_some_and(|part| chosen.wants(&part) || any());
                 let read = |kind: &LayerKind| matches!(kind.finish, Some(Use::Picture | Use::Error));
                 let of_picture = || kind_of(name).is_some_and(|(kind, finished)| !finished && read(kind));
                 chosen.wants(name) || name.is_empty() || name == MOTION || of_picture() || part()
             }
         }
+    }
+
+    /// Whether any layer by the lobe of the first hit is selected.
+    pub fn wants_lobes(&self) -> bool {
+        let finished = || lobe_names().filter_map(finished_part).any(|name| self.wants(&name));
+        finished() || lobe_names().chain(LOBE_COLORS).any(|name| self.wants(name))
     }
 
     /// The user's selection, without layers that only the temporal finish needs.
@@ -118,6 +129,15 @@ impl Layer {
     }
 }
 
+/// Name that selects all layers by the lobe of the first hit.
+const LOBES: &str = "lobes";
+
+/// Whether a layer is one by the lobe of the first hit.
+fn is_of_lobe(name: &str) -> bool {
+    let lobe = |name: &str| LOBE_COLORS.contains(&name) || lobe_names().any(|lobe| lobe == name);
+    kind_of(name).is_some_and(|(kind, _)| lobe(kind.name))
+}
+
 /// Names of all layers, for suggestions; numbered layers by the first number, light groups left out.
 fn suggestions() -> Vec<String> {
     let first = |kind: &LayerKind| match kind.suffix {
@@ -127,7 +147,7 @@ fn suggestions() -> Vec<String> {
         Suffix::Ranks => Some(format!("{}00", kind.name)),
         Suffix::Group => None,
     };
-    LAYERS.iter().filter_map(first).chain(part_names().filter_map(finished_part)).collect()
+    LAYERS.iter().filter_map(first).chain(part_names().chain(lobe_names()).filter_map(finished_part)).collect()
 }
 
 fn unknown_layer<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Error {

@@ -31,7 +31,9 @@ pub use window::{Windows, window};
 use crate::combine::{Combiner, LevelStack};
 use crate::error::Result;
 use crate::film::kind::Use;
-use crate::film::{CAUSTIC, LIGHT_GROUP, Layer, LayerSet, Picture, Size, finished_part, kind_of, part_names};
+use crate::film::{
+    CAUSTIC, LIGHT_GROUP, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
+};
 use bound::Noise;
 use estimate::{alpha, own_level};
 use finished_error::ErrorEstimator;
@@ -270,6 +272,11 @@ impl Finish {
             let groups = with_rest(groups, &noise.estimate.mean);
             finished.extend(self.split(groups, picture, noise)?);
         }
+        // They sum to the picture only together. Other renderers have layers with some of these names.
+        let lobes = present(&mut lobe_names());
+        if lobes.len() == lobe_names().count() && any(&lobes) {
+            finished.extend(self.split(lobes, picture, noise)?);
+        }
         let whole = finished_part("Caustic").and_then(|name| finished.iter().find(|(part, _)| *part == name)).cloned();
         if let (true, Some((_, whole)), Some(mean)) = (any(&caustics), whole, set.picture("Caustic")) {
             let caustics = with_rest(caustics, &mean);
@@ -287,7 +294,7 @@ impl Finish {
         for (name, mean) in parts {
             of_part.mean = mean;
             // Directly visible lights are noisy at their edges only.
-            let denoised = if of_part.mean.is_black() || name == "CombinedEmission" {
+            let denoised = if of_part.mean.is_black() || ["CombinedEmission", "CombinedEmit"].contains(&&*name) {
                 of_part.mean.clone()
             } else {
                 // Parts are looked at less closely than the picture.

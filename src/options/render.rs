@@ -385,6 +385,7 @@ impl RenderOptions {
             counts: candidate.counts,
             photon_memory: self.photon_memory.map_or(DEFAULT_MAP_MEMORY, |mib| u64::from(mib) << 20),
             levels,
+            lobes: false,
             techniques: false,
             initial_bandwidth: self.initial_bandwidth(method, levels.count)?,
             max_initial_bandwidth: [SCREEN_CAP; 2],

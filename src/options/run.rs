@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 pub struct RunOptions {
     /// Layers of the EXR: 'all', 'comp' for compositing, 'beauty', or names separated by commas
     ///
-    /// 'comp' has the picture, its parts, albedo, normal, depth and cryptomattes, in half floats if these suffice
+    /// 'comp' has the picture, its parts, albedo, normal, depth and cryptomattes, in half floats if these suffice. 'lobes'
+    /// in a list stands for diffuse, glossy and transmitted light, direct and indirect, and their colours
     #[arg(long, value_name = "all|comp|beauty|LIST", default_value = "all", help_heading = "Output")]
     pub layers: String,
     /// Names of the EXR's channels: 'blender' writes the names of Blender's own renders

@@ -16,7 +16,7 @@ use std::io::{BufReader, Read, Write};
 use std::path::Path;
 
 /// The first bytes of every checkpoint of this version of the format.
-pub const MAGIC: &[u8; 23] = b"caustique checkpoint 6\n";
+pub const MAGIC: &[u8; 23] = b"caustique checkpoint 7\n";
 /// The first bytes of checkpoints in all versions of the format.
 const KIND: &[u8] = b"caustique checkpoint ";
 /// Number of pixels in a record, a separately compressed part of the file.

@@ -59,6 +59,7 @@ impl SceneFacts {
         let inside = |corner: u32, size: u32, whole: u32| corner.checked_add(size).is_some_and(|end| end <= whole);
         (*count, *own, *compared) == (levels.count, levels.picture_level(), part.settings.compared_levels())
             && (groups.is_empty() || method.has_techniques() && groups.len() <= MAX_GROUPS)
+            && self.shape.lobes == part.settings.lobes
             && inside(x, part.size.0, width.min(MAX_SIZE))
             && inside(y, part.size.1, height.min(MAX_SIZE))
             && self.motion.as_ref().is_none_or(|motion| motion.len() == part.size.0 as usize * part.size.1 as usize)

@@ -15,7 +15,7 @@ use crate::render::{
     sample_bytes,
 };
 use crate::scene::View;
-use crate::transport::{MergePhoton, Splat};
+use crate::transport::{FirstScatter, MergePhoton, Splat};
 use std::fmt::Display;
 use std::mem::size_of;
 
@@ -50,6 +50,8 @@ struct Extent {
     channels: usize,
     /// Number of light groups (lights with layers of their own).
     groups: usize,
+    /// Whether light is recorded by the lobe of the first hit.
+    lobes: bool,
     /// Mean number of photons that a light path stores.
     photons_per_path: f64,
 }
@@ -58,7 +60,8 @@ impl Extent {
     fn new(View { scene, camera }: View<'_>, settings: &Settings, channels: usize) -> Extent {
         let [film, whole] = camera.sizes();
         let groups = scene.lights.groups().names.len();
-        Extent { film, whole, channels, groups, photons_per_path: photons_per_path(scene, camera, settings) }
+        let (lobes, photons_per_path) = (settings.lobes, photons_per_path(scene, camera, settings));
+        Extent { film, whole, channels, groups, lobes, photons_per_path }
     }
 
     /// Bytes at the end of a render, when its pixels and its layers exist together.
@@ -89,12 +92,13 @@ impl Extent {
         let merged = if merges { (vertices * MERGED_BYTES as f64) as u64 } else { 0 };
         // On average a window receives one light path per pixel, as the whole picture does.
         let connects = method.walks_whole_picture() || method.search() == Search::ConnectionsAndMerging;
-        let splats = if connects { (vertices * SPLAT_BYTES as f64) as u64 } else { 0 };
+        let splat_bytes = SPLAT_BYTES + if self.lobes { 2 * size_of::<FirstScatter>() as u64 } else { 0 };
+        let splats = if connects { (vertices * splat_bytes as f64) as u64 } else { 0 };
         // An upper bound: most scenes leave some of the techniques without a picture.
         let techniques = if settings.techniques { MAX_TECHNIQUES as u64 * BYTES_PER_TECHNIQUE } else { 0 };
         bytes_of_bandwidths(settings)
             + techniques
-            + (PixelAccumulator::bytes(settings.levels.count, self.groups) + sample_bytes(settings)) as u64
+            + (PixelAccumulator::bytes(settings.levels.count, self.groups, self.lobes) + sample_bytes(settings)) as u64
             + (self.channels * size_of::<f32>()) as u64
             + merged
             + splats
@@ -123,10 +127,11 @@ fn bytes_of_bandwidths(settings: &Settings) -> u64 {
 }
 
 /// Bytes that a finish takes besides pixels and layers; the denoiser works in tiles if memory is short.
-fn finish_bytes(size: (u32, u32), groups: usize) -> u64 {
+fn finish_bytes(size: (u32, u32), groups: usize, lobes: bool) -> u64 {
     let pixels = pixels(size);
-    // The parts by effect, and for each light group its part and its caustics.
-    let parts = (film::part_names().count() + 2 * groups) as u64;
+    // The parts by effect and by lobe, and for each light group its part and its caustics.
+    let lobes = if lobes { film::lobe_names().count() } else { 0 };
+    let parts = (film::part_names().count() + lobes + 2 * groups) as u64;
     FINISH_BYTES + pixels * (BYTES_PER_PIXEL + parts * BYTES_PER_PIXEL_OF_PART) + scratch(pixels)
 }
 
@@ -200,7 +205,7 @@ impl MemoryCheck<'_> {
             Some(limit) => limit.fit(extent, settings, self.method)?,
             None => (settings, None),
         };
-        let finish = if self.finishes { finish_bytes(extent.film, extent.groups) } else { 0 };
+        let finish = if self.finishes { finish_bytes(extent.film, extent.groups, extent.lobes) } else { 0 };
         let needed = extent.bytes(&settings) + finish;
         let (paths, remedy) = self.describe(&settings);
         let (width, height) = extent.film;
@@ -243,15 +248,18 @@ mod tests {
     use crate::render::Method;
 
     fn extent(film: (u32, u32), whole: (u32, u32)) -> Extent {
-        Extent { film, whole, channels: 93, groups: 0, photons_per_path: 2.5 }
+        Extent { film, whole, channels: 93, groups: 0, lobes: false, photons_per_path: 2.5 }
     }
 
     #[test]
     fn a_finish_needs_memory_for_its_pixels_and_parts() {
-        let [small, large] = [(320, 180), (1920, 1080)].map(|size| finish_bytes(size, 0) - FINISH_BYTES);
+        let [small, large] = [(320, 180), (1920, 1080)].map(|size| finish_bytes(size, 0, false) - FINISH_BYTES);
         assert!(large > 20 * small && large < 36 * small, "{small} {large}");
-        assert_eq!(finish_bytes((320, 180), 3), finish_bytes((320, 180), 0) + 320 * 180 * 6 * BYTES_PER_PIXEL_OF_PART);
-        assert!(finish_bytes((1 << 16, 1 << 16), 1000) > 1 << 40);
+        assert_eq!(
+            finish_bytes((320, 180), 3, false),
+            finish_bytes((320, 180), 0, false) + 320 * 180 * 6 * BYTES_PER_PIXEL_OF_PART
+        );
+        assert!(finish_bytes((1 << 16, 1 << 16), 1000, true) > 1 << 40);
     }
 
     #[test]

@@ -50,7 +50,7 @@ pub use worst::{Place, Tile, Worst};
 
 use crate::error::Result;
 use crate::film::MOTION;
-use crate::render::{Motion, RenderInput, Rendered};
+use crate::render::{Motion, RenderInput, Rendered, Settings};
 use crate::scene::View;
 use check::Checked;
 use motion::{MovingScene, few_moments};
@@ -75,7 +75,10 @@ pub fn render(mut request: Request<'_>, observer: &mut dyn Observer) -> Result<D
 ///
 /// # Errors
 /// Errors of [`render`].
-pub fn render_loaded(mut request: Request<'_>, loaded: &Loaded, observer: &mut dyn Observer) -> Result<Delivery> {
+pub fn render_loaded(request: Request<'_>, loaded: &Loaded, observer: &mut dyn Observer) -> Result<Delivery> {
+    let lobes = request.layers.wants_lobes();
+    let method = request.picture.method.map_settings(move |settings| Settings { lobes, ..settings });
+    let mut request = Request { picture: PictureRequest { method, ..request.picture }, ..request };
     observer.accept(&loaded.scene)?;
     let Checked { camera, settings } = check::check(&request, &loaded.scene)?;
     let view = View::new(&loaded.scene, &camera);

@@ -34,6 +34,7 @@ pub(super) fn motion_vectors(
     let camera = camera.without_lens();
     let interior = InitialMedia::of(scene, &camera).camera;
     let camera_paths = CameraPaths {
+        lobes: false,
         scene,
         camera: &camera,
         interior,

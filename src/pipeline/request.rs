@@ -43,6 +43,18 @@ impl<'a> MethodRequest<'a> {
         }
     }
 
+    /// The request with changed settings of the named method, or of every candidate of `auto`.
+    pub(super) fn map_settings(self, change: impl Fn(Settings) -> Settings + 'a) -> MethodRequest<'a> {
+        match self {
+            MethodRequest::Named(settings) => MethodRequest::Named(change(settings)),
+            MethodRequest::Auto(auto) => {
+                let (settings_of, fallback) = (auto.settings_of, change(auto.fallback));
+                let settings_of = Box::new(move |candidate, size| settings_of(candidate, size).map(&change));
+                MethodRequest::Auto(AutoRequest { fallback, settings_of })
+            }
+        }
+    }
+
     /// Settings for the checks that precede the choice of a method.
     pub fn settings(&self) -> &Settings {
         match self {

@@ -104,6 +104,12 @@ fn resume<'a>(
     observer.event(Event::Resumed(state.iterations()));
     let path = request.resume.as_deref().unwrap_or("".as_ref());
     let other = || Error::new(ErrorKind::Usage, path.display(), "is of a picture of another size or method");
+    let unrecorded = || {
+        let cause = "does not hold the light by the lobe of the first hit, which --layers asks for";
+        Error::new(ErrorKind::Usage, path.display(), cause)
+            .hint("leave DiffuseDirect and the like out of --layers, or start anew without --resume")
+    };
+    let state = state.with_lobes(stage.settings().lobes).ok_or_else(unrecorded)?;
     Session::resume(stage, state).ok_or_else(other)
 }
 

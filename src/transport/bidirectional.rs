@@ -8,6 +8,7 @@
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
 use super::initial_media::InitialMedia;
+use super::lobe_layers::FirstScatter;
 use super::mis::{Eta, Merges, Ratios, one_merge};
 use crate::light::Group;
 use crate::math::{Rgb, Vec3};
@@ -216,6 +217,19 @@ pub enum Technique {
 }
 
 impl Technique {
+    /// Whether the path has a single scattering event between camera and light.
+    #[inline]
+    pub fn is_direct(self) -> bool {
+        let segments = match self {
+            Technique::Hit { camera } => camera,
+            Technique::NextEvent { camera } => camera + 1,
+            Technique::Connect { light, camera } => light + camera + 1,
+            Technique::Camera { light } => light + 1,
+            Technique::Merge { light, camera } => light + camera,
+        };
+        segments == 2
+    }
+
     /// The cause to report if a contribution of the technique is not finite.
     pub(super) fn cause(self) -> Cause {
         match self {
@@ -226,6 +240,17 @@ impl Technique {
             Technique::Merge { .. } => Cause::Photons,
         }
     }
+}
+
+/// The kind of a path that brings light to a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct PathKind {
+    /// Class of the path: the kinds of its bounces.
+    pub class: PathClass,
+    /// Light group of the light that the path starts from.
+    pub group: Group,
+    /// How the first vertex seen from the camera scatters the light. Not known unless [`CameraPaths::lobes`] is set.
+    pub first: FirstScatter,
 }
 
 /// Observes the contributions of paths, for pictures per technique and for tests. `()` costs nothing.
@@ -244,11 +269,18 @@ pub trait PathRecorder {
         let _ = survival;
     }
 
-    /// `technique` adds light to the camera path's own pixel at `level`: its class and light group, `value` with
-    /// visibility and kernel but without weight, and the weight. Depths count from 1, also for light from infinity.
+    /// `technique` adds light to the camera path's own pixel at `level`: the kind of the path, `value` with visibility and
+    /// kernel but without weight, and the weight. Depths count from 1, also for light from infinity.
     #[inline]
-    fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
+    fn arrival(&mut self, technique: Technique, of: PathKind, level: usize, value: Rgb, weight: f32) {
         let _ = (technique, of, level, value, weight);
+    }
+
+    /// The camera path hits a surface first, whose diffuse, glossy and transmitting lobes have these albedos. Not called
+    /// unless [`CameraPaths::lobes`] is set.
+    #[inline]
+    fn first_surface(&mut self, colors: [Rgb; 3]) {
+        let _ = colors;
     }
 }
 

@@ -1,10 +1,11 @@
 //! Camera paths of the bidirectional methods, given a light path and the photons of the previous iteration.
 
-use super::bidirectional::{Bidirectional, MergeLevels, PathRecorder, Technique};
+use super::bidirectional::{Bidirectional, MergeLevels, PathKind, PathRecorder, Technique};
 use super::bidirectional_light::{add, scatter};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
 use super::light_vertex::LightVertex;
+use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
 use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
@@ -48,6 +49,8 @@ struct CameraWalk<'a, R> {
     last: Receiver,
     /// Number of path segments up to the last vertex.
     depth: u32,
+    /// The first vertex, if light is recorded by its lobes.
+    lobes: Option<LobeHistory>,
     sample: &'a mut PixelSample,
     record: &'a mut R,
 }
@@ -113,15 +116,21 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         is_lit(light)
     }
 
+    /// How the first vertex scatters light that arrives at the current one, which scatters it by `here`.
     #[inline]
-    fn add(&mut self, technique: Technique, of: (PathClass, Group), value: Rgb, ratios: Ratios) {
+    fn first(&self, here: impl FnOnce() -> FirstScatter) -> FirstScatter {
+        self.lobes.map_or(FirstScatter::Emit, |lobes| lobes.arriving(here))
+    }
+
+    #[inline]
+    fn add(&mut self, technique: Technique, of: PathKind, value: Rgb, ratios: Ratios) {
         if !value.is_finite() {
             return self.sample.reject(technique.cause());
         }
         for (level, &eta) in self.context.levels.eta().iter().enumerate() {
             self.record.arrival(technique, of, level, value, ratios.weight(eta));
         }
-        add(self.sample, self.context.levels, of.0, value, ratios);
+        add(self.sample, self.context.levels, of.class, value, ratios);
     }
 
     /// Adds `value` from a light that the path has hit.
@@ -139,7 +148,9 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
             return;
         };
         self.record.contribution(Technique::Hit { camera: hit.depth }, value, hit.at, ratios);
-        self.add(Technique::Hit { camera: self.depth }, (class, group), value, ratios);
+        let seen = if density.infinite { FirstScatter::Environment } else { FirstScatter::Emit };
+        let first = self.first(|| seen);
+        self.add(Technique::Hit { camera: self.depth }, PathKind { class, group, first }, value, ratios);
     }
 
     #[inline]
@@ -179,13 +190,10 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
         let at = light.target.unwrap_or(light.wi);
         self.record.contribution(technique, value, at, ratios);
         let incident = Incident { wi: light.wi, transport: Transport::Radiance, f };
+        let (value, group) = (value * visibility.transmittance, scene.lights.group(light.light));
+        let first = self.first(|| vertex.first_scatter(light.wi, Transport::Radiance, LobeSet::ALL, f));
         for (class, share) in shares(vertex, halves, incident, classes).iter() {
-            self.add(
-                technique,
-                (class, scene.lights.group(light.light)),
-                value * visibility.transmittance * share,
-                ratios,
-            );
+            self.add(technique, PathKind { class, group, first }, value * share, ratios);
         }
     }
 
@@ -246,8 +254,10 @@ impl<R: PathRecorder> CameraWalk<'_, R> {
             f64::from(*connections),
         );
         self.record.contribution(technique, value, light.p(), ratios);
+        let (value, group) = (value * visibility.transmittance, light.group);
+        let first = self.first(|| vertex.first_scatter(d, Transport::Radiance, LobeSet::ALL, f_camera));
         for (class, share) in shares().iter() {
-            self.add(technique, (class, light.group), value * visibility.transmittance * share, ratios);
+            self.add(technique, PathKind { class, group, first }, value * share, ratios);
         }
     }
 
@@ -290,6 +300,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         let Bidirectional { camera_paths, techniques, .. } = self.shared;
         record_surface(&mut self.history, vertex, scattered, self.sample);
+        if scattered.is_none() && self.lobes.is_some() {
+            self.record.first_surface(vertex.shading.lobe_albedos());
+        }
         self.depth = vertex.depth;
         let cos = vertex.wo.dot(vertex.surface.ng).abs();
         self.mis = self.mis.arrive(self.distance2(vertex.distance, scattered), cos).fly(vertex.flight);
@@ -323,6 +336,7 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
                     joins: self.shared.joins(vertex.depth),
                     own: one_merge(self.history.delta),
                     suffix: self.history.suffix,
+                    lobes: self.lobes.as_ref(),
                     classes: camera_paths.classes,
                     longest: camera_paths.max_depth - vertex.depth,
                 };
@@ -367,6 +381,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         let merges = self.shared.techniques.camera_vertex_merge(vertex.depth, self.history.delta);
         let joins = self.shared.joins(vertex.depth);
+        if let Some(lobes) = &mut self.lobes {
+            lobes.scatter(|| FirstScatter::of_sample(vertex, sample, LobeSet::ALL));
+        }
         self.mis = scatter(self.mis, vertex, sample, Transport::Importance, joins, merges);
         self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
@@ -395,6 +412,9 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
     #[inline]
     fn scatter_medium(&mut self, vertex: &MediumVertex, sample: &BsdfSample) {
         let joins = self.shared.joins(vertex.depth);
+        if let Some(lobes) = &mut self.lobes {
+            lobes.scatter(|| FirstScatter::Medium);
+        }
         self.mis = self.mis.scatter(1.0, sample.pdf_w, sample.pdf_w, joins, Merges::ZERO);
         self.record.continues(|chance| vertex.survival_chosen(LobeSet::ALL, chance));
     }
@@ -436,6 +456,7 @@ impl Bidirectional<'_> {
             history: PathHistory::START,
             last: Receiver::anywhere(start.origin),
             depth: 0,
+            lobes: camera_paths.lobes.then(LobeHistory::default),
             sample,
             record,
         };

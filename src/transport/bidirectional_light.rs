@@ -4,6 +4,7 @@ use super::bidirectional::{Bidirectional, MergeLevels, PathRecorder, Technique};
 use super::cause::Cause;
 use super::light::{Emitted, LightPaths};
 use super::light_vertex::{LightVertex, Scatterer};
+use super::lobe_layers::FirstScatter;
 use super::mis::{self, Merges, MisState, Ratios};
 use super::photon_merge::MergePhoton;
 use super::pixel_sample::PixelSample;
@@ -72,6 +73,8 @@ pub type LightVertices<'s> = bumpalo::collections::Vec<'s, LightVertex<'s>>;
 pub struct Deposits {
     /// Light for pixels, of all paths so far.
     pub splats: Vec<Splat>,
+    /// For each splat how its light vertex scatters the light; empty unless light is recorded by the lobe of the first hit.
+    pub first: Vec<FirstScatter>,
     /// Photons for the next iteration, of all paths so far.
     pub photons: Vec<MergePhoton>,
     /// Number of paths that ended because their throughput was not finite.
@@ -82,6 +85,7 @@ impl Deposits {
     /// Empties the lists and keeps their capacity.
     pub fn clear(&mut self) {
         self.splats.clear();
+        self.first.clear();
         self.photons.clear();
         self.lost = 0;
     }
@@ -138,6 +142,7 @@ impl<R: PathRecorder> LightWalk<'_, '_, R> {
                 let (pixel, light, group) = (y * camera_paths.camera.size().0 + x, vertex.depth(), self.group);
                 let (class, ratios) = (PathClass::Indirect, Ratios::ALONE);
                 self.left.splats.push(Splat { pixel, light, class, group, value: Rgb::NAN, ratios });
+                self.left.first.resize(if camera_paths.lobes { self.left.splats.len() } else { 0 }, FirstScatter::Emit);
             }
             return;
         }
@@ -169,6 +174,10 @@ impl<R: PathRecorder> LightWalk<'_, '_, R> {
             let shares = shares(vertex, halves, incident, camera_paths.classes);
             let splat = |(class, share)| Splat { pixel, light, class, group, value: value * share, ratios };
             self.left.splats.extend(shares.iter().map(splat));
+            if camera_paths.lobes {
+                let first = vertex.first_scatter(sample.wi, Transport::Importance, LobeSet::ALL, f);
+                self.left.first.resize(self.left.splats.len(), first);
+            }
         }
     }
 }

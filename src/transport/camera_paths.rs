@@ -57,6 +57,8 @@ pub struct CameraPaths<'a> {
     pub indirect: Indirect,
     /// Classes of paths (by kinds of bounces) whose light the picture shows.
     pub classes: ClassSet,
+    /// Whether the light is recorded by the lobe of the first hit, too.
+    pub lobes: bool,
     /// The switch that aborts an iteration before its end; `None` if there is none.
     pub stop: Option<&'a Stop>,
 }

@@ -7,11 +7,12 @@
 //! onward lobes is the path itself, which continues with probability `survival`. A technique that is used with
 //! probability n has density n p in the balance heuristic.
 
+use super::lobe_layers::FirstScatter;
 use super::pass_through::for_each_pass_through_light;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{End, Start, next_surface, token};
 use crate::bsdf::{LobeSet, Transport};
-use crate::math::{Rgb, is_lit};
+use crate::math::{Rgb, Vec3, is_lit};
 use crate::random::Purpose;
 use crate::scene::Scene;
 
@@ -33,24 +34,53 @@ pub fn balance(pdf: f32, other: f32) -> f32 {
     }
 }
 
+/// Light at the first surface of a camera path, divided among its diffuse, glossy and transmitting lobes; `None` if it is
+/// not recorded.
+pub(super) type Division<'d> = Option<&'d mut [Rgb; 3]>;
+
+/// Adds `light`, which the lobes of `set` scatter from `wi` with the value `f`, to the lobes of a surface.
+fn divide<S: ScatterPoint>(into: &mut [Rgb; 3], vertex: &S, wi: Vec3, (set, f): (LobeSet, Rgb), light: Rgb) {
+    if let FirstScatter::Surface(shares) = vertex.first_scatter(wi, Transport::Radiance, set, f) {
+        into.iter_mut().zip(shares).for_each(|(sum, share)| *sum += light * share);
+    }
+}
+
 /// Direct light at `vertex`, scattered towards `vertex.wo`, per unit of throughput. The path continues by `onward` with
 /// probability `survival`.
 #[inline]
 pub fn direct_light(scene: &Scene, vertex: &impl ScatterPoint, gather: LobeSet, onward: LobeSet, survival: f32) -> Rgb {
+    divided_direct_light(scene, vertex, (gather, onward), survival, None)
+}
+
+/// [`direct_light`] that also adds the light to the lobes of the vertex.
+#[inline]
+pub(super) fn divided_direct_light(
+    scene: &Scene,
+    vertex: &impl ScatterPoint,
+    (gather, onward): (LobeSet, LobeSet),
+    survival: f32,
+    mut lobes: Division<'_>,
+) -> Rgb {
     if scene.lights.is_empty() {
         return Rgb::ZERO;
     }
-    let mut light = next_event(scene, vertex, [(gather, BSDF_SAMPLE_PROBABILITY), (onward, survival)]);
+    let sets = [(gather, BSDF_SAMPLE_PROBABILITY), (onward, survival)];
+    let mut light = next_event(scene, vertex, sets, lobes.as_deref_mut());
     if !gather.is_empty() && vertex.draws().one(Purpose::SecondTechnique) < BSDF_SAMPLE_PROBABILITY {
-        light += bsdf_sample(scene, vertex, gather);
+        light += bsdf_sample(scene, vertex, gather, lobes);
     }
     light
 }
 
 /// The light sample for several sets of lobes, each with the probability that its BSDF sample is traced. The BSDF
-/// samples themselves are not part of it.
+/// samples themselves are not part of it. Also adds the light to the lobes of the vertex.
 #[inline]
-pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f32); 2]) -> Rgb {
+pub(super) fn next_event(
+    scene: &Scene,
+    vertex: &impl ScatterPoint,
+    sets: [(LobeSet, f32); 2],
+    lobes: Division<'_>,
+) -> Rgb {
     let draws = vertex.draws();
     let choice = draws.one_fine(Purpose::LightChoice);
     let point = draws.two(Purpose::LightPoint);
@@ -78,11 +108,22 @@ pub fn next_event(scene: &Scene, vertex: &impl ScatterPoint, sets: [(LobeSet, f3
     let token = token(scene, draws, Purpose::ShadowAlpha);
     let left = vertex.shadow_ray_to_light(scene, &sample, token).transmittance;
     // Infinite light behind an occluder would give NaN.
-    if is_lit(left) { arriving * left } else { Rgb::ZERO }
+    if !is_lit(left) {
+        return Rgb::ZERO;
+    }
+    if let Some(lobes) = lobes {
+        let arriving = sample.radiance / sample.pdf_w * vertex.next_event_share() * left;
+        for (set, probability) in sets.into_iter().filter(|(set, _)| set.intersects(LobeSet::SMOOTH)) {
+            let (f, pdf) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);
+            let weight = if sample.delta { 1.0 } else { balance(sample.pdf_w, probability * pdf) };
+            divide(lobes, vertex, sample.wi, (set, f), f * weight * arriving);
+        }
+    }
+    arriving * left
 }
 
 #[inline]
-fn bsdf_sample<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> Rgb {
+fn bsdf_sample<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet, lobes: Division<'_>) -> Rgb {
     let draws = vertex.draws();
     let (lobe, direction) = (draws.one(Purpose::SecondLobe), draws.two(Purpose::SecondDirection));
     let Some(sample) = vertex.sample(Transport::Radiance, set, lobe, direction) else { return Rgb::ZERO };
@@ -114,5 +155,9 @@ fn bsdf_sample<S: ScatterPoint>(scene: &Scene, vertex: &S, set: LobeSet) -> Rgb 
             light += radiance * left * weight(pdf);
         }
     });
+    if let (Some(lobes), true) = (lobes, is_lit(light)) {
+        let (f, _) = vertex.evaluate_cos(sample.wi, Transport::Radiance, set);
+        divide(lobes, vertex, sample.wi, (set, f), sample.weight * light);
+    }
     sample.weight * light
 }

@@ -5,6 +5,8 @@ use super::cause::Cause;
 use super::gathering_walk::GatheringWalk;
 use super::glint::GlintGather;
 use super::glint::Onward;
+use super::lobe_gather::LobeGather;
+use super::lobe_layers::FirstScatter;
 use super::photon_batch::Batch;
 use super::vertex::Vertex;
 use crate::bsdf::LobeSet;
@@ -61,6 +63,15 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
             && self.classes.has(self.suffix.then(Event::Sharp).class_with(LightPrefix::FOCUSED));
         let mut glints = shared.then(|| self.glints.gather(self.kernel, vertex.shading, ng, onward, &radii, photons));
         let (order, radii) = (radii.order, &radii.radius2[..radii.count]);
+        // Index of the radius whose light is recorded by the lobe of the first hit.
+        let recorded = self.record.as_ref().and_then(|lobes| lobes.level);
+        let recorded = recorded.and_then(|level| order[..radii.len()].iter().position(|k| usize::from(*k) == level));
+        let divided = recorded.filter(|_| self.divides());
+        if let Some(glints) = &mut glints {
+            glints.divide(divided);
+        }
+        let mut lobe_gather =
+            divided.map(|k| LobeGather::new(self.kernel, vertex.shading, radii[k], [broad, broad | sharp]));
         let Some(&largest) = radii.last() else { return };
         let longest = self.max_depth - vertex.depth;
         let mut counter = self.bandwidths.counter(kind, frame);
@@ -81,6 +92,9 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
                         counter.count(&FoundPhotons::one(photon.p - p, distance2, light, photon.thinning_key));
                     }
                 }
+                if let Some(lobe_gather) = &mut lobe_gather {
+                    lobe_gather.push(photon, distance2);
+                }
                 batch.push(photon, distance2, &mut counter);
             }
         };
@@ -89,6 +103,20 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
             Some(wavelength) => gather_dispersed(photons, near, vertex, wavelength, reach2, push),
         }
         let sums = batch.finish(&mut counter);
+        drop(counter);
+        if let Some(k) = recorded {
+            let glint = glints.as_ref().map_or([Rgb::ZERO; 2], |glints| [glints.sums()[k], glints.transmitted()]);
+            let scale = FRAC_1_PI / radii[k];
+            if let Some(lobe_gather) = &lobe_gather {
+                let [diffuse, glossy, transmitted] = lobe_gather.divide(sums[k]).map(|sum| sum * scale);
+                let by_lobe = [diffuse, glossy + glint[0] - glint[1], transmitted + glint[1]];
+                if let Some(lobes) = &mut self.record {
+                    lobes.photons.add(&FirstScatter::Surface(by_lobe), false, vertex.throughput);
+                }
+            } else {
+                self.record_indirect(vertex.throughput * (sums[k] * scale + glint[0]), true);
+            }
+        }
         let into = if caustic { &mut self.sample.caustic_photons } else { &mut self.sample.indirect_photons };
         let mut finite = true;
         for ((level, sum), radius2) in order.into_iter().zip(sums).zip(radii) {

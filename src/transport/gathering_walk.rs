@@ -21,8 +21,9 @@
 use super::bandwidths::GatherBandwidths;
 use super::camera_paths::{CameraPathStart, CameraPaths, Indirect};
 use super::cause::Cause;
-use super::direct::{BSDF_SAMPLE_PROBABILITY, balance, direct_light, next_event};
+use super::direct::{BSDF_SAMPLE_PROBABILITY, Division, balance, direct_light, divided_direct_light, next_event};
 use super::glint::{Glints, Onward};
+use super::lobe_layers::{FirstScatter, LobeHistory, LobeRecord};
 use super::pass_through::PassThroughHit;
 use super::photon_batch::{Scratch, Waiting};
 use super::pixel_sample::{Features, PixelSample};
@@ -67,19 +68,58 @@ pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
     /// Whether the path has had a bounce at a broad lobe.
     pub scattered_broadly: bool,
     pub glints: Glints,
+    /// Record of the light by the lobe of the first hit; `None` if it is not recorded.
+    pub record: Option<&'a mut LobeRecord>,
+    pub lobe_history: LobeHistory,
     /// The last vertex, as a receiver of direct light.
     pub last: Receiver,
 }
 
 impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, PATHS> {
+    /// Whether the vertex at which the path arrives divides the light among its lobes, for the record.
+    #[inline]
+    pub(super) fn divides(&self) -> bool {
+        self.record.is_some() && self.lobe_history.bounces == 0
+    }
+
+    /// Records light that arrives at a vertex after the first one.
+    #[inline]
+    pub(super) fn record_indirect(&mut self, light: Rgb, of_photons: bool) {
+        if let Some(lobes) = &mut self.record {
+            let into = if of_photons { &mut lobes.photons } else { &mut lobes.own };
+            into.add(&self.lobe_history.first, false, light);
+        }
+    }
+
+    /// Records light of a light that the path has hit. The camera sees it by `seen` if nothing has scattered the path.
+    #[inline]
+    fn record_hit(&mut self, seen: FirstScatter, light: Rgb, of_photons: bool) {
+        let LobeHistory { first, bounces } = self.lobe_history;
+        if let Some(lobes) = &mut self.record {
+            let into = if of_photons { &mut lobes.photons } else { &mut lobes.own };
+            into.add(if bounces == 0 { &seen } else { &first }, bounces == 1, light);
+        }
+    }
+
+    /// Records light that a vertex in a medium scatters. `direct`: it comes straight from a light.
+    #[inline]
+    fn record_in_medium(&mut self, direct: bool, light: Rgb, of_photons: bool) {
+        let LobeHistory { first, bounces } = self.lobe_history;
+        if let Some(lobes) = &mut self.record {
+            let into = if of_photons { &mut lobes.photons } else { &mut lobes.own };
+            into.add(if bounces == 0 { &FirstScatter::Medium } else { &first }, direct && bounces == 0, light);
+        }
+    }
+
     /// Adds the light `arriving` from a light that the path has hit. `pdf_light` is the density with which next-event
-    /// estimation at the last vertex would have sampled it, `density` the density of light paths that start there.
+    /// estimation at the last vertex would have sampled it, `density` the density of light paths that start there. The
+    /// camera sees the light by `seen` if nothing has scattered the path.
     #[inline]
     fn hit_light(
         &mut self,
         arriving: Rgb,
         pdf_light: f32,
-        scattered: Option<Scattered>,
+        (scattered, seen): (Option<Scattered>, FirstScatter),
         density: impl FnOnce() -> Option<EmissionDensity>,
     ) {
         if PATHS && self.scattered_broadly && scattered.is_some_and(|s| !s.lobe.intersects(LobeSet::BROAD)) {
@@ -97,13 +137,21 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
             Some(s) if !s.lobe.intersects(LobeSet::DELTA) => arriving * balance(s.pdf_w, pdf_light),
             // Next-event estimation cannot reach through a perfect mirror or clear glass, but photons may.
             Some(_) if self.glints.are_shared() => {
+                let mut recorded = None;
                 for (level, weight) in density().iter().flat_map(|density| self.glints.path_weights(density)) {
                     self.sample.indirect_photons[level] += arriving * weight;
+                    if self.record.as_ref().is_some_and(|lobes| lobes.level == Some(level)) {
+                        recorded = Some(arriving * weight);
+                    }
+                }
+                if let Some(light) = recorded {
+                    self.record_hit(seen, light, true);
                 }
                 return;
             }
             _ => arriving,
         };
+        self.record_hit(seen, weighted, false);
         *match class.part() {
             Part::Emission => &mut self.sample.emission,
             Part::Direct => &mut self.sample.direct,
@@ -139,9 +187,21 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
         self.classes.is_all() || leads(self.suffix, self.lobes, set, self.classes)
     }
 
-    /// Adds direct light at a surface vertex.
+    /// Adds direct light at a surface vertex, which `find` computes and divides among the lobes if asked to.
     #[inline]
-    fn add_direct(&mut self, light: Rgb) {
+    fn add_direct(&mut self, throughput: Rgb, find: impl FnOnce(Division<'_>) -> Rgb) {
+        let light = if self.divides() {
+            let mut by_lobe = [Rgb::ZERO; 3];
+            let light = throughput * find(Some(&mut by_lobe));
+            if let Some(lobes) = &mut self.record {
+                lobes.own.add(&FirstScatter::Surface(by_lobe), true, throughput);
+            }
+            light
+        } else {
+            let light = throughput * find(None);
+            self.record_indirect(light, false);
+            light
+        };
         if !light.is_finite() {
             self.sample.reject(Cause::DirectLight);
         }
@@ -169,7 +229,8 @@ impl<B: GatherBandwidths, K: Kernel, const PATHS: bool> GatheringWalk<'_, B, K, 
             let lit = self.lit_lobes(broad, seen);
             if lit != (LobeSet::empty(), LobeSet::empty()) {
                 let sets = [(lit.0, probability(broad, chance)), (lit.1, probability(seen, 1.0 - chance))];
-                self.add_direct(vertex.throughput * next_event(self.scene, vertex, sets));
+                let scene = self.scene;
+                self.add_direct(vertex.throughput, |lobes| next_event(scene, vertex, sets, lobes));
             }
             self.gather(vertex, broad, Onward { lobes: seen, probability: probability(seen, 1.0 - chance) });
         }
@@ -194,13 +255,16 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
         if scattered.is_none() {
             self.sample.first.get_or_insert(FirstHit { p: surface.p, instance: surface.instance });
             self.last = Receiver::anywhere(vertex.from);
+            if let Some(lobes) = &mut self.record {
+                lobes.own.colors = shading.lobe_albedos();
+            }
         }
         self.suffix = self.suffix_on_arrival(scattered);
         self.length += vertex.distance;
         let (lights, materials, from) = (&self.scene.lights, &self.scene.materials, self.last);
         if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, surface, vertex.wo) {
             let density = || Some(lights.emitted(materials, &from, surface, vertex.wo)?.1);
-            self.hit_light(vertex.throughput * radiance, pdf, scattered, density);
+            self.hit_light(vertex.throughput * radiance, pdf, (scattered, FirstScatter::Emit), density);
         }
         self.last = vertex.receiver();
         let lobes = shading.bsdf.lobes();
@@ -227,7 +291,9 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
             let survival = if onward.is_empty() { 0.0 } else { vertex.survival(onward) };
             let lit = self.lit_lobes(broad, onward);
             if lit != (LobeSet::empty(), LobeSet::empty()) {
-                self.add_direct(vertex.throughput * direct_light(self.scene, vertex, lit.0, lit.1, survival));
+                let scene = self.scene;
+                let find = |lobes: Division<'_>| divided_direct_light(scene, vertex, lit, survival, lobes);
+                self.add_direct(vertex.throughput, find);
             }
             self.gather(vertex, broad, Onward { lobes: onward, probability: survival });
         }
@@ -241,7 +307,7 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
         self.suffix = self.suffix_on_arrival(scattered);
         if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, &hit.surface, hit.wo) {
             let density = || Some(lights.emitted(materials, &from, &hit.surface, hit.wo)?.1);
-            self.hit_light(hit.throughput * radiance, pdf, scattered, density);
+            self.hit_light(hit.throughput * radiance, pdf, (scattered, FirstScatter::Emit), density);
         }
         self.suffix = before;
     }
@@ -260,6 +326,10 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
                 Rgb::ZERO
             };
             let gathered = self.gather_in_medium(vertex, suffix);
+            if let Some(level) = self.record.as_ref().and_then(|lobes| lobes.level) {
+                self.record_in_medium(true, direct, false);
+                self.record_in_medium(false, gathered.map_or(Rgb::ZERO, |gathered| gathered[level]), true);
+            }
             let sample = &mut self.sample;
             let (light, photons) = if suffix.is_clear() {
                 (&mut sample.volume, &mut sample.volume_photons)
@@ -284,7 +354,8 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
         let suffix = self.suffix_on_arrival(scattered);
         if vertex.depth < self.max_depth && !self.scene.lights.is_empty() && self.lit_in_medium(suffix) {
             let sets = [(LobeSet::BROAD, BSDF_SAMPLE_PROBABILITY), (LobeSet::empty(), 0.0)];
-            let light = vertex.throughput * next_event(self.scene, vertex, sets);
+            let light = vertex.throughput * next_event(self.scene, vertex, sets, None);
+            self.record_in_medium(true, light, false);
             if !light.is_finite() {
                 self.sample.reject(Cause::DirectLight);
             }
@@ -301,13 +372,16 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
             let onward = || scene.lights.entry_pdf_a(last.p, direction);
             let density =
                 || Some(EmissionDensity { direct, start, onward: onward(), cos: 1.0, infinite: true, delta: false });
-            self.hit_light(throughput * radiance, direct, scattered, density);
+            self.hit_light(throughput * radiance, direct, (scattered, FirstScatter::Environment), density);
         });
     }
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
         self.glints.scatter(vertex.surface.ng, sample);
+        if self.record.is_some() {
+            self.lobe_history.scatter(|| FirstScatter::of_sample(vertex, sample, sample.lobe));
+        }
     }
 
     fn lost(&mut self) {
@@ -384,6 +458,8 @@ impl CameraPaths<'_> {
             classes: self.classes,
             scattered_broadly: false,
             glints: Glints::NONE,
+            record: Some(&mut scratch.lobes).filter(|record| self.lobes && record.level.is_some()),
+            lobe_history: LobeHistory::default(),
             last: Receiver::anywhere(Vec3::ZERO),
         };
         walk(self.scene, &scratch.arena, start, *stream, Transport::Radiance, self.max_depth, &mut visitor);

@@ -97,6 +97,8 @@ impl Glints {
             largest: PI * reach2,
             reach2,
             sums: [Rgb::ZERO; MAX_LEVELS],
+            divided: None,
+            transmitted: Rgb::ZERO,
         }
     }
 
@@ -141,9 +143,31 @@ pub(super) struct GlintGather<'s, K> {
     /// Squared radius within which photons are evaluated (square scene units).
     reach2: f32,
     sums: [Rgb; MAX_LEVELS],
+    /// Index of the radius for which the light is divided into reflected and transmitted light; `None` if it is not.
+    divided: Option<usize>,
+    /// Transmitted light of that radius.
+    transmitted: Rgb,
 }
 
 impl<K: Kernel> GlintGather<'_, K> {
+    /// Divides the light of the radius number `index` into reflected and transmitted light.
+    #[inline]
+    pub fn divide(&mut self, index: Option<usize>) {
+        self.divided = index;
+    }
+
+    /// Radiance so far by bandwidth level, in the order of radii.
+    #[inline]
+    pub fn sums(&self) -> &[Rgb; MAX_LEVELS] {
+        &self.sums
+    }
+
+    /// Transmitted light of the divided radius.
+    #[inline]
+    pub fn transmitted(&self) -> Rgb {
+        self.transmitted
+    }
+
     /// Evaluates photons up to this squared distance, for bandwidth rules that count beyond the kernels.
     #[inline]
     pub fn extend_reach(&mut self, reach2: f32) {
@@ -176,6 +200,13 @@ impl<K: Kernel> GlintGather<'_, K> {
                 // The weight over pi r^2; bounded however small the kernel is.
                 *sum += light * (kernel / (area_per_photon + PI * radius2));
             }
+        }
+        if let Some(radius2) = self.divided.map(|index| self.radius2[index])
+            && distance2 < radius2
+            && shading.transmits_to(photon.wi)
+        {
+            let kernel = if K::BOX { 1.0 } else { K::weight(distance2 / radius2) };
+            self.transmitted += light * (kernel / (area_per_photon + PI * radius2));
         }
         light * (self.largest / (area_per_photon + self.largest))
     }

@@ -3,10 +3,11 @@
 //! It shares the walk with the other methods, but computes its own weights of two techniques, over all lobes of a
 //! vertex at once (`direct_light` treats two sets of lobes), so that tests can compare the two.
 
-use super::bidirectional::{PathRecorder, Technique};
+use super::bidirectional::{PathKind, PathRecorder, Technique};
 use super::bidirectional_camera::{record_medium, record_surface};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
+use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
 use super::pixel_sample::PixelSample;
@@ -16,11 +17,11 @@ use super::segment::token;
 use super::shares::{Incident, PathHalves, shares, wanted};
 use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
-use crate::bsdf::{LobeSet, Transport};
-use crate::light::{Group, Receiver};
+use crate::bsdf::{BsdfSample, LobeSet, Transport};
+use crate::light::Receiver;
 use crate::math::{Rgb, Vec3, is_lit};
 use crate::medium::FlightDensity;
-use crate::plan::{ClassSet, LightPrefix, Part, PathClass};
+use crate::plan::{ClassSet, LightPrefix, Part};
 use crate::random::{Purpose, Stream};
 use crate::scene::Scene;
 use bumpalo::Bump;
@@ -29,6 +30,8 @@ struct PathTracer<'a, R> {
     scene: &'a Scene,
     max_depth: u32,
     classes: ClassSet,
+    /// The first vertex, if light is recorded by its lobes.
+    lobes: Option<LobeHistory>,
     sample: &'a mut PixelSample,
     history: PathHistory,
     last: Receiver,
@@ -74,15 +77,24 @@ impl<R: PathRecorder> PathTracer<'_, R> {
         let technique = Technique::NextEvent { camera: self.depth };
         let incident = Incident { wi: light.wi, transport: Transport::Radiance, f };
         let shares = shares(vertex, halves, incident, self.classes);
+        let (first, group) = (
+            self.first(|| vertex.first_scatter(light.wi, Transport::Radiance, LobeSet::ALL, f)),
+            scene.lights.group(light.light),
+        );
         for (class, share) in shares.iter() {
-            self.add(technique, (class, scene.lights.group(light.light)), value * share, weight);
+            self.add(technique, PathKind { class, group, first }, value * share, weight);
         }
     }
 
-    /// Adds light, already multiplied by its MIS weight, to the sample; class, light group and weight are for the
+    /// How the first vertex scatters light that arrives at the current one, which scatters it by `here`.
+    fn first(&self, here: impl FnOnce() -> FirstScatter) -> FirstScatter {
+        self.lobes.map_or(FirstScatter::Emit, |lobes| lobes.arriving(here))
+    }
+
+    /// Adds light, already multiplied by its MIS weight, to the sample; light group, first vertex and weight are for the
     /// recorder.
-    fn add(&mut self, technique: Technique, of: (PathClass, Group), light: Rgb, weight: f32) {
-        let (class, _) = of;
+    fn add(&mut self, technique: Technique, of: PathKind, light: Rgb, weight: f32) {
+        let class = of.class;
         if !self.classes.has(class) {
             return;
         }
@@ -116,12 +128,16 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
 
     fn surface(&mut self, vertex: &Vertex<'_, 'a>, scattered: Option<Scattered>) -> Next {
         record_surface(&mut self.history, vertex, scattered, self.sample);
+        if scattered.is_none() && self.lobes.is_some() {
+            self.record.first_surface(vertex.shading.lobe_albedos());
+        }
         self.depth = vertex.depth;
         let from = if scattered.is_none() { Receiver::anywhere(vertex.from) } else { self.last };
         if let Some((radiance, pdf)) =
             self.scene.lights.hit_radiance(&self.scene.materials, &from, vertex.surface, vertex.wo)
         {
-            let of = (self.history.suffix.class_at_light(false), self.scene.lights.surface_group(vertex.surface));
+            let (class, first) = (self.history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
+            let of = PathKind { class, group: self.scene.lights.surface_group(vertex.surface), first };
             let weight = Self::weight(scattered, pdf);
             self.add(Technique::Hit { camera: self.depth }, of, vertex.throughput * radiance * weight, weight);
         }
@@ -135,6 +151,20 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         self.sample.reject(Cause::Path);
     }
 
+    #[inline]
+    fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
+        if let Some(lobes) = &mut self.lobes {
+            lobes.scatter(|| FirstScatter::of_sample(vertex, sample, LobeSet::ALL));
+        }
+    }
+
+    #[inline]
+    fn scatter_medium(&mut self, _: &MediumVertex, _: &BsdfSample) {
+        if let Some(lobes) = &mut self.lobes {
+            lobes.scatter(|| FirstScatter::Medium);
+        }
+    }
+
     fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
         let mut history = self.history;
         if let Some(scattered) = scattered {
@@ -145,7 +175,8 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         {
             let weight = Self::weight(scattered, pdf);
             let light = hit.throughput * radiance * weight;
-            let of = (history.suffix.class_at_light(false), self.scene.lights.surface_group(&hit.surface));
+            let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
+            let of = PathKind { class, group: self.scene.lights.surface_group(&hit.surface), first };
             self.add(Technique::Hit { camera: hit.depth }, of, light, weight);
         }
     }
@@ -164,11 +195,12 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
             self.history.scattered(scattered.lobe);
         }
         let class = self.history.suffix.class_at_light(false);
+        let first = self.first(|| FirstScatter::Environment);
         let (scene, technique) = (self.scene, Technique::Hit { camera: self.depth + 1 });
         let last = self.last;
         scene.lights.for_each_infinite(&last, direction, scattered.is_none(), |light, pdf, _, group| {
             let weight = Self::weight(scattered, pdf);
-            self.add(technique, (class, group), throughput * light * weight, weight);
+            self.add(technique, PathKind { class, group, first }, throughput * light * weight, weight);
         });
     }
 }
@@ -184,8 +216,9 @@ pub fn path_sample(
     *sample = PixelSample::default();
     let history = PathHistory::START;
     let CameraPaths { scene, max_depth, classes, .. } = *camera_paths;
+    let lobes = camera_paths.lobes.then(LobeHistory::default);
     let last = Receiver::anywhere(start.origin);
-    let mut tracer = PathTracer { scene, max_depth, classes, sample, history, last, depth: 0, record };
+    let mut tracer = PathTracer { scene, max_depth, classes, lobes, sample, history, last, depth: 0, record };
     walk(camera_paths.scene, arena, start, *stream, Transport::Radiance, camera_paths.max_depth, &mut tracer);
 }
 

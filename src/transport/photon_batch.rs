@@ -1,6 +1,7 @@
 //! Evaluation of the BSDF for photons at a vertex, eight at a time.
 
 use super::bandwidths::{FoundPhotons, MAX_LEVELS, PhotonCounter, first_lane};
+use super::lobe_layers::LobeRecord;
 use super::vertex::Vertex;
 use crate::bsdf::{Gathering, LobeSet};
 use crate::math::{Rgb, Vec3};
@@ -19,6 +20,8 @@ pub struct Scratch {
     pub(super) near_volume: Near<VolumePhoton>,
     /// Photons that have been found and whose BSDF is not evaluated yet.
     pub(super) waiting: Waiting,
+    /// Light of the last camera path by the lobe of the first hit, if that is recorded.
+    pub lobes: LobeRecord,
 }
 
 /// Photons whose BSDF is not evaluated yet; eight are evaluated at once. They are stored as rows, which takes two

@@ -1,7 +1,9 @@
 //! Merging of photons with multiple importance sampling.
 
-use super::bidirectional::{MergeLevels, PathRecorder, Technique};
+use super::bidirectional::{MergeLevels, PathKind, PathRecorder, Technique};
+use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, Merges, MisState};
+use super::scattering_vertex::ScatterPoint;
 use super::shares::PhotonShares;
 use super::vertex::Vertex;
 use crate::bsdf::{LobeSet, Transport};
@@ -109,6 +111,8 @@ pub(super) struct Merge<'a> {
     pub own: Merges,
     /// Class of the camera path up to the vertex: the kinds of its bounces.
     pub suffix: CameraSuffix,
+    /// The first vertex of the camera path, if light is recorded by its lobes.
+    pub lobes: Option<&'a LobeHistory>,
     /// Path classes (by kinds of bounces) that the picture shows.
     pub classes: ClassSet,
     /// Largest number of segments of a photon's light path.
@@ -152,13 +156,16 @@ impl Merge<'_> {
             let ratios = mis::merge((&photon.mis(), self.mis), [1.0, self.joins], pdf, reverse, self.own);
             let technique = Technique::Merge { light: u32::from(photon.depth), camera: vertex.depth };
             record.contribution(technique, value, photon.p, ratios);
+            let here = || vertex.first_scatter(photon.wi, Transport::Radiance, LobeSet::ALL, f);
+            let first = self.lobes.map_or(FirstScatter::Emit, |lobes| lobes.arriving(here));
             for (level, (&radius2, &eta)) in radii.iter().zip(self.levels.eta()).enumerate() {
                 if distance2 < radius2 {
                     let weight = ratios.merge_weight(eta);
                     let area = radius2 * self.levels.probability();
                     for (class, share) in shares.iter() {
                         let light = value * share * (FRAC_1_PI / area);
-                        record.arrival(technique, (class, photon.group), level, light, weight);
+                        let of = PathKind { class, group: photon.group, first };
+                        record.arrival(technique, of, level, light, weight);
                         add(class, level, value * share * (weight * FRAC_1_PI / area));
                     }
                 }

@@ -1,6 +1,7 @@
 //! Common interface of surface and medium vertices, for next-event estimation and connections.
 
 use super::interior::Interior;
+use super::lobe_layers::FirstScatter;
 use super::roulette::survival;
 use super::segment::{ShadowRay, Start, Visibility, shadow_ray};
 use super::vertex::{MediumVertex, Vertex};
@@ -34,6 +35,9 @@ pub trait ScatterPoint {
     /// Value of the lobes in `set` for light from `wi` times the cosine, and the density of sampling `wi`
     /// ([`crate::bsdf::Shading::evaluate_cos`]).
     fn evaluate_cos(&self, wi: Vec3, transport: Transport, set: LobeSet) -> (Rgb, f32);
+    /// How the vertex, if it is the first one seen from the camera, scatters light between its viewing direction and `wi`,
+    /// of which the lobes in `set` scatter `value` ([`ScatterPoint::evaluate_cos`]).
+    fn first_scatter(&self, wi: Vec3, transport: Transport, set: LobeSet, value: Rgb) -> FirstScatter;
     /// Density of sampling `wo` if light arrives from `wi` ([`crate::bsdf::Shading::reverse_pdf`]).
     fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32;
     /// Samples a direction from the lobes in `set` ([`crate::bsdf::Shading::sample`]); `None` if there is none.
@@ -177,6 +181,10 @@ impl ScatterPoint for Vertex<'_, '_> {
         self.shading.evaluate_cos(wi, transport, set)
     }
 
+    fn first_scatter(&self, wi: Vec3, transport: Transport, set: LobeSet, value: Rgb) -> FirstScatter {
+        FirstScatter::Surface(self.shading.lobe_shares(wi, transport, set, value))
+    }
+
     #[inline]
     fn reverse_pdf(&self, wi: Vec3, transport: Transport) -> f32 {
         self.shading.reverse_pdf(wi, transport, LobeSet::ALL)
@@ -270,6 +278,10 @@ impl ScatterPoint for MediumVertex {
         }
         let f = self.phase().pdf_w(self.wo, wi);
         (Rgb::splat(f), f)
+    }
+
+    fn first_scatter(&self, _: Vec3, _: Transport, _: LobeSet, _: Rgb) -> FirstScatter {
+        FirstScatter::Medium
     }
 
     #[inline]

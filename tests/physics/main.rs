@@ -19,6 +19,7 @@ mod guide;
 mod lamps;
 mod large_triangles;
 mod light_groups;
+mod lobe_layers;
 mod long_paths;
 mod many_lights;
 mod material;

@@ -537,6 +537,7 @@ impl<'a> Lab<'a> {
         samples: Samples,
     ) -> Lab<'a> {
         let camera_paths = CameraPaths {
+            lobes: false,
             scene,
             camera,
             interior: initial_media.camera,

@@ -189,6 +189,7 @@ fn rays_start_in_the_medium_of_the_film() {
     let camera = scene.camera(&square(16)).expect("a camera");
     let (interior, classes) = (InitialMedia::of(&scene, &camera).camera, ClassSet::ALL);
     let camera_paths = CameraPaths {
+        lobes: false,
         scene: &scene,
         camera: &camera,
         interior,

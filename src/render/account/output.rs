@@ -26,6 +26,7 @@ pub fn layer_shape_of(settings: &Settings, survey: &Survey, groups: &[String]) -
         classes: settings.classes,
         volume: survey.scattering,
         volume_photons: survey.scattering && settings.method.gathers(),
+        lobes: settings.lobes,
         groups: if settings.method.has_techniques() { groups.to_vec() } else { Vec::new() },
     }
 }

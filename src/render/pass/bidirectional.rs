@@ -33,8 +33,8 @@ use crate::spectrum::{IterationWavelengths, WavelengthSample};
 use crate::stat::median;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraPathStart, CameraWalkContext, Deposits, LightPaths, LightVertex, LightVertices, MergeLevels,
-    MergePhoton, PixelSample, SPARED_BY_ROULETTE, Splat, TechniqueSet,
+    Bidirectional, CameraPathStart, CameraWalkContext, Deposits, FirstScatter, LightPaths, LightVertex, LightVertices,
+    MergeLevels, MergePhoton, PixelSample, SPARED_BY_ROULETTE, Splat, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -414,13 +414,13 @@ impl Iteration<'_, '_> {
     fn add_splats<'l, W: TileRecorder>(
         &self,
         walks: &PairWalks<'_>,
-        splats: impl Iterator<Item = &'l Splat>,
+        splats: impl Iterator<Item = (&'l Splat, FirstScatter)>,
         (mut samples, recorder): (SampleBufferPart<'_>, &mut W),
     ) {
-        for splat in splats {
+        for (splat, first) in splats {
             let levels = self.levels(splat.pixel, walks.pair);
             let (_, slot) = self.tiles.place(splat.pixel);
-            recorder.record_splat(slot, walks.own, splat, &levels);
+            recorder.record_splat(slot, walks.own, (splat, first), &levels);
             let mut sample = samples.get(slot);
             splat.apply(&levels, &mut sample);
             samples.set(slot, &sample);
@@ -470,11 +470,14 @@ impl<'l> SplatsByTile<'l> {
         SplatsByTile { left, order, ends }
     }
 
-    /// The splats that a tile receives.
-    fn of(&self, tile: usize) -> impl Iterator<Item = &'l Splat> {
+    /// The splats that a tile receives, and how the light vertex of each scatters its light, if that is recorded.
+    fn of(&self, tile: usize) -> impl Iterator<Item = (&'l Splat, FirstScatter)> {
         let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
         let left = self.left;
-        self.order[start..self.ends[tile]].iter().map(move |&(from, at)| &left[from as usize].splats[at as usize])
+        self.order[start..self.ends[tile]].iter().map(move |&(from, at)| {
+            let (left, at) = (&left[from as usize], at as usize);
+            (&left.splats[at], left.first.get(at).copied().unwrap_or_default())
+        })
     }
 }
 

@@ -23,13 +23,13 @@ pub(in crate::render) fn integrator<'a>(input: &'a RenderInput<'a>) -> Box<dyn I
     let pairs = |techniques| Box::new(Passes::new(input, techniques));
     match input.settings.method {
         Method::Ppm | Method::Sppm | Method::Appm | Method::Cppm => sppm(input, PhotonTracer::new(input)),
-        Method::Pm => Box::new(Pm::new(input.camera)),
+        Method::Pm => Box::new(Pm::new(input.camera, input.settings.lobes)),
         Method::Path => Box::new(Paths::new(input)),
         Method::Light => pairs(TechniqueSet::LIGHT),
         Method::Bdpt => pairs(TechniqueSet::BDPT),
         Method::Bpm => pairs(TechniqueSet::BPM),
         Method::Vcm => pairs(TechniqueSet::VCM),
-        Method::Mlt => Box::new(Metropolis::new(input.camera)),
+        Method::Mlt => Box::new(Metropolis::new(input.camera, input.settings.lobes)),
     }
 }
 

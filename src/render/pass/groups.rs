@@ -1,33 +1,49 @@
-//! Light of each light group in the pixels of a tile.
+//! Light of each light group, and light by the lobe of the first hit, in the pixels of a tile.
 
 use super::tiles::TILE_PIXELS;
-use crate::light::Group;
 use crate::math::Rgb;
-use crate::plan::{Part, PathClass};
+use crate::plan::Part;
+use crate::transport::{LobeLight, PathKind, Technique};
 
 /// Radiance from one light group (lights with a layer of their own): all of it, and its caustics alone.
 pub(super) type GroupLight = [Rgb; 2];
 
-/// Light that one iteration brings to the pixels of a tile, by light group (lights with a layer of their own).
+/// Light that one iteration brings to the pixels of a tile, by light group (lights with a layer of their own), and, if it
+/// is asked for, by the lobe of the first hit.
 pub(super) struct TileGroups {
     groups: usize,
     light: Vec<GroupLight>,
+    /// Empty unless it is asked for.
+    lobes: Vec<LobeLight>,
 }
 
 impl TileGroups {
-    /// Makes a tile without light, for this number of light groups.
-    pub fn new(groups: usize) -> TileGroups {
-        TileGroups { groups, light: vec![GroupLight::default(); groups * TILE_PIXELS] }
+    /// Makes a tile without light, for this number of light groups. `lobes`: it also holds the light by the lobe of the
+    /// first hit.
+    pub fn new(groups: usize, lobes: bool) -> TileGroups {
+        let light = vec![GroupLight::default(); groups * TILE_PIXELS];
+        TileGroups { groups, light, lobes: vec![LobeLight::default(); if lobes { TILE_PIXELS } else { 0 }] }
     }
 
-    /// Adds light of a class from a group to the pixel at index `slot` of the tile.
+    /// Adds the light that `technique` finds by a kind of path to the pixel at index `slot` of the tile.
     #[inline]
-    pub fn add(&mut self, slot: usize, (class, group): (PathClass, Group), light: Rgb) {
-        let Some(group) = group.index().filter(|group| *group < self.groups) else { return };
+    pub fn add(&mut self, slot: usize, technique: Technique, of: &PathKind, light: Rgb) {
+        if let Some(lobes) = self.lobes.get_mut(slot) {
+            lobes.add(&of.first, technique.is_direct(), light);
+        }
+        let Some(group) = of.group.index().filter(|group| *group < self.groups) else { return };
         let [all, caustic] = &mut self.light[slot * self.groups + group];
         *all += light;
-        if class.part() == Part::Caustic {
+        if of.class.part() == Part::Caustic {
             *caustic += light;
+        }
+    }
+
+    /// Sets the albedos of the lobes at the first hit of the pixel at index `slot` of the tile.
+    #[inline]
+    pub fn set_colors(&mut self, slot: usize, colors: [Rgb; 3]) {
+        if let Some(lobes) = self.lobes.get_mut(slot) {
+            lobes.colors = colors;
         }
     }
 
@@ -36,8 +52,14 @@ impl TileGroups {
         &self.light[slot * self.groups..][..self.groups]
     }
 
+    /// Light in the pixel at index `slot` of the tile by the lobe of the first hit; `None` if it is not recorded.
+    pub fn lobes_at(&self, slot: usize) -> Option<&LobeLight> {
+        self.lobes.get(slot)
+    }
+
     /// Sets the light of all pixels to zero, before an iteration.
     pub fn clear(&mut self) {
         self.light.fill(GroupLight::default());
+        self.lobes.fill(LobeLight::default());
     }
 }

@@ -19,7 +19,6 @@ use super::integrator::{Integrator, Work};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::camera::Camera;
 use crate::estimator::PixelAccumulator;
-use crate::light::Group;
 use crate::math::{Rgb, UVec2, Vec2};
 use crate::plan::{Part, PathClass};
 use crate::random::{Chain, Domain, Purpose, Stream, Streams, mix};
@@ -28,8 +27,8 @@ use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
 use crate::transport::mis::Eta;
 use crate::transport::{
-    Bidirectional, CameraWalkContext, Deposits, Division, LightPaths, LightVertices, MergeLevels, PathRecorder,
-    PixelSample, Splat, Technique, TechniqueSet,
+    Bidirectional, CameraWalkContext, Deposits, Division, FirstScatter, LightPaths, LightVertices, LobeLight,
+    MergeLevels, PathKind, PathRecorder, PixelSample, Splat, Technique, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -67,12 +66,21 @@ struct Candidate {
     importance: f32,
 }
 
+/// How the first vertex of a path scatters its light, and whether the light has no other bounce.
+type LobeOfDeposit = (FirstScatter, bool);
+
 /// Light of one path, as far as Markov chains sample it.
 #[derive(Default)]
 struct Found {
     /// Index of the pixel in which the camera subpath starts.
     pixel: u32,
     deposits: SmallVec<[(Technique, Deposit); 4]>,
+    /// For each deposit its lobe, if light is recorded by the lobe of the first hit; otherwise empty.
+    lobes: Vec<LobeOfDeposit>,
+    /// Whether light is recorded by the lobe of the first hit.
+    records_lobes: bool,
+    /// Light that chains do not sample, by the lobe of the first hit.
+    others: LobeLight,
 }
 
 /// Target density of Markov chains at a path with this light: the sum of the channels.
@@ -82,23 +90,42 @@ fn importance(value: Rgb) -> f32 {
 }
 
 impl Found {
-    fn add(&mut self, technique: Technique, (class, pixel): (PathClass, u32), value: Rgb) {
+    /// Adds light of a class to a pixel, which the first vertex scatters by `first`.
+    fn add(
+        &mut self,
+        technique: Technique,
+        (class, pixel): (PathClass, u32),
+        value: Rgb,
+        first: impl FnOnce() -> FirstScatter,
+    ) {
         if is_sampled_by_chains(class) && importance(value) > 0.0 {
             self.deposits.push((technique, Deposit { pixel, part: class.part(), value }));
+            if self.records_lobes {
+                self.lobes.push((first(), technique.is_direct()));
+            }
         }
     }
 
-    fn splats(&mut self, splats: &[Splat]) {
-        for splat in splats {
+    /// Adds the light that light paths send to the film. `first`: how their light vertices scatter it, if that is recorded.
+    fn splats(&mut self, splats: &[Splat], first: &[FirstScatter]) {
+        for (index, splat) in splats.iter().enumerate() {
             let value = splat.value * splat.ratios.weight(Eta::NONE);
-            self.add(Technique::Camera { light: splat.light }, (splat.class, splat.pixel), value);
+            let first = || first.get(index).copied().unwrap_or_default();
+            self.add(Technique::Camera { light: splat.light }, (splat.class, splat.pixel), value, first);
         }
     }
 }
 
 impl PathRecorder for Found {
-    fn arrival(&mut self, technique: Technique, of: (PathClass, Group), _: usize, value: Rgb, weight: f32) {
-        self.add(technique, (of.0, self.pixel), value * weight);
+    fn arrival(&mut self, technique: Technique, of: PathKind, _: usize, value: Rgb, weight: f32) {
+        if self.records_lobes && !is_sampled_by_chains(of.class) {
+            self.others.add(&of.first, technique.is_direct(), value * weight);
+        }
+        self.add(technique, (of.class, self.pixel), value * weight, || of.first);
+    }
+
+    fn first_surface(&mut self, colors: [Rgb; 3]) {
+        self.others.colors = colors;
     }
 }
 
@@ -106,13 +133,25 @@ impl PathRecorder for Found {
 #[derive(Default)]
 struct State {
     deposits: SmallVec<[Deposit; 4]>,
+    /// For each deposit its lobe, if that is recorded.
+    lobes: Vec<LobeOfDeposit>,
     importance: f32,
+}
+
+/// The light that a Markov chain leaves in pixels.
+#[derive(Default)]
+struct Left {
+    deposits: Vec<Deposit>,
+    /// For each deposit its lobe, if that is recorded.
+    lobes: Vec<LobeOfDeposit>,
 }
 
 /// Integrator of Metropolis light transport.
 pub(super) struct Metropolis {
     tiles: Tiles,
     samples: Vec<PixelSample>,
+    /// Light of the samples by the lobe of the first hit; empty unless it is recorded.
+    lobes: Vec<LobeLight>,
     levels: MergeLevels,
 }
 
@@ -180,27 +219,29 @@ impl Walks<'_, '_> {
         pixel: UVec2,
         left: &mut Deposits,
         candidates: &mut Vec<Candidate>,
-    ) -> PixelSample {
+    ) -> (PixelSample, LobeLight) {
         arena.reset();
         let streams = self.streams(path);
-        let mut found = Found { pixel: path, ..Found::default() };
+        let records_lobes = self.shared.camera_paths.lobes;
+        let mut found = Found { pixel: path, records_lobes, ..Found::default() };
         let mut sample = PixelSample::default();
         let first = left.splats.len();
         let within = streams.camera.vertex(0).two(Purpose::Pixel);
         self.walk(self.shared, arena, &PairStart { pixel, within, streams }, left, &mut found, &mut sample);
-        found.splats(&left.splats[first..]);
+        found.splats(&left.splats[first..], left.first.get(first..).unwrap_or_default());
         candidates.extend(found.deposits.iter().filter_map(|(technique, deposit)| {
             let division = Division::of(*technique)?;
             Some(Candidate { path, division, importance: importance(deposit.value) })
         }));
-        sample
+        (sample, found.others)
     }
 
     /// Evaluates the path that a chain's random numbers give: its light in pixels.
     fn state(&self, arena: &mut Bump, chain: &mut Chain, segments: u32, streams: PairStreams) -> State {
         arena.reset();
         let own = streams.camera.vertex(CHAIN_VERTEX);
-        let (mut left, mut found) = (Deposits::default(), Found::default());
+        let records_lobes = self.shared.camera_paths.lobes;
+        let (mut left, mut found) = (Deposits::default(), Found { records_lobes, ..Found::default() });
         chain.run(|| {
             let camera = ((own.one(Purpose::Division) * (segments + 1) as f32) as u32).min(segments);
             let film = own.two(Purpose::Film) * self.size.as_vec2();
@@ -211,15 +252,15 @@ impl Walks<'_, '_> {
             let start = PairStart { pixel, within, streams };
             self.walk(&shared, arena, &start, &mut left, &mut found, &mut PixelSample::default());
         });
-        found.splats(&left.splats);
+        found.splats(&left.splats, &left.first);
         let deposits: SmallVec<[Deposit; 4]> = found.deposits.into_iter().map(|(_, deposit)| deposit).collect();
         let importance = deposits.iter().map(|deposit| importance(deposit.value)).sum();
-        State { deposits, importance }
+        State { deposits, lobes: found.lobes, importance }
     }
 
     /// Runs a Markov chain of `steps` steps from `candidate`. Returns its light in pixels, divided by its importance,
     /// with weights that sum to one for each step.
-    fn chain(&self, arena: &mut Bump, number: u64, candidate: &Candidate, steps: usize) -> Vec<Deposit> {
+    fn chain(&self, arena: &mut Bump, number: u64, candidate: &Candidate, steps: usize) -> Left {
         let Candidate { path, division: Division { segments, camera }, .. } = *candidate;
         let PairStreams { camera: camera_stream, light: light_stream } = self.streams(path);
         let streams = PairStreams { camera: camera_stream.chained(), light: light_stream.chained() };
@@ -231,11 +272,12 @@ impl Walks<'_, '_> {
             (place + camera_stream.vertex(0).two(Purpose::Pixel)) / self.size.as_vec2(),
         );
         chain.set_initial(own.id(Purpose::Division), Vec2::splat((camera as f32 + 0.5) / (segments + 1) as f32));
-        let mut deposits = Vec::new();
+        let mut left = Left::default();
         let mut leave = |state: &State, weight: f32| {
             if weight > 0.0 && state.importance > 0.0 {
                 let scale = weight / state.importance;
-                deposits.extend(state.deposits.iter().map(|d| Deposit { value: d.value * scale, ..*d }));
+                left.deposits.extend(state.deposits.iter().map(|d| Deposit { value: d.value * scale, ..*d }));
+                left.lobes.extend(&state.lobes);
             }
         };
         let mut current = self.state(arena, &mut chain, segments, streams);
@@ -260,7 +302,7 @@ impl Walks<'_, '_> {
             }
         }
         leave(&current, stayed);
-        deposits
+        left
     }
 }
 
@@ -284,22 +326,26 @@ fn starts(candidates: &[Candidate], count: usize, u: f64) -> (Vec<Candidate>, f6
 }
 
 impl Metropolis {
-    pub fn new(camera: &Camera) -> Metropolis {
+    pub fn new(camera: &Camera, lobes: bool) -> Metropolis {
         let tiles = Tiles::new(camera);
+        let lobes = vec![LobeLight::default(); if lobes { tiles.count() * TILE_PIXELS } else { 0 }];
         let samples = vec![PixelSample::default(); tiles.count() * TILE_PIXELS];
         let levels = MergeLevels::new(std::iter::once((0.0, Eta::NONE)));
-        Metropolis { tiles, samples, levels }
+        Metropolis { tiles, samples, lobes, levels }
     }
 
     /// Samples the paths of all pixels as usual (step 1). Returns the paths at which chains may start, and the number
     /// of light paths that ended because they were not finite.
     fn walk_all(&mut self, walks: &Walks<'_, '_>) -> (Vec<Candidate>, u64) {
         let (tiles, width) = (self.tiles, walks.size.x);
+        let mut lobes: Vec<&mut [LobeLight]> = self.lobes.chunks_mut(TILE_PIXELS).collect();
+        lobes.resize_with(self.samples.len() / TILE_PIXELS, Default::default);
         let left: Vec<(Deposits, Vec<Candidate>)> = self
             .samples
             .par_chunks_mut(TILE_PIXELS)
+            .zip(lobes)
             .enumerate()
-            .map(|(tile, samples)| {
+            .map(|(tile, (samples, lobes))| {
                 let (mut arena, mut left, mut found) = (Bump::new(), Deposits::default(), Vec::new());
                 for place in tiles.pixels(tile) {
                     if walks.shared.camera_paths.is_given_up() {
@@ -307,7 +353,10 @@ impl Metropolis {
                     }
                     let index = place.index as u32;
                     let pixel = UVec2::new(index % width, index / width);
-                    let sample = walks.ordinary(&mut arena, index, pixel, &mut left, &mut found);
+                    let (sample, light) = walks.ordinary(&mut arena, index, pixel, &mut left, &mut found);
+                    if let Some(lobes) = lobes.get_mut(place.at) {
+                        *lobes = light;
+                    }
                     let PixelSample { emission, direct, features, first, rejection, .. } = sample;
                     samples[place.at] =
                         PixelSample { emission, direct, features, first, rejection, ..PixelSample::default() };
@@ -318,8 +367,14 @@ impl Metropolis {
         let (mut candidates, mut lost) = (Vec::new(), 0);
         for (left, found) in left {
             lost += left.lost;
-            for splat in left.splats.iter().filter(|splat| !is_sampled_by_chains(splat.class)) {
-                splat.apply(&self.levels, &mut self.samples[tiles.slot(splat.pixel)]);
+            for (index, splat) in left.splats.iter().enumerate().filter(|(_, splat)| !is_sampled_by_chains(splat.class))
+            {
+                let slot = tiles.slot(splat.pixel);
+                splat.apply(&self.levels, &mut self.samples[slot]);
+                if let Some((lobes, first)) = self.lobes.get_mut(slot).zip(left.first.get(index)) {
+                    let technique = Technique::Camera { light: splat.light };
+                    lobes.add(first, technique.is_direct(), splat.value * splat.ratios.weight(Eta::NONE));
+                }
             }
             candidates.extend(found);
         }
@@ -369,7 +424,7 @@ impl Integrator for Metropolis {
         let u = walks.cameras.path(u64::MAX).vertex(CHAIN_VERTEX).one_fine(Purpose::Film);
         let (starts, total) = starts(&candidates, count, u);
         drop(candidates);
-        let left: Vec<Vec<Deposit>> = starts
+        let left: Vec<Left> = starts
             .par_iter()
             .enumerate()
             .map_init(Bump::new, |arena, (number, candidate)| walks.chain(arena, number as u64, candidate, steps))
@@ -379,7 +434,12 @@ impl Integrator for Metropolis {
         }
         // The steps represent all pixels, and light over importance is scaled to the mean `b`.
         let scale = (total / (count * steps) as f64) as f32;
-        for Deposit { pixel, part, value } in left.into_iter().flatten() {
+        for Left { deposits, lobes } in &left {
+            for (Deposit { pixel, value, .. }, (first, direct)) in deposits.iter().zip(lobes) {
+                self.lobes[self.tiles.slot(*pixel)].add(first, *direct, *value * scale);
+            }
+        }
+        for Deposit { pixel, part, value } in left.into_iter().flat_map(|left| left.deposits) {
             let sample = &mut self.samples[self.tiles.slot(pixel)];
             let into = match part {
                 Part::Caustic => &mut sample.caustic_photons[0],
@@ -388,11 +448,12 @@ impl Integrator for Metropolis {
             };
             *into += value * scale;
         }
-        let (camera_paths, tiles, samples) = (shared.camera_paths, self.tiles, &self.samples);
+        let (camera_paths, tiles, samples, lobes) = (shared.camera_paths, self.tiles, &self.samples, &self.lobes);
         pixels.par_iter_mut().enumerate().with_min_len(1024).for_each(|(index, pixel)| {
-            let sample = &samples[tiles.slot(index as u32)];
+            let slot = tiles.slot(index as u32);
+            let sample = &samples[slot];
             pixel.record_first_hit(i, || camera_paths.first_hit(sample));
-            pixel.add(i, sample, None);
+            pixel.add_with_groups(i, sample, None, (&[], lobes.get(slot)));
         });
         phases.eye += cpu_seconds() - started;
         Some(Work { light_paths: u64::from(width) * u64::from(height), rejected, ..Work::default() })

@@ -21,7 +21,7 @@ use crate::estimator::bandwidth::{FOOTPRINT_PIXELS, initial_bandwidths};
 use crate::estimator::{InitialBandwidth, level_factor2};
 use crate::film::Size;
 use crate::finish::window;
-use crate::light::{Group, Guide};
+use crate::light::Guide;
 use crate::math::{Rgb, Vec3};
 use crate::photon::PhotonMap;
 use crate::plan::{Part, PathClass};
@@ -33,7 +33,7 @@ use crate::stat::{floor, median};
 use crate::transport::mis::{Eta, Merges, Ratios};
 use crate::transport::{
     Bidirectional, CameraPathStart, CameraWalkContext, Deposits, InitialMedia, LightPaths, LightVertices, MergeLevels,
-    MergePhoton, PathRecorder, PixelSample, SPARED_BY_ROULETTE, Technique, TechniqueSet,
+    MergePhoton, PathKind, PathRecorder, PixelSample, SPARED_BY_ROULETTE, Technique, TechniqueSet,
 };
 use bumpalo::Bump;
 use rayon::prelude::*;
@@ -135,10 +135,10 @@ impl PathRecorder for Contributions {
         self.survival.continues(survival);
     }
 
-    fn arrival(&mut self, _: Technique, (class, _): (PathClass, Group), _: usize, value: Rgb, weight: f32) {
+    fn arrival(&mut self, _: Technique, of: PathKind, _: usize, value: Rgb, weight: f32) {
         if let Some(last) = self.list.last_mut() {
             last.value += value * weight;
-            last.is_direct |= is_direct(class);
+            last.is_direct |= is_direct(of.class);
         }
     }
 }

@@ -109,12 +109,13 @@ pub(super) struct Pm {
     maps: Option<PhotonMaps>,
     /// Whether the light paths of the maps have been reported in the counts of an iteration.
     counted: bool,
-    samples: [SampleBuffer; 1],
+    samples: Vec<SampleBuffer>,
 }
 
 impl Pm {
-    pub fn new(camera: &Camera) -> Pm {
-        let samples = [SampleBuffer::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
+    pub fn new(camera: &Camera, lobes: bool) -> Pm {
+        let samples = vec![SampleBuffer::new(camera.size().0 as usize * camera.size().1 as usize, 1)];
+        let samples = SampleBuffer::with_lobes(samples, lobes);
         Pm { maps: None, counted: false, samples }
     }
 
@@ -177,13 +178,15 @@ impl Integrator for Pm {
                 let starts = camera_paths.starts(places, streams);
                 for (place, start) in places.iter().flatten().zip(starts.iter().flatten()) {
                     let mut neighbours = Neighbours { count, nearest: &mut *nearest, camera, least };
-                    samples
-                        .set(place.at, &camera_paths.sample(scratch, start, &maps, None, &mut neighbours, kernel::Box));
+                    scratch.lobes.start(Some(0));
+                    let sample = camera_paths.sample(scratch, start, &maps, None, &mut neighbours, kernel::Box);
+                    samples.set(place.at, &sample);
+                    samples.set_lobes(place.at, &scratch.lobes.all());
                 }
             },
         );
         if !settings.stop.aborted() {
-            sample_buffer::add(&self.samples, camera_paths, i, pixels, |index| index, |_| &[]);
+            sample_buffer::add(&self.samples, camera_paths, i, pixels, |index| index, |_| (&[], None));
         }
         phases.eye += cpu_seconds() - start;
         let photons = maps.iter().map(|map| map.photons().len()).sum();

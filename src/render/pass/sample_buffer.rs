@@ -6,7 +6,7 @@ use crate::estimator::PixelAccumulator;
 use crate::math::{Rgb, is_lit};
 use crate::photon::ByKind;
 use crate::render::settings::{Levels, Settings};
-use crate::transport::{CameraPaths, Cause, Features, FirstHit, PixelSample};
+use crate::transport::{CameraPaths, Cause, Features, FirstHit, LobeLight, PixelSample};
 use rayon::prelude::*;
 use std::mem::size_of;
 
@@ -31,10 +31,12 @@ type OfLevel = [Rgb; 3];
 /// Bytes per pixel for the samples of one iteration, besides the pixel's sums over iterations.
 pub fn sample_bytes(settings: &Settings) -> usize {
     let pairs = 1 + usize::from(settings.levels.two_paths);
-    match settings.method.has_chains() {
-        true => size_of::<PixelSample>(),
-        false => pairs * size_of::<Shared>() + settings.levels.count * size_of::<OfLevel>(),
-    }
+    let lobes = if settings.lobes { size_of::<LobeLight>() } else { 0 };
+    lobes
+        + match settings.method.has_chains() {
+            true => size_of::<PixelSample>(),
+            false => pairs * size_of::<Shared>() + settings.levels.count * size_of::<OfLevel>(),
+        }
 }
 
 /// Samples that one iteration has measured for all pixels, in the order of the parallel tasks.
@@ -42,6 +44,8 @@ pub(super) struct SampleBuffer {
     levels: usize,
     shared: Vec<Shared>,
     by_level: Vec<OfLevel>,
+    /// Light by the lobe of the first hit; empty unless it is recorded here.
+    lobes: Vec<LobeLight>,
 }
 
 impl SampleBuffer {
@@ -57,7 +61,16 @@ impl SampleBuffer {
     /// A black buffer for the samples of `pixels` pixels at `levels` bandwidth levels.
     pub fn new(pixels: usize, levels: usize) -> SampleBuffer {
         let by_level = vec![OfLevel::default(); pixels * levels];
-        SampleBuffer { levels, shared: vec![Shared::default(); pixels], by_level }
+        SampleBuffer { levels, shared: vec![Shared::default(); pixels], by_level, lobes: Vec::new() }
+    }
+
+    /// The buffers of the camera paths of a pixel, which also have room for the light by the lobe of the first hit at the
+    /// picture's level if `lobes` is true.
+    pub fn with_lobes(mut all: Vec<SampleBuffer>, lobes: bool) -> Vec<SampleBuffer> {
+        if let Some(last) = all.last_mut().filter(|_| lobes) {
+            last.lobes = vec![LobeLight::default(); last.shared.len()];
+        }
+        all
     }
 
     /// The buffer divided into the samples of each tile, for parallel tasks.
@@ -69,8 +82,10 @@ impl SampleBuffer {
     pub fn par_parts(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = SampleBufferPart<'_>> {
         let levels = self.levels;
         let by_level = self.by_level.par_chunks_mut(pixels * levels);
-        let part = move |(shared, by_level)| SampleBufferPart { levels, shared, by_level };
-        self.shared.par_chunks_mut(pixels).zip(by_level).map(part)
+        let mut lobes: Vec<&mut [LobeLight]> = self.lobes.chunks_mut(pixels).collect();
+        lobes.resize_with(self.shared.len().div_ceil(pixels), Default::default);
+        let part = move |((shared, by_level), lobes)| SampleBufferPart { levels, shared, by_level, lobes };
+        self.shared.par_chunks_mut(pixels).zip(by_level).zip(lobes).map(part)
     }
 
     /// The buffers of one or two camera paths, each divided into the samples of `pixels` pixels, for parallel tasks.
@@ -99,6 +114,7 @@ pub(super) struct SampleBufferPart<'m> {
     levels: usize,
     shared: &'m mut [Shared],
     by_level: &'m mut [OfLevel],
+    lobes: &'m mut [LobeLight],
 }
 
 impl SampleBufferPart<'_> {
@@ -106,6 +122,14 @@ impl SampleBufferPart<'_> {
     #[inline]
     pub fn get(&self, slot: usize) -> PixelSample {
         unpack(&self.shared[slot], &self.by_level[slot * self.levels..][..self.levels])
+    }
+
+    /// Stores light by the lobe of the first hit at index `slot` of this part, if the buffer has room for it.
+    #[inline]
+    pub fn set_lobes(&mut self, slot: usize, light: &LobeLight) {
+        if let Some(lobes) = self.lobes.get_mut(slot) {
+            *lobes = *light;
+        }
     }
 
     /// Stores a sample at index `slot` of this part. Light at levels beyond those of the buffer is lost.
@@ -120,7 +144,7 @@ impl SampleBufferPart<'_> {
 }
 
 /// Adds the samples of iteration `i`, by one or two camera paths, to the pixels. `slot` gives the place of a pixel in
-/// the buffers, `groups` its light by light group. Returns for each kind of photons the number of pixels to whose own
+/// the buffers, `groups` its light by light group and by the lobe of the first hit. Returns for each kind of photons the number of pixels to whose own
 /// image it has brought light.
 pub(super) fn add<'g>(
     samples: &[SampleBuffer],
@@ -128,7 +152,7 @@ pub(super) fn add<'g>(
     i: u64,
     pixels: &mut [PixelAccumulator],
     slot: impl Fn(usize) -> usize + Sync,
-    groups: impl Fn(usize) -> &'g [[Rgb; 2]] + Sync,
+    groups: impl Fn(usize) -> (&'g [[Rgb; 2]], Option<&'g LobeLight>) + Sync,
 ) -> ByKind<u64> {
     let add = |(index, pixel): (usize, &mut PixelAccumulator)| {
         let slot = slot(index);
@@ -137,7 +161,9 @@ pub(super) fn add<'g>(
         let others = samples.get(1).map(|samples| samples.get(slot));
         let (own, level) = pixel.picture_sample(&sample, others.as_ref());
         let light = [own.indirect_photons[level], own.caustic_photons[level]];
-        pixel.add_with_groups(i, &sample, others.as_ref(), groups(slot));
+        let (groups, lobes) = groups(slot);
+        let lobes = lobes.or_else(|| samples.last().and_then(|samples| samples.lobes.get(slot)));
+        pixel.add_with_groups(i, &sample, others.as_ref(), (groups, lobes));
         light.map(|light| u64::from(is_lit(light)))
     };
     let all = |(part, pixels): (usize, &mut [PixelAccumulator])| {

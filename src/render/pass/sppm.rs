@@ -18,7 +18,7 @@ use crate::random::{Domain, Streams};
 use crate::render::clock::{Phases, cpu_seconds};
 use crate::render::input::RenderInput;
 use crate::render::settings::Settings;
-use crate::transport::{CameraPathStart, PixelSample, Scratch};
+use crate::transport::{CameraPathStart, LobeLight, PixelSample, Scratch};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -35,6 +35,7 @@ impl<B: PixelBandwidths, K: Kernel> Sppm<B, K> {
     pub fn new(input: &RenderInput<'_>, tracer: PhotonTracer, bandwidths: B, kernel: K) -> Sppm<B, K> {
         let (width, height) = input.size();
         let samples = SampleBuffer::of_paths(width as usize * height as usize, input.settings.levels);
+        let samples = SampleBuffer::with_lobes(samples, input.settings.lobes);
         Sppm { tracer, bandwidths, kernel, samples }
     }
 
@@ -55,7 +56,7 @@ impl<B: PixelBandwidths, K: Kernel> Sppm<B, K> {
             [Domain::CameraIndependent, Domain::CameraCorrelated].map(|domain| Self::streams(settings, i, domain));
         let Sppm { bandwidths, kernel, samples, .. } = self;
         let (camera_paths, levels, kernel) = (input.camera_paths(), settings.levels, *kernel);
-        let size = camera_paths.camera.size();
+        let (size, own) = (camera_paths.camera.size(), levels.picture_level());
         let band = pixels_per_band(size.0);
         let bands =
             pixels.par_chunks(band).zip(SampleBuffer::par_of_paths(samples, band)).zip(bandwidths.par_chunks(i, band));
@@ -74,25 +75,36 @@ impl<B: PixelBandwidths, K: Kernel> Sppm<B, K> {
                 let pixel = &pixels[place.at];
                 // Samples some levels by one camera path, with the photons of each channel. The path is the same each
                 // time; only the photons differ, and photons of a channel carry light of that channel only.
-                let mut sample = |start: &CameraPathStart, levels: Range<usize>| {
+                let mut sample = |start: &CameraPathStart, levels: Range<usize>, lobes: &mut LobeLight| {
+                    let own = own.checked_sub(levels.start).filter(|own| *own < levels.len());
                     let mut of_channel = |channel: usize| {
                         let (maps, scratch) = (&maps[channel], &mut scratches[channel]);
+                        scratch.lobes.start(own);
                         let volume = maps.volume(pixel, levels.clone());
                         let mut own = bandwidths.path(place.at, channel, levels.clone());
                         let sample = camera_paths.sample(scratch, start, &maps.surface, volume, &mut own, kernel);
                         own.finish();
+                        if camera_paths.lobes {
+                            scratch.lobes.add_to(lobes, channel == 0);
+                        }
                         sample
                     };
                     let mut sample = of_channel(0);
                     (1..maps.len()).for_each(|channel| add_photons(&mut sample, &of_channel(channel)));
                     sample
                 };
+                let (mut lobes, mut other) = (LobeLight::default(), LobeLight::default());
                 match (correlated.as_ref().and_then(|starts| starts[k].as_ref()), &mut *second) {
                     (Some(correlated), Some(second)) => {
-                        first.set(place.at, &sample(start, 0..1));
-                        second.set(place.at, &sample(correlated, usize::from(levels.count > 1)..levels.count));
+                        first.set(place.at, &sample(start, 0..1, &mut other));
+                        let rest = usize::from(levels.count > 1)..levels.count;
+                        second.set(place.at, &sample(correlated, rest, &mut lobes));
+                        second.set_lobes(place.at, &lobes);
                     }
-                    _ => first.set(place.at, &sample(start, 0..levels.count)),
+                    _ => {
+                        first.set(place.at, &sample(start, 0..levels.count, &mut lobes));
+                        first.set_lobes(place.at, &lobes);
+                    }
                 }
             }
         });
@@ -132,7 +144,8 @@ impl<B: PixelBandwidths, K: Kernel> Integrator for Sppm<B, K> {
             self.bandwidths = before;
         } else {
             let camera_paths = input.camera_paths();
-            work.counts.gathered = sample_buffer::add(&self.samples, &camera_paths, i, pixels, |index| index, |_| &[]);
+            work.counts.gathered =
+                sample_buffer::add(&self.samples, &camera_paths, i, pixels, |index| index, |_| (&[], None));
         }
         phases.eye += cpu_seconds() - start;
         (!aborted).then_some(work)

@@ -7,12 +7,10 @@
 use super::groups::{GroupLight, TileGroups};
 use super::tiles::{TILE_PIXELS, Tiles};
 use crate::film::Picture;
-use crate::light::Group;
 use crate::math::Rgb;
-use crate::plan::PathClass;
 use crate::render::settings::Settings;
 use crate::scene::Scene;
-use crate::transport::{MergeLevels, PathRecorder, Splat, Technique};
+use crate::transport::{FirstScatter, LobeLight, MergeLevels, PathKind, PathRecorder, Splat, Technique};
 
 /// Depth from which all deeper subpaths share one picture, because the depth of paths has no bound.
 const MAX_PICTURE_DEPTH: u32 = 6;
@@ -81,17 +79,25 @@ pub(super) trait TileRecorder: PathRecorder + Send + Sync {
         let _ = (slot, level);
     }
 
-    /// Records the splat that a light path has sent to the pixel at index `slot` of the tile.
+    /// Records the splat that a light path has sent to the pixel at index `slot` of the tile, where its light vertex
+    /// scatters the light by `first`.
     #[inline]
-    fn record_splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
-        let _ = (slot, level, splat, levels);
+    fn record_splat(
+        &mut self,
+        slot: usize,
+        level: Option<usize>,
+        (splat, first): (&Splat, FirstScatter),
+        levels: &MergeLevels,
+    ) {
+        let _ = (slot, level, splat, first, levels);
     }
 
-    /// Light of this iteration in the pixel at index `slot` of the tile, by light group.
+    /// Light of this iteration in the pixel at index `slot` of the tile, by light group, and by the lobe of the first hit
+    /// if it is recorded.
     #[inline]
-    fn group_light(&self, slot: usize) -> &[GroupLight] {
+    fn group_light(&self, slot: usize) -> (&[GroupLight], Option<&LobeLight>) {
         let _ = slot;
-        &[]
+        (&[], None)
     }
 }
 
@@ -106,19 +112,19 @@ pub(super) struct TileRecords {
 }
 
 impl TileRecords {
-    /// Makes a tile that records pictures of techniques if `techniques` is true, and the light of `groups` light
-    /// groups.
-    fn new(techniques: bool, groups: usize) -> TileRecords {
-        let groups = (groups > 0).then(|| TileGroups::new(groups));
+    /// Makes a tile that records pictures of techniques if `techniques` is true, the light of `groups` light groups, and
+    /// light by the lobe of the first hit if `lobes` is true.
+    fn new(techniques: bool, groups: usize, lobes: bool) -> TileRecords {
+        let groups = (groups > 0 || lobes).then(|| TileGroups::new(groups, lobes));
         TileRecords { slot: 0, level: None, pictures: techniques.then(TilePictures::new), groups }
     }
 
-    fn add(&mut self, technique: Technique, of: (PathClass, Group), value: Rgb, weight: f32) {
+    fn add(&mut self, technique: Technique, of: &PathKind, value: Rgb, weight: f32) {
         if let Some(pictures) = &mut self.pictures {
             pictures.add(self.slot, technique, value, weight);
         }
         if let Some(groups) = &mut self.groups {
-            groups.add(self.slot, of, value * weight);
+            groups.add(self.slot, technique, of, value * weight);
         }
     }
 }
@@ -128,11 +134,11 @@ impl TileRecords {
 pub(super) struct FilmRecorder(Option<Vec<TileRecords>>);
 
 impl FilmRecorder {
-    /// Makes the recorders of the technique pictures and light groups that the settings ask for.
+    /// Makes the recorders of the technique pictures, light groups and lobes that the settings ask for.
     pub fn new(settings: &Settings, scene: &Scene, tiles: &Tiles) -> FilmRecorder {
-        let (techniques, groups) = (settings.techniques, settings.light_groups(scene));
-        let records = || (0..tiles.count()).map(|_| TileRecords::new(techniques, groups)).collect();
-        FilmRecorder((techniques || groups > 0).then(records))
+        let (techniques, groups, lobes) = (settings.techniques, settings.light_groups(scene), settings.lobes);
+        let records = || (0..tiles.count()).map(|_| TileRecords::new(techniques, groups, lobes)).collect();
+        FilmRecorder((techniques || groups > 0 || lobes).then(records))
     }
 
     /// Starts an iteration. Returns the recorders of all tiles; `None` if nothing is recorded.
@@ -151,9 +157,16 @@ impl FilmRecorder {
 
 impl PathRecorder for TileRecords {
     #[inline]
-    fn arrival(&mut self, technique: Technique, of: (PathClass, Group), level: usize, value: Rgb, weight: f32) {
+    fn arrival(&mut self, technique: Technique, of: PathKind, level: usize, value: Rgb, weight: f32) {
         if self.level == Some(level) {
-            self.add(technique, of, value, weight);
+            self.add(technique, &of, value, weight);
+        }
+    }
+
+    #[inline]
+    fn first_surface(&mut self, colors: [Rgb; 3]) {
+        if let Some(groups) = self.groups.as_mut().filter(|_| self.level.is_some()) {
+            groups.set_colors(self.slot, colors);
         }
     }
 }
@@ -165,17 +178,24 @@ impl TileRecorder for TileRecords {
     }
 
     #[inline]
-    fn record_splat(&mut self, slot: usize, level: Option<usize>, splat: &Splat, levels: &MergeLevels) {
+    fn record_splat(
+        &mut self,
+        slot: usize,
+        level: Option<usize>,
+        (splat, first): (&Splat, FirstScatter),
+        levels: &MergeLevels,
+    ) {
         self.select_pixel(slot, level);
         if let Some(level) = level {
             let weight = splat.ratios.weight(levels.eta()[level]);
-            self.add(Technique::Camera { light: splat.light }, (splat.class, splat.group), splat.value, weight);
+            let of = PathKind { class: splat.class, group: splat.group, first };
+            self.add(Technique::Camera { light: splat.light }, &of, splat.value, weight);
         }
     }
 
     #[inline]
-    fn group_light(&self, slot: usize) -> &[GroupLight] {
-        self.groups.as_ref().map_or(&[], |groups| groups.at(slot))
+    fn group_light(&self, slot: usize) -> (&[GroupLight], Option<&LobeLight>) {
+        self.groups.as_ref().map_or((&[], None), |groups| (groups.at(slot), groups.lobes_at(slot)))
     }
 }
 

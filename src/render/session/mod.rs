@@ -59,9 +59,10 @@ impl<'a> Session<'a> {
     pub fn resume(input: &'a RenderInput<'a>, state: State) -> Option<Session<'a>> {
         let mut session = Session::new(input);
         let State { pixels, counters, passes } = state;
-        let (levels, groups) = (input.settings.levels.count, input.settings.light_groups(input.scene));
+        let Settings { levels, lobes, .. } = &input.settings;
+        let groups = input.settings.light_groups(input.scene);
         let fits = pixels.len() == session.pixels.len()
-            && pixels.iter().all(|pixel| pixel.holds(levels, groups))
+            && pixels.iter().all(|pixel| pixel.holds(levels.count, groups, *lobes))
             && session.integrator.restore(&passes);
         fits.then(|| Session { pixels, counters, ..session })
     }

@@ -35,6 +35,16 @@ impl<P> State<P> {
 }
 
 impl State {
+    /// The state of a render whose light is recorded by the lobe of the first hit exactly if `lobes` is true; `None` if
+    /// this is wanted and was not recorded.
+    pub fn with_lobes(mut self, lobes: bool) -> Option<State> {
+        if lobes {
+            return self.pixels.iter().all(PixelAccumulator::has_lobes).then_some(self);
+        }
+        self.pixels = self.pixels.into_iter().map(|pixel| pixel.with_lobes(false)).collect();
+        Some(self)
+    }
+
     /// Iterations done.
     pub fn iterations(&self) -> u64 {
         self.counters.stats.iterations

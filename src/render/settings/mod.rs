@@ -100,6 +100,9 @@ pub struct Settings {
     pub guided: bool,
     /// Bandwidth levels: pictures with different kernel bandwidths that one render makes.
     pub levels: Levels,
+    /// Also record the light by the lobe of the first hit, for the layers that this fills.
+    #[serde(default)]
+    pub lobes: bool,
     /// Also make a picture per sampling technique ([`Method::has_techniques`]).
     pub techniques: bool,
     /// Rule for the largest initial bandwidth. [`Method::Pm`] takes from it the number of neighbours whose distance is the
@@ -144,6 +147,7 @@ impl Default for Settings {
             classes: ClassSet::ALL,
             guided: false,
             levels: Levels::new(5),
+            lobes: false,
             techniques: false,
             initial_bandwidth: InitialBandwidth::Nearest(DEFAULT_KNN.0),
             max_initial_bandwidth: [SCREEN_CAP; 2],
@@ -215,18 +219,18 @@ impl Settings {
         camera: &'a Camera,
         initial_media: &InitialMedia,
     ) -> CameraPaths<'a> {
-        let Settings { max_depth, indirect, classes, .. } = *self;
+        let Settings { max_depth, indirect, classes, lobes, .. } = *self;
         // Pictures per technique are sums over paths, so an iteration cannot be taken back from them.
         let stop = (!self.techniques).then_some(&self.stop);
-        CameraPaths { scene, camera, interior: initial_media.camera, max_depth, indirect, classes, stop }
+        CameraPaths { scene, camera, interior: initial_media.camera, max_depth, indirect, classes, lobes, stop }
     }
 
     /// Returns a function that makes a pixel before the first iteration, from its largest initial bandwidths by kind of
     /// photons.
     pub(in crate::render) fn pixel_factory(&self, scene: &Scene) -> impl Fn(ByKind<f32>) -> PixelAccumulator + use<> {
         let (levels, exponent) = (self.levels.count, scene.lights.irradiance_exponent());
-        let groups = self.light_groups(scene);
-        move |bandwidths| PixelAccumulator::new(levels, exponent, bandwidths).with_groups(groups)
+        let (groups, lobes) = (self.light_groups(scene), self.lobes);
+        move |bandwidths| PixelAccumulator::new(levels, exponent, bandwidths).with_groups(groups).with_lobes(lobes)
     }
 
     /// All pixels before the first iteration, for methods whose pixels have no bandwidths.

@@ -74,7 +74,7 @@ const UNSAID: [(&str, &[&str]); 6] = [
     ),
     (
         "they are no messages",
-        &["caustique checkpoint 6n", "caustique checkpoint ", "not said", "default material", "xabKTX 20xbbrnx1an"],
+        &["caustique checkpoint 7n", "caustique checkpoint ", "not said", "default material", "xabKTX 20xbbrnx1an"],
     ),
 ];
 
