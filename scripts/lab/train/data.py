@@ -39,6 +39,9 @@ PATHS = {1: 2, 2: 1}
 # Seed of the stack by sppm that the deep combiner reads.
 DEEP_SEED = 2
 LEVELS = 5
+# Light paths of an iteration of sppm. The default, one for each pixel of the picture, takes twenty times as long in large
+# pictures, of which a view shows a small window.
+PHOTONS = 100_000
 # Additive parts, in the order in which the arrays hold them.
 PARTS = ("Emission", "Direct", "Indirect", "Caustic", "Volume")
 # Least and greatest width of the picture of which a window is rendered. The light paths of vcm are as many as its
@@ -215,6 +218,8 @@ class Maker:
         layers = ["beauty", "Level", "Variance", "Quarter", "albedo", "normal", "depth", *note["parts"]]
         radii = note["radii"] if method == "sppm" else ["Radius"]
         settings = place(note, method) | {"method": method, "levels": LEVELS, "eye_paths": PATHS[seed], "seed": seed}
+        if method == "sppm":
+            settings["photons"] = PHOTONS
         settings["layers"], height = ",".join([*layers, *radii]), settings["height"]
         arrays = self.snapshots(view, scene, work, settings, lambda picture: stack(picture, note, height, radii))
         write(view.folder / f"{method}-seed{seed}.npz", arrays)
