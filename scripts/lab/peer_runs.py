@@ -25,6 +25,7 @@ PEERS = {
     "lux_bidirvm": ("luxcore_driver.py", "bidirvm"),
     "cycles_path": ("cycles_driver.py", "path"),
     "cycles_guiding": ("cycles_driver.py", "path_guiding"),
+    "cycles_caustics": ("cycles_driver.py", "path_caustics"),
 }
 DEFAULT = ["mitsuba_path", "lux_bidir", "lux_path_caustic", "lux_bidirvm", "cycles_path"]
 INSTALL = "scripts/compare/setup.sh peers creates it"

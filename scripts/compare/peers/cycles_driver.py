@@ -1,6 +1,8 @@
-"""Renders with Blender's Cycles on the CPU (see driver.py). Modes: `path`, and `path_guiding` (Open PGL).
+"""Renders with Blender's Cycles on the CPU (see driver.py). Modes: `path`, `path_guiding` (Open PGL), and `path_caustics`
+(shadow caustics, which is manifold next event estimation: all glass casts caustics, all other surfaces receive them).
 
-Runs in .venv-bpy, which has Blender as a Python module, with OpenEXR from .venv-peers/bpy.
+Lamps and suns with a size are Blender's own. With shadow caustics, which need such lamps, luminous rectangles are area
+lights. Runs in .venv-bpy, which has Blender as a Python module, with OpenEXR from .venv-peers/bpy.
 """
 
 import os
@@ -16,6 +18,7 @@ import driver
 import pictures
 import plain_scene
 
+MODES = ["path", "path_guiding", "path_caustics"]
 #: Rotation from +Y up to +Z up.
 TURN = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 #: Limit of environment texels, because Cycles stores images in half precision.
@@ -51,7 +54,7 @@ def material(of, folder):
     nodes = Nodes(made.node_tree)
     output = nodes.add("OutputMaterial")
     colour = (*of.base, 1.0)
-    if of.kind == "matte":
+    if of.kind == "matte" and not of.coat:
         shader = nodes.add("BsdfDiffuse", Color=colour, Roughness=0.0)
     elif of.kind == "glass":
         shader = nodes.add("BsdfGlass", Color=colour, Roughness=of.roughness, IOR=of.ior)
@@ -67,7 +70,10 @@ def material(of, folder):
             Roughness=of.roughness,
             IOR=of.ior,
             Metallic=float(of.kind == "metal"),
-            Specular_IOR_Level=of.specular / 2,
+            Specular_IOR_Level=0.0 if of.kind == "matte" else of.specular / 2,
+            Coat_Weight=of.coat,
+            Coat_Roughness=of.coat_roughness,
+            Coat_IOR=1.5,
         )
         shader.distribution = "MULTI_GGX"
     if of.texture:
@@ -76,7 +82,7 @@ def material(of, folder):
             sink.write(of.texture)
         image = nodes.add("TexImage")
         image.image = bpy.data.images.load(file)
-        nodes.link(image.outputs["Color"], shader.inputs["Base Color" if of.kind in ("coated", "metal") else "Color"])
+        nodes.link(image.outputs["Color"], shader.inputs[0])
     surface = shader.outputs[0]
     if of.emission.any():
         surface = with_emission(nodes, surface, of.emission)
@@ -156,36 +162,89 @@ def world(scene, image, folder):
 
 
 def lamp(scene, light):
-    """Add a lamp without size."""
+    """Add a point lamp or a sun."""
     most = float(light.intensity.max())
     if most == 0:
         return
     if light.kind == "point":
         data = bpy.data.lights.new("point", "POINT")
         # Watts from intensity.
-        data.energy, data.shadow_soft_size = 4 * np.pi * most, 0
+        data.energy, data.shadow_soft_size, data.use_soft_falloff = 4 * np.pi * most, light.radius, False
     else:
         data = bpy.data.lights.new("sun", "SUN")
-        data.energy, data.angle = most, 0
+        data.energy, data.angle = most, light.angle
     data.color = light.intensity / most
     add(scene, data, light.to_world, "lamp")
 
 
-def build(of, folder):
+def rectangle(part):
+    """The matrix of a unit square (x and y from -1/2 to 1/2) that lies on a mesh, with its front at +z; None if the mesh is
+    no rectangle."""
+    points = np.unique(part.positions.round(9), axis=0)
+    if len(points) != 4 or len(part.triangles) != 2:
+        return None
+    a, b, c = part.positions[part.triangles[0]]
+    front = np.cross(b - a, c - a)
+    other = np.cross(*(part.positions[part.triangles[1]][1:] - part.positions[part.triangles[1]][0]))
+    centre, (u, v) = points.mean(0), sorted((points[1:] - points[0]), key=np.linalg.norm)[:2]
+    size = np.linalg.norm(u) * np.linalg.norm(v)
+    flat = front @ other > 0.9999 * np.linalg.norm(front) * np.linalg.norm(other)
+    if not flat or abs(u @ v) > 1e-4 * size or abs(np.linalg.norm(front) - size) > 1e-4 * size:
+        return None
+    if np.cross(u, v) @ front < 0:
+        u, v = v, u
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([u, v, front / np.linalg.norm(front), centre], axis=1)
+    return matrix
+
+
+def area_light(scene, matrix, radiance):
+    """Add a rectangular light that shines along +z of `matrix`."""
+    data, most = bpy.data.lights.new("area", "AREA"), float(radiance.max())
+    width, height = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 1])
+    data.shape, data.size, data.size_y = "RECTANGLE", width, height
+    data.energy, data.color = np.pi * width * height * most, radiance / most
+    # Blender's lights shine along -z.
+    turned = matrix.copy()
+    turned[:3, 0], turned[:3, 1], turned[:3, 2] = matrix[:3, 0] / width, -matrix[:3, 1] / height, -matrix[:3, 2]
+    add(scene, data, turned, "lamp")
+
+
+def cast_caustics(scene, casters):
+    """Let objects cast caustics, all others receive them, and all lights make them."""
+    for made in scene.objects:
+        if made.type == "MESH":
+            made.cycles.is_caustics_caster = made in casters
+            made.cycles.is_caustics_receiver = made not in casters
+        elif made.type == "LIGHT":
+            made.data.cycles.is_caustics_light = True
+    scene.world.cycles.is_caustics_light = True
+
+
+def build(of, folder, caustics=False):
     """Build the Blender scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene, known = bpy.context.scene, {}
+    scene, known, casters = bpy.context.scene, {}, []
     for part, surface in of.meshes:
+        square = rectangle(part) if caustics and surface.emission.any() and not surface.base.any() else None
+        if square is not None:
+            area_light(scene, square, surface.emission)
+            continue
         if id(surface) not in known:
             known[id(surface)] = material(surface, folder)
         made = mesh(part)
         made.materials.append(known[id(surface)])
         made.update()
-        scene.collection.objects.link(bpy.data.objects.new(part.name, made))
+        placed = bpy.data.objects.new(part.name, made)
+        scene.collection.objects.link(placed)
+        if surface.kind == "glass":
+            casters.append(placed)
     camera(scene, of.camera)
     world(scene, of.environment, folder)
     for light in of.lights:
         lamp(scene, light)
+    if caustics:
+        cast_caustics(scene, casters)
     return scene
 
 
@@ -234,13 +293,13 @@ def render(scene, seconds, seed, folder):
 
 
 def main():
-    options = driver.options(["path", "path_guiding"])
-    of = plain_scene.Scene(options.scene, options.camera)
+    options = driver.options(MODES)
+    of = plain_scene.Scene(options.scene, options.camera, lamps="lamps", suns="lamps")
     if of.blockers:
         driver.print_answer(cannot=of.blockers)
         return
     with tempfile.TemporaryDirectory(prefix="caustique-cycles-") as folder:
-        scene = build(of, folder)
+        scene = build(of, folder, options.mode == "path_caustics")
         set_render_settings(scene, options)
         watch, total = driver.Stopwatch(options), 0.0
 

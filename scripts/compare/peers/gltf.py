@@ -108,15 +108,16 @@ def extension(part, name):
     return part.get("extensions", {}).get(name)
 
 
-def read(path, lose=refuse):
-    """Read the scene at `path` (.glb or .gltf). `lose` receives a text for each approximated or omitted feature."""
+def read(path, lose=refuse, known=()):
+    """Read the scene at `path` (.glb or .gltf). `lose` receives a text for each approximated or omitted feature; `known`
+    are extensions of materials that the caller translates."""
     path = Path(path)
     data = path.read_bytes()
     if data[:4] == b"glTF":
         document, binary = chunks(data)
     else:
         document, binary = json.loads(data), None
-    unknown = sorted(set(document.get("extensionsUsed", [])) - EXTENSIONS)
+    unknown = sorted(set(document.get("extensionsUsed", [])) - EXTENSIONS - set(known))
     if not all(name.startswith("KHR_materials_") for name in unknown):
         raise Unsupported(f"{path}: extensions {', '.join(unknown)}")
     for name in unknown:

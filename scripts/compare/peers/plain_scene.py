@@ -1,5 +1,5 @@
-"""Simplifies a scene for LuxCore and Cycles: four kinds of materials, lamps with size as meshes, suns as pixels of the
-environment.
+"""Simplifies a scene for LuxCore and Cycles: four kinds of materials with a clear coat. Where a renderer asks for it, lamps
+with size become meshes, and suns pixels of the environment.
 
 Unsupported features are listed: `blockers` make a comparison meaningless; for `approximations` the mean of the picture
 shows how much they matter. Mitsuba does not need this module: mitsuba_world.py converts scenes directly.
@@ -17,6 +17,7 @@ import pictures
 SUN_MAP_WIDTH = 2048
 #: Extensions of materials that the four kinds support.
 SUPPORTED = {
+    "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
@@ -42,21 +43,26 @@ class Material:
     absorption: np.ndarray = field(default_factory=lambda: np.zeros(3))
     #: An encoded image that replaces `base`.
     texture: bytes | None = None
+    #: Share of the surface that has a clear coat with an index of refraction of 1.5.
+    coat: float = 0.0
+    #: Roughness of the coat.
+    coat_roughness: float = 0.0
 
 
 class Scene:
     """A simplified glTF file.
 
-    meshes: pairs of a gltf.Mesh and a Material; lights: point lights and suns without size; camera: a gltf.Camera;
-    environment: (height, width, 3), rows from the top, u = atan2(x, -z) / 2 pi, or None.
+    meshes: pairs of a gltf.Mesh and a Material; lights: point lights and suns; camera: a gltf.Camera; environment:
+    (height, width, 3), rows from the top, u = atan2(x, -z) / 2 pi, or None. `lamps`: whether point lights with size are
+    "lamps" or "meshes"; `suns`: whether suns with a disc are "lamps" or "pixels" of the environment.
     """
 
-    def __init__(self, path, camera=None):
-        self.path = Path(path)
+    def __init__(self, path, camera=None, lamps="meshes", suns="pixels"):
+        self.path, self.sized_lamps, self.sized_suns = Path(path), lamps == "lamps", suns == "lamps"
         self.meshes, self.lights, self.camera, self.environment = [], [], None, None
         self.blockers, self.approximations = [], []
         try:
-            scene = gltf.read(path)
+            scene = gltf.read(path, known=SUPPORTED)
         except gltf.Unsupported as unsupported:
             self.blockers.append(str(unsupported))
             return
@@ -111,6 +117,12 @@ class Scene:
             self._note(self.approximations, "gloss is coupled with the layer below it by another model")
         if kind == "glass":
             made.absorption = self._absorption(mesh, raw, name)
+        coat = extensions.get("KHR_materials_clearcoat", {})
+        made.coat, made.coat_roughness = coat.get("clearcoatFactor", 0.0), coat.get("clearcoatRoughnessFactor", 0.0)
+        if made.coat:
+            self._note(self.approximations, "a clear coat is coupled with the layers below it by another model")
+            if kind == "glass":
+                self._note(self.blockers, f"{name}: a clear coat on glass")
         if made.emission.any() and raw.get("doubleSided"):
             self._note(self.approximations, f"{name} shines from its front only")
         if "baseColorTexture" in surface:
@@ -144,14 +156,14 @@ class Scene:
         return -np.log(np.maximum(color, 1e-6)) / (volume or {}).get("attenuationDistance", np.inf)
 
     def _lights(self, scene):
-        """Keep lamps without size, convert those with a size to balls, and return the suns with a disc."""
+        """Keep lamps that the renderer has, convert those with a size to balls, and return the suns with a disc."""
         suns = []
         for light in scene.lights:
             if light.kind == "spot":
                 self._note(self.blockers, "spots")
-            elif light.kind == "point" and light.radius:
+            elif light.kind == "point" and light.radius and not self.sized_lamps:
                 self.meshes.append(ball(light))
-            elif light.kind == "directional" and light.angle:
+            elif light.kind == "directional" and light.angle and not self.sized_suns:
                 suns.append(light)
             else:
                 self.lights.append(light)
@@ -186,7 +198,7 @@ class Scene:
 
 def ball(light):
     """A lamp's sphere as a mesh with the lamp's power. A convex body shows a quarter of its surface on average."""
-    points, triangles = icosphere(3)
+    points, triangles = icosphere(1)
     corners = points[triangles] * light.radius
     surface = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
     mesh = gltf.Mesh("lamp", None, points * light.radius + light.to_world[:3, 3], points, None, triangles)
