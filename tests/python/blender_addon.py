@@ -52,6 +52,44 @@ class Renders(Installed):
         for axis, value in zip("XYZ", (0, -0.6, 0.8)):
             numpy.testing.assert_allclose(found[f"Normal.{axis}"], value, atol=1e-4)
 
+    def test_passes_of_cycles_add_up_to_the_picture(self):
+        """Direct and indirect light times the colour, and emission and environment, are the picture."""
+        long = bpy.app.version >= (5, 0, 0)
+        lobes = ("Diffuse", "Glossy", "Transmission") if long else ("Diff", "Gloss", "Trans")
+        kinds = (" Direct", " Indirect", " Color") if long else ("Dir", "Ind", "Col")
+        switches = [f"use_pass_{lobe}_{kind}" for lobe in ("diffuse", "glossy", "transmission")
+                    for kind in ("direct", "indirect", "color")]
+        self.stage()
+        self.passes(*switches, "use_pass_emit", "use_pass_environment")
+        for finish, method in (("auto", "vcm"), ("off", "path")):
+            self.settings.finish, self.settings.method = finish, method
+            found = self.render()
+            total = sum(found[f"{name}.G"] for name in (("Emission", "Environment") if long else ("Emit", "Env")))
+            for lobe in lobes:
+                direct, indirect, color = (found[f"{lobe}{kind}.G"] for kind in kinds)
+                total = total + (direct + indirect) * color
+                self.assertGreater(color.max(), 0, lobe)
+                self.assertGreater((direct + indirect).max(), 0, lobe)
+            with self.subTest(finish):
+                # The denoiser spreads some light to pixels where the lobe's colour is black.
+                self.assertLess((total - found["Combined.G"]).max(), 1e-3)
+                self.assertGreater(total.sum(), 0.95 * found["Combined.G"].sum())
+                if finish == "off":
+                    numpy.testing.assert_allclose(total, found["Combined.G"], rtol=1e-3, atol=1e-4)
+
+    def test_direct_light_of_a_lit_plane_is_divided_by_its_colour(self):
+        long = bpy.app.version >= (5, 0, 0)
+        self.plane(at=(0, 0, 1), turn=(math.atan(0.75), 0, 0))
+        self.sun(math.pi)
+        self.eye(height=10, width=4)
+        self.passes("use_pass_diffuse_direct", "use_pass_diffuse_indirect", "use_pass_diffuse_color")
+        self.settings.method, self.settings.finish = "path", "off"
+        found = self.render()
+        names = ("Diffuse Direct", "Diffuse Indirect", "Diffuse Color") if long else ("DiffDir", "DiffInd", "DiffCol")
+        # pi W/m2 times the cosine 0.8, reflectance 1/2.
+        for name, value in zip(names, (0.8, 0, 0.5)):
+            numpy.testing.assert_allclose(found[f"{name}.G"], value, rtol=1e-3, err_msg=name)
+
     def test_motion_vectors_are_a_pass(self):
         """A plane moves by two pixels to the right and one up in each frame, with and without other passes."""
         plane = self.plane()

@@ -154,6 +154,10 @@ class PassesPanel(Panel, bpy.types.Panel):
             ("Data", layer, ("use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_vector")),
             ("", layer.caustique, ("albedo",)),
             ("Light", layer.caustique, ("parts", "noisy_parts", "noisy")),
+            *((lobe.capitalize(), layer, tuple(f"use_pass_{lobe}_{part}" for part in ("direct", "indirect", "color")))
+              for lobe in ("diffuse", "glossy", "transmission")),
+            ("Volume", layer.caustique, ("volume_direct", "volume_indirect")),
+            ("Other", layer, ("use_pass_emit", "use_pass_environment")),
             ("Noise", layer.caustique, ("error", "levels")),
             ("Cryptomatte", layer, ("use_pass_cryptomatte_object", "use_pass_cryptomatte_material")),
         )

@@ -5,6 +5,7 @@ import pathlib
 import re
 from collections import namedtuple
 
+import bpy
 import numpy
 
 #: A pass: its name in Blender (and in the EXR with `--exr-naming blender`), its components, its data type in Blender's
@@ -17,8 +18,10 @@ _NO_LETTER = re.compile("[^0-9A-Za-z]")
 #: The program's table of layers: tests/generated.rs writes the file.
 _TABLE = json.loads(pathlib.Path(__file__).with_name("layers.json").read_text("utf-8"))
 _PARTS, _GROUPS = _TABLE["parts"], tuple(_TABLE["groups"])
+#: The value of `--layers` for all layers by the lobe of the first hit.
+_LOBES = "lobes"
 #: Layers that `--layers all` leaves out.
-_ON_REQUEST = _TABLE["on_request"]
+_ON_REQUEST = (*_TABLE["on_request"], _LOBES)
 #: {components: data type in Blender's compositor}; all others are colours.
 _KINDS = {"X": "VALUE", "Z": "VALUE", "XYZ": "VECTOR", "XYZW": "VECTOR"}
 
@@ -27,7 +30,31 @@ def _pass(name, components, layer, switch, always):
     return Pass(name, components.upper(), _KINDS.get(components, "COLOR"), layer, switch, always)
 
 
-PASSES = tuple(_pass(**one) for one in _TABLE["passes"])
+def _passes_of_cycles():
+    """Passes that Cycles has, too: {name in Blender: (switch, the program's layer, layer to divide it by)}.
+
+    Blender 5 has spelt their names out. Cycles divides light by the colour of the first hit.
+    """
+    lobes = (("Diffuse", "Diff", "diffuse"), ("Glossy", "Gloss", "glossy"), ("Transmission", "Trans", "transmission"))
+    is_spelt_out = bpy.app.version >= (5, 0, 0)
+    found = {}
+    for long, short, switch in lobes:
+        color = f"{short}Col"
+        for part, abbreviation in (("Direct", "Dir"), ("Indirect", "Ind")):
+            name = f"{long} {part}" if is_spelt_out else short + abbreviation
+            found[name] = f"use_pass_{switch}_{part.lower()}", long + part, color
+        found[f"{long} Color" if is_spelt_out else color] = f"use_pass_{switch}_color", color, None
+    for part, abbreviation in (("Direct", "Dir"), ("Indirect", "Ind")):
+        name = f"Volume {part}" if is_spelt_out else f"Volume{abbreviation}"
+        found[name] = f"volume_{part.lower()}", f"Volume{part}", None
+    found["Emission" if is_spelt_out else "Emit"] = "use_pass_emit", "Emit", None
+    found["Environment" if is_spelt_out else "Env"] = "use_pass_environment", "Environment", None
+    return found
+
+
+_OF_CYCLES = _passes_of_cycles()
+PASSES = (*(_pass(**one) for one in _TABLE["passes"]),
+          *(_pass(name, "RGB", _LOBES, switch, True) for name, (switch, _, _) in _OF_CYCLES.items()))
 
 
 def wanted(view_layer):
@@ -36,7 +63,9 @@ def wanted(view_layer):
         # All other switches are in `properties.Passes`.
         return getattr(view_layer if switch.startswith("use_pass_") else view_layer.caustique, switch)
 
-    return [one for one in PASSES if is_enabled(one.switch)] + _group_passes(view_layer)
+    # Blender 5 calls the light of visible lamps Emission, which with Noisy Parts is the name of a noisy part.
+    found = {one.name: one for one in reversed(PASSES) if is_enabled(one.switch)}
+    return [one for one in PASSES if found.get(one.name) is one] + _group_passes(view_layer)
 
 
 def _group_passes(view_layer):
@@ -65,7 +94,7 @@ def fill(render_layer, picture, frame=None):
     """
     missing = []
     for one in render_layer.passes:
-        planes = _planes(picture, one.name, one.channel_id)
+        planes = _planes_of_cycles(picture, one.name) or _planes(picture, one.name, one.channel_id)
         if planes is None:
             plain = one.name.replace(_COMBINED, "", 1)
             if plain not in _PARTS and not plain.startswith(_GROUPS):
@@ -93,6 +122,20 @@ def copy_channels(one, planes, picture, frame=None):
         one.rect.foreach_set(pixels.ravel())
     except TypeError:  # Blender 3 expects a list of pixels, each with all components
         one.rect.foreach_set(pixels)
+
+
+def _planes_of_cycles(picture, name):
+    """The channels of a pass that Cycles has, too, finished if the picture is, or None."""
+    _, layer, color = _OF_CYCLES.get(name, (None, None, None))
+    if layer is None:
+        return None
+    planes = _planes(picture, _COMBINED + layer, "RGB") or _planes(picture, layer, "RGB")
+    colors = _planes(picture, color, "RGB") if color and planes else None
+    if colors is None:
+        # In Blender 5 a noisy part has the name of a pass of Cycles.
+        return None if color else planes
+    return [numpy.divide(light, of, out=numpy.zeros_like(light), where=of > 0)
+            for light, of in zip(planes, colors)]
 
 
 def _planes(picture, name, components):

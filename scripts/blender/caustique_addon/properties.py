@@ -85,6 +85,10 @@ class Passes(bpy.types.PropertyGroup):
         description="Direct, Indirect, Caustic, Emission and Volume: noisy parts, whose sum is Noisy")
     error: bpy.props.BoolProperty(
         name="Error", description="Estimated standard error of each pixel of the finished picture")
+    volume_direct: bpy.props.BoolProperty(
+        name="Volume Direct", description="Light of lamps that media scatter to the camera")
+    volume_indirect: bpy.props.BoolProperty(
+        name="Volume Indirect", description="Other light that media scatter to the camera")
     levels: bpy.props.BoolProperty(
         name="Bandwidths", description="The estimates at five bandwidths, Level1 to Level5, and their variances")
 
