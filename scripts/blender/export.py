@@ -41,6 +41,7 @@ import bake
 import camera_export
 import glb
 import export_guard as guard
+import lamp_pictures
 import lamp_profiles
 import lighting
 import motion_gltf
@@ -104,6 +105,7 @@ def write(path, scene=None, bake_size=bake.SIZE, progress=lambda text: None):
     _warn_of_stretched_normals(document, warn)
     _correct_lamps(document, flat.lamp_factors, warn)
     buffer = lamp_profiles.embed(document, buffer, flat.profiles)
+    buffer = lamp_pictures.embed(document, buffer, flat.pictures)
     _put_active_camera_first(document, scene)
     buffer = motion_gltf.write(document, buffer, flat.motion, bodies_of_nodes, warn)
     said.update(motion_gltf.scene_keys(flat.motion))

@@ -26,7 +26,7 @@ def strength(light, distance, lights_scene):
             plain.normalize = True
         plain.energy, plain.color = 1.0, (1.0, 1.0, 1.0)
         shaped = _received(plain, distance)
-        _switch_nodes_off(plain)
+        switch_nodes_off(plain)
         reference = _received(plain, distance)
     finally:
         bpy.data.lights.remove(plain)
@@ -47,7 +47,7 @@ def _directions(rows, columns):
     return numpy.stack([around * numpy.cos(turn), around * numpy.sin(turn), numpy.sin(up)], -1), around
 
 
-def _switch_nodes_off(light):
+def switch_nodes_off(light):
     if bpy.app.version < (5, 0, 0):
         light.use_nodes = False
         return
@@ -64,7 +64,7 @@ def _received(light, distance):
         stage, observer = undo.enter_context(panorama.stage(None, "lamp"))
         lamp = bpy.data.objects.new("lamp", light)
         undo.callback(bpy.data.objects.remove, lamp)
-        screen = bpy.data.objects.new("screen", _plane(undo) if sun else _sphere(undo, distance))
+        screen = bpy.data.objects.new("screen", _plane(undo) if sun else sphere(undo, distance))
         undo.callback(bpy.data.objects.remove, screen)
         for thing in (lamp, screen):
             stage.collection.objects.link(thing)
@@ -85,7 +85,7 @@ def _plane(undo):
     return _mesh(undo, [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)])
 
 
-def _sphere(undo, radius, rings=12):
+def sphere(undo, radius, rings=12):
     """A sphere about the origin, as a mesh of 2 * rings * rings quadrangles."""
     turns = [(math.pi * i / rings, math.pi * j / rings) for i in range(rings + 1) for j in range(2 * rings)]
     corners = [(radius * math.sin(a) * math.cos(b), radius * math.sin(a) * math.sin(b), radius * math.cos(a))

@@ -2,16 +2,21 @@
 
 import math
 
-import bpy
+import bpy  # first: it makes the others importable
+
+import numpy
 from mathutils import Vector
 
 import export_guard as guard
 import lamp_nodes
+import lamp_pictures
 import lamp_profiles
 from graph import FUNCTIONS, upstream
 from shading import constant, nodes_of, output_of, source
 
 _DISC_SIDES = 64
+# Cells along each side of an area lamp with a picture.
+_CELLS = 16
 # Distance, in radii of a lamp, within which soft falloff removes more than 2 % of the light: r^2 / (d^2 + r^2) at d.
 _SOFT_RADII = 7
 
@@ -89,14 +94,17 @@ def add_lamps(flat, warn):
 def _add_lamp(thing, flat, warn):
     light = thing.data
     if light.type == "AREA" and getattr(light.cycles, "is_portal", False):
-        # A portal emits no light: it guides the sampling of the sky in Cycles.
+        warn(flat.where(thing), "it is a portal, which guides Cycles' samples of the sky: it is left out")
         flat.remove(thing)
         return
     _warn_of(thing, flat.where(thing), warn)
+    picture = None
     if not _add_profile(thing, flat):
-        _measure_nodes(thing, flat, warn)
+        picture = guard.attempt(warn, flat.where(thing), None, "its picture is not carried", _add_picture, thing, flat)
+        if picture is None:
+            _measure_nodes(thing, flat, warn)
     if light.type == "AREA":
-        _area_mesh(thing, flat)
+        _area_mesh(thing, flat, picture)
         flat.remove(thing)
     elif light.type == "SUN":
         flat.add_extras(thing, angle_deg=math.degrees(light.angle))
@@ -104,6 +112,10 @@ def _add_lamp(thing, flat, warn):
         flat.add_extras(thing, radius=light.shadow_soft_size)
         if light.type == "SPOT":
             flat.add_extras(thing, blend=light.spot_blend)
+            if light.shadow_soft_size > 0 and "camera" not in flat.hidden[thing.name]:
+                warn(flat.where(thing), "its bulb, which Cycles shows, is not seen: only its light is")
+        elif light.shadow_soft_size > 0:
+            flat.add_extras(thing, null_bsdf=True)
 
 
 def _add_profile(thing, flat):
@@ -117,18 +129,37 @@ def _add_profile(thing, flat):
     return True
 
 
-def _area_mesh(thing, flat):
-    """A one-sided emissive mesh in place of an area lamp."""
+def _add_picture(thing, flat):
+    """Carry a lamp whose nodes vary its light over its cone or its surface. Returns None if they do not; for an area lamp
+    its picture (`lamp_pictures.measure`), relative to the brightest value."""
+    light = thing.data
+    if light.type == "SPOT":
+        peak, picture = lamp_pictures.add(thing, flat), True
+    else:
+        picture = lamp_pictures.measure(light, [abs(s) for s in thing.matrix_world.to_scale()[:2]])
+        peak = None if picture is None else float(picture.max())
+    if peak is None:
+        return None
+    flat.lamp_factors[light.name] = [peak] * 3
+    return picture if picture is True else picture / peak
+
+
+def _area_mesh(thing, flat, picture=None):
+    """A one-sided emissive mesh in place of an area lamp, with the picture of its light if it varies."""
     light, scale = thing.data, thing.matrix_world.to_scale()
     size_x, size_y = _size(light)
     if light.shape in {"DISK", "ELLIPSE"}:
         turns = [-2 * math.pi * i / _DISC_SIDES for i in range(_DISC_SIDES)]
         corners = [(math.cos(t) * size_x / 2, math.sin(t) * size_y / 2, 0) for t in turns]
+        faces = [range(_DISC_SIDES)]
     else:
-        corners = [(x * size_x / 2, y * size_y / 2, 0) for x, y in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+        # Cells of a picture are lights of their own, which are sampled by their power.
+        n = _CELLS if picture is not None else 1
+        corners = [((j / n - 0.5) * size_x, (i / n - 0.5) * size_y, 0) for i in range(n + 1) for j in range(n + 1)]
+        faces = [(a, a + n + 1, a + n + 2, a + 1) for a in (i * (n + 1) + j for i in range(n) for j in range(n))]
     name = flat.names[thing.name] + " (area light)"
     mesh = flat.remove_later(bpy.data.meshes.new(name))
-    mesh.from_pydata(corners, [], [range(len(corners))])  # clockwise: the face points along -Z, as the light does
+    mesh.from_pydata(corners, [], faces)  # clockwise: the face points along -Z, as the light does
     radiance = area_radiance(light, [abs(s) for s in scale[:2]], flat.lamp_factors)
     strength = max(max(radiance), 1e-30)
     material = flat.remove_later(bpy.data.materials.new(name))
@@ -143,11 +174,31 @@ def _area_mesh(thing, flat):
     emission = tree.nodes.new("ShaderNodeEmission")
     emission.inputs["Color"].default_value = [c / strength for c in radiance] + [1]
     emission.inputs["Strength"].default_value = strength
+    if picture is not None:
+        _put_picture(mesh, tree, emission, (size_x, size_y), picture * [c / strength for c in radiance], flat)
     tree.links.new(emission.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     mesh.materials.append(material)
     # A mirrored transform keeps the front, because the lamp still emits along its local -Z.
     body = flat.add(name, mesh, thing.matrix_world.copy(), flat.hidden[thing.name], flat.groups[thing.name])
     flat.motion.pass_on(thing, body)
+
+
+def _put_picture(mesh, tree, emission, size, picture, flat):
+    """Make an emissive mesh shine with a picture, relative to its strength, that is seen from its front."""
+    height, width, _ = picture.shape
+    image = flat.remove_later(bpy.data.images.new(mesh.name, width, height))
+    pixels = numpy.ones((height, width, 4), numpy.float32)
+    pixels[..., :3] = lamp_pictures.encoded(picture)
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image, node.extension = image, "EXTEND"
+    tree.links.new(node.outputs["Color"], emission.inputs["Color"])
+    layer = mesh.uv_layers.new(name="picture")
+    for loop in mesh.loops:
+        x, y, _ = mesh.vertices[loop.vertex_index].co
+        # Seen from the front, X is to the left.
+        layer.data[loop.index].uv = (0.5 - x / size[0], 0.5 + y / size[1])
 
 
 def _warn_of(thing, where, warn):

@@ -43,9 +43,9 @@ class FlatScene:
 
     `things`: its objects. `names`: names of the original objects and meshes. `hidden`: for each of `things`, the kinds
     of rays that do not hit it. `groups`: the light group of each, or None. `lamp_factors`: for each measured lamp, the
-    factors per channel of its nodes. `profiles`: the texts of IES profiles (bytes) that lamps name. `stretched`: names
-    of materials with normal maps that uneven scale stretches, found if the materials may be baked (`bakes`). `motion`:
-    how the objects move while the shutter is open.
+    factors per channel of its nodes. `profiles`: the texts of IES profiles (bytes) that lamps name. `pictures`: PNGs
+    that spots throw. `stretched`: names of materials with normal maps that uneven scale stretches, found if the materials
+    may be baked (`bakes`). `motion`: how the objects move while the shutter is open.
     """
 
     def __init__(self, scene, undo, warn, bakes=True):
@@ -53,7 +53,7 @@ class FlatScene:
         layer = bpy.context.view_layer
         layer.update()
         self.things, self.names, self.hidden, self.groups, self.lamp_factors = [], {}, {}, {}, {}
-        self.profiles = []
+        self.profiles, self.pictures = [], []
         self.stretched, self._bakes = set(), bakes
         self._warn, self._meshes, self._shapes, self._made, self._applied = warn, {}, [], [], {}
         self._indirect, self._layer = visibility.indirect_only(layer), layer
@@ -275,8 +275,12 @@ class FlatScene:
         if thing.type != "LIGHT" and (thing.is_holdout or thing.is_shadow_catcher):
             what = "a holdout" if thing.is_holdout else "a shadow catcher"
             self._warn(where, f"it is {what}, which is not carried: it is seen as any other object")
-        if any(getattr(thing.light_linking, name + "_collection", None) for name in ("receiver", "blocker")):
-            self._warn(where, "light linking is not carried: every light shines on every object")
+        linking = thing.light_linking
+        for kind, collection, what in (("light", linking.receiver_collection, "it shines on every object"),
+                                       ("shadow", linking.blocker_collection, "every object blocks its light")):
+            if collection is not None:
+                self._warn('light' + where[6:] if thing.type == "LIGHT" else where,
+                           f'its {kind} linking (collection "{collection.name}") is not carried: {what}')
         if getattr(thing.cycles, "use_adaptive_subdivision", False):
             self._warn(where, "adaptive subdivision is not carried: the modifier's render level is taken")
 

@@ -7,7 +7,7 @@ use super::{plot, print, print_json, printable, scene};
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, describe};
 use caustique::image::exr;
-use caustique::light::Emitter;
+use caustique::light::{Emitter, Pattern};
 use caustique::math::Vec3;
 use caustique::options::SceneOptions;
 use caustique::pipeline::{FINISHED_PICTURE, Place};
@@ -252,6 +252,11 @@ fn kind(emitter: &Emitter) -> &'static str {
     match emitter {
         Emitter::Point { .. } => "point",
         Emitter::Spot { .. } => "spot",
+        Emitter::Shaped(shaped) => match (&**shaped.distribution.pattern(), shaped.distribution.cone()) {
+            (Pattern::Profile(_), None) => "point with a profile",
+            (Pattern::Profile(_), Some(_)) => "spot with a profile",
+            (Pattern::Picture(_), _) => "spot with a picture",
+        },
         Emitter::Sun { .. } => "sun",
         Emitter::Environment => "environment",
         _ => "emissive triangles",

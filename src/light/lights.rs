@@ -5,13 +5,12 @@ use super::aim::CausticTargets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
-use super::emitter::{
-    Emitter, ShapedLight, Sky, TriangleLight, position_error, spot_falloff, spot_point, spot_solid_angle,
-};
+use super::emitter::{Emitter, ShapedLight, Sky, TriangleLight, position_error, spot_point};
 use super::environment::EnvironmentSample;
 use super::group::{Group, Groups};
 use super::receiver::Receiver;
 use super::sampler::LightSampler;
+use super::spot::{spot_falloff, spot_solid_angle};
 use super::spread::Spread;
 use crate::geometry::{Shapes, Surface, offset_origin, shadow_end};
 use crate::material::{Alpha, Materials};

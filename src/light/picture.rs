@@ -26,9 +26,14 @@ impl Picture {
         (valid && lit && fits).then_some(Picture { width, height, texels, half })
     }
 
-    /// Numbers of texels across and down.
+    /// Numbers of texels down and across.
     pub(super) fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
+        [self.height, self.width]
+    }
+
+    /// Half the height and half the width on the plane at distance 1.
+    pub(super) fn half_size(&self) -> [f32; 2] {
+        [self.half.y, self.half.x]
     }
 
     /// Coordinates on the picture of a unit direction in the frame of the light: -1 to 1 from the top to the bottom, and
@@ -54,11 +59,6 @@ impl Picture {
     pub(super) fn solid_angle(&self, at: Vec2) -> f32 {
         let r2 = (at * Vec2::new(self.half.y, self.half.x)).length_squared();
         self.half.x * self.half.y / ((1.0 + r2) * (1.0 + r2).sqrt())
-    }
-
-    /// The largest tangent of an angle to the axis.
-    pub(super) fn largest_tangent(&self) -> f32 {
-        self.half.length()
     }
 
     /// Transmittance at a point of the picture.

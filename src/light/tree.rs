@@ -322,7 +322,8 @@ fn parts(lights: &mut [(u32, Bounds)], range: Range<usize>, depth: u32) -> Vec<(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::emitter::{SpotEdge, spot_point};
+    use crate::light::SpotEdge;
+    use crate::light::emitter::spot_point;
     use crate::light::{Spread, TriangleLight};
     use crate::math::{Rgb, Vec2, Vec4, warp};
     use crate::random::{Domain, Purpose, Stream};

@@ -415,9 +415,21 @@ fn one_minus_cos(angle: f64) -> f64 {
 
 /// The distributions of the lights of a scene, which lights with equal patterns and cones share.
 #[derive(Default)]
-pub(super) struct Distributions(Vec<(Arc<Pattern>, Option<SpotCone>, Option<Arc<Distribution>>)>);
+pub(super) struct Distributions(Vec<KnownDistribution>);
+
+/// A pattern and the cone that limits it, with their distribution; `None` if no light is left.
+type KnownDistribution = (Arc<Pattern>, Option<SpotCone>, Option<Arc<Distribution>>);
 
 impl Distributions {
+    /// The distributions of lights that were built before.
+    pub(super) fn of<'a>(lights: impl Iterator<Item = &'a Emitter>) -> Distributions {
+        let shaped = lights.filter_map(|light| match light {
+            Emitter::Shaped(shaped) => Some(&shaped.distribution),
+            _ => None,
+        });
+        Distributions(shaped.map(|of| (Arc::clone(of.pattern()), of.cone(), Some(Arc::clone(of)))).collect())
+    }
+
     /// The distribution of a pattern within a cone; `None` if no light is left.
     fn get(&mut self, pattern: &Arc<Pattern>, cone: Option<SpotCone>) -> Option<Arc<Distribution>> {
         let known = self.0.iter().find(|(other, of, _)| Arc::ptr_eq(other, pattern) && *of == cone);
@@ -507,6 +519,7 @@ pub(super) fn add_light_spheres(description: &mut Description) {
             metallic: 0.0,
             specular: 0.0,
             emission,
+            null_bsdf: light.pass_through,
             ..Material::default()
         };
         description.instances.push(description::PlacedMesh {

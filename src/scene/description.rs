@@ -218,6 +218,8 @@ pub struct PunctualLight {
     /// Radius (m) of a point light's sphere, of a spot's disc, or of the ball of a light with a pattern; 0 for a
     /// mathematical point.
     pub radius: f32,
+    /// Whether rays pass through the sphere of a point light, which shines nevertheless.
+    pub pass_through: bool,
     /// Whether camera rays do not see the light; it lights the scene anyway.
     pub hidden_from_camera: bool,
     /// Name of the light's group (a named set of lights with a layer of its own), if it has one.

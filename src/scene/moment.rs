@@ -68,7 +68,7 @@ impl<'a> MomentBuilder<'a> {
         let boxes = self.boxes(&shapes);
         let (sky, same_sky) = self.sky(&boxes);
         let lights = description.lights.iter().filter(|light| !light.is_sphere());
-        let mut distributions = build::Distributions::default();
+        let mut distributions = build::Distributions::of(scene.lights.others());
         let others: Vec<Emitter> =
             lights.map(|light| build::punctual(light, scene.origin, &mut distributions)).collect();
         let same_lights = same_sky

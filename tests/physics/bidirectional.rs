@@ -84,6 +84,7 @@ fn sun(intensity: f32) -> PunctualLight {
         intensity: Rgb::splat(intensity),
         kind: PunctualKind::Sun { angle: 0.0 },
         pattern: None,
+        pass_through: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

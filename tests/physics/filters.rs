@@ -36,6 +36,7 @@ fn strip() -> Scene {
         intensity: Rgb::splat(PI as f32 / 0.5),
         kind: PunctualKind::Sun { angle: 0.0 },
         pattern: None,
+        pass_through: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

@@ -13,7 +13,7 @@ use caustique::render::{Control, Method, Settings, render};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource, PunctualKind, PunctualLight};
 use caustique::scene::{Description, Scene};
 use std::f64::consts::PI;
-use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, mirror, quad, sphere, square};
+use support::scenes::{add, build, cuboid, glass, lit_room, look_at, matte, mirror, point_light, quad, sphere, square};
 use support::stats::{mean_and_error, sidak, t_critical};
 
 const ERROR_RATE: f64 = 1e-3;
@@ -214,6 +214,7 @@ fn cameras_see_no_hidden_light_from_infinity() {
         intensity: Rgb::ONE,
         kind: PunctualKind::Sun { angle: 0.2 },
         pattern: None,
+        pass_through: false,
         radius: 0.0,
         hidden_from_camera: true,
         light_group: None,
@@ -256,4 +257,61 @@ fn all_methods_agree_on_spreads() {
     add(&mut description, "mirror", sphere(Vec3::new(-0.4, 0.5, 0.0), 0.3, 48), mirror());
     add(&mut description, "glass", sphere(Vec3::new(0.3, 0.5, 0.0), 0.3, 48), glass(1.5));
     agree("spread", &build(description), &[Method::Path, Method::Bdpt, Method::Vcm, Method::Sppm]);
+}
+
+/// A sun at the zenith, whose disc has this angular diameter (radians), of irradiance 1.
+fn zenith_sun(angle: f32) -> PunctualLight {
+    PunctualLight {
+        to_world: caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-PI / 2.0)),
+        kind: PunctualKind::Sun { angle },
+        ..point_light(DVec3::ZERO, 1.0)
+    }
+}
+
+/// The disc of a sun has its radiance E / (pi sin^2) in a mirror. Through a slab of glass it is dimmer by 2 n / (n^2 + 1),
+/// with all reflections between the faces.
+#[test]
+fn discs_of_suns_are_seen_in_mirrors_and_through_glass() {
+    let radiance = 1.0 / (PI * 0.1f64.sin().powi(2));
+    let mut description = Description::default();
+    description.lights.push(zenith_sun(0.2));
+    let below = |y: f64| look_at(DVec3::new(0.0, y, 0.0), DVec3::new(0.0, y - 1.0, 0.0), 4.0);
+    let mut reflected = description.clone();
+    let floor = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+    add(&mut reflected, "mirror", floor, mirror());
+    reflected.cameras.push(below(1.0));
+    check("mirror", &build(reflected), radiance, 1e-4, 0.02);
+    add(&mut description, "slab", cuboid(Vec3::new(-3.0, 1.0, -3.0), Vec3::new(3.0, 1.2, 3.0), false), glass(1.5));
+    description.cameras.push(look_at(DVec3::ZERO, DVec3::Y, 4.0));
+    check("glass", &build(description), radiance * 2.0 * 1.5 / (1.5f64.powi(2) + 1.0), 1e-3, 0.02);
+}
+
+/// A point light with a radius above a floor under a white sky.
+fn bulb(pass_through: bool) -> Description {
+    let mut description = Description { environment: white_sky(), ..Description::default() };
+    let floor = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+    add(&mut description, "floor", floor, matte(0.5, 0.0));
+    description.lights.push(PunctualLight { radius: 0.4, pass_through, ..point_light(DVec3::new(0.0, 0.6, 0.0), 1.0) });
+    description
+}
+
+/// A bulb that rays pass through blocks no light of the sky, lights the floor with I / h^2, and is seen directly and in a
+/// mirror with its own radiance and that of the sky behind. An ordinary bulb blocks most of the sky.
+#[test]
+fn pass_through_bulbs_block_no_light() {
+    // An icosahedron's intensity varies with the direction.
+    let (own, bias) = (1.0 / (PI * 0.4f64.powi(2)), 0.02);
+    let from = |mut description: Description, eye: DVec3, to: DVec3| {
+        description.cameras.push(look_at(eye, to, 3.0));
+        build(description)
+    };
+    let floor = DVec3::new(0.0, 0.1, 0.0);
+    check("floor", &from(bulb(true), floor, DVec3::ZERO), 0.5 + 0.5 / PI / 0.36, 5e-3, 0.05);
+    let (mean, error) = seen(&from(bulb(false), floor, DVec3::ZERO), Method::Path);
+    assert!(mean + 4.0 * error < 0.8 * (0.5 + 0.5 / PI / 0.36), "{mean} +- {error}");
+    check("direct", &from(bulb(true), DVec3::new(0.0, 0.6, 2.0), DVec3::new(0.0, 0.6, 0.0)), own + 1.0, bias, 0.1);
+    let mut mirrored = bulb(true);
+    mirrored.materials[0] = Material { name: "floor".into(), ..mirror() };
+    let toward = from(mirrored, DVec3::new(0.0, 0.6, 1.6), DVec3::new(0.0, 0.0, 0.8));
+    check("mirror", &toward, own + 1.0, bias, 0.1);
 }

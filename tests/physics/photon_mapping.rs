@@ -144,6 +144,7 @@ fn sun_through_a_slab() {
         intensity: Rgb::splat(e),
         kind: PunctualKind::Sun { angle: 0.0 },
         pattern: None,
+        pass_through: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

@@ -1,12 +1,13 @@
-//! Lights with photometric profiles: closed forms for all methods, and light paths against direct light.
+//! Lights with photometric profiles, and spots that throw pictures: closed forms for all methods, and light paths
+//! against direct light.
 //!
 //! Checks are t tests over independent seeds at a family-wise error rate of 0.1 % per test (Sidak over its checks).
-//! A profile that is rotated must be rejected.
+//! A profile or a picture that is rotated must be rejected.
 
 use crate::support;
 
 use caustique::estimator::InitialBandwidth;
-use caustique::light::{Pattern, Profile, Receiver, SpotEdge};
+use caustique::light::{Pattern, Picture, Profile, Receiver, SpotEdge};
 use caustique::math::{DAffine3, DMat3, DVec3, Rgb, Vec2, Vec3};
 use caustique::random::{Domain, Purpose, Stream};
 use caustique::render::{Control, Method, Settings, render};
@@ -76,10 +77,15 @@ impl Measured {
 /// A light at the origin with the profile, 1 m above a floor. It shines down; its X axis is the world's, rotated by
 /// `turn` (degrees) about the vertical.
 fn scene(measured: &Measured, kind: PunctualKind, radius: f32, turn: f64) -> Scene {
+    let (pattern, peak) = measured.pattern();
+    scene_of(pattern, peak, kind, radius, turn)
+}
+
+/// [`scene`] with any pattern, of this intensity (W/sr).
+fn scene_of(pattern: Arc<Pattern>, peak: f32, kind: PunctualKind, radius: f32, turn: f64) -> Scene {
     let mut description = Description::default();
     let floor = quad(Vec3::new(-9.0, -1.0, -9.0), Vec3::Z * 18.0, Vec3::X * 18.0);
     add(&mut description, "floor", floor, matte(0.5, 0.0));
-    let (pattern, peak) = measured.pattern();
     let down = glam::DQuat::from_rotation_y(turn.to_radians()) * glam::DQuat::from_rotation_x(-FRAC_PI_2);
     description.lights.push(PunctualLight {
         to_world: DAffine3::from_quat(down),
@@ -136,12 +142,17 @@ fn quarters(scene: &Scene, method: Method) -> [Vec<f64>; 4] {
 
 /// Expected means of the quarters of the picture, in the same order.
 fn expected(measured: &Measured, cone: f64) -> [f64; 4] {
+    expected_of(|x, z| irradiance(measured, x, z, cone))
+}
+
+/// [`expected`] for an irradiance at (x, z).
+fn expected_of(irradiance: impl Fn(f64, f64) -> f64) -> [f64; 4] {
     let n = 200;
     let mut sums = [0.0; 4];
     for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
         let at = |k: usize| 2.0 * (k as f64 + 0.5) / n as f64 - 1.0;
         // Rows go from -Z to +Z.
-        sums[2 * usize::from(i >= n / 2) + usize::from(j >= n / 2)] += irradiance(measured, at(j), at(i), cone);
+        sums[2 * usize::from(i >= n / 2) + usize::from(j >= n / 2)] += irradiance(at(j), at(i));
     }
     sums.map(|sum| 0.5 / PI * sum * 4.0 / (n * n) as f64)
 }
@@ -279,4 +290,87 @@ fn paths_of_a_narrow_beam_carry_equal_flux() {
     }
     let spread = squares * n as f64 / (sum * sum);
     assert!(spread < 2.0, "{spread}");
+}
+
+/// A random picture of 5 x 4 texels with black ones, which spans two metres of the floor across, as red, green and blue
+/// alike.
+fn slide(seed: u64) -> Vec<f64> {
+    let draw = |i: u64| f64::from(Stream::new(19, i, Domain::Test, seed).vertex(0).one(Purpose::Lobe));
+    (0..20).map(|i| if draw(i) < 0.3 { 0.0 } else { draw(i) }).collect()
+}
+
+fn thrown(slide: &[f64]) -> Arc<Pattern> {
+    let texels = slide.iter().map(|&x| [x as f32; 3]).collect();
+    Arc::new(Pattern::Picture(Picture::new(5, 4, texels, 2.0 * 1f32.atan()).expect("a picture")))
+}
+
+/// Irradiance on the floor below a slide: the interpolated texel times cos^3 / h^2, within the cone.
+fn below_slide(slide: &[f64], x: f64, z: f64, cone: f64) -> f64 {
+    let r2 = 1.0 + x * x + z * z;
+    let beside = x.abs() > 1.0 || z.abs() > 0.8;
+    if beside || (1.0 / r2.sqrt()).acos() > cone {
+        return 0.0;
+    }
+    // Seen from behind the light, X is to the right and -Z is up.
+    let cell = |u: f64, n: usize| {
+        let u = (u * n as f64 - 0.5).clamp(0.0, n as f64 - 1.0);
+        let i = (u as usize).min(n - 2);
+        (i, u - i as f64)
+    };
+    let ((i, s), (j, t)) = (cell(0.5 + 0.5 * x, 5), cell(0.5 + 0.5 * z / 0.8, 4));
+    let row = |j: usize| slide[5 * j + i] * (1.0 - s) + slide[5 * j + i + 1] * s;
+    (row(j) * (1.0 - t) + row(j + 1) * t) / (r2 * r2.sqrt())
+}
+
+/// The radiance of a floor below a spot with a random picture is the closed form in each quarter, by every method. A
+/// picture that is rotated by 180 degrees is rejected.
+#[test]
+fn floors_below_pictures_have_the_closed_form() {
+    let cone = 0.75f32;
+    let kind = PunctualKind::Spot { inner: cone, outer: cone, edge: SpotEdge::Squared };
+    let seeds = [1u64, 2];
+    let critical = t_critical(sidak(ERROR_RATE, seeds.len() * METHODS.len() * 4), 1, SEEDS as f64 - 1.0);
+    for seed in seeds {
+        let slide = slide(seed);
+        let scene = scene_of(thrown(&slide), 1.0, kind, 0.0, 0.0);
+        let right = expected_of(|x, z| below_slide(&slide, x, z, f64::from(cone)));
+        let turned = [right[3], right[2], right[1], right[0]];
+        for method in METHODS {
+            let found = quarters(&scene, method).each_ref().map(|values| mean_and_error(values));
+            // Kernels and the edges of the picture blur.
+            let passes = |expected: [f64; 4]| {
+                let near = |((mean, error), expected): (&(f64, f64), f64)| {
+                    (mean - expected).abs() <= critical * error + 0.015 * expected
+                };
+                found.iter().zip(expected).all(near)
+            };
+            println!("{seed} {method:?}: {found:?}, {right:?}");
+            assert!(passes(right), "{seed} {method:?}: {found:?}, {right:?}");
+            assert!(!passes(turned), "{seed} {method:?}: a rotated picture is not detected: {found:?}, {turned:?}");
+        }
+    }
+}
+
+/// Light paths and direct light agree below spots that throw random pictures, with and without a radius, and the power
+/// of the light is its flux. Paths of a picture that is rotated by 40 degrees are rejected.
+#[test]
+fn light_paths_of_pictures_agree_with_direct_light() {
+    let kind = PunctualKind::Spot { inner: 0.3, outer: 0.9, edge: SpotEdge::Smooth };
+    let critical = t_critical(sidak(ERROR_RATE, 6 * 9), 1, 15.0);
+    for (seed, radius) in (0..3).flat_map(|seed| [(seed, 0.0), (seed, 0.2)]) {
+        let pattern = thrown(&slide(10 + seed));
+        let [own, turned] = [0.0, 40.0].map(|turn| scene_of(Arc::clone(&pattern), 1.0, kind, radius, turn));
+        let passes = |found: &[[(f64, f64); 2]]| {
+            found.iter().all(|[a, b]| (a.0 - b.0).abs() <= critical * a.1.hypot(b.1) + 1e-12)
+        };
+        let found = both(&own, &own, seed);
+        assert!(passes(&found), "{seed} {radius}: {found:?}");
+        assert!(!passes(&both(&turned, &own, seed)), "{seed} {radius}: a rotated picture is not detected");
+        let initial_media = InitialMedia::new(&own, Vec3::ZERO);
+        let pass = LightPaths::new(seed, 0, Domain::Test, 65_536, u32::MAX);
+        let starts = (0..65_536).filter_map(|index| pass.emit(&own, &initial_media, index));
+        let sent: f64 = starts.map(|start| f64::from(start.start.throughput.x)).sum();
+        let power = own.lights.emitters()[0].power(own.lights.sky());
+        assert!((sent / power - 1.0).abs() < 5e-3, "{seed} {radius}: {sent}, {power}");
+    }
 }

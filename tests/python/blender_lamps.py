@@ -1,5 +1,6 @@
 """Exported lamps and skies, compared with Cycles."""
 
+import json
 import math
 import os
 import unittest
@@ -8,6 +9,8 @@ import cycles_comparison  # first: it sets the search path
 import bpy
 import export
 import glb
+import numpy
+import support
 from cycles_comparison import eye, glow, lamp, shared, square
 from mathutils import Vector
 
@@ -198,6 +201,80 @@ class Lamps(cycles_comparison.CyclesComparison):
                 self.assertEqual(self.warnings, [])
                 bpy.data.objects.remove(body)
 
+    def slide(self):
+        """A picture without symmetry."""
+        image = bpy.data.images.new("slide", 64, 48)
+        y, x = numpy.mgrid[:48, :64] / numpy.array([48.0, 64.0]).reshape(2, 1, 1)
+        texels = numpy.ones((48, 64, 4), numpy.float32)
+        texels[..., 0], texels[..., 1], texels[..., 2] = 0.3 + 0.7 * x, 0.3 + 0.7 * y, 0.3 + 0.7 * x * (1 - y)
+        image.pixels.foreach_set(texels.ravel())
+        image.pack()
+        return image
+
+    def test_pictures_of_spots(self):
+        """A spot throws its image, by its own coordinates and by the direction of the light, as in Cycles."""
+        self.floor(4)
+        body = lamp("SPOT", (0, 0, 2), 300.0, spot_size=1.0, spot_blend=0.2, shadow_soft_size=0.0, color=(1, 0.8, 0.6))
+        body.rotation_euler = (0.3, 0.1, 0.2)
+        tree, node = self.nodes(body)
+        picture = tree.nodes.new("ShaderNodeTexImage")
+        picture.image = self.slide()
+        tree.links.new(picture.outputs["Color"], node.inputs["Color"])
+        eye((0.2, 0.6, 5), (0.2, 0.6, 0), lens=200)
+        self.alike(self.caustique(32, "--method", "path"), self.cycles(64), parts=4)
+        self.assertEqual(self.warnings, [])
+        listed = json.loads(support.run(["info", self.path, "--json"], check=0).stdout)["lights"]
+        self.assertEqual(listed, {"spot with a picture": 1})
+        around, place = (tree.nodes.new("ShaderNode" + kind) for kind in ("TexCoord", "Mapping"))
+        place.inputs["Location"].default_value = (0.5, 0.4, 0)
+        tree.links.new(around.outputs["Normal"], place.inputs["Vector"])
+        tree.links.new(place.outputs["Vector"], picture.inputs["Vector"])
+        self.alike(self.caustique(32, "--method", "path"), self.cycles(64), parts=4)
+        self.assertEqual(self.warnings, [])
+
+    def test_pictures_of_area_lamps(self):
+        """Area lamps shine with their image, and are seen with it, as in Cycles."""
+        floor = self.floor(4)
+        for shape in ("RECTANGLE", "DISK"):
+            with self.subTest(shape):
+                floor.hide_render = False
+                body = lamp("AREA", (0, 0, 0.5), 100.0, shape=shape, size=1.0)
+                body.data.size_y = 0.6
+                body.rotation_euler = (0.3, 0.1, 0.2)
+                tree, node = self.nodes(body)
+                picture = tree.nodes.new("ShaderNodeTexImage")
+                picture.image = self.slide()
+                tree.links.new(picture.outputs["Color"], node.inputs["Color"])
+                eye((0, 0, 5), (0, 0, 0), lens=70)
+                self.alike(self.caustique(64, "--method", "path"), self.cycles(256), parts=2, tolerance=0.03)
+                self.assertEqual(self.warnings, [])
+                floor.hide_render, body.visible_camera = True, True
+                eye((0, 0, -1), body.location, lens=100)
+                self.alike(self.caustique(16, "--method", "path"), self.cycles(64), parts=2, tolerance=0.03)
+                bpy.data.objects.remove(body)
+
+    def test_bulbs_let_light_through(self):
+        """The bulb of a point lamp is seen directly and in a mirror, in front of the world, and casts no shadow."""
+        world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        self.scene.world = world
+        next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
+        floor = self.floor(3)
+        body = lamp("POINT", (0, 0, 0.6), 5.0, shadow_soft_size=0.4, use_soft_falloff=False)
+        eye((0, -0.1, 0.1), (0, 0, 0), lens=80)
+        self.alike(self.caustique(), self.cycles())
+        self.assertEqual(self.warnings, [])
+        floor.data.materials[0] = shared.node_material("mirror", "ShaderNodeBsdfGlossy", Roughness=0.0)
+        eye((0, -1.6, 0.6), (0, -0.8, 0), lens=300)
+        self.alike(self.caustique(), self.cycles(), tolerance=0.03)
+        body.visible_camera = True
+        eye((0, -2, 0.6), (0, 0, 0.6), lens=300)
+        self.alike(self.caustique(), self.cycles(), tolerance=0.03)
+        spot = lamp("SPOT", (0, 0, 3), 5.0, shadow_soft_size=0.4, use_soft_falloff=False)
+        spot.visible_camera = True
+        self.assertIn("its bulb, which Cycles shows, is not seen", export.write(self.path)[0])
+
     def test_measured_profiles_have_the_strength_of_directions_that_meet_objects(self):
         """A lamp with an IES profile that nodes rotate lights a small square in different directions."""
         profile = bpy.data.texts.new("profile")
@@ -286,7 +363,13 @@ class Lamps(cycles_comparison.CyclesComparison):
                      'light "spot": a spot\'s uneven scale', 'its IES profile'):
             self.assertIn(what, warnings)
         lamp("AREA", (0, 0, 2), 1000).data.cycles.is_portal = True
-        export.write(self.path)
+        linked = lamp("POINT", (0, 3, 3), 10, shadow_soft_size=0.0)
+        for kind in ("receiver", "blocker"):
+            setattr(linked.light_linking, kind + "_collection", bpy.data.collections.new(kind))
+        warnings = "\n".join(export.write(self.path))
+        for what in ('light "area.001": it is a portal', '": its light linking (collection "receiver") is not carried',
+                     '": its shadow linking (collection "blocker") is not carried'):
+            self.assertIn(what, warnings)
         made = [material["name"] for material in glb.read(self.path)[0]["materials"]]
         self.assertEqual(sum("area light" in name for name in made), 1, "portals are dark")
 

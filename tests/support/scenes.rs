@@ -131,6 +131,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
         intensity: Rgb::splat(intensity),
         kind: PunctualKind::Point,
         pattern: None,
+        pass_through: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

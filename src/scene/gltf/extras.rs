@@ -153,6 +153,8 @@ pub(super) struct LightExtras {
     pub(super) visible: Option<Visible>,
     pub(super) light_group: Option<String>,
     pub(super) ies: Option<IesExtras>,
+    pub(super) gobo: Option<GoboExtras>,
+    pub(super) null_bsdf: Option<bool>,
 }
 
 /// Content of `extras.caustique.ies`: a photometric profile in a file or in a buffer view.
@@ -165,6 +167,14 @@ pub(super) struct IesExtras {
     pub(super) rotation_deg: f32,
     pub(super) clockwise: bool,
     pub(super) normalize: bool,
+}
+
+/// Content of `extras.caustique.gobo`: a picture that a spot throws.
+#[derive(Clone, Deserialize)]
+pub(super) struct GoboExtras {
+    pub(super) texture: u32,
+    #[serde(default)]
+    pub(super) view_deg: Option<f32>,
 }
 
 /// Keys of `extras.caustique` that the reader knows in a scene; keys of nested objects follow a dot.
@@ -209,6 +219,10 @@ pub(super) const LIGHT: &[&str] = &[
     "ies.rotation_deg",
     "ies.clockwise",
     "ies.normalize",
+    "null_bsdf",
+    "gobo",
+    "gobo.texture",
+    "gobo.view_deg",
 ];
 pub(super) const NODE: &[&str] = &[
     "aperture_radius",
@@ -226,6 +240,10 @@ pub(super) const NODE: &[&str] = &[
     "ies.rotation_deg",
     "ies.clockwise",
     "ies.normalize",
+    "null_bsdf",
+    "gobo",
+    "gobo.texture",
+    "gobo.view_deg",
 ];
 
 /// Reads `extras.caustique` of a part of the document; the default if there are no extras. `place` names the part in

@@ -4,6 +4,7 @@ use super::clipping::Clip;
 use super::document::{Document, get, named};
 use super::extras::{self, CameraExtras, LightExtras, Units};
 use super::profiles::Profiles;
+use super::texture::Textures;
 use super::{LightUnits, fault};
 use crate::error::Result;
 use crate::geometry::Mesh;
@@ -178,7 +179,7 @@ pub(super) fn light(
     node: (&str, &Value),
     to_world: DAffine3,
     divisors: Divisors,
-    (profiles, warnings): (&mut Profiles, &mut Vec<String>),
+    (profiles, textures, warnings): (&mut Profiles, &mut Textures, &mut Vec<String>),
 ) -> Result<PunctualLight> {
     let list = document.raw["extensions"]["KHR_lights_punctual"]["lights"].as_array();
     let raw = get(list.map_or(&[][..], Vec::as_slice), index, "light")?;
@@ -226,10 +227,23 @@ pub(super) fn light(
     let hidden_from_camera = on_node.visible.or(on_light.visible).is_some_and(|visible| !visible.camera);
     let radius = if sun { 0.0 } else { radius };
     let light_group = on_node.light_group.or(on_light.light_group);
-    let mut light =
-        PunctualLight { name, to_world, intensity, kind, pattern: None, radius, hidden_from_camera, light_group };
+    let pass_through = on_node.null_bsdf.or(on_light.null_bsdf).unwrap_or(false);
+    let mut light = PunctualLight {
+        name,
+        to_world,
+        intensity,
+        kind,
+        pattern: None,
+        radius,
+        pass_through,
+        hidden_from_camera,
+        light_group,
+    };
     if let Some(ies) = on_node.ies.or(on_light.ies) {
         profiles.apply(document, &ies, &mut light, &place, warnings)?;
+    }
+    if let Some(gobo) = on_node.gobo.or(on_light.gobo) {
+        profiles.apply_gobo((document, textures), &gobo, &mut light, &place, warnings)?;
     }
     Ok(light)
 }

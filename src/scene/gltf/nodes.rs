@@ -82,7 +82,7 @@ fn describe_pose(
     reader.out.warnings = warnings;
     reader.scene()?;
     reader.out.contents = choice::contents(&document);
-    let Reader { library, mut out, clips, bounds, meshes, divisors, flipped, .. } = reader;
+    let Reader { library, mut out, clips, bounds, meshes, divisors, profiles, flipped, .. } = reader;
     if library.occluded > 0 {
         let n = library.occluded;
         let plural = if n == 1 { "material has an occlusion texture" } else { "materials have occlusion textures" };
@@ -96,7 +96,14 @@ fn describe_pose(
     out.warnings.retain(|warning| seen.insert(warning.clone()));
     Ok((
         out,
-        Shared { library, parts: meshes, bounds, divisors: divisors.map(|divisors| divisors.over(factor)), flipped },
+        Shared {
+            library,
+            parts: meshes,
+            bounds,
+            divisors: divisors.map(|divisors| divisors.over(factor)),
+            profiles,
+            flipped,
+        },
     ))
 }
 
@@ -106,6 +113,7 @@ pub(super) struct Shared {
     parts: HashMap<(usize, Option<usize>), Vec<Part>>,
     bounds: Vec<(DVec3, DVec3)>,
     divisors: Option<lights::Divisors>,
+    profiles: profiles::Profiles,
     /// Indices of the meshes in the file with inner shells of glass that were flipped.
     flipped: HashSet<usize>,
 }
@@ -132,6 +140,7 @@ pub(super) fn describe_moment(
     reader.moment = Some(moment);
     reader.bounds.clone_from(&moment.shared.bounds);
     reader.divisors = moment.shared.divisors;
+    reader.profiles = moment.shared.profiles.clone();
     reader.out.meshes = moment.meshes.to_vec();
     reader.scene()?;
     let mut out = reader.out;
@@ -451,11 +460,11 @@ impl<'r> Reader<'r> {
             divisors
         });
         if let Some(LightReference { light }) = reference {
-            let read = (&mut self.profiles, &mut out.warnings);
+            let read = (&mut self.profiles, &mut self.library.textures, &mut out.warnings);
             out.lights.push(lights::light(document, light as usize, node, to_world, divisors, read)?);
         }
         let read = (&mut self.profiles, &mut out.warnings);
-        out.lights.extend(profiles::light(document, node, place, to_world, divisors, read)?);
+        out.lights.extend(profiles::light(document, node, place, to_world, divisors.point(), read)?);
         Ok(())
     }
 

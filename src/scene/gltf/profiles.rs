@@ -1,20 +1,24 @@
-//! Photometric profiles of lights: files and buffer views that `extras.caustique.ies` and EXT_lights_ies name.
+//! Patterns of lights: photometric profiles, which `extras.caustique.ies` and EXT_lights_ies name, and pictures, which
+//! `extras.caustique.gobo` names.
 
 use super::document::{Document, extension, get, named};
-use super::extras::{self, IesExtras, LightExtras};
-use super::lights::Divisors;
+use super::extras::{self, GoboExtras, IesExtras, LightExtras};
+use super::texture::{Textures, Use};
 use super::{fault, uri};
 use crate::error::{Error, Result};
-use crate::light::Pattern;
+use crate::light::{Pattern, Picture};
 use crate::math::{DAffine3, Rgb};
 use crate::scene::description::{PunctualKind, PunctualLight};
 use crate::scene::ies::{self, Photometry, Turn};
+use crate::texture::Texture;
 use serde::Deserialize;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
+/// Largest angle of view of a picture (radians): 170 degrees.
+const MAX_VIEW: f32 = 2.967_06;
 /// Media type of a profile in a buffer view (EXT_lights_ies).
 const MEDIA_TYPE: &str = "application/x-ies-lm-63";
 
@@ -31,12 +35,14 @@ enum Source {
 /// A profile as a light has it: the relative intensity, and its largest luminous intensity (cd).
 type Shape = (Arc<Pattern>, f32);
 
-/// The profiles of a file, each read once.
-#[derive(Default)]
+/// The patterns of a file, each read once.
+#[derive(Clone, Default)]
 pub(super) struct Profiles {
     read: HashMap<Source, Arc<Photometry>>,
     /// Profiles by their source, the bits of their rotation (degrees) and its sense.
     shapes: HashMap<(Source, u32, bool), Shape>,
+    /// Pictures by their texture and the bits of their angle of view (radians).
+    pictures: HashMap<(u32, u32), Arc<Pattern>>,
 }
 
 impl Source {
@@ -127,6 +133,55 @@ impl Profiles {
     }
 }
 
+/// The texels of a texture as linear colours, times their alpha.
+fn texels(texture: &Texture) -> Vec<[f32; 3]> {
+    let count = texture.width as usize * texture.height as usize;
+    (0..count).map(|index| texture.texels.at(index)).map(|texel| (texel.truncate() * texel.w).to_array()).collect()
+}
+
+impl Profiles {
+    /// Gives a spot the picture that its extras name.
+    pub(super) fn apply_gobo(
+        &mut self,
+        (document, textures): (&Document, &mut Textures),
+        extras: &GoboExtras,
+        light: &mut PunctualLight,
+        place: &str,
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        let PunctualKind::Spot { outer, .. } = light.kind else {
+            warnings.push(format!("{place}: extras.caustique.gobo has an effect on spots only"));
+            return Ok(());
+        };
+        if light.pattern.is_some() {
+            warnings.push(format!("{place}: extras.caustique.gobo replaces its profile"));
+        }
+        let view = extras.view_deg.map_or(2.0 * outer, f32::to_radians);
+        if !(view > 0.0 && view <= MAX_VIEW) {
+            let cause =
+                format!("the view of its gobo is {} degrees; it must be above 0 and at most 170", view.to_degrees());
+            return Err(fault(place, cause).hint("set extras.caustique.gobo.view_deg"));
+        }
+        let key = (extras.texture, view.to_bits());
+        let pattern = match self.pictures.get(&key) {
+            Some(known) => Arc::clone(known),
+            None => {
+                let index = textures.load(document, extras.texture, Use::Color, warnings);
+                let texture = &textures.list[index.map_err(|error| error.within(place))? as usize];
+                let (width, height) = (texture.width as usize, texture.height as usize);
+                let picture = Picture::new(width, height, texels(texture), view).ok_or_else(|| {
+                    fault(place, format!("its gobo \"{}\" is black", texture.name)).hint("choose another picture")
+                })?;
+                let pattern = Arc::new(Pattern::Picture(picture));
+                self.pictures.insert(key, Arc::clone(&pattern));
+                pattern
+            }
+        };
+        light.pattern = Some(pattern);
+        Ok(())
+    }
+}
+
 /// A node's reference to a light of EXT_lights_ies, by index.
 #[derive(Deserialize)]
 struct Reference {
@@ -164,13 +219,13 @@ pub(super) fn has_light(node: &Value) -> bool {
 }
 
 /// Reads the light of EXT_lights_ies of a node, which is given by its name and raw JSON. Its intensities are in the unit
-/// of the punctual lights of the file.
+/// of the punctual lights of the file, which `divisor` converts to W/sr.
 pub(super) fn light(
     document: &Document,
     node: (&str, &Value),
     place: &str,
     to_world: DAffine3,
-    divisors: Divisors,
+    divisor: f32,
     (profiles, warnings): (&mut Profiles, &mut Vec<String>),
 ) -> Result<Option<PunctualLight>> {
     let Some(reference) = extension::<Reference>(node.1, "EXT_lights_ies", place)? else { return Ok(None) };
@@ -207,10 +262,11 @@ pub(super) fn light(
     Ok(Some(PunctualLight {
         name: name.or(listed.name).unwrap_or_else(|| format!("profile {}", reference.light)),
         to_world,
-        intensity: color * (reference.multiplier.max(0.0) * peak / divisors.point()),
+        intensity: color * (reference.multiplier.max(0.0) * peak / divisor),
         kind: PunctualKind::Point,
         pattern: Some(pattern),
         radius,
+        pass_through: false,
         hidden_from_camera: extras.visible.is_some_and(|visible| !visible.camera),
         light_group: extras.light_group,
     }))

@@ -128,7 +128,14 @@ impl Textures {
         Ok(TextureRef { texture, set: set as u8, transform: matrix })
     }
 
-    fn load(&mut self, document: &Document, index: u32, usage: Use, warnings: &mut Vec<String>) -> Result<u32> {
+    /// Loads the texture with this index in the file, and returns its index in the list of those in use.
+    pub(super) fn load(
+        &mut self,
+        document: &Document,
+        index: u32,
+        usage: Use,
+        warnings: &mut Vec<String>,
+    ) -> Result<u32> {
         let texture = get(&document.textures, index as usize, "texture")?;
         let raw = document.part("textures", index as usize);
         let source = source(raw).ok_or_else(|| {

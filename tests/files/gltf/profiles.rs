@@ -2,6 +2,7 @@
 
 use super::glb::Glb;
 use super::{message, read, try_read};
+use caustique::light::{Pattern, Picture};
 use caustique::math::Rgb;
 use caustique::scene::description::PunctualKind;
 use caustique::scene::gltf::{self, ReadOptions};
@@ -87,4 +88,52 @@ fn lights_of_the_extension_have_the_candela_of_their_profile() {
     let error = try_read(&extension(&json!({"name": "none"}), &json!({"light": 0}))).expect_err("a fault");
     assert!(message(&error).contains("it has neither uri nor bufferView"), "{error}");
     assert!(try_read(&extension(&view, &json!({"light": 3}))).is_err());
+}
+
+/// A spot throws the picture of a texture, as wide as its cone unless the file says otherwise; one beside a spot is
+/// ignored with a warning.
+#[test]
+fn the_key_gobo_names_the_picture_of_a_spot() {
+    let with = |kind: &str, gobo: Value, texels: &[[u8; 4]]| {
+        let mut file = Glb::new();
+        file.png(2, texels);
+        file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+            {"type": kind, "intensity": 683, "spot": {"outerConeAngle": 0.5}, "name": "lamp"}]}});
+        let extras = json!({"caustique": {"gobo": gobo}});
+        file.node(json!({"extensions": {"KHR_lights_punctual": {"light": 0}}, "extras": extras}));
+        file
+    };
+    let texels = [[255, 0, 0, 255], [0, 255, 0, 128], [0, 0, 255, 255], [0, 0, 0, 255]];
+    let light = read(&with("spot", json!({"texture": 0}), &texels)).lights.remove(0);
+    let linear = |alpha: f32| [[1.0, 0.0, 0.0], [0.0, alpha, 0.0], [0.0, 0.0, 1.0], [0.0; 3]];
+    let picture = |view: f32| Picture::new(2, 2, linear(128.0 / 255.0).to_vec(), view).map(Pattern::Picture);
+    assert_eq!(light.pattern.as_deref(), picture(1.0).as_ref());
+    assert!((light.intensity.x - 1.0).abs() < 1e-6);
+    let light = read(&with("spot", json!({"texture": 0, "view_deg": 90}), &texels)).lights.remove(0);
+    assert_eq!(light.pattern.as_deref(), picture(90f32.to_radians()).as_ref());
+    let scene = read(&with("point", json!({"texture": 0}), &texels));
+    assert!(scene.lights[0].pattern.is_none());
+    assert_eq!(scene.warnings, ["light \"lamp\": extras.caustique.gobo has an effect on spots only"]);
+    for (gobo, texels, cause) in [
+        (json!({"texture": 4}), texels, "texture 4 does not exist"),
+        (json!({"texture": 0, "view_deg": 171}), texels, "the view of its gobo is 171 degrees"),
+        (json!({"texture": 0}), [[0, 0, 0, 255]; 4], "its gobo \"tiles\" is black"),
+        (json!({}), texels, "missing field `texture`"),
+    ] {
+        let error = message(&try_read(&with("spot", gobo, &texels)).expect_err("a fault"));
+        assert!(error.contains("light \"lamp\"") && error.contains(cause), "{error}");
+    }
+}
+
+/// Rays pass through the sphere of a point light if its `null_bsdf` says so.
+#[test]
+fn the_key_null_bsdf_lets_rays_through_a_bulb() {
+    for (keys, expected) in [(json!({"radius": 0.1}), false), (json!({"radius": 0.1, "null_bsdf": true}), true)] {
+        let mut file = Glb::new();
+        file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point"}]}});
+        let extras = json!({"caustique": keys});
+        file.node(json!({"extensions": {"KHR_lights_punctual": {"light": 0}}, "extras": extras}));
+        let scene = read(&file);
+        assert_eq!((scene.lights[0].pass_through, scene.warnings.len()), (expected, 0));
+    }
 }

@@ -86,7 +86,8 @@ pub fn said() -> String {
     let mut said = Said::default();
     let everything = everything();
     said.case("everything as it is", &messages_of(&everything.bytes(), &ReadOptions::default()));
-    let lists = [numbers(), parts(), meshes(), shapes(&everything), materials(), textures(), lamps(), nodes()];
+    let lists =
+        [numbers(), parts(), meshes(), shapes(&everything), materials(), textures(), lamps(), patterns(), nodes()];
     for (what, changes) in lists.into_iter().flatten() {
         said.case(&format!("{what}: {changes}"), &changed(&everything, &changes));
     }
@@ -382,6 +383,39 @@ fn lamps() -> Cases {
         ("a near plane", json!({"/cameras/0/perspective/znear": 5})),
         ("a far plane", json!({"/cameras/0/perspective/zfar": 0.5})),
         ("a shift beyond numbers", json!({"/cameras/0/extras/caustique/shift": [1e300, 0]})),
+    ]
+}
+
+/// A photometric profile as a URI, with these vertical angles.
+fn profile(angles: &str) -> String {
+    format!("data:,TILT=NONE 1 -1 1 3 1 1 2 0 0 0 1 1 0 {angles} 0 3 2 1").replace("NONE ", "NONE%0a")
+}
+
+fn patterns() -> Cases {
+    let lamp = "/extensions/KHR_lights_punctual/lights/0";
+    let ies = "/nodes/2/extras/caustique/ies";
+    let gobo = "/nodes/2/extras/caustique/gobo";
+    let (listed, on_node) = ("/extensions/EXT_lights_ies/lights", "/nodes/2/extensions/EXT_lights_ies");
+    let black = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg==";
+    let read = |keys: Value| json!({listed: [{"uri": profile("0 45 90"), "mimeType": "text/plain"}], on_node: keys});
+    vec![
+        ("no profile", json!({ies: {}})),
+        ("a profile that is none", json!({ies: {"bufferView": 0}})),
+        ("a profile from nowhere", json!({ies: {"file": "nowhere.ies"}})),
+        ("a folder as a profile", json!({ies: {"file": "."}})),
+        ("a rotation beyond numbers", json!({ies: {"bufferView": 0, "rotation_deg": 1e300}})),
+        ("a sun with a profile", json!({format!("{lamp}/type"): "directional", ies: {"bufferView": 0}})),
+        ("no such profile", json!({listed: [], on_node: {"light": 0}})),
+        ("a profile of nothing", json!({listed: [{}], on_node: {"light": 0}})),
+        ("a profile in words", json!({listed: [{"uri": "data:,light"}], on_node: {"light": 0}})),
+        ("angles nearer than numbers", json!({listed: [{"uri": profile("0 1e-44 90")}], on_node: {"light": 0}})),
+        ("a profile as text", read(json!({"light": 0}))),
+        ("a multiplier beyond numbers", read(json!({"light": 0, "multiplier": 1e300}))),
+        ("a multiplier below zero", read(json!({"light": 0, "multiplier": -1}))),
+        ("a point with a picture", json!({format!("{lamp}/type"): "point", gobo: {"texture": 0}})),
+        ("a picture all around", json!({gobo: {"texture": 0, "view_deg": 180}})),
+        ("a black picture", json!({gobo: {"texture": 0}, "/images/0": {"uri": black}})),
+        ("a profile and a picture", json!({gobo: {"texture": 0}, ies: {"file": "tests/corpus/ies/seed-bilateral"}})),
     ]
 }
 
