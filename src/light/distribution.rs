@@ -379,7 +379,8 @@ mod tests {
             };
             let (n, mut differing, mut mean, mut squares) = (300u32, 0, 0.0f64, 0.0f64);
             for i in 0..n * n {
-                let u = Vec2::new((0.5 + (i % n) as f32) / n as f32, (0.5 + (i / n) as f32) / n as f32);
+                let within = Stream::new(34, seed, Domain::Test, u64::from(i)).vertex(0).two(Purpose::Pixel);
+                let u = (Vec2::new((i % n) as f32, (i / n) as f32) + within) / n as f32;
                 let (d, pdf) = shape.sample(u).expect("a direction");
                 assert!((d.length() - 1.0).abs() < 1e-5);
                 let weight = f64::from(shape.relative(d).x / pdf);
@@ -390,9 +391,10 @@ mod tests {
             // At an edge of a cell, rounding may select its neighbour.
             assert!(differing < n * n / 200, "{seed}: {differing}");
             let flux = f64::from(shape.flux().x);
-            assert!((mean / flux - 1.0).abs() < 6e-3, "{seed}: {mean}, {flux}");
+            // Four standard deviations: one false alarm in 300 seeds.
+            assert!((mean / flux - 1.0).abs() < 6.5e-3, "{seed}: {mean}, {flux}");
             // Paths carry about the same flux: the variance of the weights is small.
-            assert!(squares / (mean * mean) < if seed < 24 { 1.5 } else { 2.5 }, "{seed}: {}", squares / (mean * mean));
+            assert!(squares / (mean * mean) < 1.5, "{seed}: {}", squares / (mean * mean));
             let mut lit = 0;
             for i in 0..20_000 {
                 let reach = shape.reach();
@@ -402,7 +404,8 @@ mod tests {
                 assert!(relative == 0.0 || shape.pdf_w(d) > 0.0, "{seed}: {d}, {relative}");
                 lit += usize::from(relative > 0.0);
             }
-            assert!(lit > 1000, "{seed}: {lit}");
+            // Long pictures cover a small part of the cone around them.
+            assert!(lit > if seed < 24 { 1000 } else { 5 }, "{seed}: {lit}");
         }
     }
 }
