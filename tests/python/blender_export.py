@@ -265,7 +265,7 @@ class Export(unittest.TestCase):
         self.assertAlmostEqual(lamps["p"], 683, 2)
         self.assertAlmostEqual(lamps["s"], 2 * 683, 2)
         said = {node["name"]: node["extras"]["caustique"] for node in document["nodes"]}
-        self.assertEqual(said["p"], {"radius": 0.25, "visible": {"camera": False}})
+        self.assertEqual(said["p"], {"radius": 0.25, "null_bsdf": True, "visible": {"camera": False}})
         self.assertAlmostEqual(said["s"]["angle_deg"], 3, 5)
 
     def test_lamp_nodes_multiply(self):
