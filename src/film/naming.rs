@@ -83,13 +83,12 @@ fn has_axes(name: &str) -> bool {
 /// Replaces Blender's names and axes in `set` by ours. Removes layers whose names we cannot write, and returns their
 /// names.
 pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
-    let known: Vec<&str> = LAYERS.iter().filter(|kind| kind.blender.is_some()).map(|kind| kind.name).collect();
     for layer in &mut set.layers {
-        if let Some(plain) = known.iter().find(|plain| Naming::Blender.layer(plain) == layer.name) {
-            layer.name = (*plain).into();
+        if let Some(plain) = blender_pass(&layer.name) {
+            layer.name = plain.into();
             to_our_axes(layer);
-        } else if let Some(pass) = layer.name.strip_prefix("ViewLayer.") {
-            layer.name = pass.into();
+        } else {
+            layer.name = plain_name(&layer.name).into();
         }
     }
     let fits = |layer: &Layer| {
@@ -101,6 +100,17 @@ pub fn take_plain_names(set: &mut LayerSet) -> Vec<String> {
     let (kept, left): (Vec<Layer>, Vec<Layer>) = std::mem::take(&mut set.layers).into_iter().partition(fits);
     set.layers = kept;
     left.into_iter().map(|layer| layer.name).collect()
+}
+
+/// Our name of the layer that has the name `name` in a file, in plain or Blender's naming.
+pub fn plain_name(name: &str) -> &str {
+    blender_pass(name).unwrap_or_else(|| name.strip_prefix("ViewLayer.").unwrap_or(name))
+}
+
+/// Our name of a layer that has another one in Blender; `None` for all other layers.
+fn blender_pass(name: &str) -> Option<&'static str> {
+    let mut known = LAYERS.iter().filter(|kind| kind.blender.is_some()).map(|kind| kind.name);
+    known.find(|plain| Naming::Blender.layer(plain) == name)
 }
 
 /// Converts positions and normals from Blender's axes: (x, y, z) becomes (x, z, -y).

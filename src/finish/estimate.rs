@@ -2,10 +2,13 @@
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::QUARTERS;
-use crate::film::{LayerSet, Picture, Role};
+use crate::film::{Layer, LayerSet, Picture, Role};
 
 /// Largest ratio of standard error to estimate that rounding of single-precision sums alone can produce.
 const ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// Names of two layers with independent halves of the samples.
+const HALVES: [[&str; 2]; 2] = [["Half1", "Half2"], ["HalfA", "HalfB"]];
 
 /// An unfinished picture, its noise, and the guides of a denoiser, all of one size.
 #[derive(Clone, Debug)]
@@ -32,7 +35,7 @@ impl Estimate {
     pub fn of(set: &LayerSet) -> Result<Estimate> {
         let mean = set.picture("Noisy").map_or_else(|| set.beauty(), Ok)?;
         let variance = set.picture(&format!("Variance{}", own_level(set))).or_else(|| set.picture("Variance"));
-        let halves = [["Half1", "Half2"], ["HalfA", "HalfB"]].iter().find_map(|names| {
+        let halves = HALVES.iter().find_map(|names| {
             let [a, b] = names.map(|name| set.picture(name));
             a.zip(b)
         });
@@ -68,6 +71,16 @@ impl Estimate {
         let (albedo, normal, alpha) = (self.albedo.clone(), self.normal.clone(), self.alpha.clone());
         Estimate { mean, deviation, albedo, normal, alpha }
     }
+}
+
+/// The layers of a set, which may lack its values, that [`Estimate::of`] and [`quarters`] read.
+pub(super) fn estimate_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
+    let roles = [Role::Beauty, Role::Albedo, Role::Normal].into_iter().filter_map(|role| set.find(role));
+    let reads = |name: &str| {
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        ["Noisy", "Variance", "Quarter"].contains(&stem) || HALVES.iter().flatten().any(|half| *half == name)
+    };
+    roles.chain(set.layers.iter().filter(move |layer| reads(&layer.name)))
 }
 
 /// Number, from 1, of the bandwidth level that is the method's own image: the second largest.

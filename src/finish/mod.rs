@@ -30,12 +30,13 @@ pub use window::{Windows, window};
 
 use crate::combine::{Combiner, LevelStack};
 use crate::error::Result;
+use crate::estimator::QUARTERS;
 use crate::film::kind::Use;
 use crate::film::{
     CAUSTIC, LIGHT_GROUP, Layer, LayerSet, Picture, Size, finished_part, kind_of, lobe_names, part_names,
 };
 use bound::Noise;
-use estimate::{alpha, own_level};
+use estimate::{alpha, estimate_layers, own_level};
 use finished_error::ErrorEstimator;
 use parts::Part;
 
@@ -87,14 +88,104 @@ pub struct Finished {
 /// A layer's name and its picture.
 type Named = (String, Picture);
 
-/// An estimate, its denoised picture, and what the finish makes of half of the iterations.
-struct Prepared {
+/// An estimate that [`Finish::deliver`] finishes.
+pub struct Prepared {
     estimate: Estimate,
     denoised: Picture,
     /// The finished picture by the first half of the iterations; `None` if the quarters of the iterations are unknown.
     half: Option<Picture>,
     /// Number of bandwidth levels that the network has combined.
     combined: Option<usize>,
+    /// The additive parts of the estimate that are finished too.
+    parts: Vec<Named>,
+}
+
+/// Pictures that [`Finish::deliver`] estimates the error by.
+pub struct ErrorSource {
+    quarters: [Picture; QUARTERS],
+    /// The method's own bandwidth level and the next larger one, if the picture has both.
+    levels: Option<[Picture; 2]>,
+}
+
+impl ErrorSource {
+    /// The pictures in a layer set whose own bandwidth level is number `level`; `None` if a quarter of the iterations is
+    /// missing or black.
+    fn of(set: &LayerSet, level: usize) -> Option<ErrorSource> {
+        let quarters = quarters(set)?;
+        let [own, larger] = level_names(level).map(|name| set.picture(&name));
+        Some(ErrorSource { quarters, levels: own.zip(larger).map(|(own, larger)| [own, larger]) })
+    }
+
+    /// The pictures in a file. `header` holds its layers, with or without values; `read` reads the named ones.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub fn read(header: &LayerSet, read: impl FnOnce(&[String]) -> Result<LayerSet>) -> Result<Option<ErrorSource>> {
+        let level = own_level(header);
+        let quarters = (1..=QUARTERS).map(|k| format!("Quarter{k}"));
+        let names: Vec<String> = quarters.chain(level_names(level)).collect();
+        Ok(ErrorSource::of(&read(&names)?, level))
+    }
+}
+
+/// Names of the layers of a bandwidth level and of the next larger one.
+fn level_names(level: usize) -> [String; 2] {
+    [level, level + 1].map(|level| format!("Level{level}"))
+}
+
+/// A finished picture with its parts and its error.
+pub struct FinishedPicture {
+    picture: Picture,
+    /// Finished parts, under the names of their layers.
+    parts: Vec<Named>,
+    account: Finished,
+}
+
+impl FinishedPicture {
+    /// Whether [`FinishedPicture::insert_into`] replaces the layer `name` without reading it.
+    pub fn replaces(&self, name: &str) -> bool {
+        (name == ERROR && self.account.error_map.is_some()) || self.parts.iter().any(|(part, _)| part == name)
+    }
+
+    /// Makes the picture the beauty of a layer set; alpha stays. Adds its error and its parts.
+    ///
+    /// # Errors
+    /// The set has another size.
+    pub fn insert_into(self, set: &mut LayerSet) -> Result<Finished> {
+        let FinishedPicture { picture, parts, account } = self;
+        let alpha = alpha(set);
+        set.layers.retain(|layer| layer.name != "Combined");
+        set.push(match alpha {
+            Some(alpha) => {
+                let pixels = picture.into_iter().zip(alpha).map(|([r, g, b], a)| [r, g, b, a]);
+                Layer::interleaved("", "RGBA", pixels)
+            }
+            None => Layer::interleaved("", "RGB", picture),
+        })?;
+        if let Some(map) = &account.error_map {
+            set.layers.retain(|layer| layer.name != ERROR);
+            // A large known error must not become infinity, which means unknown.
+            let root = |square: f32| square.sqrt().min(f32::MAX);
+            set.push(Layer::interleaved(ERROR, "RGB", map.squared().map(root)))?;
+        }
+        for (name, part) in parts {
+            set.push(Layer::interleaved(name, "RGB", part))?;
+        }
+        Ok(account)
+    }
+}
+
+/// Names of the additive parts of a layer set that are finished if `wanted` accepts the names of finished parts: all or
+/// none, because parts sum to the picture.
+pub fn parts_to_finish(set: &LayerSet, wanted: impl Fn(&str) -> bool) -> Vec<String> {
+    let names: Vec<String> = part_layers(set).map(|layer| layer.name.clone()).collect();
+    let any = names.iter().filter_map(|name| finished_part(name)).any(|name| wanted(&name));
+    if any { names } else { Vec::new() }
+}
+
+/// The layers of a set that are additive parts of the estimate.
+fn part_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
+    set.layers.iter().filter(|layer| finished_part(&layer.name).is_some())
 }
 
 impl Finish {
@@ -161,80 +252,77 @@ impl Finish {
         let (estimate, combined) = self.estimate(set)?;
         let denoised = self.denoiser.run(&estimate, self.quality)?;
         let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
-        self.deliver(set, None, &Prepared { estimate, denoised, half, combined }, wanted)
+        let names = parts_to_finish(set, &wanted);
+        let parts = names.into_iter().filter_map(|name| set.picture(&name).map(|picture| (name, picture))).collect();
+        let error = ErrorSource::of(set, own_level(set));
+        let prepared = Prepared { estimate, denoised, half, combined, parts };
+        self.deliver(prepared, error, wanted)?.insert_into(set)
+    }
+
+    /// Names of the layers of a set, which may lack its values, that [`Finish::frame`] reads.
+    pub fn frame_layers(&self, set: &LayerSet) -> Vec<String> {
+        let by_network = |name: &str| self.network.is_some() && reads_for_error(name);
+        let of_network = set.layers.iter().filter(|layer| by_network(&layer.name));
+        let layers = estimate_layers(set).chain(temporal::motion_layers(set)).chain(part_layers(set)).chain(of_network);
+        layers.map(|layer| layer.name.clone()).collect()
     }
 
     /// Reads and denoises a frame of an animation for the temporal finish of itself and of its neighbours.
     ///
     /// # Errors
     /// Layers are missing ([`Estimate::of`]), motion vectors too, or the denoiser or the network fails.
-    pub fn frame(&mut self, set: &LayerSet) -> Result<temporal::Frame> {
-        let (estimate, combined) = self.estimate(set)?;
-        let quarters = quarters(set);
+    pub fn frame(&mut self, set: LayerSet) -> Result<temporal::Frame> {
+        let (estimate, combined) = self.estimate(&set)?;
+        let quarters = quarters(&set);
+        let motion = temporal::motion(&set)?;
+        let parts = part_layers(&set).map(|layer| (layer.name.clone(), set.picture_of(layer))).collect();
+        let correlation = temporal::correlation(set.size(), quarters.as_ref());
+        // The denoiser runs without the layers in memory.
+        drop(set);
         let mut half = None;
-        if let Some(quarters) = &quarters {
-            let estimate = estimate.first_half(quarters);
-            let denoised = self.denoiser.run(&estimate, self.quality)?;
-            half = Some([estimate.mean, denoised]);
+        if let Some(quarters) = quarters {
+            let of_half = estimate.first_half(&quarters);
+            drop(quarters);
+            let denoised = self.denoiser.run(&of_half, self.quality)?;
+            half = Some([of_half.mean, denoised]);
         }
         let denoised = self.denoiser.run(&estimate, self.quality)?;
         let is_denoised = !matches!(self.denoiser, Denoiser::None);
         let pictures = temporal::Pictures { estimate, denoised, half, combined, is_denoised };
-        temporal::Frame::new(set, pictures, quarters.as_ref())
+        Ok(temporal::Frame::new(pictures, parts, motion, correlation))
     }
 
-    /// Does the work of [`Finish::apply`] for the layer set of the frame in the middle of a window, averaged with its
-    /// neighbours.
+    /// Averages the frame in the middle of a window with its neighbours, and the additive parts with these names; `None` if
+    /// the middle is empty.
+    pub fn average(window: &temporal::Window<'_>, parts: &[String]) -> Option<Prepared> {
+        let finish_half = |estimate: &Estimate, denoised: &Picture| {
+            let ([picture, _], _) = displaced(estimate, denoised);
+            picture
+        };
+        let average = temporal::average(window, finish_half, parts)?;
+        let temporal::Averaged { estimate, denoised, combined, half, parts } = average;
+        Some(Prepared { estimate, denoised, half, combined, parts })
+    }
+
+    /// Finishes an estimate and its parts, and estimates the error. `wanted` accepts the names of layers to make.
     ///
     /// # Errors
-    /// As for [`Finish::apply`].
-    pub fn apply_in_window(
+    /// The denoiser fails.
+    pub fn deliver(
         &mut self,
-        set: &mut LayerSet,
-        window: &temporal::Window<'_>,
+        prepared: Prepared,
+        error: Option<ErrorSource>,
         wanted: impl Fn(&str) -> bool,
-    ) -> Result<Finished> {
-        let Some((average, combined)) = temporal::average(window) else { return self.apply(set, wanted) };
-        let half = average.half.map(|(estimate, denoised)| displaced(&estimate, &denoised).0[0].clone());
-        let prepared = Prepared { estimate: average.estimate, denoised: average.denoised, half, combined };
-        self.deliver(set, Some(&average.parts), &prepared, wanted)
-    }
-
-    /// Finishes the picture and makes it the beauty of the layer set, with its error and its parts. `parts` holds the
-    /// parts of the estimate if it is not the set's own.
-    fn deliver(
-        &mut self,
-        set: &mut LayerSet,
-        parts: Option<&LayerSet>,
-        prepared: &Prepared,
-        wanted: impl Fn(&str) -> bool,
-    ) -> Result<Finished> {
-        let Prepared { estimate, denoised, half, combined } = prepared;
-        let ([picture, spread], clamped) = displaced(estimate, denoised);
-        let (error, error_map) =
-            half.as_ref().and_then(|half| error_by_quarters(set, estimate, half, wanted(ERROR))).unzip();
-        let error_map = error_map.flatten();
-        let noise = Noise { estimate, spread: &spread };
-        let parts = self.parts(parts.unwrap_or(set), &picture, noise, wanted)?;
-        let alpha = alpha(set);
-        set.layers.retain(|layer| layer.name != "Combined");
-        set.push(match alpha {
-            Some(alpha) => {
-                let pixels = picture.into_iter().zip(alpha).map(|([r, g, b], a)| [r, g, b, a]);
-                Layer::interleaved("", "RGBA", pixels)
-            }
-            None => Layer::interleaved("", "RGB", picture),
-        })?;
-        if let Some(map) = &error_map {
-            set.layers.retain(|layer| layer.name != ERROR);
-            // A large known error must not become infinity, which means unknown.
-            let root = |square: f32| square.sqrt().min(f32::MAX);
-            set.push(Layer::interleaved(ERROR, "RGB", map.squared().map(root)))?;
-        }
-        for (name, part) in parts {
-            set.push(Layer::interleaved(name, "RGB", part))?;
-        }
-        Ok(Finished { combined: *combined, error, error_map, clamped })
+    ) -> Result<FinishedPicture> {
+        let Prepared { estimate, denoised, half, combined, parts } = prepared;
+        let error = half.zip(error).map(|(half, source)| error_by_quarters(&source, &estimate, &half, wanted(ERROR)));
+        let (error, error_map) = error.unzip();
+        let ([picture, spread], clamped) = displaced(&estimate, &denoised);
+        drop(denoised);
+        let noise = Noise { estimate: &estimate, spread: &spread };
+        let parts = self.parts(parts, &picture, noise, wanted)?;
+        let account = Finished { combined, error, error_map: error_map.flatten(), clamped };
+        Ok(FinishedPicture { picture, parts, account })
     }
 
     /// The error of a picture finished from the first half of the iterations, by the second half; `None` if a quarter
@@ -245,25 +333,32 @@ impl Finish {
     pub fn estimate_error(&mut self, set: &LayerSet) -> Result<Option<FinishedError>> {
         let estimate = Estimate::of(set)?;
         let half = quarters(set).map(|quarters| self.picture(&estimate.first_half(&quarters))).transpose()?;
-        Ok(half.and_then(|half| error_by_quarters(set, &estimate, &half, false)).map(|(error, _)| error))
+        let source = ErrorSource::of(set, own_level(set));
+        Ok(half.zip(source).map(|(half, source)| error_by_quarters(&source, &estimate, &half, false).0))
     }
 
     /// The finished parts of the picture whose names are wanted, with their layers' names. Parts that together sum to
     /// the picture, or to its caustics, are all finished if one of them is wanted.
     fn parts(
         &mut self,
-        set: &LayerSet,
+        parts: Vec<Named>,
         picture: &Picture,
         noise: Noise<'_>,
         wanted: impl Fn(&str) -> bool,
     ) -> Result<Vec<Named>> {
-        let present = |names: &mut dyn Iterator<Item = &str>| -> Vec<Named> {
-            names.filter_map(|name| Some((finished_part(name)?, set.picture(name)?))).collect()
+        let (of_groups, parts): (Vec<Named>, _) =
+            parts.into_iter().partition(|(name, _)| name.starts_with(LIGHT_GROUP));
+        let (of_caustics, mut parts): (Vec<Named>, Vec<_>) =
+            parts.into_iter().partition(|(name, _)| name.starts_with(CAUSTIC));
+        let mut take = |names: &mut dyn Iterator<Item = &str>| -> Vec<Named> {
+            let mut one = |name: &str| Some(parts.swap_remove(parts.iter().position(|(part, _)| part == name)?));
+            renamed(names.filter_map(&mut one).collect())
         };
-        let of_group =
-            |prefix| present(&mut set.layers.iter().map(|layer| &*layer.name).filter(|name| name.starts_with(prefix)));
+        let (effects, lobes) = (take(&mut part_names()), take(&mut lobe_names()));
+        let (groups, caustics) = (renamed(of_groups), renamed(of_caustics));
         let any = |parts: &[Named]| parts.iter().any(|(name, _)| wanted(name));
-        let (effects, groups, caustics) = (present(&mut part_names()), of_group(LIGHT_GROUP), of_group(CAUSTIC));
+        let of_caustics = |(name, _): &&Named| finished_part("Caustic").as_ref() == Some(name);
+        let all_caustics = effects.iter().find(of_caustics).filter(|_| any(&caustics)).map(|(_, mean)| mean.clone());
         let mut finished = Vec::new();
         if any(&effects) || any(&caustics) {
             finished.extend(self.split(effects, picture, noise)?);
@@ -273,12 +368,11 @@ impl Finish {
             finished.extend(self.split(groups, picture, noise)?);
         }
         // They sum to the picture only together. Other renderers have layers with some of these names.
-        let lobes = present(&mut lobe_names());
         if lobes.len() == lobe_names().count() && any(&lobes) {
             finished.extend(self.split(lobes, picture, noise)?);
         }
-        let whole = finished_part("Caustic").and_then(|name| finished.iter().find(|(part, _)| *part == name)).cloned();
-        if let (true, Some((_, whole)), Some(mean)) = (any(&caustics), whole, set.picture("Caustic")) {
+        let whole = all_caustics.zip(finished.iter().find(of_caustics).cloned());
+        if let Some((mean, (_, whole))) = whole {
             let caustics = with_rest(caustics, &mean);
             finished.extend(self.split(caustics, &whole, noise)?);
         }
@@ -317,24 +411,27 @@ fn displaced(estimate: &Estimate, denoised: &Picture) -> ([Picture; 2], Clamped)
 }
 
 /// The error of the picture `half`, finished from the first half of the iterations, with the errors of the pixels if they
-/// are wanted; `None` if a quarter of the iterations is missing or black.
+/// are wanted.
 fn error_by_quarters(
-    set: &LayerSet,
+    source: &ErrorSource,
     estimate: &Estimate,
     half: &Picture,
     wants_map: bool,
-) -> Option<(FinishedError, Option<ErrorMap>)> {
-    let quarters = quarters(set)?;
-    let own = own_level(set);
-    let [own, larger] = [own, own + 1].map(|level| set.picture(&format!("Level{level}")));
-    let levels = own.as_ref().zip(larger.as_ref()).map(|(own, larger)| [own, larger]);
-    let estimator = ErrorEstimator { half, quarters: &quarters, deviation: &estimate.deviation, levels };
-    Some(if wants_map {
+) -> (FinishedError, Option<ErrorMap>) {
+    let ErrorSource { quarters, levels } = source;
+    let levels = levels.as_ref().map(|levels| levels.each_ref());
+    let estimator = ErrorEstimator { half, quarters, deviation: &estimate.deviation, levels };
+    if wants_map {
         let (error, map) = estimator.error_and_map();
         (error, Some(map))
     } else {
         (estimator.error(), None)
-    })
+    }
+}
+
+/// Parts under the names of their finished layers.
+fn renamed(parts: Vec<Named>) -> Vec<Named> {
+    parts.into_iter().filter_map(|(name, part)| Some((finished_part(&name)?, part))).collect()
 }
 
 /// The light of light groups. If lights outside all groups have added any to `whole`, their light comes first, without

@@ -16,11 +16,11 @@
 //!
 //! Light is averaged relative to the albedo, because textures move by fractions of pixels.
 
-use super::Estimate;
 use super::window::{Windows, window};
+use super::{Estimate, Named};
 use crate::error::{Error, ErrorKind, Result};
 use crate::estimator::QUARTERS;
-use crate::film::{Layer, LayerSet, MOTION, Picture, Size, channel_mean, finished_part};
+use crate::film::{Layer, LayerSet, MOTION, Picture, Size, channel_mean};
 use rayon::prelude::*;
 
 /// Number of frames before and after a frame that it is averaged with.
@@ -61,14 +61,13 @@ pub(super) struct Pictures {
     pub is_denoised: bool,
 }
 
-/// One frame of an animation, as the temporal finish of its neighbours reads it.
+/// One frame of an animation, as the temporal finish of its neighbours reads it: 112 bytes per pixel, and 12 for each
+/// additive part that is not black.
 pub struct Frame {
     pictures: Pictures,
-    /// Additive parts of the estimate.
-    parts: LayerSet,
-    /// Variance of the estimate, mean over RGB.
-    variance: Vec<f32>,
-    /// `variance` averaged over 7 x 7 pixels; infinite where it is unknown.
+    /// Additive parts of the estimate by name; `None` if a part is black.
+    parts: Vec<(String, Option<Picture>)>,
+    /// Variance of the estimate, mean over RGB, averaged over 7 x 7 pixels; infinite where it is unknown.
     smooth_variance: Vec<f32>,
     /// Variance of the mean of 3 x 3 pixels relative to that of one pixel: 1/9 if their noise is independent, 1 if
     /// photons are shared by all.
@@ -77,23 +76,21 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A frame from its layers and pictures, and the quarters of its iterations, if they are known.
-    ///
-    /// # Errors
-    /// The layers lack motion vectors.
-    pub(super) fn new(set: &LayerSet, pictures: Pictures, quarters: Option<&[Picture; QUARTERS]>) -> Result<Frame> {
-        let motion = motion(set)?;
+    /// A frame from its pictures, the additive parts of its estimate, its motion vectors and its [`correlation`].
+    pub(super) fn new(pictures: Pictures, parts: Vec<Named>, motion: Vec<[f32; 4]>, correlation: Vec<f32>) -> Frame {
         let deviation = &pictures.estimate.deviation;
-        let variance: Vec<f32> = deviation.par_iter().map(|s| channel_mean(s.map(|s| s * s)) as f32).collect();
-        let known: Vec<bool> = variance.iter().map(|v| v.is_finite()).collect();
-        let single: Vec<[f32; 1]> = variance.iter().map(|v| [*v]).collect();
-        let means = Windows::new(set.size(), VARIANCE_REACH, &known).means(&single);
+        let single: Vec<[f32; 1]> = deviation.par_iter().map(|s| [variance(*s)]).collect();
+        let known: Vec<bool> = single.iter().map(|[v]| v.is_finite()).collect();
+        let means = Windows::new(deviation.size(), VARIANCE_REACH, &known).means(&single);
         let smooth_variance = means.iter().zip(&known).map(|([v], known)| if *known { *v } else { f32::INFINITY });
         let smooth_variance = smooth_variance.collect();
-        let correlation = quarters.map_or_else(|| vec![INDEPENDENT; set.pixels()], correlation);
-        let layers = set.layers.iter().filter(|layer| finished_part(&layer.name).is_some()).cloned().collect();
-        let parts = LayerSet { layers, ..LayerSet::new(set.width, set.height) };
-        Ok(Frame { pictures, parts, variance, smooth_variance, correlation, motion })
+        let parts = parts.into_iter().map(|(name, part)| (name, (!part.is_black()).then_some(part))).collect();
+        Frame { pictures, parts, smooth_variance, correlation, motion }
+    }
+
+    /// Variance of the estimate of pixel `i`, mean over RGB.
+    fn variance(&self, i: usize) -> f32 {
+        variance(self.pictures.estimate.deviation[i])
     }
 
     /// The estimate and the denoised picture, by all or by `half` of the iterations.
@@ -141,13 +138,23 @@ impl Frame {
     }
 }
 
+/// Mean over RGB of squared standard errors.
+fn variance(deviation: [f32; 3]) -> f32 {
+    channel_mean(deviation.map(|s| s * s)) as f32
+}
+
+/// The layers that may hold motion vectors, the best first.
+pub(super) fn motion_layers(set: &LayerSet) -> impl Iterator<Item = &Layer> {
+    let last = |layer: &Layer, name: &str| layer.name.rsplit('.').next() == Some(name);
+    [MOTION, "Vector"].into_iter().filter_map(move |name| set.layers.iter().find(|layer| last(layer, name)))
+}
+
 /// The motion vectors of a picture.
 ///
 /// # Errors
 /// The layer is missing.
-fn motion(set: &LayerSet) -> Result<Vec<[f32; 4]>> {
-    let planes = [MOTION, "Vector"].iter().find_map(|name| {
-        let layer = set.layers.iter().find(|layer| layer.name.rsplit('.').next() == Some(name))?;
+pub(super) fn motion(set: &LayerSet) -> Result<Vec<[f32; 4]>> {
+    let planes = motion_layers(set).find_map(|layer| {
         <[_; 4]>::try_from(["X", "Y", "Z", "W"].iter().filter_map(|c| layer.plane(c)).collect::<Vec<_>>()).ok()
     });
     let Some(planes) = planes else {
@@ -159,9 +166,10 @@ fn motion(set: &LayerSet) -> Result<Vec<[f32; 4]>> {
 }
 
 /// Variance of the mean over 3 x 3 pixels relative to that of one pixel, averaged over 7 x 7 pixels. The three contrasts
-/// of the quarters of the iterations have the noise of the estimate and no light.
-fn correlation(quarters: &[Picture; QUARTERS]) -> Vec<f32> {
-    let size = quarters[0].size();
+/// of the quarters of the iterations have the noise of the estimate and no light. Without quarters, noise counts as
+/// independent.
+pub(super) fn correlation(size: Size, quarters: Option<&[Picture; QUARTERS]>) -> Vec<f32> {
+    let Some(quarters) = quarters else { return vec![INDEPENDENT; size.pixels()] };
     let all = vec![true; size.pixels()];
     let small = Windows::new(size, BIAS_REACH, &all);
     let mut squares = vec![[0f32; 2]; size.pixels()];
@@ -265,33 +273,43 @@ fn neighbours<'a>(window: &Window<'a>, own: &'a Frame) -> Vec<Neighbour<'a>> {
 }
 
 /// The average of a frame with its neighbours.
-pub(super) struct Averaged {
+pub(super) struct Averaged<T> {
     pub estimate: Estimate,
     pub denoised: Picture,
-    /// Estimate and denoised picture by half of the iterations.
-    pub half: Option<(Estimate, Picture)>,
+    /// Number of bandwidth levels that the network has combined.
+    pub combined: Option<usize>,
+    /// The picture by the first halves of the iterations; `None` if a frame lacks its halves.
+    pub half: Option<T>,
     /// The additive parts of the estimate.
-    pub parts: LayerSet,
+    pub parts: Vec<Named>,
 }
 
-/// Averages the frame in the middle of a window with its neighbours, and returns the number of bandwidth levels that the
-/// network has combined; `None` if the middle is empty.
-pub(super) fn average(window: &Window<'_>) -> Option<(Averaged, Option<usize>)> {
+/// Averages the frame in the middle of a window with its neighbours; `None` if the middle is empty. `finish_half` makes a
+/// picture of the average of the first halves of the iterations, and of their denoised picture. `parts` names the additive
+/// parts that are averaged too.
+pub(super) fn average<T>(
+    window: &Window<'_>,
+    finish_half: impl FnOnce(&Estimate, &Picture) -> T,
+    parts: &[String],
+) -> Option<Averaged<T>> {
     let own = window[REACH]?;
     let neighbours = neighbours(window, own);
     let variance = pooled_variance(own, &neighbours);
-    let whole = Average::new(own, &neighbours, &variance, false)?;
+    let guided = |mean: Picture, deviation: Picture| {
+        let Estimate { albedo, normal, alpha, .. } = &own.pictures.estimate;
+        Estimate { mean, deviation, albedo: albedo.clone(), normal: normal.clone(), alpha: alpha.clone() }
+    };
+    // The halves come first, so that their pictures do not lie in memory beside the others.
     let half = Average::new(own, &neighbours, &variance, true).map(|average| {
         let [mean, denoised] = average.pictures();
-        let (mut estimate, mut deviation) = (own.pictures.estimate.clone(), average.deviation());
-        deviation.iter_mut().for_each(|s| *s = s.map(|s| s * std::f32::consts::SQRT_2));
-        (estimate.mean, estimate.deviation) = (mean, deviation);
-        (estimate, denoised)
+        let deviation = average.deviation().map(|s| s * std::f32::consts::SQRT_2);
+        drop(average);
+        finish_half(&guided(mean, deviation), &denoised)
     });
+    let whole = Average::new(own, &neighbours, &variance, false)?;
     let [mean, denoised] = whole.pictures();
-    let mut estimate = own.pictures.estimate.clone();
-    (estimate.mean, estimate.deviation) = (mean, whole.deviation());
-    Some((Averaged { estimate, denoised, half, parts: whole.parts() }, own.pictures.combined))
+    let estimate = guided(mean, whole.deviation());
+    Some(Averaged { estimate, denoised, combined: own.pictures.combined, half, parts: whole.parts(parts) })
 }
 
 /// The variance of the frame's estimate, averaged over the frames that show a pixel's point.
@@ -307,7 +325,7 @@ fn pooled_variance(own: &Frame, neighbours: &[Neighbour<'_>]) -> Vec<f32> {
         }
         sum / count
     };
-    (0..own.variance.len()).into_par_iter().map(pooled).collect()
+    (0..own.size().pixels()).into_par_iter().map(pooled).collect()
 }
 
 /// Differences between a frame and another one.
@@ -347,7 +365,7 @@ impl Pair {
             let (a, b) = (own.smooth_variance[i], other.frame.smooth_variance[j]);
             let (estimate, denoised) = (apart(mean, mean_there), apart(denoised, denoised_there));
             let denoised = if is_denoised { channel_mean(denoised.map(|d| d * d)) as f32 } else { 0.0 };
-            let variance = [sum(a, b), sum(own.variance[i], other.frame.variance[j])];
+            let variance = [sum(a, b), sum(own.variance(i), other.frame.variance(j))];
             let kept = factor * (own.correlation[i] * a + other.frame.correlation[j] * scale * b);
             let finite = estimate.iter().chain(&variance).chain([&denoised]).all(|value| value.is_finite());
             let correlation = if variance[0] > 0.0 { kept / variance[0] } else { 1.0 };
@@ -421,7 +439,7 @@ impl<'a> Average<'a> {
         })
     }
 
-    /// The average of a layer. A neighbour without it is black.
+    /// The average of a picture of each frame; `None` stands for a black one.
     fn of(&self, own: &Picture, others: &[Option<&Picture>]) -> Picture {
         Picture::from_fn(own.size(), |i| {
             let (mut sum, mut total) = (own[i], 1.0);
@@ -452,18 +470,22 @@ impl<'a> Average<'a> {
         })
     }
 
-    /// The averages of the additive parts of the estimate.
-    fn parts(&self) -> LayerSet {
-        let size = self.own.size();
-        let mut parts = LayerSet::new(size.width, size.height);
-        for layer in &self.own.parts.layers {
-            let there: Vec<Option<Picture>> =
-                self.neighbours.iter().map(|other| other.frame.parts.picture(&layer.name)).collect();
-            let others: Vec<Option<&Picture>> = there.iter().map(Option::as_ref).collect();
-            let picture = self.of(&self.own.parts.picture_of(layer), &others);
-            parts.layers.push(Layer::interleaved(layer.name.clone(), "RGB", picture));
-        }
-        parts
+    /// The averages of the named additive parts of the estimate.
+    fn parts(&self, names: &[String]) -> Vec<Named> {
+        let part = |frame: &'a Frame, name: &str| -> Option<&'a Picture> {
+            frame.parts.iter().find(|(part, _)| part == name).and_then(|(_, picture)| picture.as_ref())
+        };
+        let average = |name: &String| {
+            let black = || Picture::filled(self.own.size(), [0.0; 3]);
+            let others: Vec<Option<&Picture>> = self.neighbours.iter().map(|other| part(other.frame, name)).collect();
+            match part(self.own, name) {
+                Some(own) => self.of(own, &others),
+                None if others.iter().all(Option::is_none) => black(),
+                None => self.of(&black(), &others),
+            }
+        };
+        let present = names.iter().filter(|name| self.own.parts.iter().any(|(part, _)| part == *name));
+        present.map(|name| (name.clone(), average(name))).collect()
     }
 }
 
@@ -500,13 +522,13 @@ mod tests {
         let estimate = Estimate { mean: mean.clone(), deviation, albedo: None, normal: None, alpha: None };
         let half = Some([halves[0].clone(), halves[0].clone()]);
         let pictures = Pictures { estimate, denoised: mean, half, combined: None, is_denoised: false };
-        let mut set = LayerSet::new(size.width, size.height);
-        set.push(Layer::interleaved(MOTION, "XYZW", vec![[0.0; 4]; size.pixels()])).unwrap();
-        Frame::new(&set, pictures, Some(quarters)).unwrap()
+        Frame::new(pictures, Vec::new(), vec![[0.0; 4]; size.pixels()], correlation(size, Some(quarters)))
     }
 
-    fn averaged(frames: &[Frame]) -> Averaged {
-        average(&std::array::from_fn(|k| frames.get(k))).expect("the middle is there").0
+    fn averaged(frames: &[Frame]) -> Averaged<Estimate> {
+        let window = std::array::from_fn(|k| frames.get(k));
+        let half = |estimate: &Estimate, _: &Picture| estimate.clone();
+        average(&window, half, &[]).expect("the middle is there")
     }
 
     /// Frames with a bright line of a width (columns) that moves by `speed` columns per frame across the floor.
@@ -527,7 +549,7 @@ mod tests {
     fn equal_frames_lose_most_of_their_noise() {
         let frames: Vec<Frame> = (0..WINDOW).map(|k| frame(|_| 1.0, 0.1, k as u64)).collect();
         let average = averaged(&frames);
-        let (half, _) = average.half.expect("halves");
+        let half = average.half.expect("halves");
         for (estimate, variance) in [(&average.estimate, 0.01), (&half, 0.02)] {
             let (found, stated) = (mean_square(&estimate.mean, 1.0), mean_square(&estimate.deviation, 0.0));
             assert!(found < 0.24 * variance, "{found}");
@@ -605,7 +627,7 @@ mod tests {
                 frame_of(&quarters, sigma)
             })
             .collect();
-        let variance = frames[REACH].variance[0];
+        let variance = frames[REACH].variance(0);
         assert!(frames[REACH].correlation.iter().sum::<f32>() / SIZE.pixels() as f32 > 0.6);
         let found = mean_square(&averaged(&frames).estimate.mean, 1.0);
         let mut blind: Vec<Frame> = frames;

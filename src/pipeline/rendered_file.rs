@@ -1,7 +1,7 @@
 //! Reads the EXR of a render to finish it.
 
 use crate::error::Result;
-use crate::film::{LayerSet, Naming, take_plain_names};
+use crate::film::{LayerSet, Naming, plain_name, take_plain_names};
 use crate::image::exr::{self, Attributes};
 use std::path::Path;
 
@@ -23,12 +23,31 @@ impl RenderedFile {
     /// # Errors
     /// As for [`exr::read`].
     pub fn read(path: &Path) -> Result<RenderedFile> {
-        let (mut set, attributes) = exr::read(path)?;
+        Ok(RenderedFile::of(path, exr::read(path)?))
+    }
+
+    /// The header of a file: its layers lack their values. Reads no pixels.
+    ///
+    /// # Errors
+    /// As for [`exr::read`].
+    pub fn read_header(path: &Path) -> Result<RenderedFile> {
+        Ok(RenderedFile::of(path, exr::read_header(path)?))
+    }
+
+    /// A file with the layers alone whose plain names `wanted` accepts.
+    ///
+    /// # Errors
+    /// As for [`exr::read`].
+    pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<RenderedFile> {
+        Ok(RenderedFile::of(path, exr::read_layers(path, |name| wanted(plain_name(name)))?))
+    }
+
+    fn of(path: &Path, (mut set, attributes): (LayerSet, Attributes)) -> RenderedFile {
         let naming = Naming::of(&set);
         let remark = |name: String| {
             format!("{}: layer \"{name}\" cannot be written under this name and is left out", path.display())
         };
         let remarks = take_plain_names(&mut set).into_iter().map(remark).collect();
-        Ok(RenderedFile { set, attributes, naming, remarks })
+        RenderedFile { set, attributes, naming, remarks }
     }
 }

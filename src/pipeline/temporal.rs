@@ -4,14 +4,16 @@ use super::deliver::write_finish;
 use super::finish::OpenFinish;
 use super::rendered_file::RenderedFile;
 use crate::error::{Error, ErrorKind, Result};
-use crate::finish::Finished;
+use crate::film::{Layer, LayerSet};
 use crate::finish::temporal::{self, REACH, WINDOW};
+use crate::finish::{ERROR, ErrorSource, Finish, Finished, parts_to_finish};
 use crate::image::exr::{self, Attributes};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Files of an animation, one per frame. Each is read once if frames are finished in ascending order.
+/// Files of an animation, one per frame. Memory holds what the average of frames needs of each frame of a window, and the
+/// rest of one file at a time. Each frame is denoised once if frames are finished in ascending order.
 pub struct FrameFiles {
     paths: BTreeMap<u32, PathBuf>,
     /// Frames in memory, by number.
@@ -23,8 +25,6 @@ pub struct FrameFiles {
 /// A frame in memory.
 struct Held {
     frame: temporal::Frame,
-    /// The file, until the frame is finished.
-    file: Option<RenderedFile>,
     /// Seed of the render; `None` for files of other programs.
     seed: Option<u64>,
 }
@@ -64,7 +64,7 @@ impl FrameFiles {
         self.held.retain(|frame, _| around.contains(frame));
         self.joined.retain(|frame, _| around.contains(frame));
         for &frame in &around {
-            if self.held.get(&frame).is_none_or(|held| frame == number && held.file.is_none()) {
+            if !self.held.contains_key(&frame) {
                 let held = self.read(frame, finish, &mut remarks)?;
                 self.held.insert(frame, held);
             }
@@ -77,20 +77,34 @@ impl FrameFiles {
             }
         }
         let path = self.path(number)?.to_owned();
-        let file = self.held.get_mut(&number).and_then(|held| held.file.take());
-        let mut file = file.ok_or_else(|| Error::new(ErrorKind::Io, path.display(), "there is no such frame"))?;
+        let within = |error: Error| error.within(path.display());
+        let header = RenderedFile::read_header(&path)?.set;
+        let wanted = |name: &str| !only_present || header.get(name).is_some();
         let (window, averaged) = self.averaged(number);
-        let present: Vec<String> = file.set.layers.iter().map(|layer| layer.name.clone()).collect();
-        let wanted = |name: &str| !only_present || present.iter().any(|layer| layer == name);
-        let finished = finish.finish().apply_in_window(&mut file.set, &window, wanted);
-        let finished = finished.map_err(|error| error.within(path.display()))?;
+        let average = Finish::average(&window, &parts_to_finish(&header, wanted));
+        let average = average.ok_or_else(|| Error::new(ErrorKind::Io, path.display(), "there is no such frame"))?;
+        // The windows of later frames lack the first frame of this one.
+        self.held.retain(|frame, _| frame + REACH as u32 > number);
+        let error = ErrorSource::read(&header, |names| self.layers(number, names))?;
+        let picture = finish.finish().deliver(average, error, wanted).map_err(within)?;
+        let mut file = RenderedFile::read_layers(&path, |name| !picture.replaces(name))?;
+        let finished = picture.insert_into(&mut file.set).map_err(within)?;
+        // Replaced layers keep their places, except the error.
+        let place = |layer: &Layer| header.layers.iter().position(|old| old.name == layer.name && layer.name != ERROR);
+        file.set.layers.sort_by_key(|layer| place(layer).unwrap_or(usize::MAX));
         write_header(&mut file.attributes, finish, &finished, [&around, &averaged])?;
         Ok(RenderedFile { remarks, ..file })
     }
 
+    /// The named layers of a frame, as far as its file has them.
+    fn layers(&self, number: u32, names: &[String]) -> Result<LayerSet> {
+        let wanted = |name: &str| names.iter().any(|wanted| wanted == name);
+        Ok(RenderedFile::read_layers(self.path(number)?, wanted)?.set)
+    }
+
     /// Whether the header of a frame's file says that the frame has been finished with all frames of its window.
     pub fn is_finished(&self, number: u32) -> bool {
-        let read = self.path(number).and_then(exr::read).ok();
+        let read = self.path(number).and_then(exr::read_header).ok();
         let header = read.and_then(|(_, attributes)| attributes.object());
         header.is_some_and(|header| header["combined"][WINDOW_KEY] == json!(self.window(number)))
     }
@@ -98,11 +112,12 @@ impl FrameFiles {
     /// Reads a frame and denoises it.
     fn read(&self, number: u32, finish: &mut OpenFinish, remarks: &mut Vec<String>) -> Result<Held> {
         let path = self.path(number)?.to_owned();
-        let mut file = RenderedFile::read(&path)?;
-        remarks.append(&mut file.remarks);
-        let frame = finish.finish().frame(&file.set).map_err(|error| error.within(path.display()))?;
-        let seed = file.attributes.object().and_then(|header| header["seed"].as_u64());
-        Ok(Held { frame, file: Some(file), seed })
+        let mut header = RenderedFile::read_header(&path)?;
+        remarks.append(&mut header.remarks);
+        let layers = self.layers(number, &finish.finish().frame_layers(&header.set))?;
+        let frame = finish.finish().frame(layers).map_err(|error| error.within(path.display()))?;
+        let seed = header.attributes.object().and_then(|header| header["seed"].as_u64());
+        Ok(Held { frame, seed })
     }
 
     /// Remarks on missing frames beside a frame, except before the first and after the last one.

@@ -1,6 +1,8 @@
 //! The temporal finish: frames of an animation, finished with their neighbours.
 
 use crate::{Folder, Outcome, values};
+use caustique::film::Layer;
+use caustique::image::exr;
 
 const RENDER: &str = "render scene.glb --width 48 --height 36 --iterations 4 --method path --denoise own --reproducible \
                       --progress plain --overwrite --frames 1-5";
@@ -93,6 +95,40 @@ fn frames_finished_together_flicker_less() {
     for (i, whole) in values(&set, "").iter().enumerate() {
         let sum: f32 = parts.iter().map(|part| part[i][1]).sum();
         assert!((sum - whole[1]).abs() <= 1e-5 * whole[1].max(1e-3), "{i}: {sum} {whole:?}");
+    }
+}
+
+/// Frames on both sides of a camera cut are finished without each other, as if the others were not there.
+#[test]
+fn a_camera_cut_divides_the_frames() {
+    let folder = folder();
+    // After the cut, all surfaces face a way in which none did before.
+    for frame in 3..=5 {
+        let path = folder.path(&format!("out.{frame}.exr"));
+        let (mut set, attributes) = exr::read(&path).expect("the file can be read");
+        set.push(Layer::interleaved("normal", "XYZ", vec![[0.577; 3]; set.pixels()])).expect("it has the size");
+        exr::write(&path, &set, &attributes, exr::Options::default()).expect("it can be written");
+    }
+    let outcome = finish(&folder, "out.#.exr -o cut.#.exr");
+    let warning = "warning: out.3.exr shows hardly any surface of out.2.exr: frames on both sides of the cut are \
+                   finished without each other\n";
+    assert_eq!(outcome.stderr.matches(warning).count(), 1, "{}", outcome.stderr);
+    assert_eq!(outcome.stderr.matches("warning").count(), 1, "{}", outcome.stderr);
+    let averaged = |frame: u32| folder.read(&format!("cut.{frame}.exr")).1["combined"]["averaged"].clone();
+    assert_eq!(
+        [1, 2, 3, 4, 5].map(averaged),
+        [[1, 2].as_slice(), &[1, 2], &[3, 4, 5], &[3, 4, 5], &[3, 4, 5]].map(|numbers| serde_json::json!(numbers))
+    );
+    let picture = |name: &str, frame: u32| values(&folder.read(&format!("{name}.{frame}.exr")).0, "");
+    for (frames, away) in [(1..=2, 3..=5), (3..=5, 1..=2)] {
+        let name = |frame: u32| folder.path(&format!("out.{frame}.exr"));
+        let hidden = |frame: u32| folder.path(&format!("away.{frame}.exr"));
+        away.clone().for_each(|frame| std::fs::rename(name(frame), hidden(frame)).expect("it is there"));
+        finish(&folder, "out.#.exr -o alone.#.exr");
+        away.for_each(|frame| std::fs::rename(hidden(frame), name(frame)).expect("it is there"));
+        for frame in frames {
+            assert!(picture("cut", frame) == picture("alone", frame), "frame {frame}");
+        }
     }
 }
 

@@ -60,6 +60,37 @@ fn written_files_are_read_back() {
     }
 }
 
+/// Reading some layers gives them as reading all layers does, from one part and from many; the header has all layers
+/// without values.
+#[test]
+fn layers_are_read_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    for (compression, multi_part) in COMPRESSIONS.into_iter().flat_map(|c| [(c, false), (c, true)]) {
+        exr::write(&path, &fixture(33, 50), &attributes(), Options { compression, multi_part, ..Options::default() })
+            .unwrap();
+        let (all, _) = exr::read(&path).unwrap();
+        for names in [&["albedo", "Z"][..], &["", "none"], &["CryptoObject00"], &[]] {
+            let wanted = |name: &str| names.contains(&name);
+            let (some, found) = exr::read_layers(&path, wanted).unwrap();
+            let mut expected = all.clone();
+            expected.layers.retain(|layer| wanted(&layer.name));
+            assert_eq!((some, found), (expected, attributes()), "{compression:?} {multi_part} {names:?}");
+        }
+        let (mut header, found) = exr::read_header(&path).unwrap();
+        assert_eq!((header.size(), found), (all.size(), attributes()));
+        assert!(header.layers.iter().flat_map(|layer| &layer.planes).all(|plane| plane.values.is_empty()));
+        for (layer, known) in header.layers.iter_mut().zip(&all.layers) {
+            layer.planes.iter_mut().zip(&known.planes).for_each(|(plane, known)| plane.values = known.values.clone());
+        }
+        assert_eq!(header, all);
+    }
+    // The header of a file whose pixels are missing can still be read.
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    assert!(exr::read_header(&path).is_ok() && exr::read_layers(&path, |_| true).is_err());
+}
+
 #[test]
 fn values_that_are_not_finite_survive() {
     let folder = tempfile::tempdir().unwrap();

@@ -11,7 +11,7 @@ mod zip;
 
 use std::collections::BTreeMap;
 
-pub use read::read;
+pub use read::{read, read_header, read_layers};
 pub use write::{Compression, Options, write, write_followed};
 
 /// Name and version of the program, for the headers of EXR files.

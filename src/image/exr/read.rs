@@ -30,6 +30,35 @@ use crate::memory;
 /// # Errors
 /// The file cannot be opened, is malformed, deep or subsampled, or declares more pixels than its length can hold.
 pub fn read(path: &Path) -> Result<(LayerSet, Attributes)> {
+    read_layers(path, |_| true)
+}
+
+/// [`read()`] of the layers alone whose names `wanted` accepts. The others take no memory.
+///
+/// # Errors
+/// As for [`read()`].
+pub fn read_layers(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<(LayerSet, Attributes)> {
+    open(path, |file, length| decode(file, length, &wanted))
+}
+
+/// The layers of an EXR without values, and the string attributes. Reads no pixels, so that a file whose pixels are
+/// damaged is not recognised.
+///
+/// # Errors
+/// As for [`read()`].
+pub fn read_header(path: &Path) -> Result<(LayerSet, Attributes)> {
+    open(path, |file, _| {
+        let reader = exr::block::read(file, false)?;
+        let headers = reader.headers();
+        let first = headers.first().ok_or_else(|| invalid("no part"))?;
+        let size = first.shared_attributes.display_window.size;
+        let layers = layers(headers.iter().map(|header| vec![Vec::new(); header.channels.list.len()]), headers);
+        Ok((LayerSet { width: size.0, height: size.1, layers }, attributes(headers)))
+    })
+}
+
+/// Reads an open EXR of some length with `decode`.
+fn open<T>(path: &Path, decode: impl FnOnce(BufReader<File>, u64) -> Outcome<T>) -> Result<T> {
     let file = File::open(path).map_err(|cause| Error::io(path, &cause))?;
     let length = file.metadata().map_err(|cause| Error::io(path, &cause))?.len();
     if length == 0 {
@@ -55,13 +84,16 @@ fn invalid(cause: &'static str) -> exr::error::Error {
     exr::error::Error::Invalid(cause.into())
 }
 
-fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)> {
+fn decode(file: BufReader<File>, length: u64, wanted: &dyn Fn(&str) -> bool) -> Outcome<(LayerSet, Attributes)> {
     let reader = exr::block::read(file, false)?;
-    check_size(reader.headers(), length)?;
-    let chunks = reader.filter_chunks(false, |_, _, block| block.level == exr::math::Vec2(0, 0))?;
+    let reads = wanted_channels(reader.headers(), wanted);
+    check_size(reader.headers(), length, &reads)?;
+    let chunks = reader.filter_chunks(false, |_, _, block| {
+        block.level == exr::math::Vec2(0, 0) && reads[block.layer].contains(&true)
+    })?;
     let meta = exr::block::reader::ChunksReader::meta_data(&chunks).clone();
     let display = meta.headers[0].shared_attributes.display_window;
-    let mut canvas = Canvas::new(display, &meta.headers)?;
+    let mut canvas = Canvas::new(display, &reads)?;
     let decompress = |chunk| {
         check_sections(&chunk, &meta.headers)?;
         UncompressedBlock::decompress_chunk(zip::unpacked(chunk, &meta.headers), &meta, false)
@@ -78,15 +110,22 @@ fn decode(file: BufReader<File>, length: u64) -> Outcome<(LayerSet, Attributes)>
         }
         blocks = next;
     }
-    Ok((canvas.into_layers(&meta.headers), attributes(&meta.headers)))
+    Ok((canvas.into_layers(&meta.headers, wanted), attributes(&meta.headers)))
 }
 
-/// Rejects headers that declare more data than the file can hold, before anything is allocated for them.
-fn check_size(headers: &[Header], length: u64) -> Outcome<()> {
+/// Whether the layer of each channel is wanted, by part and by channel.
+fn wanted_channels(headers: &[Header], wanted: &dyn Fn(&str) -> bool) -> Vec<Vec<bool>> {
+    let of_part = |part: usize| named(headers, part).map(|(layer, _)| wanted(&layer)).collect();
+    (0..headers.len()).map(of_part).collect()
+}
+
+/// Rejects headers that declare more data than the file can hold, before anything is allocated for them. `reads`: whether
+/// each channel is read, by part and by channel.
+fn check_size(headers: &[Header], length: u64, reads: &[Vec<bool>]) -> Outcome<()> {
     let Some(first) = headers.first() else { return Err(invalid("no part")) };
     let window = |size: exr::math::Vec2<usize>| size.0 as u128 * size.1 as u128;
     let mut taken = 0u128;
-    for header in headers {
+    for (header, reads) in headers.iter().zip(reads) {
         if header.deep {
             return Err(exr::error::Error::NotSupported("the file is deep".into()));
         }
@@ -100,7 +139,9 @@ fn check_size(headers: &[Header], length: u64) -> Outcome<()> {
         {
             return Err(invalid("more pixels than the file can hold"));
         }
-        taken += window(first.shared_attributes.display_window.size) * 4 * header.channels.list.len() as u128;
+        taken += window(first.shared_attributes.display_window.size)
+            * 4
+            * reads.iter().filter(|read| **read).count() as u128;
     }
     // The file of a small window in a large picture may be small.
     match u64::try_from(taken) {
@@ -161,17 +202,18 @@ struct Canvas {
     top: i64,
     width: usize,
     height: usize,
-    /// Values of each pixel, indexed by part, by channel, and by pixel row by row.
+    /// Values of each pixel, indexed by part, by channel, and by pixel row by row; no values of channels that are not read.
     planes: Vec<Vec<Vec<f32>>>,
 }
 
 impl Canvas {
-    fn new(display: exr::meta::attribute::IntegerBounds, headers: &[Header]) -> Outcome<Self> {
+    /// A black canvas. `reads`: whether each channel is read, by part and by channel.
+    fn new(display: exr::meta::attribute::IntegerBounds, reads: &[Vec<bool>]) -> Outcome<Self> {
         let (width, height) = (display.size.0, display.size.1);
         let pixels = width.checked_mul(height).filter(|&n| n > 0);
         let pixels = pixels.ok_or_else(|| invalid("the display window has no pixels"))?;
-        let part = |header: &Header| header.channels.list.iter().map(|_| vec![0.0; pixels]).collect();
-        let planes = headers.iter().map(part).collect();
+        let plane = |read: &bool| if *read { vec![0.0; pixels] } else { Vec::new() };
+        let planes = reads.iter().map(|part| part.iter().map(plane).collect()).collect();
         Ok(Canvas { left: display.position.0.into(), top: display.position.1.into(), width, height, planes })
     }
 
@@ -191,31 +233,45 @@ impl Canvas {
             let start = x.clamp(0, self.width as i64) as usize;
             let count = (at.sample_count - skip).min(self.width - start);
             let row = y as usize * self.width + start;
-            let out = &mut self.planes[part][at.channel][row..row + count];
+            let Some(out) = self.planes[part][at.channel].get_mut(row..row + count) else { continue };
             convert(line.value, skip, out, header.channels.list[at.channel].sample_type);
         }
         Ok(())
     }
 
-    fn into_layers(self, headers: &[Header]) -> LayerSet {
-        let mut layers: BTreeMap<String, Vec<Plane>> = BTreeMap::new();
-        for (part, (planes, header)) in self.planes.into_iter().zip(headers).enumerate() {
-            let prefix = if headers.len() > 1 { header.own_attributes.layer_name.as_ref() } else { None };
-            let prefix = prefix.map(Text::to_string).unwrap_or_default();
-            for (values, channel) in planes.into_iter().zip(&header.channels.list) {
-                let (name, component) = split(&prefix, part == 0, &channel.name.to_string());
-                let sample = if channel.sample_type == SampleType::F16 { Sample::Half } else { Sample::Float };
-                let planes = layers.entry(name).or_default();
-                // A channel of the same name in another part is another view; the first one is kept.
-                if planes.iter().all(|plane| plane.component != component) {
-                    planes.push(Plane { component, sample, values });
-                }
-            }
-        }
-        let mut layers: Vec<Layer> = layers.into_iter().map(|(name, planes)| Layer { name, planes }).collect();
-        layers.iter_mut().for_each(|layer| layer.planes.sort_by_key(|plane| rank(&plane.component)));
+    fn into_layers(self, headers: &[Header], wanted: &dyn Fn(&str) -> bool) -> LayerSet {
+        let mut layers = layers(self.planes, headers);
+        layers.retain(|layer| wanted(&layer.name));
         LayerSet { width: self.width, height: self.height, layers }
     }
+}
+
+/// The layers of the planes of all channels, by part and by channel.
+fn layers(planes: impl IntoIterator<Item = Vec<Vec<f32>>>, headers: &[Header]) -> Vec<Layer> {
+    let mut layers: BTreeMap<String, Vec<Plane>> = BTreeMap::new();
+    for (part, (planes, header)) in planes.into_iter().zip(headers).enumerate() {
+        for ((values, channel), (name, component)) in
+            planes.into_iter().zip(&header.channels.list).zip(named(headers, part))
+        {
+            let sample = if channel.sample_type == SampleType::F16 { Sample::Half } else { Sample::Float };
+            let planes = layers.entry(name).or_default();
+            // A channel of the same name in another part is another view; the first one is kept.
+            if planes.iter().all(|plane| plane.component != component) {
+                planes.push(Plane { component, sample, values });
+            }
+        }
+    }
+    let mut layers: Vec<Layer> = layers.into_iter().map(|(name, planes)| Layer { name, planes }).collect();
+    layers.iter_mut().for_each(|layer| layer.planes.sort_by_key(|plane| rank(&plane.component)));
+    layers
+}
+
+/// Layer and component of each channel of a part.
+fn named(headers: &[Header], part: usize) -> impl Iterator<Item = (String, String)> {
+    let header = &headers[part];
+    let prefix = if headers.len() > 1 { header.own_attributes.layer_name.as_ref() } else { None };
+    let prefix = prefix.map(Text::to_string).unwrap_or_default();
+    header.channels.list.iter().map(move |channel| split(&prefix, part == 0, &channel.name.to_string()))
 }
 
 /// Converts the samples of one line to f32, without the first `skip` samples.
