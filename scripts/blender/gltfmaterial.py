@@ -126,6 +126,10 @@ class _Entry:
     def extension(self, name, content):
         self.entry.setdefault("extensions", {})["KHR_materials_" + name] = content
 
+    def own(self, **keys):
+        """Set keys of the material's extras.caustique."""
+        self.entry.setdefault("extras", {}).setdefault("caustique", {}).update(keys)
+
     def write(self):
         self.entry["extensions"] = {name: content for name, content in self.entry.get("extensions", {}).items()
                                     if not name.startswith("KHR_materials_")}
@@ -168,6 +172,8 @@ class _Entry:
             pbr["metallicRoughnessTexture"] = shared
         elif PLAIN not in (self.channels["roughness"], self.channels["metallic"]):
             pbr.pop("metallicRoughnessTexture", None)
+        if self.factor("diffuse_roughness") > 0:
+            self.own(diffuse_roughness=self.factor("diffuse_roughness"))
         if self.factor("sheet") > 0:
             content = {"diffuseTransmissionFactor": self.factor("sheet"),
                        "diffuseTransmissionColorFactor": list(self.factor("sheet_colour", (1.0,) * 3))}

@@ -190,6 +190,8 @@ class _Match:
         rest = g.subtract(1.0, strongest)
         first = shiny[0][0]
         return Lobe(
+            diffuse_roughness=self._sum(*zip(*((lobe.diffuse_roughness, part) for lobe, part, matt
+                                               in zip(lobes, parts, diffuse) if matt))),
             base=g.clamp(g.divide(under, rest if is_constant(rest) else g.maximum(rest, 1e-3))),
             roughness=self._sum([lobe.roughness for lobe, _ in shiny], [part for _, part in shiny]),
             ior=0.0, specular=strongest, specular_colour=g.divide(gloss, g.maximum(strongest, 1e-6)),
@@ -206,7 +208,8 @@ class _Match:
         shiny = [p if lobe.faceted else 0.0 for lobe, p in zip(lobes, parts)]
         coated = [g.multiply(d, lobe.specular) if lobe.faceted else 0.0 for lobe, d in zip(lobes, dull)]
         reflected = [g.multiply(p, g.subtract(1.0, lobe.sheet)) for lobe, p in zip(lobes, parts)]
-        over = {"metallic": parts, "base": reflected, "transmission": dull, "specular": dull, "roughness": shiny,
+        matt = [g.multiply(d, g.subtract(1.0, lobe.transmission)) for lobe, d in zip(lobes, dull)]
+        over = {"metallic": parts, "diffuse_roughness": matt, "base": reflected, "transmission": dull, "specular": dull, "roughness": shiny,
                 "ior": coated, "specular_colour": coated, "coat": parts, "sheen": parts, "anisotropy": shiny,
                 "sheet": dull, "sheet_colour": [g.multiply(d, lobe.sheet) for lobe, d in zip(lobes, dull)],
                 "film": shiny, "film_ior": [g.multiply(p, lobe.film) for lobe, p in zip(lobes, shiny)],

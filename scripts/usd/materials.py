@@ -174,6 +174,8 @@ class Materials:
         def add(extension, value):
             entry.setdefault("extensions", {})[self._document.use(extension)] = value
 
+        if surface.diffuse_roughness:
+            keys.setdefault("diffuse_roughness", surface.diffuse_roughness)
         if surface.ior != 1.5:
             add("KHR_materials_ior", {"ior": max(surface.ior, 1.0)})
         if surface.specular != 1 or surface.specular_color != (1.0,) * 3:

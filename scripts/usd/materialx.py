@@ -46,7 +46,6 @@ _NAMES = {
 _FILM_UNITS = {OPEN_PBR: 1000.0, STANDARD: 1.0}  # unit of a film's thickness (nm)
 _LOST = {
     "subsurface": "subsurface scattering is not carried: the surface is diffuse",
-    "diffuse_roughness": "diffuse roughness is not carried: the surface is Lambertian",
 }
 # {quantity: quantity that must not be 0 for it to have an effect}
 _DEPENDS_ON = {
@@ -84,7 +83,8 @@ def surface(shader, reader, losses):
                   roughness=given["roughness"], normal=None if isinstance(given["normal"], tuple) else given["normal"],
                   presence=presence, ior=given["ior"], specular=given["specular"],
                   specular_color=given["specular_color"], anisotropy=given["anisotropy"], coat=given["coat"],
-                  coat_roughness=given["coat_roughness"], thin=bool(given["thin"]))
+                  coat_roughness=given["coat_roughness"], thin=bool(given["thin"]),
+                  diffuse_roughness=given["diffuse_roughness"])
     out.film, out.film_ior = given["film"], given["film_ior"]
     out.film_thickness = given["film_thickness"] * _FILM_UNITS[reader.identifier(shader)]
     out.emission = _scaled(given["emission_color"], given["emission"])

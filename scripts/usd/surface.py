@@ -8,6 +8,7 @@ class Surface:
     """A surface shader's parameters. Each is a constant or a `network.Texture`; `base` may be a `network.Primvar`."""
 
     base: object = (0.18, 0.18, 0.18)
+    diffuse_roughness: float = 0.0
     metallic: object = 0.0
     roughness: object = 0.5
     normal: object = None

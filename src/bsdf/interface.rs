@@ -9,6 +9,7 @@ use super::film;
 use super::fresnel::{is_matched, schlick};
 use super::microfacet::{Ggx, lobe_class, refraction_width};
 use super::profile::{Position, Profile};
+use super::rough_diffuse::RoughDiffuse;
 use super::{DELTA_ALPHA, LobeSet, Parameters};
 use crate::math::{Rgb, Vec2, Vec3, sqr};
 use bumpalo::Bump;
@@ -34,6 +35,8 @@ pub struct Interface<'a> {
     pub(super) eta: f32,
     /// Whether the indices are matched, so that the interface has no effect.
     pub(super) matched: bool,
+    /// Rough diffuse reflection of the base; `None` if it is Lambertian.
+    pub(super) rough_diffuse: Option<RoughDiffuse>,
     /// Share of the diffuse light that leaves on the other side, 0 to 1, and its colour.
     pub(super) diffuse_transmission: (f32, Rgb),
     /// Whether the interface is invisible over a base that only reflects diffusely: it does not reflect and has no cover.
@@ -160,8 +163,12 @@ impl<'a> Interface<'a> {
             thin: p.thin,
             eta: p.eta,
             matched,
+            rough_diffuse: None,
             diffuse_transmission: (p.diffuse_transmission, p.diffuse_transmission_color),
-            invisible: (p.specular == 0.0 || matched) && !p.is_covered() && p.diffuse_transmission == 0.0,
+            invisible: (p.specular == 0.0 || matched)
+                && !p.is_covered()
+                && p.diffuse_transmission == 0.0
+                && p.diffuse_roughness == 0.0,
             dielectric,
             average,
             multiple_scattering,
@@ -172,6 +179,11 @@ impl<'a> Interface<'a> {
             cover: None,
         };
         interface.cover = Cover::new(p, tables).map(|cover| CoverEffect::new(cover, p, alpha, &interface, tables));
+        if p.diffuse_roughness > 0.0 {
+            let cover = |mu: Position| interface.cover.as_ref().map_or(1.0, |c| c.cover.transmittance(mu.into()));
+            let through = std::array::from_fn(|i| interface.through.nodes()[i] * cover(Position::of_node(i)));
+            interface.rough_diffuse = Some(RoughDiffuse::new(p.diffuse_roughness, &Profile::from_nodes(through)));
+        }
         interface
     }
 

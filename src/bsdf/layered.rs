@@ -47,8 +47,11 @@ pub struct Layered<'a> {
     pub(super) straight: Rgb,
     /// Factor of the diffuse lobe `diffuse * through(o) * through(i)`.
     pub(super) diffuse: Rgb,
-    /// Factor of the albedo `diffuse_albedo * through(o)` of the diffuse lobe.
+    /// Factor of the albedo `diffuse_albedo * through(o)` of the diffuse lobe of a Lambertian base.
     pub(super) diffuse_albedo: Rgb,
+    /// For a rough base, the factor of the diffuse light that is scattered several times: `diffuse_multiple * through(o)
+    /// * through(i)`, times the profile of [`super::rough_diffuse::RoughDiffuse`] for both directions.
+    pub(super) diffuse_multiple: Rgb,
     /// Factor of the diffusely transmitted lobe `diffuse_transmitted * through(o) * through(i)`.
     pub(super) diffuse_transmitted: Rgb,
     /// Factor of the albedo `diffuse_transmitted_albedo * through(o)` of diffuse transmission.
@@ -193,6 +196,10 @@ impl<'a> Layered<'a> {
         let diffuse_transmitted_albedo = color_behind * (matte * behind);
         let scale = FRAC_1_PI / interface.through.average.max(1e-9);
         let (diffuse, diffuse_transmitted) = (diffuse_albedo * scale, diffuse_transmitted_albedo * scale);
+        let diffuse_multiple = match &interface.rough_diffuse {
+            None => Rgb::ZERO,
+            Some(rough) => rough.multiple_scattering(base) * (matte * (1.0 - behind) * scale),
+        };
         let mut lobes = LobeSet::empty();
         if has_facets {
             lobes |= class;
@@ -219,6 +226,7 @@ impl<'a> Layered<'a> {
             straight,
             diffuse,
             diffuse_albedo,
+            diffuse_multiple,
             diffuse_transmitted,
             diffuse_transmitted_albedo,
             reflected_compensation,
@@ -287,6 +295,10 @@ impl<'a> Layered<'a> {
         let o = Vec3::new(wo.x, wo.y, wo.z.abs());
         let at = Position::new(o.z);
         let through = n.through.at(at);
+        let diffuse = match &n.rough_diffuse {
+            None => self.diffuse_albedo,
+            Some(rough) => rough.albedo(self.base, at) * (self.matte * (1.0 - n.diffuse_transmission.0)),
+        };
         let mut view = ViewTerms {
             o,
             side,
@@ -295,7 +307,7 @@ impl<'a> Layered<'a> {
             loss: n.loss_along(at, o),
             through,
             means: LobeWeights::default(),
-            albedos: [Rgb::ZERO, self.diffuse_albedo * through, self.straight, Rgb::ZERO, Rgb::ZERO],
+            albedos: [Rgb::ZERO, diffuse * through, self.straight, Rgb::ZERO, Rgb::ZERO],
         };
         view.means.diffuse = mean(view.albedos[1]);
         if self.transmits_diffusely() {

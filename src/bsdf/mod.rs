@@ -16,6 +16,7 @@ mod microfacet;
 mod parameters;
 mod profile;
 mod relief;
+mod rough_diffuse;
 mod scatter;
 mod shading;
 mod sheen;
@@ -206,6 +207,7 @@ impl<'a> Bsdf<'a> {
             Bsdf::Layered(layered) => {
                 let mut layered = *layered;
                 layered.diffuse *= share;
+                layered.diffuse_multiple *= share;
                 layered.diffuse_transmitted *= share;
                 layered.evaluate(view, wi, transport, set)
             }

@@ -8,6 +8,8 @@ use crate::math::Rgb;
 pub struct Parameters {
     /// Colour of metal, of diffuse reflection and of transmission.
     pub base_color: Rgb,
+    /// Roughness of diffuse reflection, 0 (Lambertian) to 1: the parameter r of EON.
+    pub diffuse_roughness: f32,
     /// Metalness, 0 to 1: weight of the metal in the mixture of metal and dielectric.
     pub metallic: f32,
     /// GGX alpha along the x axis of the frame: the square of the perceptual roughness, increased by anisotropy.
@@ -49,6 +51,7 @@ impl Default for Parameters {
     fn default() -> Self {
         Parameters {
             base_color: Rgb::ONE,
+            diffuse_roughness: 0.0,
             metallic: 0.0,
             alpha_x: 1.0,
             alpha_y: 1.0,

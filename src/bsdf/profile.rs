@@ -92,6 +92,11 @@ impl Position {
         Position { i, t: x - i as f32 }
     }
 
+    /// The position of node `i`.
+    pub(super) fn of_node(i: usize) -> Position {
+        Position { i: i.min(NODES - 2), t: if i == NODES - 1 { 1.0 } else { 0.0 } }
+    }
+
     /// The position in units of nodes. Larger values have larger positions.
     pub fn value(self) -> f32 {
         self.i as f32 + self.t
@@ -251,12 +256,6 @@ impl Profile {
 
     /// Cosine-weighted average of the profile times another function of the cosine.
     pub fn average_with(&self, other: impl Fn(Position) -> f32) -> f32 {
-        (0..NODES)
-            .map(|i| {
-                AVERAGE[i]
-                    * self.nodes[i]
-                    * other(Position { i: i.min(NODES - 2), t: if i == NODES - 1 { 1.0 } else { 0.0 } })
-            })
-            .sum()
+        (0..NODES).map(|i| AVERAGE[i] * self.nodes[i] * other(Position::of_node(i))).sum()
     }
 }

@@ -1,7 +1,7 @@
 //! Evaluation and sampling of the layered model.
 
 use super::fresnel::{reflect, refract};
-use super::interface::CoverEffect;
+use super::interface::{CoverEffect, Interface};
 use super::layered::{Layered, LobeWeights, MIN_COSINE, ViewTerms, mean};
 use super::microfacet::{g1, g2_transmission};
 use super::profile::Position;
@@ -40,11 +40,12 @@ impl Layered<'_> {
         self.evaluate_with::<true>(view, wi, transport, set, &probabilities)
     }
 
-    /// If `set` contains only diffuse reflection: its factor without the profile `through` at `wi`. Otherwise `None`.
+    /// If `set` contains only Lambertian reflection: its factor without the profile `through` at `wi`. Otherwise `None`.
     #[inline]
     pub(super) fn diffuse_only(&self, view: &ViewTerms, set: LobeSet) -> Option<Rgb> {
         let facets = self.has_facets && set.intersects(self.interface.class);
-        if facets || self.interface.cover.is_some() || view.o.z < MIN_COSINE || self.transmits_diffusely() {
+        let Interface { cover, rough_diffuse, .. } = self.interface;
+        if facets || cover.is_some() || rough_diffuse.is_some() || view.o.z < MIN_COSINE || self.transmits_diffusely() {
             return None;
         }
         Some(self.diffuse * view.through)
@@ -59,6 +60,7 @@ impl Layered<'_> {
             && self.glass == 0.0
             && !self.transmits_diffusely()
             && n.cover.is_none()
+            && n.rough_diffuse.is_none()
             && n.dielectric.film.is_none()
             && n.anisotropic_loss.is_none()
             && n.dielectric.smooth[0].is_from_thin()
@@ -146,8 +148,20 @@ impl Layered<'_> {
             }
         }
         if set.intersects(LobeSet::BROAD) {
-            separable[2] = self.diffuse * (view.through * n.through.at(at_i));
-            pdf += probabilities.diffuse * i.z * FRAC_1_PI;
+            let through = view.through * n.through.at(at_i);
+            match &n.rough_diffuse {
+                None => {
+                    separable[2] = self.diffuse * through;
+                    pdf += probabilities.diffuse * i.z * FRAC_1_PI;
+                }
+                Some(rough) => {
+                    let [single, multiple] = rough.values((view.o, view.at), (i, at_i));
+                    separable[2] = (self.diffuse * single + self.diffuse_multiple * multiple) * through;
+                    if PDF {
+                        pdf += probabilities.diffuse * rough.pdf_w(view.o, i);
+                    }
+                }
+            }
         }
         let Some(c) = &n.cover else { return (single + separable[0] + separable[1] + separable[2], pdf) };
         let at_o = view.at;
@@ -264,8 +278,10 @@ impl Layered<'_> {
         };
         let drawn = if let Some(u_facet) = chosen(probabilities.facets) {
             self.sample_facets(view, transport, probabilities.facets, u_facet, u)?
-        } else if chosen(probabilities.diffuse).is_some() {
-            SampledDirection::Lobe(warp::hemisphere_cosine(u), LobeSet::BROAD)
+        } else if let Some(u_rest) = chosen(probabilities.diffuse) {
+            let i =
+                n.rough_diffuse.as_ref().map_or_else(|| warp::hemisphere_cosine(u), |rough| rough.sample(o, u_rest, u));
+            SampledDirection::Lobe(i, LobeSet::BROAD)
         } else if chosen(probabilities.reflected_compensation).is_some() {
             let drawn = self.rough_glass().map_or_else(|| n.sample_loss(u), |glass| glass.sample(side, u));
             SampledDirection::Lobe(drawn?, n.class)

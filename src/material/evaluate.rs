@@ -101,6 +101,7 @@ impl Material {
         let (base_color, metallic, transmission) = self.base_and_shares(surface, textures);
         let mut p = Parameters {
             base_color,
+            diffuse_roughness: unit(self.diffuse_roughness),
             metallic,
             eta,
             transmission,

@@ -33,6 +33,8 @@ pub struct Material {
     pub base_color: [f32; 4],
     /// Base colour texture (sRGB), alpha in its fourth channel.
     pub base_color_texture: Option<TextureRef>,
+    /// Roughness of diffuse reflection, 0 (Lambertian) to 1.
+    pub diffuse_roughness: f32,
     /// Metalness, 0 (dielectric) to 1 (metal).
     pub metallic: f32,
     /// Perceptual roughness, 0 to 1; the GGX alpha is its square.
@@ -134,6 +136,7 @@ impl Default for Material {
             name: String::new(),
             base_color: [1.0; 4],
             base_color_texture: None,
+            diffuse_roughness: 0.0,
             metallic: 1.0,
             roughness: 1.0,
             metallic_roughness_texture: None,

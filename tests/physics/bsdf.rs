@@ -115,6 +115,21 @@ fn white() -> Vec<(String, Parameters)> {
     ] {
         list.push((format!("{name} sheet"), sheet(p)));
     }
+    for diffuse_roughness in [0.1, 0.5, 1.0] {
+        for (name, p) in [
+            ("matte", Parameters::default()),
+            ("smooth plastic", plastic(0.0, 1.5)),
+            ("plastic", plastic(0.25, 1.5)),
+            ("half of all", Parameters { metallic: 0.3, transmission: 0.4, ..plastic(0.3, 1.5) }),
+            ("coated", Parameters { clearcoat: 1.0, clearcoat_alpha: 0.1, ..Parameters::default() }),
+            ("sheet", sheet(plastic(0.25, 1.5))),
+        ] {
+            list.push((
+                format!("{name}, diffuse roughness {diffuse_roughness}"),
+                Parameters { diffuse_roughness, ..p },
+            ));
+        }
+    }
     for eta in [1.5, 1.0 / 1.5] {
         list.push((format!("smooth glass with a film, eta {eta}"), filmed(glass(0.0, eta))));
     }

@@ -48,6 +48,7 @@ fn white() -> Vec<(&'static str, Material)> {
     let metal = |roughness: f32| Material { roughness, metallic: 1.0, ..matte(1.0, 0.0) };
     vec![
         ("matte", matte(1.0, 0.0)),
+        ("rough matte", Material { diffuse_roughness: 1.0, ..matte(1.0, 0.0) }),
         ("mirror", mirror()),
         ("rough metal", metal(0.6)),
         ("brushed metal", Material { anisotropy: 0.8, ..metal(0.5) }),

@@ -382,10 +382,22 @@ class Matched(Case):
         material, _ = self.write()
         self.assertEqual("KHR_materials_iridescence" in material.get("extensions", {}), bpy.app.version >= (5, 0))
 
+    def test_diffuse_roughness_is_a_key_of_the_extras(self):
+        self.stage.surface(self.stage.node("BsdfDiffuse", Roughness=0.4))
+        material, warnings = self.write()
+        self.assertAlmostEqual(material["extras"]["caustique"]["diffuse_roughness"], 0.4, 5)
+        self.assertFalse([line for line in warnings if "oughness" in line])
+        if bpy.app.version >= (4, 3):
+            self.setUp()
+            self.stage.principled(Diffuse_Roughness=0.3)
+            material, warnings = self.write()
+            self.assertAlmostEqual(material["extras"]["caustique"]["diffuse_roughness"], 0.3, 5)
+            self.assertFalse([line for line in warnings if "oughness" in line])
+
     def test_losses_are_named(self):
         losses = {
             "Coat Tint": dict(Coat_Weight=1.0, Coat_Tint=(1, 0.5, 0.5)), "sheen": dict(Sheen_Weight=1.0),
-            "Diffuse Roughness": dict(Diffuse_Roughness=0.5), "Subsurface Weight": dict(Subsurface_Weight=0.5),
+            "Subsurface Weight": dict(Subsurface_Weight=0.5),
             "Coat IOR": dict(Coat_Weight=1.0, Coat_IOR=1.8),
             "rim": dict(Metallic=1.0, Specular_Tint=(1, 0.5, 0.5)),
         }

@@ -111,10 +111,15 @@ class Materials(usd_support.Stages):
             self.assertEqual(lost, [])
             self.stage.RemovePrim("/Material")
 
+    def test_diffuse_roughness_is_a_key_of_the_extras(self):
+        for kind, name in ((OPEN_PBR, "base_diffuse_roughness"), (STANDARD, "diffuse_roughness")):
+            found, lost = self.worn(kind, "mtlx", **{name: 0.5})
+            self.assertEqual((found["extras"]["caustique"], lost), ({"diffuse_roughness": 0.5}, []))
+            self.stage.RemovePrim("/Material")
+
     def test_losses_of_materialx_are_named(self):
-        _, lost = self.worn(OPEN_PBR, "mtlx", subsurface_weight=0.5, base_diffuse_roughness=1.0)
-        self.assertEqual([line.split(": ")[1].split(" is ")[0] for line in lost],
-                         ["subsurface scattering", "diffuse roughness"])
+        _, lost = self.worn(OPEN_PBR, "mtlx", subsurface_weight=0.5)
+        self.assertEqual([line.split(": ")[1].split(" is ")[0] for line in lost], ["subsurface scattering"])
         self.stage.RemovePrim("/Material")
         found, lost = self.worn("ND_disney_principled", "mtlx")
         self.assertIn("a surface ND_disney_principled is not read", lost[0])

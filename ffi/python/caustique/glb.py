@@ -234,6 +234,8 @@ class Writer:
         own: dict = {} if material.medium is None else {"medium": coefficients(material.medium)}
         if material.null_bsdf:
             own["null_bsdf"] = True
+        if material.diffuse_roughness:
+            own["diffuse_roughness"] = float(material.diffuse_roughness)
         if own:
             item["extras"] = {"caustique": own}
         if extensions:

@@ -61,6 +61,8 @@ class Material:
     metallic_roughness_texture: ArrayLike | Texture | None = None
     #: (H, W, 3) uint8: normals in tangent space, as in glTF.
     normal_texture: ArrayLike | Texture | None = None
+    #: Roughness of diffuse reflection: 0 is Lambertian, 1 is clay or dust.
+    diffuse_roughness: float = 0.0
     #: Strength of a dielectric's reflection, 0 to 1; 0 makes a matte surface Lambertian.
     specular: float = 1.0
     #: Colour (r, g, b) of a dielectric's reflection.

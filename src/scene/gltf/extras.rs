@@ -124,6 +124,7 @@ pub(super) struct MaterialExtras {
     pub(super) contact: Option<Contact>,
     pub(super) null_bsdf: bool,
     pub(super) spread_deg: Option<f32>,
+    pub(super) diffuse_roughness: f32,
 }
 
 /// Content of `extras.caustique` of a node with a mesh.
@@ -203,8 +204,17 @@ pub(super) const SCENE: &[&str] = &[
     "shutter",
     "time",
 ];
-pub(super) const MATERIAL: &[&str] =
-    &["medium", "medium.sigma_a", "medium.sigma_s", "medium.g", "priority", "contact", "null_bsdf", "spread_deg"];
+pub(super) const MATERIAL: &[&str] = &[
+    "medium",
+    "medium.sigma_a",
+    "medium.sigma_s",
+    "medium.g",
+    "priority",
+    "contact",
+    "null_bsdf",
+    "spread_deg",
+    "diffuse_roughness",
+];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
 pub(super) const LIGHT: &[&str] = &[
     "radius",

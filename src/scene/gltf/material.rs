@@ -355,6 +355,7 @@ impl Reader<'_> {
         if own.null_bsdf && !material.null_bsdf {
             self.warnings.push(format!("{}: its null_bsdf is ignored: it transmits light by itself", self.place));
         }
+        material.diffuse_roughness = self.unit(own.diffuse_roughness, "extras.caustique.diffuse_roughness")?;
         if let Some(degrees) = own.spread_deg {
             if !(0.0..=180.0).contains(&degrees) {
                 let cause = format!("extras.caustique.spread_deg must lie between 0 and 180, it is {degrees}");

@@ -390,6 +390,11 @@ fn extras_of_materials() {
             "material \"wall\": its medium is ignored: no light is transmitted",
         ]
     );
+    let (m, warnings) = material(json!({"extras": {"caustique": {"diffuse_roughness": 0.25}}}));
+    assert!(m.diffuse_roughness == 0.25 && warnings.is_empty());
+    let (m, warnings) = material(json!({"name": "wall", "extras": {"caustique": {"diffuse_roughness": 2}}}));
+    assert_eq!(m.diffuse_roughness, 1.0);
+    assert_eq!(warnings, ["material \"wall\": extras.caustique.diffuse_roughness is 2; 1 is used"]);
     let bad = |medium: Value| {
         let file = wearing(json!({"name": "fog", "extensions": glass, "extras": {"caustique": {"medium": medium}}}));
         message(&try_read(&file).unwrap_err())
