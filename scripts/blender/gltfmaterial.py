@@ -233,6 +233,11 @@ class _Entry:
                                     numpy.ones((size, size)))
                 content["clearcoatTexture"] = content["clearcoatRoughnessTexture"] = shared
             self.extension("clearcoat", content)
+            if abs(self.factor("coat_ior") - 1.5) > 1e-6:
+                self.own(coat_ior=self.factor("coat_ior"))
+            colour = self.factor("coat_colour", (1.0,) * 3)
+            if min(colour) < 1:
+                self.own(coat_color=[min(max(c, 0.0), 1.0) for c in colour])
         sheen = self.factor("sheen", (1.0,) * 3)
         if max(sheen) > 0:
             content = {"sheenColorFactor": [min(c, 1.0) for c in sheen],

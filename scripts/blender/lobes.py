@@ -33,6 +33,8 @@ class Lobe:
     specular_colour: object = WHITE
     coat: object = 0.0
     coat_roughness: object = 0.0
+    coat_ior: object = 1.5
+    coat_colour: object = WHITE  # of light that passes the coat in and out along its normal
     sheen: object = BLACK
     sheen_roughness: object = 0.5
     anisotropy: object = 0.0
@@ -310,14 +312,11 @@ class Reader:
     def _coverings(self, leaf, lobe):
         g = self.graph
         if lobe.coat != 0.0:
-            if self.get(leaf, "Coat IOR") != 1.5:
-                self.say("Coat IOR is not carried: the coat's index of refraction is 1.5")
-            tint = self.get(leaf, "Coat Tint")
-            if tint != WHITE:
-                self.say("Coat Tint is approximated by a tint of what lies below the coat")
-                # Path length through the coat is 1 / cos, 1.146 on average at an index of 1.5.
-                tint = g.power(tint, 1.146)
-                lobe.base = g.multiply(lobe.base, g.add(g.multiply(tint, lobe.coat), g.subtract(1.0, lobe.coat)))
+            lobe.coat_ior, lobe.coat_colour = g.maximum(self.get(leaf, "Coat IOR"), 1.0), self.get(leaf, "Coat Tint")
+            if lobe.coat_colour != WHITE:
+                # Cycles applies the whole tint to emission, glTF's reader that of one passage: 1.146 / 2 on average.
+                passed = g.power(lobe.coat_colour, 0.573)
+                lobe.emission = g.multiply(lobe.emission, g.add(g.multiply(passed, lobe.coat), g.subtract(1.0, lobe.coat)))
             if self.normal(leaf, "Coat Normal") is not None:
                 self.say("Coat Normal is not carried: the coat follows the surface")
         weight = self.get(leaf, "Sheen Weight")

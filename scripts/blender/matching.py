@@ -213,7 +213,8 @@ class _Match:
                 "ior": coated, "specular_colour": coated, "coat": parts, "sheen": parts, "anisotropy": shiny,
                 "sheet": dull, "sheet_colour": [g.multiply(d, lobe.sheet) for lobe, d in zip(lobes, dull)],
                 "film": shiny, "film_ior": [g.multiply(p, lobe.film) for lobe, p in zip(lobes, shiny)],
-                "coat_roughness": [g.multiply(p, lobe.coat) for lobe, p in zip(lobes, parts)],
+                **dict.fromkeys(("coat_roughness", "coat_ior", "coat_colour"),
+                                [g.multiply(p, lobe.coat) for lobe, p in zip(lobes, parts)]),
                 "sheen_roughness": [g.multiply(p, g.max_component(lobe.sheen)) for lobe, p in zip(lobes, parts)]}
         found = Lobe(**{name: self._sum([getattr(lobe, name) for lobe in lobes], weights)
                         for name, weights in over.items()})

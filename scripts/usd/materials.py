@@ -186,6 +186,10 @@ class Materials:
         if surface.coat != 0:
             add("KHR_materials_clearcoat", self._textured(entry, sets, {
                 "clearcoat": (surface.coat, 0), "clearcoatRoughness": (surface.coat_roughness, 1)}))
+            if surface.coat_color != (1.0,) * 3:
+                keys.setdefault("coat_color", list(self._clip(entry, "the colour of its coat", surface.coat_color)))
+            if surface.coat_ior != 1.5:
+                keys.setdefault("coat_ior", max(surface.coat_ior, 1.0))
         if surface.film * surface.film_thickness > 0:
             add("KHR_materials_iridescence", {
                 "iridescenceFactor": min(surface.film, 1.0), "iridescenceIor": max(surface.film_ior, 1.0),

@@ -17,7 +17,7 @@ _NAMES = {
         "scatter": ("transmission_scatter", (0.0,) * 3), "scatter_g": ("transmission_scatter_anisotropy", 0.0),
         "abbe": ("transmission_dispersion_abbe_number", 20.0), "dispersed": ("transmission_dispersion_scale", 0.0),
         "coat": ("coat_weight", 0.0), "coat_roughness": ("coat_roughness", 0.0),
-        "coat_color": ("coat_color", (1.0,) * 3), "sheen": ("fuzz_weight", 0.0),
+        "coat_color": ("coat_color", (1.0,) * 3), "coat_ior": ("coat_ior", 1.6), "sheen": ("fuzz_weight", 0.0),
         "sheen_color": ("fuzz_color", (1.0,) * 3), "sheen_roughness": ("fuzz_roughness", 0.5),
         "emission": ("emission_luminance", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
         "presence": ("geometry_opacity", 1.0), "thin": ("geometry_thin_walled", False),
@@ -34,7 +34,7 @@ _NAMES = {
         "scatter": ("transmission_scatter", (0.0,) * 3), "scatter_g": ("transmission_scatter_anisotropy", 0.0),
         "abbe": ("transmission_dispersion", 0.0), "dispersed": (None, 1.0),
         "coat": ("coat", 0.0), "coat_roughness": ("coat_roughness", 0.1),
-        "coat_color": ("coat_color", (1.0,) * 3), "sheen": ("sheen", 0.0),
+        "coat_color": ("coat_color", (1.0,) * 3), "coat_ior": ("coat_IOR", 1.5), "sheen": ("sheen", 0.0),
         "sheen_color": ("sheen_color", (1.0,) * 3), "sheen_roughness": ("sheen_roughness", 0.3),
         "emission": ("emission", 0.0), "emission_color": ("emission_color", (1.0,) * 3),
         "presence": ("opacity", (1.0,) * 3), "thin": ("thin_walled", False), "normal": ("normal", None),
@@ -51,6 +51,7 @@ _LOST = {
 _DEPENDS_ON = {
     "inside": "transmission", "depth": "transmission", "scatter": "transmission", "scatter_g": "transmission",
     "abbe": "transmission", "dispersed": "transmission", "coat_roughness": "coat", "coat_color": "coat",
+    "coat_ior": "coat",
     "film_thickness": "film", "film_ior": "film", "sheen_color": "sheen", "sheen_roughness": "sheen", "emission_color": "emission",
 }
 _TEXTURED = {"base", "metal", "roughness", "normal", "emission_color", "presence", "coat", "coat_roughness",
@@ -74,8 +75,6 @@ def surface(shader, reader, losses):
     for key, what in _LOST.items():
         if given[key]:
             losses.add(where, what)
-    if given["coat"] and given["coat_color"] != (1.0,) * 3:
-        losses.add(where, "the colour of its coat is not carried: the coat is clear")
     presence = given["presence"]
     if isinstance(presence, tuple):
         presence = sum(presence) / 3
@@ -84,7 +83,8 @@ def surface(shader, reader, losses):
                   presence=presence, ior=given["ior"], specular=given["specular"],
                   specular_color=given["specular_color"], anisotropy=given["anisotropy"], coat=given["coat"],
                   coat_roughness=given["coat_roughness"], thin=bool(given["thin"]),
-                  diffuse_roughness=given["diffuse_roughness"])
+                  diffuse_roughness=given["diffuse_roughness"], coat_color=tuple(given["coat_color"]),
+                  coat_ior=given["coat_ior"])
     out.film, out.film_ior = given["film"], given["film_ior"]
     out.film_thickness = given["film_thickness"] * _FILM_UNITS[reader.identifier(shader)]
     out.emission = _scaled(given["emission_color"], given["emission"])

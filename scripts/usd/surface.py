@@ -22,6 +22,8 @@ class Surface:
     anisotropy: float = 0.0
     coat: object = 0.0
     coat_roughness: object = 0.0
+    coat_color: tuple = (1.0, 1.0, 1.0)
+    coat_ior: float = 1.5
     sheen: tuple = (0.0, 0.0, 0.0)
     sheen_roughness: float = 0.3
     film: float = 0.0  # share of a thin film, its thickness (nm) and its index of refraction

@@ -2,19 +2,28 @@
 //!
 //! A layer of albedo E attenuates microfacet lobes below it by `1 - max(E(o), E(i))`, which is exact for mirrors, and
 //! separable lobes by `(1 - E(o)) (1 - E(i))`, normalized so that their albedo is attenuated by `1 - E(o)`. Both
-//! factors are reciprocal. Both sides of a surface are covered.
+//! factors are reciprocal. Both sides of a surface are covered. A coloured coat absorbs along the refracted paths of both
+//! directions \[OpenPBR, coat_color\].
 
-use super::energy::{COAT_ETA, EnergyTables};
+use super::energy::EnergyTables;
 use super::fresnel::{dielectric, reflect};
 use super::microfacet::{Ggx, g1, g2_reflection, lobe_class};
 use super::profile::{Position, Profile};
 use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
-use crate::math::{Rgb, Vec2, Vec3};
+use crate::math::{Rgb, Vec2, Vec3, sqr};
 
-/// Reflectance of a smooth clear coat at this cosine with the normal, 0 to 1.
+/// Smallest colour of a coat, whose logarithm is finite.
+const MIN_COLOR: f32 = 1e-9;
+
+/// Reflectance of a smooth clear coat of relative index `eta` at this cosine with the normal, 0 to 1.
 #[inline]
-pub fn coat_reflectance(cos: f32) -> f32 {
-    dielectric(cos, COAT_ETA).0
+pub fn coat_reflectance(cos: f32, eta: f32) -> f32 {
+    dielectric(cos, eta).0
+}
+
+/// Mean of 1 / cos over the refracted paths of diffuse light in a coat of relative index `eta`.
+pub fn mean_path(eta: f32) -> f32 {
+    2.0 * sqr(eta) * (1.0 - (1.0 - 1.0 / sqr(eta)).max(0.0).sqrt())
 }
 
 /// Table positions of the cosines of a direction with two normals, which differ under a normal map.
@@ -41,6 +50,9 @@ pub struct Cover {
     coat_ggx: Ggx,
     /// Lobe class (delta, sharp or broad) of the coat.
     pub coat_class: LobeSet,
+    coat_eta: f32,
+    /// Logarithm of the coat's colour over 2: of the light that passes it once along its normal. `None` if it is white.
+    coat_log: Option<Rgb>,
     coat_albedo: Profile,
     sheen: Rgb,
     sheen_alpha: f32,
@@ -58,13 +70,17 @@ impl Cover {
         let alpha = if coat_class == LobeSet::DELTA { 0.0 } else { p.clearcoat_alpha };
         // Tables of layers that are absent are not computed.
         let absent = Profile::constant(0.0);
-        let coat_albedo = if p.clearcoat > 0.0 { tables.coat_albedo(Position::new(alpha)) } else { absent };
+        let coat_albedo =
+            if p.clearcoat > 0.0 { tables.coat_albedo(Position::new(alpha), p.clearcoat_eta) } else { absent };
         let has_sheen = p.sheen_color.max_element() > 0.0;
         let sheen_albedo = if has_sheen { tables.sheen_albedo(Position::new(p.sheen_alpha)) } else { absent };
         Some(Cover {
             coat: p.clearcoat,
             coat_ggx: Ggx { alpha_x: alpha.max(DELTA_ALPHA), alpha_y: alpha.max(DELTA_ALPHA) },
             coat_class,
+            coat_eta: p.clearcoat_eta,
+            coat_log: (p.clearcoat > 0.0 && p.clearcoat_color != Rgb::ONE)
+                .then(|| p.clearcoat_color.max(Rgb::splat(MIN_COLOR)).map(f32::ln) * 0.5),
             coat_albedo,
             sheen: p.sheen_color,
             sheen_alpha: p.sheen_alpha,
@@ -126,6 +142,27 @@ impl Cover {
             * (1.0 - sheen * self.sheen_albedo(o.base).max(self.sheen_albedo(i.base)))
     }
 
+    /// Transmittance of the coat's colour for light that passes it along two directions, from their cosines with its
+    /// normal. `None` if it is white.
+    #[inline]
+    pub fn absorption(&self, cos_o: f32, cos_i: f32) -> Option<Rgb> {
+        let log = self.coat_log?;
+        let path = |cos: f32| 1.0 / (1.0 - (1.0 - sqr(cos)).max(0.0) / sqr(self.coat_eta)).max(1e-9).sqrt();
+        Some(self.absorption_along(log, path(cos_o) + path(cos_i)))
+    }
+
+    /// Mean of [`Cover::absorption`] over diffuse light, approximately.
+    pub fn mean_absorption(&self, cos_o: f32) -> Option<Rgb> {
+        let path = 1.0 / (1.0 - (1.0 - sqr(cos_o)).max(0.0) / sqr(self.coat_eta)).max(1e-9).sqrt();
+        self.coat_log.map(|log| self.absorption_along(log, path + mean_path(self.coat_eta)))
+    }
+
+    /// Transmittance along a path in the coat, relative to its thickness.
+    #[inline]
+    fn absorption_along(&self, log: Rgb, path: f32) -> Rgb {
+        Rgb::splat(1.0 - self.coat) + (log * path).map(f32::exp) * self.coat
+    }
+
     /// Albedos of coat and sheen in a direction. `cos` is its cosine with the normal of the coat.
     #[inline]
     pub fn albedos(&self, cos: f32, w: Angles) -> [Rgb; 2] {
@@ -144,7 +181,7 @@ impl Cover {
     /// Reflectance of the coat as a smooth interface, at this cosine with its normal.
     #[inline]
     pub fn coat_reflectance(&self, cos: f32) -> f32 {
-        self.coat * coat_reflectance(cos)
+        self.coat * coat_reflectance(cos, self.coat_eta)
     }
 
     /// Value of the coat's lobe, without cosine, and the density of sampling it. Not for delta coats. Both directions

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 /// kinks along curves, at the horizon and the critical angle, where product rules converge slowly.
 const LATTICE: (usize, usize) = (987, 610);
 
-/// Index of refraction of clear coats (KHR_materials_clearcoat).
+/// Index of refraction of clear coats in glTF (KHR_materials_clearcoat).
 pub(super) const COAT_ETA: f32 = 1.5;
 
 /// Index of the set of functions in [`SideTables`] for reflection. The four functions are the albedos of a perfect
@@ -46,6 +46,8 @@ struct InterfaceTables {
     /// Index of refraction of the denser medium over that of the thinner one.
     eta: f32,
     sides: OnceLock<Box<[SideTables; 2]>>,
+    /// Losses below a coat of this index.
+    below_coat: CoverTables,
 }
 
 /// Tables of [`EnergyTables::covered_loss`], the energy that facets lose below a layer, for one kind of layer.
@@ -61,10 +63,10 @@ struct CoverTables {
 const COVER_NODES: usize = 10;
 
 /// The kind of a layer that covers the base of a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum CoverLayer {
-    /// A clear coat.
-    Coat,
+    /// A clear coat of this relative index of refraction.
+    Coat(f32),
     /// Sheen.
     Sheen,
 }
@@ -75,7 +77,6 @@ pub(super) enum CoverLayer {
 pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
     sheen: Grid<1>,
-    below_coat: CoverTables,
     below_sheen: CoverTables,
 }
 
@@ -245,7 +246,7 @@ impl SideTables {
 
 impl InterfaceTables {
     fn new(eta: f32) -> InterfaceTables {
-        InterfaceTables { eta, sides: OnceLock::new() }
+        InterfaceTables { eta, sides: OnceLock::new(), below_coat: CoverTables::new() }
     }
 
     /// The tables for directions on the thinner side and on the denser side of the interface.
@@ -299,7 +300,6 @@ impl EnergyTables {
         EnergyTables {
             interfaces: etas.into_iter().map(InterfaceTables::new).collect(),
             sheen: Grid::new(),
-            below_coat: CoverTables::new(),
             below_sheen: CoverTables::new(),
         }
     }
@@ -346,11 +346,11 @@ impl EnergyTables {
         self.sides(COAT_ETA).map(|[above, _]| above.anisotropic_white_loss(alphas))
     }
 
-    /// Albedo of a clear coat of roughness `alpha`, as a function of the cosine.
+    /// Albedo of a clear coat of roughness `alpha` and relative index `eta`, as a function of the cosine.
     #[inline]
-    pub(super) fn coat_albedo(&self, alpha: Position) -> Profile {
-        let f0 = super::fresnel::normal_incidence(COAT_ETA);
-        self.sides(COAT_ETA).map_or(Profile::constant(0.0), |[above, _]| above.reflection(alpha, f0, 1.0))
+    pub(super) fn coat_albedo(&self, alpha: Position, eta: f32) -> Profile {
+        let f0 = super::fresnel::normal_incidence(eta);
+        self.sides(eta).map_or(Profile::constant(0.0), |[above, _]| above.reflection(alpha, f0, 1.0))
     }
 
     /// Albedo of white sheen of roughness `alpha`, as a function of the cosine.
@@ -365,7 +365,15 @@ impl EnergyTables {
     #[inline]
     pub(super) fn covered_loss(&self, layer: CoverLayer, alpha: Position, cover_alpha: f32) -> Profile {
         match layer {
-            CoverLayer::Coat => self.below_coat.profile(alpha, cover_alpha, |alpha| self.coat_albedo(alpha)),
+            CoverLayer::Coat(eta) => match self.nearest(eta) {
+                None => Profile::constant(0.0),
+                Some(tables) => {
+                    // The index of the tables' first use must not matter.
+                    let usual = self.nearest(COAT_ETA).is_some_and(|usual| usual.eta == tables.eta);
+                    let eta = if usual { COAT_ETA } else { tables.eta };
+                    tables.below_coat.profile(alpha, cover_alpha, |alpha| self.coat_albedo(alpha, eta))
+                }
+            },
             CoverLayer::Sheen => self.below_sheen.profile(alpha, cover_alpha, |alpha| self.sheen_albedo(alpha)),
         }
     }

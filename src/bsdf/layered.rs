@@ -388,6 +388,7 @@ impl<'a> Layered<'a> {
         let Some(c) = &self.interface.cover else { return };
         let (coat_cos, angles) = self.angles(view.side, view.o, view.at);
         let transmittance = c.cover.transmittance(angles);
+        let absorption = c.cover.mean_absorption(coat_cos);
         for albedo in &mut view.albedos {
             *albedo *= transmittance;
         }
@@ -409,7 +410,13 @@ impl<'a> Layered<'a> {
             view.albedos[0] += lost;
             view.means.covered_loss = mean(lost);
         }
-        let [coat, sheen] = c.cover.albedos(coat_cos, angles);
+        let [coat, mut sheen] = c.cover.albedos(coat_cos, angles);
+        if let Some(absorption) = absorption {
+            for albedo in &mut view.albedos {
+                *albedo *= absorption;
+            }
+            sheen *= absorption;
+        }
         (view.albedos[3], view.albedos[4]) = (coat, sheen);
         (view.means.coat, view.means.sheen) = (mean(coat), mean(sheen));
     }

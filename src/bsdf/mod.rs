@@ -21,7 +21,7 @@ mod scatter;
 mod shading;
 mod sheen;
 
-pub use cover::coat_reflectance;
+pub use cover::{coat_reflectance, mean_path};
 pub use energy::EnergyTables;
 pub use gathering::Gathering;
 pub use interface::Interface;
@@ -289,8 +289,8 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Albedo of the lobes of `set` for `wo`. Exact for delta and diffuse lobes, an estimate for others, with errors of
-    /// up to 0.15 for anisotropic glass. Only Russian roulette and the denoiser use it, so it does not bias the
+    /// Albedo of the lobes of `set` for `wo`. Exact for delta and diffuse lobes without a coloured coat, an estimate for
+    /// others, with errors of up to 0.15 for anisotropic glass. Only Russian roulette and the denoiser use it, so it does not bias the
     /// picture.
     #[inline]
     pub fn albedo(&self, wo: Vec3, set: LobeSet) -> Rgb {

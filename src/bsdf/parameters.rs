@@ -40,6 +40,10 @@ pub struct Parameters {
     pub clearcoat: f32,
     /// GGX alpha of the clear coat: the square of its perceptual roughness.
     pub clearcoat_alpha: f32,
+    /// Index of refraction of the clear coat over the index above the surface, at least 1.
+    pub clearcoat_eta: f32,
+    /// Colour of light that passes the clear coat in and out along its normal; white absorbs nothing.
+    pub clearcoat_color: Rgb,
     /// Sheen colour.
     pub sheen_color: Rgb,
     /// Alpha of the sheen: the square of its perceptual roughness.
@@ -67,6 +71,8 @@ impl Default for Parameters {
             film_path: 0.0,
             clearcoat: 0.0,
             clearcoat_alpha: 0.0,
+            clearcoat_eta: 1.5,
+            clearcoat_color: Rgb::ONE,
             sheen_color: Rgb::ZERO,
             sheen_alpha: 0.0,
         }

@@ -40,7 +40,8 @@ impl Layered<'_> {
         self.evaluate_with::<true>(view, wi, transport, set, &probabilities)
     }
 
-    /// If `set` contains only Lambertian reflection: its factor without the profile `through` at `wi`. Otherwise `None`.
+    /// If `set` contains only Lambertian reflection: its factor without the profile `through` at `wi`. Otherwise
+    /// `None`.
     #[inline]
     pub(super) fn diffuse_only(&self, view: &ViewTerms, set: LobeSet) -> Option<Rgb> {
         let facets = self.has_facets && set.intersects(self.interface.class);
@@ -110,8 +111,9 @@ impl Layered<'_> {
         let at_i = Position::new(-i.z);
         let f = self.diffuse_transmitted * (view.through * self.interface.through.at(at_i));
         let Some(c) = &self.interface.cover else { return f };
-        let [from, to] = [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at).1);
-        f * (c.through * c.cover.transmittance(from) * c.cover.transmittance(to))
+        let [(cos_o, from), (cos_i, to)] = [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at));
+        let f = f * (c.through * c.cover.transmittance(from) * c.cover.transmittance(to));
+        c.cover.absorption(cos_o, cos_i).map_or(f, |absorption| f * absorption)
     }
 
     #[inline]
@@ -165,7 +167,7 @@ impl Layered<'_> {
         }
         let Some(c) = &n.cover else { return (single + separable[0] + separable[1] + separable[2], pdf) };
         let at_o = view.at;
-        let [from, to] = [(view.o, at_o), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at).1);
+        let [(cos_o, from), (cos_i, to)] = [(view.o, at_o), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at));
         let transmittance = c.cover.transmittance(from) * c.cover.transmittance(to);
         let sum = separable[0] * c.loss + separable[1] * c.glass_loss[view.side] + separable[2] * c.through;
         let mut f = single * c.cover.facet_transmittance(from, to) + sum * transmittance;
@@ -175,13 +177,18 @@ impl Layered<'_> {
             }
             pdf += probabilities.covered_loss * i.z * FRAC_1_PI;
         }
+        let absorption = c.cover.absorption(cos_o, cos_i);
+        if let Some(absorption) = absorption {
+            f *= absorption;
+        }
         if c.cover.has_coat() && self.coat_normal.is_none() && set.intersects(c.cover.coat_class & LobeSet::SMOOTH) {
             let (value, density) = c.cover.coat(view.o, i);
             f += Rgb::splat(value);
             pdf += probabilities.coat * density;
         }
         if c.cover.has_sheen() && set.intersects(LobeSet::BROAD) {
-            f += c.cover.sheen(view.o, i, from, to);
+            let sheen = c.cover.sheen(view.o, i, from, to);
+            f += absorption.map_or(sheen, |absorption| sheen * absorption);
             pdf += probabilities.sheen * 0.5 * FRAC_1_PI;
         }
         (f, pdf)
@@ -224,9 +231,11 @@ impl Layered<'_> {
         let f = match &n.cover {
             None => single + separable,
             Some(c) => {
-                let [from, to] = [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at).1);
+                let [(cos_o, from), (cos_i, to)] =
+                    [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at));
                 let transmittance = c.cover.transmittance(from) * c.cover.transmittance(to);
-                single * c.cover.facet_transmittance(from, to) + separable * (norm * transmittance)
+                let f = single * c.cover.facet_transmittance(from, to) + separable * (norm * transmittance);
+                c.cover.absorption(cos_o, cos_i).map_or(f, |absorption| f * absorption)
             }
         };
         (f, pdf)
@@ -325,12 +334,14 @@ impl Layered<'_> {
 
     /// Factor (0 to 1) by which the cover attenuates a delta lobe towards `wi`.
     #[inline]
-    fn cover_transmittance(&self, view: &ViewTerms, wi: Vec3) -> f32 {
+    fn cover_transmittance(&self, view: &ViewTerms, wi: Vec3) -> Rgb {
         let transmittance = |c: &CoverEffect| {
-            let [from, to] = [view.o, wi].map(|w| self.angles(view.side, w, Position::new(w.z.abs())).1);
-            c.cover.facet_transmittance(from, to)
+            let [(cos_o, from), (cos_i, to)] =
+                [view.o, wi].map(|w| self.angles(view.side, w, Position::new(w.z.abs())));
+            let transmittance = Rgb::splat(c.cover.facet_transmittance(from, to));
+            c.cover.absorption(cos_o, cos_i).map_or(transmittance, |absorption| transmittance * absorption)
         };
-        self.interface.cover.as_ref().map_or(1.0, transmittance)
+        self.interface.cover.as_ref().map_or(Rgb::ONE, transmittance)
     }
 
     /// Samples a direction from the facets, whose lobe has been chosen with the probability `share`; `u_facet` chooses
@@ -369,7 +380,7 @@ impl Layered<'_> {
             refract(o, h, n.dielectric.smooth[side].eta, cos_t)
         };
         if smooth {
-            let weight = t * (self.radiance_scale(side, transport) * self.cover_transmittance(view, i));
+            let weight = t * (self.cover_transmittance(view, i) * self.radiance_scale(side, transport));
             return Some(SampledDirection::delta(i, weight, share * (1.0 - p)));
         }
         (i.z < 0.0).then_some(SampledDirection::Lobe(i, n.class))

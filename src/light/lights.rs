@@ -81,7 +81,7 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
         area,
         two_sided: material.double_sided,
         radiance,
-        spread: Spread::new(material.spread).below_coat(coat),
+        spread: Spread::new(material.spread).below_coat(coat, material.clearcoat_ior),
         plane,
         corners,
         error: position_error(&corners),

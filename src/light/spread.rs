@@ -16,13 +16,14 @@ pub struct Spread {
     scale: f32,
     /// Squared sine of the half angle; 1 for a Lambertian emitter.
     sin2: f32,
-    /// Strength of the clear coat above the emitter, 0 to 1.
+    /// Strength of the clear coat above the emitter, 0 to 1, and its index of refraction.
     coat: f32,
+    coat_eta: f32,
 }
 
 impl Spread {
     /// A Lambertian emitter: equal radiance in all directions.
-    pub const LAMBERTIAN: Spread = Spread { tan: f32::INFINITY, scale: 0.0, sin2: 1.0, coat: 0.0 };
+    pub const LAMBERTIAN: Spread = Spread { tan: f32::INFINITY, scale: 0.0, sin2: 1.0, coat: 0.0, coat_eta: 1.5 };
     /// Smallest half angle (rad), as in Cycles. Cosines of smaller angles have too few digits in f32.
     const MIN_HALF_ANGLE: f32 = 0.5 * std::f32::consts::PI / 180.0;
 
@@ -33,18 +34,20 @@ impl Spread {
         }
         let half = f64::from(half.max(Spread::MIN_HALF_ANGLE));
         let (sin, tan) = (half.sin(), half.tan());
-        Spread { tan: tan as f32, scale: (1.0 / (tan - half)) as f32, sin2: (sin * sin) as f32, coat: 0.0 }
+        let (tan, scale) = (tan as f32, (1.0 / (tan - half)) as f32);
+        Spread { tan, scale, sin2: (sin * sin) as f32, ..Spread::LAMBERTIAN }
     }
 
-    /// Emission below a clear coat of strength `coat`, which reflects part of the light back (KHR_materials_clearcoat).
-    pub fn below_coat(self, coat: f32) -> Spread {
-        Spread { coat, ..self }
+    /// Emission below a clear coat of strength `coat` and index `eta`, which reflects part of the light back
+    /// (KHR_materials_clearcoat).
+    pub fn below_coat(self, coat: f32, eta: f32) -> Spread {
+        Spread { coat, coat_eta: eta, ..self }
     }
 
     /// Radiance over the mean radiance, in a direction with this cosine (above zero) to the normal.
     #[inline]
     pub(super) fn relative_radiance(&self, cos: f32) -> f32 {
-        let passes = if self.coat > 0.0 { 1.0 - self.coat * coat_reflectance(cos) } else { 1.0 };
+        let passes = if self.coat > 0.0 { 1.0 - self.coat * coat_reflectance(cos, self.coat_eta) } else { 1.0 };
         if self.sin2 == 1.0 {
             return passes;
         }
@@ -102,7 +105,7 @@ mod tests {
     /// The formula of KHR_materials_clearcoat at 0 and 80 degrees, where Fresnel reflectance is 0.04 and 0.388.
     #[test]
     fn a_coat_dims_the_emission_below() {
-        let spread = Spread::LAMBERTIAN.below_coat(0.5);
+        let spread = Spread::LAMBERTIAN.below_coat(0.5, 1.5);
         assert!((spread.relative_radiance(1.0) - 0.98).abs() < 1e-6);
         assert!((spread.relative_radiance(80f32.to_radians().cos()) - (1.0 - 0.5 * 0.3877)).abs() < 1e-3);
         let (d, flux) = spread.sample(Vec2::new(0.9, 0.2));

@@ -141,6 +141,7 @@ impl Material {
             p.clearcoat = self.coat(surface, textures);
             let texel = look_up(&self.clearcoat_roughness_texture, surface, textures);
             p.clearcoat_alpha = sqr(unit(self.clearcoat_roughness) * unit(texel.y));
+            (p.clearcoat_eta, p.clearcoat_color) = (self.clearcoat_ior, unit_color(self.clearcoat_color));
         }
         if self.sheen_color.max_element() > 0.0 {
             let texel = look_up(&self.sheen_color_texture, surface, textures);

@@ -107,6 +107,10 @@ pub struct Material {
     pub clearcoat_texture: Option<TextureRef>,
     /// Perceptual roughness of the clear coat, 0 to 1.
     pub clearcoat_roughness: f32,
+    /// Index of refraction of the clear coat, at least 1.
+    pub clearcoat_ior: f32,
+    /// Colour of light that passes the clear coat in and out along its normal; white absorbs nothing.
+    pub clearcoat_color: Rgb,
     /// Texture of the clear coat's roughness, in G.
     pub clearcoat_roughness_texture: Option<TextureRef>,
     /// Texture of tangent-space normals of the clear coat, and the scale of their slopes.
@@ -172,6 +176,8 @@ impl Default for Material {
             clearcoat: 0.0,
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,
+            clearcoat_ior: 1.5,
+            clearcoat_color: Rgb::ONE,
             clearcoat_roughness_texture: None,
             clearcoat_normal_texture: None,
             sheen_color: Rgb::ZERO,

@@ -79,11 +79,12 @@ fn solids(materials: &[Material]) -> Vec<f32> {
 
 impl EnergyTables {
     /// Energy compensation tables for all interfaces of these materials with empty space and with the solids among
-    /// them.
+    /// them, and for their clear coats.
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
         let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
         let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));
-        EnergyTables::new(open.iter().copied().chain(nested))
+        let coats = distinct(materials.iter().filter(|m| m.clearcoat > 0.0).map(|m| m.clearcoat_ior));
+        EnergyTables::new(open.iter().copied().chain(nested).chain(coats))
     }
 }
 

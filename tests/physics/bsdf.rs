@@ -93,6 +93,8 @@ fn white() -> Vec<(String, Parameters)> {
             let coated = Parameters { clearcoat, clearcoat_alpha, ..p };
             list.push((format!("{name} below a coat {clearcoat} {clearcoat_alpha}"), coated));
         }
+        let coated = Parameters { clearcoat: 1.0, clearcoat_alpha: 0.1, clearcoat_eta: 2.4, ..p };
+        list.push((format!("{name} below a coat of index 2.4"), coated));
         for (sheen, sheen_alpha) in [(1.0, 0.1), (0.5, 0.5), (1.0, 1.0)] {
             let sheen_color = Rgb::splat(sheen);
             list.push((
@@ -160,6 +162,12 @@ fn all() -> Vec<(String, Parameters)> {
         })
         .collect();
     list.extend(tinted);
+    let coats: Vec<_> = list
+        .iter()
+        .filter(|(name, p)| p.clearcoat > 0.0 && !name.contains("tinted"))
+        .map(|(name, p)| (format!("{name} of colour"), Parameters { clearcoat_color: Rgb::new(0.9, 0.3, 0.0), ..*p }))
+        .collect();
+    list.extend(coats);
     list.push(("black metal".into(), Parameters { base_color: Rgb::ZERO, ..metal(0.3) }));
     list.push(("black glass".into(), Parameters { base_color: Rgb::ZERO, ..glass(0.3, 1.5) }));
     list.push(("black".into(), Parameters { base_color: Rgb::ZERO, ..Parameters::default() }));
@@ -569,6 +577,31 @@ fn reflectance_at_normal_incidence_follows_the_extensions() {
     near(mirror(Parameters { base_color: gold, ..metal(0.0) }), gold);
     near(mirror(Parameters { metallic: 0.5, base_color: gold, ..plastic(0.0, 1.5) }), gold * 0.5 + Rgb::splat(0.02));
     near(mirror(Parameters { clearcoat: 0.5, base_color: Rgb::ZERO, ..Parameters::default() }), Rgb::splat(0.02));
+    let dense = Parameters { clearcoat: 1.0, clearcoat_eta: 2.0, base_color: Rgb::ZERO, ..Parameters::default() };
+    near(mirror(dense), Rgb::splat(1.0 / 9.0));
+}
+
+/// A mirror below a smooth coat of colour c reflects `(1 - E) c^(1 / cos)`, with the cosine of the refracted ray and the
+/// reflectance E of the coat, where the coat is; a diffuse base has the mean path on its other side.
+#[test]
+fn coloured_coats_absorb_along_refracted_paths() {
+    let color = Rgb::new(0.9, 0.3, 0.02);
+    for (eta, coat) in [(1.5f32, 1.0), (1.5, 0.4), (2.4, 1.0)] {
+        let p = Parameters { clearcoat: coat, clearcoat_eta: eta, clearcoat_color: color, ..metal(0.0) };
+        let bsdf = bsdf(&p, &TABLES);
+        for mu in [1.0f32, 0.6, 0.2] {
+            let wo = outgoing(mu, 0.3);
+            let inside = (1.0 - (1.0 - mu * mu) / (eta * eta)).sqrt();
+            let s = ((mu - eta * inside) / (mu + eta * inside)).powi(2);
+            let t = ((eta * mu - inside) / (eta * mu + inside)).powi(2);
+            let reflected = 0.5 * (s + t) * coat;
+            let absorbed = color.map(|c| 1.0 - coat + coat * c.powf(1.0 / inside));
+            let expected = Rgb::splat(reflected) + absorbed * (1.0 - reflected);
+            let found = drawn_albedo(&bsdf, wo, Transport::Radiance, 64);
+            // The reflectance of the coat below which facets lie is from a table.
+            assert!((found - expected).abs().max_element() < 6e-3, "{eta} {coat} {mu}: {found} is not {expected}");
+        }
+    }
 }
 
 /// Every lobe is in exactly one class: values of single classes sum to the value of all classes.

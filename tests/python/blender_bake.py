@@ -394,11 +394,17 @@ class Matched(Case):
             self.assertAlmostEqual(material["extras"]["caustique"]["diffuse_roughness"], 0.3, 5)
             self.assertFalse([line for line in warnings if "oughness" in line])
 
+    def test_tint_and_index_of_coats_are_keys_of_the_extras(self):
+        self.stage.principled(Coat_Weight=1.0, Coat_Tint=(1, 0.5, 0.25), Coat_IOR=1.75)
+        material, warnings = self.write()
+        own = material["extras"]["caustique"]
+        self.assertEqual((own["coat_color"], own["coat_ior"]), ([1, 0.5, 0.25], 1.75))
+        self.assertFalse([line for line in warnings if "oat" in line])
+
     def test_losses_are_named(self):
         losses = {
-            "Coat Tint": dict(Coat_Weight=1.0, Coat_Tint=(1, 0.5, 0.5)), "sheen": dict(Sheen_Weight=1.0),
+            "sheen": dict(Sheen_Weight=1.0),
             "Subsurface Weight": dict(Subsurface_Weight=0.5),
-            "Coat IOR": dict(Coat_Weight=1.0, Coat_IOR=1.8),
             "rim": dict(Metallic=1.0, Specular_Tint=(1, 0.5, 0.5)),
         }
         for words, inputs in losses.items():

@@ -36,6 +36,8 @@ FACTORS = {
     "sheen_roughness": ("KHR_materials_sheen", "sheenRoughnessFactor", 0.0),
     "anisotropy": ("KHR_materials_anisotropy", "anisotropyStrength", 0.0),
 }
+#: {material field: its default}, for fields that are keys of `extras.caustique`
+OWN = {"diffuse_roughness": 0.0, "coat_ior": 1.5, "coat_color": (1.0, 1.0, 1.0)}
 
 
 def pack(
@@ -234,8 +236,11 @@ class Writer:
         own: dict = {} if material.medium is None else {"medium": coefficients(material.medium)}
         if material.null_bsdf:
             own["null_bsdf"] = True
-        if material.diffuse_roughness:
-            own["diffuse_roughness"] = float(material.diffuse_roughness)
+        for name, usual in OWN.items():
+            value = getattr(material, name)
+            value = float(value) if isinstance(usual, float) else tuple(numbers(value))
+            if value != usual:
+                own[name] = value
         if own:
             item["extras"] = {"caustique": own}
         if extensions:

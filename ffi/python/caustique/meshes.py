@@ -79,10 +79,13 @@ class Material:
     null_bsdf: bool = False
     #: 20 divided by the Abbe number; 0 is no dispersion.
     dispersion: float = 0.0
-    #: Strength of a clear coat of index 1.5, 0 to 1.
+    #: Strength of a clear coat, 0 to 1.
     clearcoat: float = 0.0
     #: Perceptual roughness of the clear coat, 0 to 1.
     clearcoat_roughness: float = 0.0
+    #: Index of refraction of the clear coat, and the colour (r, g, b) of light that passes it in and out.
+    coat_ior: float = 1.5
+    coat_color: Triple = (1.0, 1.0, 1.0)
     #: Share of the surface that a thin film covers, 0 to 1, its index of refraction and its thickness, nm.
     iridescence: float = 0.0
     iridescence_ior: float = 1.3

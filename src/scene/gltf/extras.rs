@@ -125,6 +125,8 @@ pub(super) struct MaterialExtras {
     pub(super) null_bsdf: bool,
     pub(super) spread_deg: Option<f32>,
     pub(super) diffuse_roughness: f32,
+    pub(super) coat_ior: Option<f32>,
+    pub(super) coat_color: Option<[f32; 3]>,
 }
 
 /// Content of `extras.caustique` of a node with a mesh.
@@ -214,6 +216,8 @@ pub(super) const MATERIAL: &[&str] = &[
     "null_bsdf",
     "spread_deg",
     "diffuse_roughness",
+    "coat_ior",
+    "coat_color",
 ];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
 pub(super) const LIGHT: &[&str] = &[

@@ -5,6 +5,7 @@ use super::document::{Document, extension};
 use super::extras::{self, MaterialExtras};
 use super::fault;
 use super::texture::{Info, Textures, Use};
+use crate::bsdf::mean_path;
 use crate::error::Result;
 use crate::material::{Alpha, Material, MediumParameters};
 use crate::math::Rgb;
@@ -356,6 +357,19 @@ impl Reader<'_> {
             self.warnings.push(format!("{}: its null_bsdf is ignored: it transmits light by itself", self.place));
         }
         material.diffuse_roughness = self.unit(own.diffuse_roughness, "extras.caustique.diffuse_roughness")?;
+        if let Some(ior) = own.coat_ior {
+            material.clearcoat_ior = self.finite(ior, "extras.caustique.coat_ior")?.max(1.0);
+            if ior < 1.0 {
+                self.warnings.push(format!("{}: its coat_ior of {ior} is raised to 1", self.place));
+            }
+        }
+        if let Some(color) = own.coat_color {
+            material.clearcoat_color = self.color(color, 1.0, "extras.caustique.coat_color")?;
+            // Emitted light passes the coat once. Its colour does not depend on the direction.
+            let path = 0.5 * mean_path(material.clearcoat_ior);
+            let passed = material.clearcoat_color.map(|c| 1.0 + (c.powf(path) - 1.0) * material.clearcoat);
+            material.emission *= passed;
+        }
         if let Some(degrees) = own.spread_deg {
             if !(0.0..=180.0).contains(&degrees) {
                 let cause = format!("extras.caustique.spread_deg must lie between 0 and 180, it is {degrees}");

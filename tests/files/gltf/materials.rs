@@ -395,6 +395,14 @@ fn extras_of_materials() {
     let (m, warnings) = material(json!({"name": "wall", "extras": {"caustique": {"diffuse_roughness": 2}}}));
     assert_eq!(m.diffuse_roughness, 1.0);
     assert_eq!(warnings, ["material \"wall\": extras.caustique.diffuse_roughness is 2; 1 is used"]);
+    let coat = json!({"KHR_materials_clearcoat": {"clearcoatFactor": 1}});
+    let keys = json!({"coat_ior": 0.5, "coat_color": [1, 0.25, 0]});
+    let (m, warnings) = material(json!({
+        "name": "wood", "extensions": coat, "emissiveFactor": [1, 1, 1], "extras": {"caustique": keys}}));
+    assert_eq!((m.clearcoat_ior, m.clearcoat_color), (1.0, Rgb::new(1.0, 0.25, 0.0)));
+    assert_eq!(warnings, ["material \"wood\": its coat_ior of 0.5 is raised to 1"]);
+    // At an index of 1, the mean path is 2; it is passed once.
+    assert!((m.emission - Rgb::new(1.0, 0.25, 0.0)).length() < 1e-6, "{}", m.emission);
     let bad = |medium: Value| {
         let file = wearing(json!({"name": "fog", "extensions": glass, "extras": {"caustique": {"medium": medium}}}));
         message(&try_read(&file).unwrap_err())

@@ -302,6 +302,7 @@ fn materials() -> Cases {
         ),
         ("less than a vacuum", json!({at("ior"): {"ior": 0.5}})),
         ("a film below a vacuum", json!({at("iridescence"): {"iridescenceIor": 0.5}})),
+        ("a coat below a vacuum", json!({format!("{said}/coat_ior"): 0.5})),
         (
             "thick paper",
             json!({"/materials/0/extras": {}, "/materials/0/extensions": {
