@@ -41,6 +41,7 @@ for name in embree oidn onnxruntime; do
 done
 python -I scripts/package_libraries.py "$work/wheels" "$tree/lib/caustique" "$notices"
 python -I scripts/package_notices.py >"$notices/rust.txt"
+cp scripts/notices/ltc-sheen.txt "$notices/"
 
 say "building the program and the Python module"
 # Together, because the module needs more features of some crates, which would otherwise be compiled twice. The module

@@ -248,6 +248,7 @@ class _Entry:
                 shared = self.image("sheen", tint, self.layer("sheen_roughness", size))
                 content["sheenColorTexture"] = content["sheenRoughnessTexture"] = shared
             self.extension("sheen", content)
+            self.own(sheen_model="fibers")
 
     def _emission(self):
         """Split emission above one into a strength and an image with values up to one."""

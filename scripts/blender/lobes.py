@@ -258,15 +258,10 @@ class Reader:
         return node.outputs[0]
 
     def _sheen(self, leaf):
-        self.say("its Sheen shader is approximated by glTF's sheen over black")
+        if getattr(leaf.node, "distribution", "") == "ASHIKHMIN":
+            self.say("its Ashikhmin sheen is taken for Microfiber")
         return Lobe(sheen=self.get(leaf, "Color"), faceted=False, normal=self.normal(leaf),
-                    sheen_roughness=self._sheen_roughness(self.get(leaf, "Roughness")))
-
-    def _sheen_roughness(self, roughness):
-        """The roughness at which glTF's sheen has about the albedo of Cycles' sheen at `roughness`."""
-        g = self.graph
-        excess = g.maximum(g.subtract(roughness, 0.5), 0.0)
-        return g.minimum(g.add(g.multiply(roughness, 0.88), g.multiply(excess, 1.0)), 1.0)
+                    sheen_roughness=self.get(leaf, "Roughness"))
 
     def _principled(self, leaf):
         g = self.graph
@@ -321,9 +316,12 @@ class Reader:
                 self.say("Coat Normal is not carried: the coat follows the surface")
         weight = self.get(leaf, "Sheen Weight")
         if weight != 0.0:
-            self.say("sheen is approximated by glTF's")
+            self.say("what lies below its sheen is dimmed for the directions of light and view alike, in Cycles for that of "
+                     "the view alone")
+            if lobe.coat != 0.0:
+                self.say("its sheen lies below its coat, in Cycles above it")
             lobe.sheen = g.multiply(self.get(leaf, "Sheen Tint"), weight)
-            lobe.sheen_roughness = self._sheen_roughness(self.get(leaf, "Sheen Roughness"))
+            lobe.sheen_roughness = self.get(leaf, "Sheen Roughness")
 
 
 _READERS = {

@@ -197,6 +197,8 @@ class Materials:
         if any(surface.sheen):
             add("KHR_materials_sheen", {"sheenColorFactor": list(surface.sheen),
                                         "sheenRoughnessFactor": surface.sheen_roughness})
+            if surface.sheen_model != "charlie":
+                keys.setdefault("sheen_model", surface.sheen_model)
         if surface.transmission == 0:
             return
         add("KHR_materials_transmission", self._textured(entry, sets, {"transmission": (surface.transmission, 0)}))

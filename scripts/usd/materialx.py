@@ -89,7 +89,7 @@ def surface(shader, reader, losses):
     out.film_thickness = given["film_thickness"] * _FILM_UNITS[reader.identifier(shader)]
     out.emission = _scaled(given["emission_color"], given["emission"])
     if given["sheen"]:
-        losses.add(where, "its fuzz is taken for the sheen of glTF, whose lobe differs a little")
+        out.sheen_model = "fibers" if reader.identifier(shader) == OPEN_PBR else "charlie"
         out.sheen = _scaled(given["sheen_color"], given["sheen"])
         out.sheen_roughness = given["sheen_roughness"]
     _set_interior(out, given, where, losses)

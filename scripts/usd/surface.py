@@ -26,6 +26,7 @@ class Surface:
     coat_ior: float = 1.5
     sheen: tuple = (0.0, 0.0, 0.0)
     sheen_roughness: float = 0.3
+    sheen_model: str = "charlie"
     film: float = 0.0  # share of a thin film, its thickness (nm) and its index of refraction
     film_thickness: float = 0.0
     film_ior: float = 1.4

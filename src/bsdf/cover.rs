@@ -2,14 +2,14 @@
 //!
 //! A layer of albedo E attenuates microfacet lobes below it by `1 - max(E(o), E(i))`, which is exact for mirrors, and
 //! separable lobes by `(1 - E(o)) (1 - E(i))`, normalized so that their albedo is attenuated by `1 - E(o)`. Both
-//! factors are reciprocal. Both sides of a surface are covered. A coloured coat absorbs along the refracted paths of both
-//! directions \[OpenPBR, coat_color\].
+//! factors are reciprocal. Both sides of a surface are covered. A coloured coat absorbs along the refracted paths of
+//! both directions \[OpenPBR, coat_color\].
 
 use super::energy::EnergyTables;
 use super::fresnel::{dielectric, reflect};
 use super::microfacet::{Ggx, g1, g2_reflection, lobe_class};
 use super::profile::{Position, Profile};
-use super::{DELTA_ALPHA, LobeSet, Parameters, sheen};
+use super::{DELTA_ALPHA, LobeSet, Parameters, SheenModel, sheen};
 use crate::math::{Rgb, Vec2, Vec3, sqr};
 
 /// Smallest colour of a coat, whose logarithm is finite.
@@ -56,6 +56,7 @@ pub struct Cover {
     coat_albedo: Profile,
     sheen: Rgb,
     sheen_alpha: f32,
+    sheen_model: SheenModel,
     sheen_albedo: Profile,
 }
 
@@ -73,7 +74,8 @@ impl Cover {
         let coat_albedo =
             if p.clearcoat > 0.0 { tables.coat_albedo(Position::new(alpha), p.clearcoat_eta) } else { absent };
         let has_sheen = p.sheen_color.max_element() > 0.0;
-        let sheen_albedo = if has_sheen { tables.sheen_albedo(Position::new(p.sheen_alpha)) } else { absent };
+        let sheen_albedo =
+            if has_sheen { tables.sheen_albedo(p.sheen_model, Position::new(p.sheen_alpha)) } else { absent };
         Some(Cover {
             coat: p.clearcoat,
             coat_ggx: Ggx { alpha_x: alpha.max(DELTA_ALPHA), alpha_y: alpha.max(DELTA_ALPHA) },
@@ -84,6 +86,7 @@ impl Cover {
             coat_albedo,
             sheen: p.sheen_color,
             sheen_alpha: p.sheen_alpha,
+            sheen_model: p.sheen_model,
             sheen_albedo,
         })
     }
@@ -206,13 +209,12 @@ impl Cover {
     /// the surface.
     #[inline]
     pub fn sheen(&self, o: Vec3, i: Vec3, at_o: Angles, at_i: Angles) -> Rgb {
-        let Some(h) = (o + i).try_normalize() else { return Rgb::ZERO };
         let coat = if self.coat > 0.0 {
             1.0 - self.coat * self.coat_albedo.at(at_o.coat).max(self.coat_albedo.at(at_i.coat))
         } else {
             1.0
         };
         let excess = self.sheen_albedo.at(at_o.base).max(self.sheen_albedo.at(at_i.base)).max(1.0);
-        self.sheen * (sheen::eval(o.z, i.z, h.z.min(1.0), self.sheen_alpha) * coat / excess)
+        self.sheen * (sheen::eval_model(self.sheen_model, o, i, self.sheen_alpha) * coat / excess)
     }
 }

@@ -5,7 +5,7 @@ use super::anisotropic::{AnisotropicProfile, AnisotropicTables};
 use super::fresnel::{Smooth, is_matched, reflect, refract};
 use super::microfacet::{Ggx, g1, g2_reflection, g2_transmission};
 use super::profile::{AdjacentRows, Grid, NODES, Position, Profile, node, row};
-use super::sheen;
+use super::sheen::{self, SheenModel};
 use crate::math::{Vec2, Vec3, Vec4, sqr};
 use std::sync::OnceLock;
 
@@ -67,8 +67,8 @@ const COVER_NODES: usize = 10;
 pub(super) enum CoverLayer {
     /// A clear coat of this relative index of refraction.
     Coat(f32),
-    /// Sheen.
-    Sheen,
+    /// Sheen of this model.
+    Sheen(SheenModel),
 }
 
 /// All albedo tables of a scene. Rows are computed at first use, on any thread. The result does not depend on when or
@@ -76,8 +76,9 @@ pub(super) enum CoverLayer {
 #[derive(Clone, Debug)]
 pub struct EnergyTables {
     interfaces: Vec<InterfaceTables>,
-    sheen: Grid<1>,
-    below_sheen: CoverTables,
+    /// Albedos of sheen, and losses below it, by its model.
+    sheen: [Grid<1>; 2],
+    below_sheen: [CoverTables; 2],
 }
 
 /// Integrates over the normals of facets visible from `wo`. Calls `f` with Lambda(wo), a visible normal and its
@@ -299,8 +300,8 @@ impl EnergyTables {
         etas.retain(|e| !is_matched(*e));
         EnergyTables {
             interfaces: etas.into_iter().map(InterfaceTables::new).collect(),
-            sheen: Grid::new(),
-            below_sheen: CoverTables::new(),
+            sheen: [const { Grid::new() }; 2],
+            below_sheen: [const { CoverTables::new() }; 2],
         }
     }
 
@@ -353,11 +354,11 @@ impl EnergyTables {
         self.sides(eta).map_or(Profile::constant(0.0), |[above, _]| above.reflection(alpha, f0, 1.0))
     }
 
-    /// Albedo of white sheen of roughness `alpha`, as a function of the cosine.
+    /// Albedo of white sheen of a model and of roughness `alpha`, as a function of the cosine.
     #[inline]
-    pub(super) fn sheen_albedo(&self, alpha: Position) -> Profile {
-        let made = |i: usize| [row(&std::array::from_fn(|j| Vec4::X * sheen::albedo(node(i), node(j))))];
-        Profile::new(self.sheen.adjacent_rows(alpha, made), 0, 0.0, Vec4::X)
+    pub(super) fn sheen_albedo(&self, model: SheenModel, alpha: Position) -> Profile {
+        let made = |i: usize| [row(&std::array::from_fn(|j| Vec4::X * sheen::albedo(model, node(i), node(j))))];
+        Profile::new(self.sheen[model as usize].adjacent_rows(alpha, made), 0, 0.0, Vec4::X)
     }
 
     /// Energy that rough facets below a layer of albedo E lose because they are attenuated by `1 - max(E(o), E(i))` and
@@ -374,7 +375,10 @@ impl EnergyTables {
                     tables.below_coat.profile(alpha, cover_alpha, |alpha| self.coat_albedo(alpha, eta))
                 }
             },
-            CoverLayer::Sheen => self.below_sheen.profile(alpha, cover_alpha, |alpha| self.sheen_albedo(alpha)),
+            CoverLayer::Sheen(model) => {
+                let tables = &self.below_sheen[model as usize];
+                tables.profile(alpha, cover_alpha, |alpha| self.sheen_albedo(model, alpha))
+            }
         }
     }
 }

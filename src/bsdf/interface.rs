@@ -327,13 +327,14 @@ impl CoverEffect {
             _ => 1.0,
         };
         let strengths = cover.strengths();
-        let loss_profiles =
-            [(CoverLayer::Coat(p.clearcoat_eta), p.clearcoat_alpha, 0), (CoverLayer::Sheen, p.sheen_alpha, 1)].map(
-                |(layer, cover_alpha, k): (_, _, usize)| match strengths[k] {
-                    0.0 => Profile::constant(0.0),
-                    _ => tables.covered_loss(layer, alpha, cover_alpha),
-                },
-            );
+        let loss_profiles = [
+            (CoverLayer::Coat(p.clearcoat_eta), p.clearcoat_alpha, 0),
+            (CoverLayer::Sheen(p.sheen_model), p.sheen_alpha, 1),
+        ]
+        .map(|(layer, cover_alpha, k): (_, _, usize)| match strengths[k] {
+            0.0 => Profile::constant(0.0),
+            _ => tables.covered_loss(layer, alpha, cover_alpha),
+        });
         let scale = |k: usize| strengths[k] * FRAC_1_PI / loss_profiles[k].average.max(1e-9);
         let rough = below.class != LobeSet::DELTA;
         CoverEffect {

@@ -29,6 +29,7 @@ pub use layered::Layered;
 pub use microfacet::refraction_width;
 pub use parameters::Parameters;
 pub use shading::Shading;
+pub use sheen::SheenModel;
 
 use crate::math::{Rgb, Vec2, Vec3, warp};
 use bitflags::bitflags;
@@ -289,9 +290,9 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Albedo of the lobes of `set` for `wo`. Exact for delta and diffuse lobes without a coloured coat, an estimate for
-    /// others, with errors of up to 0.15 for anisotropic glass. Only Russian roulette and the denoiser use it, so it does not bias the
-    /// picture.
+    /// Albedo of the lobes of `set` for `wo`. Exact for delta and diffuse lobes without a coloured coat, an estimate
+    /// for others, with errors of up to 0.15 for anisotropic glass. Only Russian roulette and the denoiser use it, so
+    /// it does not bias the picture.
     #[inline]
     pub fn albedo(&self, wo: Vec3, set: LobeSet) -> Rgb {
         self.albedo_view(&self.view_terms(wo), set)

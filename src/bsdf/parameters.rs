@@ -1,5 +1,6 @@
 //! The parameters of the BSDF at one point, after texture lookups.
 
+use super::SheenModel;
 use crate::math::Rgb;
 
 /// Parameters of the BSDF at one point: the metallic-roughness model of glTF with its extensions. Colours and strengths
@@ -48,6 +49,8 @@ pub struct Parameters {
     pub sheen_color: Rgb,
     /// Alpha of the sheen: the square of its perceptual roughness.
     pub sheen_alpha: f32,
+    /// Model of the sheen.
+    pub sheen_model: SheenModel,
 }
 
 impl Default for Parameters {
@@ -75,6 +78,7 @@ impl Default for Parameters {
             clearcoat_color: Rgb::ONE,
             sheen_color: Rgb::ZERO,
             sheen_alpha: 0.0,
+            sheen_model: SheenModel::Charlie,
         }
     }
 }

@@ -148,6 +148,7 @@ impl Material {
             p.sheen_color = unit_color(self.sheen_color) * unit_color(texel.truncate());
             let texel = look_up(&self.sheen_roughness_texture, surface, textures);
             p.sheen_alpha = sqr(unit(self.sheen_roughness) * unit(texel.w));
+            p.sheen_model = self.sheen_model;
         }
         p
     }

@@ -8,6 +8,7 @@ pub use crate::medium::MediumParameters;
 pub use library::{MAX_FOCUSING_ROUGHNESS, Materials};
 pub use scattering::Scattering;
 
+use crate::bsdf::SheenModel;
 use crate::math::Rgb;
 use crate::texture::TextureRef;
 use std::f32::consts::FRAC_PI_2;
@@ -121,6 +122,8 @@ pub struct Material {
     pub sheen_color_texture: Option<TextureRef>,
     /// Perceptual roughness of the sheen, 0 to 1.
     pub sheen_roughness: f32,
+    /// Model of the sheen.
+    pub sheen_model: SheenModel,
     /// Texture of the sheen's roughness, in A.
     pub sheen_roughness_texture: Option<TextureRef>,
     /// Strength of the anisotropy, 0 to 1 (KHR_materials_anisotropy).
@@ -183,6 +186,7 @@ impl Default for Material {
             sheen_color: Rgb::ZERO,
             sheen_color_texture: None,
             sheen_roughness: 0.0,
+            sheen_model: SheenModel::Charlie,
             sheen_roughness_texture: None,
             anisotropy: 0.0,
             anisotropy_rotation: 0.0,

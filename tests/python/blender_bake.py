@@ -401,9 +401,17 @@ class Matched(Case):
         self.assertEqual((own["coat_color"], own["coat_ior"]), ([1, 0.5, 0.25], 1.75))
         self.assertFalse([line for line in warnings if "oat" in line])
 
+    def test_sheen_is_that_of_fibers(self):
+        self.stage.principled(Sheen_Weight=0.5, Sheen_Tint=(1, 0.5, 0.25), Sheen_Roughness=0.25)
+        material, warnings = self.write()
+        self.assertEqual(material["extensions"]["KHR_materials_sheen"],
+                         {"sheenColorFactor": [0.5, 0.25, 0.125], "sheenRoughnessFactor": 0.25})
+        self.assertEqual(material["extras"]["caustique"]["sheen_model"], "fibers")
+        self.assertEqual(len([line for line in warnings if "sheen" in line]), 1)
+
     def test_losses_are_named(self):
         losses = {
-            "sheen": dict(Sheen_Weight=1.0),
+            "sheen": dict(Sheen_Weight=1.0), "above it": dict(Sheen_Weight=1.0, Coat_Weight=0.5),
             "Subsurface Weight": dict(Subsurface_Weight=0.5),
             "rim": dict(Metallic=1.0, Specular_Tint=(1, 0.5, 0.5)),
         }

@@ -37,7 +37,7 @@ FACTORS = {
     "anisotropy": ("KHR_materials_anisotropy", "anisotropyStrength", 0.0),
 }
 #: {material field: its default}, for fields that are keys of `extras.caustique`
-OWN = {"diffuse_roughness": 0.0, "coat_ior": 1.5, "coat_color": (1.0, 1.0, 1.0)}
+OWN = {"diffuse_roughness": 0.0, "coat_ior": 1.5, "coat_color": (1.0, 1.0, 1.0), "sheen_model": "charlie"}
 
 
 def pack(
@@ -238,7 +238,8 @@ class Writer:
             own["null_bsdf"] = True
         for name, usual in OWN.items():
             value = getattr(material, name)
-            value = float(value) if isinstance(usual, float) else tuple(numbers(value))
+            if not isinstance(usual, str):
+                value = float(value) if isinstance(usual, float) else tuple(numbers(value))
             if value != usual:
                 own[name] = value
         if own:

@@ -97,6 +97,8 @@ class Material:
     sheen_color: Triple = (0.0, 0.0, 0.0)
     #: Perceptual roughness of the sheen, 0 to 1.
     sheen_roughness: float = 0.0
+    #: Model of the sheen: "charlie" as in glTF, or "fibers" as in Blender and OpenPBR.
+    sheen_model: str = "charlie"
     #: Strength of anisotropy, 0 to 1: the alpha along the tangent is a mix of the GGX alpha and 1, by its square.
     anisotropy: float = 0.0
     #: Rotation of the tangent, degrees.

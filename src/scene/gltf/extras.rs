@@ -115,6 +115,15 @@ pub(super) enum Contact {
     Optical,
 }
 
+/// The model of sheen.
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Sheen {
+    #[default]
+    Charlie,
+    Fibers,
+}
+
 /// Content of `extras.caustique` of a material.
 #[derive(Default, Deserialize)]
 #[serde(default)]
@@ -127,6 +136,7 @@ pub(super) struct MaterialExtras {
     pub(super) diffuse_roughness: f32,
     pub(super) coat_ior: Option<f32>,
     pub(super) coat_color: Option<[f32; 3]>,
+    pub(super) sheen_model: Sheen,
 }
 
 /// Content of `extras.caustique` of a node with a mesh.
@@ -218,6 +228,7 @@ pub(super) const MATERIAL: &[&str] = &[
     "diffuse_roughness",
     "coat_ior",
     "coat_color",
+    "sheen_model",
 ];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
 pub(super) const LIGHT: &[&str] = &[

@@ -5,7 +5,7 @@ use super::document::{Document, extension};
 use super::extras::{self, MaterialExtras};
 use super::fault;
 use super::texture::{Info, Textures, Use};
-use crate::bsdf::mean_path;
+use crate::bsdf::{SheenModel, mean_path};
 use crate::error::Result;
 use crate::material::{Alpha, Material, MediumParameters};
 use crate::math::Rgb;
@@ -370,6 +370,10 @@ impl Reader<'_> {
             let passed = material.clearcoat_color.map(|c| 1.0 + (c.powf(path) - 1.0) * material.clearcoat);
             material.emission *= passed;
         }
+        material.sheen_model = match own.sheen_model {
+            extras::Sheen::Charlie => SheenModel::Charlie,
+            extras::Sheen::Fibers => SheenModel::Fibers,
+        };
         if let Some(degrees) = own.spread_deg {
             if !(0.0..=180.0).contains(&degrees) {
                 let cause = format!("extras.caustique.spread_deg must lie between 0 and 180, it is {degrees}");

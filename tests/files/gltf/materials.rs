@@ -403,6 +403,10 @@ fn extras_of_materials() {
     assert_eq!(warnings, ["material \"wood\": its coat_ior of 0.5 is raised to 1"]);
     // At an index of 1, the mean path is 2; it is passed once.
     assert!((m.emission - Rgb::new(1.0, 0.25, 0.0)).length() < 1e-6, "{}", m.emission);
+    let sheen = json!({"KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1]}});
+    let (m, _) = material(json!({"extensions": sheen, "extras": {"caustique": {"sheen_model": "fibers"}}}));
+    assert_eq!(m.sheen_model, caustique::bsdf::SheenModel::Fibers);
+    assert_eq!(material(json!({"extensions": sheen})).0.sheen_model, caustique::bsdf::SheenModel::Charlie);
     let bad = |medium: Value| {
         let file = wearing(json!({"name": "fog", "extensions": glass, "extras": {"caustique": {"medium": medium}}}));
         message(&try_read(&file).unwrap_err())

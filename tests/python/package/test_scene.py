@@ -128,7 +128,7 @@ class BesideTheCommandLine(unittest.TestCase):
             emission=(2, 2, 2), clearcoat=0.5, clearcoat_roughness=0.1, sheen_color=(0.1, 0.2, 0.3), sheen_roughness=0.4,
             iridescence=0.5, iridescence_thickness=300.0, diffuse_transmission=0.25,
             anisotropy=0.5, anisotropy_rotation=90, specular_color=(1, 0.5, 0.2), double_sided=True,
-            diffuse_roughness=0.5, coat_ior=1.75, coat_color=(1, 0.5, 0.25),
+            diffuse_roughness=0.5, coat_ior=1.75, coat_color=(1, 0.5, 0.25), sheen_model="fibers",
         )
         vertices, triangles = square()
         mesh = cq.Mesh(vertices=vertices, triangles=triangles, uvs=vertices[:, :2], colors=np.ones((4, 3)), material=layered)
@@ -146,7 +146,8 @@ class BesideTheCommandLine(unittest.TestCase):
                          {"iridescenceFactor": 0.5, "iridescenceThicknessMaximum": 300})
         self.assertEqual(material["extensions"]["KHR_materials_diffuse_transmission"], {"diffuseTransmissionFactor": 0.25})
         self.assertEqual(material["extras"]["caustique"],
-                         {"diffuse_roughness": 0.5, "coat_ior": 1.75, "coat_color": [1, 0.5, 0.25]})
+                         {"diffuse_roughness": 0.5, "coat_ior": 1.75, "coat_color": [1, 0.5, 0.25],
+                          "sheen_model": "fibers"})
         self.assertAlmostEqual(placed["extensions"]["KHR_texture_transform"]["rotation"], -np.pi / 2)
         self.assertEqual(document["cameras"][0]["orthographic"]["ymag"], 2)
         self.assertEqual(cq.Scene.from_meshes(copies, cameras=[camera], strict=True).warnings, [])
