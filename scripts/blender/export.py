@@ -257,7 +257,8 @@ def may_transmit(material):
     if output.inputs["Volume"].is_linked:
         return True
     parts = shading.leaves(shading.source(output.inputs["Surface"]))
-    return any(shading.constant(p.inputs["Transmission Weight"], 1.0) for p in parts if p.type == "BSDF_PRINCIPLED")
+    return any(shading.constant(p.inputs[name], 1.0) for p in parts if p.type == "BSDF_PRINCIPLED"
+               for name in ("Transmission Weight", "Subsurface Weight"))
 
 
 def _closed(mesh):

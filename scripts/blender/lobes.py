@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import bpy
 
+import subsurface
 from graph import is_constant
 
 WHITE, BLACK = (1.0,) * 3, (0.0,) * 3
@@ -46,6 +47,7 @@ class Lobe:
     strength: object = 0.0
     sheet: object = 0.0  # share of the diffuse light that leaves on the other side, and its colour
     sheet_colour: object = WHITE
+    subsurface: object = None  # the subsurface.Subsurface behind the surface; `sheet` is then the share of light that enters
     thin: bool = False
     faceted: bool = True  # roughness and anisotropy have an effect
 
@@ -110,8 +112,25 @@ class Reader:
         lobe.base = g.multiply(base, g.subtract(1.0, g.multiply(g.multiply(lost, base), share)))
 
     def _subsurface(self, leaf):
-        self.say("subsurface scattering is not carried: its light leaves where it arrives")
-        return self._diffuse(leaf)
+        lobe = self._diffuse(leaf)
+        inputs = ("Radius", "Scale", "IOR", "Anisotropy")
+        entry = self.get(leaf, "IOR"), self.get(leaf, "Roughness")
+        self._enter(leaf, lobe, 1.0, (inputs, entry), None, getattr(leaf.node, "falloff", "RANDOM_WALK"))
+        return lobe
+
+    def _enter(self, leaf, lobe, weight, inputs_and_entry, surface, method):
+        """Set the medium below the surface, and the share of the diffuse light that enters it."""
+        # Blender hides the index of refraction where the method does not use it.
+        inputs, entry = inputs_and_entry
+        values = [[1.4 if value is None else value for value in given]
+                  for given in ((self.get(leaf, name) for name in inputs), entry)]
+        lobe.subsurface = subsurface.read(lobe.base, weight, *values, surface, method)
+        if lobe.subsurface is not None:
+            lobe.sheet = weight
+        elif not is_constant(lobe.base):
+            self.say("subsurface scattering is carried where its colour is constant: its light leaves where it arrives")
+        else:
+            self.say("subsurface scattering is carried where its inputs are constant: its light leaves where it arrives")
 
     def _translucent(self, leaf):
         return Lobe(sheet=1.0, sheet_colour=self.get(leaf, "Color"), normal=self.normal(leaf), faceted=False)
@@ -285,8 +304,13 @@ class Reader:
         if lobe.metallic != 1.0 and lobe.transmission != 1.0:
             share = g.multiply(g.subtract(1.0, lobe.metallic), g.subtract(1.0, lobe.transmission))
             self._roughen(lobe, self._diffuse_roughness(leaf, "Diffuse Roughness"), share)
-            self._warn_unless_zero(
-                leaf, "Subsurface Weight", "Subsurface Weight is not carried: light leaves where it arrives")
+            weight = g.clamp(self.get(leaf, "Subsurface Weight"))
+            if weight != 0.0 and lobe.transmission == 0.0:
+                inputs = ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy")
+                entry = self.get(leaf, "IOR"), g.power(self.get(leaf, "Roughness"), 2.0)
+                self._enter(leaf, lobe, weight, (inputs, entry), (lobe.ior, lobe.specular), leaf.node.subsurface_method)
+            elif weight != 0.0:
+                self.say("subsurface scattering is not carried beside transmission: light leaves where it arrives")
         self._film(leaf, lobe)
         return lobe
 

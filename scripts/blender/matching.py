@@ -138,6 +138,9 @@ class _Match:
             whole = 1.0
         parts = [g.divide(part, whole) for _, part in lobes]
         lobes = [lobe for lobe, _ in lobes]
+        if any(lobe.subsurface is not None for lobe in lobes):
+            self.say("subsurface scattering is not carried in mixes of shaders: its light leaves where it arrives")
+            lobes = [replace(lobe, subsurface=None, sheet=0.0) if lobe.subsurface is not None else lobe for lobe in lobes]
         diffuse = [kind in _DIFFUSE for kind in kinds]
         if all(kind in _DIFFUSE | _GLOSSY for kind in kinds) and not all(diffuse):
             found = self._under_constant_gloss(lobes, parts, diffuse)

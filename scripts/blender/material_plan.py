@@ -76,6 +76,7 @@ class Plan:
     def _plan(self):
         values = {f.name: getattr(self.matched, f.name) for f in fields(Matched)}
         del values["faceted"]
+        inside = values.pop("subsurface")
         tangent = values.pop("tangent")
         values["direction"] = self._direction(tangent) if tangent is not None else 0.0
         self._fold_constants(values)
@@ -92,7 +93,7 @@ class Plan:
         if not self.may_bake:
             self._drop_varying(values, varying)
             varying = []
-        self.channels = {n: PLAIN if n in self.links else v for n, v in values.items()}
+        self.channels = {n: PLAIN if n in self.links else v for n, v in values.items()} | {"subsurface": inside}
         self.unbaked = {n: _UNBAKED_DEFAULTS.get(n, 0.0) if n in varying else v for n, v in self.channels.items()}
         for name, parts in _PASSES.items():
             if any(part in varying for part in parts):
@@ -265,6 +266,8 @@ class Plan:
         node.inputs["Emission Strength"].default_value = 1.0 if "emission" in self.links else 0.0
         transmission = self.channels["transmission"]
         node.inputs["Transmission Weight"].default_value = transmission if isinstance(transmission, float) else 1.0
+        # What the exporter does not write, but looks for in materials of closed meshes.
+        node.inputs["Subsurface Weight"].default_value = float(self.channels["subsurface"] is not None)
         tree.links.new(node.outputs[0], graph.output.inputs["Surface"])
         material = graph.material.copy()
         self.undo.callback(bpy.data.materials.remove, material)

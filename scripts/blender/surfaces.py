@@ -10,6 +10,7 @@ import gltfmaterial
 import export_guard as guard
 import shading
 import standin
+import subsurface
 from material_plan import Plan, matt
 
 
@@ -101,8 +102,15 @@ class Surfaces:
 
     def _finish(self, entry, surface, writer, closed, least):
         entry["name"] = surface.material.name
-        gltfmaterial.write(entry, surface.channels, writer, surface.texcoord)
+        channels, inside = surface.channels, surface.channels["subsurface"]
+        if inside is not None and not closed:
+            self.warn(f'material "{surface.material.name}"',
+                      "its subsurface scattering needs closed meshes: its light leaves where it arrives")
+            channels, inside = {**channels, "sheet": 0.0}, None
+        gltfmaterial.write(entry, channels, writer, surface.texcoord)
         shading.finish(entry, surface.material, closed, least, self.warn)
+        if inside is not None:
+            subsurface.write(entry, inside, least)
 
     def _unbaked_surface(self, name):
         """The surface of a material on an object that has no stand-in, or None."""

@@ -128,7 +128,7 @@ impl Material {
             let texel = look_up(&self.specular_color_texture, surface, textures);
             p.specular_color *= texel.truncate().max(Rgb::ZERO);
         }
-        if self.diffuse_transmission > 0.0 && self.thin {
+        if self.diffuse_transmission > 0.0 {
             let texel = look_up(&self.diffuse_transmission_texture, surface, textures);
             p.diffuse_transmission = unit(self.diffuse_transmission) * unit(texel.w);
             let texel = look_up(&self.diffuse_transmission_color_texture, surface, textures);

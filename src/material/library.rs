@@ -45,7 +45,7 @@ impl Material {
     /// emit light decide at each face instead.
     #[inline]
     pub fn has_alpha_per_entry(&self) -> bool {
-        self.alpha != Alpha::Opaque && self.is_solid_glass() && !self.emits()
+        self.alpha != Alpha::Opaque && self.is_solid() && !self.emits()
     }
 
     /// Probability that a ray hits the surface and does not pass through it because of alpha.
@@ -63,14 +63,16 @@ impl Material {
         self.transmission > 0.0 || self.diffuse_transmission > 0.0
     }
 
-    /// Whether a mesh of this material is the boundary of a solid that light enters.
-    pub fn is_solid_glass(&self) -> bool {
-        self.transmission > 0.0 && !self.thin
+    /// Whether a mesh of this material is the boundary of a solid that light enters: of glass, or of a body whose
+    /// surface transmits light diffusely.
+    pub fn is_solid(&self) -> bool {
+        self.transmits() && !self.thin
     }
 
     /// Whether the base, without coats, may have a narrow lobe (delta or sharp).
     fn has_narrow_base(&self) -> bool {
-        let width = if self.is_solid_glass() { refraction_width(self.ior) } else { 1.0 };
+        let glass = self.transmission > 0.0 && !self.thin;
+        let width = if glass { refraction_width(self.ior) } else { 1.0 };
         self.roughness * width.sqrt() < MAX_FOCUSING_ROUGHNESS || self.metallic_roughness_texture.is_some()
     }
 
@@ -133,7 +135,7 @@ impl Material {
     /// Whether the material fills a solid whose index of refraction depends on the wavelength.
     #[inline]
     pub fn disperses(&self) -> bool {
-        self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.is_solid_glass()
+        self.dispersion > 0.0 && self.ior > 1.0 && self.ior.is_finite() && self.transmission > 0.0 && !self.thin
     }
 
     /// Index of refraction of a dispersive material at a wavelength (nm): Cauchy's equation through the lines of the

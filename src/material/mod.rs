@@ -67,8 +67,8 @@ pub struct Material {
     pub transmission: f32,
     /// Texture of the transmission, in R.
     pub transmission_texture: Option<TextureRef>,
-    /// Share of the diffuse light that leaves on the other side of a thin sheet, 0 to 1
-    /// (KHR_materials_diffuse_transmission). Solid glass has none.
+    /// Share of the diffuse light that leaves on the other side, 0 to 1 (KHR_materials_diffuse_transmission): of a thin
+    /// sheet, or of the boundary of a solid, which then does not refract it.
     pub diffuse_transmission: f32,
     /// Texture of the diffuse transmission, in A.
     pub diffuse_transmission_texture: Option<TextureRef>,
@@ -78,7 +78,8 @@ pub struct Material {
     pub diffuse_transmission_color_texture: Option<TextureRef>,
     /// Whether the mesh is a thin wall without refraction. Otherwise it is the boundary of a solid.
     pub thin: bool,
-    /// Medium that fills the solid: absorption from KHR_materials_volume, or `extras.caustique.medium`.
+    /// Medium that fills the solid: from KHR_materials_volume and KHR_materials_volume_scatter, or
+    /// `extras.caustique.medium`.
     pub medium: Option<MediumParameters>,
     /// Priority of nested dielectrics: where solids overlap, the one with the highest priority counts.
     pub priority: i32,

@@ -74,7 +74,7 @@ fn distinct(indices: impl Iterator<Item = f32>) -> Vec<f32> {
 
 /// Indices of refraction of the solids that may surround a surface.
 fn solids(materials: &[Material]) -> Vec<f32> {
-    distinct(materials.iter().filter(|m| m.is_solid_glass() && m.ior.is_finite()).map(|m| m.ior))
+    distinct(materials.iter().filter(|m| m.is_solid() && m.ior.is_finite()).map(|m| m.ior))
 }
 
 impl EnergyTables {

@@ -71,7 +71,7 @@ pub(super) const ENVIRONMENT: &str = "the environment";
 /// Names of the materials in `used` that call for an effect; empty if the effect is not a property of materials.
 pub(super) fn material_reasons(effect: Effect, used: &[UsedMaterial]) -> Vec<String> {
     let calls: fn(&Material) -> bool = match effect {
-        Effect::Volume => |material| material.is_solid_glass() && material.medium.is_some(),
+        Effect::Volume => |material| material.is_solid() && material.medium.is_some(),
         Effect::Dispersion => Material::disperses,
         Effect::Alpha => |material| material.alpha != Alpha::Opaque,
         Effect::Textures => |material| material.textures().next().is_some(),

@@ -155,7 +155,7 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
         let texture = material.base_color_texture.map(|t| &materials.textures[t.texture as usize]);
         let varies = || texture.is_some_and(Texture::has_alpha) || colors.iter().any(|color| color.w < 1.0);
         let opaque_from = if let Alpha::Mask(cutoff) = material.alpha { cutoff } else { 1.0 };
-        let glows = material.is_solid_glass() && material.emits() && material.alpha != Alpha::Opaque;
+        let glows = material.is_solid() && material.emits() && material.alpha != Alpha::Opaque;
         let problem = if glows && (varies() || material.base_color[3] < opaque_from) {
             "its alpha takes walls of solid glass that glows one by one, so light that passes two of them is not what it should be (give the glow to an object of its own, or set its alpha to opaque)"
         } else if material.has_alpha_per_entry() && varies() {

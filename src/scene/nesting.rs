@@ -34,7 +34,7 @@ pub struct SolidStack {
 pub fn ranks(shapes: &Shapes, materials: &Materials) -> Vec<u32> {
     let mut of_mesh = HashMap::new();
     let mut volumes = BTreeMap::<u32, f64>::new();
-    for instance in shapes.instances.iter().filter(|i| materials.list[i.material as usize].is_solid_glass()) {
+    for instance in shapes.instances.iter().filter(|i| materials.list[i.material as usize].is_solid()) {
         let own = of_mesh.entry(instance.mesh).or_insert_with(|| volume(&shapes.meshes[instance.mesh as usize]));
         let scale = instance.to_world.as_ref().map_or(1.0, |placement| placement.points.matrix3.determinant());
         *volumes.entry(instance.object).or_default() += *own * f64::from(scale.abs());

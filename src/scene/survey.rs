@@ -70,12 +70,12 @@ impl Survey {
             survey.narrow_lobes |= material.is_glossy() || material.transmission > 0.0;
             let lobes = material.perfect_and_sharp();
             (perfect, sharp) = (perfect | lobes.0, sharp | lobes.1);
-            if material.is_solid_glass() {
+            if material.is_solid() {
                 solids += uses;
                 survey.media |= material.medium.is_some();
                 let scatters = scatters(&material.medium);
                 survey.scattering |= scatters;
-                survey.cloudy_glass |= scatters && material.ior != 1.0 && lobes.0;
+                survey.cloudy_glass |= scatters && material.transmission > 0.0 && material.ior != 1.0 && lobes.0;
                 survey.null_boundaries |= material.ior == 1.0 || material.has_alpha_per_entry();
                 survey.dispersion |= material.disperses();
             }

@@ -121,7 +121,7 @@ impl SurroundingSolids {
     /// contains the scene.
     fn cross(&mut self, scene: &Scene, surface: &Surface, direction: Vec3) -> bool {
         let entering = direction.dot(surface.ng) < 0.0;
-        if scene.materials.list[surface.material as usize].is_solid_glass() {
+        if scene.materials.list[surface.material as usize].is_solid() {
             self.interior = self.interior.crossing(scene, surface.instance, entering).interior;
             return true;
         }

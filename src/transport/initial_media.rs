@@ -87,7 +87,7 @@ impl Solid {
     /// All solids of a scene.
     fn all(scene: &Scene) -> Vec<Solid> {
         let instances = (0..).zip(&scene.shapes.instances);
-        let solid = instances.filter(|(_, i)| scene.materials.list[i.material as usize].is_solid_glass());
+        let solid = instances.filter(|(_, i)| scene.materials.list[i.material as usize].is_solid());
         solid.map(|(instance, _)| Solid { instance, extent: extent(scene, instance) }).collect()
     }
 

@@ -132,7 +132,7 @@ impl Interior {
         let mut crossings = SmallVec::<[Boundary; 16]>::new();
         scene.tracer.each_hit(&Ray { origin: p, direction, tmax: f32::INFINITY, token: 0 }, &mut |hit| {
             let Some(surface) = scene.shapes.surface(hit.instance, hit.primitive, hit.barycentric) else { return };
-            if scene.materials.list[surface.material as usize].is_solid_glass() {
+            if scene.materials.list[surface.material as usize].is_solid() {
                 let object = scene.shapes.instances[surface.instance as usize].object;
                 let leaves = direction.dot(surface.ng) >= 0.0;
                 crossings.push(Boundary { object, t: hit.t, instance: surface.instance, leaves });

@@ -173,7 +173,7 @@ enum Boundary {
 #[inline(always)]
 fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Vec3, token: u32) -> Boundary {
     let material = &scene.materials.list[surface.material as usize];
-    if !material.is_solid_glass() {
+    if !material.is_solid() {
         // The coat of an opaque body borders on the medium around the body, such as air or water.
         let around = if scene.survey.solids { interior.ior(scene) } else { 1.0 };
         return Boundary::Scattering(material.ior / around, None);

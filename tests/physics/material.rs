@@ -124,9 +124,10 @@ fn diffuse_transmission_follows_its_textures() {
     };
     let p = sheet.parameters(&surface(), &textures, 1.5);
     assert_eq!((p.diffuse_transmission, p.diffuse_transmission_color), (0.2, Rgb::new(0.5, 0.25, 0.75)));
-    assert!(sheet.transmits() && !sheet.is_solid_glass() && !sheet.has_plain_interface());
+    assert!(sheet.transmits() && !sheet.is_solid() && !sheet.has_plain_interface());
     let solid = Material { thin: false, transmission: 0.5, ..sheet };
-    assert_eq!(solid.parameters(&surface(), &textures, 1.5).diffuse_transmission, 0.0);
+    assert_eq!(solid.parameters(&surface(), &textures, 1.5).diffuse_transmission, 0.2);
+    assert!(solid.is_solid() && Material { transmission: 0.0, ..solid }.is_solid());
 }
 
 /// The thickness of a thin film is interpolated by G, without a texture it is the maximum, and its index is relative to
@@ -231,7 +232,7 @@ fn rows_are_computed_at_first_use() {
         Material { ior, metallic: 0.0, roughness: 0.5, transmission: 1.0, thin: false, ..Material::default() }
     };
     let materials: Vec<Material> = (0..30).map(glass).collect();
-    assert!(materials.iter().all(Material::is_solid_glass));
+    assert!(materials.iter().all(Material::is_solid));
     let tables = EnergyTables::for_materials(&materials);
     assert_eq!(tables.row_count(), 0);
     let eta = materials[3].ior / materials[21].ior;

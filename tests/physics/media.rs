@@ -246,6 +246,81 @@ fn furnace() {
     }
 }
 
+/// The surface of a body that lets light in and out diffusely, as wax and skin do, with this medium inside.
+fn dense(medium: MediumParameters, specular: f32) -> Material {
+    let medium = Some(medium);
+    Material { diffuse_transmission: 1.0, thin: false, medium, specular, roughness: 0.5, ..matte(0.0, 0.0) }
+}
+
+/// Wax without absorption is invisible under a uniform sky, with and without facets on its surface.
+#[test]
+fn furnace_of_wax() {
+    for (specular, g) in [(0.0, 0.0), (1.0, 0.5)] {
+        let mut description = Description::default();
+        add(&mut description, "wax", sphere(Vec3::ZERO, 1.0, 32), dense(fog([0.0; 3], [6.0, 3.0, 1.5], g), specular));
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.cameras.push(look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 36.0));
+        let scene = build(description);
+        for method in WHOLE_PATHS {
+            // Connections to light paths in dense media are noisy.
+            let (detects, iterations) = if method == Method::Path { (0.05, 100) } else { (0.2, 150) };
+            let check = ByChannel { expected: [1.0; 3], bias: 2e-3, detects };
+            let means = means(&scene, method, 6, 8, |seed| settings(iterations, seed));
+            check.run(&format!("wax, g {g}, {method:?}"), &means);
+        }
+    }
+}
+
+/// A thick block of wax under a uniform sky has the colour (1 - s) (1 - 0.139 s) / (1 + 1.17 s) of a half-space, with
+/// s^2 = (1 - a) / (1 - g a) for the single-scattering albedo a \[van de Hulst 1980\], which is within 1 %.
+#[test]
+fn dense_bodies_have_the_colour_of_a_half_space() {
+    for g in [0.0f32, 0.6] {
+        let albedo = [0.99f32, 0.9, 0.75];
+        let medium = fog(albedo.map(|a| 25.0 * (1.0 - a)), albedo.map(|a| 25.0 * a), g);
+        let mut description = Description::default();
+        add(&mut description, "wax", cuboid(Vec3::splat(-2.0), Vec3::splat(2.0), false), dense(medium, 0.0));
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.cameras.push(look_at(DVec3::new(0.3, 0.2, 5.0), DVec3::new(0.0, 0.0, 2.0), 10.0));
+        let scene = build(description);
+        let expected = albedo.map(|a| {
+            let s = f64::from((1.0 - a) / (1.0 - g * a)).sqrt();
+            (1.0 - s) * (1.0 - 0.139 * s) / (1.0 + 1.17 * s)
+        });
+        let check = ByChannel { expected, bias: 0.005, detects: 0.08 };
+        check.run(&format!("half-space, g {g}"), &means(&scene, Method::Path, 6, 8, |seed| settings(100, seed)));
+    }
+}
+
+/// All methods find the same light in wax, which no light path and no camera path passes straight.
+#[test]
+fn subsurface_scattering_agrees() {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
+    let wax = fog([0.1, 0.3, 0.9], [6.0, 5.0, 4.0], 0.3);
+    let block = cuboid(Vec3::new(-0.6, 0.02, -0.4), Vec3::new(0.3, 0.9, 0.3), false);
+    add(
+        &mut description,
+        "wax",
+        block,
+        Material { base_color: [0.4; 4], diffuse_transmission: 0.8, ..dense(wax, 1.0) },
+    );
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.6, 0.0), 55.0));
+    let scene = build(description);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(60, seed));
+    for method in [Method::Bdpt, Method::Vcm] {
+        let other = seeds(&scene, method, 10, |seed| settings(20, seed));
+        agree(&format!("wax, {method:?}"), &other, &path, 0.01, 0.2);
+    }
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
+    agree("wax, sppm", &sppm, &path, 0.03, 0.3);
+}
+
 /// A closed box whose walls emit e and reflect rho, full of fog without absorption: e / (1 - rho) everywhere.
 #[test]
 fn furnace_box_full_of_fog() {

@@ -409,10 +409,26 @@ class Matched(Case):
         self.assertEqual(material["extras"]["caustique"]["sheen_model"], "fibers")
         self.assertEqual(len([line for line in warnings if "sheen" in line]), 1)
 
+    def test_subsurface_scattering_is_a_medium(self):
+        self.stage.shape("cube")
+        self.stage.principled(Subsurface_Weight=1.0, Subsurface_Radius=(1, 0.5, 0.25), Subsurface_Scale=0.1,
+                              Base_Color=(0.8, 0.4, 0.2), Specular_IOR_Level=0.0, Subsurface_Anisotropy=0.5)
+        material, warnings = self.write()
+        found = material["extensions"]
+        self.assertEqual(found["KHR_materials_diffuse_transmission"]["diffuseTransmissionFactor"], 1)
+        scatter, volume = found["KHR_materials_volume_scatter"], found["KHR_materials_volume"]
+        # Refracted light returns less than diffuse light, and dark media lose more of it.
+        ratios = numpy.divide(scatter["multiscatterColor"], [0.8, 0.4, 0.2])
+        numpy.testing.assert_allclose(ratios, [0.966, 0.896, 0.860], atol=2e-3)
+        self.assertEqual(scatter["scatterAnisotropy"], 0.5)
+        self.assertGreater(volume["thicknessFactor"], 0)
+        free = [volume["attenuationDistance"] / -math.log(c) for c in volume["attenuationColor"]]
+        numpy.testing.assert_allclose(free, [0.1 * r * 0.5 / (4 * math.pi) for r in (1, 0.5, 0.25)], rtol=1e-5)
+        self.assertFalse([line for line in warnings if "ubsurface" in line])
+
     def test_losses_are_named(self):
         losses = {
             "sheen": dict(Sheen_Weight=1.0), "above it": dict(Sheen_Weight=1.0, Coat_Weight=0.5),
-            "Subsurface Weight": dict(Subsurface_Weight=0.5),
             "rim": dict(Metallic=1.0, Specular_Tint=(1, 0.5, 0.5)),
         }
         for words, inputs in losses.items():

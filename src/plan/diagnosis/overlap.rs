@@ -21,7 +21,7 @@ const TOUCH_TOLERANCE: f32 = 1e-3;
 /// the other.
 pub(super) fn overlapping_solids(scene: &Scene) -> Vec<String> {
     let materials = &scene.materials.list;
-    let solid = |instance: &&Instance| materials[instance.material as usize].is_solid_glass();
+    let solid = |instance: &&Instance| materials[instance.material as usize].is_solid();
     let solids: Vec<&Instance> = scene.shapes.instances.iter().filter(solid).take(MAX_SOLIDS).collect();
     let mut pairs: Vec<(u32, u32)> = Vec::new();
     for instance in &solids {
@@ -69,7 +69,7 @@ fn trace_edge(scene: &Scene, object: u32, from: Vec3, to: Vec3, crossed: &mut Ve
         let across = direction.dot(surface.ng).abs() > TOUCH_TOLERANCE
             && share > TOUCH_TOLERANCE
             && share < 1.0 - TOUCH_TOLERANCE;
-        let solid = scene.materials.list[surface.material as usize].is_solid_glass();
+        let solid = scene.materials.list[surface.material as usize].is_solid();
         let other = scene.shapes.instances[surface.instance as usize].object != object;
         if across && solid && other && !crossed.contains(&surface.instance) {
             crossed.push(surface.instance);

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 const DAMAGED: &str = "the file is damaged or incomplete: copy or export it again";
 
 /// Names of the glTF extensions that the reader supports.
-const SUPPORTED: [&str; 26] = [
+const SUPPORTED: [&str; 27] = [
     "EXT_lights_ies",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -26,6 +26,7 @@ const SUPPORTED: [&str; 26] = [
     "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen",
+    "KHR_materials_volume_scatter",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",

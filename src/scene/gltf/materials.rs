@@ -73,12 +73,16 @@ impl Library {
         }
         let loaded = &self.loaded[&index];
         let transmits = loaded.material.transmission > 0.0;
-        let solid = transmits
-            && loaded.solid.unwrap_or(match self.glass {
+        let solid = if transmits {
+            loaded.solid.unwrap_or(match self.glass {
                 Glass::Auto => closed,
                 Glass::Solid => true,
                 Glass::Thin => false,
-            });
+            })
+        } else {
+            // Paper and leaves are thin without a thickness.
+            loaded.material.transmits() && loaded.solid == Some(true)
+        };
         if solid && !closed {
             warnings.push(format!("mesh \"{}\": its {place} is solid, but {}", mesh.name, reason_not_closed(bounds)));
         }

@@ -543,7 +543,7 @@ impl<'r> Reader<'r> {
         }
         let (mut meshes, whole) = self.material_meshes(index, shape)?;
         let source = get(&self.document.meshes, index, "mesh")?;
-        let is_glass = |material: u32| self.library.list[material as usize].is_solid_glass();
+        let is_glass = |material: u32| self.library.list[material as usize].is_solid();
         let glass = meshes.iter_mut().filter(|part| is_glass(part.material) && part.bounds.closed).collect();
         if orient_shells(glass, whole, &named("mesh", source.name.as_deref(), index), &mut self.out.warnings) {
             self.flipped.insert(index);
@@ -588,7 +588,7 @@ impl<'r> Reader<'r> {
             return missing();
         }
         if shared.flipped.contains(&index) {
-            let is_glass = |part: &MaterialMesh| shared.library.list[part.material as usize].is_solid_glass();
+            let is_glass = |part: &MaterialMesh| shared.library.list[part.material as usize].is_solid();
             let glass = meshes.iter_mut().filter(|part| is_glass(part) && part.bounds.closed).collect();
             orient_shells(glass, CLOSED, name, &mut Vec::new());
         }

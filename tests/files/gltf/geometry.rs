@@ -232,7 +232,7 @@ fn solids_of_several_primitives() {
     file.node(json!({"mesh": mesh}));
     let scene = read(&file);
     assert_eq!(scene.meshes.iter().map(|m| m.closed).collect::<Vec<_>>(), [false, false]);
-    assert!(scene.materials[scene.instances[0].material as usize].is_solid_glass());
+    assert!(scene.materials[scene.instances[0].material as usize].is_solid());
     assert_eq!((scene.instances[0].object, scene.instances[1].object), (0, 0));
 }
 

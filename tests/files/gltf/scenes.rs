@@ -23,7 +23,7 @@ fn our_scenes_load() {
         let triangles: usize = scene.instances.iter().map(|i| scene.meshes[i.mesh as usize].triangles.len()).sum();
         let found = [triangles, scene.instances.len(), scene.cameras.len(), scene.lights.len()];
         let closed = scene.meshes.iter().filter(|m| m.closed).count();
-        let solids = scene.materials.iter().filter(|m| m.is_solid_glass()).count();
+        let solids = scene.materials.iter().filter(|m| m.is_solid()).count();
         println!(
             "{name}: {found:?}, {} meshes ({closed} closed), {} materials ({solids} solid glass), {} textures, \
              environment {}, medium {:?}",

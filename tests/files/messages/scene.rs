@@ -303,13 +303,7 @@ fn materials() -> Cases {
         ("less than a vacuum", json!({at("ior"): {"ior": 0.5}})),
         ("a film below a vacuum", json!({at("iridescence"): {"iridescenceIor": 0.5}})),
         ("a coat below a vacuum", json!({format!("{said}/coat_ior"): 0.5})),
-        (
-            "thick paper",
-            json!({"/materials/0/extras": {}, "/materials/0/extensions": {
-                "KHR_materials_diffuse_transmission": {"diffuseTransmissionFactor": 1},
-                "KHR_materials_volume": {"thicknessFactor": 1}}}),
-        ),
-        ("glass and paper", json!({at("diffuse_transmission"): {"diffuseTransmissionFactor": 1}})),
+        ("wax of one direction", json!({at("volume_scatter"): {"scatterAnisotropy": 1}})),
         ("glass without a BSDF", json!({format!("{said}/null_bsdf"): true})),
         ("a spread too wide", json!({format!("{said}/spread_deg"): 200})),
         ("a medium behind a wall", json!({at("transmission"): {}})),
