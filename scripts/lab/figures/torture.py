@@ -1,5 +1,5 @@
 """Renders one small scene for each feature of Blender's materials by Cycles and by caustique, and compares them. Writes
-docs/lab/blender-table.md, unless --only selects features.
+docs/lab/blender-table.md, unless --only selects features; with --update then only their rows.
 
 Pictures are cached under a key of their inputs, so that an interrupted run continues. Fails if a feature differs without
 a warning.
@@ -9,6 +9,7 @@ import hashlib
 import inspect
 import json
 import os
+import re
 import subprocess
 import tempfile
 from dataclasses import dataclass
@@ -225,6 +226,17 @@ def named():
     return {row[0].strip("`") for row in _cells() if row[-1]}
 
 
+def stored():
+    """The results of the stored table. `floor` is the mean of all."""
+    with open(TABLE, encoding="utf-8") as file:
+        floor = float(re.search(r"samples each differ by ([0-9.]+)", file.read()).group(1))
+    numbers = ((row, float(row[2]), float(row[4].rstrip("%")) / 100, float(row[3]), float(row[5])) for row in _cells())
+    return [
+        Result(row[0].strip("`"), row[1], mean, tile, noise, shown, floor, row[6])
+        for row, mean, tile, noise, shown in numbers
+    ]
+
+
 def _summary(title, results):
     """A list item with the ratios of the means and FLIP of some results."""
     ratios = numpy.array([r.mean for r in results])
@@ -283,6 +295,7 @@ def add_arguments(parser):
     parser.add_argument(
         "--only", nargs="+", metavar="NAME", choices=sorted(FEATURES), help="compare only these features"
     )
+    parser.add_argument("--update", action="store_true", help="with --only: write the rows of these features")
     parser.add_argument("--look", metavar="FOLDER", help="also write a PNG of both pictures side by side")
 
 
@@ -298,7 +311,11 @@ def main():
             f"flip {result.flip:.3f}  {result.words[:150]}",
             flush=True,
         )
-    if not options.only:
+    if options.only and options.update:
+        new = {result.name: result for result in results}
+        known = {result.name: result for result in stored()}
+        results = [new.get(name) or known[name] for name in FEATURES if name in new or name in known]
+    if not options.only or options.update:
         with open(TABLE, "w", encoding="utf-8") as file:
             file.write(table(results))
     return int(any(r.verdict == WRONG for r in results))
