@@ -1,6 +1,6 @@
 //! Shares of diffuse, glossy and transmitting lobes in the light that a surface scatters, for layers by lobe.
 //!
-//! Diffuse are Lambertian reflection and transmission, and sheen. All other light that leaves on the side on which it
+//! Diffuse are diffuse reflection and transmission, and sheen. All other light that leaves on the side on which it
 //! arrives is glossy: mirrors, facets and their energy compensation, and coats. All other light that leaves on the other
 //! side is transmitted.
 
@@ -21,11 +21,12 @@ impl Layered<'_> {
             return if transmits { self.evaluate_diffuse_transmission(view, i) * share } else { Rgb::ZERO };
         }
         let at_i = Position::new(i.z);
-        let matte = self.diffuse * (share * view.through * self.interface.through.at(at_i));
+        let matte = self.diffuse_reflection(view, i, at_i) * share;
         let Some(c) = &self.interface.cover else { return matte };
-        let [from, to] = [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at).1);
+        let [(cos_o, from), (cos_i, to)] = [(view.o, view.at), (i, at_i)].map(|(w, at)| self.angles(view.side, w, at));
         let below = matte * (c.through * c.cover.transmittance(from) * c.cover.transmittance(to));
-        if c.cover.has_sheen() { below + c.cover.sheen(view.o, i, from, to) } else { below }
+        let diffuse = if c.cover.has_sheen() { below + c.cover.sheen(view.o, i, from, to) } else { below };
+        c.cover.absorption(cos_o, cos_i).map_or(diffuse, |absorption| diffuse * absorption)
     }
 
     /// Estimated albedos of the diffuse, glossy and transmitting lobes.

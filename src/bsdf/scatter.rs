@@ -116,6 +116,20 @@ impl Layered<'_> {
         c.cover.absorption(cos_o, cos_i).map_or(f, |absorption| f * absorption)
     }
 
+    /// Value of the BSDF (1/sr) for light reflected diffusely from `o` to `i` (both above), without the cover. `at_i` is
+    /// the table position of the cosine of `i`.
+    #[inline]
+    pub(super) fn diffuse_reflection(&self, view: &ViewTerms, i: Vec3, at_i: Position) -> Rgb {
+        let through = view.through * self.interface.through.at(at_i);
+        match &self.interface.rough_diffuse {
+            None => self.diffuse * through,
+            Some(rough) => {
+                let [single, multiple] = rough.values((view.o, view.at), (i, at_i));
+                (self.diffuse * single + self.diffuse_multiple * multiple) * through
+            }
+        }
+    }
+
     #[inline]
     fn evaluate_reflected<const PDF: bool>(
         &self,
@@ -150,19 +164,11 @@ impl Layered<'_> {
             }
         }
         if set.intersects(LobeSet::BROAD) {
-            let through = view.through * n.through.at(at_i);
+            separable[2] = self.diffuse_reflection(view, i, at_i);
             match &n.rough_diffuse {
-                None => {
-                    separable[2] = self.diffuse * through;
-                    pdf += probabilities.diffuse * i.z * FRAC_1_PI;
-                }
-                Some(rough) => {
-                    let [single, multiple] = rough.values((view.o, view.at), (i, at_i));
-                    separable[2] = (self.diffuse * single + self.diffuse_multiple * multiple) * through;
-                    if PDF {
-                        pdf += probabilities.diffuse * rough.pdf_w(view.o, i);
-                    }
-                }
+                None => pdf += probabilities.diffuse * i.z * FRAC_1_PI,
+                Some(rough) if PDF => pdf += probabilities.diffuse * rough.pdf_w(view.o, i),
+                Some(_) => {}
             }
         }
         let Some(c) = &n.cover else { return (single + separable[0] + separable[1] + separable[2], pdf) };

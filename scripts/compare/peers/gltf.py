@@ -98,6 +98,10 @@ class Scene:
         return _uri(image["uri"], self.folder), sampler
 
 
+#: Keys of `extras.caustique` of materials that no other renderer gets.
+OWN = {"diffuse_roughness", "coat_color", "coat_ior", "sheen_model"}
+
+
 def extras(part):
     """`extras.caustique` of a part of the document."""
     return part.get("extras", {}).get("caustique", {})
@@ -124,6 +128,9 @@ def read(path, lose=refuse, known=()):
         lose(f"{name} is left out")
     buffers = [_uri(b["uri"], path.parent) if "uri" in b else binary for b in document.get("buffers", [])]
     scene = Scene(document, path.parent, buffers, lose=lose)
+    for material in document.get("materials", []):
+        for key in sorted(OWN & set(extras(material))):
+            lose(f"material {material.get('name')}: its {key} is left out")
     if document.get("animations"):
         lose("animations are left out: everything stands where its node does")
     root = document["scenes"][document.get("scene", 0)]
