@@ -71,6 +71,8 @@ class Image:
         path: str | os.PathLike[str],
         *,
         compression: Literal["zip", "zips", "piz", "none"] = "zip",
+        half: bool = False,
+        multi_part: bool = False,
         exposure: float = 0.0,
         tonemap: Literal["agx", "filmic", "neutral", "srgb"] = "agx",
     ) -> None: ...
@@ -227,7 +229,13 @@ class Scene:
 
 def read(path: str | os.PathLike[str]) -> Image: ...
 def compare(
-    image: _Picture, reference: _Picture, *, layer: str | None = None, relative: bool = False
+    image: _Picture,
+    reference: _Picture,
+    *,
+    layer: str | None = None,
+    relative: bool = False,
+    png: str | os.PathLike[str] | None = None,
+    page: str | os.PathLike[str] | None = None,
 ) -> dict[str, Any]: ...
 def finish(image: Image, *, denoise: _Denoise = "auto", model: str | None = None, threads: int = 0) -> Image: ...
 def merge(
@@ -238,6 +246,7 @@ def merge(
     denoise: _Denoise | None = None,
     model: str | None = None,
     layers: str | None = None,
+    reproducible: bool | None = None,
     threads: int = 0,
 ) -> Image: ...
 def find_libraries() -> dict[str, dict[str, Any]]: ...

@@ -7,29 +7,45 @@ use crate::value::to_python;
 use crate::work::work;
 use caustique::film::take_plain_names;
 use caustique::image::exr::ATTRIBUTE;
-use caustique::image::{Floor, compare_with_floor};
+use caustique::image::{Floor, atomic, compare_with_floor, heat};
 use caustique::pipeline::finish::open;
+use caustique::pipeline::write_finish;
+use caustique::report::errors;
 use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
 use pyo3::prelude::*;
 use serde_json::json;
+use std::path::PathBuf;
 
 /// The error of a picture against a reference: the figures of `caustique compare --json`, and flip_map, (H, W) float32.
 ///
 /// Both are Images, paths, or arrays (H, W, 3). `layer` names the layer to compare. `relative` adds 0.01 times the
-/// squared mean radiance of the reference in relMSE, instead of 0.01.
+/// squared mean radiance of the reference in relMSE, instead of 0.01. `png` writes a heat map of FLIP, and `page` an HTML
+/// page with both pictures and the errors of their pixels, and with the estimated errors if the image has a layer "Error".
 #[pyfunction]
-#[pyo3(signature = (image, reference, *, layer = None, relative = false))]
+#[pyo3(signature = (image, reference, *, layer = None, relative = false, png = None, page = None))]
 pub fn compare<'py>(
     py: Python<'py>,
     image: &Bound<'py, PyAny>,
     reference: &Bound<'py, PyAny>,
     layer: Option<&str>,
     relative: bool,
+    png: Option<PathBuf>,
+    page: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (a, b) = (picture("image", image, layer)?, picture("reference", reference, layer)?);
+    let names = [("image", image), ("reference", reference)]
+        .map(|(place, given)| given.extract::<PathBuf>().map_or(place.into(), |path| path.display().to_string()));
     let floor = if relative { Floor::Relative } else { Floor::Papers };
     let mut comparison = py.detach(|| compare_with_floor(&a, &b, floor)).map_err(raised)?;
+    let written = py.detach(|| {
+        let colours = || comparison.flip_map.iter().map(|&error| heat::magma(error));
+        png.map_or(Ok(()), |path| caustique::image::png::write(&path, a.size(), colours()))?;
+        let Some(path) = page else { return Ok(()) };
+        let text = errors::html(&a, &b, names.each_ref().map(String::as_str), &comparison)?;
+        atomic::write_bytes(&path, text.as_bytes())
+    });
+    written.map_err(raised)?;
     let map = std::mem::take(&mut comparison.flip_map);
     let figures = to_python(py, &json!(comparison))?;
     if let Ok(map) = Array2::from_shape_vec((a.height, a.width), map) {
@@ -63,7 +79,7 @@ pub fn finish(
         caller.warn(&take_plain_names(&mut set).into_iter().map(left).collect::<Vec<_>>());
         let account = opened.finish().apply(&mut set, |_| true)?;
         let mut header = attributes.object().unwrap_or_else(|| json!({"version": env!("CARGO_PKG_VERSION")}));
-        header["combined"] = opened.header(&account);
+        write_finish(&mut header, &opened, &account);
         attributes.insert(ATTRIBUTE, &header)?;
         Ok(Image { set, attributes, sums: None })
     })?;

@@ -172,17 +172,31 @@ impl Image {
     /// Writes an EXR with all layers (and the pixel sums of a shard), or a tone-mapped PNG, by the extension of `path`.
     ///
     /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
+    /// half          store layers for which half floats suffice as such: the picture, its finished parts, albedo, normals
+    /// multi_part    store each layer as a part of the EXR, for programs that unpack all channels of a part
     /// exposure      of the PNG, stops
     /// tonemap       of the PNG: 'agx', 'filmic', 'neutral' or 'srgb'
-    #[pyo3(signature = (path, *, compression = "zip", exposure = 0.0, tonemap = "agx"))]
-    fn save(&self, py: Python<'_>, path: PathBuf, compression: &str, exposure: f32, tonemap: &str) -> PyResult<()> {
+    #[pyo3(signature = (
+        path, *, compression = "zip", half = false, multi_part = false, exposure = 0.0, tonemap = "agx"
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "they are those of Python's signature")]
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        compression: &str,
+        half: bool,
+        multi_part: bool,
+        exposure: f32,
+        tonemap: &str,
+    ) -> PyResult<()> {
         let compression = choice("save: compression", compression)?;
         let curve = choice("save: tonemap", tonemap)?;
         let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
         let set = &self.set;
         let written = py.detach(|| match () {
             () if is("exr") => {
-                let options = exr::Options { compression, ..exr::Options::default() };
+                let options = exr::Options { compression, half, multi_part, ..exr::Options::default() };
                 exr::write_followed(&path, set, &self.attributes, options, |file| {
                     self.sums.as_ref().map_or(Ok(()), |sums| sums.write(file))
                 })
@@ -256,8 +270,8 @@ fn layer(name: &str, given: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Laye
     Ok(((height, width), Layer { name: name.into(), planes: planes.collect() }))
 }
 
-/// The picture, or the layer `name`, of an image or a file, or an array (H, W, 3), without other layers. `place` names the
-/// argument in errors.
+/// The picture with its estimated errors, or the layer `name`, of an image or a file, or an array (H, W, 3), without other
+/// layers. `place` names the argument in errors.
 pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyResult<LayerSet> {
     let name = name.unwrap_or("");
     let chosen = |set: &LayerSet| {
@@ -265,7 +279,10 @@ pub fn picture(place: &str, given: &Bound<'_, PyAny>, name: Option<&str>) -> PyR
         let names = || set.layers.iter().map(|layer| format!("\"{}\"", layer.name)).collect::<Vec<_>>().join(", ");
         let layer =
             found.ok_or_else(|| usage(format!("{place}: no layer \"{name}\""), format!("there are {}", names())))?;
-        let layers = vec![Layer { name: String::new(), ..layer.clone() }];
+        // The page of a comparison shows the estimated errors of a picture.
+        let error = set.get("Error").filter(|_| name.is_empty());
+        let picture = Layer { name: String::new(), ..layer.clone() };
+        let layers = std::iter::once(picture).chain(error.cloned()).collect();
         Ok(LayerSet { width: set.width, height: set.height, layers })
     };
     if let Ok(image) = given.cast::<Image>() {

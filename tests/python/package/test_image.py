@@ -88,6 +88,13 @@ class Files(unittest.TestCase):
             self.assertEqual(again.header, {"note": "made"})
             image.save(Path(folder) / "a.png", exposure=-2.0)
             self.assertEqual((Path(folder) / "a.png").read_bytes()[:4], b"\x89PNG")
+            image.save(path, half=True, multi_part=True)
+            np.testing.assert_array_equal(cq.read(path).picture, values)
+            third = cq.Image.from_arrays({"": values / 3, "Z": values[..., 0] / 3})
+            third.save(path, half=True)
+            rounded = cq.read(path)
+            np.testing.assert_array_equal(rounded.picture, (values / 3).astype(np.float16).astype(np.float32))
+            np.testing.assert_array_equal(rounded["Z"], values[..., 0] / 3)
             for name in ("a.jpg", "no/such/a.exr"):
                 with self.subTest(name), self.assertRaises(cq.Error):
                     image.save(Path(folder) / name)
@@ -115,6 +122,59 @@ class Errors(unittest.TestCase):
         self.assertEqual(cq.compare(as_image, as_image, layer="Level1")["mse"], 0.0)
         with self.assertRaises(cq.Error):
             cq.compare(image, reference[1:])
+
+    def test_files_of_a_comparison(self):
+        rng = np.random.default_rng(2)
+        image, reference = rng.uniform(0.1, 2.0, (2, 16, 24, 3)).astype(np.float32)
+        with_error = cq.Image.from_arrays({"": image, "Error": np.abs(image - reference)})
+        with tempfile.TemporaryDirectory() as folder:
+            png, page, other = (Path(folder) / name for name in ("flip.png", "page.html", "other.html"))
+            figures = cq.compare(with_error, reference, png=png, page=page)
+            self.assertEqual(figures["mse"], cq.compare(image, reference, page=other)["mse"])
+            self.assertTrue(png.read_bytes().startswith(b"\x89PNG"))
+            pages = [path.read_text("utf-8") for path in (page, other)]
+            self.assertTrue(all("<html" in text for text in pages))
+            # The estimated errors are on the page of the image that has some.
+            self.assertGreater(len(pages[0]), len(pages[1]))
+            with self.assertRaises(cq.Error):
+                cq.compare(image, reference, page=Path(folder) / "no" / "such.html")
+
+    def test_a_finish_has_the_header_of_the_command_line(self):
+        """The error of the finished picture replaces that of the estimate."""
+        program = os.environ.get("CAUSTIQUE_BIN", ROOT / "target" / "release" / "caustique")
+        scene = cq.Scene(TORUS)
+        raw = scene.render(method="vcm", iterations=8, width=48, height=32, finish=False, layers="all,Quarter")
+        with tempfile.TemporaryDirectory() as folder:
+            before, after = Path(folder) / "raw.exr", Path(folder) / "done.exr"
+            raw.save(before)
+            words = [program, "finish", before, "-o", after, "--denoise", "own"]
+            subprocess.run(words, check=True, capture_output=True)
+            expected = cq.read(after)
+        finished = cq.finish(raw, denoise="own")
+        self.assertEqual(finished.header, expected.header)
+        self.assertNotEqual(finished.header["error_of"], raw.header["error_of"])
+        np.testing.assert_array_equal(finished.picture, expected.picture)
+
+    def test_renders_of_different_seeds_are_averaged(self):
+        program = os.environ.get("CAUSTIQUE_BIN", ROOT / "target" / "release" / "caustique")
+        scene = cq.Scene(TORUS)
+        options = {"method": "path", "width": 24, "height": 16, "finish": False}
+        renders = [scene.render(seed=seed, iterations=4 * seed, **options) for seed in (1, 3)]
+        with tempfile.TemporaryDirectory() as folder:
+            files = [Path(folder) / f"{index}.exr" for index in range(2)]
+            for render, file in zip(renders, files, strict=True):
+                render.save(file)
+            mean = cq.merge(files, finish=False)
+            finished, beauty = cq.merge(files, denoise="own"), cq.merge(files, finish=False, layers="beauty")
+            merged = Path(folder) / "merged.exr"
+            words = [program, "merge", *files, "-o", merged, "--denoise", "own"]
+            subprocess.run(words, check=True, capture_output=True)
+            expected = cq.read(merged)
+        weighted = (renders[0]["Noisy"] + 3 * renders[1]["Noisy"]) / 4
+        np.testing.assert_allclose(mean["Noisy"], weighted, rtol=1e-5, atol=1e-7)
+        self.assertEqual(beauty.keys(), [""])
+        np.testing.assert_array_equal(finished.picture, expected.picture)
+        self.assertEqual(finished.header, expected.header)
 
     def test_combine_knows_the_names_of_blender(self):
         """A render with Blender's layer names gives the same picture under caustique's names, with normals in its
