@@ -2,7 +2,7 @@
 
 use caustique::error::{Error, ErrorKind, Result};
 use caustique::film::{LayerSet, Naming};
-use caustique::image::exr::{self, Compression};
+use caustique::image::exr::{self, ColourSpace, Compression};
 use caustique::image::tonemap::ToneMap;
 use caustique::image::{atomic, png};
 use caustique::options::number::Ranged;
@@ -46,6 +46,11 @@ pub struct PictureArgs {
     #[serde(skip)]
     #[arg(hide_short_help = true)]
     pub multi_part: bool,
+    /// Linear colour space of the pictures in the EXR
+    #[arg(long, value_enum, default_value_t)]
+    #[serde(skip)]
+    #[arg(hide_short_help = true)]
+    pub colorspace: ColourSpace,
 }
 
 impl PictureArgs {
@@ -56,7 +61,8 @@ impl PictureArgs {
 
     /// How the EXR is written: its compression, and its channel names.
     pub fn exr_options(&self, naming: Naming) -> exr::Options {
-        exr::Options { compression: self.compression, naming, half: self.half, multi_part: self.multi_part }
+        let PictureArgs { compression, half, multi_part, colorspace, .. } = *self;
+        exr::Options { compression, naming, half, multi_part, colour_space: colorspace }
     }
 
     /// Exposure in stops and tone curve of the PNG: the user's, else the scene's.

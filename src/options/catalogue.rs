@@ -66,7 +66,7 @@ pub enum ValueKind {
 }
 
 /// Options that are not arguments in Python, and why.
-const NOT_IN_PYTHON: [(&str, &str); 17] = [
+const NOT_IN_PYTHON: [(&str, &str); 18] = [
     ("verbose", "Python's warnings are not grouped"),
     ("output", "the picture is an Image: its method save writes it"),
     ("png", "an argument of Image.save"),
@@ -75,6 +75,7 @@ const NOT_IN_PYTHON: [(&str, &str); 17] = [
     ("compression", "an argument of Image.save"),
     ("half", "an argument of Image.save"),
     ("multi_part", "an argument of Image.save"),
+    ("colorspace", "an argument of Image.save"),
     ("exr_naming", "layers in memory have plain names"),
     ("usd_layer", "a file beside the EXR"),
     ("preview", "the callback progress shows how a render goes"),
@@ -111,8 +112,8 @@ const OF_SCENE: [(&str, &str); 17] = [
 /// files and permissions.
 const STAGE_HEADINGS: [&str; 6] = ["Method", "When to stop", "Expert", "Light and glass", "Effects", "Finish"];
 /// Options under other headings that a stage may set.
-const ALSO_IN_STAGES: [&str; 7] =
-    ["filter", "layers", "exr_naming", "compression", "half", "multi_part", "reproducible"];
+const ALSO_IN_STAGES: [&str; 8] =
+    ["filter", "layers", "exr_naming", "compression", "half", "multi_part", "colorspace", "reproducible"];
 /// Options under `STAGE_HEADINGS` that a stage may not set: files, permissions, memory, and options for which USD has
 /// other means.
 const NOT_IN_STAGES: [&str; 8] =
@@ -216,6 +217,7 @@ mod tests {
             "compression",
             "half",
             "multi_part",
+            "colorspace",
             "usd_layer",
             "preview",
             "debug_techniques",

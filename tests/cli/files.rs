@@ -453,6 +453,39 @@ fn light_groups_of_any_names_have_layers() {
     }
 }
 
+/// The pictures of a file in ACEScg are other numbers in the file, and the same picture to its readers.
+#[test]
+fn pictures_can_be_in_acescg() {
+    let folder = Folder::new();
+    let render = "--iterations 2 --exr-naming plain --reproducible";
+    small(&folder, render);
+    std::fs::rename(folder.path("out.exr"), folder.path("rec709.exr")).expect("it can be renamed");
+    small(&folder, &format!("{render} --colorspace acescg"));
+    let of = |name: &str| {
+        let meta = ::exr::meta::MetaData::read_from_file(folder.path(name), true).expect("it is an EXR");
+        meta.headers[0].shared_attributes.chromaticities.expect("they are declared")
+    };
+    assert!((of("rec709.exr").red.0 - 0.64).abs() < 1e-6 && (of("out.exr").red.0 - 0.713).abs() < 1e-6);
+    let raw = ::exr::prelude::read_first_flat_layer_from_file(folder.path("out.exr")).expect("it is an EXR");
+    let stored = raw.layer_data.channel_data.list.iter().find(|channel| channel.name.to_string() == "Noisy.R");
+    let stored: Vec<f32> = stored.expect("it is there").sample_data.values_as_f32().collect();
+    let ((rec709, _), (read, _)) = (folder.read("rec709.exr"), folder.read("out.exr"));
+    let plane = |set: &LayerSet, name: &str| set.get("Noisy").expect(name).plane(name).expect(name).values.clone();
+    let [r, g, b] = ["R", "G", "B"].map(|name| plane(&rec709, name));
+    for pixel in 0..stored.len() {
+        let wanted = 0.613_097 * r[pixel] + 0.339_523 * g[pixel] + 0.047_379 * b[pixel];
+        assert!((stored[pixel] - wanted).abs() <= 1e-4 * wanted.abs().max(1e-3), "{} {wanted}", stored[pixel]);
+    }
+    for layer in &rec709.layers {
+        let found = read.get(&layer.name).expect("it is there");
+        for (plane, other) in layer.planes.iter().zip(&found.planes) {
+            for (a, b) in plane.values.iter().zip(&other.values) {
+                assert!((a - b).abs() <= 1e-4 * a.abs().max(1e-2), "{}: {a} {b}", layer.name);
+            }
+        }
+    }
+}
+
 /// Each layer is a part, of the layer's name, and half floats hold what they suffice for. All layers read back.
 #[test]
 fn layers_can_be_parts_and_half_floats() {

@@ -73,6 +73,7 @@ class Image:
         compression: Literal["zip", "zips", "piz", "none"] = "zip",
         half: bool = False,
         multi_part: bool = False,
+        colorspace: Literal["rec709", "acescg"] = "rec709",
         exposure: float = 0.0,
         tonemap: Literal["agx", "filmic", "neutral", "srgb"] = "agx",
     ) -> None: ...

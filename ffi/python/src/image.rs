@@ -174,10 +174,12 @@ impl Image {
     /// compression   of the EXR: 'zip', 'zips', 'piz' or 'none'; all are lossless
     /// half          store layers for which half floats suffice as such: the picture, its finished parts, albedo, normals
     /// multi_part    store each layer as a part of the EXR, for programs that unpack all channels of a part
+    /// colorspace    of the EXR: 'rec709' or 'acescg'
     /// exposure      of the PNG, stops
     /// tonemap       of the PNG: 'agx', 'filmic', 'neutral' or 'srgb'
     #[pyo3(signature = (
-        path, *, compression = "zip", half = false, multi_part = false, exposure = 0.0, tonemap = "agx"
+        path, *, compression = "zip", half = false, multi_part = false, colorspace = "rec709", exposure = 0.0,
+        tonemap = "agx"
     ))]
     #[expect(clippy::too_many_arguments, reason = "they are those of Python's signature")]
     fn save(
@@ -187,16 +189,18 @@ impl Image {
         compression: &str,
         half: bool,
         multi_part: bool,
+        colorspace: &str,
         exposure: f32,
         tonemap: &str,
     ) -> PyResult<()> {
         let compression = choice("save: compression", compression)?;
+        let colour_space = choice("save: colorspace", colorspace)?;
         let curve = choice("save: tonemap", tonemap)?;
         let is = |extension: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension));
         let set = &self.set;
         let written = py.detach(|| match () {
             () if is("exr") => {
-                let options = exr::Options { compression, half, multi_part, ..exr::Options::default() };
+                let options = exr::Options { compression, half, multi_part, colour_space, ..exr::Options::default() };
                 exr::write_followed(&path, set, &self.attributes, options, |file| {
                     self.sums.as_ref().map_or(Ok(()), |sums| sums.write(file))
                 })

@@ -4,6 +4,7 @@
 //! equal layers and attributes give equal bytes with any number of threads. The reader takes every flat EXR that the
 //! `exr` crate decodes.
 
+mod colour_space;
 mod header;
 mod read;
 mod write;
@@ -11,6 +12,7 @@ mod zip;
 
 use std::collections::BTreeMap;
 
+pub use colour_space::ColourSpace;
 pub use read::{read, read_header, read_layers};
 pub use write::{Compression, Options, write, write_followed};
 

@@ -13,6 +13,7 @@ use exr::meta::header::Header;
 use exr::prelude::f16;
 use rayon::prelude::*;
 
+use super::colour_space::convert_to_rec_709;
 use super::{Attributes, zip};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{Layer, LayerSet, Plane, Sample};
@@ -25,7 +26,7 @@ use crate::memory;
 /// with mip maps is read. A channel `a.b.C` is the component `C` of the layer `a.b`; root channels `R G B A` (or `Y`) are
 /// the layer with the empty name, any other root channel `Q` is the layer `Q` with the component `Q`. In a file of several
 /// parts the part's name is prefixed to channels that do not contain it; only root channels of the first part stay at the
-/// root. Never panics.
+/// root. Pictures are converted to linear Rec. 709 from the chromaticities that the header declares. Never panics.
 ///
 /// # Errors
 /// The file cannot be opened, is malformed, deep or subsampled, or declares more pixels than its length can hold.
@@ -110,7 +111,9 @@ fn decode(file: BufReader<File>, length: u64, wanted: &dyn Fn(&str) -> bool) -> 
         }
         blocks = next;
     }
-    Ok((canvas.into_layers(&meta.headers, wanted), attributes(&meta.headers)))
+    let mut set = canvas.into_layers(&meta.headers, wanted);
+    convert_to_rec_709(&mut set, meta.headers[0].shared_attributes.chromaticities.as_ref());
+    Ok((set, attributes(&meta.headers)))
 }
 
 /// Whether the layer of each channel is wanted, by part and by channel.

@@ -10,13 +10,13 @@ use exr::block::writer::ChunksWriter;
 use exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
 use exr::math::Vec2;
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, Chromaticities, Compression as Packing, IntegerBounds, LineOrder, SampleType,
-    Text, TimeCode,
+    AttributeValue, ChannelDescription, Compression as Packing, IntegerBounds, LineOrder, SampleType, Text, TimeCode,
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::{SmallVec, f16};
 use rayon::prelude::*;
 
+use super::colour_space::ColourSpace;
 use super::{Attributes, Frame, SOFTWARE, header, zip};
 use crate::error::{Error, ErrorKind, Result};
 use crate::film::{LayerSet, Naming, Plane, Sample, check_names};
@@ -50,6 +50,8 @@ pub struct Options {
     pub half: bool,
     /// Whether each layer is a part of its own, so that readers unpack only what they need.
     pub multi_part: bool,
+    /// Colour space of the pictures.
+    pub colour_space: ColourSpace,
 }
 
 /// Writes all layers and attributes to `path`, atomically (see [`atomic::write`]). Compresses on the current rayon
@@ -74,6 +76,8 @@ pub fn write_followed(
     tail: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
 ) -> Result<()> {
     check_names(set, options.naming).map_err(|error| error.within(path.display()))?;
+    let converted = options.colour_space.converted(set);
+    let set = converted.as_ref().unwrap_or(set);
     let parts = parts(set, options);
     let channels: usize = parts.iter().map(|part| part.channels.len()).sum();
     if channels == 0 || set.pixels() == 0 {
@@ -185,7 +189,7 @@ fn header(set: &LayerSet, part: &Part<'_>, attributes: &Attributes, options: Opt
         ScanLines,
         LineOrder::Increasing,
     );
-    header.shared_attributes.chromaticities = Some(REC_709);
+    header.shared_attributes.chromaticities = Some(options.colour_space.chromaticities());
     if let Some(Frame { display: [width, height], corner: [x, y], world_to_camera, world_to_ndc }) = attributes.frame {
         header.shared_attributes.display_window = IntegerBounds::from_dimensions(Vec2(width as usize, height as usize));
         own.layer_position = Vec2(x as i32, y as i32);
@@ -207,10 +211,6 @@ fn header(set: &LayerSet, part: &Part<'_>, attributes: &Attributes, options: Opt
         });
     Ok(header.with_attributes(own))
 }
-
-/// Chromaticities of the primaries and the white point of Rec. 709.
-const REC_709: Chromaticities =
-    Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.3, 0.6), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.329) };
 
 /// Compresses batches of blocks, groups of scan lines, in parallel and writes them in order.
 fn write_chunks(
