@@ -19,4 +19,12 @@ def blur(figures):
     return table(["method", "error, blurred", "error, still", "mean over that of `bdpt`"], rows)
 
 
-KINDS = {"blur": blur, "blur-cost": blur_cost}
+def blur_peers(figures):
+    """Table of the errors of delivered pictures of a blurred shot, by renderer."""
+    head = ["renderer", "core-seconds", "relMSE", "trimmed", "FLIP", "mean over the reference's"]
+    keys = ("core_seconds", "relmse", "relmse_trimmed", "flip", "mean_ratio")
+    rows = figures.one("blur_peers")["rows"]
+    return table(head, [[name, *(digits(row[key]) for key in keys)] for name, row in rows.items()])
+
+
+KINDS = {"blur": blur, "blur-cost": blur_cost, "blur-peers": blur_peers}

@@ -6,7 +6,6 @@ top left h/2 x w/2 pixels, random explicit weights of a window of K and the resu
 """
 
 import argparse
-import pathlib
 
 import numpy as np
 import torch
@@ -15,9 +14,9 @@ from . import combination
 from . import export_network
 from . import model
 from . import normalise
+from ..record import ROOT
 
-HERE = pathlib.Path(__file__).parent
-TARGET = HERE / "../../src/combine/testdata/contract.f32"
+TARGET = ROOT / "src" / "combine" / "testdata" / "contract.f32"
 H, W, K = 16, 22, 5
 
 
@@ -67,9 +66,8 @@ def main():
     parts = [np.array([m, H, W, f, K]), *(crop[k] for k in ("levels", "variances", "albedo", "normal", "depth"))]
     parts += [image, features.numpy(), rgb(expected), rgb(network), weights.numpy(), rgb(kernel)]
     data = np.concatenate([np.asarray(p, "<f4").ravel() for p in parts])
-    TARGET.parent.mkdir(exist_ok=True)
     data.astype("<f4").tofile(TARGET)
-    print(f"{TARGET.resolve()}: {data.nbytes} bytes")
+    print(f"{TARGET}: {data.nbytes} bytes")
 
 
 if __name__ == "__main__":
