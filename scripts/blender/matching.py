@@ -182,6 +182,7 @@ class _Match:
         g = self.graph
         under, gloss = BLACK, BLACK
         shiny = [(lobe, part) for lobe, part, matt in zip(lobes, parts, diffuse) if not matt]
+        dull = [(lobe, part) for lobe, part, matt in zip(lobes, parts, diffuse) if matt]
         for lobe, part, matt in zip(lobes, parts, diffuse):
             # Undo the metal's rise at grazing angles.
             colour = lobe.base if matt else g.add(g.multiply(lobe.base, 20 / 21), 1 / 21)
@@ -193,8 +194,8 @@ class _Match:
         rest = g.subtract(1.0, strongest)
         first = shiny[0][0]
         return Lobe(
-            diffuse_roughness=self._sum(*zip(*((lobe.diffuse_roughness, part) for lobe, part, matt
-                                               in zip(lobes, parts, diffuse) if matt))),
+            diffuse_roughness=self._sum([lobe.diffuse_roughness for lobe, _ in dull], [part for _, part in dull])
+            if dull else Lobe.diffuse_roughness,
             base=g.clamp(g.divide(under, rest if is_constant(rest) else g.maximum(rest, 1e-3))),
             roughness=self._sum([lobe.roughness for lobe, _ in shiny], [part for _, part in shiny]),
             ior=0.0, specular=strongest, specular_colour=g.divide(gloss, g.maximum(strongest, 1e-6)),

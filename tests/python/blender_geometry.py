@@ -186,7 +186,7 @@ class Geometry(cycles_comparison.CyclesComparison):
         self.look(6)
         warnings = export.write(self.path)
         self.assertEqual(len(warnings), 4, warnings)
-        for what, said in zip(('"hair": hair curves are', '"linked": light linking', '"nodes": its modifier "nodes" has an '
+        for what, said in zip(('"hair": hair curves are', '"linked": its light linking', '"nodes": its modifier "nodes" has an '
                                'Is Viewport node', '"out": it is a holdout'), sorted(warnings)):
             self.assertIn("object " + what, said)
 
