@@ -1,7 +1,7 @@
 """Renders the training data of the combiner: random scenes in families, at the lowest priority. A repeated run
 continues where the last one stopped, and renders with the same copy of the program.
 
-It takes about six core-hours on one thread; training can start on the views that are finished.
+It takes about eight core-hours on one thread; training can start on the views that are finished.
 """
 
 import os
