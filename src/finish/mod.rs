@@ -119,7 +119,7 @@ impl ErrorSource {
     /// The pictures in a file. `header` holds its layers, with or without values; `read` reads the named ones.
     ///
     /// # Errors
-    /// Those of `read`.
+    /// Errors of `read`.
     pub fn read(header: &LayerSet, read: impl FnOnce(&[String]) -> Result<LayerSet>) -> Result<Option<ErrorSource>> {
         let level = own_level(header);
         let quarters = (1..=QUARTERS).map(|k| format!("Quarter{k}"));

@@ -27,7 +27,7 @@ const MAX_PICTURE_ANGLE: f32 = 1.55;
 /// Share of the largest value in a cell that its weight has at least, so that no direction with light is too improbable.
 const PEAK_SHARE: f64 = 0.05;
 
-/// What a light shines with in each direction, relative to its intensity.
+/// Radiation pattern of a light: its emission in each direction, relative to its intensity.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pattern {
     /// A measured photometric profile.
@@ -242,7 +242,7 @@ impl Distribution {
         Some(Distribution { pattern: Arc::clone(pattern), cone, grid, flux: flux.as_vec3(), peak, reach })
     }
 
-    /// What the light shines with, before the cone limits it.
+    /// The radiation pattern, before the cone limits it.
     pub fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }

@@ -181,7 +181,7 @@ mod tests {
         }
     }
 
-    /// Whatever scatters first, all of the light is in some layers.
+    /// All of the light is in some layers, for every kind of first scattering.
     #[test]
     fn all_light_is_in_some_layer() {
         let shares = [Rgb::new(0.5, 0.25, 0.0), Rgb::new(0.25, 0.5, 1.0), Rgb::new(0.25, 0.25, 0.0)];

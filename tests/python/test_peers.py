@@ -33,6 +33,13 @@ def drive(name, scene, target, mode="path", budget=2.0):
     return said
 
 
+def render_reference(scene, out):
+    """Renders a scene by bdpt, without a finish."""
+    size = ["--width", SIZE[0], "--height", SIZE[1], "--iterations", 300]
+    line = ["render", scene, "-o", out, "--method", "bdpt", *size]
+    support.run([*line, "--no-combine", "--layers", "beauty", "--progress", "none"])
+
+
 def off(picture, truth):
     """Relative deviation of a picture's mean from the truth's, and its standard error."""
     noise = np.sqrt(np.square(picture - truth).mean(-1).sum()) / truth.mean(-1).sum()
@@ -120,27 +127,7 @@ if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
     class Installed(support.Scratch):
         def test_all_renderers_render_the_scene_as_caustique_does(self):
             scene, truth = support.ROOT / "scenes" / "blocks.glb", self.dir / "truth.exr"
-            support.run(
-                [
-                    "render",
-                    scene,
-                    "-o",
-                    truth,
-                    "--method",
-                    "bdpt",
-                    "--width",
-                    SIZE[0],
-                    "--height",
-                    SIZE[1],
-                    "--iterations",
-                    300,
-                    "--no-combine",
-                    "--layers",
-                    "beauty",
-                    "--progress",
-                    "none",
-                ]
-            )
+            render_reference(scene, truth)
             truth = pictures.read(truth).astype(float)
             for name, mode in [("mitsuba", "path"), ("luxcore", "path"), ("luxcore", "bidir"), ("cycles", "path")]:
                 with self.subTest(name=name, mode=mode):
@@ -172,27 +159,7 @@ if (PEERS / ".complete").exists() and (PEERS / "bpy" / ".complete").exists():
             ]:
                 file, exr = self.dir / f"{name}.glb", self.dir / f"{name}.exr"
                 scene.write(file)
-                support.run(
-                    [
-                        "render",
-                        file,
-                        "-o",
-                        exr,
-                        "--method",
-                        "bdpt",
-                        "--width",
-                        SIZE[0],
-                        "--height",
-                        SIZE[1],
-                        "--iterations",
-                        300,
-                        "--no-combine",
-                        "--layers",
-                        "beauty",
-                        "--progress",
-                        "none",
-                    ]
-                )
+                render_reference(file, exr)
                 truth = pictures.read(exr).astype(float)
                 for peer in peers:
                     with self.subTest(scene=name, peer=peer):

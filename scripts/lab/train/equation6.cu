@@ -15,7 +15,7 @@ struct Shape {
 __device__ inline float exp_minus(float x) { return expf(-x); }
 __device__ inline double exp_minus(double x) { return exp(-x); }
 
-// Calls f(v, u, neighbour, length) for all neighbours of pixel p inside the picture.
+// Calls f(v, u, neighbour) for all neighbours of pixel p inside the picture.
 template <class F>
 __device__ void each_neighbour(const Shape& s, long p, F f) {
     const long r = s.window / 2, y = p / s.width, x = p % s.width;

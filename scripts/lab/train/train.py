@@ -139,7 +139,6 @@ class Run:
             "steps": self.step,
             "schedule": self.args.steps,
             "seconds": self.seconds,
-            "finished": self.progress() == 1,
             "machines": self.machines,
             "data": f"{len({item[0] for item in views.files(self.args.data, False)})} views of {self.args.data.name}",
         }
