@@ -1,7 +1,8 @@
 """Renders the training data of the combiner: random scenes in families, at the lowest priority. A repeated run
 continues where the last one stopped, and renders with the same copy of the program.
 
-It takes about eight core-hours on one thread; training can start on the views that are finished.
+A view takes about a core-minute, of one thread. Training can start on the views that are finished. With --part 1/2 and
+--part 2/2, two runs render different views at the same time.
 """
 
 import os
@@ -18,12 +19,23 @@ def add_arguments(parser):
     parser.add_argument("--folder", type=Path, default=FOLDER, help=f"folder of the data [default: {FOLDER}]")
     parser.add_argument("--views", type=int, default=5, help="views of each family [default: 5]")
     parser.add_argument("--only", help="a family to render alone")
+    parser.add_argument("--part", type=part, default=(1, 1), help="I/N: every Nth view, from the Ith on [default: 1/1]")
+
+
+def part(text):
+    """The numbers of I/N."""
+    one, many = map(int, text.split("/"))
+    if not 1 <= one <= many:
+        raise ValueError(text)
+    return one, many
 
 
 def main():
     os.nice(19)
     maker = data.Maker(options.folder, BIN)
-    chosen = [view for view in data.views(options.folder, options.views) if options.only in (None, view.family)]
+    first, step = options.part
+    chosen = data.views(options.folder, options.views)[first - 1 :: step]
+    chosen = [view for view in chosen if options.only in (None, view.family)]
     done = data.manifest(options.folder)
     for view in chosen:
         if view.name in done:

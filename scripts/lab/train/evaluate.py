@@ -17,7 +17,7 @@ from . import combination, export_network, views
 
 # Share of the pixels that the trimmed error leaves out: those with the largest noise of the target and of Level4.
 TRIMMED = 0.005
-# Snapshots that are evaluated.
+# Snapshots that are evaluated, of those that a view has.
 SNAPSHOTS = (0, 2, 4)
 # Least error for geometric means, because an estimate of a small error can be negative.
 LEAST = 1e-6
@@ -48,6 +48,11 @@ def errors(net, arrays, k, device="cpu"):
     return [trimmed_mean(pixel_errors(picture, halves), order) for picture in (combined, usual, finished)]
 
 
+def evaluated(arrays):
+    """The numbers of the snapshots of a stack that are evaluated."""
+    return [k for k in SNAPSHOTS if k < len(arrays["iterations"])]
+
+
 def validate(net, folder, methods, paths, device="cpu", most=60):
     """Geometric means over at most `most` held-out snapshots: the error of the combination relative to Level4 and to
     the finished picture, by method; and the number of snapshots."""
@@ -59,7 +64,7 @@ def validate(net, folder, methods, paths, device="cpu", most=60):
         rows = []
         for item in items:
             arrays = views.read(item)
-            rows += [errors(net, arrays, k, device) for k in SNAPSHOTS]
+            rows += [errors(net, arrays, k, device) for k in evaluated(arrays)]
         if rows:
             logs = np.log(rows)
             found[f"{method}_to_level4"] = round(float(np.exp((logs[:, 0] - logs[:, 1]).mean())), 4)
@@ -82,7 +87,7 @@ def main():
     ratios = []
     for item in views.files(args.data, True, args.methods, args.paths, net.pairs):
         arrays = views.read(item)
-        for k in SNAPSHOTS:
+        for k in evaluated(arrays):
             row = errors(net, arrays, k)
             ratios.append([row[0] / row[1], row[0] / row[2]])
             values = "".join(f"{value:12.5f}" for value in row)
