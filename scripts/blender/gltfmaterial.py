@@ -120,6 +120,9 @@ class _Entry:
     def image(self, what, *layers):
         return self.writer.image(numpy.dstack(layers), f"{self.name} {what}", self.texcoord)
 
+    def grey_image(self, what, layer):
+        return self.image(what, layer, layer, layer)
+
     def size(self, *names):
         return next(len(self.channels[n]) for n in names if isinstance(self.channels[n], numpy.ndarray))
 
@@ -174,6 +177,8 @@ class _Entry:
             pbr.pop("metallicRoughnessTexture", None)
         if self.factor("diffuse_roughness") > 0:
             self.own(diffuse_roughness=self.factor("diffuse_roughness"))
+            if self.varies("diffuse_roughness"):
+                self.own(diffuse_roughness_texture=self.grey_image("diffuse roughness", self.channels["diffuse_roughness"]))
         if self.factor("sheet") > 0:
             content = {"diffuseTransmissionFactor": self.factor("sheet"),
                        "diffuseTransmissionColorFactor": list(self.factor("sheet_colour", (1.0,) * 3))}
@@ -233,11 +238,12 @@ class _Entry:
                                     numpy.ones((size, size)))
                 content["clearcoatTexture"] = content["clearcoatRoughnessTexture"] = shared
             self.extension("clearcoat", content)
-            if abs(self.factor("coat_ior") - 1.5) > 1e-6:
-                self.own(coat_ior=self.factor("coat_ior"))
+            self._coat_ior()
             colour = self.factor("coat_colour", (1.0,) * 3)
             if min(colour) < 1:
                 self.own(coat_color=[min(max(c, 0.0), 1.0) for c in colour])
+            if self.varies("coat_colour"):
+                self.own(coat_color_texture=self.image("coat color", srgb(self.channels["coat_colour"])))
         sheen = self.factor("sheen", (1.0,) * 3)
         if max(sheen) > 0:
             content = {"sheenColorFactor": [min(c, 1.0) for c in sheen],
@@ -249,6 +255,15 @@ class _Entry:
                 content["sheenColorTexture"] = content["sheenRoughnessTexture"] = shared
             self.extension("sheen", content)
             self.own(sheen_model="fibers")
+
+    def _coat_ior(self):
+        """Write the index of the coat; with a texture, its largest one, and 1 where the texture is black."""
+        index = self.channels["coat_ior"]
+        if self.varies("coat_ior"):
+            largest = max(float(index.max()), 1.0 + 1e-3)
+            self.own(coat_ior=largest, coat_ior_texture=self.grey_image("coat index", (index - 1) / (largest - 1)))
+        elif abs(self.factor("coat_ior") - 1.5) > 1e-6:
+            self.own(coat_ior=self.factor("coat_ior"))
 
     def _emission(self):
         """Split emission above one into a strength and an image with values up to one."""

@@ -47,7 +47,7 @@ class Lobe:
     strength: object = 0.0
     sheet: object = 0.0  # share of the diffuse light that leaves on the other side, and its colour
     sheet_colour: object = WHITE
-    subsurface: object = None  # the subsurface.Subsurface behind the surface; `sheet` is then the share of light that enters
+    subsurface: object = None  # subsurface.Subsurface behind the surface: `sheet` of the light enters, of `sheet_colour` it leaves
     thin: bool = False
     faceted: bool = True  # roughness and anisotropy have an effect
 
@@ -124,13 +124,12 @@ class Reader:
         inputs, entry = inputs_and_entry
         values = [[1.4 if value is None else value for value in given]
                   for given in ((self.get(leaf, name) for name in inputs), entry)]
-        lobe.subsurface = subsurface.read(lobe.base, weight, *values, surface, method)
+        lobe.subsurface = subsurface.read(lobe.base, *values, surface, method)
         if lobe.subsurface is not None:
-            lobe.sheet = weight
-        elif not is_constant(lobe.base):
-            self.say("subsurface scattering is carried where its colour is constant: its light leaves where it arrives")
-        else:
-            self.say("subsurface scattering is carried where its inputs are constant: its light leaves where it arrives")
+            lobe.sheet, lobe.sheet_colour = weight, lobe.base
+        elif lobe.base != BLACK:
+            self.say("subsurface scattering is carried where its radius, index and anisotropy are constant: its light "
+                     "leaves where it arrives")
 
     def _translucent(self, leaf):
         return Lobe(sheet=1.0, sheet_colour=self.get(leaf, "Color"), normal=self.normal(leaf), faceted=False)

@@ -138,19 +138,35 @@ class _Match:
             whole = 1.0
         parts = [g.divide(part, whole) for _, part in lobes]
         lobes = [lobe for lobe, _ in lobes]
-        if any(lobe.subsurface is not None for lobe in lobes):
-            self.say("subsurface scattering is not carried in mixes of shaders: its light leaves where it arrives")
+        inside = self._inside(lobes)
+        if inside is None:
             lobes = [replace(lobe, subsurface=None, sheet=0.0) if lobe.subsurface is not None else lobe for lobe in lobes]
         diffuse = [kind in _DIFFUSE for kind in kinds]
-        if all(kind in _DIFFUSE | _GLOSSY for kind in kinds) and not all(diffuse):
+        if inside is None and all(kind in _DIFFUSE | _GLOSSY for kind in kinds) and not all(diffuse):
             found = self._under_constant_gloss(lobes, parts, diffuse)
         else:
             found = self._mean(lobes, parts)
+        found.subsurface = inside
         found.base = g.multiply(found.base, whole)
         if found.specular != 0.0 and whole != 1.0:
             found.specular = g.multiply(found.specular, g.minimum(whole, 1.0))
         found.normal = self._normal(lobes, parts)
         return found
+
+    def _inside(self, lobes):
+        """The subsurface.Subsurface of mixed shaders, or None."""
+        found = [lobe.subsurface for lobe in lobes if lobe.subsurface is not None]
+        if not found:
+            return None
+        if any(lobe.subsurface is None and lobe.sheet != 0.0 for lobe in lobes):
+            self.say("subsurface scattering is not carried beside Translucent shaders: its light leaves where it arrives")
+            return None
+        if any(lobe.transmission != 0.0 for lobe in lobes):
+            self.say("subsurface scattering is not carried beside transmission: its light leaves where it arrives")
+            return None
+        if any(other != found[0] for other in found):
+            self.say("its mixed shaders differ in their subsurface scattering: that of the first is taken")
+        return found[0]
 
     @staticmethod
     def _is_dark_gloss(lobe, kind):

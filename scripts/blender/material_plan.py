@@ -34,7 +34,7 @@ _UNBAKED_DEFAULTS = {  # values of varying quantities if nothing may be baked
     "sheen": (0.0,) * 3, "sheen_roughness": 0.5, "anisotropy": 0.0, "normal": None, "sheet": 0.0,
     "sheet_colour": (1.0,) * 3, "diffuse_roughness": 0.0, "coat_ior": 1.5, "coat_colour": (1.0,) * 3,
 }
-_MEANS = ("ior", "diffuse_roughness", "coat_ior", "coat_colour")  # quantities that have no texture
+_MEANS = ("ior",)  # quantities that have no texture
 _MIN_ROUGH_METAL = 0.05  # share of texels that is worth a warning
 _STEEP_COSINE, _OLD_STEEP_COSINE = 0.75, 0.97  # between the shading and the surface normal; the latter before Blender 4.5
 _MIN_STEEP = 0.01  # share of texels that is worth a warning
@@ -94,7 +94,7 @@ class Plan:
             self._drop_varying(values, varying)
             varying = []
         self.channels = {n: PLAIN if n in self.links else v for n, v in values.items()} | {"subsurface": inside}
-        self.unbaked = {n: _UNBAKED_DEFAULTS.get(n, 0.0) if n in varying else v for n, v in self.channels.items()}
+        self.unbaked = {n: self._unbaked(n) if n in varying else v for n, v in self.channels.items()}
         for name, parts in _PASSES.items():
             if any(part in varying for part in parts):
                 self.passes[name] = self._pack(name, parts, values)
@@ -197,7 +197,13 @@ class Plan:
             source = value.node.bl_label if isinstance(value, bpy.types.NodeSocket) else "Displacement"
             self.say(f"{_DISPLAY_NAMES[name]} comes from a {source} node and is not baked: "
                      "leave out --no-bake to carry it")
-            values[name] = _UNBAKED_DEFAULTS.get(name)
+            values[name] = self._unbaked(name)
+
+    def _unbaked(self, name):
+        """The constant that stands for a quantity that varies where nothing may be baked."""
+        if name == "sheet_colour" and self.matched.subsurface is not None:
+            name = "base"
+        return _UNBAKED_DEFAULTS.get(name, 0.0)
 
     def _pack(self, name, parts, values):
         if name == "normal":

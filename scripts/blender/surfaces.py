@@ -106,7 +106,14 @@ class Surfaces:
         if inside is not None and not closed:
             self.warn(f'material "{surface.material.name}"',
                       "its subsurface scattering needs closed meshes: its light leaves where it arrives")
+            if channels["base"] is not gltfmaterial.PLAIN:
+                channels = {**channels, "base": subsurface.at_surface(channels)}
             channels, inside = {**channels, "sheet": 0.0}, None
+        if inside is not None:
+            plain = channels["base"] is gltfmaterial.PLAIN
+            inside, tint = subsurface.medium(inside, channels["sheet_colour"], channels["sheet"],
+                                             channels["sheet_colour" if plain else "base"])
+            channels = {**channels, "sheet_colour": tint}
         gltfmaterial.write(entry, channels, writer, surface.texcoord)
         shading.finish(entry, surface.material, closed, least, self.warn)
         if inside is not None:

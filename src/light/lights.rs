@@ -51,18 +51,22 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
     let area = 0.5 * (b - a).cross(c - a).length();
     // The mean over a few points suffices to select a light; a sample's radiance is looked up exactly.
     let probes = [[1.0 / 3.0, 1.0 / 3.0], [0.6, 0.2], [0.2, 0.6], [0.2, 0.2]];
-    let (mut radiance, mut plane, mut coat) = (Rgb::ZERO, Vec4::ZERO, 0.0);
+    let (mut radiance, mut plane, mut coat, mut coat_ior) = (Rgb::ZERO, Vec4::ZERO, 0.0, 0.0);
     for barycentric in probes {
         if let Some(surface) = shapes.surface(instance, primitive, barycentric) {
             plane = surface.ng.extend(surface.ng.dot(surface.p));
             radiance += material.emitted(&surface, &materials.textures) / probes.len() as f32;
             coat += material.coat(&surface, &materials.textures) / probes.len() as f32;
+            coat_ior += material.coat_ior(&surface, &materials.textures) / probes.len() as f32;
         }
     }
     if material.unlit {
         coat = 0.0;
     }
-    let textured = material.unlit || material.emission_texture.is_some();
+    if material.clearcoat_ior_texture.is_none() {
+        coat_ior = material.clearcoat_ior;
+    }
+    let textured = material.has_textured_emission();
     let uniform = !textured && matches!(material.alpha, Alpha::Opaque);
     if uniform {
         radiance = material.emission;
@@ -81,7 +85,7 @@ fn triangle_emitter(shapes: &Shapes, materials: &Materials, instance: u32, primi
         area,
         two_sided: material.double_sided,
         radiance,
-        spread: Spread::new(material.spread).below_coat(coat, material.clearcoat_ior),
+        spread: Spread::new(material.spread).below_coat(coat, coat_ior),
         plane,
         corners,
         error: position_error(&corners),

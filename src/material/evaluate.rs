@@ -1,7 +1,7 @@
 //! Evaluates materials at a surface point: factors times textures, as the glTF specification defines.
 
 use super::Material;
-use crate::bsdf::Parameters;
+use crate::bsdf::{Parameters, mean_path};
 use crate::geometry::Surface;
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, sqr};
 use crate::texture::{Texture, TextureRef};
@@ -75,6 +75,7 @@ impl Material {
     /// Whether no texture affects the interface, so that all surfaces of the material can share one.
     pub fn has_plain_interface(&self) -> bool {
         let textures = [
+            &self.diffuse_roughness_texture,
             &self.metallic_roughness_texture,
             &self.anisotropy_texture,
             &self.diffuse_transmission_texture,
@@ -85,6 +86,8 @@ impl Material {
             &self.iridescence_thickness_texture,
             &self.clearcoat_texture,
             &self.clearcoat_roughness_texture,
+            &self.clearcoat_ior_texture,
+            &self.clearcoat_color_texture,
             &self.sheen_color_texture,
             &self.sheen_roughness_texture,
         ];
@@ -110,6 +113,9 @@ impl Material {
             specular_color: self.specular_color.max(Rgb::ZERO),
             ..Parameters::default()
         };
+        if p.diffuse_roughness > 0.0 && self.diffuse_roughness_texture.is_some() {
+            p.diffuse_roughness *= unit(look_up(&self.diffuse_roughness_texture, surface, textures).x);
+        }
         let mut roughness = unit(self.roughness);
         if self.metallic_roughness_texture.is_some() {
             roughness *= unit(look_up(&self.metallic_roughness_texture, surface, textures).y);
@@ -141,7 +147,8 @@ impl Material {
             p.clearcoat = self.coat(surface, textures);
             let texel = look_up(&self.clearcoat_roughness_texture, surface, textures);
             p.clearcoat_alpha = sqr(unit(self.clearcoat_roughness) * unit(texel.y));
-            (p.clearcoat_eta, p.clearcoat_color) = (self.clearcoat_ior, unit_color(self.clearcoat_color));
+            p.clearcoat_eta = self.coat_ior(surface, textures);
+            p.clearcoat_color = self.coat_color(surface, textures);
         }
         if self.sheen_color.max_element() > 0.0 {
             let texel = look_up(&self.sheen_color_texture, surface, textures);
@@ -200,16 +207,67 @@ impl Material {
         unit(self.clearcoat) * unit(look_up(&self.clearcoat_texture, surface, textures).x)
     }
 
+    /// Index of refraction of the clear coat at a surface point, at least 1.
+    #[inline]
+    pub fn coat_ior(&self, surface: &Surface, textures: &[Texture]) -> f32 {
+        match self.clearcoat_ior_texture {
+            None => self.clearcoat_ior,
+            texture => 1.0 + (self.clearcoat_ior - 1.0) * unit(look_up(&texture, surface, textures).x),
+        }
+    }
+
+    /// Colour of the clear coat at a surface point, each channel 0 to 1.
+    #[inline]
+    fn coat_color(&self, surface: &Surface, textures: &[Texture]) -> Rgb {
+        let color = unit_color(self.clearcoat_color);
+        match self.clearcoat_color_texture {
+            None => color,
+            texture => color * unit_color(look_up(&texture, surface, textures).truncate()),
+        }
+    }
+
+    /// Whether textures change the tint that the clear coat gives to the emission below it, which the emission itself
+    /// does not include then.
+    pub fn has_textured_tint(&self) -> bool {
+        let by_path = self.clearcoat_ior_texture.is_some() && self.clearcoat_color != Rgb::ONE;
+        self.clearcoat > 0.0 && (self.clearcoat_color_texture.is_some() || by_path)
+    }
+
+    /// Whether the radiance that surfaces emit varies with textures.
+    pub fn has_textured_emission(&self) -> bool {
+        self.unlit || self.emission_texture.is_some() || self.has_textured_tint()
+    }
+
+    /// The share of emitted light that passes a clear coat of this strength, index and colour once. It does not depend
+    /// on the direction, because light is taken along its mean path in the coat.
+    fn coat_tint(coat: f32, ior: f32, color: Rgb) -> Rgb {
+        let path = 0.5 * mean_path(ior);
+        color.map(|c| 1.0 + (c.powf(path) - 1.0) * coat)
+    }
+
+    /// Lets the coat's colour tint the emission, unless textures change the tint, which [`Material::emitted`] then
+    /// applies at each point.
+    pub fn tint_emission(&mut self) {
+        if !self.has_textured_tint() {
+            self.emission *= Material::coat_tint(self.clearcoat, self.clearcoat_ior, self.clearcoat_color);
+        }
+    }
+
     /// Emitted radiance (W/sr/m2), before the clear coat attenuates it. Unlit materials emit their base colour.
     #[inline]
     pub fn emitted(&self, surface: &Surface, textures: &[Texture]) -> Rgb {
         if self.unlit {
             return self.base(surface, textures).truncate();
         }
-        if self.emission_texture.is_none() {
+        if !self.has_textured_emission() {
             return self.emission;
         }
-        self.emission * look_up(&self.emission_texture, surface, textures).truncate()
+        let emitted = self.emission * look_up(&self.emission_texture, surface, textures).truncate();
+        if !self.has_textured_tint() {
+            return emitted;
+        }
+        let (ior, color) = (self.coat_ior(surface, textures), self.coat_color(surface, textures));
+        emitted * Material::coat_tint(self.coat(surface, textures), ior, color)
     }
 }
 

@@ -111,6 +111,7 @@ impl Material {
     pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
         [
             self.base_color_texture,
+            self.diffuse_roughness_texture,
             self.metallic_roughness_texture,
             self.normal_texture.map(|(texture, _)| texture),
             self.emission_texture,
@@ -123,6 +124,8 @@ impl Material {
             self.iridescence_thickness_texture,
             self.clearcoat_texture,
             self.clearcoat_roughness_texture,
+            self.clearcoat_ior_texture,
+            self.clearcoat_color_texture,
             self.clearcoat_normal_texture.map(|(texture, _)| texture),
             self.sheen_color_texture,
             self.sheen_roughness_texture,

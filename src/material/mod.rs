@@ -36,6 +36,8 @@ pub struct Material {
     pub base_color_texture: Option<TextureRef>,
     /// Roughness of diffuse reflection, 0 (Lambertian) to 1.
     pub diffuse_roughness: f32,
+    /// Texture of the roughness of diffuse reflection, in R.
+    pub diffuse_roughness_texture: Option<TextureRef>,
     /// Metalness, 0 (dielectric) to 1 (metal).
     pub metallic: f32,
     /// Perceptual roughness, 0 to 1; the GGX alpha is its square.
@@ -109,10 +111,14 @@ pub struct Material {
     pub clearcoat_texture: Option<TextureRef>,
     /// Perceptual roughness of the clear coat, 0 to 1.
     pub clearcoat_roughness: f32,
-    /// Index of refraction of the clear coat, at least 1.
+    /// Index of refraction of the clear coat, at least 1, where its texture is 1 or there is none.
     pub clearcoat_ior: f32,
+    /// Texture of the index of refraction of the clear coat, which is 1 where the texture is 0, in R.
+    pub clearcoat_ior_texture: Option<TextureRef>,
     /// Colour of light that passes the clear coat in and out along its normal; white absorbs nothing.
     pub clearcoat_color: Rgb,
+    /// Texture of the colour of the clear coat (sRGB).
+    pub clearcoat_color_texture: Option<TextureRef>,
     /// Texture of the clear coat's roughness, in G.
     pub clearcoat_roughness_texture: Option<TextureRef>,
     /// Texture of tangent-space normals of the clear coat, and the scale of their slopes.
@@ -145,6 +151,7 @@ impl Default for Material {
             base_color: [1.0; 4],
             base_color_texture: None,
             diffuse_roughness: 0.0,
+            diffuse_roughness_texture: None,
             metallic: 1.0,
             roughness: 1.0,
             metallic_roughness_texture: None,
@@ -181,7 +188,9 @@ impl Default for Material {
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,
             clearcoat_ior: 1.5,
+            clearcoat_ior_texture: None,
             clearcoat_color: Rgb::ONE,
+            clearcoat_color_texture: None,
             clearcoat_roughness_texture: None,
             clearcoat_normal_texture: None,
             sheen_color: Rgb::ZERO,

@@ -77,13 +77,27 @@ fn solids(materials: &[Material]) -> Vec<f32> {
     distinct(materials.iter().filter(|m| m.is_solid() && m.ior.is_finite()).map(|m| m.ior))
 }
 
+/// Indices of refraction of a material's coat whose tables its surfaces use: one, or those of a texture in steps by which
+/// the albedo of a coat changes less than the tables' error.
+fn coat_indices(material: &Material) -> impl Iterator<Item = f32> {
+    /// Largest step of the index, and of steps.
+    const STEP: f32 = 0.02;
+    const MAX_STEPS: f32 = 200.0;
+    let above = material.clearcoat_ior - 1.0;
+    let steps = match material.clearcoat_ior_texture {
+        Some(_) => (above / STEP).ceil().clamp(1.0, MAX_STEPS),
+        None => 1.0,
+    };
+    (1..=steps as u32).map(move |step| 1.0 + above * (step as f32 / steps))
+}
+
 impl EnergyTables {
     /// Energy compensation tables for all interfaces of these materials with empty space and with the solids among
     /// them, and for their clear coats.
     pub fn for_materials(materials: &[Material]) -> EnergyTables {
         let (open, around) = (distinct(materials.iter().map(|m| m.ior)), solids(materials));
         let nested = open.iter().flat_map(|ior| around.iter().map(move |n| ior / n));
-        let coats = distinct(materials.iter().filter(|m| m.clearcoat > 0.0).map(|m| m.clearcoat_ior));
+        let coats = distinct(materials.iter().filter(|m| m.clearcoat > 0.0).flat_map(coat_indices));
         EnergyTables::new(open.iter().copied().chain(nested).chain(coats))
     }
 }

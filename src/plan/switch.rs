@@ -139,6 +139,7 @@ fn flatten_material(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, 
         base.w = 1.0;
     }
     material.base_color = (Vec4::from_array(material.base_color) * base).to_array();
+    material.diffuse_roughness *= take(&mut material.diffuse_roughness_texture).x;
     let metallic_roughness = take(&mut material.metallic_roughness_texture);
     material.roughness *= metallic_roughness.y;
     material.metallic *= metallic_roughness.z;
@@ -157,7 +158,17 @@ fn flatten_material(material: &mut Material, mean: impl Fn(TextureRef) -> Vec4, 
     let [thin, thick] = material.iridescence_thickness;
     let share = take(&mut material.iridescence_thickness_texture).y;
     material.iridescence_thickness = [thin + (thick - thin) * share; 2];
+    let tinted = material.has_textured_tint();
     material.clearcoat *= take(&mut material.clearcoat_texture).x;
+    if material.clearcoat_ior_texture.is_some() {
+        material.clearcoat_ior = 1.0 + (material.clearcoat_ior - 1.0) * take(&mut material.clearcoat_ior_texture).x;
+    }
+    if material.clearcoat_color_texture.is_some() {
+        material.clearcoat_color = color(material.clearcoat_color, take(&mut material.clearcoat_color_texture));
+    }
+    if tinted {
+        material.tint_emission();
+    }
     material.clearcoat_roughness *= take(&mut material.clearcoat_roughness_texture).y;
     material.sheen_color = color(material.sheen_color, take(&mut material.sheen_color_texture));
     material.sheen_roughness *= take(&mut material.sheen_roughness_texture).w;

@@ -3,15 +3,16 @@
 use crate::support;
 
 use bumpalo::Bump;
-use caustique::bsdf::{EnergyTables, Interface, LobeSet, Parameters, Shading, Transport};
+use caustique::bsdf::{Bsdf, EnergyTables, Interface, LobeSet, Parameters, Shading, Transport};
 use caustique::geometry::Surface;
 use caustique::material::Material;
 use caustique::math::{DAffine3, DMat3, DVec3, Frame, Rgb, Vec2, Vec3, Vec4};
+use caustique::plan::{Effect, switch};
 use caustique::random::mix;
 use caustique::scene::Description;
 use caustique::texture::{Texels, Texture, TextureRef, Wrap};
 use rayon::prelude::*;
-use support::scenes::{add_at, build, quad};
+use support::scenes::{add_at, build, matte, quad};
 use support::stats::{mean_and_error, t_critical};
 
 const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -98,6 +99,84 @@ fn factors_textures_and_vertex_colours_multiply() {
     // A missing texture is white.
     let missing = Material { base_color_texture: reference(9), ..Material::default() };
     assert_eq!(missing.parameters(&self::surface(), &textures, 1.5).base_color, Rgb::ONE);
+}
+
+/// Diffuse roughness and the index and colour of the coat follow their textures, as do the emission below the coat and
+/// the means that replace textures.
+#[test]
+fn rough_diffuse_reflection_and_coats_follow_their_textures() {
+    let material = Material {
+        diffuse_roughness: 0.8,
+        diffuse_roughness_texture: reference(0),
+        clearcoat: 0.5,
+        clearcoat_ior: 2.0,
+        clearcoat_ior_texture: reference(0),
+        clearcoat_color: Rgb::new(1.0, 0.8, 0.5),
+        clearcoat_color_texture: reference(0),
+        emission: Rgb::splat(2.0),
+        ..Material::default()
+    };
+    let textures = [texel([0.5, 0.25, 1.0, 0.4])];
+    let p = material.parameters(&surface(), &textures, 1.5);
+    assert_eq!((p.diffuse_roughness, p.clearcoat_eta), (0.4, 1.5));
+    assert_eq!(p.clearcoat_color, Rgb::new(0.5, 0.2, 0.5));
+    // What passes half a coat once, along the mean path in it.
+    let path = 2.25 * (1.0 - (1.0f32 - 1.0 / 2.25).sqrt());
+    let passed = p.clearcoat_color.map(|c| 0.5 + 0.5 * c.powf(path));
+    assert!((material.emitted(&surface(), &textures) - passed * 2.0).length() < 1e-6);
+    assert!(material.has_textured_emission() && !material.has_plain_interface());
+    let mut description = Description::default();
+    let corners = quad(Vec3::ZERO, Vec3::X, Vec3::Y);
+    add_at(&mut description, "quad", corners, material, DAffine3::IDENTITY);
+    description.textures = textures.to_vec();
+    let flat = switch::without_effect(&build(description), Effect::Textures).unwrap();
+    let (flat, none) = (&flat.materials.list[0], &[]);
+    assert_eq!(flat.textures().count(), 0);
+    assert_eq!(flat.parameters(&surface(), none, 1.5), p);
+    assert!((flat.emitted(&surface(), none) - passed * 2.0).length() < 1e-6);
+    // Without textures the reader has tinted the emission.
+    let mut plain = Material { clearcoat: 1.0, clearcoat_color: Rgb::splat(0.5), ..Material::default() };
+    plain.emission = Rgb::ONE;
+    plain.tint_emission();
+    assert!((plain.emitted(&surface(), none) - Rgb::splat(0.5f32.powf(0.5728))).length() < 1e-3);
+}
+
+/// White below a coat stays white for every index that a texture gives, between those of the tables.
+#[test]
+fn textured_coats_lose_no_energy() {
+    let coated = Material {
+        clearcoat: 1.0,
+        clearcoat_roughness: 0.3,
+        clearcoat_ior: 2.4,
+        clearcoat_ior_texture: reference(0),
+        ..matte(1.0, 0.0)
+    };
+    let tables = EnergyTables::for_materials(&[coated.clone()]);
+    let worst = |tables: &EnergyTables| {
+        let errors = (0..64u64).map(|k| {
+            let share = (mix(k) >> 40) as f32 / 16_777_216.0;
+            let p = coated.parameters(&surface(), &[texel([share, 0.0, 0.0, 0.0])], 1.5);
+            let interface = Interface::new(&p, tables);
+            let bsdf = Bsdf::from_shares(p.base_color, p.metallic, p.transmission, &interface);
+            let cos = 0.05 + 0.95 * (mix(k + 64) >> 40) as f32 / 16_777_216.0;
+            let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+            let mut sum = 0.0;
+            const SIDE: u32 = 128;
+            for i in 0..SIDE * SIDE {
+                let [lobe, x, y] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3]
+                    .map(|a| (f64::from(i) * a + 0.5).fract() as f32);
+                let drawn = bsdf.sample(wo, Transport::Radiance, LobeSet::ALL, lobe, Vec2::new(x, y));
+                sum += drawn.map_or(0.0, |s| f64::from(s.weight.x));
+            }
+            (sum / f64::from(SIDE * SIDE) - 1.0).abs()
+        });
+        errors.fold(0.0, f64::max)
+    };
+    let found = worst(&tables);
+    assert!(found < 0.006, "{found}");
+    // The tables of the largest index alone are rejected.
+    let untextured = Material { clearcoat_ior_texture: None, ..coated.clone() };
+    assert!(worst(&EnergyTables::for_materials(&[untextured])) > 0.02);
 }
 
 /// A map of the clear coat's normals does not turn the base. Without a coat it has no effect.

@@ -426,6 +426,60 @@ class Matched(Case):
         numpy.testing.assert_allclose(free, [0.1 * r * 0.5 / (4 * math.pi) for r in (1, 0.5, 0.25)], rtol=1e-5)
         self.assertFalse([line for line in warnings if "ubsurface" in line])
 
+    def spread(self, low, high):
+        """A node output that increases from `low` to `high` along the plane."""
+        split = self.stage.node("SeparateXYZ", self.stage.node("TexCoord").outputs["Object"])
+        return self.stage.node("MapRange", split.outputs[0], -1.0, 1.0, low, high).outputs[0]
+
+    def test_roughness_of_diffuse_reflection_is_baked(self):
+        self.stage.surface(self.stage.node("BsdfDiffuse", Roughness=self.spread(0.0, 1.0)))
+        material, warnings = self.write()
+        own = material["extras"]["caustique"]
+        places, found = self.look_up(own["diffuse_roughness_texture"])
+        numpy.testing.assert_allclose(own["diffuse_roughness"] * found[:, 0], (places[:, 0] + 1) / 2, atol=0.015)
+        self.assertFalse([line for line in warnings if "mean is taken" in line])
+
+    def test_tint_and_index_of_coats_are_baked(self):
+        tint = self.stage.node("CombineXYZ", self.spread(0.25, 1.0), 1.0, 0.5)
+        self.stage.principled(Coat_Weight=1.0, Coat_Tint=tint, Coat_IOR=self.spread(1.25, 2.0))
+        material, warnings = self.write()
+        own = material["extras"]["caustique"]
+        places, found = self.look_up(own["coat_ior_texture"])
+        index = 1.25 + 0.75 * (places[:, 0] + 1) / 2
+        numpy.testing.assert_allclose(1 + (own["coat_ior"] - 1) * found[:, 0], index, atol=0.02)
+        places, found = self.look_up(own["coat_color_texture"])
+        expected = 0.25 + 0.75 * (places[:, 0] + 1) / 2
+        numpy.testing.assert_allclose(linear(found[:, :2]), numpy.stack([expected, expected * 0 + 1], 1), atol=0.02)
+        self.assertFalse([line for line in warnings if "mean is taken" in line])
+
+    def test_colours_of_subsurface_scattering_vary_by_what_the_surface_transmits(self):
+        """The medium has the brightest colour; what light loses on its way in and out makes the darker ones."""
+        self.stage.shape("sphere")
+        colour = self.stage.node("CombineXYZ", self.spread(0.2, 0.8), 0.4, 0.2)
+        self.stage.principled(Subsurface_Weight=1.0, Subsurface_Radius=(1, 0.5, 0.25), Subsurface_Scale=0.1,
+                              Base_Color=colour, Specular_IOR_Level=0.0, subsurface_method="BURLEY")
+        material, warnings = self.write()
+        found = material["extensions"]
+        medium = found["KHR_materials_volume_scatter"]["multiscatterColor"]
+        numpy.testing.assert_allclose(medium, [0.77, 0.4, 0.2], atol=0.01)  # at the end of the sphere
+        places, tint = self.look_up(found["KHR_materials_diffuse_transmission"]["diffuseTransmissionColorTexture"])
+        expected = 0.2 + 0.6 * (places[:, 0] + 1) / 2
+        error = numpy.abs(linear(tint[:, 0]) ** 2 * medium[0] - expected)
+        self.assertLess(numpy.quantile(error, 0.95), 0.03)
+        self.assertFalse([line for line in warnings if "ubsurface" in line])
+
+    def test_subsurface_scattering_is_mixed_with_diffuse_reflection(self):
+        self.stage.shape("cube")
+        inside = self.stage.node("SubsurfaceScattering", Color=(0.8, 0.4, 0.2), Radius=(1, 0.5, 0.25), Scale=0.1)
+        outside = self.stage.node("BsdfDiffuse", Color=(0.2, 0.6, 0.4))
+        self.stage.mix(0.25, inside, outside)
+        material, warnings = self.write()
+        found = material["extensions"]
+        self.assertAlmostEqual(found["KHR_materials_diffuse_transmission"]["diffuseTransmissionFactor"], 0.75, 5)
+        numpy.testing.assert_allclose(material["pbrMetallicRoughness"]["baseColorFactor"][:3], (0.2, 0.6, 0.4), atol=1e-4)
+        self.assertIn("KHR_materials_volume_scatter", found)
+        self.assertFalse([line for line in warnings if "ubsurface" in line])
+
     def test_losses_are_named(self):
         losses = {
             "sheen": dict(Sheen_Weight=1.0), "above it": dict(Sheen_Weight=1.0, Coat_Weight=0.5),

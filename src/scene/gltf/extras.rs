@@ -3,6 +3,7 @@
 
 use super::container::malformed;
 use super::fault;
+use super::texture::Info;
 use crate::error::Result;
 use crate::material::MediumParameters;
 use crate::math::Rgb;
@@ -133,9 +134,12 @@ pub(super) struct MaterialExtras {
     pub(super) contact: Option<Contact>,
     pub(super) null_bsdf: bool,
     pub(super) spread_deg: Option<f32>,
-    pub(super) diffuse_roughness: f32,
+    pub(super) diffuse_roughness: Option<f32>,
+    pub(super) diffuse_roughness_texture: Option<Info>,
     pub(super) coat_ior: Option<f32>,
+    pub(super) coat_ior_texture: Option<Info>,
     pub(super) coat_color: Option<[f32; 3]>,
+    pub(super) coat_color_texture: Option<Info>,
     pub(super) sheen_model: Sheen,
 }
 
@@ -226,8 +230,11 @@ pub(super) const MATERIAL: &[&str] = &[
     "null_bsdf",
     "spread_deg",
     "diffuse_roughness",
+    "diffuse_roughness_texture",
     "coat_ior",
+    "coat_ior_texture",
     "coat_color",
+    "coat_color_texture",
     "sheen_model",
 ];
 pub(super) const CAMERA: &[&str] = &["aperture_radius", "focus_distance", "shift"];
@@ -295,6 +302,10 @@ fn check_object(value: &Value, prefix: &str, known: &[&str], place: &str, warnin
     for (key, item) in value.as_object().into_iter().flatten() {
         let path = format!("{prefix}{key}");
         if known.contains(&path.as_str()) {
+            // The content of a texture's reference is glTF's own.
+            if path.ends_with("_texture") {
+                continue;
+            }
             check_object(item, &format!("{path}."), known, place, warnings);
             continue;
         }

@@ -5,7 +5,7 @@ use super::document::{Document, extension};
 use super::extras::{self, MaterialExtras};
 use super::fault;
 use super::texture::{Info, Textures, Use};
-use crate::bsdf::{SheenModel, mean_path};
+use crate::bsdf::SheenModel;
 use crate::error::Result;
 use crate::material::{Alpha, Material, MediumParameters};
 use crate::math::Rgb;
@@ -72,6 +72,7 @@ record! { Volume {
 record! { VolumeScatter {
     multiscatter_color: [f32; 3] = [0.0; 3],
     multiscatter_color_factor: Option<[f32; 3]> = None,
+    multiscatter_color_texture: Texture = None,
     scatter_anisotropy: f32 = 0.0,
 }}
 record! { Specular {
@@ -359,24 +360,7 @@ impl Reader<'_> {
         if own.null_bsdf && !material.null_bsdf {
             self.warnings.push(format!("{}: its null_bsdf is ignored: it transmits light by itself", self.place));
         }
-        material.diffuse_roughness = self.unit(own.diffuse_roughness, "extras.caustique.diffuse_roughness")?;
-        if let Some(ior) = own.coat_ior {
-            material.clearcoat_ior = self.finite(ior, "extras.caustique.coat_ior")?.max(1.0);
-            if ior < 1.0 {
-                self.warnings.push(format!("{}: its coat_ior of {ior} is raised to 1", self.place));
-            }
-        }
-        if let Some(color) = own.coat_color {
-            material.clearcoat_color = self.color(color, 1.0, "extras.caustique.coat_color")?;
-            // Emitted light passes the coat once. Its colour does not depend on the direction.
-            let path = 0.5 * mean_path(material.clearcoat_ior);
-            let passed = material.clearcoat_color.map(|c| 1.0 + (c.powf(path) - 1.0) * material.clearcoat);
-            material.emission *= passed;
-        }
-        material.sheen_model = match own.sheen_model {
-            extras::Sheen::Charlie => SheenModel::Charlie,
-            extras::Sheen::Fibers => SheenModel::Fibers,
-        };
+        self.own_layers(material, &own)?;
         if let Some(degrees) = own.spread_deg {
             if !(0.0..=180.0).contains(&degrees) {
                 let cause = format!("extras.caustique.spread_deg must lie between 0 and 180, it is {degrees}");
@@ -395,11 +379,46 @@ impl Reader<'_> {
         Ok(solid)
     }
 
+    /// Reads the keys of diffuse reflection, coat and sheen that glTF lacks.
+    fn own_layers(&mut self, material: &mut Material, own: &MaterialExtras) -> Result<()> {
+        // With a texture, the factor is 1 unless the file has one, as for glTF's own factors.
+        let rough = own.diffuse_roughness.unwrap_or(f32::from(u8::from(own.diffuse_roughness_texture.is_some())));
+        material.diffuse_roughness = self.unit(rough, "extras.caustique.diffuse_roughness")?;
+        material.diffuse_roughness_texture =
+            self.texture(own.diffuse_roughness_texture.clone(), Use::Data, "diffuse_roughness_texture")?;
+        if let Some(ior) = own.coat_ior {
+            material.clearcoat_ior = self.finite(ior, "extras.caustique.coat_ior")?.max(1.0);
+            if ior < 1.0 {
+                self.warnings.push(format!("{}: its coat_ior of {ior} is raised to 1", self.place));
+            }
+        }
+        material.clearcoat_ior_texture = self.texture(own.coat_ior_texture.clone(), Use::Data, "coat_ior_texture")?;
+        material.clearcoat_color_texture =
+            self.texture(own.coat_color_texture.clone(), Use::Color, "coat_color_texture")?;
+        if let Some(color) = own.coat_color {
+            material.clearcoat_color = self.color(color, 1.0, "extras.caustique.coat_color")?;
+            material.tint_emission();
+        }
+        material.sheen_model = match own.sheen_model {
+            extras::Sheen::Charlie => SheenModel::Charlie,
+            extras::Sheen::Fibers => SheenModel::Fibers,
+        };
+        Ok(())
+    }
+
     /// Divides the extinction of a medium into absorption and scattering (KHR_materials_volume_scatter).
     fn scattering(&mut self, medium: &mut Option<MediumParameters>) -> Result<()> {
         let Some(e) = self.extension::<VolumeScatter>("KHR_materials_volume_scatter")? else { return Ok(()) };
         let color = e.multiscatter_color_factor.unwrap_or(e.multiscatter_color);
-        let color = self.color(color, 1.0, "multiscatterColor")?;
+        let mut color = self.color(color, 1.0, "multiscatterColor")?;
+        if let Some(texture) = self.texture(e.multiscatter_color_texture, Use::Color, "multiscatterColorTexture")? {
+            // A medium is homogeneous: docs/scene-format.md explains why.
+            color *= self.textures.list[texture.texture as usize].mean().truncate().clamp(Rgb::ZERO, Rgb::ONE);
+            self.warnings.push(format!(
+                "{}: the mean of its multiscatterColorTexture is taken; a diffuseTransmissionColorTexture varies the                  colour of the light that leaves",
+                self.place
+            ));
+        }
         let g = self.finite(e.scatter_anisotropy, "scatterAnisotropy")?;
         if !(g > -1.0 && g < 1.0) {
             return Err(fault(self.place, format!("scatterAnisotropy must lie between -1 and 1, it is {g}")));

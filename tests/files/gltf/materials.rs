@@ -57,7 +57,8 @@ fn every_field_is_read() {
             "KHR_materials_dispersion": {"dispersion": 0.36},
             "KHR_materials_unlit": {},
         },
-        "extras": {"caustique": {"priority": 3}, "maker": "us"},
+        "extras": {"caustique": {"priority": 3, "diffuse_roughness_texture": t(0), "coat_ior": 2,
+            "coat_ior_texture": t(1), "coat_color_texture": t(1)}, "maker": "us"},
     }));
     assert_eq!(warnings, Vec::<String>::new());
     assert_eq!((m.name.as_str(), m.double_sided, m.alpha, m.unlit), ("all", true, Alpha::Mask(0.25), true));
@@ -81,6 +82,9 @@ fn every_field_is_read() {
     assert_eq!((m.iridescence, m.iridescence_ior, m.iridescence_thickness), (0.6, 1.4, [50.0, 600.0]));
     assert_eq!((set(m.iridescence_texture), set(m.iridescence_thickness_texture)), (Some((1, 0)), Some((1, 1))));
     assert_eq!((m.clearcoat, m.clearcoat_roughness), (0.7, 0.3));
+    assert_eq!((m.diffuse_roughness, set(m.diffuse_roughness_texture)), (1.0, Some((1, 0))));
+    assert_eq!((m.clearcoat_ior, set(m.clearcoat_ior_texture)), (2.0, Some((1, 1))));
+    assert_eq!((m.clearcoat_color, set(m.clearcoat_color_texture)), (Rgb::ONE, Some((0, 1))));
     assert_eq!((m.sheen_color, m.sheen_roughness), (Rgb::new(0.1, 0.2, 0.3), 0.4));
     assert_eq!((set(m.sheen_color_texture), set(m.sheen_roughness_texture)), (Some((0, 0)), Some((1, 0))));
     assert_eq!((m.anisotropy, m.anisotropy_rotation, m.dispersion), (0.5, 1.5, 0.36));
