@@ -1,7 +1,7 @@
 """Renders the training data: views of random scenes, noisy stacks of bandwidth levels, and independent targets.
 
-A view is a random scene of a family (families/) or a scene of scenes/, and for each method a window of SIDE x SIDE
-pixels of a picture of random width. Its folder has, for each method,
+A view is a random scene of a family (families/) or a scene of scenes/, and for one or both methods a window of
+SIDE x SIDE pixels of a picture of random width. Its folder has, for each method,
 
   METHOD-seedN.npz   arrays by snapshot (of ITERATIONS): levels, deviations, quarters, parts, finished, radius, albedo,
                      normal, depth
@@ -69,6 +69,8 @@ class View:
         share = HELD_OUT_LONG_SHARE if self.held_out else LONG_SHARE
         long = self.rng("iterations").random() < share
         self.iterations = ITERATIONS if long else ITERATIONS[:SHORT]
+        # The first view of a family has a window by each method, others by one: more scenes are worth more than that.
+        self.methods = list(WIDTHS) if index == 0 else [str(self.rng("method").choice(list(WIDTHS)))]
 
     def rng(self, *words):
         """A random generator of the view."""
@@ -122,7 +124,8 @@ class Maker:
         scene = view.scene or work / "scene.glb"
         if not scene.exists():
             self.build(view, note["attempt"], scene)
-        for method, window in note["windows"].items():
+        for method in view.methods:
+            window = note["windows"][method]
             if not (view.folder / f"{method}-target.npz").exists():
                 window["target"] = self.target(view, note, method, scene, work)
                 self.store(view, note)
@@ -131,7 +134,7 @@ class Maker:
                     self.stacks(view, note, method, seed, scene, work)
                     self.store(view, note)
         deep = view.folder / independent_file("sppm", DEEP_SEED)
-        if not deep.exists():
+        if "sppm" in view.methods and not deep.exists():
             write(deep, self.independent(view, note, DEEP_SEED, scene, work))
             self.store(view, note)
         self.finish(view, work)
