@@ -4,7 +4,7 @@ mod evaluate;
 mod library;
 mod scattering;
 
-pub use crate::medium::MediumParameters;
+pub use crate::medium::{MediumGrids, MediumParameters};
 pub use library::{MAX_FOCUSING_ROUGHNESS, Materials};
 pub use scattering::Scattering;
 
@@ -12,6 +12,7 @@ use crate::bsdf::SheenModel;
 use crate::math::Rgb;
 use crate::texture::TextureRef;
 use std::f32::consts::FRAC_PI_2;
+use std::sync::Arc;
 
 /// The effect of the alpha channel: the alpha mode of glTF.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -83,6 +84,8 @@ pub struct Material {
     /// Medium that fills the solid: from KHR_materials_volume and KHR_materials_volume_scatter, or
     /// `extras.caustique.medium`.
     pub medium: Option<MediumParameters>,
+    /// Grids by which the medium varies in space; `None` for a homogeneous one.
+    pub grids: Option<Arc<MediumGrids>>,
     /// Priority of nested dielectrics: where solids overlap, the one with the highest priority counts.
     pub priority: i32,
     /// Whether the surface touches opaque surfaces without a film of air: paint, a label, a liquid.
@@ -173,6 +176,7 @@ impl Default for Material {
             diffuse_transmission_color_texture: None,
             thin: true,
             medium: None,
+            grids: None,
             priority: 0,
             optical_contact: false,
             specular: 1.0,

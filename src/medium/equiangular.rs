@@ -64,6 +64,12 @@ impl Equiangular {
         (self.segment[0] + from).min(self.segment[1])
     }
 
+    /// [`Equiangular::sample`] without the distance of the start of the segment, where rounding may give a point outside.
+    #[inline]
+    pub fn sample_inside(&self, u: f32) -> f32 {
+        self.sample(u + super::flight::HALF_STEP)
+    }
+
     /// Density per length (1/m) with which [`Equiangular::sample`] draws `distance` \[equation (6)\].
     #[inline]
     pub fn pdf(&self, distance: f32) -> f32 {

@@ -31,7 +31,7 @@ pub enum FlightOutcome {
 }
 
 /// Offset that is added to uniform numbers, which are multiples of 2^-24, so that no sampled distance is zero.
-const HALF_STEP: f32 = 0.5 / 16_777_216.0;
+pub(super) const HALF_STEP: f32 = 0.5 / 16_777_216.0;
 
 impl MediumParameters {
     /// Samples the free flight in the medium of a ray with `throughput` over at most `distance` (m), which may be
@@ -83,17 +83,24 @@ impl CollisionDistribution<'_> {
     /// not finite.
     #[inline]
     pub fn sample(&self, u: Vec2) -> Option<Collision> {
+        let t = self.sample_depth(u);
+        self.at(t, self.pdf(t))
+    }
+
+    /// The distance (m) of [`CollisionDistribution::sample`] alone. In a medium of varying density, it is the integral of
+    /// the density.
+    #[inline]
+    pub fn sample_depth(&self, u: Vec2) -> f32 {
         let sigma_t = sample_channel(self.medium.sigma_t(), self.share, u.x);
         let collided = sample_channel(self.collided, self.share, u.x);
         let t = -(-(u.y + HALF_STEP) * collided).ln_1p() / sigma_t;
-        let t = t.min(self.distance);
-        self.at(t, self.pdf(t))
+        t.min(self.distance)
     }
 
     /// Samples a scattering point of the ray equiangularly with respect to a light.
     #[inline]
     pub fn sample_equiangular(&self, light: &Equiangular, u: f32) -> Option<Collision> {
-        let t = light.sample(u + HALF_STEP).min(self.distance);
+        let t = light.sample_inside(u).min(self.distance);
         self.at(t, light.pdf(t))
     }
 
@@ -120,14 +127,14 @@ fn exp_m1(x: f32) -> f32 {
 
 /// Probabilities of the three colour channels in proportion to `of`; equal if `of` is zero or not finite.
 #[inline]
-fn shares(of: Rgb) -> Rgb {
+pub(super) fn shares(of: Rgb) -> Rgb {
     let sum = of.element_sum();
     if sum > 0.0 && sum.is_finite() { of / sum } else { Rgb::splat(1.0 / 3.0) }
 }
 
 /// The entry in `of` of the channel that `u` draws with the probabilities `share`.
 #[inline]
-fn sample_channel(of: Rgb, share: Rgb, u: f32) -> f32 {
+pub(super) fn sample_channel(of: Rgb, share: Rgb, u: f32) -> f32 {
     // If rounding leaves a rest, the last channel with a probability above zero takes it.
     if u < share.x || share.y + share.z <= 0.0 {
         of.x

@@ -1,16 +1,18 @@
-//! Homogeneous participating media: free-flight sampling, equiangular sampling, and the phase function.
+//! Participating media: free-flight sampling, equiangular sampling, the phase function, and grids of density.
 
 mod equiangular;
 mod flight;
+mod grid;
 mod phase;
 
 pub use equiangular::Equiangular;
 pub use flight::{Collision, CollisionDistribution, FlightDensity, FlightOutcome};
+pub use grid::{DensityGrid, Grid, GridFlight, GridRay, MediumGrids, Proxy};
 pub use phase::HenyeyGreenstein;
 
 use crate::math::Rgb;
 
-/// The parameters of a homogeneous participating medium.
+/// The parameters of a homogeneous participating medium, or of a heterogeneous one where its density is 1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct MediumParameters {
     /// Absorption coefficient (1/m).
@@ -32,6 +34,13 @@ impl MediumParameters {
     #[inline]
     pub fn scatters(&self) -> bool {
         self.sigma_s.max_element() > 0.0
+    }
+
+    /// The medium with its coefficients multiplied by `density`.
+    #[must_use]
+    #[inline]
+    pub fn scaled(&self, density: f32) -> MediumParameters {
+        MediumParameters { sigma_a: self.sigma_a * density, sigma_s: self.sigma_s * density, g: self.g }
     }
 
     /// The phase function of the medium.

@@ -77,6 +77,11 @@ pub(super) fn material_reasons(effect: Effect, used: &[UsedMaterial]) -> Vec<Str
         Effect::Textures => |material| material.textures().next().is_some(),
         _ => return vec![],
     };
-    let inside = if effect == Effect::Volume { "the medium of " } else { "" };
-    used.iter().filter(|used| calls(used.material)).map(|used| format!("{inside}{}", used.label())).collect()
+    let inside = |material: &Material| match (effect, &material.grids) {
+        (Effect::Volume, Some(_)) => "the heterogeneous medium of ",
+        (Effect::Volume, None) => "the medium of ",
+        _ => "",
+    };
+    let used = used.iter().filter(|used| calls(used.material));
+    used.map(|used| format!("{}{}", inside(used.material), used.label())).collect()
 }

@@ -78,7 +78,11 @@ pub fn without_effect(scene: &Scene, effect: Effect) -> Result<Scene> {
 /// Removes an effect from materials. Returns the scene's new list of textures if it changes, otherwise `None`.
 fn remove_from_materials(effect: Effect, materials: &mut [Material], textures: &[Texture]) -> Option<Vec<Texture>> {
     match effect {
-        Effect::Volume => materials.iter_mut().for_each(|material| material.medium = None),
+        Effect::Volume => {
+            for material in materials {
+                (material.medium, material.grids) = (None, None);
+            }
+        }
         Effect::Dispersion => materials.iter_mut().for_each(|material| material.dispersion = 0.0),
         Effect::Alpha => materials.iter_mut().for_each(|material| material.alpha = Alpha::Opaque),
         Effect::Textures => return Some(flatten_textures(materials, textures)),

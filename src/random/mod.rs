@@ -108,6 +108,8 @@ pub enum Purpose {
     Merging = 29,
     /// Moment of an iteration within the shutter interval.
     Moment = 30,
+    /// Tentative collisions along a ray in a heterogeneous medium.
+    Tracking = 31,
 }
 
 /// Finaliser of SplitMix64 \[Steele, Lea, Flood 2014; constants of Stafford's Mix13\]: a bijection with full avalanche.
@@ -120,6 +122,25 @@ pub fn mix(mut z: u64) -> u64 {
 
 /// Increment between consecutive inputs of [`mix`]: 2^64 over the golden ratio \[Steele, Lea, Flood 2014\].
 pub const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Independent uniform numbers, as many as needed, that are a function of a key.
+#[derive(Clone, Copy, Debug)]
+pub struct HashSequence(u64);
+
+impl HashSequence {
+    /// The sequence of a key, for example of [`Draws::bits`]. Sequences of different keys are independent.
+    #[inline]
+    pub fn new(key: u64) -> HashSequence {
+        HashSequence(mix(key.wrapping_add(GOLDEN)))
+    }
+
+    /// The next number, in `[0, 1)`.
+    #[inline]
+    pub fn one(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(GOLDEN);
+        unit((mix(self.0) >> 32) as u32)
+    }
+}
 
 /// A float in `[0, 1)` from the upper 24 of 32 random bits.
 #[inline]

@@ -275,7 +275,8 @@ fn bounding_sphere(description: &Description) -> (DVec3, f64) {
 }
 
 /// Moves the meshes and instances of the description into shapes, with `origin` subtracted from positions. A mesh with
-/// one instance that does not move is transformed to world space; other meshes stay in their own space.
+/// one instance that does not move and has no grid inside is transformed to world space; other meshes stay in their own
+/// space.
 fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
     let mut uses = vec![0u32; description.meshes.len()];
     for placed in &description.instances {
@@ -285,7 +286,9 @@ fn place_instances(description: &mut Description, origin: DVec3) -> Shapes {
     for placed in &description.instances {
         let mut to_world = placed.to_world;
         to_world.translation -= origin;
-        let shared = placed.moves || uses[placed.mesh as usize] > 1;
+        // Grids of media need the space of the object.
+        let has_grid = description.materials[placed.material as usize].grids.is_some();
+        let shared = placed.moves || uses[placed.mesh as usize] > 1 || has_grid;
         if !shared {
             bake(Arc::make_mut(&mut meshes[placed.mesh as usize]), &to_world);
         }

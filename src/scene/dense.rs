@@ -6,7 +6,7 @@
 //! density is reduced, channel by channel, to the highest that positions resolve; the albedo stays.
 
 use crate::geometry::{Shapes, triangle_error};
-use crate::material::{Materials, MediumParameters};
+use crate::material::{Material, Materials, MediumParameters};
 use crate::math::Rgb;
 
 /// Maximum share of a medium's mean free path that the offset of ray origins from surfaces may skip. A half-space of
@@ -29,8 +29,9 @@ pub(super) fn limit_densities(
     };
     let mut farthest = vec![0f32; materials.list.len()];
     for (i, instance) in shapes.instances.iter().enumerate() {
-        let medium = materials.list[instance.material as usize].medium;
-        let Some(medium) = medium.filter(MediumParameters::scatters) else { continue };
+        let material = &materials.list[instance.material as usize];
+        let Some(medium) = material.medium.filter(MediumParameters::scatters) else { continue };
+        let medium = medium.scaled(highest_density(material));
         let skipped = skipped(i);
         if limit_density(medium, skipped).is_some() {
             warnings.push(warning(&format!("object \"{}\": its", instance.name), medium, skipped));
@@ -39,7 +40,10 @@ pub(super) fn limit_densities(
         }
     }
     for (material, skipped) in materials.list.iter_mut().zip(farthest) {
-        material.medium = material.medium.map(|medium| limit_density(medium, skipped).unwrap_or(medium));
+        let highest = highest_density(material);
+        let limit =
+            |medium: MediumParameters| Some(limit_density(medium.scaled(highest), skipped)?.scaled(1.0 / highest));
+        material.medium = material.medium.map(|medium| limit(medium).unwrap_or(medium));
     }
     if let Some(medium) = space.as_mut().filter(|medium| medium.scatters()) {
         let skipped = (0..shapes.instances.len()).map(skipped).fold(0.0, f32::max);
@@ -48,6 +52,11 @@ pub(super) fn limit_densities(
             *medium = limited;
         }
     }
+}
+
+/// The largest factor of a medium's coefficients: 1 for a homogeneous medium.
+fn highest_density(material: &Material) -> f32 {
+    material.grids.as_ref().map_or(1.0, |grids| grids.density.highest())
 }
 
 fn warning(owner: &str, medium: MediumParameters, skipped: f32) -> String {

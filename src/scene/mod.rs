@@ -9,6 +9,7 @@ pub mod description;
 pub mod environment_file;
 mod folder;
 pub mod gltf;
+pub mod grid_file;
 pub mod ies;
 pub mod light_preset;
 mod moment;

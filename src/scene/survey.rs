@@ -20,6 +20,8 @@ pub struct Survey {
     pub null_boundaries: bool,
     /// Whether some medium absorbs or scatters.
     pub media: bool,
+    /// Whether the density of some medium varies.
+    pub grids: bool,
     /// Whether some medium scatters.
     pub scattering: bool,
     /// Whether some solid of clear glass contains a medium that scatters.
@@ -73,6 +75,7 @@ impl Survey {
             if material.is_solid() {
                 solids += uses;
                 survey.media |= material.medium.is_some();
+                survey.grids |= material.medium.is_some() && material.grids.is_some();
                 let scatters = scatters(&material.medium);
                 survey.scattering |= scatters;
                 survey.cloudy_glass |= scatters && material.transmission > 0.0 && material.ior != 1.0 && lobes.0;

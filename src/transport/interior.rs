@@ -6,8 +6,10 @@
 //! otherwise it does not scatter \[Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"\]. A path
 //! that leaves a solid that it never entered (camera or light were inside) is taken to have been in it.
 
+use crate::geometry::Placement;
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
+use crate::medium::{DensityGrid, GridRay};
 use crate::scene::contact::{self, ContactPoint};
 use crate::scene::{EMPTY_STACK, Scene, SolidStack};
 use crate::spectrum::Wavelength;
@@ -198,6 +200,25 @@ impl Interior {
             Some(m) => scene.materials.list[m as usize].medium,
             None => scene.medium,
         }
+    }
+
+    /// The ray from `origin` along the unit `direction` in the density grid of the medium that fills the space around
+    /// the path; `None` if that medium is homogeneous, or if there is none.
+    #[inline]
+    pub fn grid_ray<'s>(&self, scene: &'s Scene, origin: Vec3, direction: Vec3) -> Option<GridRay<'s>> {
+        if !scene.survey.grids {
+            return None;
+        }
+        let (density, placement) = self.grid(scene)?;
+        Some(GridRay::new(density, placement, origin, direction))
+    }
+
+    /// The density grid of the medium that fills the space around the path, and the placement of its object.
+    #[inline(never)]
+    fn grid<'s>(&self, scene: &'s Scene) -> Option<(&'s DensityGrid, &'s Placement)> {
+        let instance = &scene.shapes.instances[self.host(scene)? as usize];
+        let grids = scene.materials.list[instance.material as usize].grids.as_ref()?;
+        Some((&grids.density, instance.to_world.as_ref()?))
     }
 
     /// Index of refraction of the medium that fills the space around the path; 1 in the open.

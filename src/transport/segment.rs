@@ -5,8 +5,8 @@ use super::interior::{Crossing, Interior, ior};
 use crate::geometry::Surface;
 use crate::material::MediumParameters;
 use crate::math::{Rgb, Vec3};
-use crate::medium::FlightDensity;
-use crate::random::{Draws, Purpose};
+use crate::medium::{FlightDensity, GridRay};
+use crate::random::{Draws, HashSequence, Purpose, mix};
 use crate::scene::Scene;
 use crate::scene::contact::{self, ContactPoint, RaySurfaces};
 use crate::trace::{CAMERA_RAY_BIT, Hit, Ray};
@@ -105,6 +105,12 @@ pub(super) struct Span {
 }
 
 impl Span {
+    /// The span as a ray in the density grid of its medium; `None` if the medium is homogeneous.
+    #[inline]
+    pub fn grid_ray<'s>(&self, scene: &'s Scene) -> Option<GridRay<'s>> {
+        self.interior.grid_ray(scene, self.origin, self.direction)
+    }
+
     /// The hit to report for a collision at `p`: the object that contains the medium, or the surface behind a medium
     /// that fills the scene.
     pub fn first_hit(&self, scene: &Scene, p: Vec3) -> Option<FirstHit> {
@@ -131,14 +137,29 @@ pub(super) enum Passage {
     Ended(MediumArrival),
 }
 
-/// Media only attenuate the ray \[Beer-Lambert\].
-pub(super) struct Attenuate;
+/// Media only attenuate the ray \[Beer-Lambert\]. Heterogeneous ones take their random numbers from its token.
+pub(super) struct Attenuate<'a> {
+    pub scene: &'a Scene,
+    pub token: u32,
+}
 
-impl Through for Attenuate {
+impl Through for Attenuate<'_> {
     #[inline]
     fn pass(&mut self, span: &Span) -> Passage {
-        Passage::Left(span.medium.transmittance(span.distance))
+        Passage::Left(match span.grid_ray(self.scene) {
+            Some(ray) => attenuation(&ray, &span.medium, span.distance, (self.token, span.crossed)),
+            None => span.medium.transmittance(span.distance),
+        })
     }
+}
+
+/// An unbiased estimate of the transmittance of part number `crossed` of a ray with these random bits, over `distance`
+/// (m) in a heterogeneous medium.
+#[cold]
+#[inline(never)]
+fn attenuation(ray: &GridRay<'_>, medium: &MediumParameters, distance: f32, (bits, crossed): (u32, u32)) -> Rgb {
+    let key = mix(u64::from(bits) << 32 | u64::from(crossed));
+    ray.transmittance(medium.sigma_t(), distance, &mut HashSequence::new(key))
 }
 
 /// For scenes without media, where there is nothing to cross.
@@ -202,10 +223,11 @@ fn boundary(scene: &Scene, surface: &Surface, interior: &Interior, direction: Ve
     Boundary::Scattering(eta, Some(crossing))
 }
 
-/// Random bits from which alpha cut-outs along a ray are decided; 0 if the scene has none.
+/// Random bits from which alpha cut-outs along a ray are decided, and its transmittance in heterogeneous media is
+/// estimated; 0 if the scene has neither.
 #[inline(always)]
 pub(super) fn token(scene: &Scene, draws: Draws, purpose: Purpose) -> u32 {
-    let bits = if scene.survey.alpha { draws.token(purpose) } else { 0 };
+    let bits = if scene.survey.alpha || scene.survey.grids { draws.token(purpose) } else { 0 };
     with_camera_bit(scene, bits, false)
 }
 
@@ -234,14 +256,15 @@ pub struct Start {
     pub interior: Interior,
     /// The point on a surface that the ray leaves, if other surfaces touch it there.
     pub leaving: Option<ContactPoint>,
-    /// Random bits from which alpha cut-outs along the ray are decided.
+    /// Random bits from which alpha cut-outs along the ray are decided, and its transmittance in heterogeneous media is
+    /// estimated.
     pub token: u32,
 }
 
 /// Follows a ray to the next scattering surface and returns where it ends. Media attenuate it.
 #[inline(always)]
 pub fn next_surface(scene: &Scene, start: Start) -> End {
-    next_vertex(scene, start, &PrecomputedHit::Unknown, &mut Attenuate)
+    next_vertex(scene, start, &PrecomputedHit::Unknown, &mut Attenuate { scene, token: start.token })
 }
 
 /// Follows a ray to the next scattering surface, or to a collision in a medium, and returns where it ends. `known` is
@@ -319,24 +342,41 @@ impl Visibility {
     /// Nothing is in the way of the ray.
     pub(super) const CLEAR: Visibility = Visibility { transmittance: Rgb::ONE, flight: FlightDensity::ONE };
 
-    /// Crosses `distance` of the medium inside `interior`. `starts` and `ends`: a path vertex in the medium lies at the
-    /// start or at the end.
+    /// Crosses `part` of the ray. `starts` and `ends`: a path vertex in the medium lies at the start or at the end.
     #[inline]
-    fn pass(&mut self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) {
+    fn pass(&mut self, scene: &Scene, part: RayPart<'_>, starts: bool, ends: bool) {
         if scene.survey.media {
-            *self = self.through(scene, interior, distance, starts, ends);
+            *self = self.through(scene, part, starts, ends);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn through(self, scene: &Scene, interior: &Interior, distance: f32, starts: bool, ends: bool) -> Visibility {
+    fn through(self, scene: &Scene, part: RayPart<'_>, starts: bool, ends: bool) -> Visibility {
+        let RayPart { interior, origin, direction, distance, random } = part;
         let Some(medium) = interior.medium(scene) else { return self };
+        if let Some(ray) = interior.grid_ray(scene, origin, direction) {
+            let transmittance = self.transmittance * attenuation(&ray, &medium, distance, random);
+            let flight = ray.flight_density(self.flight, &medium, distance, starts, ends);
+            return Visibility { transmittance, flight };
+        }
         let transmittance = self.transmittance * medium.transmittance(distance);
         let scatters = scene.survey.scattering;
         let flight = if scatters { self.flight.through(&medium, distance, starts, ends) } else { self.flight };
         Visibility { transmittance, flight }
     }
+}
+
+/// A part of a shadow ray that lies inside of the same solids.
+struct RayPart<'i> {
+    interior: &'i Interior,
+    /// Start of the part.
+    origin: Vec3,
+    direction: Vec3,
+    /// Length of the part (m); may be infinite.
+    distance: f32,
+    /// Random bits of the ray, and the number of its parts before this one.
+    random: (u32, u32),
 }
 
 /// A shadow ray: a ray to a point or to infinity.
@@ -366,7 +406,7 @@ pub fn shadow_ray(scene: &Scene, between: &ShadowRay) -> Visibility {
         return Visibility::BLOCKED;
     }
     let mut visibility = Visibility::CLEAR;
-    visibility.pass(scene, interior, tmax, starts, ends);
+    visibility.pass(scene, RayPart { interior, origin, direction, distance: tmax, random: (token, 0) }, starts, ends);
     visibility
 }
 
@@ -376,9 +416,12 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
     let mut along = RaySurfaces::new(Ray { origin, direction, tmax, token }, leaving);
     let mut visibility = Visibility::CLEAR;
     let [mut starts, ends] = between.in_medium;
-    for _ in 0..MAX_NULL_CROSSINGS {
+    for crossed in 0..MAX_NULL_CROSSINGS {
+        let (before, random) = (along.ray().origin, (token, crossed));
         let Some((mut surface, t)) = along.next(scene, !interior.is_open()) else {
-            visibility.pass(scene, &interior, along.ray().tmax.max(0.0), starts, ends);
+            let distance = along.ray().tmax.max(0.0);
+            let part = RayPart { interior: &interior, origin: before, direction, distance, random };
+            visibility.pass(scene, part, starts, ends);
             let Some(place) = reaching else { return visibility };
             for surface in &contact::surfaces_before(scene, &place, direction, token) {
                 match boundary(scene, surface, &interior, direction, token) {
@@ -391,7 +434,8 @@ fn trace_through_boundaries(scene: &Scene, between: &ShadowRay) -> Visibility {
             return visibility;
         };
         if t > 0.0 {
-            visibility.pass(scene, &interior, t, starts, false);
+            let part = RayPart { interior: &interior, origin: before, direction, distance: t, random };
+            visibility.pass(scene, part, starts, false);
             starts = false;
         }
         // Reversed, because culling refers to rays from the lens.

@@ -59,7 +59,7 @@ pub fn walk<'a, V: Visitor<'a>>(
     // them.
     if scene.survey.dispersion {
         walk_aside::<V, DISPERSION>(scene, arena, start, stream, transport, max_depth, visitor);
-    } else if scene.survey.scattering {
+    } else if scene.survey.scattering || scene.survey.grids {
         walk_aside::<V, SCATTERING>(scene, arena, start, stream, transport, max_depth, visitor);
     } else if scene.survey.media {
         walk_aside::<V, ABSORPTION>(scene, arena, start, stream, transport, max_depth, visitor);
@@ -69,7 +69,7 @@ pub fn walk<'a, V: Visitor<'a>>(
 }
 
 /// Contents of a scene besides surfaces, as constants 0 to 3. Each value includes the smaller ones: nothing, absorbing
-/// media, scattering media, dispersive solids.
+/// media, scattering or heterogeneous media, dispersive solids.
 const NOTHING: u8 = 0;
 const ABSORPTION: u8 = 1;
 const SCATTERING: u8 = 2;
@@ -205,7 +205,7 @@ impl<'a> Path<'a> {
         let end = if BESIDES < ABSORPTION {
             next_vertex(scene, start, met, &mut Clear)
         } else if BESIDES < SCATTERING {
-            next_vertex(scene, start, met, &mut Attenuate)
+            next_vertex(scene, start, met, &mut Attenuate { scene, token })
         } else if V::SPLITS {
             let from = origin;
             let mut split =

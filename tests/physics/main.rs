@@ -36,6 +36,7 @@ mod photon_mapping;
 mod profiles;
 mod progressive;
 mod shadow_rays;
+mod smoke;
 mod stability;
 mod stopping;
 mod unseen;

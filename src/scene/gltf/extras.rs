@@ -83,13 +83,21 @@ pub(super) enum Units {
     Photometric,
 }
 
-/// A homogeneous participating medium, with coefficients in 1/m.
+/// A participating medium, with coefficients in 1/m.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Medium {
     sigma_a: [f32; 3],
     sigma_s: [f32; 3],
     g: f32,
+    /// Factor of the coefficients, which makes the medium heterogeneous.
+    pub(super) density: Option<GridExtras>,
+}
+
+/// Content of `extras.caustique.medium.density`: a grid in a file.
+#[derive(Deserialize)]
+pub(super) struct GridExtras {
+    pub(super) file: String,
 }
 
 impl Medium {
@@ -208,6 +216,7 @@ pub(super) const SCENE: &[&str] = &[
     "medium.sigma_a",
     "medium.sigma_s",
     "medium.g",
+    "medium.density",
     "light_units",
     "losses",
     "resolution",
@@ -225,6 +234,8 @@ pub(super) const MATERIAL: &[&str] = &[
     "medium.sigma_a",
     "medium.sigma_s",
     "medium.g",
+    "medium.density",
+    "medium.density.file",
     "priority",
     "contact",
     "null_bsdf",

@@ -2,16 +2,19 @@
 
 use super::container::malformed;
 use super::document::{Document, extension};
-use super::extras::{self, MaterialExtras};
-use super::fault;
+use super::extras::{self, GridExtras, MaterialExtras};
 use super::texture::{Info, Textures, Use};
+use super::{fault, uri};
 use crate::bsdf::SheenModel;
 use crate::error::Result;
 use crate::material::{Alpha, Material, MediumParameters};
 use crate::math::Rgb;
+use crate::medium::{DensityGrid, Grid, MediumGrids};
+use crate::scene::grid_file;
 use crate::texture::TextureRef;
 use serde::Deserialize;
 use serde_json::Value;
+use std::sync::Arc;
 
 /// Defines a JSON object whose fields are all optional and have defaults.
 macro_rules! record {
@@ -370,11 +373,12 @@ impl Reader<'_> {
         }
         if let Some(medium) = own.medium {
             material.medium = Some(medium.parameters(self.place)?);
+            material.grids = self.grids(&medium)?;
             solid = Some(true);
         }
         if !material.transmits() && material.medium.is_some_and(|m| m != MediumParameters::default()) {
             self.warnings.push(format!("{}: its medium is ignored: no light is transmitted", self.place));
-            material.medium = None;
+            (material.medium, material.grids) = (None, None);
         }
         Ok(solid)
     }
@@ -404,6 +408,22 @@ impl Reader<'_> {
             extras::Sheen::Fibers => SheenModel::Fibers,
         };
         Ok(())
+    }
+
+    /// Reads the grids of a heterogeneous medium; `None` for a homogeneous one.
+    fn grids(&mut self, medium: &extras::Medium) -> Result<Option<Arc<MediumGrids>>> {
+        let Some(density) = &medium.density else { return Ok(None) };
+        let grid = self.grid(density, "medium.density")?;
+        let density =
+            DensityGrid::new(grid).ok_or_else(|| fault(self.place, "medium.density must be a grid of one channel"))?;
+        Ok(Some(Arc::new(MediumGrids { density })))
+    }
+
+    /// Reads the grid that `key` of the extras names.
+    fn grid(&mut self, extras: &GridExtras, key: &str) -> Result<Grid> {
+        let file = uri::require_path(&extras.file).and_then(|file| self.document.folder.file(file.as_ref()));
+        let file = file.map_err(|e| e.within(format!("{}, {key}", self.place)))?;
+        grid_file::read(&file, self.warnings)
     }
 
     /// Divides the extinction of a medium into absorption and scattering (KHR_materials_volume_scatter).

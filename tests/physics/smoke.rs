@@ -1,0 +1,196 @@
+//! Compares heterogeneous media with closed forms, with homogeneous media, and methods with each other.
+//!
+//! Closed forms are t tests over independent seeds, tiles Welch's t tests, at a family-wise error rate of 0.1 % per
+//! test (Sidak over its checks), plus the stated bias of the kernel. Every check must reject a planted error of a
+//! stated size.
+
+use crate::support;
+
+use caustique::estimator::InitialBandwidth;
+use caustique::material::{Material, MediumGrids, MediumParameters};
+use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
+use caustique::medium::{DensityGrid, Grid};
+use caustique::random::HashSequence;
+use caustique::render::{Control, Levels, Method, Rendered, Settings};
+use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
+use caustique::scene::{Description, Scene};
+use std::sync::Arc;
+use support::channels::{self, SIZE, agree};
+use support::scenes::{add, add_at, build, cuboid, glass, look_at, matte, quad, square};
+use support::stats::Check;
+
+/// A density grid over the box from -1 to 1 of `cells` per edge, whose value at a cell's centre is `value`.
+fn grid(cells: u32, value: impl Fn(Vec3) -> f32) -> DensityGrid {
+    let centre = |i: u32| (i as f32 + 0.5) * 2.0 / cells as f32 - 1.0;
+    let values = (0..cells.pow(3))
+        .map(|i| value(Vec3::new(centre(i % cells), centre(i / cells % cells), centre(i / cells / cells))))
+        .collect();
+    let grid = Grid::new([cells; 3], 1, [Vec3::NEG_ONE, Vec3::ONE], values).expect("it is valid");
+    DensityGrid::new(grid).expect("it has one channel")
+}
+
+/// Smoke: a few dense puffs in thin haze, at random places, and emptiness around.
+fn puffs(seed: u64) -> DensityGrid {
+    let mut random = HashSequence::new(seed);
+    let mut number = || random.one();
+    let balls: Vec<(Vec3, f32)> =
+        (0..5).map(|_| (Vec3::new(number(), number(), number()) * 1.2 - 0.6, 0.15 + 0.3 * number())).collect();
+    grid(24, |p| {
+        let puff = |&(centre, radius): &(Vec3, f32)| (1.0 - p.distance(centre) / radius).max(0.0);
+        let haze = if p.abs().max_element() < 0.7 { 0.1 } else { 0.0 };
+        haze + 2.0 * balls.iter().map(puff).sum::<f32>()
+    })
+}
+
+fn coefficients(sigma_a: impl Into<[f32; 3]>, sigma_s: impl Into<[f32; 3]>, g: f32) -> MediumParameters {
+    MediumParameters { sigma_a: Rgb::from(sigma_a.into()), sigma_s: Rgb::from(sigma_s.into()), g }
+}
+
+/// Material of a mesh that only contains a medium: its surface is invisible.
+fn holds(medium: MediumParameters, density: Option<DensityGrid>) -> Material {
+    let grids = density.map(|density| Arc::new(MediumGrids { density }));
+    Material { medium: Some(medium), grids, ..glass(1.0) }
+}
+
+/// The box from -1 to 1, in which grids lie.
+fn domain() -> caustique::geometry::Mesh {
+    cuboid(Vec3::NEG_ONE, Vec3::ONE, false)
+}
+
+fn settings(iterations: u64, seed: u64) -> Settings {
+    Settings { seed, levels: Levels::new(1), iterations: Some(iterations), ..Settings::default() }
+}
+
+/// Settings of a photon method that gathers photons in media.
+fn photons(photons: u32, radius: f32, iterations: u64, seed: u64) -> Settings {
+    let initial_bandwidth = InitialBandwidth::Fixed(radius);
+    Settings { photons, initial_bandwidth, levels: Levels::new(5), ..settings(iterations, seed) }
+}
+
+fn render(scene: &Scene, method: Method, size: u32, settings: &Settings) -> Rendered {
+    let camera = scene.camera(&square(size)).expect("a camera");
+    let settings = Settings { method, ..settings.clone() };
+    let rendered = caustique::render::render(scene, &camera, &settings, |_, _| Control::Continue);
+    assert_eq!(rendered.rejected(), 0, "{method:?}");
+    rendered
+}
+
+fn seeds(scene: &Scene, method: Method, seeds: u64, of: impl Fn(u64) -> Settings) -> Vec<Vec<f64>> {
+    channels::seeds(method, seeds, |seed| render(scene, method, SIZE, &of(seed)))
+}
+
+/// Checks the means of the picture's channels, one value per seed.
+fn check_means(what: &str, rendered: &[Rendered], expected: [f64; 3], bias: f64, detects: f64) {
+    for (c, expected) in expected.into_iter().enumerate() {
+        let mean = |rendered: &Rendered| {
+            let level = rendered.settings.levels.picture_level();
+            rendered.pixels.iter().map(|p| p.mean(level)[c]).sum::<f64>() / rendered.pixels.len() as f64
+        };
+        let values: Vec<f64> = rendered.iter().map(mean).collect();
+        Check { expected, bias, detects }.run(12, &format!("{what}, channel {c}"), &values);
+    }
+}
+
+/// A lamp behind smoke whose density falls off exponentially with the height. The object is turned, scaled and moved.
+#[test]
+fn exponential_density_attenuates_as_its_integral() {
+    const FALLOFF: f64 = 1.5;
+    const SCALE: f64 = 0.7;
+    let sigma_t = [0.6, 1.0, 0.1];
+    let mut description = Description::default();
+    let lamp = quad(Vec3::new(-9.0, -3.0, -9.0), Vec3::Z * 18.0, Vec3::X * 18.0);
+    add(&mut description, "lamp", lamp, matte(0.0, 5.0));
+    let density = grid(64, |p| (-FALLOFF * f64::from(p.y + 1.0)).exp() as f32);
+    let medium = coefficients([0.1, 0.7, 0.1], [0.5, 0.3, 0.0], 0.2);
+    let to_world = DAffine3::from_translation(DVec3::new(0.2, 0.3, -0.1))
+        * DAffine3::from_rotation_y(0.4)
+        * DAffine3::from_scale(DVec3::splat(SCALE));
+    add_at(&mut description, "smoke", domain(), holds(medium, Some(density)), to_world);
+    description.cameras.push(look_at(DVec3::new(0.2, 4.0, -0.1), DVec3::new(0.2, 0.0, -0.1), 0.5));
+    let scene = build(description);
+    let depth = SCALE * (1.0 - (-2.0 * FALLOFF).exp()) / FALLOFF;
+    let expected = sigma_t.map(|sigma| 5.0 * (-sigma * depth).exp());
+    for method in [Method::Path, Method::Bdpt, Method::Vcm, Method::Light] {
+        let one = |seed| render(&scene, method, 4, &Settings { max_depth: 1, ..settings(200, seed) });
+        let rendered: Vec<Rendered> = (0..8).map(one).collect();
+        check_means(&format!("lamp behind smoke, {method:?}"), &rendered, expected, 2e-3, 0.1);
+    }
+    let one = |seed| render(&scene, Method::Sppm, 4, &Settings { max_depth: 1, ..photons(0, 0.1, 20, seed) });
+    let rendered: Vec<Rendered> = (0..8).map(one).collect();
+    check_means("lamp behind smoke, sppm", &rendered, expected, 2e-3, 0.03);
+}
+
+/// Smoke without absorption is invisible under a uniform sky, for any phase function and any differences between
+/// channels.
+#[test]
+fn furnace_of_smoke() {
+    for (sigma_s, g) in [([3.0; 3], 0.0), ([4.0, 1.5, 0.5], 0.6)] {
+        let mut description = Description::default();
+        add(&mut description, "smoke", domain(), holds(coefficients([0.0; 3], sigma_s, g), Some(puffs(5))));
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.cameras.push(look_at(DVec3::new(0.4, 0.9, 3.0), DVec3::ZERO, 36.0));
+        let scene = build(description);
+        for method in [Method::Path, Method::Bdpt, Method::Vcm] {
+            let rendered: Vec<Rendered> = (0..8).map(|seed| render(&scene, method, 8, &settings(100, seed))).collect();
+            check_means(&format!("furnace, g {g}, {method:?}"), &rendered, [1.0; 3], 1e-3, 0.05);
+        }
+    }
+}
+
+/// A room with a lamp, and a medium in a box that is smaller than the room.
+fn room(medium: MediumParameters, density: Option<DensityGrid>) -> Scene {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.5, 0.0));
+    let lamp = quad(Vec3::new(-0.4, 1.98, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8);
+    add(&mut description, "lamp", lamp, matte(0.0, 8.0));
+    let to_world = DAffine3::from_translation(DVec3::new(0.1, 0.8, 0.1))
+        * DAffine3::from_rotation_y(0.3)
+        * DAffine3::from_scale(DVec3::new(0.6, 0.7, 0.5));
+    add_at(&mut description, "smoke", domain(), holds(medium, density), to_world);
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.8, 0.0), 55.0));
+    build(description)
+}
+
+/// A grid of equal densities renders as the homogeneous medium, by each method.
+#[test]
+fn uniform_grids_agree_with_homogeneous_media() {
+    let (medium, density) = (coefficients([0.2, 0.6, 1.0], [1.5, 1.0, 0.5], 0.3), 2.0);
+    let homogeneous = room(medium.scaled(density), None);
+    let uniform = room(medium, Some(grid(12, |_| density)));
+    for method in [Method::Path, Method::Bdpt, Method::Vcm] {
+        let [a, b] = [&uniform, &homogeneous].map(|scene| seeds(scene, method, 8, |seed| settings(25, seed)));
+        agree(&format!("uniform grid, {method:?}"), &a, &b, 1e-3, 0.2);
+    }
+    let of = |seed| photons(10_000, 0.06, 10, seed);
+    let [a, b] = [&uniform, &homogeneous].map(|scene| seeds(scene, Method::Sppm, 8, of));
+    agree("uniform grid, sppm", &a, &b, 1e-3, 0.2);
+}
+
+/// All methods find the same light in coloured smoke.
+#[test]
+fn methods_agree_in_smoke() {
+    let scene = room(coefficients([0.3, 0.6, 1.2], [4.0, 3.0, 1.5], 0.4), Some(puffs(11)));
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(60, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(25, seed));
+    agree("smoke, bdpt", &bdpt, &path, 2e-3, 0.15);
+    let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(25, seed));
+    agree("smoke, vcm", &vcm, &path, 0.01, 0.15);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 12, seed));
+    agree("smoke, sppm", &sppm, &bdpt, 0.03, 0.3);
+}
+
+/// The other methods that render media, and Markov chains.
+#[test]
+#[ignore = "long"]
+fn more_methods_agree_in_smoke() {
+    let scene = room(coefficients([0.3, 0.6, 1.2], [4.0, 3.0, 1.5], 0.4), Some(puffs(11)));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(60, seed));
+    for method in [Method::Light, Method::Mlt] {
+        let other = seeds(&scene, method, 10, |seed| settings(150, seed));
+        agree(&format!("smoke, {method:?}"), &other, &bdpt, 5e-3, 0.3);
+    }
+    let cppm = seeds(&scene, Method::Cppm, 10, |seed| photons(10_000, 0.06, 20, seed));
+    agree("smoke, cppm", &cppm, &bdpt, 0.03, 0.3);
+}
