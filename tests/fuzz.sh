@@ -15,7 +15,7 @@ setup render
 cd "$ROOT"
 seconds=${1:-300}
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/caustique-fuzz
-read -ra readers <<<"${READERS:-glb scene gltf png jpeg webp ktx2 draco meshopt exr exr_environment hdr ies checkpoint shard model usd_options usd_fault}"
+read -ra readers <<<"${READERS:-glb scene gltf png jpeg webp ktx2 draco meshopt exr exr_environment hdr ies vol checkpoint shard model usd_options usd_fault}"
 
 rustup toolchain list | grep -q ^nightly || rustup toolchain install nightly --profile minimal
 cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz

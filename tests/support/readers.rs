@@ -8,13 +8,14 @@ use caustique::error::Result;
 use caustique::film::{Naming, Selection};
 use caustique::image::exr;
 use caustique::light::{Distribution, Pattern};
-use caustique::math::Vec2;
+use caustique::math::{Vec2, Vec3};
+use caustique::medium::DensityGrid;
 use caustique::pipeline::merge::{MergeRequest, Shards};
 use caustique::pipeline::{checkpoint, records, shard};
 use caustique::render::{Candidate, Control, Method, RenderInput, Session, Settings, StopReason, render};
 use caustique::scene::description::EnvironmentSource;
 use caustique::scene::gltf::{self, ReadOptions};
-use caustique::scene::{CameraRequest, Scene, environment_file, ies, usd};
+use caustique::scene::{CameraRequest, Scene, environment_file, grid_file, ies, usd};
 use std::fs;
 use std::io::Write;
 use std::path::Path;
@@ -24,7 +25,7 @@ use std::sync::LazyLock;
 pub type Reader = (&'static str, fn(&[u8], &Path));
 
 /// All readers.
-pub const READERS: [Reader; 18] = [
+pub const READERS: [Reader; 19] = [
     ("glb", glb),
     ("scene", scene),
     ("gltf", gltf),
@@ -38,6 +39,7 @@ pub const READERS: [Reader; 18] = [
     ("exr_environment", environment),
     ("hdr", environment),
     ("ies", profile),
+    ("vol", grid),
     ("checkpoint", checkpoint),
     ("shard", shard),
     ("model", model),
@@ -238,6 +240,14 @@ fn profile(bytes: &[u8], _: &Path) {
         if let Some(shape) = shape.flatten() {
             assert!(shape.sample(Vec2::splat(0.5)).is_none_or(|(d, pdf)| d.is_finite() && pdf > 0.0));
         }
+    }
+}
+
+/// A grid of a heterogeneous medium.
+fn grid(bytes: &[u8], folder: &Path) {
+    if let Some(grid) = value_of(grid_file::read(&file(folder, "fuzz.vol", bytes), &mut Vec::new())) {
+        assert!(grid.color_at(Vec3::splat(0.7)).is_finite());
+        assert!(grid.channels() == 3 || DensityGrid::new(grid).is_some_and(|density| density.highest() >= 0.0));
     }
 }
 

@@ -1,0 +1,3 @@
+#![no_main]
+
+caustique_fuzz::target!("vol");
