@@ -2,6 +2,7 @@
 //! cancels the inverse squared distance from the light \[Kulla and Fajardo 2012, "Importance sampling techniques for
 //! path tracing in participating media", section 4\].
 
+use super::HALF_STEP;
 use crate::math::Vec3;
 
 /// Lower bound on the distance of a light from the ray, relative to its distance from the start of the segment. Below
@@ -67,7 +68,7 @@ impl Equiangular {
     /// [`Equiangular::sample`] without the distance of the start of the segment, where rounding may give a point outside.
     #[inline]
     pub fn sample_inside(&self, u: f32) -> f32 {
-        self.sample(u + super::flight::HALF_STEP)
+        self.sample(u + HALF_STEP)
     }
 
     /// Density per length (1/m) with which [`Equiangular::sample`] draws `distance` \[equation (6)\].

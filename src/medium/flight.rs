@@ -8,7 +8,7 @@
 //! MIS weights of connected paths need the densities of paths that were not traced, whose throughput is unknown. They
 //! use the mixture with equal probabilities of the channels ([`FlightDensity`]) instead. The weights still sum to one.
 
-use super::{Equiangular, MediumParameters};
+use super::{Equiangular, HALF_STEP, MediumParameters};
 use crate::math::{Rgb, Vec2, is_lit};
 
 /// A sampled collision of a ray with a medium: the point where the ray scatters or is absorbed.
@@ -29,9 +29,6 @@ pub enum FlightOutcome {
     /// The ray collides with the medium.
     Collided(Collision),
 }
-
-/// Offset that is added to uniform numbers, which are multiples of 2^-24, so that no sampled distance is zero.
-pub(super) const HALF_STEP: f32 = 0.5 / 16_777_216.0;
 
 impl MediumParameters {
     /// Samples the free flight in the medium of a ray with `throughput` over at most `distance` (m), which may be

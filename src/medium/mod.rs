@@ -12,6 +12,9 @@ pub use phase::HenyeyGreenstein;
 
 use crate::math::Rgb;
 
+/// Offset that is added to uniform numbers, which are multiples of 2^-24, so that no sampled distance is zero.
+const HALF_STEP: f32 = 0.5 / 16_777_216.0;
+
 /// The parameters of a homogeneous participating medium, or of a heterogeneous one where its density is 1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct MediumParameters {

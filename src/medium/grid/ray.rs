@@ -19,8 +19,8 @@
 use super::{BLOCK_CELLS, Block, DensityGrid};
 use crate::geometry::Placement;
 use crate::math::{Rgb, Vec2, Vec3};
-use crate::medium::flight::{HALF_STEP, sample_channel, shares};
-use crate::medium::{FlightDensity, MediumParameters};
+use crate::medium::flight::{sample_channel, shares};
+use crate::medium::{FlightDensity, HALF_STEP, MediumParameters};
 use crate::random::HashSequence;
 use smallvec::SmallVec;
 
