@@ -257,6 +257,7 @@ fn kind(emitter: &Emitter) -> &'static str {
             (Pattern::Profile(_), Some(_)) => "spot with a profile",
             (Pattern::Picture(_), _) => "spot with a picture",
         },
+        Emitter::Volume(_) => "emissive medium",
         Emitter::Sun { .. } => "sun",
         Emitter::Environment => "environment",
         _ => "emissive triangles",

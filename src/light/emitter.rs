@@ -3,8 +3,9 @@
 use super::spot::{SpotEdge, spot_solid_angle};
 use super::{Distribution, Environment, Spread};
 use crate::geometry::{Shapes, triangle_error};
-use crate::material::Materials;
+use crate::material::{EmissionGrid, Materials, MediumGrids};
 use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sin_cos_turns, warp};
+use glam::Affine3A;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -115,6 +116,56 @@ impl ShapedLight {
     }
 }
 
+/// The light that the medium in an object emits. Its points count as lights without size: no ray can hit one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VolumeLight {
+    /// Index of the instance (the object) with the medium.
+    pub instance: u32,
+    /// The grids of the medium, with its emission.
+    pub grids: Arc<MediumGrids>,
+    /// Transform from the space of the object to world space.
+    pub to_world: Affine3A,
+}
+
+impl VolumeLight {
+    /// The emission of the medium; the light has one.
+    fn emission(&self) -> Option<&EmissionGrid> {
+        self.grids.emission.as_ref()
+    }
+
+    /// Volume of the grid's box (m3).
+    fn volume(&self) -> f32 {
+        let extent = self.emission().map_or(Vec3::ZERO, |emission| {
+            let [low, high] = emission.grid().bounds();
+            high - low
+        });
+        extent.element_product() * self.to_world.matrix3.determinant().abs()
+    }
+
+    /// Intensity of the whole light in each direction (W/sr), without absorption.
+    pub fn intensity(&self) -> Rgb {
+        self.emission().map_or(Rgb::ZERO, EmissionGrid::mean) * self.volume()
+    }
+
+    /// Samples a point by the uniform point `u`. Returns the point and its intensity over its density (W/sr).
+    pub(super) fn sample(&self, u: Vec2) -> Option<(Vec3, Rgb)> {
+        let emission = self.emission()?;
+        let (cells, pdf) = emission.sample(u);
+        let ([low, high], size) = (emission.grid().bounds(), emission.grid().size().map(|n| n as f32));
+        let p = low + (high - low) * cells / Vec3::from_array(size);
+        let cell = self.volume() / Vec3::from_array(size).element_product();
+        Some((self.to_world.transform_point3(p), emission.at(cells) * (cell / pdf)))
+    }
+
+    /// Bounding box in world space.
+    pub(super) fn bounds(&self) -> [Vec3; 2] {
+        let [low, high] = self.emission().map_or([Vec3::ZERO; 2], |emission| emission.grid().bounds());
+        let corner = |i: u32| Vec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), high, low);
+        let corners = (0..8).map(|i| self.to_world.transform_point3(corner(i)));
+        corners.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+    }
+}
+
 /// A light source. The scene has one flat list of them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Emitter {
@@ -148,6 +199,8 @@ pub enum Emitter {
     },
     /// A point or a spot with a distribution of its own over directions.
     Shaped(ShapedLight),
+    /// A medium that emits.
+    Volume(VolumeLight),
     /// Light from a small cone of directions at infinity.
     Sun {
         /// Frame whose normal points from the scene towards the sun.
@@ -204,6 +257,7 @@ impl Emitter {
                 light(*intensity) * f64::from(spot_solid_angle(*inner, *outer, *edge))
             }
             Emitter::Shaped(shaped) => light(shaped.intensity * shaped.distribution.flux()),
+            Emitter::Volume(volume) => light(volume.intensity()) * sphere,
             Emitter::Sun { irradiance, .. } => light(*irradiance) * disc,
             Emitter::Environment => sky.environment.as_ref().map_or(0.0, |e| light(e.mean())) * sphere * disc,
         }
@@ -217,6 +271,10 @@ impl Emitter {
                 shapes.surface(*instance, *primitive, [1.0 / 3.0, 1.0 / 3.0]).map(|s| s.ray_origin(s.ng))
             }
             Emitter::Point { p, .. } | Emitter::Spot { p, .. } | Emitter::Shaped(ShapedLight { p, .. }) => Some(*p),
+            Emitter::Volume(volume) => {
+                let [low, high] = volume.bounds();
+                Some((low + high) * 0.5)
+            }
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }
@@ -224,7 +282,7 @@ impl Emitter {
     /// Whether the light is a delta light: no ray can hit it.
     pub fn is_delta(&self) -> bool {
         match self {
-            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) => true,
+            Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) | Emitter::Volume(_) => true,
             Emitter::Sun { one_minus_cos, .. } => *one_minus_cos == 0.0,
             Emitter::Triangle(_) | Emitter::Environment => false,
         }

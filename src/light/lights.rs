@@ -5,7 +5,7 @@ use super::aim::CausticTargets;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
-use super::emitter::{Emitter, ShapedLight, Sky, TriangleLight, position_error, spot_point};
+use super::emitter::{Emitter, ShapedLight, Sky, TriangleLight, VolumeLight, position_error, spot_point};
 use super::environment::EnvironmentSample;
 use super::group::{Group, Groups};
 use super::receiver::Receiver;
@@ -153,7 +153,13 @@ impl Lights {
         let mut first = vec![u32::MAX; shapes.instances.len()];
         let mut relative = vec![Vec::new(); shapes.instances.len()];
         for (i, instance) in shapes.instances.iter().enumerate() {
-            if !materials.list[instance.material as usize].emits() {
+            let material = &materials.list[instance.material as usize];
+            let grids = material.grids.as_ref().filter(|_| material.medium_emission().is_some());
+            if let (Some(grids), Some(placement)) = (grids, &instance.to_world) {
+                let (instance, grids, to_world) = (i as u32, Arc::clone(grids), placement.points);
+                emitters.push(Emitter::Volume(VolumeLight { instance, grids, to_world }));
+            }
+            if !material.emits() {
                 continue;
             }
             first[i] = emitters.len() as u32;
@@ -202,7 +208,7 @@ impl Lights {
             return Group::NONE;
         }
         match &self.emitters[light as usize] {
-            Emitter::Triangle(TriangleLight { instance, .. }) => {
+            Emitter::Triangle(TriangleLight { instance, .. }) | Emitter::Volume(VolumeLight { instance, .. }) => {
                 instances.get(*instance as usize).copied().unwrap_or_default()
             }
             Emitter::Environment => *environment,
@@ -221,7 +227,13 @@ impl Lights {
     /// The light group of the object that a surface belongs to.
     #[inline]
     pub fn surface_group(&self, surface: &Surface) -> Group {
-        self.groups.instances.get(surface.instance as usize).copied().unwrap_or_default()
+        self.object_group(surface.instance)
+    }
+
+    /// The light group of an instance (an object).
+    #[inline]
+    pub fn object_group(&self, instance: u32) -> Group {
+        self.groups.instances.get(instance as usize).copied().unwrap_or_default()
     }
 
     /// Whether no light of the scene has any power.
@@ -237,9 +249,10 @@ impl Lights {
         if irradiance.is_normal() { ((irradiance.to_bits() >> 52) & 0x7ff) as i32 - 1023 } else { 0 }
     }
 
-    /// The lights that are not triangles and not the environment: points, spots and suns.
+    /// The lights that belong to no object and are not the environment: points, spots and suns.
     pub fn others(&self) -> impl Iterator<Item = &Emitter> {
-        self.emitters.iter().filter(|light| !matches!(light, Emitter::Triangle(_) | Emitter::Environment))
+        let of_objects = |light: &Emitter| matches!(light, Emitter::Triangle(_) | Emitter::Volume(_));
+        self.emitters.iter().filter(move |light| !of_objects(light) && !matches!(light, Emitter::Environment))
     }
 
     /// The lights, indexed by [`EmissionSample::light`].
@@ -302,7 +315,7 @@ impl Lights {
                 let density = if cos >= MIN_COSINE { Self::cosine_density(cos, *two_sided, spread) } else { 0.0 };
                 (density > 0.0).then_some((density, cos))
             }
-            Emitter::Point { .. } => Some((0.5 / TAU, 1.0)),
+            Emitter::Point { .. } | Emitter::Volume(_) => Some((0.5 / TAU, 1.0)),
             Emitter::Spot { frame, inner, outer, edge, .. } => {
                 let falloff = spot_falloff(one_minus_cos(d, frame.n), *inner, *outer, *edge);
                 (falloff > 0.0).then(|| (falloff / spot_solid_angle(*inner, *outer, *edge), 1.0))
@@ -378,6 +391,7 @@ impl Lights {
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_factor, light })
             }
             Emitter::Shaped(shaped) => Self::sample_shaped(shaped, p, (light, probability), u),
+            Emitter::Volume(volume) => Self::sample_volume(volume, p, (light, probability), u),
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 if *one_minus_cos == 0.0 {
                     let (wi, radiance, pdf_w) = (frame.n, *irradiance, probability);
@@ -418,6 +432,16 @@ impl Lights {
             return None;
         }
         let arrival_factor = shaped.pdf_w(-wi) / distance2;
+        Some(DirectSample { wi, target: Some(at), radiance, pdf_w: probability, delta: true, arrival_factor, light })
+    }
+
+    /// Does the work of [`Lights::sample_light`] for a medium that emits.
+    #[inline(never)]
+    fn sample_volume(volume: &VolumeLight, p: Vec3, (light, probability): (u32, f32), u: Vec2) -> Option<DirectSample> {
+        let (at, intensity) = volume.sample(u)?;
+        let to = at - p;
+        let (wi, distance2) = (to.try_normalize()?, to.length_squared());
+        let (radiance, arrival_factor) = (intensity / distance2, 0.5 / TAU / distance2);
         Some(DirectSample { wi, target: Some(at), radiance, pdf_w: probability, delta: true, arrival_factor, light })
     }
 
@@ -472,6 +496,7 @@ impl Lights {
                 let at = shaped.point(u);
                 Some((at, Cone::new(at, shaped.frame.n, shaped.distribution.reach())))
             }
+            Emitter::Volume(volume) => volume.sample(u).map(|(at, _)| (at, None)),
             Emitter::Sun { .. } | Emitter::Environment => None,
         }
     }
@@ -611,6 +636,11 @@ impl Lights {
             }
             Emitter::Spot { .. } => Self::emit_from_spot(emitter, point, direction)?,
             Emitter::Shaped(shaped) => Self::emit_from_shaped(shaped, point, direction)?,
+            Emitter::Volume(volume) => {
+                let (origin, intensity) = volume.sample(point)?;
+                let (direction, flux) = (warp::sphere_uniform(direction), intensity * (2.0 * TAU));
+                LightRay { origin, direction, flux, start: 1.0, onward: 0.5 / TAU, cos: 1.0 }
+            }
             Emitter::Sun { frame, irradiance, one_minus_cos, .. } => {
                 let d = -frame.to_world(warp::cone_uniform(direction, *one_minus_cos));
                 // A facing surface receives the irradiance E from the whole cone; a path from one direction carries

@@ -24,7 +24,7 @@ pub use cdf::Cdf;
 pub use cone::Cone;
 pub use distribution::{Distribution, Pattern, SpotCone};
 pub use emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
-pub use emitter::{Emitter, ShapedLight, Sky, TriangleLight};
+pub use emitter::{Emitter, ShapedLight, Sky, TriangleLight, VolumeLight};
 pub use environment::{Environment, ImageEnvironment};
 pub use group::{Group, Groups, MAX_GROUP_NAME, MAX_GROUPS};
 pub use guide::Guide;

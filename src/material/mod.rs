@@ -4,7 +4,7 @@ mod evaluate;
 mod library;
 mod scattering;
 
-pub use crate::medium::{MediumGrids, MediumParameters};
+pub use crate::medium::{EmissionGrid, MediumGrids, MediumParameters};
 pub use library::{MAX_FOCUSING_ROUGHNESS, Materials};
 pub use scattering::Scattering;
 
@@ -144,6 +144,13 @@ pub struct Material {
     pub anisotropy_texture: Option<TextureRef>,
     /// Dispersion, as 20 / Abbe number; 0 is none (KHR_materials_dispersion).
     pub dispersion: f32,
+}
+
+impl Material {
+    /// The light that the medium in a solid of the material emits; `None` if it emits none.
+    pub fn medium_emission(&self) -> Option<&EmissionGrid> {
+        self.grids.as_ref().filter(|_| self.medium.is_some() && self.is_solid())?.emission.as_ref()
+    }
 }
 
 impl Default for Material {

@@ -1,10 +1,12 @@
 //! Grids of values over a box: the density of a heterogeneous medium, and the light that it emits.
 
+mod emission;
 mod ray;
 
+pub use emission::EmissionGrid;
 pub use ray::{GridFlight, GridRay, Proxy};
 
-use crate::math::{Rgb, Vec3, luminance};
+use crate::math::{Rgb, Vec3};
 
 /// Number of cells along each edge of a block.
 const BLOCK_CELLS: u32 = 8;
@@ -96,13 +98,19 @@ impl Grid {
         }
     }
 
-    /// Luminance of the mean of the interpolated values in each cell, in the order of the cells.
-    pub fn cell_luminances(&self) -> Vec<f32> {
-        let [nx, ny, nz] = self.size.map(|n| n as usize);
-        let mut means: Vec<f32> = match self.channels {
-            1 => self.values.clone(),
-            _ => self.values.chunks_exact(3).map(|c| luminance(Rgb::new(c[0], c[1], c[2]))).collect(),
+    /// Mean over the box; a single channel counts three times. Interpolation does not change it.
+    fn mean(&self) -> Rgb {
+        let mean = |channel: usize| {
+            let values = self.values.iter().skip(channel).step_by(self.channels);
+            (values.map(|&x| f64::from(x)).sum::<f64>() / (self.values.len() / self.channels) as f64) as f32
         };
+        if self.channels == 1 { Rgb::splat(mean(0)) } else { Rgb::new(mean(0), mean(1), mean(2)) }
+    }
+
+    /// Means of the interpolated values of a grid of one channel in each cell, in the order of the cells.
+    fn cell_means(&self) -> Vec<f32> {
+        let [nx, ny, nz] = self.size.map(|n| n as usize);
+        let mut means = self.values.clone();
         // The mean of a linear interpolant over a cell weighs its three neighbours along an axis by 1/8, 6/8 and 1/8.
         for (stride, n) in [(1, nx), (nx, ny), (nx * ny, nz)] {
             let before = means.clone();
@@ -176,6 +184,8 @@ impl DensityGrid {
 pub struct MediumGrids {
     /// Factor of the medium's coefficients.
     pub density: DensityGrid,
+    /// The light that the medium emits; `None` if it emits none.
+    pub emission: Option<EmissionGrid>,
 }
 
 /// Bounds and mean of the interpolated density in the block at `at`, counted in blocks.
@@ -234,12 +244,12 @@ mod tests {
         assert_eq!(grid.channel_at(Vec3::splat(99.0), 0), linear(4.0, 3.0, 2.0));
     }
 
-    /// The luminances of cells are the means of the interpolant, compared with a sum over many points.
+    /// The means of cells are those of the interpolant, compared with a sum over many points.
     #[test]
-    fn luminances_of_cells_are_means() {
+    fn means_of_cells_are_exact() {
         let grid = grid([3, 4, 2], |x, y, z| ((x * 7 + y * 3 + z * 5) % 11) as f32);
         const STEPS: u32 = 20;
-        for (at, mean) in grid.cell_luminances().into_iter().enumerate() {
+        for (at, mean) in grid.cell_means().into_iter().enumerate() {
             let cell = Vec3::new((at % 3) as f32, (at / 3 % 4) as f32, (at / 12) as f32);
             let mut sum = 0.0;
             for i in 0..STEPS.pow(3) {

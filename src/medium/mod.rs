@@ -7,7 +7,7 @@ mod phase;
 
 pub use equiangular::Equiangular;
 pub use flight::{Collision, CollisionDistribution, FlightDensity, FlightOutcome};
-pub use grid::{DensityGrid, Grid, GridFlight, GridRay, MediumGrids, Proxy};
+pub use grid::{DensityGrid, EmissionGrid, Grid, GridFlight, GridRay, MediumGrids, Proxy};
 pub use phase::HenyeyGreenstein;
 
 use crate::math::Rgb;

@@ -19,6 +19,9 @@ use std::sync::Arc;
 /// f32 coordinates would lose digits.
 const FAR_FROM_ORIGIN: f64 = 8.0;
 
+/// Share of the box of an emission that may lie outside of the mesh, on each side, without a warning.
+const MAX_FIRE_OUTSIDE: f32 = 1e-3;
+
 /// Builds the scene from its description; Embree builds with `threads` threads (0: all).
 ///
 /// # Errors
@@ -52,6 +55,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         others.map(|light| (light.name.clone(), punctual(light, origin, &mut distributions))).unzip();
     let lights = Lights::new(&shapes, &materials, others, sky).with_groups(groups);
     warn_of_cut_solids(&shapes, &materials, &mut warnings);
+    warn_of_fires((&shapes, &materials), &mut warnings);
     warn_of_lights((&shapes, &materials), &lights, description.lights.len(), description.medium, &mut warnings);
     if description.cameras.is_empty() {
         warnings
@@ -126,7 +130,10 @@ fn light_groups(description: &Description, warnings: &mut Vec<String>) -> Groups
             Group::NONE
         })
     };
-    let glows = |placed: &&description::PlacedMesh| description.materials[placed.material as usize].emits();
+    let glows = |placed: &&description::PlacedMesh| {
+        let material = &description.materials[placed.material as usize];
+        material.emits() || material.medium_emission().is_some()
+    };
     let instances: Vec<Group> = description
         .instances
         .iter()
@@ -165,6 +172,26 @@ fn warn_of_cut_solids(shapes: &Shapes, materials: &Materials, warnings: &mut Vec
         };
         if !std::mem::replace(&mut named[instance.material as usize], true) {
             warnings.push(format!("material \"{}\": {problem}", material.name));
+        }
+    }
+}
+
+/// Adds a warning for each object whose medium emits light outside of its mesh: light starts there, but cameras do not see
+/// it.
+fn warn_of_fires((shapes, materials): (&Shapes, &Materials), warnings: &mut Vec<String>) {
+    for instance in &shapes.instances {
+        let Some(emission) = materials.list[instance.material as usize].medium_emission() else { continue };
+        let positions = shapes.meshes[instance.mesh as usize].positions.iter();
+        let (low, high) =
+            positions.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+        let [from, to] = emission.grid().bounds();
+        let tolerance = MAX_FIRE_OUTSIDE * (to - from);
+        if (from + tolerance).cmplt(low).any() || (to - tolerance).cmpgt(high).any() {
+            warnings.push(format!(
+                "object \"{}\": the grid of its emission reaches out of its mesh, where cameras do not see the light \
+                 (make the mesh larger)",
+                instance.name
+            ));
         }
     }
 }

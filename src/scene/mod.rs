@@ -31,7 +31,7 @@ pub use view::View;
 
 use crate::error::Result;
 use crate::geometry::{Shapes, Surface};
-use crate::light::{Emitter, Environment, Lights, TriangleLight};
+use crate::light::{Emitter, Environment, Lights, TriangleLight, VolumeLight};
 use crate::material::{Materials, MediumParameters, Scattering};
 use crate::math::{DVec3, Vec3};
 use crate::trace::Tracer;
@@ -141,10 +141,11 @@ impl Scene {
         self.survey.culled && self.materials.list[surface.material as usize].culled && direction.dot(surface.ng) > 0.0
     }
 
-    /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle of the object.
+    /// The name of a light in messages: `light "Sun"`, or `object "Panel"` for an emissive triangle or
+    /// medium of the object.
     pub fn light_name(&self, index: usize) -> String {
         match &self.lights.emitters()[index] {
-            Emitter::Triangle(TriangleLight { instance, .. }) => {
+            Emitter::Triangle(TriangleLight { instance, .. }) | Emitter::Volume(VolumeLight { instance, .. }) => {
                 let instance = &self.shapes.instances[*instance as usize];
                 let kind = if instance.object < self.first_light_sphere { "object" } else { "light" };
                 format!("{kind} \"{}\"", instance.name)

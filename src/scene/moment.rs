@@ -212,7 +212,10 @@ impl<'a> MomentBuilder<'a> {
             let mesh = &shapes.meshes[now.mesh as usize];
             points(now) != points(before) || !Arc::ptr_eq(mesh, &own.meshes[before.mesh as usize])
         };
-        let emits = |instance: &Instance| materials.list[instance.material as usize].emits();
+        let emits = |instance: &Instance| {
+            let material = &materials.list[instance.material as usize];
+            material.emits() || material.medium_emission().is_some()
+        };
         let moving = shapes.instances.iter().zip(&own.instances).filter(|(now, _)| now.moves && emits(now));
         moving.into_iter().any(|(now, before)| differs(now, before))
     }

@@ -22,6 +22,8 @@ pub struct Survey {
     pub media: bool,
     /// Whether the density of some medium varies.
     pub grids: bool,
+    /// Whether some medium emits light.
+    pub fire: bool,
     /// Whether some medium scatters.
     pub scattering: bool,
     /// Whether some solid of clear glass contains a medium that scatters.
@@ -76,6 +78,7 @@ impl Survey {
                 solids += uses;
                 survey.media |= material.medium.is_some();
                 survey.grids |= material.medium.is_some() && material.grids.is_some();
+                survey.fire |= material.medium_emission().is_some();
                 let scatters = scatters(&material.medium);
                 survey.scattering |= scatters;
                 survey.cloudy_glass |= scatters && material.transmission > 0.0 && material.ior != 1.0 && lobes.0;

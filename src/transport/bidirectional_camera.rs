@@ -4,6 +4,7 @@ use super::bidirectional::{Bidirectional, MergeLevels, PathKind, PathRecorder, T
 use super::bidirectional_light::{add, scatter};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
+use super::fire::MediumLight;
 use super::light_vertex::LightVertex;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
@@ -371,6 +372,23 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         let (group, at) = (lights.surface_group(&hit.surface), hit.surface.p);
         self.hit_light(hit.throughput * radiance, group, LightHit { depth: hit.depth, at }, &density);
         (self.mis, self.history, self.depth) = before;
+    }
+
+    fn sees_medium_light(&self, scattered: Option<Scattered>) -> bool {
+        self.history.delta && scattered.is_none_or(|scattered| scattered.lobe == LobeSet::DELTA)
+    }
+
+    fn medium_light(&mut self, light: &MediumLight, scattered: Option<Scattered>) {
+        let before = (self.history, self.depth);
+        if let Some(scattered) = scattered {
+            self.history.scattered(scattered.lobe);
+        }
+        self.depth = light.depth;
+        let group = self.shared.camera_paths.scene.lights.object_group(light.instance);
+        // Only delta lobes have scattered the path, so that no other technique finds the light.
+        let density = EmissionDensity { direct: 1.0, start: 1.0, onward: 1.0, cos: 1.0, infinite: false, delta: true };
+        self.hit_light(light.light, group, LightHit { depth: light.depth, at: light.p }, &density);
+        (self.history, self.depth) = before;
     }
 
     fn lost(&mut self) {

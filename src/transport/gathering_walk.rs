@@ -22,6 +22,7 @@ use super::bandwidths::GatherBandwidths;
 use super::camera_paths::{CameraPathStart, CameraPaths, Indirect};
 use super::cause::Cause;
 use super::direct::{BSDF_SAMPLE_PROBABILITY, Division, balance, direct_light, divided_direct_light, next_event};
+use super::fire::MediumLight;
 use super::glint::{Glints, Onward};
 use super::lobe_layers::{FirstScatter, LobeHistory, LobeRecord};
 use super::pass_through::PassThroughHit;
@@ -67,6 +68,8 @@ pub(super) struct GatheringWalk<'a, B, K, const PATHS: bool> {
     pub classes: ClassSet,
     /// Whether the path has had a bounce at a broad lobe.
     pub scattered_broadly: bool,
+    /// Whether only delta lobes have scattered the path.
+    pub delta: bool,
     pub glints: Glints,
     /// Record of the light by the lobe of the first hit; `None` if it is not recorded.
     pub record: Option<&'a mut LobeRecord>,
@@ -378,10 +381,31 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
 
     #[inline]
     fn scatter(&mut self, vertex: &Vertex<'_, 'a>, sample: &BsdfSample) {
+        self.delta &= sample.lobe == LobeSet::DELTA;
         self.glints.scatter(vertex.surface.ng, sample);
         if self.record.is_some() {
             self.lobe_history.scatter(|| FirstScatter::of_sample(vertex, sample, sample.lobe));
         }
+    }
+
+    fn sees_medium_light(&self, _: Option<Scattered>) -> bool {
+        self.delta
+    }
+
+    fn medium_light(&mut self, light: &MediumLight, scattered: Option<Scattered>) {
+        let class = self.suffix_on_arrival(scattered).class_at_light(false);
+        if !self.classes.has(class) {
+            return;
+        }
+        if !light.light.is_finite() {
+            return self.sample.reject(Cause::Emission);
+        }
+        self.record_hit(FirstScatter::Emit, light.light, false);
+        *match class.part() {
+            Part::Emission => &mut self.sample.emission,
+            Part::Direct => &mut self.sample.direct,
+            _ => &mut self.sample.indirect,
+        } += light.light;
     }
 
     fn lost(&mut self) {
@@ -457,6 +481,7 @@ impl CameraPaths<'_> {
             lobes: LobeSet::empty(),
             classes: self.classes,
             scattered_broadly: false,
+            delta: true,
             glints: Glints::NONE,
             record: Some(&mut scratch.lobes).filter(|record| self.lobes && record.level.is_some()),
             lobe_history: LobeHistory::default(),

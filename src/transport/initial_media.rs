@@ -123,6 +123,9 @@ fn around_lights(scene: &Scene) -> Vec<InitialMedium> {
                 return InitialMedium::Differs;
             }
         }
+        if matches!(emitter, Emitter::Volume(_)) {
+            return InitialMedium::Differs;
+        }
         InitialMedium::Same(emitter.any_point(&scene.shapes).map_or(Interior::default(), |p| Interior::at(scene, p)))
     };
     scene.lights.emitters().iter().map(&mut around).collect()

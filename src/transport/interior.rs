@@ -9,7 +9,7 @@
 use crate::geometry::Placement;
 use crate::material::{Material, MediumParameters};
 use crate::math::Vec3;
-use crate::medium::{DensityGrid, GridRay};
+use crate::medium::{GridRay, MediumGrids};
 use crate::scene::contact::{self, ContactPoint};
 use crate::scene::{EMPTY_STACK, Scene, SolidStack};
 use crate::spectrum::Wavelength;
@@ -209,16 +209,18 @@ impl Interior {
         if !scene.survey.grids {
             return None;
         }
-        let (density, placement) = self.grid(scene)?;
-        Some(GridRay::new(density, placement, origin, direction))
+        let (_, grids, placement) = self.grids(scene)?;
+        Some(GridRay::new(&grids.density, placement, origin, direction))
     }
 
-    /// The density grid of the medium that fills the space around the path, and the placement of its object.
+    /// The instance whose medium fills the space around the path, the grids of that medium, and the placement of the
+    /// instance; `None` if the medium is homogeneous, or if there is none.
     #[inline(never)]
-    fn grid<'s>(&self, scene: &'s Scene) -> Option<(&'s DensityGrid, &'s Placement)> {
-        let instance = &scene.shapes.instances[self.host(scene)? as usize];
+    pub fn grids<'s>(&self, scene: &'s Scene) -> Option<(u32, &'s MediumGrids, &'s Placement)> {
+        let host = self.host(scene)?;
+        let instance = &scene.shapes.instances[host as usize];
         let grids = scene.materials.list[instance.material as usize].grids.as_ref()?;
-        Some((&grids.density, instance.to_world.as_ref()?))
+        Some((host, grids, instance.to_world.as_ref()?))
     }
 
     /// Index of refraction of the medium that fills the space around the path; 1 in the open.

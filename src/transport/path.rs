@@ -7,6 +7,7 @@ use super::bidirectional::{PathKind, PathRecorder, Technique};
 use super::bidirectional_camera::{record_medium, record_surface};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
+use super::fire::MediumLight;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::pass_through::PassThroughHit;
 use super::path_history::PathHistory;
@@ -179,6 +180,20 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
             let of = PathKind { class, group: self.scene.lights.surface_group(&hit.surface), first };
             self.add(Technique::Hit { camera: hit.depth }, of, light, weight);
         }
+    }
+
+    fn sees_medium_light(&self, scattered: Option<Scattered>) -> bool {
+        scattered.is_none_or(|scattered| scattered.lobe == LobeSet::DELTA)
+    }
+
+    fn medium_light(&mut self, light: &MediumLight, scattered: Option<Scattered>) {
+        let mut history = self.history;
+        if let Some(scattered) = scattered {
+            history.scattered(scattered.lobe);
+        }
+        let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
+        let of = PathKind { class, group: self.scene.lights.object_group(light.instance), first };
+        self.add(Technique::Hit { camera: light.depth }, of, light.light, 1.0);
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {

@@ -1,5 +1,6 @@
 //! Vertices of a path, and the visitor that receives them.
 
+use super::fire::MediumLight;
 use super::interior::Interior;
 use super::pass_through::PassThroughHit;
 use super::roulette::survival;
@@ -149,6 +150,18 @@ pub trait Visitor<'a> {
     #[inline]
     fn pass_through_light(&mut self, hit: &PassThroughHit, scattered: Option<Scattered>) {
         let _ = (hit, scattered);
+    }
+    /// Whether [`Visitor::medium_light`] is to be called for the segment behind the last vertex, which scattered the
+    /// path by `scattered`.
+    #[inline]
+    fn sees_medium_light(&self, scattered: Option<Scattered>) -> bool {
+        let _ = scattered;
+        false
+    }
+    /// The medium on a part of the segment to the next surface emits light; camera paths only.
+    #[inline]
+    fn medium_light(&mut self, light: &MediumLight, scattered: Option<Scattered>) {
+        let _ = (light, scattered);
     }
     /// The path arrives at a vertex in a scattering medium; the result decides how it continues. A walk that splits
     /// ignores it.

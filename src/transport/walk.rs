@@ -1,6 +1,7 @@
 //! The only bounce loop. It handles intersection, nested solids, roulette and depth, and does not access the film. Each
 //! algorithm is a [`Visitor`].
 
+use super::fire::Glow;
 use super::flight::{Fly, Split};
 use super::interior::Interior;
 use super::pass_through::{PassThroughHit, for_each_pass_through_light};
@@ -218,6 +219,13 @@ impl<'a> Path<'a> {
             flight = fly.flight;
             end
         };
+        if BESIDES >= SCATTERING
+            && self.transport == Transport::Radiance
+            && scene.survey.fire
+            && visitor.sees_medium_light(scattered)
+        {
+            Glow { scene, visitor, throughput, draws, depth, scattered }.show(start, met);
+        }
         if self.transport == Transport::Radiance && scene.pass_through_lights.is_some() {
             let segment =
                 Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };

@@ -26,6 +26,27 @@ def cloud(of, half=0.5, eye=(0, 0, 4), field_deg=8):
     )
 
 
+def layers(falloff):
+    """An absorbing box whose density falls off exponentially along the view."""
+    values = np.exp(-falloff * (np.arange(64) + 0.5) / 64)
+    file = s.grid(np.broadcast_to(values[:, None, None], (64, 2, 2)), (-0.5,) * 3, (0.5,) * 3)
+    name = f"layers-{falloff:g}.vol"
+    return cloud(s.medium(2, 0, density=name)).beside(name, file)
+
+
+def smoke(absorbed, scattered, g=0.0, burns=False):
+    """Puffs of smoke in haze, in a box; if it `burns`, it emits as much as it absorbs of a radiance of 1."""
+    random = np.random.default_rng(3)
+    at = np.stack(np.meshgrid(*[np.linspace(-0.5, 0.5, 24)] * 3, indexing="ij"), -1)
+    centres, radii = random.uniform(-0.3, 0.3, (5, 3)), random.uniform(0.1, 0.3, 5)
+    far = np.linalg.norm(at[..., None, :] - centres, axis=-1)
+    density = 0.1 + 2 * np.maximum(1 - far / radii, 0).sum(-1)
+    box = (-0.5,) * 3, (0.5,) * 3
+    made = s.medium(absorbed, scattered, g, "smoke.vol", "fire.vol" if burns else None)
+    made = cloud(made, field_deg=12).beside("smoke.vol", s.grid(density, *box))
+    return made.beside("fire.vol", s.grid(density * absorbed, *box)) if burns else made
+
+
 def lantern(of):
     """A point light of 1 W/sr one metre above a matte floor, inside a ball of a medium with radius 0.3."""
     made = s.Scene().add(shapes.floor(1.5), s.diffuse(0.5))
@@ -101,6 +122,39 @@ CASES = [
         Value([exp(-0.1), exp(-1), exp(-3)], "Beer-Lambert law for each channel.", bound=0.01),
         METHODS,
         iterations=8,
+        photons=2000,
+        seeds=FEW,
+    ),
+    Case(
+        "media-layers",
+        "A box whose density falls off exponentially along the view",
+        {f"{k:g}": partial(layers, k) for k in (0.5, 2, 8)},
+        Values(
+            {f"{k:g}": exp(-2 * (1 - exp(-k)) / k) for k in (0.5, 2, 8)},
+            "Beer-Lambert law: exp(-2 times the integral of exp(-k z) from 0 to 1), within the error of 64 cells.",
+            bound=0.01,
+            resolves=0.1,
+        ),
+        METHODS,
+        iterations=32,
+        photons=2000,
+        seeds=FEW,
+    ),
+    Case(
+        "media-smoke",
+        "Puffs of smoke without absorption, g = 0 and 0.6, in a white furnace",
+        {f"g{g:g}": partial(smoke, 0, 8, g) for g in (0.0, 0.6)},
+        Values({f"g{g:g}": 1.0 for g in (0.0, 0.6)}, WHITE, bound=0.005, resolves=0.1),
+        EYE,
+        iterations=32,
+    ),
+    Case(
+        "media-fire",
+        "Burning smoke that emits what it absorbs, in a white furnace",
+        {"scene": partial(smoke, 4, 0, 0.0, True)},
+        Value(1.0, "A medium in equilibrium with the light around it is invisible [Kirchhoff].", 0.005, 0.1),
+        METHODS,
+        iterations=32,
         photons=2000,
         seeds=FEW,
     ),

@@ -1,5 +1,6 @@
 """Scenes of meshes and a few materials, written as glTF with the keys of docs/scene-format.md."""
 
+import struct
 from dataclasses import dataclass, field, replace
 
 import glb
@@ -68,9 +69,16 @@ def glowing(material, radiance):
     return {**material, "emissiveFactor": (rgb / strength).tolist(), "extensions": extensions}
 
 
-def medium(absorbed, scattered, g=0.0):
-    """The coefficients of a medium, 1/m."""
-    return {"sigma_a": _rgb(absorbed), "sigma_s": _rgb(scattered), "g": g}
+def medium(absorbed, scattered, g=0.0, density=None, emission=None):
+    """The coefficients of a medium, 1/m; density and emission: names of files of grids (Scene.beside)."""
+    grids = {key: {"file": name} for key, name in (("density", density), ("emission", emission)) if name}
+    return {"sigma_a": _rgb(absorbed), "sigma_s": _rgb(scattered), "g": g, **grids}
+
+
+def grid(values, low, high):
+    """A grid file (.vol) of one channel: values by z, y and x, in the box between two corners."""
+    header = struct.pack("<3sB5I6f", b"VOL", 3, 1, *values.shape[::-1], 1, *low, *high)
+    return header + values.astype("<f4").tobytes()
 
 
 def _rgb(value):
@@ -85,13 +93,18 @@ def _extras(keys):
 class Scene:
     """objects: (mesh, material, entries of the node); lights: (light of KHR_lights_punctual, matrix of the node, keys);
     camera: (eye, target, vertical field of view in degrees, up); keys: of the scene; root: the matrix of a node above
-    all others."""
+    all others; files: pairs of a name and the bytes of a file beside the scene."""
 
     objects: tuple = ()
     lights: tuple = ()
     camera: tuple = ((0, 0, 1), (0, 0, 0), 10, (0, 1, 0))
     keys: dict = field(default_factory=dict)
     root: np.ndarray | None = None
+    files: tuple = ()
+
+    def beside(self, name, content):
+        """The scene with another file beside it."""
+        return replace(self, files=(*self.files, (name, content)))
 
     def add(self, mesh, material, **node):
         """The scene with another object; `node`: entries of its node, such as scale."""
@@ -141,8 +154,10 @@ class Scene:
         return replace(self, root=matrix)
 
     def write(self, path):
-        """Writes the scene as a .glb."""
+        """Writes the scene as a .glb, and its files beside it."""
         _Writer(self).write(path)
+        for name, content in self.files:
+            path.with_name(name).write_bytes(content)
 
 
 def _across(direction):

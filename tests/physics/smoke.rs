@@ -9,7 +9,7 @@ use crate::support;
 use caustique::estimator::InitialBandwidth;
 use caustique::material::{Material, MediumGrids, MediumParameters};
 use caustique::math::{DAffine3, DVec3, Rgb, Vec3};
-use caustique::medium::{DensityGrid, Grid};
+use caustique::medium::{DensityGrid, EmissionGrid, Grid};
 use caustique::random::HashSequence;
 use caustique::render::{Control, Levels, Method, Rendered, Settings};
 use caustique::scene::description::{EnvironmentDescription, EnvironmentSource};
@@ -48,7 +48,7 @@ fn coefficients(sigma_a: impl Into<[f32; 3]>, sigma_s: impl Into<[f32; 3]>, g: f
 
 /// Material of a mesh that only contains a medium: its surface is invisible.
 fn holds(medium: MediumParameters, density: Option<DensityGrid>) -> Material {
-    let grids = density.map(|density| Arc::new(MediumGrids { density }));
+    let grids = density.map(|density| Arc::new(MediumGrids { density, emission: None }));
     Material { medium: Some(medium), grids, ..glass(1.0) }
 }
 
@@ -179,6 +179,57 @@ fn methods_agree_in_smoke() {
     agree("smoke, vcm", &vcm, &path, 0.01, 0.15);
     let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 12, seed));
     agree("smoke, sppm", &sppm, &bdpt, 0.03, 0.3);
+}
+
+/// Material of smoke that emits `color` (W/sr/m3) times the same density.
+fn burns(medium: MediumParameters, density: DensityGrid, color: impl Into<[f32; 3]>) -> Material {
+    let emission = EmissionGrid::new(density.grid().clone(), Rgb::from(color.into()));
+    Material { grids: Some(Arc::new(MediumGrids { density, emission })), ..holds(medium, None) }
+}
+
+/// A medium that emits as much as it absorbs from a sky of radiance 1 is invisible \[Kirchhoff\], whatever it scatters.
+#[test]
+fn fire_in_equilibrium_is_invisible() {
+    let sigma_a = [0.5, 1.5, 3.0];
+    for sigma_s in [0.0, 0.4] {
+        let mut description = Description::default();
+        let medium = coefficients(sigma_a, [sigma_s; 3], 0.0);
+        add(&mut description, "fire", domain(), burns(medium, puffs(5), sigma_a));
+        let source = EnvironmentSource::Color(Rgb::ONE);
+        description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
+        description.cameras.push(look_at(DVec3::new(0.4, 0.9, 3.0), DVec3::ZERO, 36.0));
+        let scene = build(description);
+        for method in [Method::Path, Method::Bdpt, Method::Vcm] {
+            let rendered: Vec<Rendered> = (0..8).map(|seed| render(&scene, method, 8, &settings(100, seed))).collect();
+            check_means(&format!("equilibrium, {method:?}"), &rendered, [1.0; 3], 2e-3, 0.1);
+        }
+        let of = |seed| photons(4000, 0.2, 30, seed);
+        let rendered: Vec<Rendered> = (0..8).map(|seed| render(&scene, Method::Sppm, 8, &of(seed))).collect();
+        check_means("equilibrium, sppm", &rendered, [1.0; 3], 0.01, 0.1);
+    }
+}
+
+/// All methods find the same light of a fire that lights a room, seen directly and by a mirror.
+#[test]
+fn methods_agree_by_firelight() {
+    let mut description = Description::default();
+    let room = cuboid(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 2.0), true);
+    add(&mut description, "room", room, matte(0.5, 0.0));
+    let mirror = quad(Vec3::new(-0.95, 0.3, -0.9), Vec3::Y * 1.4, Vec3::new(0.5, 0.0, -0.05));
+    add(&mut description, "mirror", mirror, support::scenes::mirror());
+    let to_world = DAffine3::from_translation(DVec3::new(0.2, 0.6, 0.1)) * DAffine3::from_scale(DVec3::splat(0.3));
+    let medium = coefficients([1.0, 2.0, 4.0], [0.5; 3], 0.3);
+    add_at(&mut description, "fire", domain(), burns(medium, puffs(3), [20.0, 8.0, 1.0]), to_world);
+    description.cameras.push(look_at(DVec3::new(0.0, 1.0, 1.9), DVec3::new(0.0, 0.8, 0.0), 55.0));
+    let scene = build(description);
+    let path = seeds(&scene, Method::Path, 10, |seed| settings(60, seed));
+    let bdpt = seeds(&scene, Method::Bdpt, 10, |seed| settings(30, seed));
+    // Paths miss the caustic of the mirror, which is small.
+    agree("firelight, bdpt", &bdpt, &path, 5e-3, 0.15);
+    let vcm = seeds(&scene, Method::Vcm, 10, |seed| settings(30, seed));
+    agree("firelight, vcm", &vcm, &bdpt, 0.01, 0.15);
+    let sppm = seeds(&scene, Method::Sppm, 10, |seed| photons(10_000, 0.06, 16, seed));
+    agree("firelight, sppm", &sppm, &bdpt, 0.03, 0.3);
 }
 
 /// The other methods that render media, and Markov chains.

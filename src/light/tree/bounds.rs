@@ -63,6 +63,10 @@ impl Bounds {
                 let brightest = luminance(*intensity) * distribution.peak();
                 Bounds { low, high, ..at(*p, axis, spread, reach.min(3.0), brightest) }
             }
+            Emitter::Volume(volume) => {
+                let [low, high] = volume.bounds();
+                Bounds { low, high, ..at(low, Vec3::Z, PI, 0.5 * PI, luminance(volume.intensity())) }
+            }
             Emitter::Sun { .. } | Emitter::Environment => return None,
         };
         (bounds.intensity > 0.0 && bounds.intensity.is_finite()).then_some(bounds)

@@ -121,9 +121,9 @@ impl<'g> GridRay<'g> {
         GridRay { density, origin: grid.to_cells(local), direction }
     }
 
-    /// Position at `distance` in cells.
+    /// Position at `distance` (m) in cells.
     #[inline]
-    fn cells_at(&self, distance: f32) -> Vec3 {
+    pub fn cells_at(&self, distance: f32) -> Vec3 {
         self.origin + self.direction * distance
     }
 

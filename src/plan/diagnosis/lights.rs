@@ -40,7 +40,7 @@ pub(super) fn wrong_units(scene: &Scene) -> Option<String> {
             }
             Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) => points += emitter.power(sky) as f32,
             Emitter::Sun { irradiance, .. } => suns += luminance(*irradiance),
-            Emitter::Environment => {}
+            Emitter::Environment | Emitter::Volume(_) => {}
         }
     }
     let alone = surfaces == 0.0 && sky.environment.is_none() && points + suns > 0.0;
@@ -105,7 +105,7 @@ fn light_rays(scene: &Scene) -> Vec<LightRays> {
                 sources.push(from(*p, &|d| distribution.relative(frame.to_local(*d)) != Rgb::ZERO));
             }
             Emitter::Triangle(TriangleLight { instance, .. }) => glowing.entry(*instance).or_default().push(index),
-            Emitter::Sun { .. } | Emitter::Environment => {}
+            Emitter::Sun { .. } | Emitter::Environment | Emitter::Volume(_) => {}
         }
         if sources.len() >= MAX_LIGHTS {
             break;

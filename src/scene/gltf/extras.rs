@@ -92,6 +92,8 @@ pub(super) struct Medium {
     g: f32,
     /// Factor of the coefficients, which makes the medium heterogeneous.
     pub(super) density: Option<GridExtras>,
+    /// Light that a heterogeneous medium emits.
+    pub(super) emission: Option<EmissionExtras>,
 }
 
 /// Content of `extras.caustique.medium.density`: a grid in a file.
@@ -112,6 +114,18 @@ impl Medium {
         let (sigma_a, sigma_s) = (Rgb::from_array(self.sigma_a), Rgb::from_array(self.sigma_s));
         Ok(MediumParameters { sigma_a, sigma_s, g: self.g })
     }
+}
+
+/// Content of `extras.caustique.medium.emission`: a grid in a file, and its colour (W/sr/m3).
+#[derive(Deserialize)]
+pub(super) struct EmissionExtras {
+    pub(super) file: String,
+    #[serde(default = "white")]
+    pub(super) color: [f32; 3],
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
 }
 
 /// Contact between a material and opaque surfaces that touch it.
@@ -236,6 +250,9 @@ pub(super) const MATERIAL: &[&str] = &[
     "medium.g",
     "medium.density",
     "medium.density.file",
+    "medium.emission",
+    "medium.emission.file",
+    "medium.emission.color",
     "priority",
     "contact",
     "null_bsdf",

@@ -2,14 +2,14 @@
 
 use super::container::malformed;
 use super::document::{Document, extension};
-use super::extras::{self, GridExtras, MaterialExtras};
+use super::extras::{self, MaterialExtras};
 use super::texture::{Info, Textures, Use};
 use super::{fault, uri};
 use crate::bsdf::SheenModel;
 use crate::error::Result;
 use crate::material::{Alpha, Material, MediumParameters};
 use crate::math::Rgb;
-use crate::medium::{DensityGrid, Grid, MediumGrids};
+use crate::medium::{DensityGrid, EmissionGrid, Grid, MediumGrids};
 use crate::scene::grid_file;
 use crate::texture::TextureRef;
 use serde::Deserialize;
@@ -412,16 +412,29 @@ impl Reader<'_> {
 
     /// Reads the grids of a heterogeneous medium; `None` for a homogeneous one.
     fn grids(&mut self, medium: &extras::Medium) -> Result<Option<Arc<MediumGrids>>> {
-        let Some(density) = &medium.density else { return Ok(None) };
-        let grid = self.grid(density, "medium.density")?;
+        let Some(density) = &medium.density else {
+            return match medium.emission {
+                Some(_) => Err(fault(self.place, "medium.emission needs medium.density")
+                    .hint("give the density of the medium as a grid, too")),
+                None => Ok(None),
+            };
+        };
+        let grid = self.grid(&density.file, "medium.density")?;
         let density =
             DensityGrid::new(grid).ok_or_else(|| fault(self.place, "medium.density must be a grid of one channel"))?;
-        Ok(Some(Arc::new(MediumGrids { density })))
+        let emission = match &medium.emission {
+            Some(emission) => {
+                let color = self.color(emission.color, f32::MAX, "medium.emission.color")?;
+                EmissionGrid::new(self.grid(&emission.file, "medium.emission")?, color)
+            }
+            None => None,
+        };
+        Ok(Some(Arc::new(MediumGrids { density, emission })))
     }
 
     /// Reads the grid that `key` of the extras names.
-    fn grid(&mut self, extras: &GridExtras, key: &str) -> Result<Grid> {
-        let file = uri::require_path(&extras.file).and_then(|file| self.document.folder.file(file.as_ref()));
+    fn grid(&mut self, file: &str, key: &str) -> Result<Grid> {
+        let file = uri::require_path(file).and_then(|file| self.document.folder.file(file.as_ref()));
         let file = file.map_err(|e| e.within(format!("{}, {key}", self.place)))?;
         grid_file::read(&file, self.warnings)
     }

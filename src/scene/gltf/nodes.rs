@@ -263,8 +263,8 @@ impl<'r> Reader<'r> {
         extras::check_keys(raw, extras::SCENE, &place, &mut self.out.warnings);
         self.scene = extras::read(raw, &place)?;
         if let Some(medium) = &self.scene.medium {
-            if medium.density.is_some() {
-                let cause = "the medium that fills the scene has no density grid";
+            if medium.density.is_some() || medium.emission.is_some() {
+                let cause = "the medium that fills the scene has no grids";
                 return Err(fault(place, cause).hint("give the medium to the material of a closed mesh"));
             }
             self.out.medium = Some(medium.parameters(&place)?);
