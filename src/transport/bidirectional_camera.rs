@@ -4,7 +4,6 @@ use super::bidirectional::{Bidirectional, MergeLevels, PathKind, PathRecorder, T
 use super::bidirectional_light::{add, scatter};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
-use super::fire::MediumLight;
 use super::light_vertex::LightVertex;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
@@ -15,7 +14,7 @@ use super::pixel_sample::{Features, PixelSample};
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{FirstHit, token, with_camera_bit};
 use super::shares::{Connection, Incident, PathHalves, connection_shares, shares, wanted};
-use super::vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+use super::vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 use super::walk::{PathStart, walk};
 use crate::bsdf::{BsdfSample, LobeSet, Transport};
 use crate::light::{EmissionDensity, Group, Receiver};

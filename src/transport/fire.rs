@@ -5,8 +5,8 @@
 //! first vertex, and behind perfect mirrors and clear glass.
 
 use super::segment::{Passage, PrecomputedHit, Span, Start, Through, next_vertex};
-use super::vertex::{Scattered, Visitor};
-use crate::math::{Rgb, Vec3};
+use super::vertex::{MediumLight, Scattered, Visitor};
+use crate::math::Rgb;
 use crate::medium::GridRay;
 use crate::random::{Draws, HashSequence, Purpose, mix};
 use crate::scene::Scene;
@@ -16,18 +16,6 @@ const SAMPLES: u32 = 4;
 
 /// Distinguishes the random numbers of this file from those of collisions on the same segment.
 const KEY: u64 = 0x66_69_72_65;
-
-/// Light that a medium emits along a segment of a camera path.
-pub struct MediumLight {
-    /// Index of the instance (the object) with the medium.
-    pub instance: u32,
-    /// A point of the medium on the segment.
-    pub p: Vec3,
-    /// Light that arrives at the camera, with the throughput of the path.
-    pub light: Rgb,
-    /// Number of path segments up to the light.
-    pub depth: u32,
-}
 
 /// Shows the visitor the light of the media on a segment.
 pub(super) struct Glow<'a, V> {

@@ -44,7 +44,6 @@ pub use bidirectional_light::{Deposits, LightVertices, Splat};
 pub use camera_paths::{CameraPathStart, CameraPaths, Indirect};
 pub use cause::Cause;
 pub use direct::{balance, direct_light};
-pub use fire::MediumLight;
 pub use initial_media::{InitialMedia, InitialMedium};
 pub use interior::{Crossing, Interior};
 pub use light::{Emitted, EqualFlux, LightPaths, Photons, emitted_flux, light_path};
@@ -61,7 +60,7 @@ pub use scattering_vertex::{ScatterPoint, lit_side};
 pub use segment::{
     Arrival, End, FirstHit, MediumArrival, PrecomputedHit, ShadowRay, Start, Visibility, next_surface, shadow_ray,
 };
-pub use vertex::{MediumVertex, Next, Scattered, Vertex, Visitor};
+pub use vertex::{MediumLight, MediumVertex, Next, Scattered, Vertex, Visitor};
 pub use vertex_counts::VertexCounts;
 pub use visible::visible_surface;
 pub use volume::Volume;

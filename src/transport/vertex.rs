@@ -1,6 +1,5 @@
 //! Vertices of a path, and the visitor that receives them.
 
-use super::fire::MediumLight;
 use super::interior::Interior;
 use super::pass_through::PassThroughHit;
 use super::roulette::survival;
@@ -107,6 +106,18 @@ impl MediumVertex {
     pub fn medium_id(&self, scene: &Scene) -> u32 {
         self.arrival.interior.material(scene).unwrap_or(u32::MAX)
     }
+}
+
+/// Light that a medium emits along a segment of a camera path.
+pub struct MediumLight {
+    /// Index of the instance (the object) with the medium.
+    pub instance: u32,
+    /// A point of the medium on the segment.
+    pub p: Vec3,
+    /// Light that arrives at the camera, with the throughput of the path.
+    pub light: Rgb,
+    /// Number of path segments up to the light.
+    pub depth: u32,
 }
 
 /// How the previous vertex scattered the path.
