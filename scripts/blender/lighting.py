@@ -98,8 +98,8 @@ def _add_lamp(thing, flat, warn):
         flat.remove(thing)
         return
     _warn_of(thing, flat.where(thing), warn)
-    picture = None
-    if not _add_profile(thing, flat):
+    picture, profile = None, _add_profile(thing, flat)
+    if not profile:
         picture = guard.attempt(warn, flat.where(thing), None, "its picture is not carried", _add_picture, thing, flat)
         if picture is None:
             _measure_nodes(thing, flat, warn)
@@ -112,10 +112,8 @@ def _add_lamp(thing, flat, warn):
         flat.add_extras(thing, radius=light.shadow_soft_size)
         if light.type == "SPOT":
             flat.add_extras(thing, blend=light.spot_blend)
-            if light.shadow_soft_size > 0 and "camera" not in flat.hidden[thing.name]:
-                warn(flat.where(thing), "its bulb, which Cycles shows, is not seen: only its light is")
-        elif light.shadow_soft_size > 0:
-            flat.add_extras(thing, null_bsdf=True)
+        if light.shadow_soft_size > 0:
+            flat.add_extras(thing, **{"bulb" if profile or light.type == "SPOT" else "null_bsdf": True})
 
 
 def _add_profile(thing, flat):

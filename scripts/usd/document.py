@@ -73,6 +73,13 @@ class Document:
             self._shared[key] = self.add("images", {"bufferView": self._view(data), "mimeType": mime, "name": name})
         return self._shared[key]
 
+    def profile(self, data):
+        """Add a buffer view of the bytes of a photometric profile, equal ones once. Returns its index."""
+        key = "profile", data
+        if key not in self._shared:
+            self._shared[key] = self._view(data)
+        return self._shared[key]
+
     def _view(self, data):
         self._buffer += b"\0" * (-len(self._buffer) % 4)
         view = self.add("bufferViews", {"buffer": 0, "byteOffset": len(self._buffer), "byteLength": len(data)})

@@ -69,15 +69,20 @@ class Light:
         share = area if self.normalized and area > 0 else 1.0
         return tuple(c / share for c in self.emitted())
 
-    def cone(self):
-        """Half angle (radians) and softness of the cone of UsdLuxShapingAPI, or None. Records other shaping as
-        losses."""
+    def profile(self):
+        """The asset of the IES profile of UsdLuxShapingAPI, or None."""
+        ies = self.get("shaping:ies:file", None) if self.prim.HasAPI(UsdLux.ShapingAPI) else None
+        return ies if ies is not None and ies.path else None
+
+    def cone(self, profile=False):
+        """Half angle (radians) and softness of the cone of UsdLuxShapingAPI, or None. Records other shaping as losses,
+        the profile unless `profile` says that the caller carries it."""
         if not self.prim.HasAPI(UsdLux.ShapingAPI):
             return None
         if self.get("shaping:focus", 0.0) > 0:
             self.add_loss("shaping:focus is not carried: it shines alike within its cone")
-        ies = self.get("shaping:ies:file", None)
-        if ies is not None and ies.path:
+        ies = self.profile()
+        if ies is not None and not profile:
             self.add_loss(f"its IES profile {ies.path} is not carried: it shines alike in all directions")
         angle = self.get("shaping:cone:angle", 90.0)
         softness = min(max(self.get("shaping:cone:softness", 0.0), 0.0), 1.0)
@@ -126,7 +131,16 @@ def _sphere(light, document, matrix):
     intensity = [e * (0.25 if light.normalized or a == 0 else math.pi * a * a) * light.stage.metres ** 2
                  for e in emitted]
     entry = {"name": str(light.where), "type": "point", **_strength(intensity)}
-    keys, cone = {"radius": a * light.stage.metres}, light.cone()
+    keys, cone, profile = {"radius": a * light.stage.metres}, light.cone(profile=True), light.profile()
+    if profile is not None:
+        data, _ = light.stage.asset(light.prim, profile)
+        # Horizontal angles run from the light's X axis to its Y axis, as in hdEmbree.
+        keys["ies"] = {"bufferView": document.profile(data)}
+        scale = float(light.get("shaping:ies:angleScale", 0.0))
+        if scale != 0:
+            keys["ies"]["angle_scale"] = scale
+        if light.get("shaping:ies:normalize", False):
+            keys["ies"]["normalize"] = "power"
     if cone is not None:
         entry["type"] = "spot"
         angle, softness = cone
@@ -138,8 +152,8 @@ def _sphere(light, document, matrix):
         keys["blend"] = 1 - (1 - math.cos((1 - softness) * angle)) / whole if softness > 0 and whole > 0 else 0.0
         if softness > 0:
             light.add_loss("the edge of its cone falls off by the cosine of the angle, not by the angle")
-        if a > 0:
-            light.add_loss("its bulb shines as a disc across its axis, and cannot itself be seen")
+    if a > 0 and (entry["type"] == "spot" or profile is not None):
+        keys["bulb"] = True
     return {"extensions": document.light(entry), "caustique": keys}
 
 

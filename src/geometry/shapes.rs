@@ -37,8 +37,14 @@ impl Shapes {
 
     /// Vertices of all instances, in world space.
     pub fn points(&self) -> impl Iterator<Item = Vec3> {
+        self.points_of(|_| true)
+    }
+
+    /// The vertices of the instances that `chosen` accepts, in world space.
+    pub fn points_of(&self, chosen: impl Fn(&Instance) -> bool) -> impl Iterator<Item = Vec3> {
         let positions = |instance: &Instance| self.meshes[instance.mesh as usize].positions.iter();
-        self.instances.iter().flat_map(move |instance| positions(instance).map(|p| instance.point(*p)))
+        let chosen = self.instances.iter().filter(move |instance| chosen(instance));
+        chosen.flat_map(move |instance| positions(instance).map(|p| instance.point(*p)))
     }
 
     /// The bounding box of all instances: its lowest and its highest corner. The first exceeds the second without

@@ -1,10 +1,11 @@
 //! One light source, and its power.
 
+use super::bulb::{Bulb, ball_point};
 use super::spot::{SpotEdge, spot_solid_angle};
 use super::{Distribution, Environment, Spread};
 use crate::geometry::{Shapes, triangle_error};
 use crate::material::{EmissionGrid, Materials, MediumGrids};
-use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, sin_cos_turns, warp};
+use crate::math::{Frame, Rgb, Vec2, Vec3, Vec4, luminance, warp};
 use glam::Affine3A;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -88,19 +89,15 @@ pub struct ShapedLight {
     pub intensity: Rgb,
     /// Relative intensity by direction.
     pub distribution: Arc<Distribution>,
+    /// The ball, if camera paths see it.
+    pub bulb: Option<Bulb>,
 }
 
 impl ShapedLight {
     /// Samples a point of the ball by the uniform point `u`. From every side, the ball looks like a uniform disc.
     #[inline]
     pub fn point(&self, u: Vec2) -> Vec3 {
-        if self.radius == 0.0 {
-            return self.p;
-        }
-        // The projection of a uniform point of the unit sphere in four dimensions to three; its projection to two is
-        // uniform on the disc. The third number is made of the low bits of the first.
-        let height = (1.0 - u.x).sqrt() * sin_cos_turns(0.5 * (4096.0 * u.x).fract()).1;
-        self.p + warp::around_z(u.x.sqrt(), height, u.y) * self.radius
+        ball_point(self.p, self.radius, u)
     }
 
     /// Radiant intensity along a unit direction (W/sr).
@@ -196,6 +193,8 @@ pub enum Emitter {
         outer: f32,
         /// Falloff of the intensity between `inner` and `outer`.
         edge: SpotEdge,
+        /// The ball that emits in place of the disc, if camera paths see it.
+        bulb: Option<Bulb>,
     },
     /// A point or a spot with a distribution of its own over directions.
     Shaped(ShapedLight),
@@ -229,11 +228,14 @@ pub struct Sky {
     pub hidden_from_camera: bool,
 }
 
-/// Samples a point uniformly on the disc of a spot with centre `p` and the axis of `frame`.
+/// Samples a point uniformly on the disc of a spot with centre `p` and the axis of `frame`, or of its bulb.
 #[inline]
-pub fn spot_point(p: Vec3, radius: f32, frame: &Frame, u: Vec2) -> Vec3 {
+pub fn spot_point((p, radius, bulb): (Vec3, f32, Option<Bulb>), frame: &Frame, u: Vec2) -> Vec3 {
     if radius == 0.0 {
         return p;
+    }
+    if bulb.is_some() {
+        return ball_point(p, radius, u);
     }
     let on = warp::disc_concentric(u) * radius;
     p + frame.t * on.x + frame.b * on.y
@@ -279,7 +281,15 @@ impl Emitter {
         }
     }
 
-    /// Whether the light is a delta light: no ray can hit it.
+    /// The bulb that camera paths see, if the light has one.
+    pub fn bulb(&self) -> Option<Bulb> {
+        match self {
+            Emitter::Spot { bulb, .. } | Emitter::Shaped(ShapedLight { bulb, .. }) => *bulb,
+            _ => None,
+        }
+    }
+
+    /// Whether the light is a delta light: no ray that scatters can hit it.
     pub fn is_delta(&self) -> bool {
         match self {
             Emitter::Point { .. } | Emitter::Spot { .. } | Emitter::Shaped(_) | Emitter::Volume(_) => true,

@@ -2,6 +2,7 @@
 
 use super::Region;
 use super::aim::CausticTargets;
+use super::bulb::crossed_share;
 use super::cdf::Cdf;
 use super::cone::Cone;
 use super::emission::{DirectSample, EmissionDensity, EmissionSample, EntryDisc};
@@ -36,6 +37,8 @@ pub struct Lights {
     relative: Arc<[Vec<u32>]>,
     /// Indices of the suns of finite size, which rays can hit.
     suns: Arc<[u32]>,
+    /// Indices of the lights whose bulbs camera paths see.
+    bulbs: Arc<[u32]>,
     environment: Option<u32>,
     sky: Sky,
     targets: CausticTargets,
@@ -135,6 +138,7 @@ impl Lights {
             first: Arc::clone(&self.first),
             relative: Arc::clone(&self.relative),
             suns: Arc::clone(&self.suns),
+            bulbs: Arc::clone(&self.bulbs),
             environment: self.environment,
             sky,
             targets,
@@ -175,6 +179,7 @@ impl Lights {
             environment = Some(emitters.len() as u32);
             emitters.push(Emitter::Environment);
         }
+        let bulbs = (0..emitters.len() as u32).filter(|&i| emitters[i as usize].bulb().is_some()).collect();
         let suns = (0..emitters.len() as u32)
             .filter(|&i| matches!(emitters[i as usize], Emitter::Sun { one_minus_cos, .. } if one_minus_cos > 0.0))
             .collect();
@@ -186,7 +191,7 @@ impl Lights {
         let choice = LightSampler::new(&emitters, &sky, floored).map(Arc::new);
         let groups = Groups::default();
         let (emitters, first, relative) = (emitters.into(), first.into(), relative.into());
-        Lights { emitters, choice, first, relative, suns, environment, sky, targets, groups }
+        Lights { emitters, choice, first, relative, suns, bulbs, environment, sky, targets, groups }
     }
 
     /// Assigns the lights to light groups, whose light gets layers of its own.
@@ -304,6 +309,41 @@ impl Lights {
         })
     }
 
+    /// Whether camera paths see the bulb of any light.
+    #[inline]
+    pub fn has_bulbs(&self) -> bool {
+        !self.bulbs.is_empty()
+    }
+
+    /// Calls `each(radiance, distance, group)` for every bulb on the ray from `origin` along the unit `d`, up to the
+    /// distance `reach`. `camera`: the ray starts at the camera.
+    pub fn for_each_bulb(
+        &self,
+        (origin, d): (Vec3, Vec3),
+        reach: f32,
+        camera: bool,
+        mut each: impl FnMut(Rgb, f32, Group),
+    ) {
+        for &index in self.bulbs.iter() {
+            let emitter = &self.emitters[index as usize];
+            if camera && emitter.bulb().is_some_and(|bulb| bulb.hidden_from_camera) {
+                continue;
+            }
+            let (ball, intensity) = match emitter {
+                Emitter::Spot { p, radius, frame, intensity, inner, outer, edge, .. } => {
+                    ((*p, *radius), *intensity * spot_falloff(one_minus_cos(-d, frame.n), *inner, *outer, *edge))
+                }
+                Emitter::Shaped(shaped) => ((shaped.p, shaped.radius), shaped.intensity_along(-d)),
+                _ => continue,
+            };
+            if intensity != Rgb::ZERO
+                && let Some((share, distance)) = crossed_share(ball, origin, d, reach)
+            {
+                each(intensity * (share / (PI * ball.1 * ball.1)), distance, self.group(index));
+            }
+        }
+    }
+
     /// Density per solid angle with which light `index`, not at infinity, emits along the unit `d` from any of its
     /// points, and the cosine at the light; `None` if it emits nothing along `d`.
     #[inline]
@@ -378,8 +418,8 @@ impl Lights {
                 let arrival_factor = 0.5 / TAU / to.length_squared();
                 Some(DirectSample { wi, target, radiance, pdf_w, delta: true, arrival_factor, light })
             }
-            Emitter::Spot { p: middle, radius, frame, intensity, inner, outer, edge } => {
-                let at = spot_point(*middle, *radius, frame, u);
+            Emitter::Spot { p: middle, radius, frame, intensity, inner, outer, edge, bulb } => {
+                let at = spot_point((*middle, *radius, *bulb), frame, u);
                 let to = at - p;
                 let (wi, target, pdf_w) = (to.try_normalize()?, Some(at), probability);
                 let falloff = spot_falloff(one_minus_cos(-wi, frame.n), *inner, *outer, *edge);
@@ -488,8 +528,8 @@ impl Lights {
         match &self.emitters[index] {
             Emitter::Triangle(triangle) => Some((triangle.point(warp::triangle_uniform(u)), None)),
             Emitter::Point { p, .. } => Some((*p, None)),
-            Emitter::Spot { p, radius, frame, outer, .. } => {
-                let at = spot_point(*p, *radius, frame, u);
+            Emitter::Spot { p, radius, frame, outer, bulb, .. } => {
+                let at = spot_point((*p, *radius, *bulb), frame, u);
                 Some((at, Cone::new(at, frame.n, *outer)))
             }
             Emitter::Shaped(shaped) => {
@@ -721,7 +761,7 @@ impl Lights {
     /// Samples a ray that leaves a spot.
     #[inline(always)]
     fn emit_from_spot(spot: &Emitter, point: Vec2, direction: Vec2) -> Option<LightRay> {
-        let Emitter::Spot { p, radius, frame, intensity, inner, outer, edge } = spot else { return None };
+        let Emitter::Spot { p, radius, frame, intensity, inner, outer, edge, bulb } = spot else { return None };
         // The full cone and the penumbra are selected by their flux. In the penumbra, the integral of the falloff is
         // inverted, so every path carries the same flux.
         let penumbra = (outer - inner) * edge.mean();
@@ -731,7 +771,7 @@ impl Lights {
         let filled = spot_solid_angle(*inner, *outer, *edge);
         let falloff = spot_falloff(h, *inner, *outer, *edge);
         let direction = frame.to_world(warp::around_z(sin, 1.0 - h, direction.y));
-        let (origin, flux) = (spot_point(*p, *radius, frame, point), *intensity * filled);
+        let (origin, flux) = (spot_point((*p, *radius, *bulb), frame, point), *intensity * filled);
         Some(LightRay { origin, direction, flux, start: 1.0, onward: falloff / filled, cos: 1.0 })
     }
 

@@ -1,6 +1,7 @@
 //! Light sources (emissive triangles, points, spots, suns and the environment), and their sampling.
 
 mod aim;
+mod bulb;
 mod cdf;
 mod cone;
 mod distribution;
@@ -20,6 +21,7 @@ mod spread;
 mod tree;
 
 pub use aim::CausticTargets;
+pub use bulb::Bulb;
 pub use cdf::Cdf;
 pub use cone::Cone;
 pub use distribution::{Distribution, Pattern, SpotCone};

@@ -348,6 +348,7 @@ mod tests {
                     outer: 0.3 + draws(3).one(Purpose::Lobe),
                     radius: if i % 8 == 1 { 0.3 } else { 0.0 },
                     edge: SpotEdge::Smooth,
+                    bulb: None,
                 },
                 _ => {
                     let corners = [p, vector(4) - 0.5, vector(5) - 0.5];
@@ -377,9 +378,9 @@ mod tests {
             Emitter::Triangle(TriangleLight { two_sided, plane, .. }) => {
                 *two_sided || plane.truncate().dot(p) - plane.w > 1e-4
             }
-            Emitter::Spot { p: at, radius, frame, outer, .. } => (0..16).any(|k| {
+            Emitter::Spot { p: at, radius, frame, outer, bulb, .. } => (0..16).any(|k| {
                 let u = Vec2::new((0.5 + k as f32) / 16.0, 0.99);
-                let at = spot_point(*at, *radius, frame, u);
+                let at = spot_point((*at, *radius, *bulb), frame, u);
                 frame.n.dot((p - at).normalize()) > 1.0 - outer + 1e-4
             }),
             _ => true,

@@ -33,8 +33,8 @@ impl Presence {
         let property = |effect| material_reasons(effect, &used);
         let because = Effect::ALL.map(|effect| {
             truncate_reasons(match effect {
-                // Suns with a disc are visible; delta lights are not.
-                Effect::Emission => lights(scene, |emitter| !emitter.is_delta()),
+                // Suns with a disc and bulbs are visible; other delta lights are not.
+                Effect::Emission => lights(scene, |emitter| !emitter.is_delta() || emitter.bulb().is_some()),
                 Effect::Direct if objects.is_empty() => vec![],
                 Effect::Direct => all.clone(),
                 Effect::Indirect if objects.is_empty() => vec![],

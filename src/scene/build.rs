@@ -6,8 +6,8 @@ use super::{Contacts, Scene, SolidStacks, Survey, dense};
 use crate::error::Result;
 use crate::geometry::{Instance, Mesh, Placement, Shapes};
 use crate::light::{
-    Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS, Pattern,
-    ShapedLight, Sky, SpotCone,
+    Bulb, Distribution, Emitter, Environment, Group, Groups, ImageEnvironment, Lights, MAX_GROUP_NAME, MAX_GROUPS,
+    Pattern, ShapedLight, Sky, SpotCone,
 };
 use crate::material::{Alpha, Material, Materials, MediumParameters, Scattering};
 use crate::math::{DAffine3, DVec3, Frame, Rgb, Vec3};
@@ -74,6 +74,7 @@ pub(super) fn build(mut description: Description, threads: usize) -> Result<Scen
         materials,
         objects: description.objects,
         first_light_sphere,
+        preset_floor: description.preset_floor,
         tracer,
         pass_through_lights,
         lights,
@@ -262,6 +263,7 @@ pub(super) fn rebuild_with_materials(
         origin: scene.origin,
         objects: scene.objects.clone(),
         first_light_sphere: scene.first_light_sphere,
+        preset_floor: scene.preset_floor,
         tracer,
         pass_through_lights,
         light_names: scene.light_names.clone(),
@@ -486,7 +488,13 @@ fn shaped(light: &PunctualLight, p: Vec3, pattern: &Arc<Pattern>, distributions:
     };
     let right = (light.to_world.matrix3 * DVec3::X).normalize_or(DVec3::X).as_vec3();
     let frame = Frame::from_normal_tangent(axis(light), right);
-    Emitter::Shaped(ShapedLight { p, radius: light.radius, frame, intensity: light.intensity, distribution })
+    let (radius, intensity, bulb) = (light.radius, light.intensity, bulb(light));
+    Emitter::Shaped(ShapedLight { p, radius, frame, intensity, distribution, bulb })
+}
+
+/// The bulb of a spot or of a light with a pattern, if it has a visible one.
+fn bulb(light: &PunctualLight) -> Option<Bulb> {
+    (light.bulb && light.radius > 0.0).then_some(Bulb { hidden_from_camera: light.hidden_from_camera })
 }
 
 /// 1 minus the cosines of the half angles of a spot's cone (radians); the second is greater, so that the ramp between
@@ -514,6 +522,7 @@ pub(super) fn punctual(light: &PunctualLight, origin: DVec3, distributions: &mut
                 inner,
                 outer,
                 edge,
+                bulb: bulb(light),
             }
         }
         PunctualKind::Sun { angle } => Emitter::Sun {

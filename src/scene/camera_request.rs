@@ -4,6 +4,7 @@ use super::Scene;
 use super::description::{CameraDescription, Projection};
 use crate::camera::{self, Camera, Filter};
 use crate::error::{Error, ErrorKind, Result};
+use crate::geometry::Instance;
 use crate::math::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};
 use serde::Serialize;
 use std::borrow::Cow;
@@ -250,7 +251,8 @@ impl Scene {
         let back = DVec3::new(sa * ce, se, ca * ce);
         let right = DVec3::new(ca, 0.0, -sa);
         let matrix = DMat3::from_cols(right, back.cross(right), back);
-        let (low, high) = self.shapes.bounds();
+        let around = |(low, high): (Vec3, Vec3), p: Vec3| (low.min(p), high.max(p));
+        let (low, high) = self.framed_points().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), around);
         let middle = if low.cmple(high).all() { 0.5 * (low + high) } else { self.lights.sky().center };
         let distance = match orbit.distance {
             Distance::Metres(length) => length,
@@ -268,6 +270,12 @@ impl Scene {
         })
     }
 
+    /// The vertices that views of the whole scene frame.
+    fn framed_points(&self) -> impl Iterator<Item = Vec3> {
+        let framed = |instance: &Instance| self.preset_floor != Some(instance.object);
+        self.shapes.points_of(framed)
+    }
+
     /// Distance (m) from `middle` at which a camera with the axes of `rotation` sees all vertices, with a margin.
     fn framing_distance(&self, middle: Vec3, rotation: DMat3, aspect: f64) -> f64 {
         let half = (0.5 * VIEW_YFOV).tan() * VIEW_FILL;
@@ -277,7 +285,7 @@ impl Scene {
             p.z + (p.x.abs() / aspect).max(p.y.abs()) / half
         };
         let radius = f64::from(self.lights.sky().radius);
-        let distance = self.shapes.points().map(least).fold(0.0, f64::max);
+        let distance = self.framed_points().map(least).fold(0.0, f64::max);
         // A scene without meshes, or one that is a point.
         if distance > 0.0 { distance } else { radius / half }
     }

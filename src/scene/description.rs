@@ -45,6 +45,8 @@ pub struct Description {
     pub environment_unknown: bool,
     /// Whether the file itself says that its environment is black.
     pub environment_is_black: bool,
+    /// Index of the object that a light preset has added, which views of the whole scene do not frame.
+    pub preset_floor: Option<u32>,
     /// The medium that fills the space outside all solids; `None` if it is empty.
     pub medium: Option<MediumParameters>,
     /// Settings of the picture, which options of the user override.
@@ -215,11 +217,13 @@ pub struct PunctualLight {
     /// Relative intensity of a point or a spot by direction, within the cone of a spot; `None` for equal intensity in
     /// all directions. The x axis of the pattern's frame is that of the light's space.
     pub pattern: Option<Arc<Pattern>>,
-    /// Radius (m) of a point light's sphere, of a spot's disc, or of the ball of a light with a pattern; 0 for a
-    /// mathematical point.
+    /// Radius (m) of a point light's sphere, of a spot's disc, or of the ball of a light with a pattern or a bulb; 0 for
+    /// a mathematical point.
     pub radius: f32,
     /// Whether rays pass through the sphere of a point light, which shines nevertheless.
     pub pass_through: bool,
+    /// Whether camera paths see the radius of a spot, or of a light with a pattern, as a ball that rays pass through.
+    pub bulb: bool,
     /// Whether camera rays do not see the light; it lights the scene anyway.
     pub hidden_from_camera: bool,
     /// Name of the light's group (a named set of lights with a layer of its own), if it has one.

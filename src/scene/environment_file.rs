@@ -2,7 +2,9 @@
 
 use super::description::EnvironmentSource;
 use crate::error::{Error, ErrorKind, Result};
+use crate::math::Vec3;
 use crate::memory;
+use crate::spectrum::primaries::to_rec_709;
 use exr::prelude::{ReadChannels, ReadLayers};
 use image::ImageDecoder;
 use std::fs::File;
@@ -20,8 +22,8 @@ const MAX_HALF: f32 = 65_504.0;
 /// A decoded image: width, height, and RGB texels with the top row first.
 type Pixels = (u32, u32, Vec<[f32; 3]>);
 
-/// Reads the radiance of an environment from an OpenEXR or Radiance HDR file, recognised by its first bytes. Texels
-/// that are negative or not finite are clamped, with a warning.
+/// Reads the radiance of an environment from an OpenEXR or Radiance HDR file, recognised by its first bytes. An OpenEXR
+/// file with other chromaticities in its header is converted to Rec. 709. Texels that are negative or not finite are clamped, with a warning.
 ///
 /// # Errors
 /// The file cannot be opened, is in another format, is damaged, or is too large.
@@ -96,7 +98,13 @@ fn read_exr(path: &Path) -> std::result::Result<Pixels, String> {
         .from_file(path)
         .map_err(text)?;
     let size = image.layer_data.size;
-    Ok((size.width() as u32, size.height() as u32, image.layer_data.channel_data.pixels.1))
+    let mut texels = image.layer_data.channel_data.pixels.1;
+    if let Some(matrix) = image.attributes.chromaticities.as_ref().and_then(to_rec_709) {
+        for texel in &mut texels {
+            *texel = (matrix * Vec3::from_array(*texel).as_dvec3()).as_vec3().to_array();
+        }
+    }
+    Ok((size.width() as u32, size.height() as u32, texels))
 }
 
 fn read_hdr(path: &Path) -> std::result::Result<Pixels, String> {

@@ -1,4 +1,5 @@
-//! Reads photometric profiles: IESNA LM-63 files of 1986, 1991, 1995, 2002 and 2019, with type C photometry.
+//! Reads photometric profiles: IESNA LM-63 files of 1986, 1991, 1995, 2002 and 2019. Photometry of types A and B is
+//! resampled to type C.
 
 use crate::error::{Error, ErrorKind, Result};
 use crate::light::Profile;
@@ -9,6 +10,21 @@ pub const MAX_BYTES: u64 = 64 << 20;
 /// Largest number of angles of a kind.
 const MAX_ANGLES: usize = 1 << 16;
 const DAMAGED: &str = "get the file again from the maker of the luminaire, or export it again";
+
+/// Angles between the samples of profiles of type A and B: half of the smallest angle of the file, within these limits
+/// (degrees).
+const RESAMPLED_STEPS: [f32; 2] = [0.5, 1.0];
+
+/// How the angles of a file give a direction (IES LM-75). Each letter is the type's own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// Horizontal angles turn about the axis of the light, vertical angles lean away from it.
+    C,
+    /// Vertical angles turn about the light's X axis, horizontal angles lean from the plane across it towards it.
+    B,
+    /// Horizontal angles turn about the light's Y axis, vertical angles lean from the plane across it towards it.
+    A,
+}
 
 /// The content of a profile's file.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +112,7 @@ fn shortened(word: &str) -> String {
 /// Reads the bytes of a file. Adds warnings about features that are ignored; the errors name the line.
 ///
 /// # Errors
-/// The file is damaged, or has photometry of another type than C.
+/// The file is damaged.
 pub fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Photometry> {
     let text = String::from_utf8_lossy(bytes).replace("\r\n", "\n").replace('\r', "\n");
     let text = text.trim_start_matches('\u{feff}');
@@ -134,13 +150,7 @@ pub fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Photometry> {
     let multiplier = numbers.next("its multiplier")?;
     let vertical = numbers.count("the number of vertical angles", 2, MAX_ANGLES)?;
     let horizontal = numbers.count("the number of horizontal angles", 1, MAX_ANGLES)?;
-    match numbers.count("its photometric type", 1, 3)? {
-        1 => {}
-        other => {
-            let cause = format!("its photometry is of type {}, only type C is read", ["B", "A"][other - 2]);
-            return Err(fault(numbers.line, cause).hint("convert the profile to type C photometry"));
-        }
-    }
+    let kind = [Kind::C, Kind::B, Kind::A][numbers.count("its photometric type", 1, 3)? - 1];
     for what in ["its unit of length", "its width", "its length", "its height"] {
         numbers.next(what)?;
     }
@@ -154,15 +164,37 @@ pub fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Photometry> {
         return Err(fault(numbers.line, format!("its factors multiply the light by {factor}")).hint(DAMAGED));
     }
     let vertical = numbers.angles("vertical angle", vertical)?;
-    if vertical[0] < 0.0 || vertical[vertical.len() - 1] > 180.0 {
-        return Err(fault(numbers.line, "a vertical angle is outside 0 to 180 degrees").hint(DAMAGED));
+    let [lean, turn] = [[-90.0, 90.0], [-180.0, 180.0]];
+    let (allowed, across) = match kind {
+        Kind::C => ([0.0, 180.0], None),
+        Kind::B => (turn, Some(lean)),
+        Kind::A => (lean, Some(turn)),
+    };
+    let outside = |angles: &[f32], [low, high]: [f32; 2]| angles[0] < low || angles[angles.len() - 1] > high;
+    if outside(&vertical, allowed) {
+        let [low, high] = allowed;
+        return Err(fault(numbers.line, format!("a vertical angle is outside {low} to {high} degrees")).hint(DAMAGED));
     }
     let angles = numbers.angles("horizontal angle", horizontal)?;
-    let horizontal = whole_turn(&angles).ok_or_else(|| {
+    if let Some(across) = across
+        && (angles.len() < 2 || outside(&angles, across))
+    {
+        let ([low, high], count) = (across, angles.len());
+        let cause = format!(
+            "photometry of type {kind:?} has at least two horizontal angles from {low} to {high} degrees, this file {count} from {} to {}",
+            angles[0],
+            angles[count - 1]
+        );
+        return Err(fault(numbers.line, cause).hint(DAMAGED));
+    }
+    let around = whole_turn(&angles).filter(|_| kind == Kind::C);
+    if kind == Kind::C && around.is_none() {
         let (start, end) = (angles[0], angles[angles.len() - 1]);
-        let cause = format!("its horizontal angles run from {start} to {end}; type C has one angle, or 0 to 90, 0 to 180, 90 to 270 or 0 to 360 degrees");
-        fault(numbers.line, cause).hint(DAMAGED)
-    })?;
+        let cause = format!(
+            "its horizontal angles run from {start} to {end}; type C has one angle, or 0 to 90, 0 to 180, 90 to 270 or 0 to 360 degrees"
+        );
+        return Err(fault(numbers.line, cause).hint(DAMAGED));
+    }
     let count = vertical.len() * angles.len();
     let (mut candela, mut negative) = (Vec::new(), 0);
     for k in 1..=count {
@@ -176,7 +208,80 @@ pub fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Photometry> {
     if !candela.iter().any(|&x| x > 0.0) {
         return Err(fault(numbers.line, "all its intensities are zero").hint(DAMAGED));
     }
-    Ok(Photometry { vertical, horizontal, candela })
+    match around {
+        Some(horizontal) => Ok(Photometry { vertical, horizontal, candela }),
+        None => Planes { kind, vertical, horizontal: angles, candela }
+            .resampled()
+            .ok_or_else(|| fault(numbers.line, "all its intensities are zero").hint(DAMAGED)),
+    }
+}
+
+/// The measurements of a file of type A or B.
+struct Planes {
+    kind: Kind,
+    vertical: Vec<f32>,
+    horizontal: Vec<f32>,
+    candela: Vec<f32>,
+}
+
+impl Planes {
+    /// The luminous intensity along a direction given by its components to the right, up and ahead, seen from behind the
+    /// light. Angles that start at 0 are mirrored. There is no light beyond the angles of the file.
+    fn intensity(&self, [x, y, z]: [f32; 3]) -> f32 {
+        let (horizontal, vertical) = match self.kind {
+            Kind::A => (x.atan2(z), y.clamp(-1.0, 1.0).asin()),
+            _ => (x.clamp(-1.0, 1.0).asin(), y.atan2(z)),
+        };
+        let place = |angles: &[f32], angle: f32| {
+            let angle = if angles[0] == 0.0 { angle.abs() } else { angle }.to_degrees();
+            // Rounding must not lose the rim.
+            let (first, last) = (angles[0], angles[angles.len() - 1]);
+            if angle < first - 1e-3 || angle > last + 1e-3 {
+                return None;
+            }
+            let after = angles.partition_point(|&a| a <= angle).clamp(1, angles.len() - 1);
+            let (low, high) = (angles[after - 1], angles[after]);
+            Some((after - 1, ((angle - low) / (high - low)).clamp(0.0, 1.0)))
+        };
+        let (Some((i, s)), Some((j, t))) = (place(&self.vertical, vertical), place(&self.horizontal, horizontal))
+        else {
+            return 0.0;
+        };
+        let column = |j: usize| {
+            let at = j * self.vertical.len() + i;
+            self.candela[at] + (self.candela[at + 1] - self.candela[at]) * s
+        };
+        column(j) + (column(j + 1) - column(j)) * t
+    }
+
+    /// The same light as photometry of type C; `None` if no light is left.
+    fn resampled(&self) -> Option<Photometry> {
+        let angles = [&self.vertical, &self.horizontal];
+        let least =
+            angles.iter().flat_map(|a| a.windows(2)).map(|pair| pair[1] - pair[0]).fold(f32::INFINITY, f32::min);
+        let [low, high] = RESAMPLED_STEPS;
+        let step = 180.0 / (180.0 / (0.5 * least).clamp(low, high)).ceil();
+        let count = (180.0 / step).round() as usize;
+        let turn = 2 * count;
+        let columns: Vec<Vec<f32>> = (0..turn)
+            .map(|j| {
+                let (sin, cos) = (step * j as f32).to_radians().sin_cos();
+                let along = |i: usize| {
+                    let (out, ahead) = (step * i as f32).to_radians().sin_cos();
+                    self.intensity([out * cos, out * sin, ahead])
+                };
+                (0..=count).map(along).collect()
+            })
+            .collect();
+        // Rows after the last one with light would only cost memory.
+        let lit = columns.iter().filter_map(|column| column.iter().rposition(|&x| x > 0.0)).max()?;
+        let rows = (lit + 2).clamp(2, count + 1);
+        Some(Photometry {
+            vertical: (0..rows).map(|i| (step * i as f32).min(180.0)).collect(),
+            horizontal: (0..=turn).map(|j| (step * j as f32, j % turn)).collect(),
+            candela: columns.iter().flat_map(|column| &column[..rows]).copied().collect(),
+        })
+    }
 }
 
 /// Extends the horizontal angles of a file by its symmetry to a whole turn: ascending angles, each with the index of its
@@ -208,6 +313,60 @@ impl Photometry {
     /// The largest luminous intensity (cd).
     pub fn peak(&self) -> f32 {
         self.candela.iter().copied().fold(0.0, f32::max)
+    }
+
+    /// The luminous flux (lm): the integral of the intensity over all directions.
+    pub fn flux(&self) -> f64 {
+        let n = self.vertical.len();
+        let column = |index: usize| -> f64 {
+            let values = &self.candela[index * n..(index + 1) * n];
+            let cell = |k: usize| {
+                let [a, b] = [self.vertical[k], self.vertical[k + 1]].map(|angle| f64::from(angle).to_radians());
+                let (from, to) = (f64::from(values[k]), f64::from(values[k + 1]));
+                let slope = (to - from) / (b - a);
+                // The integral of a linear function times the sine.
+                from * a.cos() - to * b.cos() + slope * (b.sin() - a.sin())
+            };
+            (0..n - 1).map(cell).sum()
+        };
+        let part = |pair: &[(f32, usize)]| {
+            let width = f64::from(pair[1].0 - pair[0].0).to_radians();
+            0.5 * width * (column(pair[0].1) + column(pair[1].1))
+        };
+        self.horizontal.windows(2).map(part).sum()
+    }
+
+    /// The profile with the angles to its axis multiplied by `scale`, if it is positive, or the angles to the opposite
+    /// axis by `-scale`, if it is negative \[UsdLux, shaping:ies:angleScale\]. `None` if no light is left.
+    pub fn scaled(&self, scale: f32) -> Option<Photometry> {
+        let moved: Vec<f32> = self
+            .vertical
+            .iter()
+            .map(|&angle| if scale > 0.0 { angle * scale } else { 180.0 + (180.0 - angle) * scale })
+            .collect();
+        // Angles between which the scaled profile has light, with the share of the later node at either end.
+        let at = |angle: f32| {
+            let after = moved.partition_point(|&a| a <= angle).clamp(1, moved.len() - 1);
+            (after - 1, ((angle - moved[after - 1]) / (moved[after] - moved[after - 1])).clamp(0.0, 1.0))
+        };
+        let (start, end) = (moved[0].max(0.0), moved[moved.len() - 1].min(180.0));
+        if start >= end || !start.is_finite() || !end.is_finite() {
+            return None;
+        }
+        let inside = || moved.iter().copied().filter(|&angle| angle > start && angle < end);
+        let vertical: Vec<f32> = std::iter::once(start).chain(inside()).chain([end]).collect();
+        let n = self.vertical.len();
+        let value = |column: usize, angle: f32| {
+            let (k, share) = at(angle);
+            let values = &self.candela[column * n..];
+            values[k] + (values[k + 1] - values[k]) * share
+        };
+        let columns = self.candela.len() / n;
+        let candela: Vec<f32> = (0..columns)
+            .flat_map(|column| vertical.iter().map(move |&angle| (column, angle)))
+            .map(|(c, a)| value(c, a))
+            .collect();
+        candela.iter().any(|&x| x > 0.0).then(|| Photometry { vertical, horizontal: self.horizontal.clone(), candela })
     }
 
     /// The relative intensity, for a light whose axis is that of the profile. `None` if rounding leaves no profile.
@@ -265,13 +424,20 @@ mod tests {
         Vec3::new(sin * x, sin * y, -cos)
     }
 
+    fn distribution(profile: Profile) -> crate::light::Distribution {
+        crate::light::Distribution::new(std::sync::Arc::new(crate::light::Pattern::Profile(profile)), None)
+            .expect("light")
+    }
+
+    /// Relative intensity in a direction of the light's space.
+    fn relative(distribution: &crate::light::Distribution, d: Vec3) -> f32 {
+        // The frame of a light: its normal is the axis -Z, its x axis the light's.
+        distribution.relative(Vec3::new(d.x, -d.y, -d.z)).x
+    }
+
     /// Relative intensity in a direction of the light's space.
     fn along(profile: &Profile, d: Vec3) -> f32 {
-        // The frame of a light: its normal is the axis -Z, its x axis the light's.
-        let d = Vec3::new(d.x, -d.y, -d.z);
-        let distribution =
-            crate::light::Distribution::new(std::sync::Arc::new(crate::light::Pattern::Profile(profile.clone())), None);
-        distribution.expect("light").relative(d).x
+        relative(&distribution(profile.clone()), d)
     }
 
     #[test]
@@ -340,6 +506,76 @@ mod tests {
         }
     }
 
+    /// In random directions, files of types A and B have the intensity of the formula that they tabulate, also where half
+    /// of the angles is left to symmetry. With exchanged types they do not.
+    #[test]
+    fn angles_of_types_a_and_b_give_their_directions() {
+        // Linear in both angles between -60 and 60 degrees, or symmetric about 0.
+        let whole = |h: f32, v: f32| 100.0 + h + 0.5 * v;
+        let mirrored = |h: f32, v: f32| 100.0 - h.abs() - 0.5 * v.abs();
+        let text = |kind: u32, angles: &[f32], value: &dyn Fn(f32, f32) -> f32| {
+            let words = |list: Vec<f32>| list.iter().map(f32::to_string).collect::<Vec<_>>().join(" ");
+            let rows: Vec<String> =
+                angles.iter().map(|&h| words(angles.iter().map(|&v| value(h, v)).collect())).collect();
+            let (n, list) = (angles.len(), words(angles.to_vec()));
+            format!(
+                "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 {n} {n} {kind} 2 0 0 0\n1 1 30\n{list}\n{list}\n{}",
+                rows.join("\n")
+            )
+        };
+        let worst = |text: &str, kind: u32, value: &dyn Fn(f32, f32) -> f32| {
+            let photometry = read(text);
+            let (profile, peak) = (photometry.profile(Turn::default()).expect("a profile"), photometry.peak());
+            let made = distribution(profile);
+            let mut worst = 0.0f32;
+            for i in 0..400 {
+                let u = Stream::new(4, 0, Domain::Test, i).vertex(0).two(Purpose::Direction);
+                let (h, v) = (110.0 * u.x - 55.0, 110.0 * u.y - 55.0);
+                let ((sh, ch), (sv, cv)) = (h.to_radians().sin_cos(), v.to_radians().sin_cos());
+                let [x, y, z] = if kind == 3 { [sh * cv, sv, ch * cv] } else { [sh, ch * sv, ch * cv] };
+                let found = peak * relative(&made, Vec3::new(x, y, -z));
+                worst = worst.max((found - value(h, v)).abs());
+            }
+            worst
+        };
+        let (all, half) = ([-60.0, -30.0, 0.0, 30.0, 60.0], [0.0, 30.0, 60.0]);
+        for (own, other) in [(2, 3), (3, 2)] {
+            let error = worst(&text(own, &all, &whole), own, &whole);
+            assert!(error < 0.5, "{own}: {error}");
+            let error = worst(&text(own, &half, &mirrored), own, &mirrored);
+            assert!(error < 1.0, "{own}, mirrored: {error}");
+            let error = worst(&text(own, &all, &whole), other, &whole);
+            assert!(error > 3.0, "{own} is not told from {other}: {error}");
+        }
+    }
+
+    /// Scaled profiles have the intensity of the scaled angle, and the flux of a profile is its integral.
+    #[test]
+    fn profiles_are_scaled_about_either_end_of_their_axis() {
+        let value = |i: usize, j: usize| [90.0, 60.0, 30.0][i] - 10.0 * j as f32;
+        let read = read(&file("IESNA:LM-63-1995\nTILT=NONE", &[0.0, 90.0, 180.0], value));
+        for scale in [0.5f32, 1.5, 3.0, -0.75, -1.5] {
+            let scaled = read.scaled(scale).expect("light is left");
+            let [own, moved] =
+                [&read, &scaled].map(|p| (distribution(p.profile(Turn::default()).expect("a profile")), p.peak()));
+            for i in 0..200 {
+                let u = Stream::new(5, 0, Domain::Test, i).vertex(0).two(Purpose::Direction);
+                let (vertical, horizontal) = (180.0 * u.x, 360.0 * u.y);
+                let before = if scale > 0.0 { vertical / scale } else { (vertical - 180.0) / -scale + 180.0 };
+                let known = (0.0..=90.0).contains(&before);
+                let expected = if known { own.1 * relative(&own.0, direction(before, horizontal)) } else { 0.0 };
+                let found = moved.1 * relative(&moved.0, direction(vertical, horizontal));
+                let near_rim = (before - 90.0).abs() < 0.1 || before.abs() < 0.1;
+                assert!(near_rim || (found - expected).abs() < 0.05, "{scale} {vertical}: {found}, {expected}");
+            }
+        }
+        assert!(read.scaled(-3.0).is_none());
+        // A uniform hemisphere of 100 cd, times 0.5 and the multiplier 2.
+        let even = file("IESNA:LM-63-1995\nTILT=NONE", &[0.0], |_, _| 100.0);
+        let flux = parse(even.as_bytes(), &mut Vec::new()).expect("a profile").flux();
+        assert!((flux - 200.0 * std::f64::consts::PI).abs() < 1e-2, "{flux}");
+    }
+
     #[test]
     fn errors_name_the_line_the_fault_and_the_remedy() {
         let good = file("IESNA:LM-63-1995\nTILT=NONE", &[0.0], |i, _| [100.0, 50.0, 0.0][i]);
@@ -349,8 +585,9 @@ mod tests {
             (good.replace("1 1000", "1 many"), "line 3", "\"many\" is not a number"),
             (good.replace("1 1000", "1 nan"), "line 3", "\"nan\" is not a number"),
             (good.replace(" 3 1 1 2 ", " 3.5 1 1 2 "), "line 3", "number of vertical angles is 3.5"),
-            (good.replace(" 3 1 1 2 ", " 3 1 2 2 "), "line 3", "type B"),
-            (good.replace(" 3 1 1 2 ", " 3 1 3 2 "), "line 3", "type A"),
+            (good.replace(" 3 1 1 2 ", " 3 1 2 2 "), "line 6", "type B has at least two horizontal angles"),
+            (good.replace(" 3 1 1 2 ", " 3 1 4 2 "), "line 3", "its photometric type is 4"),
+            (good.replace(" 3 1 1 2 ", " 3 1 3 2 ").replace("0 45 90", "0 45 95"), "line 5", "outside -90 to 90"),
             (good.replace("0 45 90", "0 45 45"), "line 5", "vertical angle 3 is 45, not above"),
             (good.replace("0 45 90", "0 45 190"), "line 5", "outside 0 to 180"),
             (good.replace("100 50 0", "100 50"), "line 7", "ends before intensity 3 of 3"),

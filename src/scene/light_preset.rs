@@ -1,18 +1,23 @@
 //! Procedural environments that light a scene without any light.
 
-use super::description::{Description, EnvironmentDescription, EnvironmentSource};
-use crate::math::Vec3;
+use super::description::{Description, EnvironmentDescription, EnvironmentSource, PlacedMesh};
+use crate::geometry::Mesh;
+use crate::material::{Alpha, Material};
+use crate::math::{DAffine3, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::Arc;
 
 /// A procedural environment, with +Z as the front of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum LightPreset {
     /// A grey photo studio with soft lights: a key light from the front left, a fill light, a rim light, one above
     Studio,
+    /// The studio with a neutral grey floor below the scene, which receives its shadows
+    StudioFloor,
     /// A clear sky with a sun of 3 degrees from the front left
     Sky,
     /// No light
@@ -23,7 +28,7 @@ impl LightPreset {
     /// The radiance of the environment; `None` for [`LightPreset::None`].
     fn environment(self) -> Option<EnvironmentSource> {
         match self {
-            LightPreset::Studio => Some(image(studio)),
+            LightPreset::Studio | LightPreset::StudioFloor => Some(image(studio)),
             LightPreset::Sky => Some(image(Sky::new().radiance())),
             LightPreset::None => None,
         }
@@ -44,10 +49,91 @@ pub fn apply(description: &mut Description, chosen: Option<LightPreset>) {
                 .into(),
         );
     }
+    if chosen == Some(LightPreset::StudioFloor) {
+        add_floor(description);
+    }
     description.environment = Some(EnvironmentDescription { source, rotation_deg: 0.0, strength: 1.0 });
     description.environment_hidden_from_camera = false;
     description.environment_light_group = None;
     description.environment_unknown = false;
+}
+
+/// Adds the floor of the studio: a matte disc below the scene, which cameras do not see from below, and which fades out
+/// towards its edge. With motion blur there is none, with a warning.
+fn add_floor(description: &mut Description) {
+    /// Reflectance of the floor, at which it is about as bright as the horizon.
+    const REFLECTANCE: f32 = 0.35;
+    /// Radii of the part that is opaque and of the whole floor, relative to the scene's.
+    const RADII: [f64; 2] = [2.0, 5.0];
+    const SIDES: u32 = 96;
+    const RINGS: u32 = 8;
+    if description.blur().is_some() {
+        description.warnings.push("the studio has no floor, because the scene has motion blur".into());
+        return;
+    }
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for placed in &description.instances {
+        for p in &description.meshes[placed.mesh as usize].positions {
+            let p = placed.to_world.transform_point3(p.as_dvec3());
+            (low, high) = (low.min(p), high.max(p));
+        }
+    }
+    if low.cmpgt(high).any() {
+        return;
+    }
+    let scene = (0.5 * (high - low).length()).max(1e-6);
+    let [inner, outer] = RADII.map(|factor| factor * scene);
+    let ring = |radius: f64| {
+        (0..SIDES).map(move |k| {
+            let (sin, cos) = (f64::from(k) / f64::from(SIDES) * std::f64::consts::TAU).sin_cos();
+            DVec3::new(radius * sin, 0.0, radius * cos).as_vec3()
+        })
+    };
+    let around = |k: u32| (k + 1) % SIDES;
+    let disc = Mesh {
+        name: "studio floor".into(),
+        positions: std::iter::once(Vec3::ZERO).chain(ring(inner)).collect(),
+        triangles: (0..SIDES).map(|k| [0, 1 + k, 1 + around(k)]).collect(),
+        ..Mesh::default()
+    };
+    let mut rim = Mesh { name: "edge of the studio floor".into(), ..Mesh::default() };
+    for r in 0..=RINGS {
+        let share = f64::from(r) / f64::from(RINGS);
+        rim.positions.extend(ring(inner + (outer - inner) * share));
+        rim.colors.extend((0..SIDES).map(|_| Vec4::new(1.0, 1.0, 1.0, 1.0 - smoothstep(0.0, 1.0, share as f32))));
+    }
+    for r in 0..RINGS {
+        for k in 0..SIDES {
+            let (a, b) = (r * SIDES + k, r * SIDES + around(k));
+            rim.triangles.extend([[a, a + SIDES, b], [b, a + SIDES, b + SIDES]]);
+        }
+    }
+    let middle = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
+    let object = description.objects.len() as u32;
+    description.preset_floor = Some(object);
+    description.objects.push("studio floor".into());
+    for (mesh, alpha) in [(disc, Alpha::Opaque), (rim, Alpha::Blend)] {
+        description.instances.push(PlacedMesh {
+            name: "studio floor".into(),
+            mesh: description.meshes.len() as u32,
+            material: description.materials.len() as u32,
+            object,
+            hidden_from_camera: false,
+            light_group: None,
+            moves: false,
+            to_world: DAffine3::from_translation(middle),
+        });
+        description.materials.push(Material {
+            name: mesh.name.clone(),
+            base_color: [REFLECTANCE, REFLECTANCE, REFLECTANCE, 1.0],
+            metallic: 0.0,
+            specular: 0.0,
+            alpha,
+            culled: true,
+            ..Material::default()
+        });
+        description.meshes.push(Arc::new(mesh));
+    }
 }
 
 /// Whether the scene has a light, or says itself that its environment is black. In a file without a camera, which is a

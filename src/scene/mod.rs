@@ -56,6 +56,8 @@ pub struct Scene {
     pub objects: Vec<String>,
     /// Index of the first object that is a sphere made for a point light with a radius. All later objects are, too.
     pub first_light_sphere: u32,
+    /// Index of the object that a light preset has added, which views of the whole scene do not frame.
+    pub preset_floor: Option<u32>,
     /// Embree scene of all shapes except lights that rays pass through.
     pub tracer: Tracer,
     /// Embree scene of the lights that rays pass through ([`crate::material::Material::null_bsdf`]), if there are any.

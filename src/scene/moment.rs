@@ -83,6 +83,7 @@ impl<'a> MomentBuilder<'a> {
             origin: scene.origin,
             objects: scene.objects.clone(),
             first_light_sphere: scene.first_light_sphere,
+            preset_floor: scene.preset_floor,
             tracer,
             pass_through_lights,
             light_names: scene.light_names.clone(),

@@ -12,6 +12,7 @@
 
 mod iteration_wavelengths;
 pub mod observer;
+pub mod primaries;
 
 pub use iteration_wavelengths::IterationWavelengths;
 

@@ -7,7 +7,7 @@ use super::cause::Cause;
 use super::light_vertex::LightVertex;
 use super::lobe_layers::{FirstScatter, LobeHistory};
 use super::mis::{self, End, Merges, MisState, NextEventPdfs, Ratios, one_merge};
-use super::pass_through::PassThroughHit;
+use super::pass_through::{BulbHit, PassThroughHit};
 use super::path_history::PathHistory;
 use super::photon_merge::{Merge, MergePhoton};
 use super::pixel_sample::{Features, PixelSample};
@@ -387,6 +387,21 @@ impl<'a, R: PathRecorder> Visitor<'a> for CameraWalk<'_, R> {
         // Only delta lobes have scattered the path, so that no other technique finds the light.
         let density = EmissionDensity { direct: 1.0, start: 1.0, onward: 1.0, cos: 1.0, infinite: false, delta: true };
         self.hit_light(light.light, group, LightHit { depth: light.depth, at: light.p }, &density);
+        (self.history, self.depth) = before;
+    }
+
+    fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
+        let before = (self.history, self.depth);
+        if let Some(scattered) = scattered {
+            self.history.scattered(scattered.lobe);
+        }
+        self.depth = hit.depth;
+        if self.history.delta {
+            // Its density does not count, because no other technique finds the path.
+            let density =
+                EmissionDensity { direct: 0.0, start: 0.0, onward: 0.0, cos: 1.0, infinite: false, delta: true };
+            self.hit_light(hit.light, hit.group, LightHit { depth: hit.depth, at: hit.at }, &density);
+        }
         (self.history, self.depth) = before;
     }
 

@@ -24,7 +24,7 @@ use super::cause::Cause;
 use super::direct::{BSDF_SAMPLE_PROBABILITY, Division, balance, direct_light, divided_direct_light, next_event};
 use super::glint::{Glints, Onward};
 use super::lobe_layers::{FirstScatter, LobeHistory, LobeRecord};
-use super::pass_through::PassThroughHit;
+use super::pass_through::{BulbHit, PassThroughHit};
 use super::photon_batch::{Scratch, Waiting};
 use super::pixel_sample::{Features, PixelSample};
 use super::scattering_vertex::ScatterPoint;
@@ -38,7 +38,7 @@ use crate::light::{EmissionDensity, Receiver};
 use crate::math::{Rgb, Vec3};
 use crate::medium::FlightDensity;
 use crate::photon::{ByKind, Kernel, Near, Photon, PhotonMaps, VolumePhoton};
-use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, Part};
+use crate::plan::{CameraSuffix, ClassSet, Event, LightPrefix, Part, PathClass};
 use crate::random::Purpose;
 use crate::scene::Scene;
 
@@ -310,6 +310,15 @@ impl<'a, B: GatherBandwidths, K: Kernel, const PATHS: bool> Visitor<'a> for Gath
         if let Some((radiance, pdf)) = lights.hit_radiance(materials, &from, &hit.surface, hit.wo) {
             let density = || Some(lights.emitted(materials, &from, &hit.surface, hit.wo)?.1);
             self.hit_light(hit.throughput * radiance, pdf, (scattered, FirstScatter::Emit), density);
+        }
+        self.suffix = before;
+    }
+
+    fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
+        let before = self.suffix;
+        self.suffix = self.suffix_on_arrival(scattered);
+        if matches!(self.suffix.class_at_light(false), PathClass::Emission | PathClass::Coat) {
+            self.hit_light(hit.light, 0.0, (scattered, FirstScatter::Emit), || None);
         }
         self.suffix = before;
     }

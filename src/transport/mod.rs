@@ -49,7 +49,7 @@ pub use interior::{Crossing, Interior};
 pub use light::{Emitted, EqualFlux, LightPaths, Photons, emitted_flux, light_path};
 pub use light_vertex::{LightVertex, Scatterer};
 pub use lobe_layers::{FirstScatter, LobeLayer, LobeLight, LobeRecord};
-pub use pass_through::PassThroughHit;
+pub use pass_through::{BulbHit, PassThroughHit};
 pub use path::{path_radiance, path_sample};
 pub use photon_batch::Scratch;
 pub use photon_merge::MergePhoton;

@@ -6,6 +6,7 @@
 
 use super::segment::{ShadowRay, Start, shadow_ray};
 use crate::geometry::Surface;
+use crate::light::Group;
 use crate::math::{Rgb, Vec3};
 use crate::medium::FlightDensity;
 use crate::scene::Scene;
@@ -49,4 +50,34 @@ pub(super) fn for_each_pass_through_light(
         };
         pass_through_lights.each_hit(&Ray { origin, direction, tmax: reach, token }, &mut met);
     }
+}
+
+/// A segment of a camera path crosses the bulb of a light ([`crate::light::Bulb`]).
+pub struct BulbHit {
+    /// Light that reaches the camera from the bulb.
+    pub light: Rgb,
+    /// Light group of the bulb.
+    pub group: Group,
+    /// Number of path segments up to the bulb.
+    pub depth: u32,
+    /// A point in the bulb, on the segment.
+    pub at: Vec3,
+}
+
+/// Calls `each` with every bulb on a ray up to the distance `reach`: the radiance that arrives at the origin, a point in
+/// the bulb, and its light group. The ray starts in a medium, or at the camera.
+pub(super) fn for_each_bulb(
+    scene: &Scene,
+    start: &Start,
+    reach: f32,
+    (from_medium, camera): (bool, bool),
+    mut each: impl FnMut(Rgb, Vec3, Group),
+) {
+    scene.lights.for_each_bulb((start.origin, start.direction), reach, camera, |radiance, distance, group| {
+        let between = ShadowRay { start: *start, tmax: distance, reaching: None, in_medium: [from_medium, false] };
+        let light = radiance * shadow_ray(scene, &between).transmittance;
+        if light != Rgb::ZERO {
+            each(light, start.origin + start.direction * distance, group);
+        }
+    });
 }

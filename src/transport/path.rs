@@ -8,7 +8,7 @@ use super::bidirectional_camera::{record_medium, record_surface};
 use super::camera_paths::CameraPaths;
 use super::cause::Cause;
 use super::lobe_layers::{FirstScatter, LobeHistory};
-use super::pass_through::PassThroughHit;
+use super::pass_through::{BulbHit, PassThroughHit};
 use super::path_history::PathHistory;
 use super::pixel_sample::PixelSample;
 use super::roulette::SPARED_BY_ROULETTE;
@@ -193,6 +193,18 @@ impl<'a, R: PathRecorder> Visitor<'a> for PathTracer<'_, R> {
         let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
         let of = PathKind { class, group: self.scene.lights.object_group(light.instance), first };
         self.add(Technique::Hit { camera: light.depth }, of, light.light, 1.0);
+    }
+
+    fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
+        let mut history = self.history;
+        if let Some(scattered) = scattered {
+            history.scattered(scattered.lobe);
+        }
+        if history.delta {
+            let (class, first) = (history.suffix.class_at_light(false), self.first(|| FirstScatter::Emit));
+            let of = PathKind { class, group: hit.group, first };
+            self.add(Technique::Hit { camera: hit.depth }, of, hit.light, 1.0);
+        }
     }
 
     fn medium(&mut self, vertex: &MediumVertex, scattered: Option<Scattered>) -> Next {

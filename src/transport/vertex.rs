@@ -1,7 +1,7 @@
 //! Vertices of a path, and the visitor that receives them.
 
 use super::interior::Interior;
-use super::pass_through::PassThroughHit;
+use super::pass_through::{BulbHit, PassThroughHit};
 use super::roulette::survival;
 use super::segment::MediumArrival;
 use crate::bsdf::{BsdfSample, LobeSet, Shading};
@@ -173,6 +173,13 @@ pub trait Visitor<'a> {
     #[inline]
     fn medium_light(&mut self, light: &MediumLight, scattered: Option<Scattered>) {
         let _ = (light, scattered);
+    }
+    /// The segment to the next vertex, which starts at the camera or at a delta lobe, crosses the bulb of a light; camera
+    /// paths only. If all lobes on the path were delta lobes, no other technique finds this light; otherwise others do,
+    /// and it must be ignored.
+    #[inline]
+    fn bulb(&mut self, hit: &BulbHit, scattered: Option<Scattered>) {
+        let _ = (hit, scattered);
     }
     /// The path arrives at a vertex in a scattering medium; the result decides how it continues. A walk that splits
     /// ignores it.

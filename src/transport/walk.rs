@@ -4,7 +4,7 @@
 use super::fire::Glow;
 use super::flight::{Fly, Split};
 use super::interior::Interior;
-use super::pass_through::{PassThroughHit, for_each_pass_through_light};
+use super::pass_through::{BulbHit, PassThroughHit, for_each_bulb, for_each_pass_through_light};
 use super::roulette::late_survival;
 use super::scattering_vertex::ScatterPoint;
 use super::segment::{
@@ -231,6 +231,14 @@ impl<'a> Path<'a> {
                 Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };
             visit_pass_through_lights(scene, &segment, visitor);
         }
+        if self.transport == Transport::Radiance
+            && scene.lights.has_bulbs()
+            && scattered.is_none_or(|scattered| scattered.lobe == LobeSet::DELTA)
+        {
+            let segment =
+                Segment { start: &start, end: &end, from_medium: self.in_medium, throughput, depth, scattered };
+            visit_bulbs(scene, &segment, visitor);
+        }
         if BESIDES >= SCATTERING
             && let (End::Surface(_) | End::Escaped(_), Some(scattered)) = (&end, &mut self.scattered)
         {
@@ -418,5 +426,16 @@ fn visit_pass_through_lights<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segmen
         let (surface, wo, throughput) = (*surface, -start.direction, throughput * transmittance);
         let scattered = scattered.map(|s| Scattered { pdf_w: s.pdf_w * flight.forward, ..s });
         visitor.pass_through_light(&PassThroughHit { surface, wo, throughput, depth, distance, flight }, scattered);
+    });
+}
+
+/// Shows the visitor the bulbs of lights on a segment that starts at the camera or at a delta lobe.
+#[cold]
+#[inline(never)]
+fn visit_bulbs<'a, V: Visitor<'a>>(scene: &Scene, segment: &Segment<'_>, visitor: &mut V) {
+    let Segment { start, end, from_medium, throughput, depth, scattered } = *segment;
+    let reach = if let End::Surface(arrival) = end { arrival.distance } else { f32::INFINITY };
+    for_each_bulb(scene, start, reach, (from_medium, depth == 1), |radiance, at, group| {
+        visitor.bulb(&BulbHit { light: throughput * radiance, group, depth, at }, scattered);
     });
 }

@@ -82,3 +82,29 @@ fn a_hidden_background_is_transparent_in_the_exr_and_the_png() {
         assert_eq!(png.get_pixel(12, 9)[3], 255);
     }
 }
+
+/// The studio's floor lies below the scene, which a view of the whole scene still fills; from below it is not seen.
+#[test]
+fn the_studio_may_have_a_floor() {
+    let folder = dark();
+    let coverage = |options: &str| {
+        let outcome = folder.run(&format!("render dark.glb -o out.exr {SMALL} --background hide {options}"));
+        assert_eq!(outcome.code, Some(0), "{options}: {}", outcome.stderr);
+        let (set, _) = folder.read("out.exr");
+        set.get("").and_then(|beauty| beauty.plane("A")).expect("alpha").values.clone()
+    };
+    let [without, with] =
+        ["studio", "studio-floor"].map(|preset| coverage(&format!("--light-preset {preset} --orbit 30,25")));
+    // The corners below show the floor; the upper ones nothing.
+    let [top, bottom] = [0, 17 * 24];
+    assert_eq!((without[top], without[bottom]), (0.0, 0.0));
+    assert!(with[top] == 0.0 && with[bottom] > 0.9, "{} {}", with[top], with[bottom]);
+    // The scene is framed as before.
+    assert!(without.iter().zip(&with).all(|(a, b)| a <= b));
+    let sum = |values: &[f32]| values.iter().sum::<f32>();
+    assert!(sum(&with) > 1.2 * sum(&without), "{} {}", sum(&with), sum(&without));
+    let below = "--orbit 30,-40";
+    let [without, with] =
+        ["studio", "studio-floor"].map(|preset| coverage(&format!("--light-preset {preset} {below}")));
+    assert_eq!(without, with);
+}

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use caustique::error::ErrorKind;
 use caustique::film::{Layer, LayerSet, Naming, Picture, Role, Sample, Selection, Size};
-use caustique::image::exr::{self, Attributes, Compression, Options};
+use caustique::image::exr::{self, Attributes, ColourSpace, Compression, Options};
 use caustique::image::{atomic, png, tonemap::ToneMap};
+use caustique::scene::description::EnvironmentSource;
+use caustique::scene::environment_file;
 
 const COMPRESSIONS: [Compression; 4] = [Compression::Zip, Compression::Zips, Compression::Piz, Compression::None];
 
@@ -552,5 +554,26 @@ fn pngs_hold_the_display_values() {
     assert_eq!(image::open(&path).unwrap().into_rgb8().as_raw()[1], 255);
     for (width, height) in [(0, 1), (1, 1), (3, 1)] {
         assert!(png::write(&path, Size { width, height }, pixels.map(Into::into)).is_err());
+    }
+}
+
+/// An environment in ACEScg lights as the same one in Rec. 709, and one without chromaticities is taken as it is.
+#[test]
+fn environments_are_converted_from_the_colour_space_of_their_header() {
+    let folder = tempfile::tempdir().unwrap();
+    let texel = |i: usize| [0.2 + 0.1 * i as f32, 1.5, 0.4 + 0.05 * i as f32];
+    let mut set = LayerSet::new(4, 2);
+    set.push(Layer::interleaved("", "RGB", (0..8).map(texel))).unwrap();
+    for (name, colour_space) in [("rec709", ColourSpace::Rec709), ("acescg", ColourSpace::AcesCg)] {
+        let path = folder.path().join(name).with_extension("exr");
+        exr::write(&path, &set, &attributes(), Options { colour_space, ..Options::default() }).unwrap();
+        let mut warnings = Vec::new();
+        let read = environment_file::read(&path, &mut warnings).unwrap();
+        let EnvironmentSource::Image { width, height, texels } = read else { panic!("it is an image") };
+        assert!((width, height) == (4, 2) && warnings.is_empty(), "{warnings:?}");
+        for (i, found) in texels.iter().enumerate() {
+            let wanted = texel(i);
+            assert!((0..3).all(|c| (found[c] - wanted[c]).abs() < 1e-5), "{name}: {found:?} {wanted:?}");
+        }
     }
 }

@@ -79,6 +79,7 @@ fn sun(intensity: f32) -> PunctualLight {
         kind: PunctualKind::Sun { angle: 0.0 },
         pattern: None,
         pass_through: false,
+        bulb: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

@@ -37,6 +37,7 @@ fn strip() -> Scene {
         kind: PunctualKind::Sun { angle: 0.0 },
         pattern: None,
         pass_through: false,
+        bulb: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

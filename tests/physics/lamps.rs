@@ -7,6 +7,7 @@
 use crate::support;
 
 use caustique::estimator::InitialBandwidth;
+use caustique::light::SpotEdge;
 use caustique::material::{Material, MediumParameters};
 use caustique::math::{DVec3, Rgb, Vec3};
 use caustique::render::{Control, Method, Settings, render};
@@ -215,6 +216,7 @@ fn cameras_see_no_hidden_light_from_infinity() {
         kind: PunctualKind::Sun { angle: 0.2 },
         pattern: None,
         pass_through: false,
+        bulb: false,
         radius: 0.0,
         hidden_from_camera: true,
         light_group: None,
@@ -314,4 +316,74 @@ fn pass_through_bulbs_block_no_light() {
     mirrored.materials[0] = Material { name: "floor".into(), ..mirror() };
     let toward = from(mirrored, DVec3::new(0.0, 0.6, 1.6), DVec3::new(0.0, 0.0, 0.8));
     check("mirror", &toward, own + 1.0, bias, 0.1);
+}
+
+/// A spot with a bulb, which shines straight down on a floor, under a white sky.
+fn spot(bulb: bool, hidden_from_camera: bool) -> Description {
+    let mut description = Description { environment: white_sky(), ..Description::default() };
+    let floor = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0);
+    add(&mut description, "floor", floor, matte(0.5, 0.0));
+    description.lights.push(PunctualLight {
+        to_world: caustique::math::DAffine3::from_translation(DVec3::new(0.0, 0.6, 0.0))
+            * caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-PI / 2.0)),
+        kind: PunctualKind::Spot { inner: 1.2, outer: 1.5, edge: SpotEdge::Smooth },
+        radius: 0.1,
+        bulb,
+        hidden_from_camera,
+        ..point_light(DVec3::ZERO, 1.0)
+    });
+    description
+}
+
+/// The bulb of a spot blocks no light. It is seen from within its cone with the radiance I / (pi r^2), directly, in a
+/// mirror and through a slab of glass, and not from behind. Hidden from cameras, only the mirror shows it; without the
+/// key, nothing does. Its light on the floor counts once.
+#[test]
+fn bulbs_of_spots_are_seen_and_count_once() {
+    let own = 1.0 / (PI * 0.1f64.powi(2));
+    let from = |mut description: Description, eye: DVec3, to: DVec3| {
+        description.cameras.push(look_at(eye, to, 0.5));
+        build(description)
+    };
+    let (above, below) = (DVec3::new(0.0, 2.0, 0.0), DVec3::new(0.0, 0.05, 0.0));
+    let lamp = DVec3::new(0.0, 0.6, 0.0);
+    for invisible in [spot(true, true), spot(false, false)] {
+        assert!((seen(&from(invisible, below, lamp), Method::Path).0 - 1.0).abs() < 1e-4);
+    }
+    let mirrored = |hidden: bool| {
+        let mut description = spot(true, hidden);
+        description.materials[0] = Material { name: "floor".into(), ..mirror() };
+        from(description, DVec3::new(0.6, 0.6, 0.0), DVec3::new(0.3, 0.0, 0.0))
+    };
+    assert!((seen(&mirrored(false), Method::Path).0 - own - 1.0).abs() < 1e-3 * own);
+    check("mirror, hidden", &mirrored(true), own + 1.0, 1e-3, 0.02);
+    // The floor below reflects I / h^2 / pi and the sky; the back of the bulb is dark.
+    check("floor", &from(spot(true, false), above, DVec3::ZERO), 0.5 + 0.5 / PI / 0.36, 0.03, 0.1);
+    let mut behind_glass = spot(true, false);
+    behind_glass.environment = None;
+    let slab = cuboid(Vec3::new(-0.9, 0.2, -0.9), Vec3::new(0.9, 0.3, 0.9), false);
+    add(&mut behind_glass, "slab", slab, glass(1.5));
+    behind_glass.materials[0] = Material { name: "floor".into(), ..matte(0.0, 0.0) };
+    let through = from(behind_glass, below, lamp);
+    // All reflections between the faces leave the share 2 n / (n^2 + 1).
+    check("glass", &through, own * 3.0 / 3.25, 2e-3, 0.02);
+}
+
+/// All methods agree on a room that only the bulb of a spot lights, seen in a varnished floor.
+#[test]
+fn all_methods_agree_on_bulbs_of_spots() {
+    let mut description = lit_room(matte(0.5, 0.0));
+    description.materials[1].emission = Rgb::ZERO;
+    description.materials[1].null_bsdf = true;
+    description.materials[0] =
+        Material { name: "room".into(), clearcoat: 1.0, clearcoat_roughness: 0.0, ..matte(0.5, 0.0) };
+    description.lights.push(PunctualLight {
+        to_world: caustique::math::DAffine3::from_translation(DVec3::new(0.2, 1.6, 0.2))
+            * caustique::math::DAffine3::from_quat(glam::DQuat::from_rotation_x(-PI / 2.0)),
+        kind: PunctualKind::Spot { inner: 0.8, outer: 1.3, edge: SpotEdge::Smooth },
+        radius: 0.15,
+        bulb: true,
+        ..point_light(DVec3::ZERO, 3.0)
+    });
+    agree("bulb", &build(description), &[Method::Bdpt, Method::Vcm, Method::Sppm]);
 }

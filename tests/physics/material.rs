@@ -151,7 +151,7 @@ fn textured_coats_lose_no_energy() {
         clearcoat_ior_texture: reference(0),
         ..matte(1.0, 0.0)
     };
-    let tables = EnergyTables::for_materials(&[coated.clone()]);
+    let tables = EnergyTables::for_materials(std::slice::from_ref(&coated));
     let worst = |tables: &EnergyTables| {
         let errors = (0..64u64).map(|k| {
             let share = (mix(k) >> 40) as f32 / 16_777_216.0;

@@ -24,6 +24,7 @@ fn scene(inner: f32, outer: f32, edge: SpotEdge, radius: f32) -> Scene {
         kind: PunctualKind::Spot { inner, outer, edge },
         pattern: None,
         pass_through: false,
+        bulb: false,
         radius,
         hidden_from_camera: false,
         light_group: None,

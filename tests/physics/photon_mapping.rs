@@ -145,6 +145,7 @@ fn sun_through_a_slab() {
         kind: PunctualKind::Sun { angle: 0.0 },
         pattern: None,
         pass_through: false,
+        bulb: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

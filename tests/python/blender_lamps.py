@@ -271,9 +271,24 @@ class Lamps(cycles_comparison.CyclesComparison):
         body.visible_camera = True
         eye((0, -2, 0.6), (0, 0, 0.6), lens=300)
         self.alike(self.caustique(), self.cycles(), tolerance=0.03)
-        spot = lamp("SPOT", (0, 0, 3), 5.0, shadow_soft_size=0.4, use_soft_falloff=False)
-        spot.visible_camera = True
-        self.assertIn("its bulb, which Cycles shows, is not seen", export.write(self.path)[0])
+
+    def test_bulbs_of_spots_are_seen_in_mirrors_and_block_no_light(self):
+        world = bpy.data.worlds.new("world")
+        if bpy.app.version < (5, 0, 0):
+            world.use_nodes = True
+        self.scene.world = world
+        next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
+        floor = self.floor(3)
+        body = lamp("SPOT", (0, 0, 0.6), 5.0, shadow_soft_size=0.2, spot_size=2.6, spot_blend=0.1, use_soft_falloff=False)
+        eye((0, -0.1, 0.1), (0, 0, 0), lens=80)
+        self.alike(self.caustique(), self.cycles())
+        self.assertEqual(self.warnings, [])
+        floor.data.materials[0] = shared.node_material("mirror", "ShaderNodeBsdfGlossy", Roughness=0.0)
+        eye((0, -1.0, 0.6), (0, -0.5, 0), lens=300)
+        self.alike(self.caustique(), self.cycles(), tolerance=0.03)
+        body.visible_camera = True
+        eye((0, -0.4, 0.2), (0, 0, 0.6), lens=300)
+        self.alike(self.caustique(), self.cycles(), tolerance=0.03)
 
     def test_measured_profiles_have_the_strength_of_directions_that_meet_objects(self):
         """A lamp with an IES profile that nodes rotate lights a small square in different directions."""

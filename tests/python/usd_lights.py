@@ -67,6 +67,30 @@ class Irradiance(usd_support.Stages):
         normal = unit / axes / numpy.linalg.norm(unit / axes, axis=2, keepdims=True)
         self.check(30 / area * _seen(unit * axes + (0, HEIGHT, 0), normal, element))
 
+    def profiled(self, values, **inputs):
+        """A sphere light with a profile of these candela at 0, 30, 60 and 90 degrees."""
+        path = self.dir / "lamp.ies"
+        path.write_text("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 1 1 2 0 0 0\n1 1 30\n0 30 60 90\n0\n"
+                        + " ".join(map(str, values)) + "\n")
+        light = self.light("SphereLight", radius=0.02, intensity=50.0, **inputs)
+        shaping = UsdLux.ShapingAPI.Apply(light.GetPrim())
+        shaping.CreateShapingIesFileAttr(Sdf.AssetPath("lamp.ies"))
+        return shaping
+
+    def test_a_profile_multiplies_the_intensity(self):
+        self.profiled([4, 4, 1, 0], matrix=down(HEIGHT))
+        self.check(50 * math.pi * 0.02 ** 2 * 4 / HEIGHT ** 2)
+
+    def test_a_scaled_profile(self):
+        """Turned by 45 degrees, the floor sees 30 degrees of a profile that is stretched by a half."""
+        turned = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(0, 1, 0), 45)) * down(HEIGHT)
+        self.profiled([4, 2, 1, 0], matrix=turned).CreateShapingIesAngleScaleAttr(1.5)
+        self.check(50 * math.pi * 0.02 ** 2 * 2 / HEIGHT ** 2)
+
+    def test_a_profile_divided_by_its_power(self):
+        self.profiled([3, 3, 3, 3], matrix=down(HEIGHT)).CreateShapingIesNormalizeAttr(True)
+        self.check(50 * math.pi * 0.02 ** 2 / (2 * math.pi) / HEIGHT ** 2)
+
     def test_disk(self):
         self.light("DiskLight", matrix=down(HEIGHT), radius=0.5, intensity=2.0)
         self.check(2 * math.pi * 0.25 / (0.25 + HEIGHT ** 2))

@@ -132,6 +132,7 @@ pub fn point_light(p: DVec3, intensity: f32) -> PunctualLight {
         kind: PunctualKind::Point,
         pattern: None,
         pass_through: false,
+        bulb: false,
         radius: 0.0,
         hidden_from_camera: false,
         light_group: None,

@@ -58,8 +58,8 @@ class Scene(_native.Scene):
                            (r, g, b), or an array (H, W, 3) of radiance in latitude and longitude, the top row first
     environment_rotation   rotation about the vertical, degrees, counter-clockwise seen from above
     environment_strength   factor on the radiance of the environment
-    light_preset           'studio', 'sky' or 'none': light of a scene without any [default: 'studio'], or instead of
-                           its environment
+    light_preset           'studio', 'studio-floor', 'sky' or 'none': light of a scene without any [default:
+                           'studio'], or instead of its environment
     background             'show' or 'hide' the environment behind the scene
     light_units            'auto', 'radiometric' or 'photometric': the unit of the file's lamps
     glass                  'auto', 'solid' or 'thin': the kind of glass if the file does not say

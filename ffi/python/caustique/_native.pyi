@@ -92,7 +92,7 @@ class Scene:
         environment: str | os.PathLike[str] | Sequence[float] | NDArray[Any] | None = None,
         environment_rotation: float | None = None,
         environment_strength: float | None = None,
-        light_preset: Literal["studio", "sky", "none"] | None = None,
+        light_preset: Literal["studio", "studio-floor", "sky", "none"] | None = None,
         background: Literal["show", "hide"] | None = None,
         light_units: Literal["auto", "radiometric", "photometric"] = "auto",
         glass: Literal["auto", "solid", "thin"] = "auto",

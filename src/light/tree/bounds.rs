@@ -55,7 +55,7 @@ impl Bounds {
                 let (low, high) = (p - *radius, p + *radius);
                 Bounds { low, high, ..at(*p, frame.n, 0.0, reach, luminance(*intensity)) }
             }
-            Emitter::Shaped(ShapedLight { p, radius, frame, intensity, distribution }) => {
+            Emitter::Shaped(ShapedLight { p, radius, frame, intensity, distribution, .. }) => {
                 let reach = polar_angle(distribution.reach());
                 // The bound of wide lights must not depend on rounding at the back of the axis.
                 let (axis, spread) = if reach < 3.0 { (frame.n, 0.0) } else { (Vec3::Z, PI) };

@@ -194,6 +194,7 @@ pub(super) struct LightExtras {
     pub(super) ies: Option<IesExtras>,
     pub(super) gobo: Option<GoboExtras>,
     pub(super) null_bsdf: Option<bool>,
+    pub(super) bulb: Option<bool>,
 }
 
 /// Content of `extras.caustique.ies`: a photometric profile in a file or in a buffer view.
@@ -205,7 +206,30 @@ pub(super) struct IesExtras {
     pub(super) buffer_view: Option<u32>,
     pub(super) rotation_deg: f32,
     pub(super) clockwise: bool,
-    pub(super) normalize: bool,
+    pub(super) normalize: Normalize,
+    pub(super) angle_scale: f32,
+}
+
+/// What the intensities of a profile are divided by.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "true, false or \"power\"")]
+pub(super) enum Normalize {
+    /// The largest one, or nothing.
+    Peak(bool),
+    Flux(Power),
+}
+
+/// The word for division by the flux.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Power {
+    Power,
+}
+
+impl Default for Normalize {
+    fn default() -> Self {
+        Normalize::Peak(false)
+    }
 }
 
 /// Content of `extras.caustique.gobo`: a picture that a spot throws.
@@ -279,7 +303,9 @@ pub(super) const LIGHT: &[&str] = &[
     "ies.rotation_deg",
     "ies.clockwise",
     "ies.normalize",
+    "ies.angle_scale",
     "null_bsdf",
+    "bulb",
     "gobo",
     "gobo.texture",
     "gobo.view_deg",
@@ -300,7 +326,9 @@ pub(super) const NODE: &[&str] = &[
     "ies.rotation_deg",
     "ies.clockwise",
     "ies.normalize",
+    "ies.angle_scale",
     "null_bsdf",
+    "bulb",
     "gobo",
     "gobo.texture",
     "gobo.view_deg",

@@ -228,6 +228,7 @@ pub(super) fn light(
     let radius = if sun { 0.0 } else { radius };
     let light_group = on_node.light_group.or(on_light.light_group);
     let pass_through = on_node.null_bsdf.or(on_light.null_bsdf).unwrap_or(false);
+    let bulb = on_node.bulb.or(on_light.bulb).unwrap_or(false);
     let mut light = PunctualLight {
         name,
         to_world,
@@ -236,11 +237,16 @@ pub(super) fn light(
         pattern: None,
         radius,
         pass_through,
+        bulb,
         hidden_from_camera,
         light_group,
     };
     if let Some(ies) = on_node.ies.or(on_light.ies) {
         profiles.apply(document, &ies, &mut light, &place, warnings)?;
+    }
+    if light.bulb && (sun || light.radius == 0.0 || light.is_sphere()) {
+        let why = if sun || light.radius == 0.0 { "it needs a radius" } else { "its sphere is visible without it" };
+        warnings.push(format!("{place}: extras.caustique.bulb has no effect: {why}"));
     }
     if let Some(gobo) = on_node.gobo.or(on_light.gobo) {
         profiles.apply_gobo((document, textures), &gobo, &mut light, &place, warnings)?;

@@ -2,7 +2,7 @@
 //! `extras.caustique.gobo` names.
 
 use super::document::{Document, extension, get, named};
-use super::extras::{self, GoboExtras, IesExtras, LightExtras};
+use super::extras::{self, GoboExtras, IesExtras, LightExtras, Normalize};
 use super::texture::{Textures, Use};
 use super::{fault, uri};
 use crate::error::{Error, Result};
@@ -32,15 +32,23 @@ enum Source {
     BufferView(u32),
 }
 
-/// A profile as a light has it: the relative intensity, and its largest luminous intensity (cd).
-type Shape = (Arc<Pattern>, f32);
+/// A profile as a light has it.
+#[derive(Clone)]
+struct Shape {
+    /// The relative intensity.
+    pattern: Arc<Pattern>,
+    /// The largest luminous intensity (cd).
+    peak: f32,
+    /// The flux of the profile before its angles are scaled (lm).
+    flux: f32,
+}
 
 /// The patterns of a file, each read once.
 #[derive(Clone, Default)]
 pub(super) struct Profiles {
     read: HashMap<Source, Arc<Photometry>>,
-    /// Profiles by their source, the bits of their rotation (degrees) and its sense.
-    shapes: HashMap<(Source, u32, bool), Shape>,
+    /// Profiles by their source, the bits of their rotation (degrees), its sense, and the bits of their scale.
+    shapes: HashMap<(Source, u32, bool, u32), Shape>,
     /// Pictures by their texture and the bits of their angle of view (radians).
     pictures: HashMap<(u32, u32), Arc<Pattern>>,
 }
@@ -76,8 +84,15 @@ impl Source {
 }
 
 impl Profiles {
-    fn get(&mut self, document: &Document, source: Source, turn: Turn, warnings: &mut Vec<String>) -> Result<Shape> {
-        let key = (source, turn.degrees.to_bits(), turn.clockwise);
+    /// The profile of a source. A `scale` of 0 does not change its angles.
+    fn get(
+        &mut self,
+        document: &Document,
+        source: Source,
+        (turn, scale): (Turn, f32),
+        warnings: &mut Vec<String>,
+    ) -> Result<Shape> {
+        let key = (source, turn.degrees.to_bits(), turn.clockwise, scale.to_bits());
         if let Some(known) = self.shapes.get(&key) {
             return Ok(known.clone());
         }
@@ -94,10 +109,18 @@ impl Profiles {
                 parsed
             }
         };
-        let profile = photometry.profile(turn).ok_or_else(|| {
+        let scaled = match scale {
+            0.0 => None,
+            scale => Some(photometry.scaled(scale).ok_or_else(|| {
+                fault(&name, format!("its angles times {scale} leave no light")).hint("give another angle_scale")
+            })?),
+        };
+        let used = scaled.as_ref().unwrap_or(&photometry);
+        let profile = used.profile(turn).ok_or_else(|| {
             fault(&name, "its angles are too near to each other").hint("remove one of each pair of equal angles")
         })?;
-        let shape = (Arc::new(Pattern::Profile(profile)), photometry.peak());
+        let (pattern, peak) = (Arc::new(Pattern::Profile(profile)), used.peak());
+        let shape = Shape { pattern, peak, flux: photometry.flux() as f32 };
         self.shapes.insert(key, shape.clone());
         Ok(shape)
     }
@@ -115,8 +138,8 @@ impl Profiles {
             warnings.push(format!("{place}: extras.caustique.ies has no effect on a directional light"));
             return Ok(());
         }
-        if !extras.rotation_deg.is_finite() {
-            return Err(fault(place, "extras.caustique.ies.rotation_deg must be finite"));
+        if !(extras.rotation_deg.is_finite() && extras.angle_scale.is_finite()) {
+            return Err(fault(place, "extras.caustique.ies.rotation_deg and angle_scale must be finite"));
         }
         let source = match (&extras.file, extras.buffer_view) {
             (Some(file), None) => Source::File(file.clone()),
@@ -124,10 +147,13 @@ impl Profiles {
             _ => return Err(fault(place, "extras.caustique.ies must have one of file and bufferView")),
         };
         let turn = Turn { degrees: extras.rotation_deg, clockwise: extras.clockwise };
-        let (pattern, peak) = self.get(document, source, turn, warnings).map_err(|error| error.within(place))?;
+        let shape = self.get(document, source, (turn, extras.angle_scale), warnings);
+        let Shape { pattern, peak, flux } = shape.map_err(|error| error.within(place))?;
         light.pattern = Some(pattern);
-        if !extras.normalize {
-            light.intensity *= peak;
+        match extras.normalize {
+            Normalize::Peak(true) => {}
+            Normalize::Peak(false) => light.intensity *= peak,
+            Normalize::Flux(_) => light.intensity *= peak / flux,
         }
         Ok(())
     }
@@ -256,8 +282,8 @@ pub(super) fn light(
         return Err(fault(&place, cause));
     }
     // Horizontal angles start at the X axis, and run counter-clockwise as seen from behind the light.
-    let (pattern, peak) =
-        profiles.get(document, source, Turn::default(), warnings).map_err(|error| error.within(&place))?;
+    let shape = profiles.get(document, source, (Turn::default(), 0.0), warnings);
+    let Shape { pattern, peak, .. } = shape.map_err(|error| error.within(&place))?;
     let name = Some(node.0).filter(|name| !name.is_empty()).map(str::to_owned);
     Ok(Some(PunctualLight {
         name: name.or(listed.name).unwrap_or_else(|| format!("profile {}", reference.light)),
@@ -267,6 +293,7 @@ pub(super) fn light(
         pattern: Some(pattern),
         radius,
         pass_through: false,
+        bulb: extras.bulb.unwrap_or(false),
         hidden_from_camera: extras.visible.is_some_and(|visible| !visible.camera),
         light_group: extras.light_group,
     }))
