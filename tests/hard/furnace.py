@@ -77,6 +77,24 @@ def _extended(material, name, values):
     return {**material, "extensions": {**material.get("extensions", {}), f"KHR_materials_{name}": values}}
 
 
+def _own(material, **keys):
+    """A material with these keys of the scene format."""
+    return {**material, "extras": {"caustique": keys}}
+
+
+def mirror_below(tint):
+    """A mirror below a smooth coat of this colour, faced by the camera in a white environment."""
+    coated = _own(_with(s.metal(1, 0), "clearcoat", 0.0, 1.0), coat_color=[tint] * 3)
+    return s.Scene().within(1).add(shapes.floor(1), coated).seen((0, 3, 0), (0, 0, 0), 2, (0, 0, 1))
+
+
+#: The colour of a coat.
+COAT = 0.25
+#: A white body whose surface lets all light in, with a mean free path of a tenth of its radius.
+WAX = _extended(s.diffuse(1), "diffuse_transmission", {"diffuseTransmissionFactor": 1})
+WAX = _extended(WAX, "volume", {"thicknessFactor": 1})
+WAX = _own(WAX, medium=s.medium(0, 10))
+
 CASES = [
     Case(
         "furnace-mirrors",
@@ -125,6 +143,49 @@ CASES = [
         "White paper that transmits part of the diffuse light",
         lambda r: _extended(s.plastic(1, r), "diffuse_transmission", {"diffuseTransmissionFactor": 0.4}),
         bound=0.01,
+    ),
+    _lobe(
+        "rough-diffuse",
+        "A rough diffuse base (EON) below a dielectric coat",
+        lambda r: _own(s.plastic(1, r), diffuse_roughness=1.0),
+        bound=0.01,
+        iterations=8,
+    ),
+    _lobe(
+        "fibers",
+        "White sheen of fibres over a white base",
+        lambda r: _own(_with(s.diffuse(1), "sheen", r, [1, 1, 1]), sheen_model="fibers"),
+        bound=0.015,
+        iterations=8,
+    ),
+    _lobe(
+        "coat-index",
+        "A clear coat of index 2 over white metal",
+        lambda r: _own(_with(s.metal(1, 0.5), "clearcoat", r, 1.0), coat_ior=2.0),
+        bound=0.01,
+        iterations=8,
+    ),
+    Case(
+        "furnace-wax",
+        "A body that scatters all light below its surface in a white furnace",
+        {"scene": partial(white, WAX)},
+        Value(1.0, WHITE, bound=0.005, resolves=0.1),
+        ("path", "bdpt", "vcm"),
+        iterations=32,
+    ),
+    Case(
+        "coat-tint",
+        "A tinted coat on a mirror, seen straight on in a white furnace",
+        {"scene": lambda: mirror_below(COAT)},
+        Value(
+            0.04 + 0.96 * COAT,
+            "A coat of index 1.5 reflects 0.04 and lets the rest pass to the mirror and back, tinted once.",
+            bound=0.005,
+            resolves=0.05,
+        ),
+        ("path", "bdpt", "vcm"),
+        iterations=8,
+        seeds=FEW,
     ),
     Case(
         "furnace-glass-box",

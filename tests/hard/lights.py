@@ -91,6 +91,18 @@ def pane(angle_deg):
     )
 
 
+#: A profile with 3 cd on its axis.
+PROFILE = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 1 1 2 0 0 0\n1 1 30\n0 10 45 90\n0\n3 3 2 0\n"
+#: The radius of a bulb, and the linear value of the sRGB value 188 of 255.
+BULB, GREY = 0.05, ((188 / 255 + 0.055) / 1.055) ** 2.4
+
+
+def below_a_bulb(**keys):
+    """The bulb of a spot, seen from its axis."""
+    made = s.Scene().spot((0, HEIGHT, 0), (0, -1, 0), 1.0, 40, radius=BULB, bulb=True, **keys)
+    return made.seen((0, 0, 0), (0, HEIGHT, 0), 0.5, (0, 0, 1))
+
+
 SIZES = {f"{half:g}": half for half in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)}
 POWERS = {"2^-40": -40, "2^40": 40}
 SUN = ALBEDO / pi * 3.0 * cos(radians(60))
@@ -125,6 +137,36 @@ CASES = [
         Exact("2^0", POWERS, "Light transport is linear; a power of two changes only exponents."),
         ("path", "bdpt", "vcm", "sppm", "ppm", "appm", "cppm", "bpm", "pm", "light"),
         seeds=1,
+    ),
+    Case(
+        "light-profile",
+        "A spot with a photometric profile, seen on the floor, and the bulb of it",
+        {
+            "floor": lambda: ground().spot((0, HEIGHT, 0), (0, -1, 0), 1.0, 80, ies={"profile": PROFILE}),
+            "bulb": lambda: below_a_bulb(ies={"profile": PROFILE}),
+        },
+        Values(
+            {"floor": ALBEDO / pi * 3.0 / HEIGHT**2, "bulb": 3.0 / (pi * BULB**2)},
+            "Albedo / pi times I / d² for the 3 cd along the axis; the bulb looks like a disc of radiance I / (pi r²).",
+        ),
+        ("path", "bdpt", "vcm"),
+        size=8,
+        seeds=FEW,
+    ),
+    Case(
+        "light-gobo",
+        "A spot that throws a grey picture, seen on the floor, and the bulb of it",
+        {
+            "floor": lambda: ground().spot((0, HEIGHT, 0), (0, -1, 0), 1.0, 40, gobo={"image": s.grey_png(188)}),
+            "bulb": lambda: below_a_bulb(gobo={"image": s.grey_png(188)}),
+        },
+        Values(
+            {"floor": ALBEDO / pi * GREY / HEIGHT**2, "bulb": GREY / (pi * BULB**2)},
+            "Albedo / pi times I / d², times the linear value of the picture (sRGB 188); the bulb as for a profile.",
+        ),
+        ("path", "bdpt", "vcm"),
+        size=8,
+        seeds=FEW,
     ),
     Case(
         "light-sun",

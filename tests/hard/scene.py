@@ -1,6 +1,7 @@
 """Scenes of meshes and a few materials, written as glTF with the keys of docs/scene-format.md."""
 
 import struct
+import zlib
 from dataclasses import dataclass, field, replace
 
 import glb
@@ -120,6 +121,13 @@ class Scene:
         light = {"type": "point", "color": [1, 1, 1], "intensity": intensity}
         return self._lit(light, place, (0, 0, -1), {})
 
+    def spot(self, place, direction, intensity, half_angle_deg, **keys):
+        """The scene with a spot; keys: of its `extras.caustique`. The key `ies` may hold a profile's text as `profile`, the
+        key `gobo` an image's PNG as `image`."""
+        light = {"type": "spot", "color": [1, 1, 1], "intensity": intensity}
+        light["spot"] = {"outerConeAngle": np.radians(half_angle_deg)}
+        return self._lit(light, place, direction, keys)
+
     def _lit(self, light, place, direction, keys):
         matrix = _turned(place, -np.asarray(direction, float), _across(direction))
         return replace(self, lights=(*self.lights, (light, matrix, keys)))
@@ -228,6 +236,12 @@ class _Writer:
         return self._append("nodes", {"camera": self._append("cameras", lens), "matrix": _columns(matrix)})
 
     def _light(self, light, matrix, keys):
+        keys = dict(keys)
+        if "ies" in keys:
+            keys["ies"] = {"bufferView": self._view(keys["ies"]["profile"].encode())}
+        if "gobo" in keys:
+            image = {"bufferView": self._view(keys["gobo"]["image"]), "mimeType": "image/png"}
+            keys["gobo"] = {"texture": self._append("textures", {"source": self._append("images", image)})}
         lights = self.document.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})["lights"]
         lights.append(light)
         return self._append(
@@ -249,15 +263,30 @@ class _Writer:
         part = {"attributes": attributes, "indices": indices, "material": index}
         return self._append("nodes", {"mesh": self._append("meshes", {"primitives": [part]}), **node})
 
+    def _view(self, data):
+        self.buffer += bytes(-len(self.buffer) % 4)
+        view = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": len(data)}
+        self.buffer += data
+        return self._append("bufferViews", view)
+
     def _accessor(self, values, kind, component):
         accessor = {"componentType": component, "count": len(values), "type": kind}
         if len(values):
-            view = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": values.nbytes}
-            self.buffer += values.tobytes()
-            accessor["bufferView"] = self._append("bufferViews", view)
+            accessor["bufferView"] = self._view(values.tobytes())
         if kind == "VEC3" and len(values):
             accessor.update(min=_finite(values.min(axis=0)), max=_finite(values.max(axis=0)))
         return self._append("accessors", accessor)
+
+
+def grey_png(value):
+    """A PNG of one texel, a grey of 8 bits."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", 1, 1, 8, 0, 0, 0, 0)
+    texels = zlib.compress(bytes([0, value]))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", texels) + chunk(b"IEND", b"")
 
 
 def _finite(values):
